@@ -1,0 +1,6 @@
+//! Nonsmooth multibody mechanics of a wheeled rover.
+#![forbid(unsafe_code)]
+
+pub mod cone;
+pub mod problem;
+pub mod solver;

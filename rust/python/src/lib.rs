@@ -1,0 +1,1 @@
+//! The border between rover-core and Python.
