@@ -1,0 +1,330 @@
+"""Compiled core of rover-gym: the border to the Rust mechanics (`rover-core`).
+
+SI units and radians everywhere. World frame: x forward, y up, z to the right. Wheels are always
+listed FL, FR, ML, BL, MR, BR.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, final
+
+import numpy as np
+import numpy.typing as npt
+
+type _Array = npt.NDArray[np.float64]
+type _Coordinates = Literal["report", "state"]
+
+__version__: str
+
+class RoverGymError(Exception):
+    """Root of every error that rover-gym raises. `field` names the culprit, `value` is what was given."""
+
+    field: str | None
+    value: object
+
+class ModelError(RoverGymError, ValueError):
+    """A model description is not physical or not readable."""
+
+class StateError(RoverGymError, ValueError):
+    """A state (q, velocities, snapshot) has a wrong shape or a non-finite entry."""
+
+class TerrainError(RoverGymError, ValueError):
+    """A terrain description is invalid."""
+
+class OptionError(RoverGymError, ValueError):
+    """A simulation option or an argument is out of its range."""
+
+class CommandError(RoverGymError, ValueError):
+    """A torque, set-point or action is invalid."""
+
+class ProblemError(RoverGymError, ValueError):
+    """A friction-contact problem (W, q, mu) has wrong shapes or entries."""
+
+class StepError(RoverGymError, RuntimeError):
+    """A time step could not be taken; the state is as it was before the call."""
+
+@final
+class RoverModel:
+    """A tree of solids under a free base, read from data. Immutable."""
+
+    def __new__(cls) -> RoverModel: ...
+    @staticmethod
+    def from_file(path: str | Any) -> RoverModel: ...
+    @staticmethod
+    def from_text(text: str) -> RoverModel: ...
+    @staticmethod
+    def from_dict(description: Mapping[str, Any]) -> RoverModel: ...
+    def to_file(self, path: str | Any) -> None: ...
+    def to_text(self) -> str: ...
+    def to_dict(self) -> dict[str, Any]: ...
+    def replace(
+        self,
+        *,
+        wheel_radius: float | None = None,
+        masses: Mapping[str, float] | Sequence[float] | None = None,
+        steering_stiffness: float | None = None,
+        steering_damping: float | None = None,
+        wheel_torque_limit: float | None = None,
+    ) -> RoverModel: ...
+    def weld(self, joints: Mapping[str, float] | Sequence[str]) -> RoverModel: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def nq(self) -> int: ...
+    @property
+    def nv(self) -> int: ...
+    @property
+    def mass(self) -> float: ...
+    @property
+    def dof_names(self) -> list[str]: ...
+    @property
+    def joint_names(self) -> list[str]: ...
+    @property
+    def solid_names(self) -> list[str]: ...
+    @property
+    def wheel_names(self) -> list[str]: ...
+    @property
+    def wheel_radii(self) -> _Array: ...
+    @property
+    def wheel_torque_limits(self) -> _Array: ...
+    @property
+    def wheel_joint_indices(self) -> list[int]:
+        """Index in q of each wheel's rotation (-1 where welded)."""
+    @property
+    def steering_joint_indices(self) -> list[int]:
+        """Index in q of each wheel's steering joint (-1 where there is none or it is welded)."""
+    @property
+    def steering_limit(self) -> float:
+        """Largest steering set-point, rad, either way."""
+    def mass_matrix(self, q: npt.ArrayLike, coordinates: _Coordinates = "report") -> _Array: ...
+    def bias(
+        self,
+        q: npt.ArrayLike,
+        qdot: npt.ArrayLike,
+        gravity: npt.ArrayLike = (0.0, -9.81, 0.0),
+        coordinates: _Coordinates = "report",
+    ) -> _Array: ...
+    def actuation_matrix(self) -> _Array: ...
+    def kinetic_energy(
+        self, q: npt.ArrayLike, qdot: npt.ArrayLike, coordinates: _Coordinates = "report"
+    ) -> float: ...
+    def tags(self, q: npt.ArrayLike, coordinates: _Coordinates = "report") -> dict[str, _Array]: ...
+    def poses(
+        self, q: npt.ArrayLike, coordinates: _Coordinates = "report"
+    ) -> dict[str, tuple[_Array, _Array]]:
+        """Origin (3,) and rotation matrix (3, 3) of every solid, world frame."""
+    def wheel_gaps(
+        self, q: npt.ArrayLike, terrain: Plane, coordinates: _Coordinates = "report"
+    ) -> _Array: ...
+    def wheel_contact_points(
+        self, q: npt.ArrayLike, terrain: Plane, coordinates: _Coordinates = "report"
+    ) -> _Array: ...
+    def wheel_jacobians(
+        self, q: npt.ArrayLike, terrain: Plane, coordinates: _Coordinates = "report"
+    ) -> _Array: ...
+    def to_report(self, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[_Array, _Array]:
+        """Public q and state velocity -> the report's q and qdot."""
+    def from_report(self, q: npt.ArrayLike, qdot: npt.ArrayLike) -> tuple[_Array, _Array]:
+        """The report's q and qdot -> public q and state velocity."""
+    def __reduce__(self) -> Any: ...
+
+@final
+class Plane:
+    """The half-space n.x + offset >= 0 is free; the ground is below. `normal` is normalised."""
+
+    def __new__(cls, normal: npt.ArrayLike = (0.0, 1.0, 0.0), offset: float = 0.0) -> Plane: ...
+    @property
+    def normal(self) -> _Array: ...
+    @property
+    def offset(self) -> float: ...
+    def height(self, x: float, z: float) -> float: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class StepReport:
+    """What the solver says of the steps just taken (worst over the steps of one call)."""
+
+    @property
+    def status(self) -> Literal["converged", "not_converged"]: ...
+    @property
+    def is_converged(self) -> bool: ...
+    @property
+    def steps(self) -> int: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def residual(self) -> float: ...
+    @property
+    def n_contacts(self) -> int: ...
+
+@final
+class Contacts:
+    """The contacts of the last step, as fresh arrays with one row a contact."""
+
+    @property
+    def bodies(self) -> list[str]:
+        """Name of the solid that touches."""
+    @property
+    def wheels(self) -> npt.NDArray[np.int64]:
+        """(n,) wheel index 0..5, or -1 for the trunk."""
+    @property
+    def points(self) -> _Array:
+        """(n, 3) m, world."""
+    @property
+    def frames(self) -> _Array:
+        """(n, 3, 3): rows are the unit vectors n, t, b, world."""
+    @property
+    def gaps(self) -> _Array:
+        """(n,) m, at the configuration where the step's contact was evaluated."""
+    @property
+    def impulses(self) -> _Array:
+        """(n, 3) N s, along n, t, b."""
+    @property
+    def velocities(self) -> _Array:
+        """(n, 3) m/s after the step, along n, t, b."""
+    def __len__(self) -> int: ...
+
+@final
+class Energy:
+    @property
+    def kinetic(self) -> float: ...
+    @property
+    def potential(self) -> float: ...
+    @property
+    def total(self) -> float: ...
+
+@final
+class Snapshot:
+    """Everything that a simulation needs to continue bit for bit; picklable."""
+
+    def __reduce__(self) -> Any: ...
+    def __eq__(self, other: object) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
+class Simulation:
+    def __new__(
+        cls,
+        model: RoverModel | None = None,
+        terrain: Plane | None = None,
+        *,
+        gravity: npt.ArrayLike = (0.0, -9.81, 0.0),
+        friction: float = 0.7,
+        restitution: float = 0.0,
+        time_step: float = 0.005,
+        variant: Literal["linearised", "newton"] = "linearised",
+        theta: float = 0.5,
+        forecast: float = 0.5,
+        solver: Literal["auto", "nsgs", "newton"] = "auto",
+        tolerance: float = 1e-9,
+        max_iterations: int = 1000,
+        stabilisation: Literal["projection", "none"] = "projection",
+        warm_start: bool = True,
+    ) -> Simulation: ...
+    @property
+    def model(self) -> RoverModel: ...
+    @property
+    def terrain(self) -> Plane: ...
+    @property
+    def time(self) -> float: ...
+    @property
+    def time_step(self) -> float: ...
+    @property
+    def gravity(self) -> _Array: ...
+    @property
+    def friction(self) -> float: ...
+    @property
+    def restitution(self) -> float: ...
+    @property
+    def q(self) -> _Array:
+        """(nq,) public coordinates: x, y, z, roll, heading, pitch, joints."""
+    @property
+    def v(self) -> _Array:
+        """(nv,) trunk velocity (world, m/s), angular velocity (world, rad/s), joint rates."""
+    @property
+    def rotation(self) -> _Array:
+        """(3, 3) trunk attitude R_WB."""
+    def set_state(
+        self, q: npt.ArrayLike, qdot: npt.ArrayLike | None = None, *, coordinates: _Coordinates = "state"
+    ) -> None:
+        """Sets q and velocity ("state": as `q` and `v` return them). Time goes to 0, warm start is dropped."""
+    def report_state(self) -> tuple[_Array, _Array]: ...
+    @property
+    def wheel_torques(self) -> _Array: ...
+    def set_wheel_torques(self, torques: npt.ArrayLike) -> None:
+        """(6,) N m, positive drives forward; saturates at the model's limits."""
+    @property
+    def steering(self) -> _Array: ...
+    def set_steering(self, set_points: npt.ArrayLike) -> None:
+        """(6,) rad, held by the implicit PD with the model's gains."""
+    def set_joint_torques(self, torques: npt.ArrayLike) -> None:
+        """(nv - 6,) N m about the joint axes, added to what set_wheel_torques gives; no limit."""
+    def hold(
+        self,
+        joints: str | Sequence[str],
+        set_points: npt.ArrayLike | None = None,
+        *,
+        stiffness: float | None = None,
+        damping: float | None = None,
+    ) -> None:
+        """Holds joints at set-points (default: where they are) by the implicit PD (default: the model's gains)."""
+    def release(self, joints: str | Sequence[str]) -> None: ...
+    def brake(self) -> None:
+        """Holds the six wheels where they are (`hold` on the wheel joints), and zeroes their torques."""
+    def step(self, n: int = 1) -> StepReport: ...
+    @property
+    def contacts(self) -> Contacts: ...
+    @property
+    def wheel_gaps(self) -> _Array:
+        """(6,) m at the current state."""
+    @property
+    def wheel_forces(self) -> _Array:
+        """(6, 3) N: mean contact force of the last step along n, t, b of each wheel's frame."""
+    @property
+    def trunk_force(self) -> float:
+        """N: mean normal force on trunk and beams in the last step (high-centred if large)."""
+    def energy(self) -> Energy: ...
+    def momentum(self) -> tuple[_Array, _Array]:
+        """Linear (3,) kg m/s and angular momentum about the world origin (3,) kg m2/s."""
+    def centre_of_mass(self) -> _Array: ...
+    def tags(self) -> dict[str, _Array]: ...
+    def poses(self) -> dict[str, tuple[_Array, _Array]]: ...
+    def snapshot(self) -> Snapshot: ...
+    def restore(self, snapshot: Snapshot) -> None: ...
+    def profile(self, n: int = 1000) -> dict[str, float]:
+        """Mean microseconds per step by part (kinematics, mass_matrix, factor, ...) over n steps of a copy."""
+    def __reduce__(self) -> Any: ...
+
+@final
+class SolverReport:
+    @property
+    def status(self) -> Literal["converged", "not_converged"]: ...
+    @property
+    def is_converged(self) -> bool: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def residual(self) -> float: ...
+    @property
+    def solver(self) -> str: ...
+
+@final
+class FrictionContactSolution:
+    @property
+    def impulses(self) -> _Array: ...
+    @property
+    def velocities(self) -> _Array: ...
+    @property
+    def report(self) -> SolverReport: ...
+
+def solve_friction_contact(
+    W: npt.ArrayLike,
+    q: npt.ArrayLike,
+    mu: npt.ArrayLike,
+    tolerance: float = 1e-8,
+    *,
+    dimension: Literal[2, 3] = 3,
+    solver: Literal["auto", "nsgs", "newton"] = "auto",
+    max_iterations: int = 1000,
+    initial: npt.ArrayLike | None = None,
+) -> FrictionContactSolution:
+    """Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K, for any W (n_c d, n_c d)."""
