@@ -1,6 +1,8 @@
 //! Nonsmooth multibody mechanics of a wheeled rover.
 #![forbid(unsafe_code)]
 
+pub use nalgebra;
+
 pub mod cone;
 pub mod contact;
 pub mod geometry;
