@@ -2,5 +2,6 @@
 #![forbid(unsafe_code)]
 
 pub mod cone;
+pub mod law;
 pub mod problem;
 pub mod solver;
