@@ -1,9 +1,5 @@
-"""A nonsmooth simulator of a six-wheel Mars rover, and Gymnasium environments on it.
+"""rover-gym: a nonsmooth simulator of a six-wheel Mars rover, with Gymnasium environments."""
 
-Importing the package registers `Rover-v0` with Gymnasium.
-"""
-
-from rover_gym import registration as _registration
 from rover_gym._core import (
     CommandError,
     ModelError,
@@ -13,7 +9,6 @@ from rover_gym._core import (
     RoverGymError,
     RoverModel,
     Simulation,
-    Snapshot,
     StateError,
     StepError,
     TerrainError,
@@ -22,6 +17,9 @@ from rover_gym._core import (
 )
 from rover_gym.env import RoverEnv
 from rover_gym.policy import PDPolicy
+from rover_gym.registration import register_environments
+
+register_environments()
 
 __all__ = [
     "CommandError",
@@ -34,12 +32,9 @@ __all__ = [
     "RoverGymError",
     "RoverModel",
     "Simulation",
-    "Snapshot",
     "StateError",
     "StepError",
     "TerrainError",
     "__version__",
     "solve_friction_contact",
 ]
-
-_registration.register()
