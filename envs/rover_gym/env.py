@@ -244,9 +244,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             goal_bearing=_radians(span("goal_bearing_deg", goal_bearing_deg)),
         )
         self.goal_tolerance = number("goal_tolerance", goal_tolerance, above=0.0)
-        self._cos_max_tilt = math.cos(
-            math.radians(number("max_tilt_deg", max_tilt_deg, above=0.0, at_most=180.0))
-        )
+        self._cos_max_tilt = math.cos(math.radians(number("max_tilt_deg", max_tilt_deg, above=0.0, at_most=180.0)))
         self._stuck_limit = number("stuck_time", stuck_time, above=0.0)
         self.gravity = vector("gravity", gravity, 3)
         magnitude = math.hypot(*self.gravity)
@@ -499,9 +497,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         if "q" in given:
             for name in ("position", "heading_deg"):
                 if name in given:
-                    refuse(
-                        OptionError, f"options.{name}", given[name], "must not come with q, which holds it"
-                    )
+                    refuse(OptionError, f"options.{name}", given[name], "must not come with q, which holds it")
             q = np.array(vector("options.q", given["q"], self.model.nq, error=StateError))
             fixed["position"], fixed["heading"] = (float(q[0]), float(q[2])), float(q[4])
             if "v" in given:

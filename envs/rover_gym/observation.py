@@ -71,9 +71,7 @@ class ObservationLayout(Mapping[str, slice]):
 
     def __repr__(self) -> str:
         rows = (
-            f"{f.name}[{f.start}:{f.start + f.size}] {f.unit}"
-            if f.unit
-            else f"{f.name}[{f.start}:{f.start + f.size}]"
+            f"{f.name}[{f.start}:{f.start + f.size}] {f.unit}" if f.unit else f"{f.name}[{f.start}:{f.start + f.size}]"
             for f in self.fields
         )
         return f"ObservationLayout({', '.join(rows)})"

@@ -45,9 +45,7 @@ def number(
     return result
 
 
-def vector(
-    field: str, value: object, size: int, *, error: type[RoverGymError] = OptionError
-) -> tuple[float, ...]:
+def vector(field: str, value: object, size: int, *, error: type[RoverGymError] = OptionError) -> tuple[float, ...]:
     """`size` finite numbers, as a tuple of floats."""
     entries = _entries(value)
     if entries is None or len(entries) != size:
@@ -89,9 +87,7 @@ def known_keys(field: str, value: Iterable[str], known: Iterable[str]) -> None:
 
 def _is_number(value: object) -> bool:
     # Covers int, float and numpy scalars, not strings, arrays or None.
-    return (
-        not isinstance(value, (str, bytes)) and hasattr(value, "__float__") and not hasattr(value, "__len__")
-    )
+    return not isinstance(value, (str, bytes)) and hasattr(value, "__float__") and not hasattr(value, "__len__")
 
 
 def _entries(value: object) -> list[object] | None:
