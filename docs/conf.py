@@ -3,10 +3,11 @@
 import inspect
 from pathlib import Path
 
-from rover_gym import RoverEnv, __version__
-from rover_gym.cli import app as rover
 from sphinx.application import Sphinx
 from typer.testing import CliRunner
+
+from rover_gym import RoverEnv, __version__
+from rover_gym.cli import app as rover
 
 HERE = Path(__file__).parent
 GENERATED = HERE / "_generated"
