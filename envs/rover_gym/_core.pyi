@@ -5,13 +5,13 @@ listed FL, FR, ML, BL, MR, BR.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, final
+from typing import Any, Literal, TypeAlias, final
 
 import numpy as np
 import numpy.typing as npt
 
-type _Array = npt.NDArray[np.float64]
-type _Coordinates = Literal["report", "state"]
+_Array: TypeAlias = npt.NDArray[np.float64]
+_Coordinates: TypeAlias = Literal["report", "state"]
 
 __version__: str
 
@@ -104,23 +104,15 @@ class RoverModel:
         coordinates: _Coordinates = "report",
     ) -> _Array: ...
     def actuation_matrix(self) -> _Array: ...
-    def kinetic_energy(
-        self, q: npt.ArrayLike, qdot: npt.ArrayLike, coordinates: _Coordinates = "report"
-    ) -> float: ...
+    def kinetic_energy(self, q: npt.ArrayLike, qdot: npt.ArrayLike, coordinates: _Coordinates = "report") -> float: ...
     def tags(self, q: npt.ArrayLike, coordinates: _Coordinates = "report") -> dict[str, _Array]: ...
-    def poses(
-        self, q: npt.ArrayLike, coordinates: _Coordinates = "report"
-    ) -> dict[str, tuple[_Array, _Array]]:
+    def poses(self, q: npt.ArrayLike, coordinates: _Coordinates = "report") -> dict[str, tuple[_Array, _Array]]:
         """Origin (3,) and rotation matrix (3, 3) of every solid, world frame."""
-    def wheel_gaps(
-        self, q: npt.ArrayLike, terrain: Plane, coordinates: _Coordinates = "report"
-    ) -> _Array: ...
+    def wheel_gaps(self, q: npt.ArrayLike, terrain: Plane, coordinates: _Coordinates = "report") -> _Array: ...
     def wheel_contact_points(
         self, q: npt.ArrayLike, terrain: Plane, coordinates: _Coordinates = "report"
     ) -> _Array: ...
-    def wheel_jacobians(
-        self, q: npt.ArrayLike, terrain: Plane, coordinates: _Coordinates = "report"
-    ) -> _Array: ...
+    def wheel_jacobians(self, q: npt.ArrayLike, terrain: Plane, coordinates: _Coordinates = "report") -> _Array: ...
     def to_report(self, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[_Array, _Array]:
         """Public q and state velocity -> the report's q and qdot."""
     def from_report(self, q: npt.ArrayLike, qdot: npt.ArrayLike) -> tuple[_Array, _Array]:

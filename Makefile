@@ -1,0 +1,86 @@
+# Every target has one line after '##'; plain `make` prints them.
+SHELL := bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+
+PYTHON ?= python3# the interpreter that makes the virtual environment: 3.11 or newer
+VENV   ?= .venv
+
+BIN    := $(VENV)/bin
+STAMPS := $(VENV)/stamps# in the environment, so that both go together
+UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
+
+export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
+export PYTHONDONTWRITEBYTECODE := 1
+
+.PHONY: help demo test check lint types format test-rust test-python docs bench pins clean
+
+help: ## list the targets (this list)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: $(STAMPS)/demo $(STAMPS)/core ## set up, drive Rover-v0 to a goal, redraw the report's section 6.1 under runs/
+	$(BIN)/rover drive --output runs/drive
+	$(BIN)/rover report --figures --output runs/report
+
+test: check test-rust docs test-python ## set up and run every check and every test (what .ci/run calls)
+
+check: lint types ## lint and type checks, Rust and Python: what the commit hooks call
+
+lint: $(STAMPS)/test ## formatting and lint, Rust and Python
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets --locked --quiet -- -D warnings
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+
+types: $(STAMPS)/test $(STAMPS)/core ## mypy, and the stub against the compiled module
+	$(BIN)/mypy
+	MYPYPATH=envs $(BIN)/stubtest rover_gym._core
+
+format: $(STAMPS)/test ## rewrite the sources as the linters want them
+	cargo fmt --all
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+test-rust: ## the Rust tests only
+	cargo test --locked --quiet
+
+test-python: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core ## the Python tests only
+	$(BIN)/pytest --numprocesses auto
+
+docs: $(STAMPS)/test $(STAMPS)/core ## build the documentation, Rust and Python, warnings denied
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --quiet
+	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going docs docs/_build/html
+	@echo "docs/_build/html/index.html"
+	@echo "target/doc/rover_core/index.html"
+
+bench: ## time a step and tell where the time goes (informs, does not gate)
+	cargo bench --locked
+
+pins: $(STAMPS)/venv ## resolve requirements/*.txt anew from pyproject.toml
+	$(call pin,demo) --extra demo --group build
+	$(call pin,test) --extra test --extra docs --group build --group lint --constraint requirements/demo.txt
+	$(call pin,train) --extra train --constraint requirements/test.txt
+
+clean: ## remove everything that make made, but for runs/
+	rm -rf $(VENV) target docs/_build envs/rover_gym/_core*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis
+
+# One list for every Python from 3.11 on, versions only.
+pin = $(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --no-annotate \
+	--custom-compile-command "make pins" --output-file requirements/$(1).txt pyproject.toml
+
+# pip fetches uv, and uv, which is several times faster, the rest.
+$(STAMPS)/venv: requirements/demo.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "rover-gym needs Python 3.11 or newer; say which with make PYTHON=...")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check "$$(grep '^uv==' $<)"
+	@mkdir -p $(@D) && touch $@
+
+$(STAMPS)/demo $(STAMPS)/test $(STAMPS)/train: $(STAMPS)/%: requirements/%.txt $(STAMPS)/venv
+	$(UV) --requirement $<
+	@touch $@
+
+# The compiled core, in release mode, and the package itself, editable.
+$(STAMPS)/core: pyproject.toml Cargo.toml Cargo.lock $(shell find rust -type f) | $(STAMPS)/demo
+	$(BIN)/python -m maturin develop --release --uv --quiet
+	@touch $@

@@ -1,0 +1,40 @@
+"""rover-gym: a nonsmooth simulator of a six-wheel Mars rover, with Gymnasium environments."""
+
+from rover_gym._core import (
+    CommandError,
+    ModelError,
+    OptionError,
+    Plane,
+    ProblemError,
+    RoverGymError,
+    RoverModel,
+    Simulation,
+    StateError,
+    StepError,
+    TerrainError,
+    __version__,
+    solve_friction_contact,
+)
+from rover_gym.env import RoverEnv
+from rover_gym.policy import PDPolicy
+from rover_gym.registration import register_environments
+
+register_environments()
+
+__all__ = [
+    "CommandError",
+    "ModelError",
+    "OptionError",
+    "PDPolicy",
+    "Plane",
+    "ProblemError",
+    "RoverEnv",
+    "RoverGymError",
+    "RoverModel",
+    "Simulation",
+    "StateError",
+    "StepError",
+    "TerrainError",
+    "__version__",
+    "solve_friction_contact",
+]

@@ -1,0 +1,154 @@
+"""The observation: one flat float32 vector with a named layout.
+
+    observation = value / scale
+
+with a fixed scale per entry, so that a driving rover gives entries of order one. Nothing is ever
+clipped: an entry outside its usual range is shown as it is, and a non-finite one ends the episode.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym._core import RoverModel, StateError
+from rover_gym.validation import refuse
+
+N_WHEELS = 6
+N_ACTIONS = 12
+
+#: A wheel touches when its gap is at most this, m. Resting wheels show gaps below a micrometre.
+CONTACT_GAP = 1e-3
+
+# Scales of one entry each; the forces are measured in mean wheel loads, m g / 6.
+GAP_SCALE = 0.1
+WHEEL_RATE_SCALE = 10.0
+GOAL_SCALE = 10.0
+
+_LARGEST = float(np.finfo(np.float32).max)
+
+
+@dataclass(frozen=True)
+class ObservationField:
+    """One named stretch of the observation. `low` and `high` bound the scaled entries."""
+
+    name: str
+    start: int
+    size: int
+    unit: str
+    scale: tuple[float, ...]
+    low: float
+    high: float
+    meaning: str
+
+    @property
+    def slice(self) -> slice:
+        """Where the field lies in the observation."""
+        return slice(self.start, self.start + self.size)
+
+
+class ObservationLayout(Mapping[str, slice]):
+    """Maps the name of a field to its slice of the observation; immutable.
+
+    `layout.fields` holds unit, scale and meaning, `layout.split(observation)` gives the values back
+    in SI units, for one observation `(size,)` or a batch `(n, size)`.
+    """
+
+    def __init__(self, fields: tuple[ObservationField, ...]) -> None:
+        self.fields = fields
+        self.size = sum(field.size for field in fields)
+        self._by_name = {field.name: field for field in fields}
+
+    def __getitem__(self, name: str) -> slice:
+        return self._by_name[name].slice
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._by_name)
+
+    def __len__(self) -> int:
+        return len(self.fields)
+
+    def __repr__(self) -> str:
+        rows = (
+            f"{f.name}[{f.start}:{f.start + f.size}] {f.unit}" if f.unit else f"{f.name}[{f.start}:{f.start + f.size}]"
+            for f in self.fields
+        )
+        return f"ObservationLayout({', '.join(rows)})"
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each field's values, "" where there is none."""
+        return {field.name: field.unit for field in self.fields}
+
+    @property
+    def scale(self) -> npt.NDArray[np.float64]:
+        """(size,) what one unit of each entry stands for."""
+        return np.concatenate([np.asarray(field.scale) for field in self.fields])
+
+    @property
+    def low(self) -> npt.NDArray[np.float32]:
+        """(size,) lower bounds of the observation space."""
+        return np.repeat([f.low for f in self.fields], [f.size for f in self.fields]).astype(np.float32)
+
+    @property
+    def high(self) -> npt.NDArray[np.float32]:
+        """(size,) upper bounds of the observation space."""
+        return np.repeat([f.high for f in self.fields], [f.size for f in self.fields]).astype(np.float32)
+
+    def split(self, observation: npt.ArrayLike) -> dict[str, npt.NDArray[np.float64]]:
+        """The fields' values in SI units, as fresh arrays `(..., field size)`.
+
+        Raises:
+            StateError: The last axis does not have the layout's size.
+        """
+        given = np.asarray(observation, dtype=np.float64)
+        if given.ndim == 0 or given.shape[-1] != self.size:
+            refuse(StateError, "observation", given.shape, f"must have {self.size} entries on its last axis")
+        values = given * self.scale
+        return {field.name: values[..., field.slice].copy() for field in self.fields}
+
+
+def build_layout(model: RoverModel, gravity_magnitude: float) -> ObservationLayout:
+    """The layout of `Rover-v0` for a model under a gravity of so many m/s2."""
+    nq, nv = model.nq, model.nv
+    wheel_load = model.mass * gravity_magnitude / N_WHEELS
+
+    # The trunk's six velocities come first, then the joints in the order of q.
+    velocity_scale = [1.0] * nv
+    for index in model.wheel_joint_indices:
+        velocity_scale[index] = WHEEL_RATE_SCALE
+
+    fields: list[ObservationField] = []
+
+    def add(
+        name: str,
+        size: int,
+        unit: str,
+        scale: float | list[float],
+        meaning: str,
+        low: float = -_LARGEST,
+        high: float = _LARGEST,
+    ) -> None:
+        start = fields[-1].start + fields[-1].size if fields else 0
+        scales = tuple(scale) if isinstance(scale, list) else (scale,) * size
+        fields.append(ObservationField(name, start, size, unit, scales, low, high, meaning))
+
+    add("q", nq, "m, rad", 1.0, "trunk x, y, z; roll, heading, pitch; joint angles, wheels within one turn")
+    add("velocity", nv, "m/s, rad/s", velocity_scale, "trunk linear, angular (trunk frame); joint rates")
+    add("wheel_gap", N_WHEELS, "m", GAP_SCALE, "distance of each wheel to the ground")
+    add("wheel_contact", N_WHEELS, "", 1.0, "1 where the gap is at most 1 mm, else 0", 0.0, 1.0)
+    add("normal_force", N_WHEELS, "N", wheel_load, "ground on wheel, along the ground's normal")
+    add(
+        "tangential_force",
+        2 * N_WHEELS,
+        "N",
+        wheel_load,
+        "ground on wheel, rolling and lateral, wheel by wheel",
+    )
+    add("ground_normal", 3, "", 1.0, "ground's normal in the trunk frame", -1.0, 1.0)
+    add("goal", 2, "m", GOAL_SCALE, "goal forward and to the right of the trunk, horizontal")
+    add("goal_distance", 1, "m", GOAL_SCALE, "horizontal distance to the goal", 0.0)
+    add("previous_action", N_ACTIONS, "", 1.0, "the action before this observation, 0 at reset", -1.0, 1.0)
+    add("stuck", 1, "", 1.0, "fraction of the time to high-centring", 0.0, 1.0)
+    return ObservationLayout(tuple(fields))

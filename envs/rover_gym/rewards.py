@@ -1,0 +1,68 @@
+"""The terms of the reward of `Rover-v0`, one function a term.
+
+The reward of a step is the sum of the terms; each term is its weight times a quantity of that step,
+with the weight's sign telling reward from cost. `dt` is the control period in seconds.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+#: Default weights. With them a 7 m drive on flat ground earns about 15: 7 for the way, 10 at the goal.
+WEIGHTS: Mapping[str, float] = MappingProxyType(
+    {
+        "progress": 1.0,
+        "time": -0.05,
+        "energy": -5e-5,
+        "slip": -0.1,
+        "tilt": -0.1,
+        "torque_change": -0.02,
+        "steering_change": -0.02,
+        "success": 10.0,
+        "failure": -10.0,
+    }
+)
+
+
+def progress(weight: float, previous_distance: float, distance: float) -> float:
+    """`w (d_before - d_after)`: metres gained on the goal."""
+    return weight * (previous_distance - distance)
+
+
+def time(weight: float, dt: float) -> float:
+    """`w dt`: seconds spent."""
+    return weight * dt
+
+
+def energy(weight: float, work: float) -> float:
+    """`w sum_i |tau_i dphi_i|`: joules through the six wheel motors, driving or braking."""
+    return weight * work
+
+
+def slip(weight: float, slip_ratio: float, dt: float) -> float:
+    """`w s dt`: mean slip ratio of the wheels in contact, for as long as it lasts."""
+    return weight * slip_ratio * dt
+
+
+def tilt(weight: float, cos_tilt: float, dt: float) -> float:
+    """`w (1 - cos tilt) dt`: the trunk's lean from the vertical."""
+    return weight * (1.0 - cos_tilt) * dt
+
+
+def torque_change(weight: float, squared_change: float) -> float:
+    """`w sum_i (a_i - a_i,before)^2 / 6` over the six wheel torques."""
+    return weight * squared_change / 6.0
+
+
+def steering_change(weight: float, squared_change: float) -> float:
+    """`w sum_i (a_i - a_i,before)^2 / 6` over the six steering set-points."""
+    return weight * squared_change / 6.0
+
+
+def success(weight: float, reached: bool) -> float:
+    """`w` on the step that reaches the goal."""
+    return weight if reached else 0.0
+
+
+def failure(weight: float, failed: bool) -> float:
+    """`w` on the step that ends in a roll-over, a high-centring or a step that could not be taken."""
+    return weight if failed else 0.0
