@@ -332,7 +332,7 @@ impl Simulation {
 
     #[getter]
     fn contacts(&self) -> Contacts {
-        Contacts::new(self.model_ref(), self.inner.contacts(), self.inner.state().configuration.position)
+        Contacts::new(self.model_ref(), self.inner.contacts())
     }
 
     #[getter]

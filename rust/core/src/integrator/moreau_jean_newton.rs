@@ -4,7 +4,7 @@
 //! about a point fixed in the world, d'Alembert's principle over the step reads, for every velocity k with screw S_k(q_m),
 //!
 //! ```text
-//! Σ_{i moved by k} S_k · (ΔP_i − h m_i g, ΔL_i − h c̄_i × m_i g) = h τ_k + (H(q_m) p)_k
+//! Σ_{i moved by k} S_k · (ΔP_i − h m_i g, ΔL_i − h c̄_i × m_i g) = h τ_k + (H(q⁺) p + r)_k
 //! ```
 //!
 //! Momenta at both ends are evaluated exactly, so no bias is needed and, summed over the base's six screws, total linear and
@@ -12,13 +12,16 @@
 //! any step. For θ = ½ the scheme is symmetric and of order 2. The iteration uses M̂(q_m) as its matrix, which
 //! differs from the true Jacobian by O(h) and converges by that factor.
 //!
-//! Source: the discrete d'Alembert principle, as in Simo, Wong 1991 for one body; contacts as in [`super::moreau_jean`].
+//! Source: the discrete d'Alembert principle, as in Simo, Wong 1991 for one body; contacts and the
+//! correction r as in [`super::moreau_jean`].
 
 use nalgebra::Vector3;
 
 use super::command::Command;
 use super::error::StepError;
-use super::moreau_jean::{activation, add_command, factorise, finish, set_held_theta, solve_contacts};
+use super::moreau_jean::{
+    activation, add_command, add_correction, assemble_contacts, factorise, finish, set_held_theta, solve_contacts,
+};
 use super::probe::{Phase, Probe};
 use super::report::{StepReport, StepStatus};
 use super::workspace::{WarmStart, Workspace};
@@ -60,8 +63,8 @@ impl Integrator for MoreauJeanNewton {
             ws.kinematics_end.update(model, &ws.end);
             probe.end(Phase::Kinematics);
             if iteration == 0 {
-                let activation = activation(model, options, &state.v, theta * h);
-                detect(model, &ws.kinematics, terrain, &state.v, &activation, &mut ws.contacts);
+                let activation = activation(model, options, &state.v, h);
+                detect(model, &ws.kinematics_end, terrain, &state.v, &activation, &mut ws.contacts);
             } else {
                 place_again(scene, &state.v, ws);
             }
@@ -75,7 +78,14 @@ impl Integrator for MoreauJeanNewton {
             factorise(model, options, command, ws).ok_or(StepError::SingularMassMatrix { time: state.time })?;
             ws.factor.half_solve(model, &mut ws.y);
             probe.end(Phase::Factor);
-            let solved = solve_contacts(scene, &state.v, warm_start, ws, iteration == 0, probe);
+            assemble_contacts(scene, &state.v, warm_start, ws);
+            add_correction(scene, warm_start, ws);
+            if iteration > 0 {
+                ws.p.copy_from_slice(&ws.p_last);
+            }
+            probe.end(Phase::Delassus);
+            let solved = solve_contacts(scene, ws, probe);
+            ws.p_last.clone_from(&ws.p);
             report.iterations += solved.iterations;
             report.residual = solved.residual;
             report.n_contacts = solved.n_contacts;
@@ -96,19 +106,17 @@ impl Integrator for MoreauJeanNewton {
             *mean = theta * end + (1.0 - theta) * begin;
         }
         ws.end.set_moved(&state.configuration, &ws.v_mean, h);
+        // The contacts were measured at the end of the last iterate, which is the end of the step.
         ws.gap_end.clear();
-        let local = ws.u.chunks_exact(3).zip(ws.u_before.chunks_exact(3));
-        ws.gap_end.extend(ws.contacts.iter().zip(local).map(|(contact, (u, before))| {
-            contact.gap + (1.0 - theta) * h * (theta * u[0] + (1.0 - theta) * before[0])
-        }));
+        ws.gap_end.extend(ws.contacts.iter().map(|contact| contact.gap));
         finish(scene, state, warm_start, ws, report, probe)
     }
 }
 
-/// Finds the same contacts again at the new midpoint: the set of a step is decided once, by the forecast.
+/// Finds the same contacts again at the new end: the set of a step is decided once, by the forecast.
 fn place_again(scene: &Scene<'_>, v: &[f64], ws: &mut Workspace) {
     let anywhere = crate::contact::Activation { lead: 0.0, hover: f64::MAX, slow: f64::MAX, margin: f64::MAX };
-    detect(scene.model, &ws.kinematics, scene.terrain, v, &anywhere, &mut ws.found);
+    detect(scene.model, &ws.kinematics_end, scene.terrain, v, &anywhere, &mut ws.found);
     for contact in &mut ws.contacts {
         if let Some(moved) = ws.found.iter().find(|c| c.key == contact.key) {
             *contact = *moved;

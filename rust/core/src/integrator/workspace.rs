@@ -13,13 +13,16 @@ use crate::solver::SolverWorkspace;
 pub struct WarmStart {
     /// (key, impulse along n, t, b in N s), in the order of detection.
     pub impulses: Vec<(ContactKey, [f64; 3])>,
+    /// Generalized impulse of persistent contact in the last step (nv), N s and N m s; empty where a contact was new,
+    /// left, or struck.
+    pub persistent: Vec<f64>,
 }
 
 impl WarmStart {
     /// Room for what a model can touch a plane with.
     #[must_use]
     pub fn with_capacity(model: &Model) -> Self {
-        Self { impulses: Vec::with_capacity(contact_capacity(model)) }
+        Self { impulses: Vec::with_capacity(contact_capacity(model)), persistent: Vec::with_capacity(model.nv()) }
     }
 
     /// Fills `p` (3 n_c) with what is remembered of these contacts, zero for new ones.
@@ -30,6 +33,12 @@ impl WarmStart {
             let found = same.or_else(|| self.impulses.iter().find(|(key, _)| *key == contact.key));
             out.copy_from_slice(&found.map_or([0.0; 3], |(_, p)| *p));
         }
+    }
+
+    /// Whether the last step had exactly these contacts.
+    #[must_use]
+    pub fn is_of(&self, contacts: &[Contact]) -> bool {
+        self.impulses.len() == contacts.len() && self.impulses.iter().zip(contacts).all(|((key, _), c)| *key == c.key)
     }
 
     /// Remembers the impulses `p` (3 n_c).
@@ -44,6 +53,8 @@ impl WarmStart {
 pub struct ActiveContact {
     /// Point, frame and gap where the step evaluated them.
     pub contact: Contact,
+    /// The contact's point, world, m.
+    pub position: Vector3<f64>,
     /// Impulse along n, t, b, N s.
     pub impulse: [f64; 3],
     /// Local velocity after the step along n, t, b, m/s.
@@ -67,6 +78,7 @@ pub struct Workspace {
     pub(super) theta_held: Vec<f64>,
     pub(super) force: Vec<f64>,
     pub(super) y: Vec<f64>,
+    pub(super) correction: Vec<f64>,
     pub(super) v: Vec<f64>,
     pub(super) v_mean: Vec<f64>,
     pub(super) contacts: Vec<Contact>,
@@ -75,6 +87,7 @@ pub struct Workspace {
     pub(super) q_free: Vec<f64>,
     pub(super) mu: Vec<f64>,
     pub(super) p: Vec<f64>,
+    pub(super) p_last: Vec<f64>,
     pub(super) u: Vec<f64>,
     pub(super) u_before: Vec<f64>,
     pub(super) gap_end: Vec<f64>,
@@ -106,6 +119,7 @@ impl Workspace {
             theta_held: vec![0.0; model.n_joints()],
             force: vec![0.0; nv],
             y: vec![0.0; nv],
+            correction: vec![0.0; nv],
             v: vec![0.0; nv],
             v_mean: vec![0.0; nv],
             contacts: Vec::with_capacity(n),
@@ -114,6 +128,7 @@ impl Workspace {
             q_free: room(),
             mu: Vec::with_capacity(n),
             p: room(),
+            p_last: room(),
             u: room(),
             u_before: room(),
             gap_end: Vec::with_capacity(n),

@@ -110,6 +110,7 @@ impl Simulation {
         assert_eq!(v.len(), self.model.nv(), "invariant: a velocity of this model");
         self.state = State { configuration, v, time: 0.0 };
         self.warm_start.impulses.clear();
+        self.warm_start.persistent.clear();
         self.active.clear();
     }
 
@@ -379,6 +380,8 @@ impl Simulation {
             && [&command.torque, &snapshot.joint_torque].iter().all(|t| t.len() == expected)
             && command.held.len() == expected
             && torques.copied().chain(held).all(f64::is_finite)
+            && [0, self.model.nv()].contains(&snapshot.warm_start.persistent.len())
+            && snapshot.warm_start.persistent.iter().all(|x| x.is_finite())
             && snapshot.warm_start.impulses.iter().all(|(_, p)| p.iter().all(|x| x.is_finite()))
             && snapshot.active.iter().all(|a| match a.contact.part {
                 Part::Wheel(i) => i < self.model.wheels().len(),
