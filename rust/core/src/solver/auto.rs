@@ -1,9 +1,11 @@
 //! The choice of method, and what all methods share: prepared scales, the acceptance test, the final report.
 
+use super::modes::Proximal;
 use super::nsgs::Budget;
 use super::report::{SolveReport, SolveStatus};
 use super::workspace::SolverWorkspace;
 use super::{Method, SolverOptions, newton, nsgs, proximal};
+use crate::law::coulomb::natural_map;
 use crate::problem::{
     FrictionContactProblem, Residual, contact_scale, evaluate_contact, evaluate_into,
 };
@@ -108,6 +110,28 @@ impl<'a> Prepared<'a> {
         } else {
             Residual::UNSOLVED
         }
+    }
+
+    /// Squared natural map of the regularised problem (`W + α I`, `q − α c`) at `(p, u)`, `u = W p + q`, in (N s)².
+    pub fn merit<const D: usize>(
+        &self,
+        rho: &[f64],
+        prox: Proximal<'_>,
+        p: &[f64],
+        u: &[f64],
+    ) -> f64 {
+        let mut sum = 0.0;
+        for (i, (&mu, &rho)) in self.mu.iter().zip(rho).enumerate() {
+            let p_i: [f64; D] = std::array::from_fn(|k| p[D * i + k]);
+            let u_hat = std::array::from_fn(|k| {
+                u[D * i + k] + prox.alpha * (p_i[k] - prox.centre[D * i + k])
+            });
+            sum += natural_map(&p_i, &u_hat, mu, rho)
+                .iter()
+                .map(|x| x * x)
+                .sum::<f64>();
+        }
+        sum
     }
 
     /// Whether both tolerances hold.

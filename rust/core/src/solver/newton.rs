@@ -25,6 +25,13 @@ const REUSE_CONTRACTION: f64 = 0.02;
 /// A regularised step with settled modes should gain at least this much, or `α` hides what is left.
 const SLOW: f64 = 0.1;
 
+/// Relative natural map at which a proximal step counts as solved: its error is amplified by `1/α` in the directions that `W`
+/// cannot see.
+const SOLVED: f64 = 1e-15;
+
+/// Settled steps after which the centre moves even so.
+const PATIENCE: usize = 4;
+
 /// Full Newton steps from `p`; in steady motion two or three of them solve the step.
 ///
 /// The proximal centre stays at the start until the modes settle and follows the iterate then, so that the last steps refine what the
@@ -107,7 +114,14 @@ pub(super) fn full_steps<const D: usize>(
             }
         } else {
             settled += 1;
-            workspace.centre.copy_from_slice(p);
+            // After a change of modes the centre waits for the answer of its own proximal step, or the transient would stay in
+            // the impulses that W cannot see. The modes of the warm start need no such care.
+            if !exact || settled > PATIENCE || {
+                let merit = data.merit::<D>(&workspace.rho, prox, p, u).sqrt() * data.inverse_data;
+                merit <= SOLVED
+            } {
+                workspace.centre.copy_from_slice(p);
+            }
         }
         if settled > 1 && progress > SLOW && factors != Factors::None {
             if factors == Factors::Symmetric && allow_symmetric {
