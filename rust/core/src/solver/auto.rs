@@ -6,9 +6,7 @@ use super::report::{SolveReport, SolveStatus};
 use super::workspace::SolverWorkspace;
 use super::{Method, SolverOptions, newton, nsgs, proximal};
 use crate::law::coulomb::natural_map;
-use crate::problem::{
-    FrictionContactProblem, Residual, contact_scale, evaluate_contact, evaluate_into,
-};
+use crate::problem::{FrictionContactProblem, Residual, contact_scale, evaluate_contact};
 
 /// The problem's slices and the scales derived from them.
 #[derive(Clone, Copy, Debug)]
@@ -171,17 +169,16 @@ pub(super) fn solve_in<const D: usize>(
     let data = Prepared::new::<D>(problem, workspace);
     let mut iterations = 0;
     let (method, status, residual) = run::<D>(&data, options, p, u, workspace, &mut iterations);
-    if status == SolveStatus::NonFinite || !residual.is_finite() {
+    // An infinite velocity can hide from the natural map of an open contact.
+    let is_finite = residual.is_finite() && p.iter().chain(u.iter()).all(|x| x.is_finite());
+    if status == SolveStatus::NonFinite || !is_finite {
         p.fill(0.0);
-        let from_rest = evaluate_into(problem, p, u);
-        if !from_rest.is_finite() || u.iter().any(|x| !x.is_finite()) {
-            u.fill(0.0);
-        }
+        u.fill(0.0);
         return SolveReport {
             status: SolveStatus::NonFinite,
             iterations,
-            residual: from_rest.relative,
-            velocity_error: from_rest.velocity,
+            residual: f64::INFINITY,
+            velocity_error: f64::INFINITY,
             method,
         };
     }

@@ -9,7 +9,7 @@
 //! problem when backtracking fails.
 
 use super::modes::{self, Proximal};
-use super::reduced_system::{self, Factors};
+use super::reduced_system::{self, Factors, System};
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
 use super::{SolverOptions, auto::Prepared, nsgs};
@@ -62,16 +62,13 @@ fn inner<const D: usize>(
         *iterations += 1;
         let mut accepted = false;
         if factors != Factors::None || prediction.m == 0 {
-            reduced_system::newton_point::<D>(
-                data,
+            let system = System {
                 alpha,
-                prediction.m,
+                m: prediction.m,
                 factors,
-                false,
-                p,
-                u,
-                workspace,
-            );
+                on_cone: false,
+            };
+            reduced_system::newton_point::<D>(data, system, p, u, workspace);
             for ((d, t), x) in workspace
                 .direction
                 .iter_mut()
