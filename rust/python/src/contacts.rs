@@ -21,10 +21,17 @@ impl Contacts {
             Part::Wheel(i) => model.description().wheels[i].solid.clone(),
             Part::Box(i) => model.boxes()[i].name.clone(),
         };
-        Self { active: active.to_vec(), bodies: active.iter().map(name).collect() }
+        Self {
+            active: active.to_vec(),
+            bodies: active.iter().map(name).collect(),
+        }
     }
 
-    fn rows<'py>(&self, py: Python<'py>, f: impl Fn(&ActiveContact) -> [f64; 3]) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn rows<'py>(
+        &self,
+        py: Python<'py>,
+        f: impl Fn(&ActiveContact) -> [f64; 3],
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         fresh_rows(py, &self.active.iter().map(f).collect::<Vec<_>>())
     }
 }
@@ -52,7 +59,12 @@ impl Contacts {
 
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let values = self.active.iter().flat_map(|a| a.contact.frame.rows().map(<[f64; 3]>::from)).flatten().collect();
+        let values = self
+            .active
+            .iter()
+            .flat_map(|a| a.contact.frame.rows().map(<[f64; 3]>::from))
+            .flatten()
+            .collect();
         fresh_blocks(py, values, [self.active.len(), 3, 3])
     }
 

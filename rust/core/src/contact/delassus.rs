@@ -115,7 +115,13 @@ impl ContactSystem {
 }
 
 /// `out = H p` (nv): generalized impulse, N s and N m s, of the impulses `p` (3 n_c) at the contacts.
-pub fn generalized_impulse(model: &Model, kinematics: &Kinematics, contacts: &[Contact], p: &[f64], out: &mut [f64]) {
+pub fn generalized_impulse(
+    model: &Model,
+    kinematics: &Kinematics,
+    contacts: &[Contact],
+    p: &[f64],
+    out: &mut [f64],
+) {
     out.fill(0.0);
     for (contact, p) in contacts.iter().zip(p.chunks_exact(3)) {
         let [n, t, b] = contact.frame.rows();
@@ -135,5 +141,8 @@ pub fn generalized_impulse(model: &Model, kinematics: &Kinematics, contacts: &[C
 #[inline]
 fn path_dot(path: &[usize], row: &[f64], v: &[f64]) -> f64 {
     let base: f64 = row[..6].iter().zip(&v[..6]).map(|(a, b)| a * b).sum();
-    row[6..].iter().zip(&path[6..]).fold(base, |sum, (a, &k)| sum + a * v[k])
+    row[6..]
+        .iter()
+        .zip(&path[6..])
+        .fold(base, |sum, (a, &k)| sum + a * v[k])
 }

@@ -14,7 +14,7 @@
 //! h/2 and its speed decays with h ω²/2: on the flat drive of the tests the error was five times larger.
 //!
 //! The PD of a held joint is implicit with an exponentially fitted θ_j ([`super::fitted_theta`]), so no gain and
-//! no step make it unstable. Contacts enter by the forecast `gap + γ h u_N ≤ 0`, measured from q̃.
+//! no step make it unstable. Contacts enter by the forecast `gap + γ h u_N ≤ 0`, measured from q_m.
 //!
 //! Source: Moreau 1988; Jean 1999; Acary, Brogliato 2008, ch. 10.
 
@@ -27,7 +27,7 @@ use super::probe::{Phase, Probe};
 use super::report::{StepReport, StepStatus};
 use super::workspace::{ActiveContact, WarmStart, Workspace};
 use super::{Integrator, Scene};
-use crate::contact::{Activation, Contact, detect, generalized_impulse};
+use crate::contact::{Activation, Contact, detect, generalized_impulse, relocate};
 use crate::multibody::{Model, State, bias};
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::solver::{SolveReport, solve};
@@ -46,21 +46,37 @@ impl Integrator for MoreauJean {
         workspace: &mut Workspace,
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
-        let Scene { model, terrain, options } = *scene;
+        let Scene {
+            model,
+            terrain,
+            options,
+        } = *scene;
         let (h, theta) = (options.time_step, options.theta);
         let ws = workspace;
-        ws.configuration.set_moved(&state.configuration, &state.v, (1.0 - theta) * h);
+        ws.configuration
+            .set_moved(&state.configuration, &state.v, (1.0 - theta) * h);
         ws.kinematics.update(model, &ws.configuration);
         ws.end.set_moved(&state.configuration, &state.v, h);
         ws.kinematics_end.update(model, &ws.end);
         probe.end(Phase::Kinematics);
-        let activation = activation(model, options, &state.v, h);
-        detect(model, &ws.kinematics_end, terrain, &state.v, &activation, &mut ws.contacts);
+        let activation = activation(model, options, &state.v, (1.0 - theta) * h);
+        detect(
+            model,
+            &ws.kinematics,
+            terrain,
+            &state.v,
+            &activation,
+            &mut ws.contacts,
+        );
+        for contact in &mut ws.contacts {
+            relocate(model, &ws.kinematics_end, terrain, contact);
+        }
         probe.end(Phase::Detection);
         ws.mass_matrix.update(model, &ws.kinematics);
         set_held_theta(model, options, command, ws);
         probe.end(Phase::MassMatrix);
-        factorise(model, options, command, ws).ok_or(StepError::SingularMassMatrix { time: state.time })?;
+        factorise(model, options, command, ws)
+            .ok_or(StepError::SingularMassMatrix { time: state.time })?;
         probe.end(Phase::Factor);
         ws.v.copy_from_slice(&state.v);
         assemble_contacts(scene, &state.v, warm_start, ws);
@@ -68,12 +84,27 @@ impl Integrator for MoreauJean {
         // Forces at v, then at the velocity that they lead to.
         ws.v_mean.copy_from_slice(&state.v);
         for is_last in [false, true] {
-            bias(model, &ws.kinematics, &ws.v_mean, &options.gravity, &mut ws.bias_scratch, &mut ws.force);
+            bias(
+                model,
+                &ws.kinematics,
+                &ws.v_mean,
+                &options.gravity,
+                &mut ws.bias_scratch,
+                &mut ws.force,
+            );
             for (y, f) in ws.y.iter_mut().zip(&ws.force) {
                 *y = -h * f;
             }
             let joints = &state.configuration.joints;
-            add_command(options, command, joints, &state.v, &state.v, &ws.theta_held, &mut ws.y);
+            add_command(
+                options,
+                command,
+                joints,
+                &state.v,
+                &state.v,
+                &ws.theta_held,
+                &mut ws.y,
+            );
             ws.factor.half_solve(model, &mut ws.y);
             if !is_last {
                 ws.system.add_impulses(model, &ws.p, &mut ws.y);
@@ -90,7 +121,9 @@ impl Integrator for MoreauJean {
         ws.end.advance(&ws.v, theta * h);
         ws.gap_end.clear();
         let local = ws.u.chunks_exact(3).zip(ws.u_before.chunks_exact(3));
-        let moved = |(contact, (u, before)): (&Contact, (&[f64], &[f64]))| contact.gap + theta * h * (u[0] - before[0]);
+        let moved = |(contact, (u, before)): (&Contact, (&[f64], &[f64]))| {
+            contact.gap + theta * h * (u[0] - before[0])
+        };
         ws.gap_end.extend(ws.contacts.iter().zip(local).map(moved));
         probe.end(Phase::Update);
         report.steps = 1;
@@ -101,12 +134,22 @@ impl Integrator for MoreauJean {
 /// The contact forecast measured from `q_m`, and how close to rest a contact stays closed.
 ///
 /// `measured`: seconds after the start of the step at which the gaps are measured.
-pub(super) fn activation(model: &Model, options: &StepOptions, v: &[f64], measured: f64) -> Activation {
+pub(super) fn activation(
+    model: &Model,
+    options: &StepOptions,
+    v: &[f64],
+    measured: f64,
+) -> Activation {
     let h = options.time_step;
     let lead = options.forecast * h - measured;
     // In one step gravity moves what rests by g h²/2 and speeds it up by g h.
     let g = options.gravity.norm();
-    let reach: f64 = model.bodies().iter().map(|b| b.position.norm()).sum::<f64>() + 1.0;
+    let reach: f64 = model
+        .bodies()
+        .iter()
+        .map(|b| b.position.norm())
+        .sum::<f64>()
+        + 1.0;
     let linear = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
     let turning: f64 = v[3..].iter().map(|w| w.abs()).sum();
     Activation {
@@ -118,7 +161,12 @@ pub(super) fn activation(model: &Model, options: &StepOptions, v: &[f64], measur
 }
 
 /// How implicit each held joint's PD is.
-pub(super) fn set_held_theta(model: &Model, options: &StepOptions, command: &Command, ws: &mut Workspace) {
+pub(super) fn set_held_theta(
+    model: &Model,
+    options: &StepOptions,
+    command: &Command,
+    ws: &mut Workspace,
+) {
     let h = options.time_step;
     for (j, held) in command.held.iter().enumerate() {
         if let Some(held) = held {
@@ -153,7 +201,12 @@ pub(super) fn add_command(
 }
 
 /// `M̂ = M + h θ_j K_d + h² θ_j θ K_p` on held joints, and its factor.
-pub(super) fn factorise(model: &Model, options: &StepOptions, command: &Command, ws: &mut Workspace) -> Option<()> {
+pub(super) fn factorise(
+    model: &Model,
+    options: &StepOptions,
+    command: &Command,
+    ws: &mut Workspace,
+) -> Option<()> {
     let (h, theta) = (options.time_step, options.theta);
     for (j, held) in command.held.iter().enumerate() {
         if let Some(held) = held {
@@ -162,19 +215,32 @@ pub(super) fn factorise(model: &Model, options: &StepOptions, command: &Command,
             ws.mass_matrix.add_to_diagonal(model, 6 + j, implicit);
         }
     }
-    ws.mass_matrix.factorise(model, &mut ws.factor).then_some(())
+    ws.mass_matrix
+        .factorise(model, &mut ws.factor)
+        .then_some(())
 }
 
 /// Contact Jacobian, operator, velocity before the step and the solver's starting point, at the end's poses.
 ///
 /// Newton's law looks at `v_before`, the velocity before the step.
-pub(super) fn assemble_contacts(scene: &Scene<'_>, v_before: &[f64], warm_start: &WarmStart, ws: &mut Workspace) {
+pub(super) fn assemble_contacts(
+    scene: &Scene<'_>,
+    v_before: &[f64],
+    warm_start: &WarmStart,
+    ws: &mut Workspace,
+) {
     let n = ws.contacts.len();
     for local in [&mut ws.u_before, &mut ws.q_free, &mut ws.p, &mut ws.u] {
         local.resize(3 * n, 0.0);
     }
     ws.mu.resize(n, scene.options.friction_coefficient);
-    ws.system.assemble(scene.model, &ws.kinematics_end, &ws.factor, &ws.contacts, v_before);
+    ws.system.assemble(
+        scene.model,
+        &ws.kinematics_end,
+        &ws.factor,
+        &ws.contacts,
+        v_before,
+    );
     ws.u_before.copy_from_slice(&ws.system.u);
     if scene.options.warm_start {
         warm_start.recall(&ws.contacts, &mut ws.p);
@@ -187,11 +253,20 @@ pub(super) fn assemble_contacts(scene: &Scene<'_>, v_before: &[f64], warm_start:
 ///
 /// `ws.p` must still hold the last step's impulses.
 pub(super) fn add_correction(scene: &Scene<'_>, warm_start: &WarmStart, ws: &mut Workspace) {
-    if !scene.options.warm_start || warm_start.persistent.is_empty() || !warm_start.is_of(&ws.contacts) {
+    if !scene.options.warm_start
+        || warm_start.persistent.is_empty()
+        || !warm_start.is_of(&ws.contacts)
+    {
         return;
     }
     let share = 1.0 - scene.options.theta;
-    generalized_impulse(scene.model, &ws.kinematics_end, &ws.contacts, &ws.p, &mut ws.correction);
+    generalized_impulse(
+        scene.model,
+        &ws.kinematics_end,
+        &ws.contacts,
+        &ws.p,
+        &mut ws.correction,
+    );
     for (r, before) in ws.correction.iter_mut().zip(&warm_start.persistent) {
         *r = share * (before - *r);
     }
@@ -204,18 +279,46 @@ pub(super) fn add_correction(scene: &Scene<'_>, warm_start: &WarmStart, ws: &mut
 /// Solves the assembled contacts for the free change `ws.y` (factor coordinates) from `ws.v`, and adds both to `ws.v`.
 ///
 /// Starts from `ws.p`.
-pub(super) fn solve_contacts(scene: &Scene<'_>, ws: &mut Workspace, probe: &mut dyn Probe) -> StepReport {
+pub(super) fn solve_contacts(
+    scene: &Scene<'_>,
+    ws: &mut Workspace,
+    probe: &mut dyn Probe,
+) -> StepReport {
     let Scene { model, options, .. } = *scene;
     let n = ws.contacts.len();
-    let mut report = StepReport { n_contacts: n, ..StepReport::default() };
+    let mut report = StepReport {
+        n_contacts: n,
+        ..StepReport::default()
+    };
     if n > 0 {
         ws.system.local(model, &ws.y, &mut ws.q_free);
-        ws.system.add_local_of_velocity(model, &ws.kinematics_end, &ws.contacts, &ws.v, &mut ws.q_free);
-        for (q, u) in ws.q_free.chunks_exact_mut(3).zip(ws.u_before.chunks_exact(3)) {
+        ws.system.add_local_of_velocity(
+            model,
+            &ws.kinematics_end,
+            &ws.contacts,
+            &ws.v,
+            &mut ws.q_free,
+        );
+        for (q, u) in ws
+            .q_free
+            .chunks_exact_mut(3)
+            .zip(ws.u_before.chunks_exact(3))
+        {
             q[0] += options.restitution * u[0];
         }
-        let problem = FrictionContactProblem::from_assembled(Dimension::Three, &ws.system.W, &ws.q_free, &ws.mu);
-        let solved = solve(&problem, &options.solver, &mut ws.p, &mut ws.u, &mut ws.solver);
+        let problem = FrictionContactProblem::from_assembled(
+            Dimension::Three,
+            &ws.system.W,
+            &ws.q_free,
+            &ws.mu,
+        );
+        let solved = solve(
+            &problem,
+            &options.solver,
+            &mut ws.p,
+            &mut ws.u,
+            &mut ws.solver,
+        );
         note(&mut report, &solved);
         // u came with the restitution term inside: take it out again.
         for (u, before) in ws.u.chunks_exact_mut(3).zip(ws.u_before.chunks_exact(3)) {
@@ -260,20 +363,32 @@ pub(super) fn finish(
     state.v.copy_from_slice(&ws.v);
     state.time += scene.options.time_step;
     let slow = 2.0 * scene.options.gravity.norm() * scene.options.time_step;
-    let is_persistent = warm_start.is_of(&ws.contacts) && ws.u_before.iter().step_by(3).all(|u_N| u_N.abs() <= slow);
+    let is_persistent = warm_start.is_of(&ws.contacts)
+        && ws.u_before.iter().step_by(3).all(|u_N| u_N.abs() <= slow);
     warm_start.remember(&ws.contacts, &ws.p);
     warm_start.persistent.clear();
     if is_persistent && !ws.contacts.is_empty() {
         warm_start.persistent.resize(scene.model.nv(), 0.0);
-        generalized_impulse(scene.model, &ws.kinematics_end, &ws.contacts, &ws.p, &mut warm_start.persistent);
+        generalized_impulse(
+            scene.model,
+            &ws.kinematics_end,
+            &ws.contacts,
+            &ws.p,
+            &mut warm_start.persistent,
+        );
     }
     ws.active.clear();
     let local = ws.p.chunks_exact(3).zip(ws.u.chunks_exact(3));
-    ws.active.extend(ws.contacts.iter().zip(local).map(|(contact, (p, u))| ActiveContact {
-        contact: *contact,
-        position: ws.kinematics_end.base + contact.point,
-        impulse: [p[0], p[1], p[2]],
-        velocity: [u[0], u[1], u[2]],
-    }));
+    ws.active.extend(
+        ws.contacts
+            .iter()
+            .zip(local)
+            .map(|(contact, (p, u))| ActiveContact {
+                contact: *contact,
+                position: ws.kinematics_end.base + contact.point,
+                impulse: [p[0], p[1], p[2]],
+                velocity: [u[0], u[1], u[2]],
+            }),
+    );
     Ok(report)
 }

@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::{Contact, ContactKey, ContactSystem};
 use crate::multibody::bias::BiasScratch;
-use crate::multibody::{Configuration, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum};
+use crate::multibody::{
+    Configuration, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum,
+};
 use crate::solver::SolverWorkspace;
 
 /// Impulses of the last step by contact: where the next solve starts. Part of what a snapshot holds.
@@ -22,7 +24,10 @@ impl WarmStart {
     /// Room for what a model can touch a plane with.
     #[must_use]
     pub fn with_capacity(model: &Model) -> Self {
-        Self { impulses: Vec::with_capacity(contact_capacity(model)), persistent: Vec::with_capacity(model.nv()) }
+        Self {
+            impulses: Vec::with_capacity(contact_capacity(model)),
+            persistent: Vec::with_capacity(model.nv()),
+        }
     }
 
     /// Fills `p` (3 n_c) with what is remembered of these contacts, zero for new ones.
@@ -38,13 +43,23 @@ impl WarmStart {
     /// Whether the last step had exactly these contacts.
     #[must_use]
     pub fn is_of(&self, contacts: &[Contact]) -> bool {
-        self.impulses.len() == contacts.len() && self.impulses.iter().zip(contacts).all(|((key, _), c)| *key == c.key)
+        self.impulses.len() == contacts.len()
+            && self
+                .impulses
+                .iter()
+                .zip(contacts)
+                .all(|((key, _), c)| *key == c.key)
     }
 
     /// Remembers the impulses `p` (3 n_c).
     pub fn remember(&mut self, contacts: &[Contact], p: &[f64]) {
         self.impulses.clear();
-        self.impulses.extend(contacts.iter().zip(p.chunks_exact(3)).map(|(c, p)| (c.key, [p[0], p[1], p[2]])));
+        self.impulses.extend(
+            contacts
+                .iter()
+                .zip(p.chunks_exact(3))
+                .map(|(c, p)| (c.key, [p[0], p[1], p[2]])),
+        );
     }
 }
 
@@ -82,7 +97,6 @@ pub struct Workspace {
     pub(super) v: Vec<f64>,
     pub(super) v_mean: Vec<f64>,
     pub(super) contacts: Vec<Contact>,
-    pub(super) found: Vec<Contact>,
     pub(super) system: ContactSystem,
     pub(super) q_free: Vec<f64>,
     pub(super) mu: Vec<f64>,
@@ -123,7 +137,6 @@ impl Workspace {
             v: vec![0.0; nv],
             v_mean: vec![0.0; nv],
             contacts: Vec::with_capacity(n),
-            found: Vec::with_capacity(3 * model.wheels().len() + 8 * model.boxes().len()),
             system: ContactSystem::with_capacity(model, n),
             q_free: room(),
             mu: Vec::with_capacity(n),
