@@ -45,9 +45,7 @@ def number(
     return result
 
 
-def vector(
-    field: str, value: object, size: int, *, error: type[RoverGymError] = OptionError
-) -> tuple[float, ...]:
+def vector(field: str, value: object, size: int, *, error: type[RoverGymError] = OptionError) -> tuple[float, ...]:
     """`size` finite numbers, as a tuple of floats."""
     entries = _entries(value)
     if entries is None or len(entries) != size:
@@ -67,13 +65,12 @@ def span(
     if _is_number(value):
         single = number(field, value, above=above, at_least=at_least, at_most=at_most)
         return (single, single)
-    entries = _entries(value)
-    if entries is None or len(entries) != 2:
-        refuse(OptionError, field, value, "must be a number or a pair (low, high)")
-    low, high = (
-        number(f"{field}[{i}]", entry, above=above, at_least=at_least, at_most=at_most)
-        for i, entry in enumerate(entries)
-    )
+    match _entries(value):
+        case [first, last]:
+            low = number(f"{field}[0]", first, above=above, at_least=at_least, at_most=at_most)
+            high = number(f"{field}[1]", last, above=above, at_least=at_least, at_most=at_most)
+        case _:
+            refuse(OptionError, field, value, "must be a number or a pair (low, high)")
     if low > high:
         refuse(OptionError, field, value, "must be a pair (low, high) with low <= high")
     return (low, high)
@@ -89,9 +86,7 @@ def known_keys(field: str, value: Iterable[str], known: Iterable[str]) -> None:
 
 def _is_number(value: object) -> bool:
     # Covers int, float and numpy scalars, not strings, arrays or None.
-    return (
-        not isinstance(value, (str, bytes)) and hasattr(value, "__float__") and not hasattr(value, "__len__")
-    )
+    return not isinstance(value, (str, bytes)) and hasattr(value, "__float__") and not hasattr(value, "__len__")
 
 
 def _entries(value: object) -> list[object] | None:
