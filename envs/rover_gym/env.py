@@ -620,11 +620,14 @@ def _six_wheels(model: object) -> RoverModel:
 def _check_action(action: object) -> npt.NDArray[np.float64]:
     """The action as twelve floats of its own, within [-1, 1]."""
     try:
-        command = np.array(action, dtype=np.float64)
-    except (TypeError, ValueError):
+        given = np.asarray(action)
+    except ValueError:  # a ragged sequence
         refuse(CommandError, "action", action, f"must be {N_ACTIONS} numbers")
-    if command.shape != (N_ACTIONS,):
-        refuse(CommandError, "action", command.shape, f"must have shape ({N_ACTIONS},)")
+    if given.dtype.kind not in "fiu":
+        refuse(CommandError, "action", action, f"must be {N_ACTIONS} numbers")
+    if given.shape != (N_ACTIONS,):
+        refuse(CommandError, "action", given.shape, f"must have shape ({N_ACTIONS},)")
+    command = given.astype(np.float64)
     # Written so that a NaN fails too.
     if not np.abs(command).max() <= 1.0:
         for i, entry in enumerate(command.tolist()):
