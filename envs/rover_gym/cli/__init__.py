@@ -1,0 +1,38 @@
+"""The console command `rover`."""
+
+from typing import Annotated
+
+import typer
+
+from rover_gym._core import __version__
+from rover_gym.cli.drive import drive
+from rover_gym.cli.report import report
+
+app = typer.Typer(
+    help="Drive a six-wheel Mars rover in a nonsmooth simulator.",
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    pretty_exceptions_enable=False,
+)
+app.command()(drive)
+app.command()(report)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"rover-gym {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def rover(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and stop.")
+    ] = False,
+) -> None:
+    """Drive a six-wheel Mars rover in a nonsmooth simulator."""
+
+
+def main() -> None:
+    """Entry point of the console command."""
+    app()

@@ -1,0 +1,165 @@
+"""`rover drive`: episodes of `Rover-v0` with the PD baseline."""
+
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import gymnasium as gym
+import numpy as np
+import typer
+from rich.progress import Progress
+from rich.table import Table
+
+from rover_gym.cli.console import console, plain_errors, progress_bar, say_path
+from rover_gym.env import RoverEnv
+from rover_gym.episodes import Episode, run_episode
+from rover_gym.policy import PDPolicy
+from rover_gym.recording import Channel, Recorder, sample, simulation_channels
+from rover_gym.rewards import WEIGHTS
+
+CONTROL_PERIOD = 0.05  # s, of Rover-v0
+
+
+@plain_errors
+def drive(
+    *,
+    terrain: Annotated[str, typer.Option(help="The ground; only 'plane' for now.")] = "plane",
+    slope: Annotated[float, typer.Option(help="Slope of the ground, degrees.")] = 0.0,
+    uphill: Annotated[
+        float | None, typer.Option(help="Direction of steepest ascent, degrees to the left of x; drawn if not given.")
+    ] = None,
+    heading: Annotated[
+        float | None, typer.Option(help="Start heading, degrees to the left of x; drawn if not given.")
+    ] = None,
+    goal: Annotated[
+        tuple[float, float] | None, typer.Option(metavar="X Z", help="Goal on the map, m; drawn if not given.")
+    ] = None,
+    friction: Annotated[float, typer.Option(help="Coulomb's coefficient.")] = 0.7,
+    time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
+    time_limit: Annotated[float, typer.Option(min=CONTROL_PERIOD, help="Time limit of an episode, s.")] = 60.0,
+    episodes: Annotated[int, typer.Option(min=1, help="How many episodes.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode; the next ones count up.")] = 0,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            file_okay=False, help="Folder for trajectories (HDF5) and summary.json; nothing is saved without."
+        ),
+    ] = None,
+) -> None:
+    """Drive Rover-v0 to its goal with the PD baseline and print what the episodes came to."""
+    arguments: dict[str, Any] = {
+        "terrain": terrain,
+        "slope_deg": slope,
+        "friction": friction,
+        "time_step": time_step,
+    }
+    arguments |= {} if uphill is None else {"uphill_deg": uphill}
+    arguments |= {} if heading is None else {"heading_deg": heading}
+    options = {} if goal is None else {"goal": goal}
+    env = gym.make("Rover-v0", max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments)
+    policy = PDPolicy(env)
+
+    results, paths = [], []
+    with progress_bar() as bar:
+        for number in range(seed, seed + episodes):
+            path = None if output is None else output / f"episode-{number}.h5"
+            results.append(_drive_one(env, policy, number, arguments, options, path, bar))
+            paths += [path] if path else []
+
+    console().print(_table(results))
+    if output is not None:
+        summary = {"arguments": arguments | options, "episodes": [asdict(episode) for episode in results]}
+        paths.append(output / "summary.json")
+        paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    for path in paths:
+        say_path("written", path)
+
+
+def _drive_one(
+    env: gym.Env[Any, Any],
+    policy: PDPolicy,
+    seed: int,
+    arguments: Mapping[str, Any],
+    options: Mapping[str, Any],
+    path: Path | None,
+    bar: Progress,
+) -> Episode:
+    """One episode, recorded if there is a path."""
+    task = bar.add_task(f"seed {seed}", total=None, state="")
+    with ExitStack() as stack:
+        recorder: Recorder | None = None
+
+        def on_step(rover: RoverEnv, info: Mapping[str, Any]) -> None:
+            nonlocal recorder
+            bar.update(task, state=f"{info['time']:.1f} s, {info['distance_to_goal']:.1f} m to go")
+            if path is not None:
+                if recorder is None:  # after the reset, when the start is known
+                    recorder = stack.enter_context(_recorder(path, rover, seed, arguments))
+                recorder.append(_row(rover, info))
+
+        episode = run_episode(env, policy, seed, options=options, on_step=on_step)
+    bar.remove_task(task)
+    return episode
+
+
+def _recorder(path: Path, rover: RoverEnv, seed: int, arguments: Mapping[str, Any]) -> Recorder:
+    channels = (
+        *simulation_channels(rover.model),
+        Channel("distance_to_goal", "m", "horizontal distance from the trunk's origin to the goal"),
+        Channel("slip_ratio", "1", "mean over the wheels in contact of rim slip over the faster of rim and ground"),
+        Channel("motor_energy", "J", "work through the wheel motors since the start, driving or braking"),
+        Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
+    )
+    attributes = {
+        "title": "an episode of Rover-v0 with the PD baseline",
+        "scene": {**arguments, **asdict(rover.start)},
+        "seed": seed,
+    }
+    return Recorder(path, channels, attributes)
+
+
+def _row(rover: RoverEnv, info: Mapping[str, Any]) -> dict[str, Any]:
+    solver = info["solver"]
+    return {
+        **sample(rover.simulation, residual=solver["residual"], iterations=solver["iterations"]),
+        "distance_to_goal": info["distance_to_goal"],
+        "slip_ratio": info["slip_ratio"],
+        "motor_energy": info["energy"],
+        "reward_terms": [info["reward_terms"][name] for name in WEIGHTS],
+    }
+
+
+def _table(results: Sequence[Episode]) -> Table:
+    table = Table(title="Rover-v0 with the PD baseline", title_justify="left")
+    for heading in ("seed", "success", "distance", "time", "energy", "slip", "real-time factor"):
+        table.add_column(heading, justify="right")
+    for episode in results:
+        table.add_row(
+            str(episode.seed),
+            "yes" if episode.success else f"no: {episode.end}",
+            f"{episode.distance:.2f} m",
+            f"{episode.time:.2f} s",
+            f"{episode.energy:.0f} J",
+            f"{episode.slip:.3f}",
+            f"{episode.real_time_factor:.0f}",
+        )
+    if len(results) > 1:
+        table.add_section()
+        table.add_row(
+            "mean",
+            f"{sum(episode.success for episode in results)} of {len(results)}",
+            *(
+                form.format(np.mean([getattr(episode, name) for episode in results]))
+                for name, form in (
+                    ("distance", "{:.2f} m"),
+                    ("time", "{:.2f} s"),
+                    ("energy", "{:.0f} J"),
+                    ("slip", "{:.3f}"),
+                    ("real_time_factor", "{:.0f}"),
+                )
+            ),
+        )
+    return table

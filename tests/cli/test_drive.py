@@ -1,0 +1,93 @@
+"""`rover drive`: episodes from the command line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from rover_gym.cli import app
+from rover_gym.recording import read_trajectory
+
+
+def rover(*arguments: str) -> Result:
+    return CliRunner(env={"COLUMNS": "120", "NO_COLOR": "1"}).invoke(app, list(arguments))
+
+
+def test_an_episode_prints_its_summary() -> None:
+    result = rover("drive", "--seed", "1")
+    assert result.exit_code == 0, result.output
+    for word in ("success", "distance", "time", "energy", "slip", "real-time factor", "yes"):
+        assert word in result.output
+
+
+def test_a_given_goal_is_driven_to_and_the_trajectory_ends_there(tmp_path: Path) -> None:
+    result = rover("drive", "--heading", "0", "--goal", "6", "-1", "--output", str(tmp_path))
+    assert result.exit_code == 0, result.output
+    trajectory = read_trajectory(tmp_path / "episode-0.h5")
+    assert np.hypot(trajectory["q"][-1, 0] - 6.0, trajectory["q"][-1, 2] + 1.0) <= 0.5
+    assert trajectory.attributes["complete"]
+    assert trajectory.attributes["scene"]["goal"] == [6.0, -1.0]
+    assert np.all(np.diff(trajectory["time"]) > 0.0)
+    for path in (tmp_path / "episode-0.h5", tmp_path / "summary.json"):
+        assert str(path) in result.output.replace("\n", "")
+
+
+def test_several_episodes_are_saved_with_their_mean(tmp_path: Path) -> None:
+    result = rover("drive", "--episodes", "2", "--seed", "5", "--slope", "10", "--output", str(tmp_path))
+    assert result.exit_code == 0, result.output
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert [episode["seed"] for episode in summary["episodes"]] == [5, 6]
+    assert summary["arguments"]["slope_deg"] == 10.0
+    assert "mean" in result.output
+    assert (tmp_path / "episode-5.h5").exists()
+    assert (tmp_path / "episode-6.h5").exists()
+
+
+def test_the_same_seed_drives_the_same_way(tmp_path: Path) -> None:
+    for run in ("a", "b"):
+        assert rover("drive", "--seed", "3", "--output", str(tmp_path / run)).exit_code == 0
+    a, b = (read_trajectory(tmp_path / run / "episode-3.h5") for run in ("a", "b"))
+    assert np.array_equal(a["q"], b["q"])
+
+
+def test_a_short_time_limit_ends_the_episode_without_success() -> None:
+    result = rover("drive", "--time-limit", "1")
+    assert result.exit_code == 0, result.output
+    assert "no: time" in result.output
+    assert "1.00 s" in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "culprit"),
+    [
+        (["--terrain", "sea"], "terrain"),
+        (["--slope", "-3"], "slope_deg"),
+        (["--slope", "nan"], "slope_deg"),
+        (["--friction", "-1"], "friction"),
+        (["--time-step", "0"], "time_step"),
+        (["--time-step", "0.007"], "control_frequency"),
+        (["--goal", "inf", "0"], "goal"),
+    ],
+)
+def test_bad_input_is_one_line_that_names_the_culprit(arguments: list[str], culprit: str) -> None:
+    result = rover("drive", *arguments)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("error: ")
+    assert len(result.stderr.splitlines()) == 1
+    assert culprit in result.stderr
+    assert "Traceback" not in result.output
+
+
+def test_output_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("a file, not a folder", encoding="utf-8")
+    result = rover("drive", "--output", str(tmp_path / "taken" / "below"))
+    assert result.exit_code == 2
+    assert len(result.stderr.splitlines()) == 1
+
+
+def test_version_and_help() -> None:
+    assert rover("--version").output.startswith("rover-gym ")
+    assert "drive" in rover("--help").output
+    assert rover("no-such-command").exit_code == 2

@@ -1,0 +1,112 @@
+"""Trajectory files: they describe themselves and survive a kill."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from rover_gym import RoverModel, Simulation
+from rover_gym.recording import Channel, MissingExtraError, Recorder, read_trajectory, sample, simulation_channels
+
+TIME = Channel("time", "s", "time since the start")
+POINT = Channel("point", "m", "a point, world", (3,), ("x", "y", "z"))
+
+KILLED = """
+import os, signal, sys
+from rover_gym.recording import Channel, Recorder
+
+recorder = Recorder(sys.argv[1], [Channel("time", "s", "time")], {"title": "to be killed"}, rows_per_flush=10)
+for i in range(57):
+    recorder.append({"time": i})
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_rows_come_back_with_units_and_attributes(tmp_path: Path) -> None:
+    path = tmp_path / "deep" / "run.h5"
+    with Recorder(path, [TIME, POINT], {"title": "a test", "scene": {"slope": 0.1}, "seed": 4}) as recorder:
+        for i in range(5):
+            recorder.append({"time": 0.1 * i, "point": [i, 2 * i, 3 * i]})
+        recorder.note(wall_time=1.5)
+    trajectory = read_trajectory(path)
+    assert trajectory["time"] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4])
+    assert trajectory["point"].shape == (5, 3)
+    assert trajectory.units == {"time": "s", "point": "m"}
+    assert trajectory.attributes["scene"] == {"slope": 0.1}
+    assert trajectory.attributes["seed"] == 4
+    assert trajectory.attributes["wall_time"] == 1.5
+    assert trajectory.attributes["complete"]
+
+
+def test_every_data_set_of_a_simulation_says_what_it_is(tmp_path: Path) -> None:
+    sim = Simulation(RoverModel())
+    with Recorder(tmp_path / "run.h5", simulation_channels(sim.model)) as recorder:
+        recorder.append(sample(sim))
+        sim.step()
+        recorder.append(sample(sim))
+    with h5py.File(tmp_path / "run.h5") as file:
+        for data in file.values():
+            assert data.attrs["unit"]
+            assert data.attrs["description"]
+            assert len(data) == 2
+        assert list(file["q"].attrs["columns"]) == sim.model.dof_names
+        for name in ("rover_gym_version", "numpy_version", "python_version"):
+            assert file.attrs[name]
+
+
+def test_a_killed_run_keeps_what_it_had(tmp_path: Path) -> None:
+    path = tmp_path / "killed.h5"
+    done = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
+    assert done.returncode == -signal.SIGKILL
+    trajectory = read_trajectory(path)
+    assert np.array_equal(trajectory["time"], np.arange(50.0))
+    assert not trajectory.attributes["complete"]
+    assert trajectory.attributes["title"] == "to be killed"
+
+
+def test_an_exception_keeps_all_rows_and_leaves_the_file_incomplete(tmp_path: Path) -> None:
+    def fail_after_a_row() -> None:
+        with Recorder(tmp_path / "run.h5", [TIME]) as recorder:
+            recorder.append({"time": 1.0})
+            raise RuntimeError("on purpose")
+
+    with pytest.raises(RuntimeError, match="on purpose"):
+        fail_after_a_row()
+    trajectory = read_trajectory(tmp_path / "run.h5")
+    assert trajectory["time"].tolist() == [1.0]
+    assert not trajectory.attributes["complete"]
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ({"time": 0.0}, "point"),
+        ({"time": 0.0, "point": np.zeros(3), "speed": 1.0}, "speed"),
+        ({"time": 0.0, "point": np.zeros(2)}, "point has shape"),
+    ],
+)
+def test_a_row_that_does_not_fit_is_refused_and_nothing_added(
+    row: dict[str, object], message: str, tmp_path: Path
+) -> None:
+    with Recorder(tmp_path / "run.h5", [TIME, POINT]) as recorder:
+        with pytest.raises(ValueError, match=message):
+            recorder.append(row)
+        recorder.append({"time": 0.0, "point": np.zeros(3)})
+    assert len(read_trajectory(tmp_path / "run.h5")["time"]) == 1
+
+
+def test_another_hdf5_file_is_refused(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["time"] = [1.0]
+    with pytest.raises(ValueError, match="is no rover-gym trajectory"):
+        read_trajectory(tmp_path / "other.h5")
+
+
+def test_without_h5py_the_error_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'rover-gym\[demo\]'"):
+        Recorder(tmp_path / "run.h5", [TIME])

@@ -1,0 +1,58 @@
+"""`rover report`: section 6.1, run, recorded and drawn."""
+
+import struct
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rover_gym import report as scene
+from rover_gym.cli import app
+from rover_gym.recording import read_trajectory
+
+FIGURES = (
+    "figure-6.2-wheel-traces.png",
+    "figure-6.3-contact-distances.png",
+    "figure-6.4-reaction-force.png",
+    "figure-6.5-steering-angles.png",
+)
+
+
+def test_the_scene_is_recorded_and_drawn(tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["report", "--figures", "--duration", "12", "--output", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    trajectory = read_trajectory(tmp_path / "trajectory.h5")
+    assert trajectory.attributes["complete"]
+    assert trajectory.attributes["scene"]["gravity"] == list(scene.GRAVITY)
+    assert trajectory["time"][-1] == pytest.approx(12.0)
+    for name in FIGURES:
+        head = (tmp_path / name).read_bytes()[:24]
+        assert head.startswith(b"\x89PNG")
+        width, height = struct.unpack(">II", head[16:24])
+        assert width >= 1200
+        assert height >= 600
+        assert name in result.output
+    assert "from Siconos" in result.output
+
+
+def test_the_run_lands_where_siconos_does(tmp_path: Path) -> None:
+    scene.run(tmp_path / "run.h5", duration=10.0, time_step=0.005, variant="newton")
+    rows = scene.distance_to_siconos(read_trajectory(tmp_path / "run.h5"))
+    assert [step for step, _, _ in rows] == [0.005, 0.0002]
+    assert all(distance < 0.01 for _, _, distance in rows)  # m, the tolerance at 5 ms
+
+
+def test_the_scene_starts_as_the_reference_does() -> None:
+    # The gaps at the start, from the Siconos run: they fix plane, wheel radius, geometry and attitude.
+    reference = scene.reference_data()["siconos"][0]
+    assert scene.scene().wheel_gaps == pytest.approx(np.array(reference["gap"][0]), abs=1e-6)
+
+
+def test_without_matplotlib_the_error_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    result = CliRunner().invoke(app, ["report", "--figures", "--duration", "0.1", "--output", str(tmp_path)])
+    assert result.exit_code == 2
+    assert "pip install 'rover-gym[demo]'" in result.stderr
+    assert len(result.stderr.splitlines()) == 1

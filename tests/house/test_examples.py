@@ -1,0 +1,34 @@
+"""The Python blocks of the README and of the manual run as they stand."""
+
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from rover_gym.cli import app
+
+ROOT = Path(__file__).parents[2]
+PAGES = ("README.md", "docs/recording.md")
+
+
+def blocks() -> list[pytest.param]:
+    found = []
+    for page in PAGES:
+        text = (ROOT / page).read_text(encoding="utf-8")
+        for number, code in enumerate(re.findall(r"^```python\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL), 1):
+            found.append(pytest.param(code, id=f"{page}-{number}"))
+    return found
+
+
+@pytest.mark.parametrize("code", blocks())
+def test_example_runs(code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    exec(compile(code, "example", "exec"), {"__name__": "__main__"})  # noqa: S102 - that is the test
+
+
+def test_the_commands_of_the_readme_are_known() -> None:
+    commands = re.findall(r"^rover (\w+)", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert commands
+    for command in commands:
+        assert CliRunner().invoke(app, [command, "--help"]).exit_code == 0

@@ -1,0 +1,36 @@
+"""The Makefile says what it offers, and continuous integration runs what the README tells."""
+
+import re
+import subprocess
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
+
+
+def phony_targets() -> set[str]:
+    (line,) = re.findall(r"^\.PHONY: (.*)$", MAKEFILE, flags=re.MULTILINE)
+    return set(line.split())
+
+
+def test_plain_make_lists_every_target_with_one_line() -> None:
+    output = subprocess.run(["make"], cwd=ROOT, check=True, capture_output=True, text=True).stdout  # noqa: S607
+    described = dict(re.findall(r"^make ([a-z-]+) +(\S.*)$", output, flags=re.MULTILINE))
+    assert described.keys() == phony_targets()
+    assert len(output.splitlines()) == len(described)
+
+
+def test_ci_calls_the_readmes_test_command_and_nothing_else() -> None:
+    script = ROOT / ".ci" / "run"
+    assert script.stat().st_mode & 0o111, "not executable"
+    lines = [line for line in script.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
+    assert [line for line in lines if "make" in line] == ["exec make test"]
+    assert re.search(r"^make test\b", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+
+
+def test_the_commit_hooks_call_make_targets() -> None:
+    hooks = (ROOT / ".pre-commit-config.yaml").read_text(encoding="utf-8")
+    entries = re.findall(r"^ +entry: (.*)$", hooks, flags=re.MULTILINE)
+    assert entries
+    assert {entry.split()[0] for entry in entries} == {"make"}
+    assert {entry.split()[1] for entry in entries} <= phony_targets()

@@ -1,0 +1,61 @@
+"""What must not be in the tree: places of one machine, registries' addresses, large files."""
+
+import re
+import runpy
+import subprocess
+import tomllib
+from pathlib import Path
+
+import rover_gym
+
+ROOT = Path(__file__).parents[2]
+LARGEST = 1_500_000  # bytes
+
+# Written in pieces, so that this file does not match itself.
+MACHINE_PATHS = re.compile(r"(?<![\w.])/(?:wo" r"rk|ro" r"ot|ho" r"me|fa" r"rm)/|/tm" r"p/")
+REGISTRIES = re.compile(r"pypi\.or" r"g|pythonhost" r"ed|crates\.i" r"o|registry\.np" r"mjs|debian\.o" r"rg")
+
+
+def tracked_files() -> list[Path]:
+    listing = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True)  # noqa: S607
+    return [ROOT / name for name in listing.stdout.split("\0") if name]
+
+
+def test_no_file_names_a_place_of_one_machine_or_a_registry() -> None:
+    found = []
+    for path in tracked_files():
+        if path.name == "Cargo.lock":  # cargo's own identifier of its registry
+            continue
+        text = path.read_text(encoding="utf-8")
+        for number, line in enumerate(text.splitlines(), 1):
+            if MACHINE_PATHS.search(line) or REGISTRIES.search(line):
+                found.append(f"{path.relative_to(ROOT)}:{number}: {line.strip()[:80]}")
+    assert not found
+
+
+def test_no_file_is_large() -> None:
+    assert not [path for path in tracked_files() if path.stat().st_size > LARGEST]
+
+
+def test_every_golden_file_has_its_provenance() -> None:
+    folder = ROOT / "tests" / "golden"
+    readme = (folder / "README.md").read_text(encoding="utf-8")
+    assert not [path.name for path in folder.glob("*.json") if f"`{path.name}`" not in readme]
+
+
+def test_the_packages_copy_of_the_golden_curves_is_current() -> None:
+    packer = runpy.run_path(str(ROOT / "tests" / "golden" / "pack_section_6_1.py"))
+    assert packer["PACKED"].read_text(encoding="utf-8") == packer["pack"]()
+
+
+def test_there_is_one_version() -> None:
+    workspace = tomllib.loads((ROOT / "Cargo.toml").read_text(encoding="utf-8"))
+    assert rover_gym.__version__ == workspace["workspace"]["package"]["version"]
+
+
+def test_pins_hold_versions_and_nothing_else() -> None:
+    pin = re.compile(r"[a-z0-9._-]+==[0-9][\w.]*( ; [^@/]+)?")
+    for path in (ROOT / "requirements").glob("*.txt"):
+        lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+        assert lines
+        assert not [line for line in lines if not pin.fullmatch(line)], path.name
