@@ -84,8 +84,8 @@ class PDPolicy:
         self,
         observation: npt.NDArray[np.float32],
         state: tuple[npt.NDArray[Any], ...] | None = None,
-        episode_start: npt.NDArray[np.bool_] | None = None,  # noqa: ARG002 - the signature is not ours
-        deterministic: bool = True,  # noqa: ARG002 - the same
+        episode_start: npt.NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
     ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...] | None]:
         """The action for an observation `(size,)`, or the actions `(n, 12)` for a batch `(n, size)`.
 
