@@ -286,7 +286,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             if math.radians(asked) > limit * (1.0 + 1e-12):
                 reason = f"must be at most the model's limit, {math.degrees(limit):g}"
                 refuse(OptionError, "max_steering_deg", max_steering_deg, reason)
-            limit = math.radians(asked)
+            limit = min(limit, math.radians(asked))
         self.max_steering = limit
         self._torque_limits = self.model.wheel_torque_limits
         self._wheel_index = np.array(self.model.wheel_joint_indices)
