@@ -1,0 +1,68 @@
+//! The frame (n, t, b) of a contact: normal, rolling direction, binormal.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// Right-handed orthonormal frame in world axes; `b = t × n`, so `(t, n, b)` stands like (x, y, z).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ContactFrame {
+    /// From the ground to the machine.
+    pub n: Vector3<f64>,
+    /// Rolling direction: forward where the axle points to the right.
+    pub t: Vector3<f64>,
+    /// `t × n`.
+    pub b: Vector3<f64>,
+}
+
+/// Sine of the angle between axle and normal below which the rolling direction is not defined by them.
+const PARALLEL: f64 = 1e-9;
+
+impl ContactFrame {
+    /// Frame of a wheel with unit axle `s`; where s is parallel to n, the wheel's `spoke` gives t.
+    #[inline]
+    #[must_use]
+    pub fn of_wheel(n: &Vector3<f64>, s: &Vector3<f64>, spoke: &Vector3<f64>) -> Self {
+        let across = n.cross(s);
+        let length = across.norm();
+        let t = if length > PARALLEL { across / length } else { (spoke - n * n.dot(spoke)).normalize() };
+        Self { n: *n, t, b: t.cross(n) }
+    }
+
+    /// Frame where no direction is preferred: t is along the world's x, or its z where n is.
+    #[must_use]
+    pub fn of_normal(n: &Vector3<f64>) -> Self {
+        let e = if n.x.abs() < 0.9 { Vector3::x() } else { Vector3::z() };
+        let t = (e - n * n.dot(&e)).normalize();
+        Self { n: *n, t, b: t.cross(n) }
+    }
+
+    /// n, t, b in this order.
+    #[inline]
+    #[must_use]
+    pub fn rows(&self) -> [Vector3<f64>; 3] {
+        [self.n, self.t, self.b]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_orthonormal_also_where_the_axle_is_the_normal() {
+        let n = Vector3::new(0.1, 0.9, -0.2).normalize();
+        for s in [Vector3::z(), n, -n, Vector3::new(0.5, 0.5, 0.1).normalize()] {
+            let spoke = if (s - n).norm() < 1e-3 || (s + n).norm() < 1e-3 {
+                (Vector3::x() - n * n.x).normalize()
+            } else {
+                Vector3::x()
+            };
+            for frame in [ContactFrame::of_wheel(&n, &s, &spoke), ContactFrame::of_normal(&n)] {
+                let R = nalgebra::Matrix3::from_rows(&frame.rows().map(|r| r.transpose()));
+                assert!((R * R.transpose() - nalgebra::Matrix3::identity()).norm() < 1e-14);
+            }
+        }
+        let flat = ContactFrame::of_wheel(&Vector3::y(), &Vector3::z(), &Vector3::x());
+        assert!((flat.t - Vector3::x()).norm() < 1e-15 && (flat.b - Vector3::z()).norm() < 1e-15);
+    }
+}

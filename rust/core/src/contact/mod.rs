@@ -1,0 +1,13 @@
+//! From bodies near the ground to unilateral contacts: points, frames, gaps and their Jacobians.
+
+pub mod box_plane;
+pub mod contact_frame;
+pub mod contact_point;
+pub mod delassus;
+pub mod detection;
+pub mod wheel_plane;
+
+pub use contact_frame::ContactFrame;
+pub use contact_point::{Contact, ContactKey, Part};
+pub use delassus::ContactSystem;
+pub use detection::{Activation, detect};

@@ -1,0 +1,116 @@
+//! Wheel on a plane: the lowest points of a rim.
+//!
+//! A wheel is a disc of radius R, centre c, unit axle s. With `w = n − (n·s) s` the lowest rim point is
+//! `E = c − R w/|w|`, the gap `n·c + d − R |w|`, `|w| = √(1 − (n·s)²)`. By the envelope theorem the gap's gradient is nᵀ times the
+//! Jacobian of the *material* point at E, so the contact frame's normal is the plane's, not the in-wheel one.
+//!
+//! A wheel lying flat touches with its whole rim: two more rim points, 120 degrees to either side of the lowest, carry
+//! it then. Their gap is `n·c + d + R |w| / 2`, so they fade in continuously as the wheel tips over.
+
+use nalgebra::Vector3;
+
+use super::contact_frame::ContactFrame;
+use crate::geometry::Plane;
+
+/// A rim point: number, place (relative to the plane's argument origin), frame, gap.
+#[derive(Clone, Copy, Debug)]
+pub struct RimPoint {
+    /// 0 the lowest, 1 and 2 to either side.
+    pub feature: usize,
+    /// m.
+    pub point: Vector3<f64>,
+    /// Frame of the contact.
+    pub frame: ContactFrame,
+    /// m.
+    pub gap: f64,
+}
+
+/// A wheel in space: centre and unit axle and in-plane spoke, in the axes of the plane.
+#[derive(Clone, Copy, Debug)]
+pub struct PlacedWheel {
+    /// m.
+    pub centre: Vector3<f64>,
+    /// Unit.
+    pub axle: Vector3<f64>,
+    /// Unit, in the wheel's plane.
+    pub spoke: Vector3<f64>,
+    /// m.
+    pub radius: f64,
+}
+
+/// Rim points whose gap is at most `reach`; the lowest one always comes first if it is near.
+///
+/// `base` (m, world) is where the wheel's coordinates have their origin: the centre's world position is `base + centre`.
+#[inline]
+pub fn rim_points(wheel: &PlacedWheel, plane: &Plane, base: &Vector3<f64>, reach: f64, mut visit: impl FnMut(&RimPoint)) {
+    let (n, s) = (plane.normal(), &wheel.axle);
+    let height = plane.distance(base) + n.dot(&wheel.centre);
+    if height - wheel.radius > reach {
+        return;
+    }
+    let w = n - s * n.dot(s);
+    let length = w.norm();
+    let gap = height - wheel.radius * length;
+    if gap > reach {
+        return;
+    }
+    let down = if length > 1e-9 { w / -length } else { wheel.spoke };
+    let frame = ContactFrame::of_wheel(n, s, &wheel.spoke);
+    visit(&RimPoint { feature: 0, point: wheel.centre + down * wheel.radius, frame, gap });
+    let gap = height + 0.5 * wheel.radius * length;
+    if gap > reach {
+        return;
+    }
+    let side = s.cross(&down) * 0.75_f64.sqrt();
+    for (feature, sign) in [(1, 1.0), (2, -1.0)] {
+        let point = wheel.centre + (down * -0.5 + side * sign) * wheel.radius;
+        visit(&RimPoint { feature, point, frame, gap });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn unit(a: f64, b: f64) -> Vector3<f64> {
+        Vector3::new(a.cos() * b.cos(), b.sin(), a.sin() * b.cos())
+    }
+
+    proptest! {
+        #[test]
+        fn the_lowest_point_is_lower_than_any_other(a in -3.0..3.0, b in -1.5..1.5, tilt in -0.3..0.3, phi in 0.0..6.28) {
+            let plane = Plane::new([tilt, 1.0, -tilt], 0.2).unwrap();
+            let axle = unit(a, b);
+            let spoke = ContactFrame::of_normal(&axle).t;
+            let wheel = PlacedWheel { centre: Vector3::new(0.3, 0.1, -0.2), axle, spoke, radius: 0.3 };
+            let base = Vector3::new(1.0, 2.0, 3.0);
+            let rim = wheel.centre + (spoke * f64::cos(phi) + axle.cross(&spoke) * f64::sin(phi)) * wheel.radius;
+            let mut gaps = Vec::new();
+            rim_points(&wheel, &plane, &base, 10.0, |p| {
+                gaps.push(p.gap);
+                // the gap is the height of the point that is named, and that point is on the rim
+                assert!((p.gap - plane.distance(&(base + p.point))).abs() < 1e-12);
+                assert!(((p.point - wheel.centre).norm() - wheel.radius).abs() < 1e-12);
+                assert!((p.point - wheel.centre).dot(&axle).abs() < 1e-12);
+            });
+            prop_assert_eq!(gaps.len(), 3);
+            prop_assert!(gaps[0] <= plane.distance(&(base + rim)) + 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_wheel_lying_flat_stands_on_three_points_around_its_centre() {
+        let plane = Plane::ground();
+        let wheel = PlacedWheel { centre: Vector3::zeros(), axle: Vector3::y(), spoke: Vector3::x(), radius: 0.1 };
+        let mut sum = Vector3::zeros();
+        let mut count = 0;
+        rim_points(&wheel, &plane, &Vector3::zeros(), 1e-6, |p| {
+            assert!(p.gap.abs() < 1e-15);
+            sum += p.point;
+            count += 1;
+        });
+        assert_eq!(count, 3);
+        assert!(sum.norm() < 1e-15);
+    }
+}

@@ -1,0 +1,19 @@
+//! What a terrain must answer: which of its primitives can be touched near a place.
+
+use nalgebra::Vector3;
+
+use super::plane::Plane;
+
+/// A convex piece of ground whose distance to a wheel or a box has a closed form.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Primitive {
+    /// A half-space.
+    Plane(Plane),
+}
+
+/// The ground. Immutable, shared between threads.
+pub trait Terrain: Send + Sync {
+    /// Visits every primitive that comes closer than `reach` (m) to `centre` (world, m), with a number that
+    /// names it for as long as the terrain lives. May visit others too; must not depend on those far away.
+    fn visit_near(&self, centre: &Vector3<f64>, reach: f64, visit: &mut dyn FnMut(u32, &Primitive));
+}

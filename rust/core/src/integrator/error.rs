@@ -1,0 +1,35 @@
+//! Options out of range, and steps that cannot be taken.
+
+use thiserror::Error;
+
+/// An option out of its range.
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum OptionsError {
+    /// A number outside its interval.
+    #[error("{field}: must be {range}, is {value}")]
+    OutOfRange {
+        /// Name of the option.
+        field: &'static str,
+        /// Admissible values, in words.
+        range: &'static str,
+        /// What was given.
+        value: f64,
+    },
+}
+
+/// A step that could not be taken. The state is as it was before it.
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum StepError {
+    /// A coordinate or velocity overflowed.
+    #[error("the step from t = {time} s gave a state that is not finite; the state before it was kept")]
+    NonFinite {
+        /// Time before the step, s.
+        time: f64,
+    },
+    /// The mass matrix lost its positive definiteness to rounding.
+    #[error("the mass matrix at t = {time} s is not positive definite in floating point; the state before the step was kept")]
+    SingularMassMatrix {
+        /// Time before the step, s.
+        time: f64,
+    },
+}

@@ -1,0 +1,104 @@
+//! Options of a step, with their defaults and their ranges.
+
+use nalgebra::Vector3;
+
+use super::error::OptionsError;
+use crate::solver::SolverOptions;
+
+/// Which time-stepping scheme.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Variant {
+    /// One linearised step: one evaluation of kinematics, mass matrix and bias.
+    #[default]
+    Linearised,
+    /// Newton on the forces at the end of the step, in momentum form.
+    Newton,
+}
+
+/// What is done about penetration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Stabilisation {
+    /// Nothing: it stays as the velocity law leaves it.
+    None,
+    /// Projection of the position onto gap ≥ 0 where more than `penetration_tolerance` was left.
+    #[default]
+    Projection,
+}
+
+/// Step, scheme, laws and tolerances.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StepOptions {
+    /// Gravity, world, m/s². Default (0, −9.81, 0).
+    pub gravity: Vector3<f64>,
+    /// Coulomb's μ of every contact. Default 0.7.
+    pub friction_coefficient: f64,
+    /// Newton's e of every contact, in [0, 1]. Default 0.
+    pub restitution: f64,
+    /// h, s. Default 0.005.
+    pub time_step: f64,
+    /// θ of the θ-method, in [½, 1]. Default ½: order 2.
+    pub theta: f64,
+    /// γ of the contact forecast `gap + γ h u_N ≤ 0`, in [0, 1]. Default ½, as the reference runs.
+    pub forecast: f64,
+    /// Scheme. Default linearised.
+    pub variant: Variant,
+    /// Default projection.
+    pub stabilisation: Stabilisation,
+    /// Penetration that is left alone, m. Default 1e-8: what one step of driving adds on a plane is below it.
+    pub penetration_tolerance: f64,
+    /// Whether the solver starts from the last step's impulses. Default true.
+    pub warm_start: bool,
+    /// Options of the contact solver.
+    pub solver: SolverOptions,
+    /// Newton variant: stop when no velocity changes by more than this, relative to 1 m/s and to the largest. Default 1e-12.
+    pub newton_tolerance: f64,
+    /// Newton variant: most iterations. Default 20.
+    pub newton_max_iterations: usize,
+}
+
+impl Default for StepOptions {
+    fn default() -> Self {
+        Self {
+            gravity: Vector3::new(0.0, -9.81, 0.0),
+            friction_coefficient: 0.7,
+            restitution: 0.0,
+            time_step: 0.005,
+            theta: 0.5,
+            forecast: 0.5,
+            variant: Variant::default(),
+            stabilisation: Stabilisation::default(),
+            penetration_tolerance: 1e-8,
+            warm_start: true,
+            solver: SolverOptions::default(),
+            newton_tolerance: 1e-12,
+            newton_max_iterations: 20,
+        }
+    }
+}
+
+impl StepOptions {
+    /// Checks every range.
+    ///
+    /// # Errors
+    /// The first option out of its range.
+    pub fn check(&self) -> Result<(), OptionsError> {
+        let demand = |field, value: f64, is_in: bool, range| {
+            if value.is_finite() && is_in { Ok(()) } else { Err(OptionsError::OutOfRange { field, range, value }) }
+        };
+        for value in self.gravity.iter() {
+            demand("gravity", *value, true, "finite")?;
+        }
+        let (mu, e, h) = (self.friction_coefficient, self.restitution, self.time_step);
+        demand("friction", mu, mu >= 0.0, "finite and not negative")?;
+        demand("restitution", e, (0.0..=1.0).contains(&e), "in [0, 1]")?;
+        demand("time_step", h, h > 0.0, "finite and positive")?;
+        demand("theta", self.theta, (0.5..=1.0).contains(&self.theta), "in [0.5, 1]")?;
+        demand("forecast", self.forecast, (0.0..=1.0).contains(&self.forecast), "in [0, 1]")?;
+        let depth = self.penetration_tolerance;
+        demand("penetration_tolerance", depth, depth >= 0.0, "finite and not negative")?;
+        let tolerance = self.solver.tolerance;
+        demand("tolerance", tolerance, tolerance > 0.0, "finite and positive")?;
+        let iterations = self.solver.max_newton_steps.min(self.solver.max_sweeps) as f64;
+        demand("max_iterations", iterations, iterations >= 1.0, "at least 1")
+    }
+}

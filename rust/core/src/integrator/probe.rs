@@ -1,0 +1,39 @@
+//! Where the time of a step goes.
+
+/// Part of a step that has just ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Phase {
+    /// Configuration of the evaluation and forward kinematics.
+    Kinematics,
+    /// Search for contacts.
+    Detection,
+    /// Composite rigid bodies.
+    MassMatrix,
+    /// Recursive Newton–Euler, commands.
+    Bias,
+    /// `Lᵀ D L` and the free velocity.
+    Factor,
+    /// Contact Jacobians and W.
+    Delassus,
+    /// Friction-contact problem.
+    Solve,
+    /// Impulses to velocity, new configuration.
+    Update,
+    /// Projection of positions.
+    Projection,
+}
+
+/// Hears when each part of a step ends.
+pub trait Probe {
+    /// `phase` has just ended.
+    fn end(&mut self, phase: Phase);
+}
+
+/// Hears nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoProbe;
+
+impl Probe for NoProbe {
+    #[inline]
+    fn end(&mut self, _phase: Phase) {}
+}

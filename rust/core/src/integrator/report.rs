@@ -1,0 +1,48 @@
+//! What a step says of itself.
+
+/// Whether the equations of the step were solved to their tolerance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StepStatus {
+    /// They were.
+    #[default]
+    Converged,
+    /// The contact solver, or Newton's iteration, stopped above its tolerance; the state is the best it had.
+    NotConverged,
+}
+
+/// Report of a step, or of the worst of several.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StepReport {
+    /// Worst status.
+    pub status: StepStatus,
+    /// Steps taken.
+    pub steps: usize,
+    /// Iterations of the contact solver, all steps together.
+    pub iterations: usize,
+    /// Newton iterations on the forces, all steps together (0 in the linearised variant).
+    pub newton_iterations: usize,
+    /// Largest natural-map residual, recomputed from the impulses.
+    pub residual: f64,
+    /// Most contacts in a step.
+    pub n_contacts: usize,
+}
+
+impl StepReport {
+    /// Whether every step was solved to tolerance.
+    #[must_use]
+    pub fn is_converged(&self) -> bool {
+        self.status == StepStatus::Converged
+    }
+
+    /// Adds the report of a later step.
+    pub fn merge(&mut self, later: &Self) {
+        if later.status == StepStatus::NotConverged {
+            self.status = StepStatus::NotConverged;
+        }
+        self.steps += later.steps;
+        self.iterations += later.iterations;
+        self.newton_iterations += later.newton_iterations;
+        self.residual = self.residual.max(later.residual);
+        self.n_contacts = self.n_contacts.max(later.n_contacts);
+    }
+}

@@ -1,0 +1,193 @@
+//! The model as data: what a rover's file says, readable and writable, not yet checked.
+//!
+//! [`Model::from_description`](super::Model::from_description) checks it and computes the tree.
+
+use serde::{Deserialize, Serialize};
+
+use super::error::ModelError;
+
+/// The built-in rover: Table 4.1 and Fig. 4.5 of the report, in SI units.
+const ROVER: &str = include_str!("../../models/rover.toml");
+
+/// A tree of solids under a free base, with its wheels.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelDescription {
+    /// Name of the machine.
+    pub name: String,
+    /// Solids, parents before children; the first is the free base. Their order is the order of the coordinates.
+    pub solids: Vec<SolidDescription>,
+    /// Wheels in the order of every public array.
+    #[serde(default)]
+    pub wheels: Vec<WheelDescription>,
+}
+
+/// One solid and the revolute joint that carries it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolidDescription {
+    /// Name of the solid and of its joint.
+    pub name: String,
+    /// Name of the solid that carries it; none for the base.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parent: Option<String>,
+    /// Origin of the frame in the parent's frame, m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position: Option<[f64; 3]>,
+    /// Direction of the revolute joint, the same in both frames; need not be normalised.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<[f64; 3]>,
+    /// Mass, kg.
+    pub mass: f64,
+    /// Shape: gives the inertia and the looks.
+    pub shape: Shape,
+    /// Mass centre in the solid's frame, m; the origin by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub centre_of_mass: Option<[f64; 3]>,
+    /// Inertia about the mass centre, frame axes, kg m²: xx, yy, zz, xy, xz, yz. From the shape by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inertia: Option<[f64; 6]>,
+    /// Whether its box touches the ground.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub collides: bool,
+    /// Gains with which the joint is held at a set-point.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hold: Option<Hold>,
+}
+
+/// Gains of a joint held at a set-point: `τ = −stiffness (q − q*) − damping q̇`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hold {
+    /// N m/rad.
+    pub stiffness: f64,
+    /// N m s/rad.
+    pub damping: f64,
+}
+
+/// Shape of a solid, centred at its mass centre.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
+pub enum Shape {
+    /// Box of edge lengths `size` along x, y, z (m).
+    Box {
+        /// Edge lengths, m.
+        size: [f64; 3],
+    },
+    /// Solid cylinder about y.
+    Cylinder {
+        /// m.
+        radius: f64,
+        /// Along y, m.
+        height: f64,
+    },
+    /// Thin disc about z.
+    Disc {
+        /// m.
+        radius: f64,
+    },
+}
+
+impl Shape {
+    /// Principal inertias about the centre for a mass `m` (kg m²), Fig. 4.5 of the report.
+    #[must_use]
+    pub fn inertia(&self, m: f64) -> [f64; 3] {
+        match *self {
+            Self::Box { size: [a, b, c] } => {
+                [m / 12.0 * (b * b + c * c), m / 12.0 * (a * a + c * c), m / 12.0 * (a * a + b * b)]
+            }
+            Self::Cylinder { radius: r, height: h } => {
+                let across = m / 12.0 * (3.0 * r * r + h * h);
+                [across, m * r * r / 2.0, across]
+            }
+            Self::Disc { radius: r } => [m * r * r / 4.0, m * r * r / 4.0, m * r * r / 2.0],
+        }
+    }
+}
+
+/// A wheel: a disc of no width, fixed to a solid.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WheelDescription {
+    /// Short name, such as `FL`.
+    pub name: String,
+    /// The solid that turns; the wheel's centre is its origin.
+    pub solid: String,
+    /// Direction of the axle in the solid's frame.
+    pub axle: [f64; 3],
+    /// Contact radius, m.
+    pub radius: f64,
+    /// Largest driving torque, N m.
+    pub torque_limit: f64,
+    /// 1 or −1: joint torque of a positive (forward) command.
+    pub drive_sign: f64,
+    /// The solid whose joint steers it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steering: Option<String>,
+    /// Largest steering set-point either way, rad.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steering_limit: Option<f64>,
+}
+
+impl ModelDescription {
+    /// The built-in rover.
+    ///
+    /// # Panics
+    /// If the file that was built in is not readable, which the tests exclude.
+    #[must_use]
+    pub fn rover() -> Self {
+        let parsed = Self::from_toml(ROVER);
+        assert!(parsed.is_ok(), "the built-in rover is readable");
+        parsed.unwrap_or_else(|_| Self { name: String::new(), solids: Vec::new(), wheels: Vec::new() })
+    }
+
+    /// Reads TOML.
+    ///
+    /// # Errors
+    /// [`ModelError::Unreadable`] with line and column.
+    pub fn from_toml(text: &str) -> Result<Self, ModelError> {
+        toml::from_str(text).map_err(|e| ModelError::Unreadable { message: e.to_string() })
+    }
+
+    /// Writes TOML that [`Self::from_toml`] reads back to the same description.
+    ///
+    /// # Errors
+    /// [`ModelError::Unreadable`] where a value has no TOML form.
+    pub fn to_toml(&self) -> Result<String, ModelError> {
+        toml::to_string(self).map_err(|e| ModelError::Unreadable { message: e.to_string() })
+    }
+
+    /// Reads JSON.
+    ///
+    /// # Errors
+    /// [`ModelError::Unreadable`] with line and column.
+    pub fn from_json(text: &str) -> Result<Self, ModelError> {
+        serde_json::from_str(text).map_err(|e| ModelError::Unreadable { message: e.to_string() })
+    }
+
+    /// Writes JSON.
+    ///
+    /// # Errors
+    /// [`ModelError::Unreadable`] where a value has no JSON form.
+    pub fn to_json(&self) -> Result<String, ModelError> {
+        serde_json::to_string(self).map_err(|e| ModelError::Unreadable { message: e.to_string() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rover_survives_both_formats() {
+        let rover = ModelDescription::rover();
+        assert_eq!(ModelDescription::from_toml(&rover.to_toml().unwrap()).unwrap(), rover);
+        assert_eq!(ModelDescription::from_json(&rover.to_json().unwrap()).unwrap(), rover);
+    }
+
+    #[test]
+    fn unknown_fields_are_refused_by_name() {
+        let error = ModelDescription::from_toml("name = 'x'\nsolids = []\nwheles = []").unwrap_err();
+        assert!(error.to_string().contains("wheles"), "{error}");
+    }
+}

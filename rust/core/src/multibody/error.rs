@@ -1,0 +1,172 @@
+//! What can be wrong with a model's description or with a state.
+
+use thiserror::Error;
+
+/// A model description that is not readable or not physical. Each variant names the field and what it held.
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum ModelError {
+    /// The text is not the format it should be.
+    #[error("the model description cannot be read: {message}")]
+    Unreadable {
+        /// The parser's own words, with line and column.
+        message: String,
+    },
+    /// No solids at all.
+    #[error("solids: a model needs at least one solid, the free base")]
+    NoSolids,
+    /// Two things of one name.
+    #[error("{field}: the name {name:?} is used twice")]
+    DuplicateName {
+        /// Path of the second use.
+        field: String,
+        /// The name.
+        name: String,
+    },
+    /// A parent that is not listed before its child, or a base that has one.
+    #[error("{field}: {name:?} is not a solid listed before this one")]
+    UnknownParent {
+        /// Path of the field.
+        field: String,
+        /// What was given.
+        name: String,
+    },
+    /// A reference to something that is not there.
+    #[error("{field}: there is no solid or joint named {name:?}")]
+    UnknownName {
+        /// Path of the field.
+        field: String,
+        /// What was given.
+        name: String,
+    },
+    /// A field that must be there is missing.
+    #[error("{field}: is missing")]
+    Missing {
+        /// Path of the field.
+        field: String,
+    },
+    /// A field that only another kind of solid may have.
+    #[error("{field}: the free base (the first solid) has no {what}")]
+    NotForBase {
+        /// Path of the field.
+        field: String,
+        /// The field's name.
+        what: &'static str,
+    },
+    /// NaN or infinite.
+    #[error("{field}: must be finite, is {value}")]
+    NotFinite {
+        /// Path of the field.
+        field: String,
+        /// What was given.
+        value: f64,
+    },
+    /// Zero or negative where a positive number is needed.
+    #[error("{field}: must be positive, is {value}")]
+    NotPositive {
+        /// Path of the field.
+        field: String,
+        /// What was given.
+        value: f64,
+    },
+    /// Negative where zero or more is needed.
+    #[error("{field}: must not be negative, is {value}")]
+    Negative {
+        /// Path of the field.
+        field: String,
+        /// What was given.
+        value: f64,
+    },
+    /// An axis of no direction.
+    #[error("{field}: an axis must have a direction, is {value:?}")]
+    NoDirection {
+        /// Path of the field.
+        field: String,
+        /// What was given.
+        value: [f64; 3],
+    },
+    /// A sign that is not ±1.
+    #[error("{field}: must be 1 or -1, is {value}")]
+    NotASign {
+        /// Path of the field.
+        field: String,
+        /// What was given.
+        value: f64,
+    },
+    /// Principal inertias that no mass distribution has.
+    #[error("{field}: no body has the principal inertias {principal:?} (each must be positive and at most the sum of the others)")]
+    ImpossibleInertia {
+        /// Path of the field.
+        field: String,
+        /// Principal moments, kg m².
+        principal: [f64; 3],
+    },
+    /// `collides` on something that is not a box.
+    #[error("{field}: only a solid whose shape is a box can collide")]
+    CollidesWithoutBox {
+        /// Path of the field.
+        field: String,
+    },
+    /// A steering limit of a wheel that has no steering joint.
+    #[error("{field}: the steering solid {name:?} is not an ancestor of the wheel")]
+    SteeringNotAbove {
+        /// Path of the field.
+        field: String,
+        /// What was given.
+        name: String,
+    },
+}
+
+impl ModelError {
+    /// Path of the offending field, such as `solids[3].mass`.
+    #[must_use]
+    pub fn field(&self) -> &str {
+        match self {
+            Self::Unreadable { .. } => "text",
+            Self::NoSolids => "solids",
+            Self::DuplicateName { field, .. }
+            | Self::UnknownParent { field, .. }
+            | Self::UnknownName { field, .. }
+            | Self::Missing { field }
+            | Self::NotForBase { field, .. }
+            | Self::NotFinite { field, .. }
+            | Self::NotPositive { field, .. }
+            | Self::Negative { field, .. }
+            | Self::NoDirection { field, .. }
+            | Self::NotASign { field, .. }
+            | Self::ImpossibleInertia { field, .. }
+            | Self::CollidesWithoutBox { field }
+            | Self::SteeringNotAbove { field, .. } => field,
+        }
+    }
+}
+
+/// A state that cannot be taken.
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum StateError {
+    /// Wrong number of entries.
+    #[error("{field}: needs {expected} entries, has {actual}")]
+    Length {
+        /// `q` or `qdot`.
+        field: &'static str,
+        /// What the model needs.
+        expected: usize,
+        /// What was given.
+        actual: usize,
+    },
+    /// NaN or infinite.
+    #[error("{field}[{index}]: must be finite, is {value}")]
+    NotFinite {
+        /// `q` or `qdot`.
+        field: &'static str,
+        /// Which entry.
+        index: usize,
+        /// What was given.
+        value: f64,
+    },
+    /// The report's angles cannot express a rate there.
+    #[error("q[4]: the report's coordinates are singular at a heading of 90 degrees, is {heading} rad")]
+    SingularCardan {
+        /// Middle Cardan angle, rad.
+        heading: f64,
+    },
+}

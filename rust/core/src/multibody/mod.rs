@@ -1,0 +1,25 @@
+//! The tree of solids: from its description to mass matrix, bias, energy and momentum.
+//!
+//! All spatial quantities of a step are taken in **world axes about the trunk origin**: composite
+//! inertias then add without any transformation, and a rover far from the world's origin loses no digit.
+
+pub mod bias;
+pub mod coordinates;
+pub mod description;
+pub mod error;
+pub mod joint;
+pub mod kinematics;
+pub mod mass_matrix;
+pub mod model;
+pub mod momentum;
+pub mod state;
+
+pub use bias::bias;
+pub use description::{Hold, ModelDescription, Shape, SolidDescription, WheelDescription};
+pub use error::{ModelError, StateError};
+pub use joint::JointAxis;
+pub use kinematics::Kinematics;
+pub use mass_matrix::{FactoredMassMatrix, MassMatrix};
+pub use model::{Body, Frame, Model, Wheel};
+pub use momentum::{Energy, Momentum};
+pub use state::{Configuration, State};

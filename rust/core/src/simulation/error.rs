@@ -1,0 +1,72 @@
+//! Commands and snapshots that cannot be taken.
+
+use thiserror::Error;
+
+/// A torque or set-point that cannot be taken.
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum CommandError {
+    /// Wrong number of entries.
+    #[error("{field}: needs {expected} entries, has {actual}")]
+    Length {
+        /// Name of the argument.
+        field: &'static str,
+        /// What the model needs.
+        expected: usize,
+        /// What was given.
+        actual: usize,
+    },
+    /// NaN or infinite.
+    #[error("{field}[{index}]: must be finite, is {value}")]
+    NotFinite {
+        /// Name of the argument.
+        field: &'static str,
+        /// Which entry.
+        index: usize,
+        /// What was given.
+        value: f64,
+    },
+    /// Negative gain.
+    #[error("{field}: must not be negative, is {value}")]
+    Negative {
+        /// Name of the argument.
+        field: &'static str,
+        /// What was given.
+        value: f64,
+    },
+    /// A set-point beyond the actuator's range.
+    #[error("{field}[{index}]: must be within ±{limit} rad, is {value}")]
+    BeyondLimit {
+        /// Name of the argument.
+        field: &'static str,
+        /// Which entry.
+        index: usize,
+        /// What was given, rad.
+        value: f64,
+        /// rad.
+        limit: f64,
+    },
+    /// A joint that the model does not have, or that is locked.
+    #[error("{field}: there is no free joint named {name:?}")]
+    UnknownJoint {
+        /// Name of the argument.
+        field: &'static str,
+        /// What was given.
+        name: String,
+    },
+}
+
+/// A snapshot that does not fit the simulation.
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum SnapshotError {
+    /// Taken from a model of another size.
+    #[error("snapshot: belongs to a model of {actual} joints, this one has {expected}")]
+    OtherModel {
+        /// Joints of this model.
+        expected: usize,
+        /// Joints in the snapshot.
+        actual: usize,
+    },
+    /// Not finite, or with contacts that the model cannot have.
+    #[error("snapshot: its contents are damaged")]
+    Damaged,
+}

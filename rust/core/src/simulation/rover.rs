@@ -1,0 +1,408 @@
+//! The simulation: one machine, one terrain, one state.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+
+use super::error::{CommandError, SnapshotError};
+use super::profile::Stopwatch;
+use super::snapshot::Snapshot;
+use crate::contact::{Contact, ContactFrame, Part, detection::wheel_contacts};
+use crate::geometry::Terrain;
+use crate::integrator::{
+    ActiveContact, Command, HeldJoint, NoProbe, OptionsError, Probe, Scene, StepError, StepOptions, StepReport, WarmStart,
+    Workspace,
+};
+use crate::multibody::{Configuration, Energy, Kinematics, Model, Momentum, State, momentum};
+
+/// A machine on a terrain. Model and terrain are shared; everything else is its own.
+#[derive(Clone)]
+pub struct Simulation {
+    model: Arc<Model>,
+    terrain: Arc<dyn Terrain>,
+    options: StepOptions,
+    state: State,
+    command: Command,
+    wheel_torque: Vec<f64>,
+    joint_torque: Vec<f64>,
+    warm_start: WarmStart,
+    workspace: Workspace,
+    active: Vec<ActiveContact>,
+}
+
+impl Simulation {
+    /// At rest in the zero configuration; steering joints held at zero, all others free.
+    ///
+    /// # Errors
+    /// An option out of its range.
+    pub fn new(model: Arc<Model>, terrain: Arc<dyn Terrain>, options: StepOptions) -> Result<Self, OptionsError> {
+        options.check()?;
+        let mut command = Command::idle(&model);
+        for wheel in model.wheels() {
+            if let Some(k) = wheel.steering {
+                let hold = model.bodies()[k - 5].hold;
+                command.held[k - 6] =
+                    Some(HeldJoint { set_point: 0.0, stiffness: hold.stiffness, damping: hold.damping });
+            }
+        }
+        Ok(Self {
+            state: State::zero(&model),
+            wheel_torque: vec![0.0; model.wheels().len()],
+            joint_torque: vec![0.0; model.n_joints()],
+            warm_start: WarmStart::with_capacity(&model),
+            workspace: Workspace::new(&model),
+            active: Vec::with_capacity(3 * model.wheels().len() + 4 * model.boxes().len()),
+            command,
+            model,
+            terrain,
+            options,
+        })
+    }
+
+    /// The machine.
+    #[must_use]
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    /// The ground.
+    #[must_use]
+    pub fn terrain(&self) -> &Arc<dyn Terrain> {
+        &self.terrain
+    }
+
+    /// Options of every step.
+    #[must_use]
+    pub fn options(&self) -> &StepOptions {
+        &self.options
+    }
+
+    /// Where it is and how fast.
+    #[must_use]
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Torques and held joints.
+    #[must_use]
+    pub fn command(&self) -> &Command {
+        &self.command
+    }
+
+    /// Contacts of the last step.
+    #[must_use]
+    pub fn contacts(&self) -> &[ActiveContact] {
+        &self.active
+    }
+
+    /// The last step's friction-contact problem: W (row-major), free velocity, friction.
+    #[must_use]
+    pub fn last_problem(&self) -> (&[f64], &[f64], &[f64]) {
+        self.workspace.last_problem()
+    }
+
+    /// Sets configuration and velocity, as checked by [`crate::multibody::coordinates`]; time 0, warm start forgotten.
+    ///
+    /// # Panics
+    /// If the sizes are another model's.
+    pub fn set_state(&mut self, configuration: Configuration, v: Vec<f64>) {
+        assert_eq!(configuration.joints.len(), self.model.n_joints(), "invariant: a configuration of this model");
+        assert_eq!(v.len(), self.model.nv(), "invariant: a velocity of this model");
+        self.state = State { configuration, v, time: 0.0 };
+        self.warm_start.impulses.clear();
+        self.active.clear();
+    }
+
+    /// Driving torque of each wheel, positive forward, as it acts (N m).
+    #[must_use]
+    pub fn wheel_torques(&self) -> &[f64] {
+        &self.wheel_torque
+    }
+
+    /// Sets the driving torques (N m, positive forward); each saturates at its wheel's limit.
+    ///
+    /// # Errors
+    /// Wrong length or an entry that is not finite; nothing is changed then.
+    pub fn set_wheel_torques(&mut self, torques: &[f64]) -> Result<(), CommandError> {
+        check("torques", torques, self.model.wheels().len())?;
+        for ((own, torque), wheel) in self.wheel_torque.iter_mut().zip(torques).zip(self.model.wheels()) {
+            *own = torque.clamp(-wheel.torque_limit, wheel.torque_limit);
+        }
+        self.combine_torques();
+        Ok(())
+    }
+
+    /// Sets torques about the joint axes (n_joints, N m) that come on top of the wheels' and have no limit.
+    ///
+    /// # Errors
+    /// Wrong length or an entry that is not finite; nothing is changed then.
+    pub fn set_joint_torques(&mut self, torques: &[f64]) -> Result<(), CommandError> {
+        check("torques", torques, self.model.n_joints())?;
+        self.joint_torque.copy_from_slice(torques);
+        self.combine_torques();
+        Ok(())
+    }
+
+    fn combine_torques(&mut self) {
+        self.command.torque.copy_from_slice(&self.joint_torque);
+        for (wheel, torque) in self.model.wheels().iter().zip(&self.wheel_torque) {
+            if let Some(k) = wheel.joint {
+                self.command.torque[k - 6] += wheel.drive_sign * torque;
+            }
+        }
+    }
+
+    /// Steering set-point of each wheel, rad; 0 where its steering is not held or is locked.
+    #[must_use]
+    pub fn steering(&self) -> Vec<f64> {
+        let of = |k: usize| self.command.held[k - 6].map_or(0.0, |h| h.set_point);
+        self.model.wheels().iter().map(|w| w.steering.map_or(0.0, of)).collect()
+    }
+
+    /// Holds the steering joints at set-points (rad, one a wheel) with the model's gains.
+    ///
+    /// # Errors
+    /// Wrong length, not finite, beyond the wheel's limit, or nonzero where there is no free steering joint.
+    pub fn set_steering(&mut self, set_points: &[f64]) -> Result<(), CommandError> {
+        check("set_points", set_points, self.model.wheels().len())?;
+        for (index, (&value, wheel)) in set_points.iter().zip(self.model.wheels()).enumerate() {
+            let limit = if wheel.steering.is_some() { wheel.steering_limit } else { 0.0 };
+            if value.abs() > limit * (1.0 + 1e-12) {
+                return Err(CommandError::BeyondLimit { field: "set_points", index, value, limit });
+            }
+        }
+        for (&set_point, wheel) in set_points.iter().zip(self.model.wheels()) {
+            if let Some(k) = wheel.steering {
+                let hold = self.model.bodies()[k - 5].hold;
+                let held = self.command.held[k - 6];
+                let (stiffness, damping) =
+                    held.map_or((hold.stiffness, hold.damping), |h| (h.stiffness, h.damping));
+                self.command.held[k - 6] = Some(HeldJoint { set_point, stiffness, damping });
+            }
+        }
+        Ok(())
+    }
+
+    /// Holds joints by name; set-points default to where they are, gains to the model's.
+    ///
+    /// # Errors
+    /// An unknown joint, a wrong number of set-points, a gain that is negative or not finite; nothing is changed then.
+    pub fn hold(
+        &mut self,
+        joints: &[String],
+        set_points: Option<&[f64]>,
+        stiffness: Option<f64>,
+        damping: Option<f64>,
+    ) -> Result<(), CommandError> {
+        let indices = self.joint_indices(joints)?;
+        if let Some(points) = set_points {
+            check("set_points", points, joints.len())?;
+        }
+        for (field, gain) in [("stiffness", stiffness), ("damping", damping)] {
+            if let Some(value) = gain {
+                check(field, &[value], 1)?;
+                if value < 0.0 {
+                    return Err(CommandError::Negative { field, value });
+                }
+            }
+        }
+        for (i, &j) in indices.iter().enumerate() {
+            let hold = self.model.bodies()[j + 1].hold;
+            self.command.held[j] = Some(HeldJoint {
+                set_point: set_points.map_or(self.state.configuration.joints[j], |p| p[i]),
+                stiffness: stiffness.unwrap_or(hold.stiffness),
+                damping: damping.unwrap_or(hold.damping),
+            });
+        }
+        Ok(())
+    }
+
+    /// Lets joints go by name.
+    ///
+    /// # Errors
+    /// An unknown joint; nothing is changed then.
+    pub fn release(&mut self, joints: &[String]) -> Result<(), CommandError> {
+        for j in self.joint_indices(joints)? {
+            self.command.held[j] = None;
+        }
+        Ok(())
+    }
+
+    /// Holds all wheels where they are and takes their torques away.
+    pub fn brake(&mut self) {
+        self.wheel_torque.fill(0.0);
+        self.combine_torques();
+        for wheel in self.model.wheels() {
+            if let Some(k) = wheel.joint {
+                let hold = self.model.bodies()[k - 5].hold;
+                let set_point = self.state.configuration.joints[k - 6];
+                self.command.held[k - 6] =
+                    Some(HeldJoint { set_point, stiffness: hold.stiffness, damping: hold.damping });
+            }
+        }
+    }
+
+    fn joint_indices(&self, joints: &[String]) -> Result<Vec<usize>, CommandError> {
+        let index = |name: &String| {
+            let found = self.model.joint_index(name).map(|k| k - 6);
+            found.ok_or_else(|| CommandError::UnknownJoint { field: "joints", name: name.clone() })
+        };
+        joints.iter().map(index).collect()
+    }
+
+    /// Takes `n` steps, or stops at the first that fails, keeping the state before it.
+    ///
+    /// # Errors
+    /// See [`StepError`]. A solver that did not converge is no error: see the report.
+    pub fn step(&mut self, n: usize) -> Result<StepReport, StepError> {
+        self.step_probed(n, &mut NoProbe)
+    }
+
+    fn step_probed(&mut self, n: usize, probe: &mut dyn Probe) -> Result<StepReport, StepError> {
+        let integrator = self.options.variant.integrator();
+        let scene = Scene { model: &self.model, terrain: &*self.terrain, options: &self.options };
+        let mut total = StepReport::default();
+        for _ in 0..n {
+            let report = integrator.step(
+                &scene,
+                &self.command,
+                &mut self.state,
+                &mut self.warm_start,
+                &mut self.workspace,
+                probe,
+            )?;
+            total.merge(&report);
+            self.active.clear();
+            self.active.extend_from_slice(self.workspace.active());
+        }
+        Ok(total)
+    }
+
+    /// Takes `n` steps of a copy and says where their time went.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn profile(&self, n: usize) -> Result<Stopwatch, StepError> {
+        let mut copy = self.clone();
+        copy.step(n.min(10))?;
+        let mut stopwatch = Stopwatch::start();
+        copy.step_probed(n, &mut stopwatch)?;
+        stopwatch.finish(n);
+        Ok(stopwatch)
+    }
+
+    /// Poses of the bodies now.
+    #[must_use]
+    pub fn kinematics(&self) -> Kinematics {
+        Kinematics::of(&self.model, &self.state.configuration)
+    }
+
+    /// Kinetic and potential energy now, J.
+    #[must_use]
+    pub fn energy(&self) -> Energy {
+        momentum::energy(&self.model, &self.kinematics(), &self.state.v, &self.options.gravity)
+    }
+
+    /// Linear momentum, and angular momentum about the world's origin.
+    #[must_use]
+    pub fn momentum(&self) -> Momentum {
+        momentum::momentum(&self.model, &self.kinematics(), &self.state.v)
+    }
+
+    /// Mass centre, world, m.
+    #[must_use]
+    pub fn centre_of_mass(&self) -> Vector3<f64> {
+        momentum::centre_of_mass(&self.model, &self.kinematics())
+    }
+
+    /// Nearest point, frame and gap of every wheel now.
+    #[must_use]
+    pub fn wheel_contacts(&self) -> Vec<Contact> {
+        wheel_contacts(&self.model, &self.kinematics(), &*self.terrain)
+    }
+
+    /// Mean contact force of the last step on every wheel along its frame's n, t, b, N.
+    ///
+    /// Several contacts of one wheel are summed in the frame of its first.
+    #[must_use]
+    pub fn wheel_forces(&self) -> Vec<[f64; 3]> {
+        let mut forces = vec![[0.0; 3]; self.model.wheels().len()];
+        let mut frames: Vec<Option<ContactFrame>> = vec![None; forces.len()];
+        for active in &self.active {
+            if let Part::Wheel(i) = active.contact.part {
+                let [n, t, b] = active.contact.frame.rows();
+                let [p_n, p_t, p_b] = active.impulse;
+                let impulse = n * p_n + t * p_t + b * p_b;
+                let frame = frames[i].get_or_insert(active.contact.frame);
+                for (force, d) in forces[i].iter_mut().zip(frame.rows()) {
+                    *force += impulse.dot(&d) / self.options.time_step;
+                }
+            }
+        }
+        forces
+    }
+
+    /// Mean normal force of the last step on all that is no wheel, N.
+    #[must_use]
+    pub fn body_force(&self) -> f64 {
+        let boxes = self.active.iter().filter(|a| matches!(a.contact.part, Part::Box(_)));
+        boxes.map(|a| a.impulse[0]).sum::<f64>() / self.options.time_step
+    }
+
+    /// Everything that is needed to continue bit for bit.
+    #[must_use]
+    pub fn snapshot(&self) -> Snapshot {
+        Snapshot {
+            state: self.state.clone(),
+            command: self.command.clone(),
+            wheel_torque: self.wheel_torque.clone(),
+            joint_torque: self.joint_torque.clone(),
+            warm_start: self.warm_start.clone(),
+            active: self.active.clone(),
+        }
+    }
+
+    /// Goes back to a snapshot.
+    ///
+    /// # Errors
+    /// A snapshot of another model or with damaged contents; nothing is changed then.
+    pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), SnapshotError> {
+        let (expected, actual) = (self.model.n_joints(), snapshot.state.configuration.joints.len());
+        if expected != actual || snapshot.wheel_torque.len() != self.model.wheels().len() {
+            return Err(SnapshotError::OtherModel { expected, actual });
+        }
+        let command = &snapshot.command;
+        let held = command.held.iter().flatten().flat_map(|h| [h.set_point, h.stiffness, h.damping]);
+        let torques = command.torque.iter().chain(&snapshot.wheel_torque).chain(&snapshot.joint_torque);
+        let is_sound = snapshot.state.is_finite()
+            && snapshot.state.v.len() == self.model.nv()
+            && [&command.torque, &snapshot.joint_torque].iter().all(|t| t.len() == expected)
+            && command.held.len() == expected
+            && torques.copied().chain(held).all(f64::is_finite)
+            && snapshot.warm_start.impulses.iter().all(|(_, p)| p.iter().all(|x| x.is_finite()))
+            && snapshot.active.iter().all(|a| match a.contact.part {
+                Part::Wheel(i) => i < self.model.wheels().len(),
+                Part::Box(i) => i < self.model.boxes().len(),
+            });
+        if !is_sound {
+            return Err(SnapshotError::Damaged);
+        }
+        self.state.clone_from(&snapshot.state);
+        self.command.clone_from(&snapshot.command);
+        self.wheel_torque.clone_from(&snapshot.wheel_torque);
+        self.joint_torque.clone_from(&snapshot.joint_torque);
+        self.warm_start.clone_from(&snapshot.warm_start);
+        self.active.clone_from(&snapshot.active);
+        Ok(())
+    }
+}
+
+fn check(field: &'static str, values: &[f64], expected: usize) -> Result<(), CommandError> {
+    if values.len() != expected {
+        return Err(CommandError::Length { field, expected, actual: values.len() });
+    }
+    match values.iter().position(|x| !x.is_finite()) {
+        Some(index) => Err(CommandError::NotFinite { field, index, value: values[index] }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,167 @@
+//! Attitude: the exponential map and the two angle triples that users see.
+//!
+//! The state carries a unit quaternion `R_WB`; nothing in a step is singular. Angles are for
+//! people and for comparison with the references:
+//!
+//! - public `q`: `R = Ry(heading) Rz(pitch) Rx(roll)`, singular only with the nose straight up;
+//! - report: `R = Rz(q5) Ry(q4) Rx(q3)`, singular at a heading of 90 degrees.
+
+use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+
+/// Rotation by the vector `phi` (rad, world axes): the quaternion `exp(phi / 2)`.
+///
+/// The series at small angles keeps full precision where `sin(x) / x` would not.
+#[must_use]
+pub fn exp_rotation(phi: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let half2 = 0.25 * phi.norm_squared();
+    let (w, s) = if half2 < 1e-4 {
+        // sin(x)/x and cos(x) with x² = half2: error below 1e-19 at the switch.
+        (
+            1.0 - half2 / 2.0 * (1.0 - half2 / 12.0 * (1.0 - half2 / 30.0)),
+            0.5 * (1.0 - half2 / 6.0 * (1.0 - half2 / 20.0 * (1.0 - half2 / 42.0))),
+        )
+    } else {
+        let half = half2.sqrt();
+        (half.cos(), 0.5 * half.sin() / half)
+    };
+    UnitQuaternion::new_unchecked(Quaternion::new(w, s * phi.x, s * phi.y, s * phi.z))
+}
+
+/// Heading, pitch and roll (rad) of the public coordinates: `R = Ry(heading) Rz(pitch) Rx(roll)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeadingPitchRoll {
+    /// About the vertical y, positive to the left.
+    pub heading: f64,
+    /// About z, positive with the nose up.
+    pub pitch: f64,
+    /// About x, positive with the right side down.
+    pub roll: f64,
+}
+
+impl HeadingPitchRoll {
+    /// Angles of an attitude. With the nose straight up or down the heading is taken as 0.
+    #[must_use]
+    pub fn from_rotation(R: &Matrix3<f64>) -> Self {
+        let pitch = R[(1, 0)].clamp(-1.0, 1.0).asin();
+        if R[(0, 0)].hypot(R[(2, 0)]) < 1e-9 {
+            let roll = R[(2, 1)].atan2(R[(2, 2)]);
+            return Self { heading: 0.0, pitch, roll };
+        }
+        Self {
+            heading: (-R[(2, 0)]).atan2(R[(0, 0)]),
+            pitch,
+            roll: (-R[(1, 2)]).atan2(R[(1, 1)]),
+        }
+    }
+
+    /// The attitude `R_WB` of these angles.
+    #[must_use]
+    pub fn to_quaternion(self) -> UnitQuaternion<f64> {
+        UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.heading)
+            * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.pitch)
+            * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.roll)
+    }
+}
+
+/// Cardan angles of the report about x, y, z (rad): `R = Rz(z) Ry(y) Rx(x)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CardanReport {
+    /// `q3`, about x.
+    pub x: f64,
+    /// `q4`, about y: the heading, where the triple is singular at ±90 degrees.
+    pub y: f64,
+    /// `q5`, about z.
+    pub z: f64,
+}
+
+impl CardanReport {
+    /// Angles of an attitude. At the singular heading the angle about z is taken as 0.
+    #[must_use]
+    pub fn from_rotation(R: &Matrix3<f64>) -> Self {
+        let y = (-R[(2, 0)]).clamp(-1.0, 1.0).asin();
+        if R[(0, 0)].hypot(R[(1, 0)]) < 1e-9 {
+            let x = (-R[(1, 2)]).atan2(R[(1, 1)]);
+            return Self { x, y, z: 0.0 };
+        }
+        Self { x: R[(2, 1)].atan2(R[(2, 2)]), y, z: R[(1, 0)].atan2(R[(0, 0)]) }
+    }
+
+    /// The attitude `R_WB` of these angles.
+    #[must_use]
+    pub fn to_quaternion(self) -> UnitQuaternion<f64> {
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.z)
+            * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.y)
+            * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.x)
+    }
+
+    /// `E` in `ω = E (ẋ, ẏ, ż)`: Cardan rates to world angular velocity.
+    #[must_use]
+    pub fn rate_matrix(self) -> Matrix3<f64> {
+        let Rz = Rotation3::from_axis_angle(&Vector3::z_axis(), self.z);
+        let Ry = Rotation3::from_axis_angle(&Vector3::y_axis(), self.y);
+        Matrix3::from_columns(&[Rz * (Ry * Vector3::x()), Rz * Vector3::y(), Vector3::z()])
+    }
+
+    /// `dE/dt (ẋ, ẏ, ż)`: the part of the angular acceleration that is quadratic in the rates.
+    #[must_use]
+    pub fn rate_matrix_derivative_times_rates(self, rates: &Vector3<f64>) -> Vector3<f64> {
+        let E = self.rate_matrix();
+        // Each column turns with the angles outside it: d/dt(Rz Ry x) = (ż z + ẏ Rz y) × column, ...
+        let w_z = Vector3::z() * rates.z;
+        let w_zy = w_z + E.column(1) * rates.y;
+        w_zy.cross(&(E.column(0) * rates.x)) + w_z.cross(&(E.column(1) * rates.y))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn matrix(q: UnitQuaternion<f64>) -> Matrix3<f64> {
+        *q.to_rotation_matrix().matrix()
+    }
+
+    proptest! {
+        #[test]
+        fn exponential_agrees_with_axis_angle(x in -3.0..3.0, y in -3.0..3.0, z in -3.0..3.0, scale in -12.0..0.0f64) {
+            let phi = Vector3::new(x, y, z) * scale.exp2();
+            let expected = UnitQuaternion::from_scaled_axis(phi);
+            prop_assert!((exp_rotation(&phi).coords - expected.coords).norm() < 1e-15);
+        }
+
+        #[test]
+        fn angles_return_the_attitude(a in -3.1..3.1, b in -1.5..1.5, c in -3.1..3.1) {
+            let hpr = HeadingPitchRoll { heading: a, pitch: b, roll: c };
+            let R = matrix(hpr.to_quaternion());
+            prop_assert!((matrix(HeadingPitchRoll::from_rotation(&R).to_quaternion()) - R).norm() < 1e-12);
+            let cardan = CardanReport { x: a, y: b, z: c };
+            let R = matrix(cardan.to_quaternion());
+            prop_assert!((matrix(CardanReport::from_rotation(&R).to_quaternion()) - R).norm() < 1e-12);
+        }
+
+        #[test]
+        fn rate_matrix_is_the_derivative_of_the_attitude(a in -3.0..3.0, b in -1.4..1.4, c in -3.0..3.0, da in -1.0..1.0, db in -1.0..1.0, dc in -1.0..1.0) {
+            let at = |t: f64| CardanReport { x: a + t * da, y: b + t * db, z: c + t * dc };
+            let rates = Vector3::new(da, db, dc);
+            let h = 1e-5;
+            let dR = (matrix(at(h).to_quaternion()) - matrix(at(-h).to_quaternion())) / (2.0 * h);
+            let w = at(0.0).rate_matrix() * rates;
+            prop_assert!((dR - w.cross_matrix() * matrix(at(0.0).to_quaternion())).norm() < 1e-8);
+            let dw = (at(h).rate_matrix() - at(-h).rate_matrix()) * rates / (2.0 * h);
+            prop_assert!((dw - at(0.0).rate_matrix_derivative_times_rates(&rates)).norm() < 1e-8);
+        }
+    }
+
+    #[test]
+    fn nose_straight_up_keeps_the_attitude() {
+        for pitch in [std::f64::consts::FRAC_PI_2, -std::f64::consts::FRAC_PI_2] {
+            let R = matrix(HeadingPitchRoll { heading: 0.3, pitch, roll: 0.4 }.to_quaternion());
+            let again = matrix(HeadingPitchRoll::from_rotation(&R).to_quaternion());
+            assert!((R - again).norm() < 1e-8);
+            let R = matrix(CardanReport { x: 0.3, y: pitch, z: 0.4 }.to_quaternion());
+            let again = matrix(CardanReport::from_rotation(&R).to_quaternion());
+            assert!((R - again).norm() < 1e-8);
+        }
+    }
+}
