@@ -25,6 +25,7 @@ default_role = "literal"  # docstrings write `code` as Markdown does
 nitpicky = False
 myst_heading_anchors = 3
 
+napoleon_use_ivar = True  # attributes in a class docstring document the fields, once
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_default_options = {"members": True, "undoc-members": True}

@@ -1,6 +1,6 @@
 """The report's figures 6.2 to 6.5, drawn from a recorded run.
 
-Ours in colour, one colour a wheel; a Siconos run of the same scene dashed in black where it exists; the report's own
+Ours in colour, one colour a wheel; a Siconos run of the same scene dotted in black where it exists; the report's own
 curves in grey or in a panel of their own, since they were made with other parameters (the data's `meta` says which).
 """
 
@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rover_gym.recording import MissingExtraError, Trajectory, read_trajectory
 from rover_gym.report import reference_data
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 WHEELS = ("FL", "FR", "ML", "BL", "MR", "BR")
@@ -77,101 +79,115 @@ def wheel_traces(figure: Figure, trajectory: Trajectory) -> None:
     """Figure 6.2: the paths of the six wheel centres, from above and in the report's perspective."""
     centres = trajectory["wheel_centres"]
     above, perspective = figure.subplots(1, 2)
+    curves = reference_data()["published"]["fig_6_2_wheel_traces"]["curves"].values()
+    for n, curve in enumerate(curves):
+        label = "" if n else "the report's: other mass table and torque"
+        perspective.plot(*np.array(curve).T, color="0.6", linewidth=0.9, linestyle="--", label=label)
     for i, wheel in enumerate(WHEELS):
-        above.plot(-centres[:, i, 2], centres[:, i, 0], color=COLOURS[wheel], label=NAMES[wheel])
-        above.plot(-centres[0, i, 2], centres[0, i, 0], "o", color=COLOURS[wheel], markersize=4)
-        perspective.plot(*_on_the_page(100.0 * centres[:, i].T), color=COLOURS[wheel])
+        colour = COLOURS[wheel]
+        above.plot(-centres[:, i, 2], centres[:, i, 0], color=colour, label=NAMES[wheel])
+        above.plot(-centres[0, i, 2], centres[0, i, 0], "o", color=colour, markersize=4)
+        perspective.plot(
+            *_on_the_page(100.0 * centres[:, i].T), color=colour, label="" if i else "ours, colours as left"
+        )
     above.set(title="from above; dots: the start", xlabel="to the left, -z (m)", ylabel="forward, x (m)")
     above.invert_xaxis()
     above.set_aspect("equal", adjustable="datalim")
     above.legend(title="wheel centre")
-
-    published = reference_data()["published"]["fig_6_2_wheel_traces"]["curves"]
-    for n, curve in enumerate(published.values()):
-        px, py = np.array(curve).T
-        perspective.plot(
-            px, py, color="0.55", linewidth=0.9, linestyle="--", label="" if n else "the report's (other parameters)"
-        )
     perspective.set(
-        title="in the report's perspective", xlabel="across its page (points)", ylabel="up its page (points)"
+        title="in the report's perspective", xlabel="across its page (pixels)", ylabel="up its page (pixels)"
     )
     perspective.legend()
-    figure.suptitle(f"Figure 6.2: traces of the wheels over {_duration(trajectory)}")
+    figure.suptitle(f"Figure 6.2: traces of the wheels over {trajectory['time'][-1]:g} s")
 
 
 def contact_distances(figure: Figure, trajectory: Trajectory) -> None:
     """Figure 6.3: the six gaps against time, with a close view of the ground."""
-    gaps = 100.0 * trajectory["wheel_gaps"]
     ours, published = figure.subplots(1, 2, sharey=True, sharex=True)
-    for i, wheel in enumerate(WHEELS):
-        ours.plot(trajectory["time"], gaps[:, i], color=COLOURS[wheel], label=NAMES[wheel])
-    reference = _finest_siconos()
-    for i in range(len(WHEELS)):
-        ours.plot(
-            reference["t"],
-            100.0 * np.array(reference["gap"])[:, i],
-            "k:",
-            linewidth=0.9,
-            label="" if i else f"Siconos 4.4, step {1e3 * reference['step']:g} ms",
-        )
-    for n, curve in enumerate(reference_data()["published"]["fig_6_3_gaps"]["curves"].values()):
-        k, gap = np.array(curve).T
-        published.plot(PUBLISHED_STEP * k, gap, color=COLOURS[WHEELS[n]])
-    ours.set(title=f"ours, step {_step(trajectory)}", xlabel="time (s)", ylabel="contact distance (cm)")
+    _plot_wheels(ours, trajectory["time"], 100.0 * trajectory["wheel_gaps"])
+    _plot_siconos(ours, "gap", 100.0)
+    _plot_published(published, "fig_6_3_gaps")
+    ours.set(
+        title=f"ours, step {_step(trajectory)}",
+        xlabel="time (s)",
+        ylabel="contact distance (cm)",
+        xlim=(0.0, 10.0),
+        ylim=(-1.0, 5.0),
+    )
     published.set(title="the report's: plane (0.15, 0, 0.15), steering +0.1 rad, step 20 ms", xlabel="time (s)")
-    ours.set(ylim=(-1.0, 5.0), xlim=(0.0, min(20.0, trajectory["time"][-1])))
-    ours.legend()
+    for axes in (ours, published):
+        axes.legend(loc="upper right")
     figure.suptitle("Figure 6.3: contact distance between wheels and plane")
 
 
 def reaction_force(figure: Figure, trajectory: Trajectory) -> None:
     """Figure 6.4: normal force on a front wheel against time."""
     ours, published = figure.subplots(1, 2, sharey=True, sharex=True)
-    for wheel in ("FL", "FR"):
-        force = trajectory["wheel_forces"][:, WHEELS.index(wheel), 0]
-        ours.plot(trajectory["time"], force, color=COLOURS[wheel], label=NAMES[wheel])
-    (curve,) = reference_data()["published"]["fig_6_4_reaction"]["curves"].values()
-    k, percussion = np.array(curve).T
-    # The report's percussion is in kg cm/s a step; it is labelled FL, its code writes FR.
-    published.plot(PUBLISHED_STEP * k, 0.01 * percussion / PUBLISHED_STEP, color=COLOURS["FR"])
+    forces = trajectory["wheel_forces"][:, :, 0]
+    for wheel in ("FR", "FL"):
+        ours.plot(trajectory["time"], forces[:, WHEELS.index(wheel)], color=COLOURS[wheel], label=NAMES[wheel])
+    # Its percussions are in kg cm/s a step, and cut at 500; labelled FL, they are FR's.
+    _plot_published(published, "fig_6_4_reaction", 0.01 / PUBLISHED_STEP, ("FR",))
     ours.set(
         title=f"ours, mean over each step of {_step(trajectory)}",
         xlabel="time (s)",
         ylabel="normal force on the wheel (N)",
+        xlim=(0.0, min(20.0, trajectory["time"][-1])),
+        ylim=(0.0, None),
+        yscale="symlog",
     )
-    published.set(title="the report's front wheel: other parameters, step 20 ms, cut at 250 N", xlabel="time (s)")
-    ours.set(yscale="symlog")
-    ours.legend()
+    published.set(title="the report's: plane (0.15, 0, 0.15), step 20 ms, cut at 250 N", xlabel="time (s)")
+    for axes in (ours, published):
+        axes.legend(loc="upper right")
     figure.suptitle("Figure 6.4: reaction force of the front wheels")
 
 
 def steering_angles(figure: Figure, trajectory: Trajectory) -> None:
     """Figure 6.5: the six steering angles against time."""
     columns = [7, 8, 12, 13, 17, 18]
-    ours, published = figure.subplots(1, 2)
-    for i, wheel in enumerate(WHEELS):
-        ours.plot(trajectory["time"], trajectory["q"][:, columns[i]], color=COLOURS[wheel], label=NAMES[wheel])
-    for n, curve in enumerate(reference_data()["published"]["fig_6_5_steering"]["curves"].values()):
-        k, angle = np.array(curve).T
-        published.plot(PUBLISHED_STEP * k, angle, color=COLOURS[WHEELS[n]])
-    ours.legend()
+    ours, published = figure.subplots(1, 2, sharex=True)
+    _plot_wheels(ours, trajectory["time"], trajectory["q"][:, columns])
+    _plot_siconos(ours, "steering")
+    _plot_published(published, "fig_6_5_steering")
+    ours.set(
+        title=f"ours, step {_step(trajectory)}; set-points -0.1 rad in front, else 0",
+        xlabel="time (s)",
+        ylabel="steering angle (rad)",
+        xlim=(0.0, min(20.0, trajectory["time"][-1])),
+    )
+    published.set(title="the report's: set-points +0.1 rad in front, torque 0.3 N m, step 20 ms", xlabel="time (s)")
+    for axes in (ours, published):
+        axes.legend(loc="right")
     figure.suptitle("Figure 6.5: steering angles under the PD controller")
 
 
-def _on_the_page(centres: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _plot_wheels(axes: Axes, time: Any, values: Any) -> None:
+    for i, wheel in enumerate(WHEELS):
+        axes.plot(time, values[:, i], color=COLOURS[wheel], label=NAMES[wheel])
+
+
+def _plot_siconos(axes: Axes, name: str, scale: float = 1.0) -> None:
+    reference = min(reference_data()["siconos"], key=lambda run: run["step"])
+    values = scale * np.array(reference[name])
+    for i in range(len(WHEELS)):
+        label = "" if i else f"Siconos 4.4, step {1e3 * reference['step']:g} ms"
+        axes.plot(reference["t"], values[:, i], "k:", linewidth=0.9, label=label)
+
+
+def _plot_published(axes: Axes, figure: str, scale: float = 1.0, wheels: tuple[str, ...] = WHEELS) -> None:
+    """The report's curves under the report's names, in SI time."""
+    curves = reference_data()["published"][figure]["curves"].items()
+    for wheel, (name, curve) in zip(wheels, curves, strict=True):
+        step, value = np.array(curve).T
+        axes.plot(PUBLISHED_STEP * step, scale * value, color=COLOURS[wheel], label=name)
+
+
+def _on_the_page(centres: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """The report's perspective of points (3, n) in cm, recovered from its figure 6.2 (points of its page)."""
     x, y, z = centres
     px = 2625.0 + 2.51143 * (x + 1200.0) - 2.61 * (z + 500.0)
     py = 1234.0 + 0.447143 * (x + 1200.0) + 2.34333 * (z + 500.0) + 8.5125 * (y + 80.0)
     return px, py
-
-
-def _finest_siconos() -> Any:
-    return min(reference_data()["siconos"], key=lambda run: run["step"])
-
-
-def _duration(trajectory: Trajectory) -> str:
-    return f"{trajectory['time'][-1]:g} s"
 
 
 def _step(trajectory: Trajectory) -> str:

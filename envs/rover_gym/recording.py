@@ -64,75 +64,74 @@ class Channel:
     columns: tuple[str, ...] = ()
 
 
-def simulation_channels(model: RoverModel) -> tuple[Channel, ...]:
-    """The channels that `sample` fills."""
-    wheels = tuple(model.wheel_names)
-    return (
-        Channel("time", "s", "time since the run's start"),
-        Channel(
-            "q",
-            "m, rad",
-            "public coordinates: trunk x, y (up), z (m); roll, heading, pitch, joint angles (rad);"
-            " trunk attitude R = Ry(heading) Rz(pitch) Rx(roll)",
-            (model.nq,),
-            tuple(model.dof_names),
-        ),
-        Channel(
-            "v",
-            "m/s, rad/s",
-            "trunk origin's velocity, world (m/s); trunk's angular velocity, world (rad/s); joint rates (rad/s)",
-            (model.nv,),
-        ),
-        Channel(
-            "wheel_gaps", "m", "distance from wheel to ground, negative where they overlap", (len(wheels),), wheels
-        ),
-        Channel(
-            "wheel_forces",
-            "N",
-            "mean contact force of the last step along n (ground to wheel), t (rolling direction), b = t x n",
-            (len(wheels), 3),
-            wheels,
-        ),
-        Channel(
-            "wheel_centres",
-            "m",
-            "wheel centres, world: x forward, y up, z to the right",
-            (len(wheels), 3),
-            wheels,
-        ),
-        Channel("wheel_torques", "N m", "driving torques, positive drives forward", (len(wheels),), wheels),
-        Channel("steering_set_points", "rad", "set-points of the steering controllers", (len(wheels),), wheels),
-        Channel("kinetic_energy", "J", "kinetic energy of the whole rover"),
-        Channel("potential_energy", "J", "potential energy, zero with all mass centres at the world's origin"),
-        Channel("solver_residual", "1", "worst natural-map residual of the contact solver since the last row"),
-        Channel("solver_iterations", "1", "iterations of the contact solver since the last row"),
-    )
-
-
-def sample(sim: Simulation, *, residual: float = 0.0, iterations: int = 0) -> dict[str, npt.ArrayLike]:
-    """One row of `simulation_channels`.
+class Sampler:
+    """Makes rows of a simulation.
 
     Args:
-        sim: The simulation to look at; it is not changed.
-        residual: Worst residual since the last row, from the step's report.
-        iterations: Iterations since the last row, from the step's report.
+        model: The model of the simulations to look at.
     """
-    energy = sim.energy()
-    poses = sim.poses()
-    return {
-        "time": sim.time,
-        "q": sim.q,
-        "v": sim.v,
-        "wheel_gaps": sim.wheel_gaps,
-        "wheel_forces": sim.wheel_forces,
-        "wheel_centres": np.array([poses[name][0] for name in sim.model.wheel_names]),
-        "wheel_torques": sim.wheel_torques,
-        "steering_set_points": sim.steering,
-        "kinetic_energy": energy.kinetic,
-        "potential_energy": energy.potential,
-        "solver_residual": residual,
-        "solver_iterations": iterations,
-    }
+
+    def __init__(self, model: RoverModel) -> None:
+        wheels = tuple(model.wheel_names)
+        n = len(wheels)
+        self._wheel_solids = [wheel["solid"] for wheel in model.to_dict()["wheels"]]
+        self.channels = (
+            Channel("time", "s", "time since the run's start"),
+            Channel(
+                "q",
+                "m, rad",
+                "public coordinates: trunk x, y (up), z (m); roll, heading, pitch, joint angles (rad);"
+                " trunk attitude R = Ry(heading) Rz(pitch) Rx(roll)",
+                (model.nq,),
+                tuple(model.dof_names),
+            ),
+            Channel(
+                "v",
+                "m/s, rad/s",
+                "trunk origin's velocity, world (m/s); trunk's angular velocity, world (rad/s); joint rates (rad/s)",
+                (model.nv,),
+            ),
+            Channel("wheel_gaps", "m", "distance from wheel to ground, negative where they overlap", (n,), wheels),
+            Channel(
+                "wheel_forces",
+                "N",
+                "mean contact force of the last step along n (ground to wheel), t (rolling direction), b = t x n",
+                (n, 3),
+                wheels,
+            ),
+            Channel("wheel_centres", "m", "world: x forward, y up, z to the right", (n, 3), wheels),
+            Channel("wheel_torques", "N m", "driving torques, positive drives forward", (n,), wheels),
+            Channel("steering_set_points", "rad", "set-points of the steering controllers", (n,), wheels),
+            Channel("kinetic_energy", "J", "kinetic energy of the whole rover"),
+            Channel("potential_energy", "J", "potential energy, zero with all mass centres at the world's origin"),
+            Channel("solver_residual", "1", "worst natural-map residual of the contact solver since the last row"),
+            Channel("solver_iterations", "1", "iterations of the contact solver since the last row"),
+        )
+
+    def row(self, sim: Simulation, *, residual: float = 0.0, iterations: int = 0) -> dict[str, npt.ArrayLike]:
+        """One row of `channels`.
+
+        Args:
+            sim: The simulation to look at; it is not changed.
+            residual: Worst residual since the last row, from the step's report.
+            iterations: Iterations since the last row, from the step's report.
+        """
+        energy = sim.energy()
+        poses = sim.poses()
+        return {
+            "time": sim.time,
+            "q": sim.q,
+            "v": sim.v,
+            "wheel_gaps": sim.wheel_gaps,
+            "wheel_forces": sim.wheel_forces,
+            "wheel_centres": np.array([poses[solid][0] for solid in self._wheel_solids]),
+            "wheel_torques": sim.wheel_torques,
+            "steering_set_points": sim.steering,
+            "kinetic_energy": energy.kinetic,
+            "potential_energy": energy.potential,
+            "solver_residual": residual,
+            "solver_iterations": iterations,
+        }
 
 
 class Recorder:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from rover_gym._core import Plane, RoverModel, Simulation
-from rover_gym.recording import Recorder, Trajectory, sample, simulation_channels
+from rover_gym.recording import Recorder, Sampler, Trajectory
 
 #: The 880 kg table of the plane run, kg, in the order of Table 4.1.
 MASSES = (700.0, 20.0, 6.0, 6.0, 14.0, 14.0, 20.0, 6.0, 6.0, 14.0, 14.0, 20.0, 6.0, 6.0, 14.0, 14.0)
@@ -123,12 +123,13 @@ def run(
     first_contact: float | None = None
     smallest_gap = float(sim.wheel_gaps.min())
     unconverged, worst = 0, 0.0
-    with Recorder(path, simulation_channels(sim.model), _attributes(time_step, options)) as recorder:
-        recorder.append(sample(sim))
+    sampler = Sampler(sim.model)
+    with Recorder(path, sampler.channels, _attributes(time_step, options)) as recorder:
+        recorder.append(sampler.row(sim))
         start = time.perf_counter()
         for step in range(1, steps + 1):
             report = sim.step()
-            recorder.append(sample(sim, residual=report.residual, iterations=report.iterations))
+            recorder.append(sampler.row(sim, residual=report.residual, iterations=report.iterations))
             unconverged += not report.is_converged
             worst = max(worst, report.residual)
             smallest_gap = min(smallest_gap, float(sim.wheel_gaps.min()))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rover_gym import RoverModel, Simulation
-from rover_gym.recording import Channel, MissingExtraError, Recorder, read_trajectory, sample, simulation_channels
+from rover_gym.recording import Channel, MissingExtraError, Recorder, Sampler, read_trajectory
 
 TIME = Channel("time", "s", "time since the start")
 POINT = Channel("point", "m", "a point, world", (3,), ("x", "y", "z"))
@@ -44,10 +44,11 @@ def test_rows_come_back_with_units_and_attributes(tmp_path: Path) -> None:
 
 def test_every_data_set_of_a_simulation_says_what_it_is(tmp_path: Path) -> None:
     sim = Simulation(RoverModel())
-    with Recorder(tmp_path / "run.h5", simulation_channels(sim.model)) as recorder:
-        recorder.append(sample(sim))
+    sampler = Sampler(sim.model)
+    with Recorder(tmp_path / "run.h5", sampler.channels) as recorder:
+        recorder.append(sampler.row(sim))
         sim.step()
-        recorder.append(sample(sim))
+        recorder.append(sampler.row(sim))
     with h5py.File(tmp_path / "run.h5") as file:
         for data in file.values():
             assert data.attrs["unit"]

@@ -17,7 +17,7 @@ from rover_gym.cli.console import console, plain_errors, progress_bar, say_path
 from rover_gym.env import RoverEnv
 from rover_gym.episodes import Episode, run_episode
 from rover_gym.policy import PDPolicy
-from rover_gym.recording import Channel, Recorder, sample, simulation_channels
+from rover_gym.recording import Channel, Recorder, Sampler
 from rover_gym.rewards import WEIGHTS
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
@@ -90,46 +90,54 @@ def _drive_one(
     """One episode, recorded if there is a path."""
     task = bar.add_task(f"seed {seed}", total=None, state="")
     with ExitStack() as stack:
-        recorder: Recorder | None = None
+        tape: _Tape | None = None
 
         def on_step(rover: RoverEnv, info: Mapping[str, Any]) -> None:
-            nonlocal recorder
+            nonlocal tape
             bar.update(task, state=f"{info['time']:.1f} s, {info['distance_to_goal']:.1f} m to go")
             if path is not None:
-                if recorder is None:  # after the reset, when the start is known
-                    recorder = stack.enter_context(_recorder(path, rover, seed, arguments))
-                recorder.append(_row(rover, info))
+                if tape is None:  # after the reset, when the start is known
+                    tape = _Tape(path, rover, seed, arguments)
+                    stack.enter_context(tape.recorder)
+                tape.append(rover, info)
 
         episode = run_episode(env, policy, seed, options=options, on_step=on_step)
     bar.remove_task(task)
     return episode
 
 
-def _recorder(path: Path, rover: RoverEnv, seed: int, arguments: Mapping[str, Any]) -> Recorder:
-    channels = (
-        *simulation_channels(rover.model),
-        Channel("distance_to_goal", "m", "horizontal distance from the trunk's origin to the goal"),
-        Channel("slip_ratio", "1", "mean over the wheels in contact of rim slip over the faster of rim and ground"),
-        Channel("motor_energy", "J", "work through the wheel motors since the start, driving or braking"),
-        Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
-    )
-    attributes = {
-        "title": "an episode of Rover-v0 with the PD baseline",
-        "scene": {**arguments, **asdict(rover.start)},
-        "seed": seed,
-    }
-    return Recorder(path, channels, attributes)
+class _Tape:
+    """Records an episode: the simulation, and what the environment makes of it."""
 
+    def __init__(self, path: Path, rover: RoverEnv, seed: int, arguments: Mapping[str, Any]) -> None:
+        self._sampler = Sampler(rover.model)
+        channels = (
+            *self._sampler.channels,
+            Channel("distance_to_goal", "m", "horizontal distance from the trunk's origin to the goal"),
+            Channel("slip_ratio", "1", "mean over the wheels in contact of rim slip over the faster of rim and ground"),
+            Channel("motor_energy", "J", "work through the wheel motors since the start, driving or braking"),
+            Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
+        )
+        attributes = {
+            "title": "an episode of Rover-v0 with the PD baseline",
+            "scene": {**arguments, "gravity": rover.gravity, **asdict(rover.start)},
+            "seed": seed,
+            "solver": {"time_step": rover.simulation.time_step, "control_period": rover.dt},
+        }
+        self.recorder = Recorder(path, channels, attributes)
 
-def _row(rover: RoverEnv, info: Mapping[str, Any]) -> dict[str, Any]:
-    solver = info["solver"]
-    return {
-        **sample(rover.simulation, residual=solver["residual"], iterations=solver["iterations"]),
-        "distance_to_goal": info["distance_to_goal"],
-        "slip_ratio": info["slip_ratio"],
-        "motor_energy": info["energy"],
-        "reward_terms": [info["reward_terms"][name] for name in WEIGHTS],
-    }
+    def append(self, rover: RoverEnv, info: Mapping[str, Any]) -> None:
+        """Adds the environment's present state."""
+        solver = info["solver"]
+        self.recorder.append(
+            {
+                **self._sampler.row(rover.simulation, residual=solver["residual"], iterations=solver["iterations"]),
+                "distance_to_goal": info["distance_to_goal"],
+                "slip_ratio": info["slip_ratio"],
+                "motor_energy": info["energy"],
+                "reward_terms": [info["reward_terms"][name] for name in WEIGHTS],
+            }
+        )
 
 
 def _table(results: Sequence[Episode]) -> Table:
