@@ -1,5 +1,23 @@
 //! Nonsmooth multibody mechanics of a wheeled rover.
+//!
+//! The machine is a tree of solids under a free base; its wheels are unilateral contacts with Coulomb friction and Newton
+//! impact. A step of length h solves, for the velocity v⁺ and the contact impulses p,
+//!
+//! ```text
+//! M(q) (v⁺ − v) = h (T u − N(q, v) v − G(q)) + H(q) p
+//! u = Hᵀ v⁺,    ũ = u + e u_N⁻ n + μ |u_T| n,    K_μ* ∋ ũ ⊥ p ∈ K_μ   at every contact.
+//! ```
+//!
+//! Chapters, each using only those above it:
+//!
+//! - [`spatial`]: rotations and inertias;
+//! - [`multibody`]: model, state, kinematics, mass matrix, bias, energy, momentum;
+//! - [`geometry`]: the ground; [`contact`]: points, frames, gaps, Delassus operator;
+//! - [`cone`], [`law`], [`problem`], [`solver`]: the friction-contact problem, which sees only (W, q, μ);
+//! - [`integrator`]: one step; [`simulation`]: many.
 #![forbid(unsafe_code)]
+
+pub use nalgebra;
 
 pub mod cone;
 pub mod contact;

@@ -1,1 +1,31 @@
-//! The border between rover-core and Python.
+//! The border between `rover-core` and Python: conversions, exceptions, array views. No mechanics.
+#![forbid(unsafe_code)]
+
+mod arrays;
+mod contacts;
+mod errors;
+mod friction_contact;
+mod model;
+mod plane;
+mod simulation;
+mod snapshot;
+
+use pyo3::prelude::*;
+
+/// Compiled core of rover-gym.
+#[pymodule]
+fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    errors::register(module)?;
+    module.add_class::<model::RoverModel>()?;
+    module.add_class::<plane::Plane>()?;
+    module.add_class::<contacts::Contacts>()?;
+    module.add_class::<simulation::Simulation>()?;
+    module.add_class::<simulation::StepReport>()?;
+    module.add_class::<simulation::Energy>()?;
+    module.add_class::<snapshot::Snapshot>()?;
+    module.add_class::<friction_contact::SolverReport>()?;
+    module.add_class::<friction_contact::FrictionContactSolution>()?;
+    module.add_function(wrap_pyfunction!(friction_contact::solve_friction_contact, module)?)?;
+    Ok(())
+}

@@ -1,1 +1,18 @@
-//! (chapter opens here)
+//! The friction-contact problem of one time step, and the measure of how well it is solved.
+//!
+//! Given the Delassus operator `W = Hᵀ M⁻¹ H`, the free local velocity `q` and the friction coefficients `μ`, find the
+//! impulses `p` such that
+//!
+//! ```text
+//! u = W p + q,    ũ = u + μ|u_T| n,    K_μ* ∋ ũ ⊥ p ∈ K_μ    at every contact.
+//! ```
+//!
+//! [`FrictionContactProblem`] states it, [`Residual`] judges an answer. Nothing here knows a body, so a problem read
+//! from a file is as good as one from a rover.
+
+mod friction_contact;
+mod residual;
+
+pub use friction_contact::{Dimension, FrictionContactProblem, ProblemError};
+pub use residual::{Residual, contact_scale, evaluate, evaluate_into, local_velocity};
+pub(crate) use residual::{dot, evaluate_contact, multiply_add};

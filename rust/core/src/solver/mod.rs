@@ -1,1 +1,61 @@
-//! (chapter opens here)
+//! Solvers of the friction-contact problem. One entry point, [`solve`]; a solver sees only `(W, q, μ)`.
+//!
+//! - [`one_contact`]: the exact solution of a single contact, the brick of Gauss–Seidel;
+//! - `nsgs`: nonsmooth Gauss–Seidel, cheap sweeps, good with many contacts;
+//! - `newton`: semismooth Newton on the contact modes, quadratic near the answer;
+//! - `proximal`: the proximal-point method around Newton, for whatever resists (redundant contacts, jammed stacks).
+//!
+//! [`Method::Auto`] takes few contacts to Newton at once and many to Gauss–Seidel first, and escalates when progress stops.
+//! Every report is computed from the returned impulse, never from inside an iteration.
+
+mod auto;
+mod dense;
+mod newton;
+mod nsgs;
+pub mod one_contact;
+mod options;
+mod proximal;
+mod report;
+mod workspace;
+
+pub use options::{Method, SolverOptions};
+pub use report::{SolveReport, SolveStatus};
+pub use workspace::SolverWorkspace;
+
+use crate::problem::{Dimension, FrictionContactProblem};
+
+/// Solves `K_μ* ∋ ũ ⊥ p ∈ K_μ`, `u = W p + q`.
+///
+/// `p` (n), N s: in, the warm start or zeros; out, the impulses, inside the friction cones up to the report's residual.
+/// `u` (n), m/s: out, `W p + q` of the returned `p`. `workspace` may have served any other problem before; it influences
+/// no bit of the answer, and allocates only when a problem is larger than all before.
+///
+/// From `p = 0` and few contacts the answer is the one next to zero (Tikhonov's limit), so a symmetric problem has a
+/// symmetric answer and the order of the contacts does not matter; from a warm start it is the one next to the warm start.
+///
+/// Not converged is an answer, see [`SolveStatus`]: then `p` is the best impulse met. Data or warm start that are not finite
+/// never come out again: with bad data `p` and `u` are zero and the status is [`SolveStatus::NonFinite`]; a bad warm start
+/// counts as zeros.
+///
+/// # Panics
+/// If `p` or `u` has not the problem's number of unknowns.
+pub fn solve(
+    problem: &FrictionContactProblem<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    workspace: &mut SolverWorkspace,
+) -> SolveReport {
+    assert!(
+        p.len() == problem.n_unknowns(),
+        "p must have one entry per unknown"
+    );
+    assert!(
+        u.len() == problem.n_unknowns(),
+        "u must have one entry per unknown"
+    );
+    match problem.dimension() {
+        Dimension::Two => auto::solve_in::<2>(problem, options, p, u, workspace),
+        Dimension::Three => auto::solve_in::<3>(problem, options, p, u, workspace),
+    }
+}

@@ -1,0 +1,300 @@
+//! The data of one friction-contact problem: `(W, q, μ)`.
+
+use thiserror::Error;
+
+/// Whether contacts have one tangent (planar scenes) or two.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Dimension {
+    /// Normal and one tangent.
+    Two,
+    /// Normal and two tangents.
+    Three,
+}
+
+impl Dimension {
+    /// Components per contact, 2 or 3.
+    #[inline]
+    #[must_use]
+    pub const fn components(self) -> usize {
+        match self {
+            Self::Two => 2,
+            Self::Three => 3,
+        }
+    }
+}
+
+/// What a friction-contact problem cannot be built from.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum ProblemError {
+    /// The free velocity's length is not `components · n_contacts`.
+    #[error("q has {found} entries, but {n_contacts} contacts of {components} components need {}", n_contacts * components)]
+    VelocityShape {
+        /// Number of contacts, the length of `mu`.
+        n_contacts: usize,
+        /// Components per contact.
+        components: usize,
+        /// Length of the given `q`.
+        found: usize,
+    },
+    /// `W` is not an `n × n` matrix with `n` the length of `q`.
+    #[error("W has {found} entries, but {n} x {n} are needed")]
+    OperatorShape {
+        /// Number of rows needed.
+        n: usize,
+        /// Number of entries given.
+        found: usize,
+    },
+    /// An entry of `W` is infinite or not a number.
+    #[error("W[{row}, {column}] = {value} is not finite")]
+    NonFiniteOperator {
+        /// Row of the entry.
+        row: usize,
+        /// Column of the entry.
+        column: usize,
+        /// The entry.
+        value: f64,
+    },
+    /// An entry of `q` is infinite or not a number.
+    #[error("q[{index}] = {value} m/s is not finite")]
+    NonFiniteVelocity {
+        /// Position in `q`.
+        index: usize,
+        /// The entry, m/s.
+        value: f64,
+    },
+    /// A friction coefficient is negative, infinite or not a number.
+    #[error("friction coefficient mu[{contact}] = {value} is not a finite number >= 0")]
+    InvalidFrictionCoefficient {
+        /// Contact index.
+        contact: usize,
+        /// The coefficient.
+        value: f64,
+    },
+    /// A contact that no normal impulse can move: `W_NN ≤ 0`.
+    #[error(
+        "contact {contact} has W_NN = {value} 1/kg; a normal impulse must change the normal velocity"
+    )]
+    NonPositiveNormal {
+        /// Contact index.
+        contact: usize,
+        /// The diagonal entry, 1/kg.
+        value: f64,
+    },
+    /// A negative tangential diagonal entry: `W` is not positive semidefinite.
+    #[error("contact {contact} has the negative tangential diagonal entry {value} 1/kg")]
+    NegativeTangential {
+        /// Contact index.
+        contact: usize,
+        /// The diagonal entry, 1/kg.
+        value: f64,
+    },
+}
+
+/// Find `p` with `u = W p + q`, `ũ = u + μ|u_T| n`, `K_μ* ∋ ũ ⊥ p ∈ K_μ` at every contact.
+///
+/// Components run contact by contact, `normal, tangent, (tangent)`; with `n_c` contacts of `d` components, `n = d n_c`.
+/// `W` is used as given: it need not be symmetric and may be rank-deficient. Source: Acary, Brémond and Huber 2018.
+#[derive(Clone, Copy, Debug)]
+pub struct FrictionContactProblem<'a> {
+    dimension: Dimension,
+    W: &'a [f64],
+    q: &'a [f64],
+    mu: &'a [f64],
+}
+
+impl<'a> FrictionContactProblem<'a> {
+    /// Checks every entry and states the problem.
+    ///
+    /// `W`: Delassus operator, row-major `n × n`, 1/kg. `q`: free local velocity (n), m/s, with `e u_N⁻` already added to
+    /// the normal components. `mu`: friction coefficients (`n_c`).
+    ///
+    /// # Errors
+    /// [`ProblemError`], naming the first entry that is of the wrong shape, not finite or of the wrong sign.
+    pub fn new(
+        dimension: Dimension,
+        W: &'a [f64],
+        q: &'a [f64],
+        mu: &'a [f64],
+    ) -> Result<Self, ProblemError> {
+        let d = dimension.components();
+        let n = d * mu.len();
+        if q.len() != n {
+            return Err(ProblemError::VelocityShape {
+                n_contacts: mu.len(),
+                components: d,
+                found: q.len(),
+            });
+        }
+        if W.len() != n * n {
+            return Err(ProblemError::OperatorShape { n, found: W.len() });
+        }
+        if let Some(index) = W.iter().position(|x| !x.is_finite()) {
+            return Err(ProblemError::NonFiniteOperator {
+                row: index / n,
+                column: index % n,
+                value: W[index],
+            });
+        }
+        if let Some(index) = q.iter().position(|x| !x.is_finite()) {
+            return Err(ProblemError::NonFiniteVelocity {
+                index,
+                value: q[index],
+            });
+        }
+        for (contact, &value) in mu.iter().enumerate() {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(ProblemError::InvalidFrictionCoefficient { contact, value });
+            }
+            for k in 0..d {
+                let value = W[(d * contact + k) * (n + 1)];
+                if k == 0 && value <= 0.0 {
+                    return Err(ProblemError::NonPositiveNormal { contact, value });
+                }
+                if value < 0.0 {
+                    return Err(ProblemError::NegativeTangential { contact, value });
+                }
+            }
+        }
+        Ok(Self {
+            dimension,
+            W,
+            q,
+            mu,
+        })
+    }
+
+    /// States the problem from data that the caller assembled itself; only the shapes are checked.
+    ///
+    /// Meant for the time stepper. Entries that are not finite make a solve end with
+    /// [`SolveStatus::NonFinite`](crate::solver::SolveStatus::NonFinite), never with a NaN in the answer.
+    ///
+    /// # Panics
+    /// If the lengths of `W`, `q` and `mu` do not fit together.
+    #[must_use]
+    pub fn from_assembled(dimension: Dimension, W: &'a [f64], q: &'a [f64], mu: &'a [f64]) -> Self {
+        let n = dimension.components() * mu.len();
+        assert!(q.len() == n, "q must have components * n_contacts entries");
+        assert!(W.len() == n * n, "W must have n * n entries");
+        Self {
+            dimension,
+            W,
+            q,
+            mu,
+        }
+    }
+
+    /// One tangent per contact or two.
+    #[inline]
+    #[must_use]
+    pub const fn dimension(&self) -> Dimension {
+        self.dimension
+    }
+
+    /// Delassus operator `W`, row-major `n × n`, 1/kg.
+    #[inline]
+    #[must_use]
+    pub const fn operator(&self) -> &'a [f64] {
+        self.W
+    }
+
+    /// Free local velocity `q` (n), m/s, restitution included.
+    #[inline]
+    #[must_use]
+    pub const fn free_velocity(&self) -> &'a [f64] {
+        self.q
+    }
+
+    /// Friction coefficients `μ` (`n_c`).
+    #[inline]
+    #[must_use]
+    pub const fn friction_coefficients(&self) -> &'a [f64] {
+        self.mu
+    }
+
+    /// Number of contacts `n_c`.
+    #[inline]
+    #[must_use]
+    pub const fn n_contacts(&self) -> usize {
+        self.mu.len()
+    }
+
+    /// Number of unknowns `n = d n_c`.
+    #[inline]
+    #[must_use]
+    pub const fn n_unknowns(&self) -> usize {
+        self.q.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BLOCK: [f64; 4] = [2.0, 0.5, 0.5, 1.0];
+
+    #[test]
+    fn a_sound_problem_is_accepted() {
+        let problem = FrictionContactProblem::new(Dimension::Two, &BLOCK, &[-1.0, 0.0], &[0.5])
+            .expect("sound");
+        assert_eq!((problem.n_contacts(), problem.n_unknowns()), (1, 2));
+    }
+
+    #[test]
+    fn no_contact_is_a_problem_too() {
+        assert!(FrictionContactProblem::new(Dimension::Three, &[], &[], &[]).is_ok());
+    }
+
+    #[test]
+    fn each_mistake_is_named() {
+        let build = |W: &[f64], q: &[f64], mu: &[f64]| {
+            FrictionContactProblem::new(Dimension::Two, W, q, mu)
+                .map(|_| ())
+                .expect_err("refused")
+        };
+        assert_eq!(
+            build(&BLOCK, &[1.0], &[0.5]),
+            ProblemError::VelocityShape {
+                n_contacts: 1,
+                components: 2,
+                found: 1
+            }
+        );
+        assert_eq!(
+            build(&BLOCK[..3], &[0.0; 2], &[0.5]),
+            ProblemError::OperatorShape { n: 2, found: 3 }
+        );
+        assert!(matches!(
+            build(&[2.0, 0.5, f64::NAN, 1.0], &[0.0; 2], &[0.5]),
+            ProblemError::NonFiniteOperator { row: 1, column: 0, value } if value.is_nan()
+        ));
+        assert_eq!(
+            build(&BLOCK, &[0.0, f64::INFINITY], &[0.5]),
+            ProblemError::NonFiniteVelocity {
+                index: 1,
+                value: f64::INFINITY
+            }
+        );
+        assert_eq!(
+            build(&BLOCK, &[0.0; 2], &[-0.1]),
+            ProblemError::InvalidFrictionCoefficient {
+                contact: 0,
+                value: -0.1
+            }
+        );
+        assert_eq!(
+            build(&[0.0, 0.0, 0.0, 1.0], &[0.0; 2], &[0.5]),
+            ProblemError::NonPositiveNormal {
+                contact: 0,
+                value: 0.0
+            }
+        );
+        assert_eq!(
+            build(&[1.0, 0.0, 0.0, -1.0], &[0.0; 2], &[0.5]),
+            ProblemError::NegativeTangential {
+                contact: 0,
+                value: -1.0
+            }
+        );
+    }
+}

@@ -1,0 +1,226 @@
+//! The choice of method, and what all methods share: prepared scales, the acceptance test, the final report.
+
+use super::nsgs::Budget;
+use super::report::{SolveReport, SolveStatus};
+use super::workspace::SolverWorkspace;
+use super::{Method, SolverOptions, newton, nsgs, proximal};
+use crate::problem::{
+    FrictionContactProblem, Residual, contact_scale, evaluate_contact, evaluate_into,
+};
+
+/// The problem's slices and the scales derived from them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prepared<'a> {
+    /// Delassus operator, row-major `n × n`, 1/kg.
+    pub W: &'a [f64],
+    /// Free velocity (n), m/s.
+    pub q: &'a [f64],
+    /// Friction coefficients.
+    pub mu: &'a [f64],
+    /// Number of unknowns.
+    pub n: usize,
+    /// Mean diagonal entry of `W`, 1/kg; 1 if not positive.
+    pub mean_diagonal: f64,
+    /// `1/|(ρ_i q_i)|`, or 1 if that is no number.
+    pub inverse_data: f64,
+}
+
+impl<'a> Prepared<'a> {
+    fn new<const D: usize>(
+        problem: &FrictionContactProblem<'a>,
+        workspace: &mut SolverWorkspace,
+    ) -> Self {
+        let (W, q, mu, n) = (
+            problem.operator(),
+            problem.free_velocity(),
+            problem.friction_coefficients(),
+            problem.n_unknowns(),
+        );
+        let mut trace = 0.0;
+        let mut data = 0.0;
+        for i in 0..mu.len() {
+            let rho = contact_scale(problem, i);
+            workspace.rho[i] = rho;
+            let normal = W[D * i * (n + 1)];
+            let mut tangential = 0.0;
+            for k in 1..D {
+                tangential += W[(D * i + k) * (n + 1)];
+            }
+            trace += normal + tangential;
+            tangential /= (D - 1) as f64;
+            workspace.rho_modes[i] = [
+                if normal > 0.0 { 1.0 / normal } else { rho },
+                if tangential > 0.0 {
+                    1.0 / tangential
+                } else {
+                    rho
+                },
+            ];
+            for q in &q[D * i..D * (i + 1)] {
+                data += (rho * q) * (rho * q);
+            }
+        }
+        let mean = trace / n.max(1) as f64;
+        let inverse = 1.0 / data.sqrt();
+        Self {
+            W,
+            q,
+            mu,
+            n,
+            mean_diagonal: if mean > 0.0 && mean.is_finite() {
+                mean
+            } else {
+                1.0
+            },
+            inverse_data: if inverse.is_finite() && inverse > 0.0 {
+                inverse
+            } else {
+                1.0
+            },
+        }
+    }
+
+    /// Residual of `(p, u)`; the same numbers as [`crate::problem::evaluate`], with the scales already at hand.
+    #[inline]
+    pub fn measure<const D: usize>(&self, rho: &[f64], p: &[f64], u: &[f64]) -> Residual {
+        let (mut map, mut velocity) = (0.0, 0.0_f64);
+        for (i, (&mu, &rho)) in self.mu.iter().zip(rho).enumerate() {
+            let square = evaluate_contact::<D>(p, u, D * i, mu, rho);
+            map += square;
+            velocity = velocity.max(square / (rho * rho));
+        }
+        if map.is_finite() {
+            Residual {
+                relative: map.sqrt() * self.inverse_data,
+                velocity: velocity.sqrt(),
+            }
+        } else {
+            Residual::UNSOLVED
+        }
+    }
+
+    /// Whether both tolerances hold.
+    #[inline]
+    pub fn accepts(options: &SolverOptions, residual: Residual) -> bool {
+        residual.relative <= options.tolerance && residual.velocity <= options.velocity_tolerance
+    }
+
+    /// Whether each contact's violation is within the rounding of its own rows of `W p + q`: then no impulse does better.
+    pub fn is_within_rounding<const D: usize>(&self, rho: &[f64], p: &[f64], u: &[f64]) -> bool {
+        self.mu.iter().zip(rho).enumerate().all(|(i, (&mu, &rho))| {
+            let violation = evaluate_contact::<D>(p, u, D * i, mu, rho).sqrt() / rho;
+            let size: f64 = (D * i..D * (i + 1))
+                .map(|r| {
+                    let row = &self.W[r * self.n..(r + 1) * self.n];
+                    let terms: f64 = row.iter().zip(p).map(|(w, p)| (w * p).abs()).sum();
+                    terms + self.q[r].abs()
+                })
+                .sum();
+            violation <= 4.0 * f64::EPSILON * size
+        })
+    }
+}
+
+/// Solves in dimension `D`, see [`solve`](super::solve).
+pub(super) fn solve_in<const D: usize>(
+    problem: &FrictionContactProblem<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    workspace: &mut SolverWorkspace,
+) -> SolveReport {
+    workspace.fit(problem);
+    if p.iter().any(|x| !x.is_finite()) {
+        p.fill(0.0);
+    }
+    let data = Prepared::new::<D>(problem, workspace);
+    let mut iterations = 0;
+    let (method, status, residual) = run::<D>(&data, options, p, u, workspace, &mut iterations);
+    if status == SolveStatus::NonFinite || !residual.is_finite() {
+        p.fill(0.0);
+        let from_rest = evaluate_into(problem, p, u);
+        if !from_rest.is_finite() || u.iter().any(|x| !x.is_finite()) {
+            u.fill(0.0);
+        }
+        return SolveReport {
+            status: SolveStatus::NonFinite,
+            iterations,
+            residual: from_rest.relative,
+            velocity_error: from_rest.velocity,
+            method,
+        };
+    }
+    SolveReport {
+        status,
+        iterations,
+        residual: residual.relative,
+        velocity_error: residual.velocity,
+        method,
+    }
+}
+
+fn run<const D: usize>(
+    data: &Prepared<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    workspace: &mut SolverWorkspace,
+    iterations: &mut usize,
+) -> (Method, SolveStatus, Residual) {
+    match options.method {
+        Method::GaussSeidel => {
+            let budget = Budget {
+                sweeps: options.max_sweeps,
+                predict: false,
+            };
+            workspace.start.copy_from_slice(p);
+            let (status, residual) =
+                nsgs::sweeps::<D>(data, options, budget, p, u, workspace, iterations);
+            (Method::GaussSeidel, status, residual)
+        }
+        Method::Newton => {
+            let (status, residual) = newton::full_steps::<D>(
+                data,
+                options,
+                options.max_newton_steps,
+                p,
+                u,
+                workspace,
+                iterations,
+            );
+            (Method::Newton, status, residual)
+        }
+        Method::ProximalPoint => {
+            workspace.start.copy_from_slice(p);
+            let (status, residual) =
+                proximal::solve::<D>(data, options, p, u, workspace, iterations);
+            (Method::ProximalPoint, status, residual)
+        }
+        Method::Auto => {
+            workspace.start.copy_from_slice(p);
+            if data.mu.len() > options.direct_contacts {
+                // A Newton step costs as much as about n sweeps.
+                let budget = Budget {
+                    sweeps: 2 * data.n,
+                    predict: true,
+                };
+                let (status, residual) =
+                    nsgs::sweeps::<D>(data, options, budget, p, u, workspace, iterations);
+                if matches!(status, SolveStatus::Converged | SolveStatus::NonFinite) {
+                    return (Method::GaussSeidel, status, residual);
+                }
+                workspace.start.copy_from_slice(p);
+            }
+            let steps = newton::FULL_STEPS.min(options.max_newton_steps);
+            let (status, residual) =
+                newton::full_steps::<D>(data, options, steps, p, u, workspace, iterations);
+            if status == SolveStatus::Converged {
+                return (Method::Newton, status, residual);
+            }
+            p.copy_from_slice(&workspace.start);
+            let (status, residual) =
+                proximal::solve::<D>(data, options, p, u, workspace, iterations);
+            (Method::ProximalPoint, status, residual)
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! The exception tree: one root, shape and value mistakes also `ValueError`, fields kept as attributes.
+
+use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyDict, PyTuple, PyType};
+use rover_core::geometry::TerrainError;
+use rover_core::integrator::{OptionsError, StepError};
+use rover_core::multibody::{ModelError, StateError};
+use rover_core::problem::ProblemError;
+use rover_core::simulation::{CommandError, SnapshotError};
+
+/// Which exception.
+#[derive(Clone, Copy, Debug)]
+pub enum Kind {
+    Model,
+    State,
+    Terrain,
+    Option,
+    Command,
+    Problem,
+    Step,
+}
+
+/// What was given where something else was needed.
+#[derive(Debug)]
+pub enum Value {
+    Nothing,
+    Number(f64),
+    Numbers(Vec<f64>),
+    Count(usize),
+    Text(String),
+}
+
+/// An error on its way to Python. A newtype, since neither crate owns both `ModelError` and `PyErr`.
+#[derive(Debug)]
+pub struct BorderError {
+    pub kind: Kind,
+    pub message: String,
+    pub field: Option<String>,
+    pub value: Value,
+}
+
+struct Classes {
+    model: Py<PyType>,
+    state: Py<PyType>,
+    terrain: Py<PyType>,
+    option: Py<PyType>,
+    command: Py<PyType>,
+    problem: Py<PyType>,
+    step: Py<PyType>,
+}
+
+static CLASSES: PyOnceLock<Classes> = PyOnceLock::new();
+
+/// Makes the exception classes and adds them to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    let make = |name: &str, bases: Bound<'_, PyTuple>, doc: &str| -> PyResult<Py<PyType>> {
+        let body = PyDict::new(py);
+        body.set_item("__module__", "rover_gym._core")?;
+        body.set_item("__doc__", doc)?;
+        body.set_item("field", py.None())?;
+        body.set_item("value", py.None())?;
+        let class = py.get_type::<PyType>().call1((name, bases, body))?.cast_into::<PyType>()?;
+        module.add(name, &class)?;
+        Ok(class.unbind())
+    };
+    let exception = PyTuple::new(py, [py.get_type::<PyException>()])?;
+    let root = make(
+        "RoverGymError",
+        exception,
+        "Root of every error that rover-gym raises. `field` names the culprit, `value` is what was given.",
+    )?;
+    let root = root.bind(py);
+    let value_error = || PyTuple::new(py, [root.clone(), py.get_type::<PyValueError>()]);
+    let classes = Classes {
+        model: make("ModelError", value_error()?, "A model description is not physical or not readable.")?,
+        state: make("StateError", value_error()?, "A state has a wrong shape or a non-finite entry.")?,
+        terrain: make("TerrainError", value_error()?, "A terrain description is invalid.")?,
+        option: make("OptionError", value_error()?, "An option or an argument is out of its range.")?,
+        command: make("CommandError", value_error()?, "A torque, set-point or action is invalid.")?,
+        problem: make("ProblemError", value_error()?, "A friction-contact problem has wrong shapes or entries.")?,
+        step: make(
+            "StepError",
+            PyTuple::new(py, [root.clone(), py.get_type::<PyRuntimeError>()])?,
+            "A time step could not be taken; the state is as it was before the call's failing step.",
+        )?,
+    };
+    let _ = CLASSES.set(py, classes);
+    Ok(())
+}
+
+impl From<BorderError> for PyErr {
+    fn from(error: BorderError) -> Self {
+        Python::attach(|py| {
+            let Some(classes) = CLASSES.get(py) else { return PyRuntimeError::new_err(error.message) };
+            let class = match error.kind {
+                Kind::Model => &classes.model,
+                Kind::State => &classes.state,
+                Kind::Terrain => &classes.terrain,
+                Kind::Option => &classes.option,
+                Kind::Command => &classes.command,
+                Kind::Problem => &classes.problem,
+                Kind::Step => &classes.step,
+            };
+            let raise = || -> PyResult<PyErr> {
+                let instance = class.bind(py).call1((error.message,))?;
+                instance.setattr("field", error.field)?;
+                match error.value {
+                    Value::Nothing => instance.setattr("value", py.None())?,
+                    Value::Number(x) => instance.setattr("value", x)?,
+                    Value::Numbers(x) => instance.setattr("value", x)?,
+                    Value::Count(x) => instance.setattr("value", x)?,
+                    Value::Text(x) => instance.setattr("value", x)?,
+                }
+                Ok(PyErr::from_value(instance))
+            };
+            raise().unwrap_or_else(|e| e)
+        })
+    }
+}
+
+impl BorderError {
+    /// An option or argument that is not what it must be.
+    pub fn option(field: &str, message: String, value: Value) -> Self {
+        Self { kind: Kind::Option, message, field: Some(field.to_owned()), value }
+    }
+}
+
+impl From<ModelError> for BorderError {
+    fn from(e: ModelError) -> Self {
+        let value = match &e {
+            ModelError::Unreadable { .. }
+            | ModelError::NoSolids
+            | ModelError::Missing { .. }
+            | ModelError::NotForBase { .. }
+            | ModelError::CollidesWithoutBox { .. } => Value::Nothing,
+            ModelError::DuplicateName { name, .. }
+            | ModelError::UnknownParent { name, .. }
+            | ModelError::UnknownName { name, .. }
+            | ModelError::SteeringNotAbove { name, .. } => Value::Text(name.clone()),
+            ModelError::NotFinite { value, .. }
+            | ModelError::NotPositive { value, .. }
+            | ModelError::Negative { value, .. }
+            | ModelError::NotASign { value, .. } => Value::Number(*value),
+            ModelError::NoDirection { value, .. } => Value::Numbers(value.to_vec()),
+            ModelError::ImpossibleInertia { principal, .. } => Value::Numbers(principal.to_vec()),
+        };
+        Self { kind: Kind::Model, message: e.to_string(), field: Some(e.field().to_owned()), value }
+    }
+}
+
+impl From<StateError> for BorderError {
+    fn from(e: StateError) -> Self {
+        let (field, value) = match &e {
+            StateError::Length { field, actual, .. } => ((*field).to_owned(), Value::Count(*actual)),
+            StateError::NotFinite { field, index, value } => (format!("{field}[{index}]"), Value::Number(*value)),
+            StateError::SingularCardan { heading } => ("q[4]".to_owned(), Value::Number(*heading)),
+        };
+        Self { kind: Kind::State, message: e.to_string(), field: Some(field), value }
+    }
+}
+
+impl From<TerrainError> for BorderError {
+    fn from(e: TerrainError) -> Self {
+        let value = match &e {
+            TerrainError::NotFinite { value, .. } => Value::Number(*value),
+            TerrainError::NoDirection { value } => Value::Numbers(value.to_vec()),
+        };
+        Self { kind: Kind::Terrain, message: e.to_string(), field: Some(e.field().to_owned()), value }
+    }
+}
+
+impl From<OptionsError> for BorderError {
+    fn from(e: OptionsError) -> Self {
+        let OptionsError::OutOfRange { field, value, .. } = e;
+        Self::option(field, e.to_string(), Value::Number(value))
+    }
+}
+
+impl From<CommandError> for BorderError {
+    fn from(e: CommandError) -> Self {
+        let (field, value) = match &e {
+            CommandError::Length { field, actual, .. } => ((*field).to_owned(), Value::Count(*actual)),
+            CommandError::NotFinite { field, index, value } | CommandError::BeyondLimit { field, index, value, .. } => {
+                (format!("{field}[{index}]"), Value::Number(*value))
+            }
+            CommandError::Negative { field, value } => ((*field).to_owned(), Value::Number(*value)),
+            CommandError::UnknownJoint { field, name } => ((*field).to_owned(), Value::Text(name.clone())),
+        };
+        Self { kind: Kind::Command, message: e.to_string(), field: Some(field), value }
+    }
+}
+
+impl From<SnapshotError> for BorderError {
+    fn from(e: SnapshotError) -> Self {
+        Self { kind: Kind::State, message: e.to_string(), field: Some("snapshot".to_owned()), value: Value::Nothing }
+    }
+}
+
+impl From<StepError> for BorderError {
+    fn from(e: StepError) -> Self {
+        Self { kind: Kind::Step, message: e.to_string(), field: None, value: Value::Nothing }
+    }
+}
+
+impl From<ProblemError> for BorderError {
+    fn from(e: ProblemError) -> Self {
+        Self { kind: Kind::Problem, message: e.to_string(), field: None, value: Value::Nothing }
+    }
+}

@@ -1,0 +1,506 @@
+//! `RoverModel`: what the report had Maple generate, from data.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArray2, PyArray3};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyMapping};
+use rover_core::contact::{Contact, detection::wheel_contacts};
+use rover_core::multibody::bias::BiasScratch;
+use rover_core::multibody::{
+    Configuration, Kinematics, MassMatrix, Model, ModelDescription, ModelError, bias, coordinates, momentum,
+};
+use rover_core::nalgebra::{DMatrix, DVector, Vector3};
+
+use crate::arrays::{fresh, fresh_blocks, fresh_matrix, fresh_rows, triple, vector};
+use crate::errors::{BorderError, Kind, Value};
+use crate::plane::Plane;
+
+/// A tree of solids under a free base, read from data. Immutable.
+#[pyclass(module = "rover_gym._core", frozen, from_py_object)]
+#[derive(Clone)]
+pub struct RoverModel {
+    pub inner: Arc<Model>,
+}
+
+/// How a user's `q` and velocities are to be read.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Coordinates {
+    /// The report's Cardan angles and their rates.
+    Report,
+    /// Public `q` and our velocity.
+    State,
+}
+
+impl Coordinates {
+    pub fn parse(name: &str) -> Result<Self, BorderError> {
+        match name {
+            "report" => Ok(Self::Report),
+            "state" => Ok(Self::State),
+            _ => Err(BorderError::option(
+                "coordinates",
+                format!("coordinates: must be \"report\" or \"state\", is {name:?}"),
+                Value::Text(name.to_owned()),
+            )),
+        }
+    }
+
+    pub fn configuration(self, model: &Model, q: &[f64]) -> Result<Configuration, BorderError> {
+        Ok(match self {
+            Self::Report => coordinates::from_report(model, q)?,
+            Self::State => coordinates::from_public(model, q)?,
+        })
+    }
+
+    pub fn velocity(self, model: &Model, q: &[f64], qdot: &[f64]) -> Result<Vec<f64>, BorderError> {
+        Ok(match self {
+            Self::Report => coordinates::velocity_from_report(model, q, qdot)?,
+            Self::State => coordinates::checked_velocity(model, qdot)?,
+        })
+    }
+}
+
+impl RoverModel {
+    fn wrap(model: Result<Model, ModelError>) -> PyResult<Self> {
+        Ok(Self { inner: Arc::new(model.map_err(BorderError::from)?) })
+    }
+
+    fn placed(&self, q: &Bound<'_, PyAny>, coordinates: &str) -> PyResult<(Vec<f64>, Coordinates, Kinematics)> {
+        let kind = Coordinates::parse(coordinates)?;
+        let q = vector(q, Kind::State, "q")?;
+        let configuration = kind.configuration(&self.inner, &q)?;
+        Ok((q, kind, Kinematics::of(&self.inner, &configuration)))
+    }
+
+    fn contacts(&self, q: &Bound<'_, PyAny>, terrain: &Plane, coordinates: &str) -> PyResult<(Vec<f64>, Coordinates, Kinematics, Vec<Contact>)> {
+        let (q, kind, kinematics) = self.placed(q, coordinates)?;
+        let contacts = wheel_contacts(&self.inner, &kinematics, &terrain.inner);
+        Ok((q, kind, kinematics, contacts))
+    }
+
+    fn rover_from_json(text: &str, locked: &[(String, f64)]) -> PyResult<Self> {
+        let description = ModelDescription::from_json(text).map_err(BorderError::from)?;
+        let model = Model::from_description(description).and_then(|m| m.with_locked_joints(locked));
+        Self::wrap(model)
+    }
+}
+
+/// Points with names: solids, wheel axles, mass centre.
+pub fn tags<'py>(py: Python<'py>, model: &Model, kinematics: &Kinematics) -> PyResult<Bound<'py, PyDict>> {
+    let tags = PyDict::new(py);
+    for frame in model.frames() {
+        let x = kinematics.base + kinematics.point(frame.body, &frame.position);
+        tags.set_item(&frame.name, fresh(py, x.as_slice()))?;
+    }
+    for wheel in model.wheels() {
+        let s = kinematics.R[wheel.body] * wheel.axle;
+        tags.set_item(format!("axle_{}", wheel.name), fresh(py, s.as_slice()))?;
+    }
+    let centre = momentum::centre_of_mass(model, kinematics);
+    tags.set_item("centre_of_mass", fresh(py, centre.as_slice()))?;
+    Ok(tags)
+}
+
+/// Origin and rotation matrix of every solid.
+pub fn poses<'py>(py: Python<'py>, model: &Model, kinematics: &Kinematics) -> PyResult<Bound<'py, PyDict>> {
+    let poses = PyDict::new(py);
+    for frame in model.frames() {
+        let x = kinematics.base + kinematics.point(frame.body, &frame.position);
+        let R = kinematics.R[frame.body] * frame.rotation;
+        let R = DMatrix::from_iterator(3, 3, R.iter().copied());
+        poses.set_item(&frame.name, (fresh(py, x.as_slice()), fresh_matrix(py, &R)?))?;
+    }
+    Ok(poses)
+}
+
+#[pymethods]
+impl RoverModel {
+    #[new]
+    fn new() -> Self {
+        Self { inner: Arc::new(Model::rover()) }
+    }
+
+    /// Reads a model file (TOML). Raises ModelError, or OSError where there is no such file.
+    #[staticmethod]
+    fn from_file(path: PathBuf) -> PyResult<Self> {
+        let bytes = std::fs::read(&path)?;
+        let unreadable = || {
+            let message = format!("the model description cannot be read: {} is not UTF-8 text", path.display());
+            let (field, value) = (Some("text".to_owned()), Value::Text(path.display().to_string()));
+            BorderError { kind: Kind::Model, message, field, value }
+        };
+        let text = String::from_utf8(bytes).map_err(|_| unreadable())?;
+        Self::from_text(&text)
+    }
+
+    /// Reads a model from TOML text.
+    #[staticmethod]
+    fn from_text(text: &str) -> PyResult<Self> {
+        Self::wrap(ModelDescription::from_toml(text).and_then(Model::from_description))
+    }
+
+    /// Reads a model from nested dictionaries and lists, as `to_dict` gives them.
+    #[staticmethod]
+    fn from_dict(description: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let py = description.py();
+        let options = PyDict::new(py);
+        options.set_item("allow_nan", true)?;
+        let refuse = |e: &PyErr| {
+            let message = format!("the model description cannot be read: {}", e.value(py));
+            BorderError { kind: Kind::Model, message, field: Some("text".to_owned()), value: Value::Nothing }
+        };
+        let text: String = py
+            .import("json")?
+            .call_method("dumps", (description,), Some(&options))
+            .map_err(|e| refuse(&e))?
+            .extract()?;
+        Self::rover_from_json(&text, &[])
+    }
+
+    /// Writes a model file (TOML). Locked joints are not part of a description.
+    fn to_file(&self, path: PathBuf) -> PyResult<()> {
+        Ok(std::fs::write(path, self.to_text()?)?)
+    }
+
+    /// The description as TOML text.
+    fn to_text(&self) -> PyResult<String> {
+        Ok(self.inner.description().to_toml().map_err(BorderError::from)?)
+    }
+
+    /// The description as nested dictionaries and lists.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let text = self.inner.description().to_json().map_err(BorderError::from)?;
+        py.import("json")?.call_method1("loads", (text,))
+    }
+
+    /// The same machine with some of its data changed.
+    #[pyo3(signature = (*, wheel_radius = None, masses = None, steering_stiffness = None, steering_damping = None, wheel_torque_limit = None))]
+    fn replace(
+        &self,
+        wheel_radius: Option<f64>,
+        masses: Option<&Bound<'_, PyAny>>,
+        steering_stiffness: Option<f64>,
+        steering_damping: Option<f64>,
+        wheel_torque_limit: Option<f64>,
+    ) -> PyResult<Self> {
+        let mut description = self.inner.description().clone();
+        for wheel in &mut description.wheels {
+            wheel.radius = wheel_radius.unwrap_or(wheel.radius);
+            wheel.torque_limit = wheel_torque_limit.unwrap_or(wheel.torque_limit);
+        }
+        if let Some(masses) = masses {
+            if masses.cast::<PyMapping>().is_ok() {
+                for (name, mass) in masses.extract::<HashMap<String, f64>>()? {
+                    let Some(solid) = description.solids.iter_mut().find(|s| s.name == name) else {
+                        return Err(BorderError::from(ModelError::UnknownName { field: "masses".to_owned(), name }).into());
+                    };
+                    solid.mass = mass;
+                }
+            } else {
+                let masses = vector(masses, Kind::Model, "masses")?;
+                if masses.len() != description.solids.len() {
+                    let message = format!("masses: needs {} entries, has {}", description.solids.len(), masses.len());
+                    let (field, value) = (Some("masses".to_owned()), Value::Count(masses.len()));
+                    return Err(BorderError { kind: Kind::Model, message, field, value }.into());
+                }
+                for (solid, mass) in description.solids.iter_mut().zip(masses) {
+                    solid.mass = mass;
+                }
+            }
+        }
+        let steering: Vec<String> = description.wheels.iter().filter_map(|w| w.steering.clone()).collect();
+        for solid in &mut description.solids {
+            if let (Some(hold), true) = (&mut solid.hold, steering.contains(&solid.name)) {
+                hold.stiffness = steering_stiffness.unwrap_or(hold.stiffness);
+                hold.damping = steering_damping.unwrap_or(hold.damping);
+            }
+        }
+        let locked = self.inner.locked_joints();
+        Self::wrap(Model::from_description(description).and_then(|m| m.with_locked_joints(locked)))
+    }
+
+    /// The same machine with joints locked (at 0, or at the given angles in rad): their coordinates are gone.
+    fn weld(&self, joints: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let joints: Vec<(String, f64)> = if let Ok(map) = joints.cast::<PyMapping>() {
+            map.items()?.iter().map(|item| item.extract()).collect::<PyResult<_>>()?
+        } else {
+            joints.extract::<Vec<String>>()?.into_iter().map(|name| (name, 0.0)).collect()
+        };
+        Self::wrap(self.inner.with_locked_joints(&joints))
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.inner.description().name
+    }
+
+    #[getter]
+    fn nq(&self) -> usize {
+        self.inner.nv()
+    }
+
+    #[getter]
+    fn nv(&self) -> usize {
+        self.inner.nv()
+    }
+
+    #[getter]
+    fn mass(&self) -> f64 {
+        self.inner.mass()
+    }
+
+    #[getter]
+    fn dof_names(&self) -> Vec<String> {
+        let base = ["x", "y", "z", "roll", "heading", "pitch"].map(str::to_owned);
+        base.into_iter().chain(self.joint_names()).collect()
+    }
+
+    #[getter]
+    fn joint_names(&self) -> Vec<String> {
+        self.inner.bodies().iter().skip(1).map(|b| b.name.clone()).collect()
+    }
+
+    #[getter]
+    fn solid_names(&self) -> Vec<String> {
+        self.inner.frames().iter().map(|f| f.name.clone()).collect()
+    }
+
+    #[getter]
+    fn wheel_names(&self) -> Vec<String> {
+        self.inner.wheels().iter().map(|w| w.name.clone()).collect()
+    }
+
+    #[getter]
+    fn wheel_radii<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.inner.wheels().iter().map(|w| w.radius))
+    }
+
+    #[getter]
+    fn wheel_torque_limits<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.inner.wheels().iter().map(|w| w.torque_limit))
+    }
+
+    #[getter]
+    fn wheel_joint_indices(&self) -> Vec<i64> {
+        self.inner.wheels().iter().map(|w| signed(w.joint)).collect()
+    }
+
+    #[getter]
+    fn steering_joint_indices(&self) -> Vec<i64> {
+        self.inner.wheels().iter().map(|w| signed(w.steering)).collect()
+    }
+
+    #[getter]
+    fn steering_limit(&self) -> f64 {
+        self.inner.wheels().iter().map(|w| w.steering_limit).fold(0.0, f64::max)
+    }
+
+    /// M(q), (nv, nv). Source: Featherstone 2008, ch. 6.
+    #[pyo3(signature = (q, coordinates = "report"))]
+    fn mass_matrix<'py>(&self, py: Python<'py>, q: &Bound<'_, PyAny>, coordinates: &str) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (q, kind, kinematics) = self.placed(q, coordinates)?;
+        let dense = dense_mass_matrix(&self.inner, &kinematics);
+        match kind {
+            Coordinates::State => fresh_matrix(py, &dense),
+            Coordinates::Report => fresh_matrix(py, &coordinates::congruence(&dense, coordinates::report_angles(&q))),
+        }
+    }
+
+    /// N(q, v) v + G(q), (nv,): M q̈ + bias = generalized forces.
+    #[pyo3(signature = (q, qdot, gravity = None, coordinates = "report"))]
+    fn bias<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'_, PyAny>,
+        qdot: &Bound<'_, PyAny>,
+        gravity: Option<&Bound<'_, PyAny>>,
+        coordinates: &str,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (q, kind, kinematics) = self.placed(q, coordinates)?;
+        let qdot = vector(qdot, Kind::State, "qdot")?;
+        let v = kind.velocity(&self.inner, &q, &qdot)?;
+        let gravity = checked_gravity(gravity)?;
+        let mut out = vec![0.0; v.len()];
+        bias(&self.inner, &kinematics, &v, &gravity, &mut BiasScratch::new(&self.inner), &mut out);
+        if kind == Coordinates::State {
+            return Ok(fresh(py, &out));
+        }
+        let angles = coordinates::report_angles(&q);
+        let drift = dense_mass_matrix(&self.inner, &kinematics) * coordinates::rate_drift(angles, &qdot);
+        let pulled = coordinates::pull_back(&(DVector::from_vec(out) + drift), angles);
+        Ok(fresh(py, pulled.as_slice()))
+    }
+
+    /// T, (nv, 2 n_wheels): generalized forces of wheel torques (positive forward), then of steering torques.
+    fn actuation_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let wheels = self.inner.wheels();
+        let mut T = DMatrix::zeros(self.inner.nv(), 2 * wheels.len());
+        for (i, wheel) in wheels.iter().enumerate() {
+            if let Some(k) = wheel.joint {
+                T[(k, i)] = wheel.drive_sign;
+            }
+            if let Some(k) = wheel.steering {
+                T[(k, wheels.len() + i)] = 1.0;
+            }
+        }
+        fresh_matrix(py, &T)
+    }
+
+    /// ½ vᵀ M v, J.
+    #[pyo3(signature = (q, qdot, coordinates = "report"))]
+    fn kinetic_energy(&self, q: &Bound<'_, PyAny>, qdot: &Bound<'_, PyAny>, coordinates: &str) -> PyResult<f64> {
+        let (q, kind, kinematics) = self.placed(q, coordinates)?;
+        let v = kind.velocity(&self.inner, &q, &vector(qdot, Kind::State, "qdot")?)?;
+        Ok(momentum::energy(&self.inner, &kinematics, &v, &Vector3::zeros()).kinetic)
+    }
+
+    /// {name: (3,)}: origins of the solids (m), unit axles `axle_FL`, ..., and `centre_of_mass`, world.
+    #[pyo3(signature = (q, coordinates = "report"))]
+    fn tags<'py>(&self, py: Python<'py>, q: &Bound<'_, PyAny>, coordinates: &str) -> PyResult<Bound<'py, PyDict>> {
+        tags(py, &self.inner, &self.placed(q, coordinates)?.2)
+    }
+
+    /// {name: ((3,), (3, 3))}: origin and rotation matrix of every solid, world.
+    #[pyo3(signature = (q, coordinates = "report"))]
+    fn poses<'py>(&self, py: Python<'py>, q: &Bound<'_, PyAny>, coordinates: &str) -> PyResult<Bound<'py, PyDict>> {
+        poses(py, &self.inner, &self.placed(q, coordinates)?.2)
+    }
+
+    /// (n_wheels,) m, positive when apart.
+    #[pyo3(signature = (q, terrain, coordinates = "report"))]
+    fn wheel_gaps<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'_, PyAny>,
+        terrain: &Plane,
+        coordinates: &str,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let contacts = self.contacts(q, terrain, coordinates)?.3;
+        Ok(PyArray1::from_iter(py, contacts.iter().map(|c| c.gap)))
+    }
+
+    /// (n_wheels, 3) m: the rim point nearest to the terrain, world.
+    #[pyo3(signature = (q, terrain, coordinates = "report"))]
+    fn wheel_contact_points<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'_, PyAny>,
+        terrain: &Plane,
+        coordinates: &str,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (_, _, kinematics, contacts) = self.contacts(q, terrain, coordinates)?;
+        let rows: Vec<[f64; 3]> = contacts.iter().map(|c| (kinematics.base + c.point).into()).collect();
+        fresh_rows(py, &rows)
+    }
+
+    /// (n_wheels, 3, nv): rows n, t, b of the contact point's velocity per unit of each velocity.
+    #[pyo3(signature = (q, terrain, coordinates = "report"))]
+    fn wheel_jacobians<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'_, PyAny>,
+        terrain: &Plane,
+        coordinates: &str,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let (q, kind, kinematics, contacts) = self.contacts(q, terrain, coordinates)?;
+        let nv = self.inner.nv();
+        let mut rows = Vec::with_capacity(contacts.len() * 3 * nv);
+        for contact in &contacts {
+            let path = self.inner.path(contact.body);
+            for d in contact.frame.rows() {
+                let mut along = vec![0.0; path.len()];
+                kinematics.point_jacobian_row(path, &contact.point, &d, &mut along);
+                let mut full = DVector::zeros(nv);
+                for (entry, &k) in along.iter().zip(path) {
+                    full[k] = *entry;
+                }
+                if kind == Coordinates::Report {
+                    full = coordinates::pull_back(&full, coordinates::report_angles(&q));
+                }
+                rows.extend_from_slice(full.as_slice());
+            }
+        }
+        fresh_blocks(py, rows, [contacts.len(), 3, nv])
+    }
+
+    /// Public q and state velocity to the report's q and qdot.
+    fn to_report<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'_, PyAny>,
+        v: &Bound<'_, PyAny>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+        let configuration = Coordinates::State.configuration(&self.inner, &vector(q, Kind::State, "q")?)?;
+        let v = coordinates::checked_velocity(&self.inner, &vector(v, Kind::State, "v")?).map_err(BorderError::from)?;
+        let (q, qdot) = coordinates::to_report(&configuration, &v).map_err(BorderError::from)?;
+        Ok((fresh(py, &q), fresh(py, &qdot)))
+    }
+
+    /// The report's q and qdot to public q and state velocity.
+    fn from_report<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'_, PyAny>,
+        qdot: &Bound<'_, PyAny>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+        let q = vector(q, Kind::State, "q")?;
+        let configuration = Coordinates::Report.configuration(&self.inner, &q)?;
+        let v = Coordinates::Report.velocity(&self.inner, &q, &vector(qdot, Kind::State, "qdot")?)?;
+        Ok((fresh(py, &coordinates::to_public(&configuration)), fresh(py, &v)))
+    }
+
+    fn __repr__(&self) -> String {
+        let m = &self.inner;
+        format!("RoverModel({:?}, nv={}, mass={})", m.description().name, m.nv(), m.mass())
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other.cast::<Self>().is_ok_and(|o| {
+            let o = &o.get().inner;
+            o.description() == self.inner.description() && o.locked_joints() == self.inner.locked_joints()
+        })
+    }
+
+    fn __hash__(&self) -> PyResult<u64> {
+        use std::hash::{DefaultHasher, Hash, Hasher};
+        let mut hasher = DefaultHasher::new();
+        self.inner.description().to_json().map_err(BorderError::from)?.hash(&mut hasher);
+        Ok(hasher.finish())
+    }
+
+    #[staticmethod]
+    fn _restore(text: &str, locked: Vec<(String, f64)>) -> PyResult<Self> {
+        Self::rover_from_json(text, &locked)
+    }
+
+    #[allow(clippy::type_complexity)]
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String, Vec<(String, f64)>))> {
+        let model = &slf.get().inner;
+        let text = model.description().to_json().map_err(BorderError::from)?;
+        Ok((slf.get_type().getattr("_restore")?, (text, model.locked_joints().to_vec())))
+    }
+}
+
+fn signed(index: Option<usize>) -> i64 {
+    index.and_then(|k| i64::try_from(k).ok()).unwrap_or(-1)
+}
+
+fn dense_mass_matrix(model: &Model, kinematics: &Kinematics) -> DMatrix<f64> {
+    let mut M = MassMatrix::new(model);
+    M.update(model, kinematics);
+    M.to_dense(model)
+}
+
+/// Three finite numbers, by default Earth's.
+pub fn checked_gravity(gravity: Option<&Bound<'_, PyAny>>) -> PyResult<Vector3<f64>> {
+    let given = gravity.map_or(Ok([0.0, -9.81, 0.0]), |g| triple(g, Kind::Option, "gravity"))?;
+    for value in given {
+        if !value.is_finite() {
+            let message = format!("gravity: must be finite, is {given:?}");
+            return Err(BorderError::option("gravity", message, Value::Numbers(given.to_vec())).into());
+        }
+    }
+    Ok(given.into())
+}

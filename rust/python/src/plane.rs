@@ -1,0 +1,56 @@
+//! `Plane`.
+
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use rover_core::geometry::Plane as CorePlane;
+
+use crate::arrays::{fresh, triple};
+use crate::errors::{BorderError, Kind, Value};
+
+/// The half-space n.x + offset >= 0 is free; the ground is below. `normal` is normalised.
+#[pyclass(module = "rover_gym._core", frozen, from_py_object)]
+#[derive(Clone)]
+pub struct Plane {
+    pub inner: CorePlane,
+}
+
+#[pymethods]
+impl Plane {
+    #[new]
+    #[pyo3(signature = (normal = None, offset = 0.0))]
+    fn new(normal: Option<&Bound<'_, PyAny>>, offset: f64) -> PyResult<Self> {
+        let normal = normal.map_or(Ok([0.0, 1.0, 0.0]), |n| triple(n, Kind::Terrain, "normal"))?;
+        Ok(Self { inner: CorePlane::new(normal, offset).map_err(BorderError::from)? })
+    }
+
+    #[getter]
+    fn normal<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, self.inner.normal().as_slice())
+    }
+
+    #[getter]
+    fn offset(&self) -> f64 {
+        self.inner.offset()
+    }
+
+    /// Height y of the plane at (x, z), m.
+    fn height(&self, x: f64, z: f64) -> PyResult<f64> {
+        let n = self.inner.normal();
+        if n.y.abs() < 1e-12 {
+            let message = "normal: a vertical plane has no height".to_owned();
+            let value = Value::Numbers(n.as_slice().to_vec());
+            return Err(BorderError { kind: Kind::Terrain, message, field: Some("normal".to_owned()), value }.into());
+        }
+        Ok(-(n.x * x + n.z * z + self.inner.offset()) / n.y)
+    }
+
+    fn __repr__(&self) -> String {
+        let n = self.inner.normal();
+        format!("Plane(normal=({}, {}, {}), offset={})", n.x, n.y, n.z, self.inner.offset())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, ((f64, f64, f64), f64))> {
+        let n = slf.get().inner.normal();
+        Ok((slf.get_type().into_any(), ((n.x, n.y, n.z), slf.get().inner.offset())))
+    }
+}

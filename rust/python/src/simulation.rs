@@ -1,0 +1,442 @@
+//! `Simulation`: one rover on one terrain.
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+use rover_core::integrator::{Stabilisation, StepOptions, StepReport as CoreReport, Variant};
+use rover_core::multibody::{Energy as CoreEnergy, Model, coordinates};
+use rover_core::nalgebra::DMatrix;
+use rover_core::simulation::Simulation as CoreSimulation;
+use std::sync::Arc;
+
+use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
+use crate::contacts::Contacts;
+use crate::errors::{BorderError, Kind, Value};
+use crate::friction_contact::solver_options;
+use crate::model::{Coordinates, RoverModel, checked_gravity, poses, tags};
+use crate::plane::Plane;
+use crate::snapshot::Snapshot;
+
+/// What the solver says of the steps just taken (worst over the steps of one call).
+#[pyclass(module = "rover_gym._core", frozen)]
+pub struct StepReport {
+    inner: CoreReport,
+}
+
+#[pymethods]
+impl StepReport {
+    #[getter]
+    fn status(&self) -> &'static str {
+        if self.inner.is_converged() { "converged" } else { "not_converged" }
+    }
+
+    #[getter]
+    fn is_converged(&self) -> bool {
+        self.inner.is_converged()
+    }
+
+    #[getter]
+    fn steps(&self) -> usize {
+        self.inner.steps
+    }
+
+    #[getter]
+    fn iterations(&self) -> usize {
+        self.inner.iterations
+    }
+
+    #[getter]
+    fn newton_iterations(&self) -> usize {
+        self.inner.newton_iterations
+    }
+
+    #[getter]
+    fn residual(&self) -> f64 {
+        self.inner.residual
+    }
+
+    #[getter]
+    fn n_contacts(&self) -> usize {
+        self.inner.n_contacts
+    }
+
+    fn __repr__(&self) -> String {
+        let r = &self.inner;
+        format!(
+            "StepReport(status={:?}, steps={}, iterations={}, residual={:.3e}, n_contacts={})",
+            self.status(), r.steps, r.iterations, r.residual, r.n_contacts
+        )
+    }
+}
+
+/// Kinetic and potential energy, J.
+#[pyclass(module = "rover_gym._core", frozen)]
+pub struct Energy {
+    inner: CoreEnergy,
+}
+
+#[pymethods]
+impl Energy {
+    #[getter]
+    fn kinetic(&self) -> f64 {
+        self.inner.kinetic
+    }
+
+    #[getter]
+    fn potential(&self) -> f64 {
+        self.inner.potential
+    }
+
+    #[getter]
+    fn total(&self) -> f64 {
+        self.inner.total()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Energy(kinetic={}, potential={})", self.inner.kinetic, self.inner.potential)
+    }
+}
+
+/// A rover on a terrain, stepped through time.
+#[pyclass(module = "rover_gym._core")]
+pub struct Simulation {
+    inner: CoreSimulation,
+    terrain: Plane,
+    /// Keyword arguments that it was made with, for pickling.
+    solver: String,
+    max_iterations: usize,
+}
+
+fn names(joints: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
+    joints.extract::<String>().map(|name| vec![name]).or_else(|_| joints.extract())
+}
+
+fn choice<T: Copy>(field: &'static str, given: &str, choices: &[(&str, T)]) -> Result<T, BorderError> {
+    let found = choices.iter().find(|(name, _)| *name == given).map(|(_, value)| *value);
+    found.ok_or_else(|| {
+        let known: Vec<String> = choices.iter().map(|(name, _)| format!("{name:?}")).collect();
+        let message = format!("{field}: must be one of {}, is {given:?}", known.join(", "));
+        BorderError::option(field, message, Value::Text(given.to_owned()))
+    })
+}
+
+const VARIANTS: [(&str, Variant); 2] = [("linearised", Variant::Linearised), ("newton", Variant::Newton)];
+const STABILISATIONS: [(&str, Stabilisation); 2] =
+    [("projection", Stabilisation::Projection), ("none", Stabilisation::None)];
+
+fn name_of<T: PartialEq + Copy>(value: T, choices: &[(&'static str, T)]) -> &'static str {
+    choices.iter().find(|(_, v)| *v == value).map_or("", |(name, _)| name)
+}
+
+impl Simulation {
+    fn model_ref(&self) -> &Model {
+        self.inner.model()
+    }
+}
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
+    #[pyo3(signature = (model = None, terrain = None, *, gravity = None, friction = 0.7, restitution = 0.0, time_step = 0.005,
+        variant = "linearised", theta = 0.5, forecast = 0.5, solver = "auto", tolerance = 1e-9, max_iterations = 1000,
+        stabilisation = "projection", warm_start = true))]
+    fn new(
+        model: Option<RoverModel>,
+        terrain: Option<&Bound<'_, PyAny>>,
+        gravity: Option<&Bound<'_, PyAny>>,
+        friction: f64,
+        restitution: f64,
+        time_step: f64,
+        variant: &str,
+        theta: f64,
+        forecast: f64,
+        solver: &str,
+        tolerance: f64,
+        max_iterations: usize,
+        stabilisation: &str,
+        warm_start: bool,
+    ) -> PyResult<Self> {
+        let model = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
+        let terrain = match terrain {
+            None => Plane { inner: rover_core::geometry::Plane::ground() },
+            Some(given) => given.extract::<Plane>().map_err(|_| {
+                let shown = given.repr().map_or_else(|_| String::new(), |r| r.to_string());
+                let message = format!("terrain: must be a Plane, is {shown}");
+                BorderError { kind: Kind::Terrain, message, field: Some("terrain".to_owned()), value: Value::Text(shown) }
+            })?,
+        };
+        let options = StepOptions {
+            gravity: checked_gravity(gravity)?,
+            friction_coefficient: friction,
+            restitution,
+            time_step,
+            theta,
+            forecast,
+            variant: choice("variant", variant, &VARIANTS)?,
+            stabilisation: choice("stabilisation", stabilisation, &STABILISATIONS)?,
+            warm_start,
+            solver: solver_options(solver, tolerance, max_iterations)?,
+            ..StepOptions::default()
+        };
+        let inner = CoreSimulation::new(model, Arc::new(terrain.inner), options).map_err(BorderError::from)?;
+        Ok(Self { inner, terrain, solver: solver.to_owned(), max_iterations })
+    }
+
+    #[getter]
+    fn model(&self) -> RoverModel {
+        RoverModel { inner: self.inner.model().clone() }
+    }
+
+    #[getter]
+    fn terrain(&self) -> Plane {
+        self.terrain.clone()
+    }
+
+    #[getter]
+    fn time(&self) -> f64 {
+        self.inner.state().time
+    }
+
+    #[getter]
+    fn time_step(&self) -> f64 {
+        self.inner.options().time_step
+    }
+
+    #[getter]
+    fn gravity<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, self.inner.options().gravity.as_slice())
+    }
+
+    #[getter]
+    fn friction(&self) -> f64 {
+        self.inner.options().friction_coefficient
+    }
+
+    #[getter]
+    fn restitution(&self) -> f64 {
+        self.inner.options().restitution
+    }
+
+    /// The keyword arguments that make a simulation with these options.
+    #[getter]
+    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let o = self.inner.options();
+        let settings = PyDict::new(py);
+        settings.set_item("gravity", (o.gravity.x, o.gravity.y, o.gravity.z))?;
+        settings.set_item("friction", o.friction_coefficient)?;
+        settings.set_item("restitution", o.restitution)?;
+        settings.set_item("time_step", o.time_step)?;
+        settings.set_item("variant", name_of(o.variant, &VARIANTS))?;
+        settings.set_item("theta", o.theta)?;
+        settings.set_item("forecast", o.forecast)?;
+        settings.set_item("solver", &self.solver)?;
+        settings.set_item("tolerance", o.solver.tolerance)?;
+        settings.set_item("max_iterations", self.max_iterations)?;
+        settings.set_item("stabilisation", name_of(o.stabilisation, &STABILISATIONS))?;
+        settings.set_item("warm_start", o.warm_start)?;
+        Ok(settings)
+    }
+
+    #[getter]
+    fn q<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, &coordinates::to_public(&self.inner.state().configuration))
+    }
+
+    #[getter]
+    fn v<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, &self.inner.state().v)
+    }
+
+    #[getter]
+    fn rotation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let R = self.inner.state().configuration.attitude.to_rotation_matrix();
+        fresh_matrix(py, &DMatrix::from_iterator(3, 3, R.matrix().iter().copied()))
+    }
+
+    #[pyo3(signature = (q, qdot = None, *, coordinates = "state"))]
+    fn set_state(&mut self, q: &Bound<'_, PyAny>, qdot: Option<&Bound<'_, PyAny>>, coordinates: &str) -> PyResult<()> {
+        let kind = Coordinates::parse(coordinates)?;
+        let q = vector(q, Kind::State, "q")?;
+        let configuration = kind.configuration(self.model_ref(), &q)?;
+        let qdot = qdot.map_or_else(|| Ok(vec![0.0; self.model_ref().nv()]), |v| vector(v, Kind::State, "qdot"))?;
+        let v = kind.velocity(self.model_ref(), &q, &qdot)?;
+        self.inner.set_state(configuration, v);
+        Ok(())
+    }
+
+    #[allow(clippy::type_complexity)]
+    fn report_state<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+        let state = self.inner.state();
+        let (q, qdot) = coordinates::to_report(&state.configuration, &state.v).map_err(BorderError::from)?;
+        Ok((fresh(py, &q), fresh(py, &qdot)))
+    }
+
+    #[getter]
+    fn wheel_torques<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, self.inner.wheel_torques())
+    }
+
+    fn set_wheel_torques(&mut self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+        let torques = vector(torques, Kind::Command, "torques")?;
+        Ok(self.inner.set_wheel_torques(&torques).map_err(BorderError::from)?)
+    }
+
+    #[getter]
+    fn steering<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, &self.inner.steering())
+    }
+
+    fn set_steering(&mut self, set_points: &Bound<'_, PyAny>) -> PyResult<()> {
+        let set_points = vector(set_points, Kind::Command, "set_points")?;
+        Ok(self.inner.set_steering(&set_points).map_err(BorderError::from)?)
+    }
+
+    fn set_joint_torques(&mut self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+        let torques = vector(torques, Kind::Command, "torques")?;
+        Ok(self.inner.set_joint_torques(&torques).map_err(BorderError::from)?)
+    }
+
+    #[pyo3(signature = (joints, set_points = None, *, stiffness = None, damping = None))]
+    fn hold(
+        &mut self,
+        joints: &Bound<'_, PyAny>,
+        set_points: Option<&Bound<'_, PyAny>>,
+        stiffness: Option<f64>,
+        damping: Option<f64>,
+    ) -> PyResult<()> {
+        let set_points = set_points
+            .map(|s| s.extract::<f64>().map(|x| vec![x]).or_else(|_| vector(s, Kind::Command, "set_points")))
+            .transpose()?;
+        let held = self.inner.hold(&names(joints)?, set_points.as_deref(), stiffness, damping);
+        Ok(held.map_err(BorderError::from)?)
+    }
+
+    fn release(&mut self, joints: &Bound<'_, PyAny>) -> PyResult<()> {
+        Ok(self.inner.release(&names(joints)?).map_err(BorderError::from)?)
+    }
+
+    fn brake(&mut self) {
+        self.inner.brake();
+    }
+
+    #[pyo3(signature = (n = 1))]
+    fn step(&mut self, py: Python<'_>, n: i64) -> PyResult<StepReport> {
+        let steps = usize::try_from(n).map_err(|_| {
+            BorderError::option("n", format!("n: must not be negative, is {n}"), Value::Number(n as f64))
+        })?;
+        let inner = &mut self.inner;
+        let report = py.detach(|| inner.step(steps)).map_err(BorderError::from)?;
+        Ok(StepReport { inner: report })
+    }
+
+    #[getter]
+    fn contacts(&self) -> Contacts {
+        Contacts::new(self.model_ref(), self.inner.contacts(), self.inner.state().configuration.position)
+    }
+
+    #[getter]
+    fn wheel_gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.inner.wheel_contacts().iter().map(|c| c.gap))
+    }
+
+    #[getter]
+    fn wheel_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        fresh_rows(py, &self.inner.wheel_forces())
+    }
+
+    #[getter]
+    fn trunk_force(&self) -> f64 {
+        self.inner.body_force()
+    }
+
+    fn energy(&self) -> Energy {
+        Energy { inner: self.inner.energy() }
+    }
+
+    #[allow(clippy::type_complexity)]
+    fn momentum<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
+        let momentum = self.inner.momentum();
+        (fresh(py, momentum.linear.as_slice()), fresh(py, momentum.angular.as_slice()))
+    }
+
+    fn centre_of_mass<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, self.inner.centre_of_mass().as_slice())
+    }
+
+    fn tags<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        tags(py, self.model_ref(), &self.inner.kinematics())
+    }
+
+    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        poses(py, self.model_ref(), &self.inner.kinematics())
+    }
+
+    fn snapshot(&self) -> Snapshot {
+        Snapshot { inner: self.inner.snapshot() }
+    }
+
+    fn restore(&mut self, snapshot: &Snapshot) -> PyResult<()> {
+        Ok(self.inner.restore(&snapshot.inner).map_err(BorderError::from)?)
+    }
+
+    /// W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem.
+    #[allow(clippy::type_complexity)]
+    fn last_problem<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+        let (W, q, mu) = self.inner.last_problem();
+        let (n, size) = (mu.len(), 3 * mu.len());
+        let q = if n == 0 { &q[..0] } else { q };
+        let W = DMatrix::from_row_slice(size, size, &W[..size * size]);
+        Ok((fresh_matrix(py, &W)?, fresh(py, q), fresh(py, mu)))
+    }
+
+    #[pyo3(signature = (n = 1000))]
+    fn profile<'py>(&self, py: Python<'py>, n: usize) -> PyResult<Bound<'py, PyDict>> {
+        let stopwatch = self.inner.profile(n).map_err(BorderError::from)?;
+        let parts = PyDict::new(py);
+        for (phase, microseconds) in stopwatch.microseconds() {
+            parts.set_item(snake_case(&format!("{phase:?}")), microseconds)?;
+        }
+        Ok(parts)
+    }
+
+    fn __repr__(&self) -> String {
+        let model = self.model_ref();
+        format!("Simulation({:?}, nv={}, time={})", model.description().name, model.nv(), self.time())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let py = slf.py();
+        let own = slf.borrow();
+        let rebuild = slf.get_type().getattr("_rebuild")?;
+        let arguments = (own.model(), own.terrain(), own.settings(py)?, own.snapshot());
+        (rebuild, arguments).into_pyobject(py)
+    }
+
+    #[staticmethod]
+    fn _rebuild<'py>(
+        py: Python<'py>,
+        model: &Bound<'py, PyAny>,
+        terrain: &Bound<'py, PyAny>,
+        settings: &Bound<'py, PyDict>,
+        snapshot: &Snapshot,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let made = py.get_type::<Self>().call((model, terrain), Some(settings))?;
+        made.cast::<Self>()?.borrow_mut().restore(snapshot)?;
+        Ok(made)
+    }
+}
+
+fn snake_case(camel: &str) -> String {
+    let mut out = String::new();
+    for c in camel.chars() {
+        if c.is_uppercase() && !out.is_empty() {
+            out.push('_');
+        }
+        out.extend(c.to_lowercase());
+    }
+    out
+}
