@@ -119,21 +119,22 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     the slices and gives the values back in SI units. Never clipped. The bounds of unbounded entries
     are float32's largest numbers: the space holds every finite observation and nothing else.
 
-    | index | field            | meaning                                                      | unit       | scale        |
-    |-------|------------------|--------------------------------------------------------------|------------|--------------|
-    | 0-20  | q                | trunk x, y, z; roll, heading, pitch; 15 joint angles, the wheels' wrapped to one turn | m, rad | 1 |
-    | 21-41 | velocity         | trunk linear and angular in the trunk frame; 15 joint rates  | m/s, rad/s | 1, wheels 10 |
-    | 42-47 | wheel_gap        | distance of each wheel to the ground                         | m          | 0.1          |
-    | 48-53 | wheel_contact    | 1 where the gap is at most 1 mm, else 0                      |            | 1            |
-    | 54-59 | normal_force     | ground on wheel, along the ground's normal, last 5 ms        | N          | m g / 6      |
-    | 60-71 | tangential_force | ground on wheel, rolling then lateral, wheel by wheel        | N          | m g / 6      |
-    | 72-74 | ground_normal    | the ground's normal in the trunk frame                       |            | 1            |
-    | 75-76 | goal             | goal ahead and to the right of the trunk, horizontal         | m          | 10           |
-    | 77    | goal_distance    | horizontal distance from the trunk's origin to the goal      | m          | 10           |
-    | 78-89 | previous_action  | the action before this observation, 0 at reset               |            | 1            |
-    | 90    | stuck            | fraction of the time to high-centring that has passed        |            | 1            |
+    | index | field            | meaning                                                   | unit       | scale        |
+    |-------|------------------|-----------------------------------------------------------|------------|--------------|
+    | 0-20  | q                | trunk x, y, z, roll, heading, pitch; joint angles         | m, rad     | 1            |
+    | 21-41 | velocity         | trunk linear and angular in the trunk frame; joint rates  | m/s, rad/s | 1, wheels 10 |
+    | 42-47 | wheel_gap        | distance of each wheel to the ground                      | m          | 0.1          |
+    | 48-53 | wheel_contact    | 1 where the gap is at most 1 mm, else 0                   |            | 1            |
+    | 54-59 | normal_force     | ground on wheel, along the ground's normal                | N          | m g / 6      |
+    | 60-71 | tangential_force | ground on wheel, rolling then lateral, wheel by wheel     | N          | m g / 6      |
+    | 72-74 | ground_normal    | the ground's normal in the trunk frame                    |            | 1            |
+    | 75-76 | goal             | goal ahead and to the right of the trunk, horizontal      | m          | 10           |
+    | 77    | goal_distance    | horizontal distance from the trunk's origin to the goal   | m          | 10           |
+    | 78-89 | previous_action  | the action before this observation, 0 at reset            |            | 1            |
+    | 90    | stuck            | fraction of the time to high-centring that has passed     |            | 1            |
 
-    The trunk frame is x forward, y up, z to the right of the trunk. Forces are zero at reset.
+    The trunk frame is x forward, y up, z to the right of the trunk. `q` is the simulation's, with the
+    wheels' angles wrapped to one turn. Forces are those of the last physics step, zero at reset.
 
     ## Reward
 
@@ -285,7 +286,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             if math.radians(asked) > limit * (1.0 + 1e-12):
                 reason = f"must be at most the model's limit, {math.degrees(limit):g}"
                 refuse(OptionError, "max_steering_deg", max_steering_deg, reason)
-            limit = math.radians(asked)
+            limit = min(limit, math.radians(asked))
         self.max_steering = limit
         self._torque_limits = self.model.wheel_torque_limits
         self._wheel_index = np.array(self.model.wheel_joint_indices)
@@ -343,10 +344,15 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         if observation is None:
             refuse(StateError, "q", q, "must be observable in float32")
         self._episode.observation = observation.copy()
-        solver = {"status": "converged", "iterations": 0, "residual": 0.0, "n_contacts": 0, "message": ""}
-        terms = dict.fromkeys(self._reward_weights, 0.0)
-        cos_tilt = float(self._up @ rotation[:, 1])
-        return observation, self._info(self._episode, cos_tilt, "", 0.0, terms, solver)
+        info = self._info(
+            self._episode,
+            float(self._up @ rotation[:, 1]),
+            0.0,
+            termination="",
+            terms=dict.fromkeys(self._reward_weights, 0.0),
+            solver=_solver_info("converged"),
+        )
+        return observation, info
 
     def step(
         self, action: npt.NDArray[np.float32]
@@ -359,87 +365,55 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             ResetNeeded: The environment has not been reset.
         """
         episode = self._running()
-        command = _check_action(action)
         simulation = self._simulation
+        command = _check_action(action)
         torques = command[:N_WHEELS] * self._torque_limits
-        simulation.set_wheel_torques(torques)
-        simulation.set_steering(command[N_WHEELS:] * self.max_steering)
-        failed = False
-        try:
-            report = simulation.step(self._substeps)
-        except StepError as error:
-            failed = True
-            solver = {
-                "status": "failed",
-                "iterations": 0,
-                "residual": math.inf,
-                "n_contacts": 0,
-                "message": str(error),
-            }
-        else:
-            solver = {
-                "status": report.status,
-                "iterations": report.iterations,
-                "residual": report.residual,
-                "n_contacts": report.n_contacts,
-                "message": "",
-            }
+        solver = self._drive(torques, command[N_WHEELS:] * self.max_steering)
 
         # The torque is constant over the period: its work is exactly torque times angle turned.
-        q = simulation.q
-        turned = (q - episode.q)[self._wheel_index]
-        work = (torques * -turned).tolist()
+        q, v, rotation = simulation.q, simulation.v, simulation.rotation
+        work: list[float] = (torques * (episode.q - q)[self._wheel_index]).tolist()
         spent = sum(map(abs, work))
-        episode.energy += spent
-        episode.energy_positive += sum(w for w in work if w > 0.0)
         change = command - episode.previous_action
-        change *= change
-        changes = change.tolist()
-
+        changes: list[float] = (change * change).tolist()
         previous_distance = episode.distance
         goal = episode.start.goal
+        cos_tilt = float(self._up @ rotation[:, 1])
+
         episode.q = q
         episode.previous_action = command
         episode.distance = math.hypot(goal[0] - q[0], goal[1] - q[2])
-        v = simulation.v
-        rotation = simulation.rotation
-        cos_tilt = float(self._up @ rotation[:, 1])
+        episode.energy += spent
+        episode.energy_positive += sum(joules for joules in work if joules > 0.0)
         if simulation.trunk_force <= self._trunk_load_limit or math.hypot(v[0], v[2]) > STUCK_SPEED:
             episode.stuck_time = 0.0
-        elif not failed:
-            episode.stuck_time += self.dt
-        slip_ratio = self._slip_ratio(v)
-        observation = self._observe(episode, v, rotation)
-
-        if failed or observation is None:
-            termination = "step_failed"
-        elif episode.distance <= self.goal_tolerance:
-            termination = "goal"
-        elif cos_tilt < self._cos_max_tilt:
-            termination = "roll_over"
-        elif episode.stuck_time >= self._stuck_limit:
-            termination = "high_centred"
         else:
-            termination = ""
+            episode.stuck_time += self.dt
 
-        w = self._reward_weights
-        dt = self.dt
-        terms = {
-            "progress": rewards.progress(w["progress"], previous_distance, episode.distance),
-            "time": rewards.time(w["time"], dt),
-            "energy": rewards.energy(w["energy"], spent),
-            "slip": rewards.slip(w["slip"], slip_ratio, dt),
-            "tilt": rewards.tilt(w["tilt"], cos_tilt, dt),
-            "torque_change": rewards.torque_change(w["torque_change"], sum(changes[:N_WHEELS])),
-            "steering_change": rewards.steering_change(w["steering_change"], sum(changes[N_WHEELS:])),
-            "success": rewards.success(w["success"], termination == "goal"),
-            "failure": rewards.failure(w["failure"], termination not in ("", "goal")),
-        }
-        info = self._info(episode, cos_tilt, termination, slip_ratio, terms, solver)
+        observation = self._observe(episode, v, rotation)
+        slip_ratio = self._slip_ratio(v)
+        if observation is None or solver["status"] == "failed":
+            termination = "step_failed"
+        else:
+            termination = self._termination(episode, cos_tilt)
         if observation is None:
             observation = episode.observation.copy()
         else:
             episode.observation = observation.copy()
+
+        w = self._reward_weights
+        terms = {
+            "progress": rewards.progress(w["progress"], previous_distance, episode.distance),
+            "time": rewards.time(w["time"], self.dt),
+            "energy": rewards.energy(w["energy"], spent),
+            "slip": rewards.slip(w["slip"], slip_ratio, self.dt),
+            "tilt": rewards.tilt(w["tilt"], cos_tilt, self.dt),
+            "torque_change": rewards.torque_change(w["torque_change"], sum(changes[:N_WHEELS])),
+            "steering_change": rewards.steering_change(w["steering_change"], sum(changes[N_WHEELS:])),
+            "success": rewards.success(w["success"], termination == "goal"),
+            "failure": rewards.failure(w["failure"], termination not in {"", "goal"}),
+        }
+        info = self._info(episode, cos_tilt, slip_ratio, termination=termination, terms=terms, solver=solver)
         return observation, sum(terms.values()), termination != "", False, info
 
     def snapshot(self) -> EnvSnapshot:
@@ -466,6 +440,27 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     def _simulate(self, plane: Plane) -> Simulation:
         return Simulation(self.model, plane, **self._simulation_options)
+
+    def _drive(self, torques: npt.NDArray[np.float64], set_points: npt.NDArray[np.float64]) -> dict[str, Any]:
+        """One control period of physics; returns what the solver says of it."""
+        simulation = self._simulation
+        simulation.set_wheel_torques(torques)
+        simulation.set_steering(set_points)
+        try:
+            report = simulation.step(self._substeps)
+        except StepError as error:
+            return _solver_info("failed", residual=math.inf, message=str(error))
+        return _solver_info(report.status, report.iterations, report.residual, report.n_contacts)
+
+    def _termination(self, episode: _Episode, cos_tilt: float) -> str:
+        """Why the episode ends here, or "" if it goes on."""
+        if episode.distance <= self.goal_tolerance:
+            return "goal"
+        if cos_tilt < self._cos_max_tilt:
+            return "roll_over"
+        if episode.stuck_time >= self._stuck_limit:
+            return "high_centred"
+        return ""
 
     def _running(self) -> _Episode:
         if self._episode is None:
@@ -563,8 +558,9 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         self,
         episode: _Episode,
         cos_tilt: float,
-        termination: str,
         slip_ratio: float,
+        *,
+        termination: str,
         terms: dict[str, float],
         solver: dict[str, Any],
     ) -> dict[str, Any]:
@@ -582,6 +578,18 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             "reward_terms": terms,
             "solver": solver,
         }
+
+
+def _solver_info(
+    status: str, iterations: int = 0, residual: float = 0.0, n_contacts: int = 0, *, message: str = ""
+) -> dict[str, Any]:
+    return {
+        "status": status,
+        "iterations": iterations,
+        "residual": residual,
+        "n_contacts": n_contacts,
+        "message": message,
+    }
 
 
 def _radians(degrees: Range) -> Range:
@@ -612,11 +620,14 @@ def _six_wheels(model: object) -> RoverModel:
 def _check_action(action: object) -> npt.NDArray[np.float64]:
     """The action as twelve floats of its own, within [-1, 1]."""
     try:
-        command = np.array(action, dtype=np.float64)
-    except (TypeError, ValueError):
+        given = np.asarray(action)
+    except ValueError:  # a ragged sequence
         refuse(CommandError, "action", action, f"must be {N_ACTIONS} numbers")
-    if command.shape != (N_ACTIONS,):
-        refuse(CommandError, "action", command.shape, f"must have shape ({N_ACTIONS},)")
+    if given.dtype.kind not in "fiu":
+        refuse(CommandError, "action", action, f"must be {N_ACTIONS} numbers")
+    if given.shape != (N_ACTIONS,):
+        refuse(CommandError, "action", given.shape, f"must have shape ({N_ACTIONS},)")
+    command = given.astype(np.float64)
     # Written so that a NaN fails too.
     if not np.abs(command).max() <= 1.0:
         for i, entry in enumerate(command.tolist()):

@@ -119,36 +119,23 @@ def build_layout(model: RoverModel, gravity_magnitude: float) -> ObservationLayo
     for index in model.wheel_joint_indices:
         velocity_scale[index] = WHEEL_RATE_SCALE
 
+    any_number, no_less = (-_LARGEST, _LARGEST), (0.0, _LARGEST)
+    rows: list[tuple[str, str, list[float], tuple[float, float], str]] = [
+        ("q", "m, rad", [1.0] * nq, any_number, "trunk x, y, z, roll, heading, pitch; joint angles"),
+        ("velocity", "m/s, rad/s", velocity_scale, any_number, "trunk linear, angular in its frame; joint rates"),
+        ("wheel_gap", "m", [GAP_SCALE] * N_WHEELS, any_number, "distance of each wheel to the ground"),
+        ("wheel_contact", "", [1.0] * N_WHEELS, (0.0, 1.0), "1 where the gap is at most 1 mm, else 0"),
+        ("normal_force", "N", [wheel_load] * N_WHEELS, any_number, "ground on wheel, along the ground's normal"),
+        ("tangential_force", "N", [wheel_load] * 2 * N_WHEELS, any_number, "ground on wheel, rolling then lateral"),
+        ("ground_normal", "", [1.0] * 3, (-1.0, 1.0), "the ground's normal in the trunk frame"),
+        ("goal", "m", [GOAL_SCALE] * 2, any_number, "goal ahead and to the right of the trunk, horizontal"),
+        ("goal_distance", "m", [GOAL_SCALE], no_less, "horizontal distance to the goal"),
+        ("previous_action", "", [1.0] * N_ACTIONS, (-1.0, 1.0), "the action before this observation"),
+        ("stuck", "", [1.0], (0.0, 1.0), "fraction of the time to high-centring"),
+    ]
     fields: list[ObservationField] = []
-
-    def add(
-        name: str,
-        size: int,
-        unit: str,
-        scale: float | list[float],
-        meaning: str,
-        low: float = -_LARGEST,
-        high: float = _LARGEST,
-    ) -> None:
-        start = fields[-1].start + fields[-1].size if fields else 0
-        scales = tuple(scale) if isinstance(scale, list) else (scale,) * size
-        fields.append(ObservationField(name, start, size, unit, scales, low, high, meaning))
-
-    add("q", nq, "m, rad", 1.0, "trunk x, y, z; roll, heading, pitch; joint angles, wheels within one turn")
-    add("velocity", nv, "m/s, rad/s", velocity_scale, "trunk linear, angular (trunk frame); joint rates")
-    add("wheel_gap", N_WHEELS, "m", GAP_SCALE, "distance of each wheel to the ground")
-    add("wheel_contact", N_WHEELS, "", 1.0, "1 where the gap is at most 1 mm, else 0", 0.0, 1.0)
-    add("normal_force", N_WHEELS, "N", wheel_load, "ground on wheel, along the ground's normal")
-    add(
-        "tangential_force",
-        2 * N_WHEELS,
-        "N",
-        wheel_load,
-        "ground on wheel, rolling and lateral, wheel by wheel",
-    )
-    add("ground_normal", 3, "", 1.0, "ground's normal in the trunk frame", -1.0, 1.0)
-    add("goal", 2, "m", GOAL_SCALE, "goal forward and to the right of the trunk, horizontal")
-    add("goal_distance", 1, "m", GOAL_SCALE, "horizontal distance to the goal", 0.0)
-    add("previous_action", N_ACTIONS, "", 1.0, "the action before this observation, 0 at reset", -1.0, 1.0)
-    add("stuck", 1, "", 1.0, "fraction of the time to high-centring", 0.0, 1.0)
+    start = 0
+    for name, unit, scale, (low, high), meaning in rows:
+        fields.append(ObservationField(name, start, len(scale), unit, tuple(scale), low, high, meaning))
+        start += len(scale)
     return ObservationLayout(tuple(fields))

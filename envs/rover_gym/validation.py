@@ -65,13 +65,12 @@ def span(
     if _is_number(value):
         single = number(field, value, above=above, at_least=at_least, at_most=at_most)
         return (single, single)
-    entries = _entries(value)
-    if entries is None or len(entries) != 2:
-        refuse(OptionError, field, value, "must be a number or a pair (low, high)")
-    low, high = (
-        number(f"{field}[{i}]", entry, above=above, at_least=at_least, at_most=at_most)
-        for i, entry in enumerate(entries)
-    )
+    match _entries(value):
+        case [first, last]:
+            low = number(f"{field}[0]", first, above=above, at_least=at_least, at_most=at_most)
+            high = number(f"{field}[1]", last, above=above, at_least=at_least, at_most=at_most)
+        case _:
+            refuse(OptionError, field, value, "must be a number or a pair (low, high)")
     if low > high:
         refuse(OptionError, field, value, "must be a pair (low, high) with low <= high")
     return (low, high)
