@@ -80,6 +80,17 @@ impl<'a> Prepared<'a> {
         }
     }
 
+    /// Diagonal block of contact `i`, 1/kg.
+    #[inline]
+    pub fn block<const D: usize>(&self, i: usize) -> [[f64; D]; D] {
+        let mut block = [[0.0; D]; D];
+        for (r, row) in block.iter_mut().enumerate() {
+            let start = (D * i + r) * self.n + D * i;
+            row.copy_from_slice(&self.W[start..start + D]);
+        }
+        block
+    }
+
     /// Residual of `(p, u)`; the same numbers as [`crate::problem::evaluate`], with the scales already at hand.
     #[inline]
     pub fn measure<const D: usize>(&self, rho: &[f64], p: &[f64], u: &[f64]) -> Residual {

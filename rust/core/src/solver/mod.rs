@@ -10,11 +10,13 @@
 
 mod auto;
 mod dense;
+mod modes;
 mod newton;
 mod nsgs;
 pub mod one_contact;
 mod options;
 mod proximal;
+mod reduced_system;
 mod report;
 mod workspace;
 

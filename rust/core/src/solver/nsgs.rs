@@ -3,7 +3,7 @@
 //! Source: Jean 1999; Acary and Brogliato 2008, ch. 13. Converges linearly, and hardly at all for redundant contacts with
 //! large mass ratios; a sweep costs no more than one product with `W`.
 
-use super::newton::Proximal;
+use super::modes::Proximal;
 use super::one_contact::solve_one_contact;
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
@@ -36,7 +36,7 @@ pub(super) fn sweep<const D: usize>(data: &Prepared<'_>, prox: Proximal<'_>, p: 
         for r in 0..D {
             block[r][r] += prox.alpha;
         }
-        let solved = solve_one_contact(&block, &q, mu);
+        let solved = solve_one_contact(&block, &q, mu).impulse;
         if solved.iter().all(|x| x.is_finite()) {
             p[offset..offset + D].copy_from_slice(&solved);
         }

@@ -14,31 +14,51 @@
 //! of Bonnefon and Daviet 2011.
 
 use crate::cone::tangential_norm;
+use crate::law::coulomb::ContactMode;
 
 /// Most steps of the safeguarded Newton on `g(κ)`; bisection alone needs about 60 for all digits.
 const MAX_STEPS: usize = 100;
 
-/// Impulse (N s) of a single contact under Coulomb's law and Signorini's condition.
+/// The solved contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OneContactSolution<const D: usize> {
+    /// Impulse, N s.
+    pub impulse: [f64; D],
+    /// Which case of the law holds; without friction a closed contact slides.
+    pub mode: ContactMode,
+    /// Sliding `u_T = −κ p_T`, 1/kg; zero otherwise and without friction.
+    pub kappa: f64,
+}
+
+/// Solves a single contact under Coulomb's law and Signorini's condition.
 ///
 /// `W`: block of the Delassus operator, row-major, 1/kg; need not be symmetric, tangential part may be singular. `q`: velocity
 /// without this impulse, m/s. `mu`: friction coefficient. Components `[normal, tangent, (tangent)]`. A block with
 /// `W_NN ≤ 0` cannot be pushed and answers zero.
 #[must_use]
-pub fn solve_one_contact<const D: usize>(W: &[[f64; D]; D], q: &[f64; D], mu: f64) -> [f64; D] {
-    let mut p = [0.0; D];
+pub fn solve_one_contact<const D: usize>(
+    W: &[[f64; D]; D],
+    q: &[f64; D],
+    mu: f64,
+) -> OneContactSolution<D> {
+    let mut solution = OneContactSolution {
+        impulse: [0.0; D],
+        mode: ContactMode::Open,
+        kappa: 0.0,
+    };
     let W_NN = W[0][0];
     if q[0] >= 0.0 || W_NN <= 0.0 {
-        return p;
+        return solution;
     }
-    p[0] = -q[0] / W_NN;
+    solution.impulse[0] = -q[0] / W_NN;
     if mu <= 0.0 {
-        return p;
-    }
-    if D == 2 {
-        in_the_plane(W, q, mu, p)
+        solution.mode = ContactMode::Slide;
+    } else if D == 2 {
+        in_the_plane(W, q, mu, &mut solution);
     } else {
-        in_space(W, q, mu, p)
+        in_space(W, q, mu, &mut solution);
     }
+    solution
 }
 
 /// Two dimensions: `g` is linear in `κ`, so the slide is explicit.
@@ -46,14 +66,16 @@ fn in_the_plane<const D: usize>(
     W: &[[f64; D]; D],
     q: &[f64; D],
     mu: f64,
-    mut p: [f64; D],
-) -> [f64; D] {
+    solution: &mut OneContactSolution<D>,
+) {
+    let p = &mut solution.impulse;
     let W_NN = W[0][0];
     let W_hat = (W[1][1] - W[1][0] * W[0][1] / W_NN).max(0.0);
     let q_hat = q[1] - W[1][0] * q[0] / W_NN;
     // g(κ) = |q̂| + (μ/W_NN)(q_N (Ŵ + κ) − W_NT q̂); its root is at Ŵ + κ = the following.
     let stiffness = (q_hat.abs() * W_NN / mu - W[0][1] * q_hat) / -q[0];
     let denominator = W_hat.max(stiffness);
+    solution.mode = ContactMode::Stick;
     if denominator > 0.0 {
         p[1] = -q_hat / denominator;
         p[0] = -(q[0] + W[0][1] * p[1]) / W_NN;
@@ -61,11 +83,18 @@ fn in_the_plane<const D: usize>(
     if denominator > W_hat {
         // On the cone exactly, not up to the rounding of the elimination.
         p[1] = (mu * p[0]).copysign(-q_hat);
+        solution.mode = ContactMode::Slide;
+        solution.kappa = denominator - W_hat;
     }
-    p
 }
 
-fn in_space<const D: usize>(W: &[[f64; D]; D], q: &[f64; D], mu: f64, mut p: [f64; D]) -> [f64; D] {
+fn in_space<const D: usize>(
+    W: &[[f64; D]; D],
+    q: &[f64; D],
+    mu: f64,
+    solution: &mut OneContactSolution<D>,
+) {
+    let p = &mut solution.impulse;
     let W_NN = W[0][0];
     let inverse = 1.0 / W_NN;
     let mut S = [[0.0; 2]; 2];
@@ -108,6 +137,7 @@ fn in_space<const D: usize>(W: &[[f64; D]; D], q: &[f64; D], mu: f64, mut p: [f6
         vanishing.max(0.0) + 1e-8 * trace
     };
     let (g, _, b, det) = at(smallest);
+    solution.mode = ContactMode::Stick;
     if g <= 0.0 || det <= 0.0 {
         if det > 0.0 {
             for k in 0..2 {
@@ -115,7 +145,7 @@ fn in_space<const D: usize>(W: &[[f64; D]; D], q: &[f64; D], mu: f64, mut p: [f6
             }
             p[0] = -(q[0] + W[0][1] * p[1] + W[0][2] * p[2]) * inverse;
         }
-        return p;
+        return;
     }
     let (mut low, mut high) = (smallest, trace.max(f64::MIN_POSITIVE));
     while at(high).0 > 0.0 && high < f64::MAX / 16.0 {
@@ -143,12 +173,14 @@ fn in_space<const D: usize>(W: &[[f64; D]; D], q: &[f64; D], mu: f64, mut p: [f6
         }
     }
     let (_, _, b, det) = at(kappa);
+    solution.mode = ContactMode::Slide;
+    solution.kappa = kappa;
     if det > 0.0 {
         for k in 0..2 {
             p[k + 1] = -b[k] / det;
         }
         p[0] = -(q[0] + W[0][1] * p[1] + W[0][2] * p[2]) * inverse;
-        let norm = tangential_norm(&p);
+        let norm = tangential_norm(p);
         if norm > 0.0 {
             // On the cone exactly.
             let scale = mu * p[0].max(0.0) / norm;
@@ -156,7 +188,6 @@ fn in_space<const D: usize>(W: &[[f64; D]; D], q: &[f64; D], mu: f64, mut p: [f6
             p[2] *= scale;
         }
     }
-    p
 }
 
 #[cfg(test)]
@@ -166,7 +197,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn violation<const D: usize>(W: &[[f64; D]; D], q: &[f64; D], mu: f64) -> f64 {
-        let p = solve_one_contact(W, q, mu);
+        let p = solve_one_contact(W, q, mu).impulse;
         let mut u = *q;
         for r in 0..D {
             for c in 0..D {
@@ -205,7 +236,7 @@ mod tests {
         let mu = 0.5_f64;
         for (angle, slides) in [(mu.atan() - 1e-9, false), (mu.atan() + 1e-9, true)] {
             let q = [-angle.cos(), angle.sin() * 0.6, angle.sin() * 0.8];
-            let p = solve_one_contact(&W, &q, mu);
+            let p = solve_one_contact(&W, &q, mu).impulse;
             let speed = (q[1] + 0.5 * p[1]).hypot(q[2] + 0.5 * p[2]);
             let expected = if slides {
                 angle.sin() - mu * angle.cos()
@@ -223,6 +254,7 @@ mod tests {
     fn a_block_that_cannot_be_pushed_answers_zero() {
         assert!(
             solve_one_contact(&[[0.0; 3]; 3], &[-1.0, 1.0, 0.0], 0.5)
+                .impulse
                 .iter()
                 .all(|x| x.abs() < 1e-300)
         );

@@ -8,7 +8,8 @@
 //! Inside: Newton steps with backtracking on the natural map of the regularised problem, and Gauss–Seidel sweeps on the same
 //! problem when backtracking fails.
 
-use super::newton::{self, Factors, Proximal};
+use super::modes::{self, Proximal};
+use super::reduced_system::{self, Factors};
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
 use super::{SolverOptions, auto::Prepared, nsgs};
@@ -72,19 +73,29 @@ fn inner<const D: usize>(
         if current <= threshold {
             return true;
         }
-        let prediction = newton::predict::<D>(
+        let prediction = modes::predict::<D>(
             data,
             &workspace.rho_modes,
             prox,
+            true,
             p,
             u,
             &mut workspace.contacts,
         );
-        let factors = newton::factorise::<D>(data, alpha, prediction, false, workspace);
+        let factors = reduced_system::factorise::<D>(data, alpha, prediction, false, workspace);
         *iterations += 1;
         let mut accepted = false;
         if factors != Factors::None || prediction.m == 0 {
-            newton::newton_point::<D>(data, alpha, prediction.m, factors, p, u, workspace);
+            reduced_system::newton_point::<D>(
+                data,
+                alpha,
+                prediction.m,
+                factors,
+                false,
+                p,
+                u,
+                workspace,
+            );
             for ((d, t), x) in workspace
                 .direction
                 .iter_mut()

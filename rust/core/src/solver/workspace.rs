@@ -1,6 +1,6 @@
 //! Scratch memory of a solve, kept between solves so that none of them allocates.
 
-use super::newton::Linearised;
+use super::modes::Linearised;
 use crate::problem::FrictionContactProblem;
 
 /// Scratch of [`solve`](crate::solver::solve): grows to the largest problem met, carries nothing from one solve to the next.

@@ -1,0 +1,317 @@
+//! The linear system of a Newton step, over the unknowns that the predicted modes leave.
+//!
+//! - *open*: `p = 0`, no unknown;
+//! - *stick*: `û = 0`, the impulse's `d` unknowns;
+//! - *slide* along `e`, with `t = e⊥`: `û_N = 0`, `p_e = μ p_N` and `û_t + γ p_t = 0`, unknowns `(p_N, p_t)` (one in the plane).
+//!
+//! Written for the increment it reads `(Bᵀ (W + α I) C + γ) y = −Bᵀ û − γ p_t`, symmetric when nothing slides with friction.
+
+use super::auto::Prepared;
+use super::dense;
+use super::modes::{Linearised, Prediction, Proximal, n_unknowns};
+use super::workspace::SolverWorkspace;
+use crate::law::coulomb::ContactMode;
+use crate::problem::multiply_add;
+
+/// Kept factors of the reduced system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Factors {
+    /// None, or outdated.
+    None,
+    /// Cholesky.
+    Symmetric,
+    /// LU.
+    General,
+}
+
+/// Puts `p` where the linearised constraints hold (`p = 0` if open, `p_e = μ p_N` if sliding); says whether that moved it.
+#[inline]
+fn snap<const D: usize>(mu: &[f64], contacts: &[Linearised], p: &mut [f64]) -> bool {
+    let mut moved = false;
+    for ((contact, &mu), p) in contacts.iter().zip(mu).zip(p.chunks_exact_mut(D)) {
+        match contact.mode {
+            ContactMode::Stick => {}
+            ContactMode::Open => {
+                for x in p {
+                    moved |= x.abs() > 0.0;
+                    *x = 0.0;
+                }
+            }
+            ContactMode::Slide => {
+                let wanted = mu * p[0];
+                let along = if D == 2 {
+                    p[1] * contact.e[0]
+                } else {
+                    p[1] * contact.e[0] + p[2] * contact.e[1]
+                };
+                let gap = wanted - along;
+                if gap.abs() > 1e-14 * wanted.abs() {
+                    moved = true;
+                    if mu > 0.0 {
+                        for k in 1..D {
+                            p[k] += gap * contact.e[k - 1];
+                        }
+                    } else {
+                        p[1..].fill(0.0);
+                    }
+                }
+            }
+        }
+    }
+    moved
+}
+
+/// `Bᵀ (W + α I) C + γ` of the predicted modes, row-major `m × m`.
+#[inline]
+fn assemble<const D: usize>(
+    data: &Prepared<'_>,
+    alpha: f64,
+    contacts: &[Linearised],
+    m: usize,
+    row: &mut [f64],
+    A: &mut [f64],
+) {
+    let n = data.n;
+    if m == n {
+        A[..n * n].copy_from_slice(data.W);
+        for k in 0..n {
+            A[k * (n + 1)] += alpha;
+        }
+        return;
+    }
+    for (i, contact) in contacts.iter().enumerate() {
+        let first = &data.W[i * D * n..];
+        let size = n_unknowns::<D>(contact.mode, data.mu[i]);
+        for k in 0..size {
+            let index = contact.start + k;
+            let target = &mut A[index * m..(index + 1) * m];
+            if contact.mode == ContactMode::Slide && k == 1 {
+                let [e0, e1] = contact.e;
+                let (a, b) = (&first[n..2 * n], &first[2 * n..3 * n]);
+                for ((out, x), y) in row.iter_mut().zip(a).zip(b) {
+                    *out = e0 * y - e1 * x;
+                }
+                combine_columns::<D>(row, data.mu, contacts, target);
+                target[index] += contact.gamma;
+            } else {
+                combine_columns::<D>(&first[k * n..(k + 1) * n], data.mu, contacts, target);
+            }
+            target[index] += alpha;
+        }
+    }
+}
+
+/// One row of `W C`: the columns that the unknowns of every contact act through.
+#[inline]
+fn combine_columns<const D: usize>(
+    row: &[f64],
+    mu: &[f64],
+    contacts: &[Linearised],
+    target: &mut [f64],
+) {
+    let mut target = target.iter_mut();
+    for ((w, contact), &mu) in row.chunks_exact(D).zip(contacts).zip(mu) {
+        match contact.mode {
+            ContactMode::Open => {}
+            ContactMode::Stick => {
+                for (x, out) in w.iter().zip(target.by_ref()) {
+                    *out = *x;
+                }
+            }
+            ContactMode::Slide => {
+                let [e0, e1] = contact.e;
+                let along = if D == 2 {
+                    w[1] * e0
+                } else {
+                    w[1] * e0 + w[2] * e1
+                };
+                if let Some(out) = target.next() {
+                    *out = w[0] + mu * along;
+                }
+                if D == 3
+                    && mu > 0.0
+                    && let Some(out) = target.next()
+                {
+                    *out = e0 * w[2] - e1 * w[1];
+                }
+            }
+        }
+    }
+}
+
+/// Right-hand side: minus the linearised equations at `(p, û)`.
+#[inline]
+fn right_hand_side<const D: usize>(
+    data: &Prepared<'_>,
+    prox: Proximal<'_>,
+    contacts: &[Linearised],
+    p: &[f64],
+    u: &[f64],
+    rhs: &mut [f64],
+) {
+    for (i, contact) in contacts.iter().enumerate() {
+        let mut u_hat = [0.0; D];
+        for k in 0..D {
+            u_hat[k] = u[D * i + k] + prox.alpha * (p[D * i + k] - prox.centre[D * i + k]);
+        }
+        match contact.mode {
+            ContactMode::Open => {}
+            ContactMode::Stick => {
+                for k in 0..D {
+                    rhs[contact.start + k] = -u_hat[k];
+                }
+            }
+            ContactMode::Slide => {
+                rhs[contact.start] = -u_hat[0];
+                if D == 3 && data.mu[i] > 0.0 {
+                    let [e0, e1] = contact.e;
+                    let p_t = e0 * p[D * i + 2] - e1 * p[D * i + 1];
+                    rhs[contact.start + 1] =
+                        -(e0 * u_hat[D - 1] - e1 * u_hat[1] + contact.gamma * p_t);
+                }
+            }
+        }
+    }
+}
+
+/// Adds `C y` to `p`. With `on_cone` a sliding impulse returns radially to the cone's surface, a change of second order.
+#[inline]
+fn apply<const D: usize>(
+    mu: &[f64],
+    contacts: &[Linearised],
+    y: &[f64],
+    on_cone: bool,
+    p: &mut [f64],
+) {
+    for ((contact, &mu), p) in contacts.iter().zip(mu).zip(p.chunks_exact_mut(D)) {
+        match contact.mode {
+            ContactMode::Open => {}
+            ContactMode::Stick => {
+                for (x, y) in p.iter_mut().zip(&y[contact.start..]) {
+                    *x += y;
+                }
+            }
+            ContactMode::Slide => {
+                let y_N = y[contact.start];
+                p[0] += y_N;
+                if mu <= 0.0 {
+                    continue;
+                }
+                let [e0, e1] = contact.e;
+                p[1] += mu * y_N * e0;
+                if D == 3 {
+                    let y_t = y[contact.start + 1];
+                    p[1] -= y_t * e1;
+                    p[2] += mu * y_N * e1 + y_t * e0;
+                }
+                if on_cone && p[0] > 0.0 {
+                    let norm = crate::cone::tangential_norm::<D>(&std::array::from_fn(|k| p[k]));
+                    if norm > 0.0 {
+                        let scale = mu * p[0] / norm;
+                        for x in &mut p[1..] {
+                            *x *= scale;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Factors the reduced system of the predicted modes into the workspace.
+#[inline]
+pub(super) fn factorise<const D: usize>(
+    data: &Prepared<'_>,
+    alpha: f64,
+    prediction: Prediction,
+    allow_symmetric: bool,
+    workspace: &mut SolverWorkspace,
+) -> Factors {
+    let m = prediction.m;
+    assemble::<D>(
+        data,
+        alpha,
+        &workspace.contacts,
+        m,
+        &mut workspace.row,
+        &mut workspace.matrix,
+    );
+    if !prediction.slides && allow_symmetric {
+        if dense::cholesky(&mut workspace.matrix[..m * m], m) {
+            return Factors::Symmetric;
+        }
+        assemble::<D>(
+            data,
+            alpha,
+            &workspace.contacts,
+            m,
+            &mut workspace.row,
+            &mut workspace.matrix,
+        );
+    }
+    if dense::lu(&mut workspace.matrix[..m * m], m, &mut workspace.pivots) {
+        Factors::General
+    } else {
+        Factors::None
+    }
+}
+
+/// Solves the factored reduced system for the workspace's right-hand side, in place.
+#[inline]
+fn back_substitute(factors: Factors, m: usize, workspace: &mut SolverWorkspace) {
+    let rhs = &mut workspace.rhs[..m];
+    match factors {
+        Factors::None => rhs.fill(0.0),
+        Factors::Symmetric => dense::cholesky_solve(&workspace.matrix[..m * m], m, rhs),
+        Factors::General => dense::lu_solve(&workspace.matrix[..m * m], m, &workspace.pivots, rhs),
+    }
+}
+
+/// The Newton point of the regularised problem for the predicted modes and kept factors, from `(p, u)`, into
+/// `workspace.trial`. With `on_cone` sliding impulses are returned radially to the cone.
+pub(super) fn newton_point<const D: usize>(
+    data: &Prepared<'_>,
+    alpha: f64,
+    m: usize,
+    factors: Factors,
+    on_cone: bool,
+    p: &[f64],
+    u: &[f64],
+    workspace: &mut SolverWorkspace,
+) {
+    workspace.trial.copy_from_slice(p);
+    let moved = snap::<D>(data.mu, &workspace.contacts, &mut workspace.trial);
+    if moved {
+        multiply_add(
+            data.W,
+            &workspace.trial,
+            data.q,
+            &mut workspace.trial_velocity,
+        );
+    }
+    let u = if moved {
+        &workspace.trial_velocity[..]
+    } else {
+        u
+    };
+    let prox = Proximal {
+        alpha,
+        centre: &workspace.centre,
+    };
+    right_hand_side::<D>(
+        data,
+        prox,
+        &workspace.contacts,
+        &workspace.trial,
+        u,
+        &mut workspace.rhs,
+    );
+    back_substitute(factors, m, workspace);
+    apply::<D>(
+        data.mu,
+        &workspace.contacts,
+        &workspace.rhs,
+        on_cone,
+        &mut workspace.trial,
+    );
+}
