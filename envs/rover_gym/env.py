@@ -290,7 +290,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         self.max_steering = limit
         self._torque_limits = self.model.wheel_torque_limits
         self._wheel_index = np.array(self.model.wheel_joint_indices)
-        self._wheel_radii: list[float] = self.model.wheel_radii.tolist()
+        self._drive_signs = drive_signs(self.model)
+        self._rim_per_rate: list[float] = (self.model.wheel_radii * self._drive_signs).tolist()
         self._trunk_load_limit = TRUNK_LOAD * self.model.mass * magnitude
 
         self.observation_layout: ObservationLayout = build_layout(self.model, magnitude)
@@ -372,7 +373,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
         # The torque is constant over the period: its work is exactly torque times angle turned.
         q, v, rotation = simulation.q, simulation.v, simulation.rotation
-        work: list[float] = (torques * (episode.q - q)[self._wheel_index]).tolist()
+        work: list[float] = (torques * self._drive_signs * (q - episode.q)[self._wheel_index]).tolist()
         spent = sum(map(abs, work))
         change = command - episode.previous_action
         changes: list[float] = (change * change).tolist()
@@ -537,7 +538,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             )
         )
         values *= self._inverse_scale
-        observation = values.astype(np.float32)
+        with np.errstate(over="ignore"):  # an overflow is found, and ends the episode, below
+            observation = values.astype(np.float32)
         # Zero times a number is zero, unless the number is infinite or not a number.
         return observation if observation @ self._no_weights == 0.0 else None
 
@@ -545,11 +547,11 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         """Mean over the wheels in contact of |u_T| / max(|rim speed|, |ground speed|)."""
         contacts = self._simulation.contacts
         rates = v[self._wheel_index].tolist()
-        radii = self._wheel_radii
+        rim_per_rate = self._rim_per_rate
         total, n = 0.0, 0
         for wheel, (_, u_t, u_b) in zip(contacts.wheels.tolist(), contacts.velocities.tolist(), strict=True):
             if wheel >= 0:
-                rim = -radii[wheel] * rates[wheel]
+                rim = rim_per_rate[wheel] * rates[wheel]
                 total += math.hypot(u_t, u_b) / max(abs(rim), math.hypot(rim + u_t, u_b), SLIP_SPEED)
                 n += 1
         return total / n if n else 0.0
@@ -615,6 +617,11 @@ def _six_wheels(model: object) -> RoverModel:
         if len(indices) != N_WHEELS or min(indices) < 0:
             refuse(ModelError, f"model.{name}", indices, f"must be {N_WHEELS} joints that move")
     return model
+
+
+def drive_signs(model: RoverModel) -> npt.NDArray[np.float64]:
+    """`(6,)` rate of a wheel's joint when the wheel rolls forward: 1, or -1 where the axis points right."""
+    return model.actuation_matrix()[model.wheel_joint_indices, range(N_WHEELS)]
 
 
 def _check_action(action: object) -> npt.NDArray[np.float64]:

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym._core import Plane, RoverModel, StateError
-from rover_gym.env import RoverEnv
+from rover_gym.env import RoverEnv, drive_signs
 from rover_gym.observation import N_ACTIONS, N_WHEELS
 from rover_gym.validation import refuse
 
@@ -74,6 +74,7 @@ class PDPolicy:
         self._x_c = 0.5 * (centres[:, 0].min() + centres[:, 0].max())
         self._wheels: list[tuple[float, float]] = [(float(x - self._x_c), float(z)) for x, z in centres]
         self._radii: list[float] = model.wheel_radii.tolist()
+        self._rim_per_rate: list[float] = (model.wheel_radii * drive_signs(model)).tolist()
         self._torque_limits: list[float] = model.wheel_torque_limits.tolist()
         self._max_steering = rover.max_steering
         self._mass = model.mass
@@ -136,7 +137,7 @@ class PDPolicy:
         action = [0.0] * N_ACTIONS
         for i, (x, z) in enumerate(self._wheels):
             wanted = speed * math.hypot(1.0 + curvature * z, curvature * x)
-            rim = -self._radii[i] * row[self._rates[i]]
+            rim = self._rim_per_rate[i] * row[self._rates[i]]
             torque = self._radii[i] * (hold + inertia * (wanted - rim))
             action[i] = _clip(torque / self._torque_limits[i])
             action[N_WHEELS + i] = _clip(angles[i] / self._max_steering)
