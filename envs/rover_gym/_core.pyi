@@ -258,7 +258,7 @@ class Simulation:
         """The keyword arguments that make a simulation with these options."""
     @property
     def q(self) -> _Array:
-        """(nq,) public coordinates: x, y, z, roll, heading, pitch, joints."""
+        """(nq,) x, y, z, roll, heading, pitch, joints."""
     @property
     def v(self) -> _Array:
         """(nv,) trunk velocity (world, m/s), angular velocity (world, rad/s), joint rates."""
