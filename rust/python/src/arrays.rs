@@ -1,23 +1,36 @@
 //! Array-likes in, fresh arrays out.
 
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn};
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::errors::{BorderError, Kind, Value};
 
 /// Any array-like as float64 of any shape.
-pub fn array<'py>(value: &Bound<'py, PyAny>, kind: Kind, field: &str) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+pub fn array<'py>(
+    value: &Bound<'py, PyAny>,
+    kind: Kind,
+    field: &str,
+) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
     let py = value.py();
     let refuse = |e: &PyErr| BorderError {
         kind,
         message: format!("{field}: must be an array of numbers ({})", e.value(py)),
         field: Some(field.to_owned()),
-        value: Value::Text(value.repr().map_or_else(|_| String::new(), |r| r.to_string())),
+        value: Value::Text(
+            value
+                .repr()
+                .map_or_else(|_| String::new(), |r| r.to_string()),
+        ),
     };
     let options = PyDict::new(py);
     options.set_item("dtype", "float64")?;
-    let converted = py.import("numpy")?.call_method("asarray", (value,), Some(&options)).map_err(|e| refuse(&e))?;
+    let converted = py
+        .import("numpy")?
+        .call_method("asarray", (value,), Some(&options))
+        .map_err(|e| refuse(&e))?;
     let typed = converted.cast_into::<PyArrayDyn<f64>>()?;
     Ok(typed.readonly())
 }
@@ -31,7 +44,13 @@ pub fn vector(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vec
     let view = any.as_array();
     if view.ndim() != 1 {
         let message = format!("{field}: needs one dimension, has shape {:?}", view.shape());
-        return Err(BorderError { kind, message, field: Some(field.to_owned()), value: Value::Count(view.ndim()) }.into());
+        return Err(BorderError {
+            kind,
+            message,
+            field: Some(field.to_owned()),
+            value: Value::Count(view.ndim()),
+        }
+        .into());
     }
     Ok(view.iter().copied().collect())
 }
@@ -41,7 +60,13 @@ pub fn triple(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<[f6
     let values = vector(value, kind, field)?;
     <[f64; 3]>::try_from(values.as_slice()).map_err(|_| {
         let message = format!("{field}: needs 3 entries, has {}", values.len());
-        BorderError { kind, message, field: Some(field.to_owned()), value: Value::Count(values.len()) }.into()
+        BorderError {
+            kind,
+            message,
+            field: Some(field.to_owned()),
+            value: Value::Count(values.len()),
+        }
+        .into()
     })
 }
 
@@ -51,17 +76,27 @@ pub fn fresh<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyArray1<f64>> 
 }
 
 /// Fresh (n, m) array from rows.
-pub fn fresh_rows<'py, const M: usize>(py: Python<'py>, rows: &[[f64; M]]) -> PyResult<Bound<'py, PyArray2<f64>>> {
+pub fn fresh_rows<'py, const M: usize>(
+    py: Python<'py>,
+    rows: &[[f64; M]],
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
     PyArray1::from_iter(py, rows.iter().flatten().copied()).reshape([rows.len(), M])
 }
 
 /// Fresh (n, a, b) array from a row-major list.
-pub fn fresh_blocks<'py>(py: Python<'py>, values: Vec<f64>, shape: [usize; 3]) -> PyResult<Bound<'py, PyArray3<f64>>> {
+pub fn fresh_blocks<'py>(
+    py: Python<'py>,
+    values: Vec<f64>,
+    shape: [usize; 3],
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
     PyArray1::from_vec(py, values).reshape(shape)
 }
 
 /// Fresh (n, n) array from a nalgebra matrix.
-pub fn fresh_matrix<'py>(py: Python<'py>, m: &rover_core::nalgebra::DMatrix<f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+pub fn fresh_matrix<'py>(
+    py: Python<'py>,
+    m: &rover_core::nalgebra::DMatrix<f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (rows, columns) = m.shape();
     let transposed = m.transpose();
     PyArray1::from_slice(py, transposed.as_slice()).reshape([rows, columns])

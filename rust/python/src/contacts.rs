@@ -5,7 +5,6 @@ use pyo3::prelude::*;
 use rover_core::contact::Part;
 use rover_core::integrator::ActiveContact;
 use rover_core::multibody::Model;
-use rover_core::nalgebra::Vector3;
 
 use crate::arrays::{fresh_blocks, fresh_rows};
 
@@ -14,20 +13,25 @@ use crate::arrays::{fresh_blocks, fresh_rows};
 pub struct Contacts {
     active: Vec<ActiveContact>,
     bodies: Vec<String>,
-    base: Vector3<f64>,
 }
 
 impl Contacts {
-    /// `base`: the trunk origin (world, m) that the contacts' points are relative to.
-    pub fn new(model: &Model, active: &[ActiveContact], base: Vector3<f64>) -> Self {
+    pub fn new(model: &Model, active: &[ActiveContact]) -> Self {
         let name = |a: &ActiveContact| match a.contact.part {
             Part::Wheel(i) => model.description().wheels[i].solid.clone(),
             Part::Box(i) => model.boxes()[i].name.clone(),
         };
-        Self { active: active.to_vec(), bodies: active.iter().map(name).collect(), base }
+        Self {
+            active: active.to_vec(),
+            bodies: active.iter().map(name).collect(),
+        }
     }
 
-    fn rows<'py>(&self, py: Python<'py>, f: impl Fn(&ActiveContact) -> [f64; 3]) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn rows<'py>(
+        &self,
+        py: Python<'py>,
+        f: impl Fn(&ActiveContact) -> [f64; 3],
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         fresh_rows(py, &self.active.iter().map(f).collect::<Vec<_>>())
     }
 }
@@ -50,12 +54,17 @@ impl Contacts {
 
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| (self.base + a.contact.point).into())
+        self.rows(py, |a| a.position.into())
     }
 
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let values = self.active.iter().flat_map(|a| a.contact.frame.rows().map(<[f64; 3]>::from)).flatten().collect();
+        let values = self
+            .active
+            .iter()
+            .flat_map(|a| a.contact.frame.rows().map(<[f64; 3]>::from))
+            .flatten()
+            .collect();
         fresh_blocks(py, values, [self.active.len(), 3, 3])
     }
 

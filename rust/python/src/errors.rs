@@ -62,7 +62,10 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
         body.set_item("__doc__", doc)?;
         body.set_item("field", py.None())?;
         body.set_item("value", py.None())?;
-        let class = py.get_type::<PyType>().call1((name, bases, body))?.cast_into::<PyType>()?;
+        let class = py
+            .get_type::<PyType>()
+            .call1((name, bases, body))?
+            .cast_into::<PyType>()?;
         module.add(name, &class)?;
         Ok(class.unbind())
     };
@@ -75,12 +78,36 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let root = root.bind(py);
     let value_error = || PyTuple::new(py, [root.clone(), py.get_type::<PyValueError>()]);
     let classes = Classes {
-        model: make("ModelError", value_error()?, "A model description is not physical or not readable.")?,
-        state: make("StateError", value_error()?, "A state has a wrong shape or a non-finite entry.")?,
-        terrain: make("TerrainError", value_error()?, "A terrain description is invalid.")?,
-        option: make("OptionError", value_error()?, "An option or an argument is out of its range.")?,
-        command: make("CommandError", value_error()?, "A torque, set-point or action is invalid.")?,
-        problem: make("ProblemError", value_error()?, "A friction-contact problem has wrong shapes or entries.")?,
+        model: make(
+            "ModelError",
+            value_error()?,
+            "A model description is not physical or not readable.",
+        )?,
+        state: make(
+            "StateError",
+            value_error()?,
+            "A state has a wrong shape or a non-finite entry.",
+        )?,
+        terrain: make(
+            "TerrainError",
+            value_error()?,
+            "A terrain description is invalid.",
+        )?,
+        option: make(
+            "OptionError",
+            value_error()?,
+            "An option or an argument is out of its range.",
+        )?,
+        command: make(
+            "CommandError",
+            value_error()?,
+            "A torque, set-point or action is invalid.",
+        )?,
+        problem: make(
+            "ProblemError",
+            value_error()?,
+            "A friction-contact problem has wrong shapes or entries.",
+        )?,
         step: make(
             "StepError",
             PyTuple::new(py, [root.clone(), py.get_type::<PyRuntimeError>()])?,
@@ -94,7 +121,9 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 impl From<BorderError> for PyErr {
     fn from(error: BorderError) -> Self {
         Python::attach(|py| {
-            let Some(classes) = CLASSES.get(py) else { return PyRuntimeError::new_err(error.message) };
+            let Some(classes) = CLASSES.get(py) else {
+                return PyRuntimeError::new_err(error.message);
+            };
             let class = match error.kind {
                 Kind::Model => &classes.model,
                 Kind::State => &classes.state,
@@ -124,7 +153,12 @@ impl From<BorderError> for PyErr {
 impl BorderError {
     /// An option or argument that is not what it must be.
     pub fn option(field: &str, message: String, value: Value) -> Self {
-        Self { kind: Kind::Option, message, field: Some(field.to_owned()), value }
+        Self {
+            kind: Kind::Option,
+            message,
+            field: Some(field.to_owned()),
+            value,
+        }
     }
 }
 
@@ -147,18 +181,34 @@ impl From<ModelError> for BorderError {
             ModelError::NoDirection { value, .. } => Value::Numbers(value.to_vec()),
             ModelError::ImpossibleInertia { principal, .. } => Value::Numbers(principal.to_vec()),
         };
-        Self { kind: Kind::Model, message: e.to_string(), field: Some(e.field().to_owned()), value }
+        Self {
+            kind: Kind::Model,
+            message: e.to_string(),
+            field: Some(e.field().to_owned()),
+            value,
+        }
     }
 }
 
 impl From<StateError> for BorderError {
     fn from(e: StateError) -> Self {
         let (field, value) = match &e {
-            StateError::Length { field, actual, .. } => ((*field).to_owned(), Value::Count(*actual)),
-            StateError::NotFinite { field, index, value } => (format!("{field}[{index}]"), Value::Number(*value)),
+            StateError::Length { field, actual, .. } => {
+                ((*field).to_owned(), Value::Count(*actual))
+            }
+            StateError::NotFinite {
+                field,
+                index,
+                value,
+            } => (format!("{field}[{index}]"), Value::Number(*value)),
             StateError::SingularCardan { heading } => ("q[4]".to_owned(), Value::Number(*heading)),
         };
-        Self { kind: Kind::State, message: e.to_string(), field: Some(field), value }
+        Self {
+            kind: Kind::State,
+            message: e.to_string(),
+            field: Some(field),
+            value,
+        }
     }
 }
 
@@ -168,7 +218,12 @@ impl From<TerrainError> for BorderError {
             TerrainError::NotFinite { value, .. } => Value::Number(*value),
             TerrainError::NoDirection { value } => Value::Numbers(value.to_vec()),
         };
-        Self { kind: Kind::Terrain, message: e.to_string(), field: Some(e.field().to_owned()), value }
+        Self {
+            kind: Kind::Terrain,
+            message: e.to_string(),
+            field: Some(e.field().to_owned()),
+            value,
+        }
     }
 }
 
@@ -182,31 +237,63 @@ impl From<OptionsError> for BorderError {
 impl From<CommandError> for BorderError {
     fn from(e: CommandError) -> Self {
         let (field, value) = match &e {
-            CommandError::Length { field, actual, .. } => ((*field).to_owned(), Value::Count(*actual)),
-            CommandError::NotFinite { field, index, value } | CommandError::BeyondLimit { field, index, value, .. } => {
-                (format!("{field}[{index}]"), Value::Number(*value))
+            CommandError::Length { field, actual, .. } => {
+                ((*field).to_owned(), Value::Count(*actual))
             }
+            CommandError::NotFinite {
+                field,
+                index,
+                value,
+            }
+            | CommandError::BeyondLimit {
+                field,
+                index,
+                value,
+                ..
+            } => (format!("{field}[{index}]"), Value::Number(*value)),
             CommandError::Negative { field, value } => ((*field).to_owned(), Value::Number(*value)),
-            CommandError::UnknownJoint { field, name } => ((*field).to_owned(), Value::Text(name.clone())),
+            CommandError::UnknownJoint { field, name } => {
+                ((*field).to_owned(), Value::Text(name.clone()))
+            }
         };
-        Self { kind: Kind::Command, message: e.to_string(), field: Some(field), value }
+        Self {
+            kind: Kind::Command,
+            message: e.to_string(),
+            field: Some(field),
+            value,
+        }
     }
 }
 
 impl From<SnapshotError> for BorderError {
     fn from(e: SnapshotError) -> Self {
-        Self { kind: Kind::State, message: e.to_string(), field: Some("snapshot".to_owned()), value: Value::Nothing }
+        Self {
+            kind: Kind::State,
+            message: e.to_string(),
+            field: Some("snapshot".to_owned()),
+            value: Value::Nothing,
+        }
     }
 }
 
 impl From<StepError> for BorderError {
     fn from(e: StepError) -> Self {
-        Self { kind: Kind::Step, message: e.to_string(), field: None, value: Value::Nothing }
+        Self {
+            kind: Kind::Step,
+            message: e.to_string(),
+            field: None,
+            value: Value::Nothing,
+        }
     }
 }
 
 impl From<ProblemError> for BorderError {
     fn from(e: ProblemError) -> Self {
-        Self { kind: Kind::Problem, message: e.to_string(), field: None, value: Value::Nothing }
+        Self {
+            kind: Kind::Problem,
+            message: e.to_string(),
+            field: None,
+            value: Value::Nothing,
+        }
     }
 }

@@ -19,7 +19,11 @@ pub struct SolverReport {
 impl SolverReport {
     #[getter]
     fn status(&self) -> &'static str {
-        if self.inner.is_converged() { "converged" } else { "not_converged" }
+        if self.inner.is_converged() {
+            "converged"
+        } else {
+            "not_converged"
+        }
     }
 
     #[getter]
@@ -49,7 +53,10 @@ impl SolverReport {
 
     fn __repr__(&self) -> String {
         let (status, r) = (self.status(), &self.inner);
-        format!("SolverReport(status={status:?}, iterations={}, residual={:.3e})", r.iterations, r.residual)
+        format!(
+            "SolverReport(status={status:?}, iterations={}, residual={:.3e})",
+            r.iterations, r.residual
+        )
     }
 }
 
@@ -95,14 +102,26 @@ pub fn method(name: &str) -> Result<Method, BorderError> {
 }
 
 /// Solver options of the public arguments.
-pub fn solver_options(name: &str, tolerance: f64, max_iterations: usize) -> Result<SolverOptions, BorderError> {
+pub fn solver_options(
+    name: &str,
+    tolerance: f64,
+    max_iterations: usize,
+) -> Result<SolverOptions, BorderError> {
     if !(tolerance.is_finite() && tolerance > 0.0) {
         let message = format!("tolerance: must be finite and positive, is {tolerance}");
-        return Err(BorderError::option("tolerance", message, Value::Number(tolerance)));
+        return Err(BorderError::option(
+            "tolerance",
+            message,
+            Value::Number(tolerance),
+        ));
     }
     if max_iterations == 0 {
         let message = "max_iterations: must be at least 1, is 0".to_owned();
-        return Err(BorderError::option("max_iterations", message, Value::Count(0)));
+        return Err(BorderError::option(
+            "max_iterations",
+            message,
+            Value::Count(0),
+        ));
     }
     let mut options = SolverOptions::default();
     options.method = method(name)?;
@@ -141,10 +160,20 @@ pub fn solve_friction_contact(
     if shape.len() != 2 || shape[0] != shape[1] {
         let message = format!("W: must be square, has shape {shape:?}");
         let value = Value::Numbers(shape.iter().map(|&s| s as f64).collect());
-        return Err(BorderError { kind: Kind::Problem, message, field: Some("W".to_owned()), value }.into());
+        return Err(BorderError {
+            kind: Kind::Problem,
+            message,
+            field: Some("W".to_owned()),
+            value,
+        }
+        .into());
     }
     let flat = |value: &Bound<'_, PyAny>, field| -> PyResult<Vec<f64>> {
-        Ok(array(value, Kind::Problem, field)?.as_array().iter().copied().collect())
+        Ok(array(value, Kind::Problem, field)?
+            .as_array()
+            .iter()
+            .copied()
+            .collect())
     };
     let W: Vec<f64> = W.as_array().iter().copied().collect();
     let q = flat(q, "q")?;
@@ -156,11 +185,30 @@ pub fn solve_friction_contact(
         if start.len() != p.len() || start.iter().any(|x| !x.is_finite()) {
             let message = format!("initial: needs {} finite entries", p.len());
             let (field, value) = (Some("initial".to_owned()), Value::Count(start.len()));
-            return Err(BorderError { kind: Kind::Problem, message, field, value }.into());
+            return Err(BorderError {
+                kind: Kind::Problem,
+                message,
+                field,
+                value,
+            }
+            .into());
         }
         p = start;
     }
     let mut u = vec![0.0; q.len()];
-    let inner = py.detach(|| solve(&problem, &options, &mut p, &mut u, &mut SolverWorkspace::default()));
-    Ok(FrictionContactSolution { p, u, dimension, report: SolverReport { inner } })
+    let inner = py.detach(|| {
+        solve(
+            &problem,
+            &options,
+            &mut p,
+            &mut u,
+            &mut SolverWorkspace::default(),
+        )
+    });
+    Ok(FrictionContactSolution {
+        p,
+        u,
+        dimension,
+        report: SolverReport { inner },
+    })
 }

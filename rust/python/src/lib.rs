@@ -26,6 +26,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<snapshot::Snapshot>()?;
     module.add_class::<friction_contact::SolverReport>()?;
     module.add_class::<friction_contact::FrictionContactSolution>()?;
-    module.add_function(wrap_pyfunction!(friction_contact::solve_friction_contact, module)?)?;
+    module.add_function(wrap_pyfunction!(
+        friction_contact::solve_friction_contact,
+        module
+    )?)?;
     Ok(())
 }

@@ -10,7 +10,8 @@ use pyo3::types::{PyDict, PyMapping};
 use rover_core::contact::{Contact, detection::wheel_contacts};
 use rover_core::multibody::bias::BiasScratch;
 use rover_core::multibody::{
-    Configuration, Kinematics, MassMatrix, Model, ModelDescription, ModelError, bias, coordinates, momentum,
+    Configuration, Kinematics, MassMatrix, Model, ModelDescription, ModelError, bias, coordinates,
+    momentum,
 };
 use rover_core::nalgebra::{DMatrix, DVector, Vector3};
 
@@ -64,17 +65,28 @@ impl Coordinates {
 
 impl RoverModel {
     fn wrap(model: Result<Model, ModelError>) -> PyResult<Self> {
-        Ok(Self { inner: Arc::new(model.map_err(BorderError::from)?) })
+        Ok(Self {
+            inner: Arc::new(model.map_err(BorderError::from)?),
+        })
     }
 
-    fn placed(&self, q: &Bound<'_, PyAny>, coordinates: &str) -> PyResult<(Vec<f64>, Coordinates, Kinematics)> {
+    fn placed(
+        &self,
+        q: &Bound<'_, PyAny>,
+        coordinates: &str,
+    ) -> PyResult<(Vec<f64>, Coordinates, Kinematics)> {
         let kind = Coordinates::parse(coordinates)?;
         let q = vector(q, Kind::State, "q")?;
         let configuration = kind.configuration(&self.inner, &q)?;
         Ok((q, kind, Kinematics::of(&self.inner, &configuration)))
     }
 
-    fn contacts(&self, q: &Bound<'_, PyAny>, terrain: &Plane, coordinates: &str) -> PyResult<(Vec<f64>, Coordinates, Kinematics, Vec<Contact>)> {
+    fn contacts(
+        &self,
+        q: &Bound<'_, PyAny>,
+        terrain: &Plane,
+        coordinates: &str,
+    ) -> PyResult<(Vec<f64>, Coordinates, Kinematics, Vec<Contact>)> {
         let (q, kind, kinematics) = self.placed(q, coordinates)?;
         let contacts = wheel_contacts(&self.inner, &kinematics, &terrain.inner);
         Ok((q, kind, kinematics, contacts))
@@ -88,7 +100,11 @@ impl RoverModel {
 }
 
 /// Points with names: solids, wheel axles, mass centre.
-pub fn tags<'py>(py: Python<'py>, model: &Model, kinematics: &Kinematics) -> PyResult<Bound<'py, PyDict>> {
+pub fn tags<'py>(
+    py: Python<'py>,
+    model: &Model,
+    kinematics: &Kinematics,
+) -> PyResult<Bound<'py, PyDict>> {
     let tags = PyDict::new(py);
     for frame in model.frames() {
         let x = kinematics.base + kinematics.point(frame.body, &frame.position);
@@ -104,13 +120,20 @@ pub fn tags<'py>(py: Python<'py>, model: &Model, kinematics: &Kinematics) -> PyR
 }
 
 /// Origin and rotation matrix of every solid.
-pub fn poses<'py>(py: Python<'py>, model: &Model, kinematics: &Kinematics) -> PyResult<Bound<'py, PyDict>> {
+pub fn poses<'py>(
+    py: Python<'py>,
+    model: &Model,
+    kinematics: &Kinematics,
+) -> PyResult<Bound<'py, PyDict>> {
     let poses = PyDict::new(py);
     for frame in model.frames() {
         let x = kinematics.base + kinematics.point(frame.body, &frame.position);
         let R = kinematics.R[frame.body] * frame.rotation;
         let R = DMatrix::from_iterator(3, 3, R.iter().copied());
-        poses.set_item(&frame.name, (fresh(py, x.as_slice()), fresh_matrix(py, &R)?))?;
+        poses.set_item(
+            &frame.name,
+            (fresh(py, x.as_slice()), fresh_matrix(py, &R)?),
+        )?;
     }
     Ok(poses)
 }
@@ -119,7 +142,9 @@ pub fn poses<'py>(py: Python<'py>, model: &Model, kinematics: &Kinematics) -> Py
 impl RoverModel {
     #[new]
     fn new() -> Self {
-        Self { inner: Arc::new(Model::rover()) }
+        Self {
+            inner: Arc::new(Model::rover()),
+        }
     }
 
     /// Reads a model file (TOML). Raises ModelError, or OSError where there is no such file.
@@ -127,9 +152,20 @@ impl RoverModel {
     fn from_file(path: PathBuf) -> PyResult<Self> {
         let bytes = std::fs::read(&path)?;
         let unreadable = || {
-            let message = format!("the model description cannot be read: {} is not UTF-8 text", path.display());
-            let (field, value) = (Some("text".to_owned()), Value::Text(path.display().to_string()));
-            BorderError { kind: Kind::Model, message, field, value }
+            let message = format!(
+                "the model description cannot be read: {} is not UTF-8 text",
+                path.display()
+            );
+            let (field, value) = (
+                Some("text".to_owned()),
+                Value::Text(path.display().to_string()),
+            );
+            BorderError {
+                kind: Kind::Model,
+                message,
+                field,
+                value,
+            }
         };
         let text = String::from_utf8(bytes).map_err(|_| unreadable())?;
         Self::from_text(&text)
@@ -149,7 +185,12 @@ impl RoverModel {
         options.set_item("allow_nan", true)?;
         let refuse = |e: &PyErr| {
             let message = format!("the model description cannot be read: {}", e.value(py));
-            BorderError { kind: Kind::Model, message, field: Some("text".to_owned()), value: Value::Nothing }
+            BorderError {
+                kind: Kind::Model,
+                message,
+                field: Some("text".to_owned()),
+                value: Value::Nothing,
+            }
         };
         let text: String = py
             .import("json")?
@@ -166,12 +207,20 @@ impl RoverModel {
 
     /// The description as TOML text.
     fn to_text(&self) -> PyResult<String> {
-        Ok(self.inner.description().to_toml().map_err(BorderError::from)?)
+        Ok(self
+            .inner
+            .description()
+            .to_toml()
+            .map_err(BorderError::from)?)
     }
 
     /// The description as nested dictionaries and lists.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let text = self.inner.description().to_json().map_err(BorderError::from)?;
+        let text = self
+            .inner
+            .description()
+            .to_json()
+            .map_err(BorderError::from)?;
         py.import("json")?.call_method1("loads", (text,))
     }
 
@@ -194,23 +243,41 @@ impl RoverModel {
             if masses.cast::<PyMapping>().is_ok() {
                 for (name, mass) in masses.extract::<HashMap<String, f64>>()? {
                     let Some(solid) = description.solids.iter_mut().find(|s| s.name == name) else {
-                        return Err(BorderError::from(ModelError::UnknownName { field: "masses".to_owned(), name }).into());
+                        return Err(BorderError::from(ModelError::UnknownName {
+                            field: "masses".to_owned(),
+                            name,
+                        })
+                        .into());
                     };
                     solid.mass = mass;
                 }
             } else {
                 let masses = vector(masses, Kind::Model, "masses")?;
                 if masses.len() != description.solids.len() {
-                    let message = format!("masses: needs {} entries, has {}", description.solids.len(), masses.len());
+                    let message = format!(
+                        "masses: needs {} entries, has {}",
+                        description.solids.len(),
+                        masses.len()
+                    );
                     let (field, value) = (Some("masses".to_owned()), Value::Count(masses.len()));
-                    return Err(BorderError { kind: Kind::Model, message, field, value }.into());
+                    return Err(BorderError {
+                        kind: Kind::Model,
+                        message,
+                        field,
+                        value,
+                    }
+                    .into());
                 }
                 for (solid, mass) in description.solids.iter_mut().zip(masses) {
                     solid.mass = mass;
                 }
             }
         }
-        let steering: Vec<String> = description.wheels.iter().filter_map(|w| w.steering.clone()).collect();
+        let steering: Vec<String> = description
+            .wheels
+            .iter()
+            .filter_map(|w| w.steering.clone())
+            .collect();
         for solid in &mut description.solids {
             if let (Some(hold), true) = (&mut solid.hold, steering.contains(&solid.name)) {
                 hold.stiffness = steering_stiffness.unwrap_or(hold.stiffness);
@@ -224,9 +291,16 @@ impl RoverModel {
     /// The same machine with joints locked (at 0, or at the given angles in rad): their coordinates are gone.
     fn weld(&self, joints: &Bound<'_, PyAny>) -> PyResult<Self> {
         let joints: Vec<(String, f64)> = if let Ok(map) = joints.cast::<PyMapping>() {
-            map.items()?.iter().map(|item| item.extract()).collect::<PyResult<_>>()?
+            map.items()?
+                .iter()
+                .map(|item| item.extract())
+                .collect::<PyResult<_>>()?
         } else {
-            joints.extract::<Vec<String>>()?.into_iter().map(|name| (name, 0.0)).collect()
+            joints
+                .extract::<Vec<String>>()?
+                .into_iter()
+                .map(|name| (name, 0.0))
+                .collect()
         };
         Self::wrap(self.inner.with_locked_joints(&joints))
     }
@@ -259,7 +333,12 @@ impl RoverModel {
 
     #[getter]
     fn joint_names(&self) -> Vec<String> {
-        self.inner.bodies().iter().skip(1).map(|b| b.name.clone()).collect()
+        self.inner
+            .bodies()
+            .iter()
+            .skip(1)
+            .map(|b| b.name.clone())
+            .collect()
     }
 
     #[getter]
@@ -284,27 +363,47 @@ impl RoverModel {
 
     #[getter]
     fn wheel_joint_indices(&self) -> Vec<i64> {
-        self.inner.wheels().iter().map(|w| signed(w.joint)).collect()
+        self.inner
+            .wheels()
+            .iter()
+            .map(|w| signed(w.joint))
+            .collect()
     }
 
     #[getter]
     fn steering_joint_indices(&self) -> Vec<i64> {
-        self.inner.wheels().iter().map(|w| signed(w.steering)).collect()
+        self.inner
+            .wheels()
+            .iter()
+            .map(|w| signed(w.steering))
+            .collect()
     }
 
     #[getter]
     fn steering_limit(&self) -> f64 {
-        self.inner.wheels().iter().map(|w| w.steering_limit).fold(0.0, f64::max)
+        self.inner
+            .wheels()
+            .iter()
+            .map(|w| w.steering_limit)
+            .fold(0.0, f64::max)
     }
 
     /// M(q), (nv, nv). Source: Featherstone 2008, ch. 6.
     #[pyo3(signature = (q, coordinates = "report"))]
-    fn mass_matrix<'py>(&self, py: Python<'py>, q: &Bound<'_, PyAny>, coordinates: &str) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn mass_matrix<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'_, PyAny>,
+        coordinates: &str,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (q, kind, kinematics) = self.placed(q, coordinates)?;
         let dense = dense_mass_matrix(&self.inner, &kinematics);
         match kind {
             Coordinates::State => fresh_matrix(py, &dense),
-            Coordinates::Report => fresh_matrix(py, &coordinates::congruence(&dense, coordinates::report_angles(&q))),
+            Coordinates::Report => fresh_matrix(
+                py,
+                &coordinates::congruence(&dense, coordinates::report_angles(&q)),
+            ),
         }
     }
 
@@ -323,12 +422,20 @@ impl RoverModel {
         let v = kind.velocity(&self.inner, &q, &qdot)?;
         let gravity = checked_gravity(gravity)?;
         let mut out = vec![0.0; v.len()];
-        bias(&self.inner, &kinematics, &v, &gravity, &mut BiasScratch::new(&self.inner), &mut out);
+        bias(
+            &self.inner,
+            &kinematics,
+            &v,
+            &gravity,
+            &mut BiasScratch::new(&self.inner),
+            &mut out,
+        );
         if kind == Coordinates::State {
             return Ok(fresh(py, &out));
         }
         let angles = coordinates::report_angles(&q);
-        let drift = dense_mass_matrix(&self.inner, &kinematics) * coordinates::rate_drift(angles, &qdot);
+        let drift =
+            dense_mass_matrix(&self.inner, &kinematics) * coordinates::rate_drift(angles, &qdot);
         let pulled = coordinates::pull_back(&(DVector::from_vec(out) + drift), angles);
         Ok(fresh(py, pulled.as_slice()))
     }
@@ -350,7 +457,12 @@ impl RoverModel {
 
     /// ½ vᵀ M v, J.
     #[pyo3(signature = (q, qdot, coordinates = "report"))]
-    fn kinetic_energy(&self, q: &Bound<'_, PyAny>, qdot: &Bound<'_, PyAny>, coordinates: &str) -> PyResult<f64> {
+    fn kinetic_energy(
+        &self,
+        q: &Bound<'_, PyAny>,
+        qdot: &Bound<'_, PyAny>,
+        coordinates: &str,
+    ) -> PyResult<f64> {
         let (q, kind, kinematics) = self.placed(q, coordinates)?;
         let v = kind.velocity(&self.inner, &q, &vector(qdot, Kind::State, "qdot")?)?;
         Ok(momentum::energy(&self.inner, &kinematics, &v, &Vector3::zeros()).kinetic)
@@ -358,13 +470,23 @@ impl RoverModel {
 
     /// {name: (3,)}: origins of the solids (m), unit axles `axle_FL`, ..., and `centre_of_mass`, world.
     #[pyo3(signature = (q, coordinates = "report"))]
-    fn tags<'py>(&self, py: Python<'py>, q: &Bound<'_, PyAny>, coordinates: &str) -> PyResult<Bound<'py, PyDict>> {
+    fn tags<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'_, PyAny>,
+        coordinates: &str,
+    ) -> PyResult<Bound<'py, PyDict>> {
         tags(py, &self.inner, &self.placed(q, coordinates)?.2)
     }
 
     /// {name: ((3,), (3, 3))}: origin and rotation matrix of every solid, world.
     #[pyo3(signature = (q, coordinates = "report"))]
-    fn poses<'py>(&self, py: Python<'py>, q: &Bound<'_, PyAny>, coordinates: &str) -> PyResult<Bound<'py, PyDict>> {
+    fn poses<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'_, PyAny>,
+        coordinates: &str,
+    ) -> PyResult<Bound<'py, PyDict>> {
         poses(py, &self.inner, &self.placed(q, coordinates)?.2)
     }
 
@@ -391,7 +513,10 @@ impl RoverModel {
         coordinates: &str,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (_, _, kinematics, contacts) = self.contacts(q, terrain, coordinates)?;
-        let rows: Vec<[f64; 3]> = contacts.iter().map(|c| (kinematics.base + c.point).into()).collect();
+        let rows: Vec<[f64; 3]> = contacts
+            .iter()
+            .map(|c| (kinematics.base + c.point).into())
+            .collect();
         fresh_rows(py, &rows)
     }
 
@@ -432,8 +557,10 @@ impl RoverModel {
         q: &Bound<'_, PyAny>,
         v: &Bound<'_, PyAny>,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
-        let configuration = Coordinates::State.configuration(&self.inner, &vector(q, Kind::State, "q")?)?;
-        let v = coordinates::checked_velocity(&self.inner, &vector(v, Kind::State, "v")?).map_err(BorderError::from)?;
+        let configuration =
+            Coordinates::State.configuration(&self.inner, &vector(q, Kind::State, "q")?)?;
+        let v = coordinates::checked_velocity(&self.inner, &vector(v, Kind::State, "v")?)
+            .map_err(BorderError::from)?;
         let (q, qdot) = coordinates::to_report(&configuration, &v).map_err(BorderError::from)?;
         Ok((fresh(py, &q), fresh(py, &qdot)))
     }
@@ -447,26 +574,40 @@ impl RoverModel {
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
         let q = vector(q, Kind::State, "q")?;
         let configuration = Coordinates::Report.configuration(&self.inner, &q)?;
-        let v = Coordinates::Report.velocity(&self.inner, &q, &vector(qdot, Kind::State, "qdot")?)?;
-        Ok((fresh(py, &coordinates::to_public(&configuration)), fresh(py, &v)))
+        let v =
+            Coordinates::Report.velocity(&self.inner, &q, &vector(qdot, Kind::State, "qdot")?)?;
+        Ok((
+            fresh(py, &coordinates::to_public(&configuration)),
+            fresh(py, &v),
+        ))
     }
 
     fn __repr__(&self) -> String {
         let m = &self.inner;
-        format!("RoverModel({:?}, nv={}, mass={})", m.description().name, m.nv(), m.mass())
+        format!(
+            "RoverModel({:?}, nv={}, mass={})",
+            m.description().name,
+            m.nv(),
+            m.mass()
+        )
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
         other.cast::<Self>().is_ok_and(|o| {
             let o = &o.get().inner;
-            o.description() == self.inner.description() && o.locked_joints() == self.inner.locked_joints()
+            o.description() == self.inner.description()
+                && o.locked_joints() == self.inner.locked_joints()
         })
     }
 
     fn __hash__(&self) -> PyResult<u64> {
         use std::hash::{DefaultHasher, Hash, Hasher};
         let mut hasher = DefaultHasher::new();
-        self.inner.description().to_json().map_err(BorderError::from)?.hash(&mut hasher);
+        self.inner
+            .description()
+            .to_json()
+            .map_err(BorderError::from)?
+            .hash(&mut hasher);
         Ok(hasher.finish())
     }
 
@@ -476,10 +617,15 @@ impl RoverModel {
     }
 
     #[allow(clippy::type_complexity)]
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String, Vec<(String, f64)>))> {
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, (String, Vec<(String, f64)>))> {
         let model = &slf.get().inner;
         let text = model.description().to_json().map_err(BorderError::from)?;
-        Ok((slf.get_type().getattr("_restore")?, (text, model.locked_joints().to_vec())))
+        Ok((
+            slf.get_type().getattr("_restore")?,
+            (text, model.locked_joints().to_vec()),
+        ))
     }
 }
 
@@ -495,11 +641,15 @@ fn dense_mass_matrix(model: &Model, kinematics: &Kinematics) -> DMatrix<f64> {
 
 /// Three finite numbers, by default Earth's.
 pub fn checked_gravity(gravity: Option<&Bound<'_, PyAny>>) -> PyResult<Vector3<f64>> {
-    let given = gravity.map_or(Ok([0.0, -9.81, 0.0]), |g| triple(g, Kind::Option, "gravity"))?;
+    let given = gravity.map_or(Ok([0.0, -9.81, 0.0]), |g| {
+        triple(g, Kind::Option, "gravity")
+    })?;
     for value in given {
         if !value.is_finite() {
             let message = format!("gravity: must be finite, is {given:?}");
-            return Err(BorderError::option("gravity", message, Value::Numbers(given.to_vec())).into());
+            return Err(
+                BorderError::option("gravity", message, Value::Numbers(given.to_vec())).into(),
+            );
         }
     }
     Ok(given.into())

@@ -20,7 +20,9 @@ impl Plane {
     #[pyo3(signature = (normal = None, offset = 0.0))]
     fn new(normal: Option<&Bound<'_, PyAny>>, offset: f64) -> PyResult<Self> {
         let normal = normal.map_or(Ok([0.0, 1.0, 0.0]), |n| triple(n, Kind::Terrain, "normal"))?;
-        Ok(Self { inner: CorePlane::new(normal, offset).map_err(BorderError::from)? })
+        Ok(Self {
+            inner: CorePlane::new(normal, offset).map_err(BorderError::from)?,
+        })
     }
 
     #[getter]
@@ -39,18 +41,35 @@ impl Plane {
         if n.y.abs() < 1e-12 {
             let message = "normal: a vertical plane has no height".to_owned();
             let value = Value::Numbers(n.as_slice().to_vec());
-            return Err(BorderError { kind: Kind::Terrain, message, field: Some("normal".to_owned()), value }.into());
+            return Err(BorderError {
+                kind: Kind::Terrain,
+                message,
+                field: Some("normal".to_owned()),
+                value,
+            }
+            .into());
         }
         Ok(-(n.x * x + n.z * z + self.inner.offset()) / n.y)
     }
 
     fn __repr__(&self) -> String {
         let n = self.inner.normal();
-        format!("Plane(normal=({}, {}, {}), offset={})", n.x, n.y, n.z, self.inner.offset())
+        format!(
+            "Plane(normal=({}, {}, {}), offset={})",
+            n.x,
+            n.y,
+            n.z,
+            self.inner.offset()
+        )
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, ((f64, f64, f64), f64))> {
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, ((f64, f64, f64), f64))> {
         let n = slf.get().inner.normal();
-        Ok((slf.get_type().into_any(), ((n.x, n.y, n.z), slf.get().inner.offset())))
+        Ok((
+            slf.get_type().into_any(),
+            ((n.x, n.y, n.z), slf.get().inner.offset()),
+        ))
     }
 }

@@ -27,7 +27,11 @@ pub struct StepReport {
 impl StepReport {
     #[getter]
     fn status(&self) -> &'static str {
-        if self.inner.is_converged() { "converged" } else { "not_converged" }
+        if self.inner.is_converged() {
+            "converged"
+        } else {
+            "not_converged"
+        }
     }
 
     #[getter]
@@ -64,7 +68,11 @@ impl StepReport {
         let r = &self.inner;
         format!(
             "StepReport(status={:?}, steps={}, iterations={}, residual={:.3e}, n_contacts={})",
-            self.status(), r.steps, r.iterations, r.residual, r.n_contacts
+            self.status(),
+            r.steps,
+            r.iterations,
+            r.residual,
+            r.n_contacts
         )
     }
 }
@@ -93,7 +101,10 @@ impl Energy {
     }
 
     fn __repr__(&self) -> String {
-        format!("Energy(kinetic={}, potential={})", self.inner.kinetic, self.inner.potential)
+        format!(
+            "Energy(kinetic={}, potential={})",
+            self.inner.kinetic, self.inner.potential
+        )
     }
 }
 
@@ -108,24 +119,45 @@ pub struct Simulation {
 }
 
 fn names(joints: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
-    joints.extract::<String>().map(|name| vec![name]).or_else(|_| joints.extract())
+    joints
+        .extract::<String>()
+        .map(|name| vec![name])
+        .or_else(|_| joints.extract())
 }
 
-fn choice<T: Copy>(field: &'static str, given: &str, choices: &[(&str, T)]) -> Result<T, BorderError> {
-    let found = choices.iter().find(|(name, _)| *name == given).map(|(_, value)| *value);
+fn choice<T: Copy>(
+    field: &'static str,
+    given: &str,
+    choices: &[(&str, T)],
+) -> Result<T, BorderError> {
+    let found = choices
+        .iter()
+        .find(|(name, _)| *name == given)
+        .map(|(_, value)| *value);
     found.ok_or_else(|| {
-        let known: Vec<String> = choices.iter().map(|(name, _)| format!("{name:?}")).collect();
+        let known: Vec<String> = choices
+            .iter()
+            .map(|(name, _)| format!("{name:?}"))
+            .collect();
         let message = format!("{field}: must be one of {}, is {given:?}", known.join(", "));
         BorderError::option(field, message, Value::Text(given.to_owned()))
     })
 }
 
-const VARIANTS: [(&str, Variant); 2] = [("linearised", Variant::Linearised), ("newton", Variant::Newton)];
-const STABILISATIONS: [(&str, Stabilisation); 2] =
-    [("projection", Stabilisation::Projection), ("none", Stabilisation::None)];
+const VARIANTS: [(&str, Variant); 2] = [
+    ("linearised", Variant::Linearised),
+    ("newton", Variant::Newton),
+];
+const STABILISATIONS: [(&str, Stabilisation); 2] = [
+    ("projection", Stabilisation::Projection),
+    ("none", Stabilisation::None),
+];
 
 fn name_of<T: PartialEq + Copy>(value: T, choices: &[(&'static str, T)]) -> &'static str {
-    choices.iter().find(|(_, v)| *v == value).map_or("", |(name, _)| name)
+    choices
+        .iter()
+        .find(|(_, v)| *v == value)
+        .map_or("", |(name, _)| name)
 }
 
 impl Simulation {
@@ -159,11 +191,20 @@ impl Simulation {
     ) -> PyResult<Self> {
         let model = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
         let terrain = match terrain {
-            None => Plane { inner: rover_core::geometry::Plane::ground() },
+            None => Plane {
+                inner: rover_core::geometry::Plane::ground(),
+            },
             Some(given) => given.extract::<Plane>().map_err(|_| {
-                let shown = given.repr().map_or_else(|_| String::new(), |r| r.to_string());
+                let shown = given
+                    .repr()
+                    .map_or_else(|_| String::new(), |r| r.to_string());
                 let message = format!("terrain: must be a Plane, is {shown}");
-                BorderError { kind: Kind::Terrain, message, field: Some("terrain".to_owned()), value: Value::Text(shown) }
+                BorderError {
+                    kind: Kind::Terrain,
+                    message,
+                    field: Some("terrain".to_owned()),
+                    value: Value::Text(shown),
+                }
             })?,
         };
         let options = StepOptions {
@@ -179,13 +220,21 @@ impl Simulation {
             solver: solver_options(solver, tolerance, max_iterations)?,
             ..StepOptions::default()
         };
-        let inner = CoreSimulation::new(model, Arc::new(terrain.inner), options).map_err(BorderError::from)?;
-        Ok(Self { inner, terrain, solver: solver.to_owned(), max_iterations })
+        let inner = CoreSimulation::new(model, Arc::new(terrain.inner), options)
+            .map_err(BorderError::from)?;
+        Ok(Self {
+            inner,
+            terrain,
+            solver: solver.to_owned(),
+            max_iterations,
+        })
     }
 
     #[getter]
     fn model(&self) -> RoverModel {
-        RoverModel { inner: self.inner.model().clone() }
+        RoverModel {
+            inner: self.inner.model().clone(),
+        }
     }
 
     #[getter]
@@ -240,7 +289,10 @@ impl Simulation {
 
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, &coordinates::to_public(&self.inner.state().configuration))
+        fresh(
+            py,
+            &coordinates::to_public(&self.inner.state().configuration),
+        )
     }
 
     #[getter]
@@ -250,25 +302,45 @@ impl Simulation {
 
     #[getter]
     fn rotation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let R = self.inner.state().configuration.attitude.to_rotation_matrix();
-        fresh_matrix(py, &DMatrix::from_iterator(3, 3, R.matrix().iter().copied()))
+        let R = self
+            .inner
+            .state()
+            .configuration
+            .attitude
+            .to_rotation_matrix();
+        fresh_matrix(
+            py,
+            &DMatrix::from_iterator(3, 3, R.matrix().iter().copied()),
+        )
     }
 
     #[pyo3(signature = (q, qdot = None, *, coordinates = "state"))]
-    fn set_state(&mut self, q: &Bound<'_, PyAny>, qdot: Option<&Bound<'_, PyAny>>, coordinates: &str) -> PyResult<()> {
+    fn set_state(
+        &mut self,
+        q: &Bound<'_, PyAny>,
+        qdot: Option<&Bound<'_, PyAny>>,
+        coordinates: &str,
+    ) -> PyResult<()> {
         let kind = Coordinates::parse(coordinates)?;
         let q = vector(q, Kind::State, "q")?;
         let configuration = kind.configuration(self.model_ref(), &q)?;
-        let qdot = qdot.map_or_else(|| Ok(vec![0.0; self.model_ref().nv()]), |v| vector(v, Kind::State, "qdot"))?;
+        let qdot = qdot.map_or_else(
+            || Ok(vec![0.0; self.model_ref().nv()]),
+            |v| vector(v, Kind::State, "qdot"),
+        )?;
         let v = kind.velocity(self.model_ref(), &q, &qdot)?;
         self.inner.set_state(configuration, v);
         Ok(())
     }
 
     #[allow(clippy::type_complexity)]
-    fn report_state<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+    fn report_state<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
         let state = self.inner.state();
-        let (q, qdot) = coordinates::to_report(&state.configuration, &state.v).map_err(BorderError::from)?;
+        let (q, qdot) =
+            coordinates::to_report(&state.configuration, &state.v).map_err(BorderError::from)?;
         Ok((fresh(py, &q), fresh(py, &qdot)))
     }
 
@@ -279,7 +351,10 @@ impl Simulation {
 
     fn set_wheel_torques(&mut self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
         let torques = vector(torques, Kind::Command, "torques")?;
-        Ok(self.inner.set_wheel_torques(&torques).map_err(BorderError::from)?)
+        Ok(self
+            .inner
+            .set_wheel_torques(&torques)
+            .map_err(BorderError::from)?)
     }
 
     #[getter]
@@ -289,12 +364,18 @@ impl Simulation {
 
     fn set_steering(&mut self, set_points: &Bound<'_, PyAny>) -> PyResult<()> {
         let set_points = vector(set_points, Kind::Command, "set_points")?;
-        Ok(self.inner.set_steering(&set_points).map_err(BorderError::from)?)
+        Ok(self
+            .inner
+            .set_steering(&set_points)
+            .map_err(BorderError::from)?)
     }
 
     fn set_joint_torques(&mut self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
         let torques = vector(torques, Kind::Command, "torques")?;
-        Ok(self.inner.set_joint_torques(&torques).map_err(BorderError::from)?)
+        Ok(self
+            .inner
+            .set_joint_torques(&torques)
+            .map_err(BorderError::from)?)
     }
 
     #[pyo3(signature = (joints, set_points = None, *, stiffness = None, damping = None))]
@@ -306,14 +387,23 @@ impl Simulation {
         damping: Option<f64>,
     ) -> PyResult<()> {
         let set_points = set_points
-            .map(|s| s.extract::<f64>().map(|x| vec![x]).or_else(|_| vector(s, Kind::Command, "set_points")))
+            .map(|s| {
+                s.extract::<f64>()
+                    .map(|x| vec![x])
+                    .or_else(|_| vector(s, Kind::Command, "set_points"))
+            })
             .transpose()?;
-        let held = self.inner.hold(&names(joints)?, set_points.as_deref(), stiffness, damping);
+        let held = self
+            .inner
+            .hold(&names(joints)?, set_points.as_deref(), stiffness, damping);
         Ok(held.map_err(BorderError::from)?)
     }
 
     fn release(&mut self, joints: &Bound<'_, PyAny>) -> PyResult<()> {
-        Ok(self.inner.release(&names(joints)?).map_err(BorderError::from)?)
+        Ok(self
+            .inner
+            .release(&names(joints)?)
+            .map_err(BorderError::from)?)
     }
 
     fn brake(&mut self) {
@@ -323,7 +413,11 @@ impl Simulation {
     #[pyo3(signature = (n = 1))]
     fn step(&mut self, py: Python<'_>, n: i64) -> PyResult<StepReport> {
         let steps = usize::try_from(n).map_err(|_| {
-            BorderError::option("n", format!("n: must not be negative, is {n}"), Value::Number(n as f64))
+            BorderError::option(
+                "n",
+                format!("n: must not be negative, is {n}"),
+                Value::Number(n as f64),
+            )
         })?;
         let inner = &mut self.inner;
         let report = py.detach(|| inner.step(steps)).map_err(BorderError::from)?;
@@ -332,7 +426,7 @@ impl Simulation {
 
     #[getter]
     fn contacts(&self) -> Contacts {
-        Contacts::new(self.model_ref(), self.inner.contacts(), self.inner.state().configuration.position)
+        Contacts::new(self.model_ref(), self.inner.contacts())
     }
 
     #[getter]
@@ -351,13 +445,21 @@ impl Simulation {
     }
 
     fn energy(&self) -> Energy {
-        Energy { inner: self.inner.energy() }
+        Energy {
+            inner: self.inner.energy(),
+        }
     }
 
     #[allow(clippy::type_complexity)]
-    fn momentum<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
+    fn momentum<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
         let momentum = self.inner.momentum();
-        (fresh(py, momentum.linear.as_slice()), fresh(py, momentum.angular.as_slice()))
+        (
+            fresh(py, momentum.linear.as_slice()),
+            fresh(py, momentum.angular.as_slice()),
+        )
     }
 
     fn centre_of_mass<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
@@ -373,11 +475,16 @@ impl Simulation {
     }
 
     fn snapshot(&self) -> Snapshot {
-        Snapshot { inner: self.inner.snapshot() }
+        Snapshot {
+            inner: self.inner.snapshot(),
+        }
     }
 
     fn restore(&mut self, snapshot: &Snapshot) -> PyResult<()> {
-        Ok(self.inner.restore(&snapshot.inner).map_err(BorderError::from)?)
+        Ok(self
+            .inner
+            .restore(&snapshot.inner)
+            .map_err(BorderError::from)?)
     }
 
     /// W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem.
@@ -385,7 +492,11 @@ impl Simulation {
     fn last_problem<'py>(
         &self,
         py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+    ) -> PyResult<(
+        Bound<'py, PyArray2<f64>>,
+        Bound<'py, PyArray1<f64>>,
+        Bound<'py, PyArray1<f64>>,
+    )> {
         let (W, q, mu) = self.inner.last_problem();
         let (n, size) = (mu.len(), 3 * mu.len());
         let q = if n == 0 { &q[..0] } else { q };
@@ -405,14 +516,24 @@ impl Simulation {
 
     fn __repr__(&self) -> String {
         let model = self.model_ref();
-        format!("Simulation({:?}, nv={}, time={})", model.description().name, model.nv(), self.time())
+        format!(
+            "Simulation({:?}, nv={}, time={})",
+            model.description().name,
+            model.nv(),
+            self.time()
+        )
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let py = slf.py();
         let own = slf.borrow();
         let rebuild = slf.get_type().getattr("_rebuild")?;
-        let arguments = (own.model(), own.terrain(), own.settings(py)?, own.snapshot());
+        let arguments = (
+            own.model(),
+            own.terrain(),
+            own.settings(py)?,
+            own.snapshot(),
+        );
         (rebuild, arguments).into_pyobject(py)
     }
 
@@ -424,7 +545,9 @@ impl Simulation {
         settings: &Bound<'py, PyDict>,
         snapshot: &Snapshot,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let made = py.get_type::<Self>().call((model, terrain), Some(settings))?;
+        let made = py
+            .get_type::<Self>()
+            .call((model, terrain), Some(settings))?;
         made.cast::<Self>()?.borrow_mut().restore(snapshot)?;
         Ok(made)
     }

@@ -20,14 +20,21 @@ impl Snapshot {
 
 fn damaged(e: &postcard::Error) -> BorderError {
     let message = format!("snapshot: its bytes are damaged ({e})");
-    BorderError { kind: Kind::State, message, field: Some("snapshot".to_owned()), value: Value::Nothing }
+    BorderError {
+        kind: Kind::State,
+        message,
+        field: Some("snapshot".to_owned()),
+        value: Value::Nothing,
+    }
 }
 
 #[pymethods]
 impl Snapshot {
     #[staticmethod]
     fn from_bytes(data: &[u8]) -> PyResult<Self> {
-        Ok(Self { inner: postcard::from_bytes(data).map_err(|e| damaged(&e))? })
+        Ok(Self {
+            inner: postcard::from_bytes(data).map_err(|e| damaged(&e))?,
+        })
     }
 
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
@@ -35,7 +42,9 @@ impl Snapshot {
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|o| o.get().inner == self.inner)
+        other
+            .cast::<Self>()
+            .is_ok_and(|o| o.get().inner == self.inner)
     }
 
     fn __hash__(&self) -> PyResult<u64> {
@@ -45,7 +54,9 @@ impl Snapshot {
         Ok(hasher.finish())
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         let bytes = slf.get().to_bytes(slf.py())?;
         Ok((slf.get_type().getattr("from_bytes")?, (bytes,)))
     }

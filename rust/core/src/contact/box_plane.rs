@@ -24,14 +24,29 @@ pub fn corners(
     if height - rise.x.abs() - rise.y.abs() - rise.z.abs() > reach {
         return;
     }
-    for corner in 0..8 {
-        let sign = |bit: usize| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
-        let signs = Vector3::new(sign(0), sign(1), sign(2));
-        let gap = height + rise.dot(&signs);
+    for feature in 0..8 {
+        let gap = height + rise.dot(&signs(feature));
         if gap <= reach {
-            visit(corner, centre + R * half_size.component_mul(&signs), gap);
+            visit(feature, corner(centre, R, half_size, feature), gap);
         }
     }
+}
+
+/// Place of the corner of a number, relative to what `centre` is relative to.
+#[inline]
+#[must_use]
+pub fn corner(
+    centre: &Vector3<f64>,
+    R: &Matrix3<f64>,
+    half_size: &Vector3<f64>,
+    feature: usize,
+) -> Vector3<f64> {
+    centre + R * half_size.component_mul(&signs(feature))
+}
+
+fn signs(feature: usize) -> Vector3<f64> {
+    let sign = |bit: usize| if feature >> bit & 1 == 1 { 1.0 } else { -1.0 };
+    Vector3::new(sign(0), sign(1), sign(2))
 }
 
 #[cfg(test)]
@@ -43,13 +58,29 @@ mod tests {
         let half = Vector3::new(0.6, 0.2, 0.5);
         let mut found = Vec::new();
         let base = Vector3::new(0.0, 0.2, 0.0);
-        corners(&Vector3::zeros(), &Matrix3::identity(), &half, &Plane::ground(), &base, 1e-9, |k, p, gap| {
-            assert!(gap.abs() < 1e-15 && (p.y + 0.2).abs() < 1e-15);
-            found.push(k);
-        });
+        corners(
+            &Vector3::zeros(),
+            &Matrix3::identity(),
+            &half,
+            &Plane::ground(),
+            &base,
+            1e-9,
+            |k, p, gap| {
+                assert!(gap.abs() < 1e-15 && (p.y + 0.2).abs() < 1e-15);
+                found.push(k);
+            },
+        );
         assert_eq!(found, [0, 1, 4, 5]);
-        corners(&Vector3::zeros(), &Matrix3::identity(), &half, &Plane::ground(), &(base * 2.0), 1e-9, |_, _, _| {
-            panic!("nothing is near");
-        });
+        corners(
+            &Vector3::zeros(),
+            &Matrix3::identity(),
+            &half,
+            &Plane::ground(),
+            &(base * 2.0),
+            1e-9,
+            |_, _, _| {
+                panic!("nothing is near");
+            },
+        );
     }
 }

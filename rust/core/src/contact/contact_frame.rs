@@ -24,16 +24,32 @@ impl ContactFrame {
     pub fn of_wheel(n: &Vector3<f64>, s: &Vector3<f64>, spoke: &Vector3<f64>) -> Self {
         let across = n.cross(s);
         let length = across.norm();
-        let t = if length > PARALLEL { across / length } else { (spoke - n * n.dot(spoke)).normalize() };
-        Self { n: *n, t, b: t.cross(n) }
+        let t = if length > PARALLEL {
+            across / length
+        } else {
+            (spoke - n * n.dot(spoke)).normalize()
+        };
+        Self {
+            n: *n,
+            t,
+            b: t.cross(n),
+        }
     }
 
     /// Frame where no direction is preferred: t is along the world's x, or its z where n is.
     #[must_use]
     pub fn of_normal(n: &Vector3<f64>) -> Self {
-        let e = if n.x.abs() < 0.9 { Vector3::x() } else { Vector3::z() };
+        let e = if n.x.abs() < 0.9 {
+            Vector3::x()
+        } else {
+            Vector3::z()
+        };
         let t = (e - n * n.dot(&e)).normalize();
-        Self { n: *n, t, b: t.cross(n) }
+        Self {
+            n: *n,
+            t,
+            b: t.cross(n),
+        }
     }
 
     /// n, t, b in this order.
@@ -57,7 +73,10 @@ mod tests {
             } else {
                 Vector3::x()
             };
-            for frame in [ContactFrame::of_wheel(&n, &s, &spoke), ContactFrame::of_normal(&n)] {
+            for frame in [
+                ContactFrame::of_wheel(&n, &s, &spoke),
+                ContactFrame::of_normal(&n),
+            ] {
                 let R = nalgebra::Matrix3::from_rows(&frame.rows().map(|r| r.transpose()));
                 assert!((R * R.transpose() - nalgebra::Matrix3::identity()).norm() < 1e-14);
             }

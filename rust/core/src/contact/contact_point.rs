@@ -32,12 +32,19 @@ impl ContactKey {
     /// If a model has more than 2^15 wheels or boxes, or a part more than 2^16 features.
     #[must_use]
     pub fn new(part: Part, feature: usize, primitive: u32) -> Self {
-        let narrow = |x: usize| u16::try_from(x).unwrap_or_else(|_| panic!("invariant: {x} parts or features fit 16 bits"));
+        let narrow = |x: usize| {
+            u16::try_from(x)
+                .unwrap_or_else(|_| panic!("invariant: {x} parts or features fit 16 bits"))
+        };
         let part = match part {
             Part::Wheel(i) => narrow(i),
             Part::Box(i) => narrow(i) | 0x8000,
         };
-        Self { part, feature: narrow(feature), primitive }
+        Self {
+            part,
+            feature: narrow(feature),
+            primitive,
+        }
     }
 }
 

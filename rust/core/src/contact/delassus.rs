@@ -114,9 +114,35 @@ impl ContactSystem {
     }
 }
 
+/// `out = H p` (nv): generalized impulse, N s and N m s, of the impulses `p` (3 n_c) at the contacts.
+pub fn generalized_impulse(
+    model: &Model,
+    kinematics: &Kinematics,
+    contacts: &[Contact],
+    p: &[f64],
+    out: &mut [f64],
+) {
+    out.fill(0.0);
+    for (contact, p) in contacts.iter().zip(p.chunks_exact(3)) {
+        let [n, t, b] = contact.frame.rows();
+        let force = n * p[0] + t * p[1] + b * p[2];
+        let moment = contact.point.cross(&force);
+        for i in 0..3 {
+            out[i] += force[i];
+            out[3 + i] += moment[i];
+        }
+        for &k in &model.path(contact.body)[6..] {
+            out[k] += kinematics.axis[k - 5].dot(&(moment - kinematics.r[k - 5].cross(&force)));
+        }
+    }
+}
+
 /// Dot product of a row along a path with a full vector.
 #[inline]
 fn path_dot(path: &[usize], row: &[f64], v: &[f64]) -> f64 {
     let base: f64 = row[..6].iter().zip(&v[..6]).map(|(a, b)| a * b).sum();
-    row[6..].iter().zip(&path[6..]).fold(base, |sum, (a, &k)| sum + a * v[k])
+    row[6..]
+        .iter()
+        .zip(&path[6..])
+        .fold(base, |sum, (a, &k)| sum + a * v[k])
 }

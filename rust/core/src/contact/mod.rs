@@ -9,5 +9,5 @@ pub mod wheel_plane;
 
 pub use contact_frame::ContactFrame;
 pub use contact_point::{Contact, ContactKey, Part};
-pub use delassus::ContactSystem;
-pub use detection::{Activation, detect};
+pub use delassus::{ContactSystem, generalized_impulse};
+pub use detection::{Activation, detect, relocate};

@@ -42,29 +42,58 @@ pub struct PlacedWheel {
 ///
 /// `base` (m, world) is where the wheel's coordinates have their origin: the centre's world position is `base + centre`.
 #[inline]
-pub fn rim_points(wheel: &PlacedWheel, plane: &Plane, base: &Vector3<f64>, reach: f64, mut visit: impl FnMut(&RimPoint)) {
-    let (n, s) = (plane.normal(), &wheel.axle);
-    let height = plane.distance(base) + n.dot(&wheel.centre);
+pub fn rim_points(
+    wheel: &PlacedWheel,
+    plane: &Plane,
+    base: &Vector3<f64>,
+    reach: f64,
+    mut visit: impl FnMut(&RimPoint),
+) {
+    let height = plane.distance(base) + plane.normal().dot(&wheel.centre);
     if height - wheel.radius > reach {
         return;
     }
+    for feature in 0..3 {
+        let point = rim_point(wheel, plane, base, feature);
+        if point.gap > reach {
+            return;
+        }
+        visit(&point);
+    }
+}
+
+/// The rim point of a number, wherever it is.
+#[inline]
+#[must_use]
+pub fn rim_point(
+    wheel: &PlacedWheel,
+    plane: &Plane,
+    base: &Vector3<f64>,
+    feature: usize,
+) -> RimPoint {
+    let (n, s) = (plane.normal(), &wheel.axle);
+    let height = plane.distance(base) + n.dot(&wheel.centre);
     let w = n - s * n.dot(s);
     let length = w.norm();
-    let gap = height - wheel.radius * length;
-    if gap > reach {
-        return;
-    }
-    let down = if length > 1e-9 { w / -length } else { wheel.spoke };
+    let down = if length > 1e-9 {
+        w / -length
+    } else {
+        wheel.spoke
+    };
     let frame = ContactFrame::of_wheel(n, s, &wheel.spoke);
-    visit(&RimPoint { feature: 0, point: wheel.centre + down * wheel.radius, frame, gap });
-    let gap = height + 0.5 * wheel.radius * length;
-    if gap > reach {
-        return;
-    }
-    let side = s.cross(&down) * 0.75_f64.sqrt();
-    for (feature, sign) in [(1, 1.0), (2, -1.0)] {
-        let point = wheel.centre + (down * -0.5 + side * sign) * wheel.radius;
-        visit(&RimPoint { feature, point, frame, gap });
+    let (direction, share) = match feature {
+        0 => (down, 1.0),
+        k => {
+            let side = s.cross(&down) * 0.75_f64.sqrt();
+            (down * -0.5 + if k == 1 { side } else { -side }, -0.5)
+        }
+    };
+    let gap = height - share * wheel.radius * length;
+    RimPoint {
+        feature,
+        point: wheel.centre + direction * wheel.radius,
+        frame,
+        gap,
     }
 }
 
@@ -102,7 +131,12 @@ mod tests {
     #[test]
     fn a_wheel_lying_flat_stands_on_three_points_around_its_centre() {
         let plane = Plane::ground();
-        let wheel = PlacedWheel { centre: Vector3::zeros(), axle: Vector3::y(), spoke: Vector3::x(), radius: 0.1 };
+        let wheel = PlacedWheel {
+            centre: Vector3::zeros(),
+            axle: Vector3::y(),
+            spoke: Vector3::x(),
+            radius: 0.1,
+        };
         let mut sum = Vector3::zeros();
         let mut count = 0;
         rim_points(&wheel, &plane, &Vector3::zeros(), 1e-6, |p| {

@@ -20,20 +20,31 @@ impl Plane {
     pub fn new(normal: [f64; 3], offset: f64) -> Result<Self, TerrainError> {
         for value in normal {
             if !value.is_finite() {
-                return Err(TerrainError::NotFinite { field: "normal", value });
+                return Err(TerrainError::NotFinite {
+                    field: "normal",
+                    value,
+                });
             }
         }
         if !offset.is_finite() {
-            return Err(TerrainError::NotFinite { field: "offset", value: offset });
+            return Err(TerrainError::NotFinite {
+                field: "offset",
+                value: offset,
+            });
         }
         let direction = Unit::try_new(Vector3::from(normal), 1e-9);
-        direction.map(|normal| Self { normal, offset }).ok_or(TerrainError::NoDirection { value: normal })
+        direction
+            .map(|normal| Self { normal, offset })
+            .ok_or(TerrainError::NoDirection { value: normal })
     }
 
     /// Flat ground at height 0.
     #[must_use]
     pub fn ground() -> Self {
-        Self { normal: Vector3::y_axis(), offset: 0.0 }
+        Self {
+            normal: Vector3::y_axis(),
+            offset: 0.0,
+        }
     }
 
     /// Unit normal.
@@ -58,8 +69,18 @@ impl Plane {
 
 impl Terrain for Plane {
     #[inline]
-    fn visit_near(&self, _centre: &Vector3<f64>, _reach: f64, visit: &mut dyn FnMut(u32, &Primitive)) {
+    fn visit_near(
+        &self,
+        _centre: &Vector3<f64>,
+        _reach: f64,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
         visit(0, &Primitive::Plane(*self));
+    }
+
+    #[inline]
+    fn primitive(&self, _id: u32) -> Primitive {
+        Primitive::Plane(*self)
     }
 }
 
@@ -71,8 +92,19 @@ mod tests {
     fn normalises_and_measures() {
         let plane = Plane::new([0.0, 2.0, 0.0], -0.5).unwrap();
         assert!((plane.distance(&Vector3::new(3.0, 2.0, 1.0)) - 1.5).abs() < 1e-15);
-        assert_eq!(Plane::new([0.0; 3], 0.0), Err(TerrainError::NoDirection { value: [0.0; 3] }));
-        assert_eq!(Plane::new([0.0, 1.0, 0.0], f64::NAN).unwrap_err().field(), "offset");
-        assert_eq!(Plane::new([0.0, f64::INFINITY, 0.0], 0.0).unwrap_err().field(), "normal");
+        assert_eq!(
+            Plane::new([0.0; 3], 0.0),
+            Err(TerrainError::NoDirection { value: [0.0; 3] })
+        );
+        assert_eq!(
+            Plane::new([0.0, 1.0, 0.0], f64::NAN).unwrap_err().field(),
+            "offset"
+        );
+        assert_eq!(
+            Plane::new([0.0, f64::INFINITY, 0.0], 0.0)
+                .unwrap_err()
+                .field(),
+            "normal"
+        );
     }
 }

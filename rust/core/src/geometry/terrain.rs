@@ -16,4 +16,7 @@ pub trait Terrain: Send + Sync {
     /// Visits every primitive that comes closer than `reach` (m) to `centre` (world, m), with a number that
     /// names it for as long as the terrain lives. May visit others too; must not depend on those far away.
     fn visit_near(&self, centre: &Vector3<f64>, reach: f64, visit: &mut dyn FnMut(u32, &Primitive));
+
+    /// The primitive of a number that [`Self::visit_near`] gave.
+    fn primitive(&self, id: u32) -> Primitive;
 }

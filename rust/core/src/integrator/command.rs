@@ -28,6 +28,9 @@ impl Command {
     /// No torque, nothing held.
     #[must_use]
     pub fn idle(model: &Model) -> Self {
-        Self { torque: vec![0.0; model.n_joints()], held: vec![None; model.n_joints()] }
+        Self {
+            torque: vec![0.0; model.n_joints()],
+            held: vec![None; model.n_joints()],
+        }
     }
 }

@@ -21,13 +21,17 @@ pub enum OptionsError {
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum StepError {
     /// A coordinate or velocity overflowed.
-    #[error("the step from t = {time} s gave a state that is not finite; the state before it was kept")]
+    #[error(
+        "the step from t = {time} s gave a state that is not finite; the state before it was kept"
+    )]
     NonFinite {
         /// Time before the step, s.
         time: f64,
     },
     /// The mass matrix lost its positive definiteness to rounding.
-    #[error("the mass matrix at t = {time} s is not positive definite in floating point; the state before the step was kept")]
+    #[error(
+        "the mass matrix at t = {time} s is not positive definite in floating point; the state before the step was kept"
+    )]
     SingularMassMatrix {
         /// Time before the step, s.
         time: f64,

@@ -4,7 +4,7 @@
 //! about a point fixed in the world, d'Alembert's principle over the step reads, for every velocity k with screw S_k(q_m),
 //!
 //! ```text
-//! Σ_{i moved by k} S_k · (ΔP_i − h m_i g, ΔL_i − h c̄_i × m_i g) = h τ_k + (H(q_m) p)_k
+//! Σ_{i moved by k} S_k · (ΔP_i − h m_i g, ΔL_i − h c̄_i × m_i g) = h τ_k + (H(q⁺) p + r)_k
 //! ```
 //!
 //! Momenta at both ends are evaluated exactly, so no bias is needed and, summed over the base's six screws, total linear and
@@ -12,20 +12,27 @@
 //! any step. For θ = ½ the scheme is symmetric and of order 2. The iteration uses M̂(q_m) as its matrix, which
 //! differs from the true Jacobian by O(h) and converges by that factor.
 //!
-//! Source: the discrete d'Alembert principle, as in Simo, Wong 1991 for one body; contacts as in [`super::moreau_jean`].
+//! Source: the discrete d'Alembert principle, as in Simo, Wong 1991 for one body; contacts and the
+//! correction r as in [`super::moreau_jean`].
 
 use nalgebra::Vector3;
 
 use super::command::Command;
 use super::error::StepError;
-use super::moreau_jean::{activation, add_command, factorise, finish, set_held_theta, solve_contacts};
+use super::moreau_jean::{
+    MoreauJean, activation, add_command, add_correction, assemble_contacts, factorise, finish,
+    set_held_theta, solve_contacts,
+};
 use super::probe::{Phase, Probe};
 use super::report::{StepReport, StepStatus};
 use super::workspace::{WarmStart, Workspace};
 use super::{Integrator, Scene};
-use crate::contact::detect;
+use crate::contact::{detect, relocate};
 use crate::multibody::momentum::body_momenta;
 use crate::multibody::{Model, State};
+
+/// Relative change below which an iteration that no longer shrinks has met rounding.
+const ROUNDING: f64 = 1e-8;
 
 /// The Newton variant.
 #[derive(Clone, Copy, Debug, Default)]
@@ -41,41 +48,83 @@ impl Integrator for MoreauJeanNewton {
         workspace: &mut Workspace,
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
-        let Scene { model, terrain, options } = *scene;
+        let Scene {
+            model,
+            terrain,
+            options,
+        } = *scene;
         let (h, theta) = (options.time_step, options.theta);
         let ws = workspace;
         ws.kinematics.update(model, &state.configuration);
         let start = ws.kinematics.base;
         ws.c_start.copy_from_slice(&ws.kinematics.c);
-        body_momenta(model, &ws.kinematics, &state.v, &Vector3::zeros(), &mut ws.momenta);
+        body_momenta(
+            model,
+            &ws.kinematics,
+            &state.v,
+            &Vector3::zeros(),
+            &mut ws.momenta,
+        );
         ws.v.copy_from_slice(&state.v);
-        let mut report = StepReport { steps: 1, status: StepStatus::NotConverged, ..StepReport::default() };
+        let mut report = StepReport {
+            steps: 1,
+            status: StepStatus::NotConverged,
+            ..StepReport::default()
+        };
+        let mut is_settled = false;
+        let mut last_change = f64::INFINITY;
         for iteration in 0..options.newton_max_iterations {
             for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(&state.v) {
                 *mean = theta * end + (1.0 - theta) * begin;
             }
-            ws.configuration.set_moved(&state.configuration, &ws.v_mean, theta * h);
+            ws.configuration
+                .set_moved(&state.configuration, &ws.v_mean, theta * h);
             ws.end.set_moved(&state.configuration, &ws.v_mean, h);
             ws.kinematics.update(model, &ws.configuration);
             ws.kinematics_end.update(model, &ws.end);
             probe.end(Phase::Kinematics);
             if iteration == 0 {
+                // The set of contacts of a step is decided once, by the forecast.
                 let activation = activation(model, options, &state.v, theta * h);
-                detect(model, &ws.kinematics, terrain, &state.v, &activation, &mut ws.contacts);
-            } else {
-                place_again(scene, &state.v, ws);
+                detect(
+                    model,
+                    &ws.kinematics,
+                    terrain,
+                    &state.v,
+                    &activation,
+                    &mut ws.contacts,
+                );
+            }
+            for contact in &mut ws.contacts {
+                relocate(model, &ws.kinematics_end, terrain, contact);
             }
             probe.end(Phase::Detection);
             ws.mass_matrix.update(model, &ws.kinematics);
             probe.end(Phase::MassMatrix);
             momentum_residual(model, &options.gravity, h, theta, &start, ws);
             set_held_theta(model, options, command, ws);
-            add_command(options, command, &state.configuration.joints, &state.v, &ws.v, &ws.theta_held, &mut ws.y);
+            add_command(
+                options,
+                command,
+                &state.configuration.joints,
+                &state.v,
+                &ws.v,
+                &ws.theta_held,
+                &mut ws.y,
+            );
             probe.end(Phase::Bias);
-            factorise(model, options, command, ws).ok_or(StepError::SingularMassMatrix { time: state.time })?;
+            factorise(model, options, command, ws)
+                .ok_or(StepError::SingularMassMatrix { time: state.time })?;
             ws.factor.half_solve(model, &mut ws.y);
             probe.end(Phase::Factor);
-            let solved = solve_contacts(scene, &state.v, warm_start, ws, iteration == 0, probe);
+            assemble_contacts(scene, &state.v, warm_start, ws);
+            add_correction(scene, warm_start, ws);
+            if iteration > 0 {
+                ws.p.copy_from_slice(&ws.p_last);
+            }
+            probe.end(Phase::Delassus);
+            let solved = solve_contacts(scene, ws, probe);
+            ws.p_last.clone_from(&ws.p);
             report.iterations += solved.iterations;
             report.residual = solved.residual;
             report.n_contacts = solved.n_contacts;
@@ -84,40 +133,49 @@ impl Integrator for MoreauJeanNewton {
             let change = ws.y.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let size = ws.v.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
             probe.end(Phase::Update);
-            if change.is_nan() {
-                break;
-            }
-            if change <= options.newton_tolerance * size {
+            // Settled, or as settled as rounding allows: no longer shrinking, and small.
+            let is_small = change <= options.newton_tolerance * size;
+            let is_rounding = change <= ROUNDING * size && change >= 0.5 * last_change;
+            last_change = change;
+            if is_small || is_rounding {
+                is_settled = true;
                 report.status = solved.status;
                 break;
             }
+            if change.is_nan() {
+                break;
+            }
+        }
+        if !is_settled {
+            // An iterate that has not settled obeys no law: take the step that needs no iteration, and say so.
+            let taken = MoreauJean.step(scene, command, state, warm_start, ws, probe)?;
+            return Ok(StepReport {
+                newton_iterations: report.newton_iterations,
+                status: StepStatus::NotConverged,
+                ..taken
+            });
         }
         for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(&state.v) {
             *mean = theta * end + (1.0 - theta) * begin;
         }
         ws.end.set_moved(&state.configuration, &ws.v_mean, h);
+        // The contacts were measured at the end of the last iterate, which is the end of the step.
         ws.gap_end.clear();
-        let local = ws.u.chunks_exact(3).zip(ws.u_before.chunks_exact(3));
-        ws.gap_end.extend(ws.contacts.iter().zip(local).map(|(contact, (u, before))| {
-            contact.gap + (1.0 - theta) * h * (theta * u[0] + (1.0 - theta) * before[0])
-        }));
+        ws.gap_end
+            .extend(ws.contacts.iter().map(|contact| contact.gap));
         finish(scene, state, warm_start, ws, report, probe)
     }
 }
 
-/// Finds the same contacts again at the new midpoint: the set of a step is decided once, by the forecast.
-fn place_again(scene: &Scene<'_>, v: &[f64], ws: &mut Workspace) {
-    let anywhere = crate::contact::Activation { lead: 0.0, hover: f64::MAX, slow: f64::MAX, margin: f64::MAX };
-    detect(scene.model, &ws.kinematics, scene.terrain, v, &anywhere, &mut ws.found);
-    for contact in &mut ws.contacts {
-        if let Some(moved) = ws.found.iter().find(|c| c.key == contact.key) {
-            *contact = *moved;
-        }
-    }
-}
-
 /// `ws.y = −(left side)` of the principle above at the iterate `ws.v`, without commands and contacts.
-fn momentum_residual(model: &Model, gravity: &Vector3<f64>, h: f64, theta: f64, start: &Vector3<f64>, ws: &mut Workspace) {
+fn momentum_residual(
+    model: &Model,
+    gravity: &Vector3<f64>,
+    h: f64,
+    theta: f64,
+    start: &Vector3<f64>,
+    ws: &mut Workspace,
+) {
     let end = ws.kinematics_end.base - start;
     body_momenta(model, &ws.kinematics_end, &ws.v, &end, &mut ws.momenta_end);
     let middle = ws.kinematics.base - start;

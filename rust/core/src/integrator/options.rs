@@ -83,7 +83,15 @@ impl StepOptions {
     /// The first option out of its range.
     pub fn check(&self) -> Result<(), OptionsError> {
         let demand = |field, value: f64, is_in: bool, range| {
-            if value.is_finite() && is_in { Ok(()) } else { Err(OptionsError::OutOfRange { field, range, value }) }
+            if value.is_finite() && is_in {
+                Ok(())
+            } else {
+                Err(OptionsError::OutOfRange {
+                    field,
+                    range,
+                    value,
+                })
+            }
         };
         for value in self.gravity.iter() {
             demand("gravity", *value, true, "finite")?;
@@ -92,13 +100,38 @@ impl StepOptions {
         demand("friction", mu, mu >= 0.0, "finite and not negative")?;
         demand("restitution", e, (0.0..=1.0).contains(&e), "in [0, 1]")?;
         demand("time_step", h, h > 0.0, "finite and positive")?;
-        demand("theta", self.theta, (0.5..=1.0).contains(&self.theta), "in [0.5, 1]")?;
-        demand("forecast", self.forecast, (0.0..=1.0).contains(&self.forecast), "in [0, 1]")?;
+        demand(
+            "theta",
+            self.theta,
+            (0.5..=1.0).contains(&self.theta),
+            "in [0.5, 1]",
+        )?;
+        demand(
+            "forecast",
+            self.forecast,
+            (0.0..=1.0).contains(&self.forecast),
+            "in [0, 1]",
+        )?;
         let depth = self.penetration_tolerance;
-        demand("penetration_tolerance", depth, depth >= 0.0, "finite and not negative")?;
+        demand(
+            "penetration_tolerance",
+            depth,
+            depth >= 0.0,
+            "finite and not negative",
+        )?;
         let tolerance = self.solver.tolerance;
-        demand("tolerance", tolerance, tolerance > 0.0, "finite and positive")?;
+        demand(
+            "tolerance",
+            tolerance,
+            tolerance > 0.0,
+            "finite and positive",
+        )?;
         let iterations = self.solver.max_newton_steps.min(self.solver.max_sweeps) as f64;
-        demand("max_iterations", iterations, iterations >= 1.0, "at least 1")
+        demand(
+            "max_iterations",
+            iterations,
+            iterations >= 1.0,
+            "at least 1",
+        )
     }
 }

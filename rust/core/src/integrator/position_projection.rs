@@ -40,11 +40,19 @@ pub(super) fn project(scene: &Scene<'_>, ws: &mut Workspace, report: &mut StepRe
     ws.p_position.resize(ws.p.len(), 0.0);
     ws.u_position.resize(ws.p.len(), 0.0);
     ws.p_position.fill(0.0);
-    let problem = FrictionContactProblem::from_assembled(Dimension::Three, &ws.system.W, &ws.q_free, &ws.mu);
-    let solved = solve(&problem, &options.solver, &mut ws.p_position, &mut ws.u_position, &mut ws.solver);
+    let problem =
+        FrictionContactProblem::from_assembled(Dimension::Three, &ws.system.W, &ws.q_free, &ws.mu);
+    let solved = solve(
+        &problem,
+        &options.solver,
+        &mut ws.p_position,
+        &mut ws.u_position,
+        &mut ws.solver,
+    );
     note(report, &solved);
     ws.y.fill(0.0);
-    ws.system.add_impulses(scene.model, &ws.p_position, &mut ws.y);
+    ws.system
+        .add_impulses(scene.model, &ws.p_position, &mut ws.y);
     ws.factor.half_solve_back(scene.model, &mut ws.y);
     ws.end.advance(&ws.y, 1.0);
 }

@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::{Contact, ContactKey, ContactSystem};
 use crate::multibody::bias::BiasScratch;
-use crate::multibody::{Configuration, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum};
+use crate::multibody::{
+    Configuration, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum,
+};
 use crate::solver::SolverWorkspace;
 
 /// Impulses of the last step by contact: where the next solve starts. Part of what a snapshot holds.
@@ -13,13 +15,19 @@ use crate::solver::SolverWorkspace;
 pub struct WarmStart {
     /// (key, impulse along n, t, b in N s), in the order of detection.
     pub impulses: Vec<(ContactKey, [f64; 3])>,
+    /// Generalized impulse of persistent contact in the last step (nv), N s and N m s; empty where a contact was new,
+    /// left, or struck.
+    pub persistent: Vec<f64>,
 }
 
 impl WarmStart {
     /// Room for what a model can touch a plane with.
     #[must_use]
     pub fn with_capacity(model: &Model) -> Self {
-        Self { impulses: Vec::with_capacity(contact_capacity(model)) }
+        Self {
+            impulses: Vec::with_capacity(contact_capacity(model)),
+            persistent: Vec::with_capacity(model.nv()),
+        }
     }
 
     /// Fills `p` (3 n_c) with what is remembered of these contacts, zero for new ones.
@@ -32,10 +40,26 @@ impl WarmStart {
         }
     }
 
+    /// Whether the last step had exactly these contacts.
+    #[must_use]
+    pub fn is_of(&self, contacts: &[Contact]) -> bool {
+        self.impulses.len() == contacts.len()
+            && self
+                .impulses
+                .iter()
+                .zip(contacts)
+                .all(|((key, _), c)| *key == c.key)
+    }
+
     /// Remembers the impulses `p` (3 n_c).
     pub fn remember(&mut self, contacts: &[Contact], p: &[f64]) {
         self.impulses.clear();
-        self.impulses.extend(contacts.iter().zip(p.chunks_exact(3)).map(|(c, p)| (c.key, [p[0], p[1], p[2]])));
+        self.impulses.extend(
+            contacts
+                .iter()
+                .zip(p.chunks_exact(3))
+                .map(|(c, p)| (c.key, [p[0], p[1], p[2]])),
+        );
     }
 }
 
@@ -44,6 +68,8 @@ impl WarmStart {
 pub struct ActiveContact {
     /// Point, frame and gap where the step evaluated them.
     pub contact: Contact,
+    /// The contact's point, world, m.
+    pub position: Vector3<f64>,
     /// Impulse along n, t, b, N s.
     pub impulse: [f64; 3],
     /// Local velocity after the step along n, t, b, m/s.
@@ -67,14 +93,15 @@ pub struct Workspace {
     pub(super) theta_held: Vec<f64>,
     pub(super) force: Vec<f64>,
     pub(super) y: Vec<f64>,
+    pub(super) correction: Vec<f64>,
     pub(super) v: Vec<f64>,
     pub(super) v_mean: Vec<f64>,
     pub(super) contacts: Vec<Contact>,
-    pub(super) found: Vec<Contact>,
     pub(super) system: ContactSystem,
     pub(super) q_free: Vec<f64>,
     pub(super) mu: Vec<f64>,
     pub(super) p: Vec<f64>,
+    pub(super) p_last: Vec<f64>,
     pub(super) u: Vec<f64>,
     pub(super) u_before: Vec<f64>,
     pub(super) gap_end: Vec<f64>,
@@ -106,14 +133,15 @@ impl Workspace {
             theta_held: vec![0.0; model.n_joints()],
             force: vec![0.0; nv],
             y: vec![0.0; nv],
+            correction: vec![0.0; nv],
             v: vec![0.0; nv],
             v_mean: vec![0.0; nv],
             contacts: Vec::with_capacity(n),
-            found: Vec::with_capacity(3 * model.wheels().len() + 8 * model.boxes().len()),
             system: ContactSystem::with_capacity(model, n),
             q_free: room(),
             mu: Vec::with_capacity(n),
             p: room(),
+            p_last: room(),
             u: room(),
             u_before: room(),
             gap_end: Vec::with_capacity(n),

@@ -22,7 +22,13 @@ impl BiasScratch {
     #[must_use]
     pub fn new(model: &Model) -> Self {
         let zeros = vec![Vector3::zeros(); model.bodies().len()];
-        Self { omega: zeros.clone(), alpha: zeros.clone(), origin: zeros.clone(), force: zeros.clone(), moment: zeros }
+        Self {
+            omega: zeros.clone(),
+            alpha: zeros.clone(),
+            origin: zeros.clone(),
+            force: zeros.clone(),
+            moment: zeros,
+        }
     }
 }
 
@@ -47,7 +53,8 @@ pub fn bias(
             let p = body.parent;
             let d = kinematics.r[b] - kinematics.r[p];
             let spin = kinematics.axis[b] * v[5 + b];
-            s.origin[b] = s.origin[p] + s.alpha[p].cross(&d) + s.omega[p].cross(&s.omega[p].cross(&d));
+            s.origin[b] =
+                s.origin[p] + s.alpha[p].cross(&d) + s.omega[p].cross(&s.omega[p].cross(&d));
             s.alpha[b] = s.alpha[p] + s.omega[p].cross(&spin);
             s.omega[b] = s.omega[p] + spin;
         }

@@ -13,10 +13,18 @@ use crate::spatial::{CardanReport, HeadingPitchRoll};
 
 fn check(field: &'static str, values: &[f64], expected: usize) -> Result<(), StateError> {
     if values.len() != expected {
-        return Err(StateError::Length { field, expected, actual: values.len() });
+        return Err(StateError::Length {
+            field,
+            expected,
+            actual: values.len(),
+        });
     }
     match values.iter().position(|x| !x.is_finite()) {
-        Some(index) => Err(StateError::NotFinite { field, index, value: values[index] }),
+        Some(index) => Err(StateError::NotFinite {
+            field,
+            index,
+            value: values[index],
+        }),
         None => Ok(()),
     }
 }
@@ -27,7 +35,11 @@ fn check(field: &'static str, values: &[f64], expected: usize) -> Result<(), Sta
 /// Wrong length, or an entry that is not finite.
 pub fn from_public(model: &Model, q: &[f64]) -> Result<Configuration, StateError> {
     check("q", q, model.nv())?;
-    let angles = HeadingPitchRoll { roll: q[3], heading: q[4], pitch: q[5] };
+    let angles = HeadingPitchRoll {
+        roll: q[3],
+        heading: q[4],
+        pitch: q[5],
+    };
     Ok(Configuration {
         position: Vector3::new(q[0], q[1], q[2]),
         attitude: angles.to_quaternion(),
@@ -38,7 +50,8 @@ pub fn from_public(model: &Model, q: &[f64]) -> Result<Configuration, StateError
 /// Public coordinates (nv) of a configuration.
 #[must_use]
 pub fn to_public(configuration: &Configuration) -> Vec<f64> {
-    let angles = HeadingPitchRoll::from_rotation(configuration.attitude.to_rotation_matrix().matrix());
+    let angles =
+        HeadingPitchRoll::from_rotation(configuration.attitude.to_rotation_matrix().matrix());
     let p = &configuration.position;
     let mut q = vec![p.x, p.y, p.z, angles.roll, angles.heading, angles.pitch];
     q.extend_from_slice(&configuration.joints);
@@ -61,7 +74,11 @@ pub fn from_report(model: &Model, q: &[f64]) -> Result<Configuration, StateError
 /// The Cardan angles in report coordinates.
 #[must_use]
 pub fn report_angles(q: &[f64]) -> CardanReport {
-    CardanReport { x: q[3], y: q[4], z: q[5] }
+    CardanReport {
+        x: q[3],
+        y: q[4],
+        z: q[5],
+    }
 }
 
 /// A checked velocity (nv).
@@ -77,7 +94,11 @@ pub fn checked_velocity(model: &Model, v: &[f64]) -> Result<Vec<f64>, StateError
 ///
 /// # Errors
 /// Wrong length, or an entry that is not finite.
-pub fn velocity_from_report(model: &Model, q: &[f64], qdot: &[f64]) -> Result<Vec<f64>, StateError> {
+pub fn velocity_from_report(
+    model: &Model,
+    q: &[f64],
+    qdot: &[f64],
+) -> Result<Vec<f64>, StateError> {
     check("q", q, model.nv())?;
     check("qdot", qdot, model.nv())?;
     let mut v = qdot.to_vec();
@@ -90,14 +111,21 @@ pub fn velocity_from_report(model: &Model, q: &[f64], qdot: &[f64]) -> Result<Ve
 ///
 /// # Errors
 /// `SingularCardan` where the heading is ±90 degrees and the rates do not exist.
-pub fn to_report(configuration: &Configuration, v: &[f64]) -> Result<(Vec<f64>, Vec<f64>), StateError> {
+pub fn to_report(
+    configuration: &Configuration,
+    v: &[f64],
+) -> Result<(Vec<f64>, Vec<f64>), StateError> {
     let angles = CardanReport::from_rotation(configuration.attitude.to_rotation_matrix().matrix());
     let p = &configuration.position;
     let mut q = vec![p.x, p.y, p.z, angles.x, angles.y, angles.z];
     q.extend_from_slice(&configuration.joints);
     let E = angles.rate_matrix();
-    let inverse = (angles.y.cos().abs() > 1e-9).then(|| E.try_inverse()).flatten();
-    let Some(inverse) = inverse else { return Err(StateError::SingularCardan { heading: angles.y }) };
+    let inverse = (angles.y.cos().abs() > 1e-9)
+        .then(|| E.try_inverse())
+        .flatten();
+    let Some(inverse) = inverse else {
+        return Err(StateError::SingularCardan { heading: angles.y });
+    };
     let mut qdot = v.to_vec();
     let rates = inverse * Vector3::new(v[3], v[4], v[5]);
     qdot[3..6].copy_from_slice(rates.as_slice());
@@ -122,7 +150,9 @@ pub fn pull_back(f: &DVector<f64>, angles: CardanReport) -> DVector<f64> {
 pub fn rate_drift(angles: CardanReport, qdot: &[f64]) -> DVector<f64> {
     let mut drift = DVector::zeros(qdot.len());
     let rates = Vector3::new(qdot[3], qdot[4], qdot[5]);
-    drift.rows_mut(3, 3).copy_from(&angles.rate_matrix_derivative_times_rates(&rates));
+    drift
+        .rows_mut(3, 3)
+        .copy_from(&angles.rate_matrix_derivative_times_rates(&rates));
     drift
 }
 

@@ -93,10 +93,15 @@ impl Shape {
     #[must_use]
     pub fn inertia(&self, m: f64) -> [f64; 3] {
         match *self {
-            Self::Box { size: [a, b, c] } => {
-                [m / 12.0 * (b * b + c * c), m / 12.0 * (a * a + c * c), m / 12.0 * (a * a + b * b)]
-            }
-            Self::Cylinder { radius: r, height: h } => {
+            Self::Box { size: [a, b, c] } => [
+                m / 12.0 * (b * b + c * c),
+                m / 12.0 * (a * a + c * c),
+                m / 12.0 * (a * a + b * b),
+            ],
+            Self::Cylinder {
+                radius: r,
+                height: h,
+            } => {
                 let across = m / 12.0 * (3.0 * r * r + h * h);
                 [across, m * r * r / 2.0, across]
             }
@@ -138,7 +143,11 @@ impl ModelDescription {
     pub fn rover() -> Self {
         let parsed = Self::from_toml(ROVER);
         assert!(parsed.is_ok(), "the built-in rover is readable");
-        parsed.unwrap_or_else(|_| Self { name: String::new(), solids: Vec::new(), wheels: Vec::new() })
+        parsed.unwrap_or_else(|_| Self {
+            name: String::new(),
+            solids: Vec::new(),
+            wheels: Vec::new(),
+        })
     }
 
     /// Reads TOML.
@@ -146,7 +155,9 @@ impl ModelDescription {
     /// # Errors
     /// [`ModelError::Unreadable`] with line and column.
     pub fn from_toml(text: &str) -> Result<Self, ModelError> {
-        toml::from_str(text).map_err(|e| ModelError::Unreadable { message: e.to_string() })
+        toml::from_str(text).map_err(|e| ModelError::Unreadable {
+            message: e.to_string(),
+        })
     }
 
     /// Writes TOML that [`Self::from_toml`] reads back to the same description.
@@ -154,7 +165,9 @@ impl ModelDescription {
     /// # Errors
     /// [`ModelError::Unreadable`] where a value has no TOML form.
     pub fn to_toml(&self) -> Result<String, ModelError> {
-        toml::to_string(self).map_err(|e| ModelError::Unreadable { message: e.to_string() })
+        toml::to_string(self).map_err(|e| ModelError::Unreadable {
+            message: e.to_string(),
+        })
     }
 
     /// Reads JSON.
@@ -162,7 +175,9 @@ impl ModelDescription {
     /// # Errors
     /// [`ModelError::Unreadable`] with line and column.
     pub fn from_json(text: &str) -> Result<Self, ModelError> {
-        serde_json::from_str(text).map_err(|e| ModelError::Unreadable { message: e.to_string() })
+        serde_json::from_str(text).map_err(|e| ModelError::Unreadable {
+            message: e.to_string(),
+        })
     }
 
     /// Writes JSON.
@@ -170,7 +185,9 @@ impl ModelDescription {
     /// # Errors
     /// [`ModelError::Unreadable`] where a value has no JSON form.
     pub fn to_json(&self) -> Result<String, ModelError> {
-        serde_json::to_string(self).map_err(|e| ModelError::Unreadable { message: e.to_string() })
+        serde_json::to_string(self).map_err(|e| ModelError::Unreadable {
+            message: e.to_string(),
+        })
     }
 }
 
@@ -181,13 +198,20 @@ mod tests {
     #[test]
     fn the_rover_survives_both_formats() {
         let rover = ModelDescription::rover();
-        assert_eq!(ModelDescription::from_toml(&rover.to_toml().unwrap()).unwrap(), rover);
-        assert_eq!(ModelDescription::from_json(&rover.to_json().unwrap()).unwrap(), rover);
+        assert_eq!(
+            ModelDescription::from_toml(&rover.to_toml().unwrap()).unwrap(),
+            rover
+        );
+        assert_eq!(
+            ModelDescription::from_json(&rover.to_json().unwrap()).unwrap(),
+            rover
+        );
     }
 
     #[test]
     fn unknown_fields_are_refused_by_name() {
-        let error = ModelDescription::from_toml("name = 'x'\nsolids = []\nwheles = []").unwrap_err();
+        let error =
+            ModelDescription::from_toml("name = 'x'\nsolids = []\nwheles = []").unwrap_err();
         assert!(error.to_string().contains("wheles"), "{error}");
     }
 }

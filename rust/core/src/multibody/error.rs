@@ -93,7 +93,9 @@ pub enum ModelError {
         value: f64,
     },
     /// Principal inertias that no mass distribution has.
-    #[error("{field}: no body has the principal inertias {principal:?} (each must be positive and at most the sum of the others)")]
+    #[error(
+        "{field}: no body has the principal inertias {principal:?} (each must be positive and at most the sum of the others)"
+    )]
     ImpossibleInertia {
         /// Path of the field.
         field: String,
@@ -164,7 +166,9 @@ pub enum StateError {
         value: f64,
     },
     /// The report's angles cannot express a rate there.
-    #[error("q[4]: the report's coordinates are singular at a heading of 90 degrees, is {heading} rad")]
+    #[error(
+        "q[4]: the report's coordinates are singular at a heading of 90 degrees, is {heading} rad"
+    )]
     SingularCardan {
         /// Middle Cardan angle, rad.
         heading: f64,

@@ -60,7 +60,10 @@ impl JointAxis {
             Self::X => columns(0),
             Self::Y => columns(1),
             Self::Z => columns(2),
-            Self::General(u) => (R * Rotation3::from_axis_angle(u, angle).matrix(), R * u.into_inner()),
+            Self::General(u) => (
+                R * Rotation3::from_axis_angle(u, angle).matrix(),
+                R * u.into_inner(),
+            ),
         }
     }
 }
@@ -72,7 +75,11 @@ mod tests {
     #[test]
     fn coordinate_axes_agree_with_the_general_one() {
         let R = *Rotation3::from_euler_angles(0.2, -0.5, 1.1).matrix();
-        for (axis, e) in [(JointAxis::X, Vector3::x()), (JointAxis::Y, Vector3::y()), (JointAxis::Z, Vector3::z())] {
+        for (axis, e) in [
+            (JointAxis::X, Vector3::x()),
+            (JointAxis::Y, Vector3::y()),
+            (JointAxis::Z, Vector3::z()),
+        ] {
             assert_eq!(JointAxis::from_direction(&(e * 2.0)), Some(axis));
             let (special, a) = axis.rotate(&R, 0.7);
             let (general, b) = JointAxis::General(Unit::new_normalize(e)).rotate(&R, 0.7);

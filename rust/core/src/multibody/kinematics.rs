@@ -74,7 +74,13 @@ impl Kinematics {
 
     /// Velocity (m/s, world) of the material point of body `b` that is at `x` (relative to the trunk origin).
     #[must_use]
-    pub fn point_velocity(&self, model: &Model, b: usize, x: &Vector3<f64>, v: &[f64]) -> Vector3<f64> {
+    pub fn point_velocity(
+        &self,
+        model: &Model,
+        b: usize,
+        x: &Vector3<f64>,
+        v: &[f64],
+    ) -> Vector3<f64> {
         let mut velocity = Vector3::new(v[0], v[1], v[2]) + Vector3::new(v[3], v[4], v[5]).cross(x);
         for &k in &model.path(b)[6..] {
             velocity += self.axis[k - 5].cross(&(x - self.r[k - 5])) * v[k];
@@ -86,7 +92,13 @@ impl Kinematics {
     ///
     /// `row` has the length of the path.
     #[inline]
-    pub fn point_jacobian_row(&self, path: &[usize], x: &Vector3<f64>, d: &Vector3<f64>, row: &mut [f64]) {
+    pub fn point_jacobian_row(
+        &self,
+        path: &[usize],
+        x: &Vector3<f64>,
+        d: &Vector3<f64>,
+        row: &mut [f64],
+    ) {
         let moment = x.cross(d);
         row[..3].copy_from_slice(d.as_slice());
         row[3..6].copy_from_slice(moment.as_slice());

@@ -43,8 +43,13 @@ impl MassMatrix {
         for (b, body) in bodies.iter().enumerate() {
             let c = &kinematics.c[b];
             let mut inertia = match &body.principal_axes {
-                None => SymmetricMatrix3::rotated_diagonal(&kinematics.R[b], &body.principal_inertia),
-                Some(P) => SymmetricMatrix3::rotated_diagonal(&(kinematics.R[b] * P), &body.principal_inertia),
+                None => {
+                    SymmetricMatrix3::rotated_diagonal(&kinematics.R[b], &body.principal_inertia)
+                }
+                Some(P) => SymmetricMatrix3::rotated_diagonal(
+                    &(kinematics.R[b] * P),
+                    &body.principal_inertia,
+                ),
             };
             inertia += SymmetricMatrix3::point_mass(body.mass, c);
             self.mass[b] = body.mass;
@@ -134,13 +139,21 @@ impl MassMatrix {
 /// Velocity indices from the base to velocity `k` itself.
 #[inline]
 fn path(model: &Model, k: usize) -> &[usize] {
-    if k < 6 { &model.path(0)[..=k] } else { model.path(k - 5) }
+    if k < 6 {
+        &model.path(0)[..=k]
+    } else {
+        model.path(k - 5)
+    }
 }
 
 /// Position of velocity `k` in its own row.
 #[inline]
 fn last(model: &Model, k: usize) -> usize {
-    if k < 6 { k } else { model.path(k - 5).len() - 1 }
+    if k < 6 {
+        k
+    } else {
+        model.path(k - 5).len() - 1
+    }
 }
 
 /// `M = Lᵀ D L`, L unit lower triangular with M's sparsity. Holds `L` along paths and `D^(-1/2)`.

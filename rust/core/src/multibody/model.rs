@@ -145,12 +145,23 @@ impl Model {
     pub fn with_locked_joints(&self, joints: &[(String, f64)]) -> Result<Self, ModelError> {
         let mut locked = self.locked.clone();
         for (i, (name, angle)) in joints.iter().enumerate() {
-            let is_joint = self.description.solids.iter().skip(1).any(|s| &s.name == name);
+            let is_joint = self
+                .description
+                .solids
+                .iter()
+                .skip(1)
+                .any(|s| &s.name == name);
             if !is_joint {
-                return Err(ModelError::UnknownName { field: format!("joints[{i}]"), name: name.clone() });
+                return Err(ModelError::UnknownName {
+                    field: format!("joints[{i}]"),
+                    name: name.clone(),
+                });
             }
             if !angle.is_finite() {
-                return Err(ModelError::NotFinite { field: format!("joints[{name}]"), value: *angle });
+                return Err(ModelError::NotFinite {
+                    field: format!("joints[{name}]"),
+                    value: *angle,
+                });
             }
             locked.retain(|(n, _)| n != name);
             locked.push((name.clone(), *angle));
@@ -159,7 +170,10 @@ impl Model {
     }
 
     #[allow(clippy::too_many_lines)] // one pass over the solids; its parts share every local
-    fn build(description: ModelDescription, locked: Vec<(String, f64)>) -> Result<Self, ModelError> {
+    fn build(
+        description: ModelDescription,
+        locked: Vec<(String, f64)>,
+    ) -> Result<Self, ModelError> {
         check(&description)?;
         let mut bodies: Vec<Body> = Vec::new();
         let mut lumps: Vec<Lump> = Vec::new();
@@ -167,15 +181,27 @@ impl Model {
         let mut boxes = Vec::new();
         let index_of = |frames: &[Frame], name: &str| frames.iter().position(|f| f.name == name);
         for (i, solid) in description.solids.iter().enumerate() {
-            let axis = solid.axis.and_then(|a| JointAxis::from_direction(&a.into())).unwrap_or(JointAxis::X);
-            let lock = locked.iter().find(|(n, _)| *n == solid.name).map(|(_, angle)| *angle);
+            let axis = solid
+                .axis
+                .and_then(|a| JointAxis::from_direction(&a.into()))
+                .unwrap_or(JointAxis::X);
+            let lock = locked
+                .iter()
+                .find(|(n, _)| *n == solid.name)
+                .map(|(_, angle)| *angle);
             let parent = solid.parent.as_deref().and_then(|p| index_of(&frames, p));
             let frame = if let (Some(p), true) = (parent, i > 0) {
                 let carrier: Frame = frames[p].clone();
-                let position = carrier.position + carrier.rotation * Vector3::from(solid.position.unwrap_or_default());
+                let position = carrier.position
+                    + carrier.rotation * Vector3::from(solid.position.unwrap_or_default());
                 if let Some(angle) = lock {
                     let (rotation, _) = axis.rotate(&carrier.rotation, angle);
-                    Frame { name: solid.name.clone(), body: carrier.body, position, rotation }
+                    Frame {
+                        name: solid.name.clone(),
+                        body: carrier.body,
+                        position,
+                        rotation,
+                    }
                 } else {
                     let fixed = carrier.rotation;
                     bodies.push(Body {
@@ -188,7 +214,10 @@ impl Model {
                         centre_of_mass: Vector3::zeros(),
                         principal_inertia: Vector3::zeros(),
                         principal_axes: None,
-                        hold: solid.hold.unwrap_or(Hold { stiffness: 0.0, damping: 0.0 }),
+                        hold: solid.hold.unwrap_or(Hold {
+                            stiffness: 0.0,
+                            damping: 0.0,
+                        }),
                     });
                     lumps.push(Lump::default());
                     Frame {
@@ -209,17 +238,29 @@ impl Model {
                     centre_of_mass: Vector3::zeros(),
                     principal_inertia: Vector3::zeros(),
                     principal_axes: None,
-                    hold: Hold { stiffness: 0.0, damping: 0.0 },
+                    hold: Hold {
+                        stiffness: 0.0,
+                        damping: 0.0,
+                    },
                 });
                 lumps.push(Lump::default());
-                Frame { name: solid.name.clone(), body: 0, position: Vector3::zeros(), rotation: Matrix3::identity() }
+                Frame {
+                    name: solid.name.clone(),
+                    body: 0,
+                    position: Vector3::zeros(),
+                    rotation: Matrix3::identity(),
+                }
             };
-            let centre = frame.position + frame.rotation * Vector3::from(solid.centre_of_mass.unwrap_or_default());
-            let about_centre = frame.rotation * solid_inertia(solid.mass, &solid.shape, solid.inertia) * frame.rotation.transpose();
+            let centre = frame.position
+                + frame.rotation * Vector3::from(solid.centre_of_mass.unwrap_or_default());
+            let about_centre = frame.rotation
+                * solid_inertia(solid.mass, &solid.shape, solid.inertia)
+                * frame.rotation.transpose();
             let lump = &mut lumps[frame.body];
             lump.mass += solid.mass;
             lump.moment += centre * solid.mass;
-            lump.inertia += about_centre + SymmetricMatrix3::point_mass(solid.mass, &centre).to_matrix();
+            lump.inertia +=
+                about_centre + SymmetricMatrix3::point_mass(solid.mass, &centre).to_matrix();
             if let (true, Shape::Box { size }) = (solid.collides, solid.shape) {
                 boxes.push(CollisionBox {
                     body: frame.body,
@@ -247,8 +288,16 @@ impl Model {
         }
         let mut wheels = Vec::new();
         for wheel in &description.wheels {
-            let Some(frame) = index_of(&frames, &wheel.solid).map(|k| frames[k].clone()) else { continue };
-            let joint_of = |name: &str| bodies.iter().skip(1).position(|b| b.name == name).map(|k| k + 6);
+            let Some(frame) = index_of(&frames, &wheel.solid).map(|k| frames[k].clone()) else {
+                continue;
+            };
+            let joint_of = |name: &str| {
+                bodies
+                    .iter()
+                    .skip(1)
+                    .position(|b| b.name == name)
+                    .map(|k| k + 6)
+            };
             let axle = frame.rotation * Vector3::from(wheel.axle).normalize();
             wheels.push(Wheel {
                 name: wheel.name.clone(),
@@ -264,7 +313,14 @@ impl Model {
                 steering_limit: wheel.steering_limit.unwrap_or(0.0),
             });
         }
-        Ok(Self::with_tree(description, locked, bodies, frames, wheels, boxes))
+        Ok(Self::with_tree(
+            description,
+            locked,
+            bodies,
+            frames,
+            wheels,
+            boxes,
+        ))
     }
 
     fn with_tree(
@@ -290,11 +346,27 @@ impl Model {
         let mut common = vec![0; bodies.len() * bodies.len()];
         for (a, path_a) in path_of.iter().enumerate() {
             for (b, path_b) in path_of.iter().enumerate() {
-                common[a * bodies.len() + b] = path_a.iter().zip(path_b).take_while(|(i, j)| i == j).count();
+                common[a * bodies.len() + b] = path_a
+                    .iter()
+                    .zip(path_b)
+                    .take_while(|(i, j)| i == j)
+                    .count();
             }
         }
         let mass = bodies.iter().map(|b| b.mass).sum();
-        Self { description, locked, bodies, frames, wheels, boxes, paths, path_lengths, path_stride, common, mass }
+        Self {
+            description,
+            locked,
+            bodies,
+            frames,
+            wheels,
+            boxes,
+            paths,
+            path_lengths,
+            path_stride,
+            common,
+            mass,
+        }
     }
 
     /// The description that it was built from.
@@ -375,38 +447,75 @@ impl Model {
     /// Velocity index of a joint by name.
     #[must_use]
     pub fn joint_index(&self, name: &str) -> Option<usize> {
-        self.bodies.iter().skip(1).position(|b| b.name == name).map(|k| k + 6)
+        self.bodies
+            .iter()
+            .skip(1)
+            .position(|b| b.name == name)
+            .map(|k| k + 6)
     }
 }
 
 /// Inertia about the mass centre in the solid's frame, kg m².
 fn solid_inertia(mass: f64, shape: &Shape, given: Option<[f64; 6]>) -> Matrix3<f64> {
     match given {
-        Some([xx, yy, zz, xy, xz, yz]) => SymmetricMatrix3 { xx, yy, zz, xy, xz, yz }.to_matrix(),
+        Some([xx, yy, zz, xy, xz, yz]) => SymmetricMatrix3 {
+            xx,
+            yy,
+            zz,
+            xy,
+            xz,
+            yz,
+        }
+        .to_matrix(),
         None => Matrix3::from_diagonal(&shape.inertia(mass).into()),
     }
 }
 
 /// Some unit vector perpendicular to a unit vector.
 fn perpendicular(axle: &Vector3<f64>) -> Vector3<f64> {
-    let e = if axle.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
+    let e = if axle.x.abs() < 0.7 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
     Rotation3::face_towards(axle, &e) * -Vector3::x()
 }
 
 fn finite(field: &str, values: &[f64]) -> Result<(), ModelError> {
     values.iter().try_for_each(|&value| {
-        if value.is_finite() { Ok(()) } else { Err(ModelError::NotFinite { field: field.to_owned(), value }) }
+        if value.is_finite() {
+            Ok(())
+        } else {
+            Err(ModelError::NotFinite {
+                field: field.to_owned(),
+                value,
+            })
+        }
     })
 }
 
 fn positive(field: &str, value: f64) -> Result<(), ModelError> {
     finite(field, &[value])?;
-    if value > 0.0 { Ok(()) } else { Err(ModelError::NotPositive { field: field.to_owned(), value }) }
+    if value > 0.0 {
+        Ok(())
+    } else {
+        Err(ModelError::NotPositive {
+            field: field.to_owned(),
+            value,
+        })
+    }
 }
 
 fn not_negative(field: &str, value: f64) -> Result<(), ModelError> {
     finite(field, &[value])?;
-    if value >= 0.0 { Ok(()) } else { Err(ModelError::Negative { field: field.to_owned(), value }) }
+    if value >= 0.0 {
+        Ok(())
+    } else {
+        Err(ModelError::Negative {
+            field: field.to_owned(),
+            value,
+        })
+    }
 }
 
 fn direction(field: &str, value: [f64; 3]) -> Result<(), ModelError> {
@@ -414,7 +523,10 @@ fn direction(field: &str, value: [f64; 3]) -> Result<(), ModelError> {
     if Unit::try_new(Vector3::from(value), 1e-9).is_some() {
         Ok(())
     } else {
-        Err(ModelError::NoDirection { field: field.to_owned(), value })
+        Err(ModelError::NoDirection {
+            field: field.to_owned(),
+            value,
+        })
     }
 }
 
@@ -427,7 +539,10 @@ fn check(description: &ModelDescription) -> Result<(), ModelError> {
         let at = |what: &str| format!("solids[{i}].{what}");
         let before = &description.solids[..i];
         if before.iter().any(|s| s.name == solid.name) {
-            return Err(ModelError::DuplicateName { field: at("name"), name: solid.name.clone() });
+            return Err(ModelError::DuplicateName {
+                field: at("name"),
+                name: solid.name.clone(),
+            });
         }
         if i == 0 {
             for (is_given, what) in [
@@ -437,43 +552,70 @@ fn check(description: &ModelDescription) -> Result<(), ModelError> {
                 (solid.hold.is_some(), "hold"),
             ] {
                 if is_given {
-                    return Err(ModelError::NotForBase { field: at(what), what });
+                    return Err(ModelError::NotForBase {
+                        field: at(what),
+                        what,
+                    });
                 }
             }
         } else {
-            let Some(parent) = &solid.parent else { return Err(ModelError::Missing { field: at("parent") }) };
+            let Some(parent) = &solid.parent else {
+                return Err(ModelError::Missing {
+                    field: at("parent"),
+                });
+            };
             if !before.iter().any(|s| s.name == *parent) {
-                return Err(ModelError::UnknownParent { field: at("parent"), name: parent.clone() });
+                return Err(ModelError::UnknownParent {
+                    field: at("parent"),
+                    name: parent.clone(),
+                });
             }
-            let Some(axis) = solid.axis else { return Err(ModelError::Missing { field: at("axis") }) };
+            let Some(axis) = solid.axis else {
+                return Err(ModelError::Missing { field: at("axis") });
+            };
             direction(&at("axis"), axis)?;
-            let Some(position) = solid.position else { return Err(ModelError::Missing { field: at("position") }) };
+            let Some(position) = solid.position else {
+                return Err(ModelError::Missing {
+                    field: at("position"),
+                });
+            };
             finite(&at("position"), &position)?;
         }
         positive(&at("mass"), solid.mass)?;
         match solid.shape {
-            Shape::Box { size } => size.iter().try_for_each(|&s| positive(&at("shape.size"), s))?,
+            Shape::Box { size } => size
+                .iter()
+                .try_for_each(|&s| positive(&at("shape.size"), s))?,
             Shape::Cylinder { radius, height } => {
                 positive(&at("shape.radius"), radius)?;
                 positive(&at("shape.height"), height)?;
             }
             Shape::Disc { radius } => positive(&at("shape.radius"), radius)?,
         }
-        finite(&at("centre_of_mass"), &solid.centre_of_mass.unwrap_or_default())?;
+        finite(
+            &at("centre_of_mass"),
+            &solid.centre_of_mass.unwrap_or_default(),
+        )?;
         if let Some(inertia) = solid.inertia {
             finite(&at("inertia"), &inertia)?;
         }
-        let principal = solid_inertia(solid.mass, &solid.shape, solid.inertia).symmetric_eigenvalues();
+        let principal =
+            solid_inertia(solid.mass, &solid.shape, solid.inertia).symmetric_eigenvalues();
         let (sum, largest) = (principal.sum(), principal.max());
         if principal.min() <= 0.0 || largest > (sum - largest) * (1.0 + 1e-9) {
-            return Err(ModelError::ImpossibleInertia { field: at("inertia"), principal: principal.into() });
+            return Err(ModelError::ImpossibleInertia {
+                field: at("inertia"),
+                principal: principal.into(),
+            });
         }
         if let Some(hold) = solid.hold {
             not_negative(&at("hold.stiffness"), hold.stiffness)?;
             not_negative(&at("hold.damping"), hold.damping)?;
         }
         if solid.collides && !matches!(solid.shape, Shape::Box { .. }) {
-            return Err(ModelError::CollidesWithoutBox { field: at("collides") });
+            return Err(ModelError::CollidesWithoutBox {
+                field: at("collides"),
+            });
         }
     }
     check_wheels(description)
@@ -484,31 +626,48 @@ fn check_wheels(description: &ModelDescription) -> Result<(), ModelError> {
     for (i, wheel) in description.wheels.iter().enumerate() {
         let at = |what: &str| format!("wheels[{i}].{what}");
         if description.wheels[..i].iter().any(|w| w.name == wheel.name) {
-            return Err(ModelError::DuplicateName { field: at("name"), name: wheel.name.clone() });
+            return Err(ModelError::DuplicateName {
+                field: at("name"),
+                name: wheel.name.clone(),
+            });
         }
         let find = |name: &str| solids.iter().position(|s| s.name == name);
         let Some(mut solid) = find(&wheel.solid) else {
-            return Err(ModelError::UnknownName { field: at("solid"), name: wheel.solid.clone() });
+            return Err(ModelError::UnknownName {
+                field: at("solid"),
+                name: wheel.solid.clone(),
+            });
         };
         direction(&at("axle"), wheel.axle)?;
         positive(&at("radius"), wheel.radius)?;
         not_negative(&at("torque_limit"), wheel.torque_limit)?;
         finite(&at("drive_sign"), &[wheel.drive_sign])?;
         if (wheel.drive_sign.abs() - 1.0).abs() > 0.0 {
-            return Err(ModelError::NotASign { field: at("drive_sign"), value: wheel.drive_sign });
+            return Err(ModelError::NotASign {
+                field: at("drive_sign"),
+                value: wheel.drive_sign,
+            });
         }
         if let Some(name) = &wheel.steering {
             let Some(steering) = find(name) else {
-                return Err(ModelError::UnknownName { field: at("steering"), name: name.clone() });
+                return Err(ModelError::UnknownName {
+                    field: at("steering"),
+                    name: name.clone(),
+                });
             };
             while let (Some(parent), true) = (&solids[solid].parent, solid != steering) {
                 solid = find(parent).unwrap_or(0);
             }
             if solid != steering || steering == 0 {
-                return Err(ModelError::SteeringNotAbove { field: at("steering"), name: name.clone() });
+                return Err(ModelError::SteeringNotAbove {
+                    field: at("steering"),
+                    name: name.clone(),
+                });
             }
             let Some(limit) = wheel.steering_limit else {
-                return Err(ModelError::Missing { field: at("steering_limit") });
+                return Err(ModelError::Missing {
+                    field: at("steering_limit"),
+                });
             };
             not_negative(&at("steering_limit"), limit)?;
         }

@@ -35,21 +35,39 @@ pub struct Momentum {
 /// `base − about`; also returns the kinetic energy (J).
 ///
 /// `out`: one entry a body.
-pub fn body_momenta(model: &Model, kinematics: &Kinematics, v: &[f64], about: &Vector3<f64>, out: &mut [Momentum]) -> f64 {
+pub fn body_momenta(
+    model: &Model,
+    kinematics: &Kinematics,
+    v: &[f64],
+    about: &Vector3<f64>,
+    out: &mut [Momentum],
+) -> f64 {
     let mut kinetic = 0.0;
     // Velocity of each frame's origin and angular velocity ride along the tree in `out` until overwritten.
     for (b, body) in model.bodies().iter().enumerate() {
         let (origin, omega) = if b == 0 {
-            (Vector3::new(v[0], v[1], v[2]), Vector3::new(v[3], v[4], v[5]))
+            (
+                Vector3::new(v[0], v[1], v[2]),
+                Vector3::new(v[3], v[4], v[5]),
+            )
         } else {
             let p = &out[body.parent];
             let d = kinematics.r[b] - kinematics.r[body.parent];
-            (p.linear + p.angular.cross(&d), p.angular + kinematics.axis[b] * v[5 + b])
+            (
+                p.linear + p.angular.cross(&d),
+                p.angular + kinematics.axis[b] * v[5 + b],
+            )
         };
-        out[b] = Momentum { linear: origin, angular: omega };
+        out[b] = Momentum {
+            linear: origin,
+            angular: omega,
+        };
     }
     for (b, body) in model.bodies().iter().enumerate() {
-        let Momentum { linear: origin, angular: omega } = out[b];
+        let Momentum {
+            linear: origin,
+            angular: omega,
+        } = out[b];
         let velocity = origin + omega.cross(&(kinematics.c[b] - kinematics.r[b]));
         let A = match &body.principal_axes {
             None => kinematics.R[b],
@@ -59,7 +77,10 @@ pub fn body_momenta(model: &Model, kinematics: &Kinematics, v: &[f64], about: &V
         let spin = body.principal_inertia.component_mul(&w);
         let p = velocity * body.mass;
         kinetic += 0.5 * (p.dot(&velocity) + spin.dot(&w));
-        out[b] = Momentum { linear: p, angular: A * spin + (kinematics.c[b] + about).cross(&p) };
+        out[b] = Momentum {
+            linear: p,
+            angular: A * spin + (kinematics.c[b] + about).cross(&p),
+        };
     }
     kinetic
 }
@@ -67,7 +88,12 @@ pub fn body_momenta(model: &Model, kinematics: &Kinematics, v: &[f64], about: &V
 /// Mass centre, world, m.
 #[must_use]
 pub fn centre_of_mass(model: &Model, kinematics: &Kinematics) -> Vector3<f64> {
-    let moment: Vector3<f64> = model.bodies().iter().zip(&kinematics.c).map(|(body, c)| c * body.mass).sum();
+    let moment: Vector3<f64> = model
+        .bodies()
+        .iter()
+        .zip(&kinematics.c)
+        .map(|(body, c)| c * body.mass)
+        .sum();
     kinematics.base + moment / model.mass()
 }
 
@@ -76,7 +102,10 @@ pub fn centre_of_mass(model: &Model, kinematics: &Kinematics) -> Vector3<f64> {
 pub fn energy(model: &Model, kinematics: &Kinematics, v: &[f64], gravity: &Vector3<f64>) -> Energy {
     let mut momenta = vec![Momentum::default(); model.bodies().len()];
     let kinetic = body_momenta(model, kinematics, v, &Vector3::zeros(), &mut momenta);
-    Energy { kinetic, potential: -model.mass() * gravity.dot(&centre_of_mass(model, kinematics)) }
+    Energy {
+        kinetic,
+        potential: -model.mass() * gravity.dot(&centre_of_mass(model, kinematics)),
+    }
 }
 
 /// Total momentum, angular about the world's origin.

@@ -21,7 +21,11 @@ impl Configuration {
     /// The zero configuration of a model.
     #[must_use]
     pub fn zero(model: &Model) -> Self {
-        Self { position: Vector3::zeros(), attitude: UnitQuaternion::identity(), joints: vec![0.0; model.n_joints()] }
+        Self {
+            position: Vector3::zeros(),
+            attitude: UnitQuaternion::identity(),
+            joints: vec![0.0; model.n_joints()],
+        }
     }
 
     /// `self = from ⊕ h v`: moves with the velocity `v` (nv) for `h` seconds along the exponential map.
@@ -55,7 +59,11 @@ impl Configuration {
     /// Whether every entry is finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        self.position.iter().chain(self.attitude.coords.iter()).chain(&self.joints).all(|x| x.is_finite())
+        self.position
+            .iter()
+            .chain(self.attitude.coords.iter())
+            .chain(&self.joints)
+            .all(|x| x.is_finite())
     }
 }
 
@@ -74,12 +82,18 @@ impl State {
     /// At rest in the zero configuration at time 0.
     #[must_use]
     pub fn zero(model: &Model) -> Self {
-        Self { configuration: Configuration::zero(model), v: vec![0.0; model.nv()], time: 0.0 }
+        Self {
+            configuration: Configuration::zero(model),
+            v: vec![0.0; model.nv()],
+            time: 0.0,
+        }
     }
 
     /// Whether every entry is finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        self.configuration.is_finite() && self.time.is_finite() && self.v.iter().all(|x| x.is_finite())
+        self.configuration.is_finite()
+            && self.time.is_finite()
+            && self.v.iter().all(|x| x.is_finite())
     }
 }

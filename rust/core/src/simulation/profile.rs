@@ -17,7 +17,11 @@ impl Stopwatch {
     /// Starts now.
     #[must_use]
     pub fn start() -> Self {
-        Self { last: Instant::now(), seconds: BTreeMap::new(), steps: 0 }
+        Self {
+            last: Instant::now(),
+            seconds: BTreeMap::new(),
+            steps: 0,
+        }
     }
 
     pub(super) fn finish(&mut self, steps: usize) {
@@ -28,7 +32,10 @@ impl Stopwatch {
     #[must_use]
     pub fn microseconds(&self) -> Vec<(Phase, f64)> {
         let scale = 1e6 / self.steps.max(1) as f64;
-        self.seconds.iter().map(|(phase, s)| (*phase, s * scale)).collect()
+        self.seconds
+            .iter()
+            .map(|(phase, s)| (*phase, s * scale))
+            .collect()
     }
 }
 

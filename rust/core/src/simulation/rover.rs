@@ -10,8 +10,8 @@ use super::snapshot::Snapshot;
 use crate::contact::{Contact, ContactFrame, Part, detection::wheel_contacts};
 use crate::geometry::Terrain;
 use crate::integrator::{
-    ActiveContact, Command, HeldJoint, NoProbe, OptionsError, Probe, Scene, StepError, StepOptions, StepReport, WarmStart,
-    Workspace,
+    ActiveContact, Command, HeldJoint, NoProbe, OptionsError, Probe, Scene, StepError, StepOptions,
+    StepReport, WarmStart, Workspace,
 };
 use crate::multibody::{Configuration, Energy, Kinematics, Model, Momentum, State, momentum};
 
@@ -35,14 +35,21 @@ impl Simulation {
     ///
     /// # Errors
     /// An option out of its range.
-    pub fn new(model: Arc<Model>, terrain: Arc<dyn Terrain>, options: StepOptions) -> Result<Self, OptionsError> {
+    pub fn new(
+        model: Arc<Model>,
+        terrain: Arc<dyn Terrain>,
+        options: StepOptions,
+    ) -> Result<Self, OptionsError> {
         options.check()?;
         let mut command = Command::idle(&model);
         for wheel in model.wheels() {
             if let Some(k) = wheel.steering {
                 let hold = model.bodies()[k - 5].hold;
-                command.held[k - 6] =
-                    Some(HeldJoint { set_point: 0.0, stiffness: hold.stiffness, damping: hold.damping });
+                command.held[k - 6] = Some(HeldJoint {
+                    set_point: 0.0,
+                    stiffness: hold.stiffness,
+                    damping: hold.damping,
+                });
             }
         }
         Ok(Self {
@@ -106,10 +113,23 @@ impl Simulation {
     /// # Panics
     /// If the sizes are another model's.
     pub fn set_state(&mut self, configuration: Configuration, v: Vec<f64>) {
-        assert_eq!(configuration.joints.len(), self.model.n_joints(), "invariant: a configuration of this model");
-        assert_eq!(v.len(), self.model.nv(), "invariant: a velocity of this model");
-        self.state = State { configuration, v, time: 0.0 };
+        assert_eq!(
+            configuration.joints.len(),
+            self.model.n_joints(),
+            "invariant: a configuration of this model"
+        );
+        assert_eq!(
+            v.len(),
+            self.model.nv(),
+            "invariant: a velocity of this model"
+        );
+        self.state = State {
+            configuration,
+            v,
+            time: 0.0,
+        };
         self.warm_start.impulses.clear();
+        self.warm_start.persistent.clear();
         self.active.clear();
     }
 
@@ -125,7 +145,12 @@ impl Simulation {
     /// Wrong length or an entry that is not finite; nothing is changed then.
     pub fn set_wheel_torques(&mut self, torques: &[f64]) -> Result<(), CommandError> {
         check("torques", torques, self.model.wheels().len())?;
-        for ((own, torque), wheel) in self.wheel_torque.iter_mut().zip(torques).zip(self.model.wheels()) {
+        for ((own, torque), wheel) in self
+            .wheel_torque
+            .iter_mut()
+            .zip(torques)
+            .zip(self.model.wheels())
+        {
             *own = torque.clamp(-wheel.torque_limit, wheel.torque_limit);
         }
         self.combine_torques();
@@ -156,7 +181,11 @@ impl Simulation {
     #[must_use]
     pub fn steering(&self) -> Vec<f64> {
         let of = |k: usize| self.command.held[k - 6].map_or(0.0, |h| h.set_point);
-        self.model.wheels().iter().map(|w| w.steering.map_or(0.0, of)).collect()
+        self.model
+            .wheels()
+            .iter()
+            .map(|w| w.steering.map_or(0.0, of))
+            .collect()
     }
 
     /// Holds the steering joints at set-points (rad, one a wheel) with the model's gains.
@@ -166,9 +195,18 @@ impl Simulation {
     pub fn set_steering(&mut self, set_points: &[f64]) -> Result<(), CommandError> {
         check("set_points", set_points, self.model.wheels().len())?;
         for (index, (&value, wheel)) in set_points.iter().zip(self.model.wheels()).enumerate() {
-            let limit = if wheel.steering.is_some() { wheel.steering_limit } else { 0.0 };
+            let limit = if wheel.steering.is_some() {
+                wheel.steering_limit
+            } else {
+                0.0
+            };
             if value.abs() > limit * (1.0 + 1e-12) {
-                return Err(CommandError::BeyondLimit { field: "set_points", index, value, limit });
+                return Err(CommandError::BeyondLimit {
+                    field: "set_points",
+                    index,
+                    value,
+                    limit,
+                });
             }
         }
         for (&set_point, wheel) in set_points.iter().zip(self.model.wheels()) {
@@ -177,7 +215,11 @@ impl Simulation {
                 let held = self.command.held[k - 6];
                 let (stiffness, damping) =
                     held.map_or((hold.stiffness, hold.damping), |h| (h.stiffness, h.damping));
-                self.command.held[k - 6] = Some(HeldJoint { set_point, stiffness, damping });
+                self.command.held[k - 6] = Some(HeldJoint {
+                    set_point,
+                    stiffness,
+                    damping,
+                });
             }
         }
         Ok(())
@@ -236,8 +278,11 @@ impl Simulation {
             if let Some(k) = wheel.joint {
                 let hold = self.model.bodies()[k - 5].hold;
                 let set_point = self.state.configuration.joints[k - 6];
-                self.command.held[k - 6] =
-                    Some(HeldJoint { set_point, stiffness: hold.stiffness, damping: hold.damping });
+                self.command.held[k - 6] = Some(HeldJoint {
+                    set_point,
+                    stiffness: hold.stiffness,
+                    damping: hold.damping,
+                });
             }
         }
     }
@@ -245,7 +290,10 @@ impl Simulation {
     fn joint_indices(&self, joints: &[String]) -> Result<Vec<usize>, CommandError> {
         let index = |name: &String| {
             let found = self.model.joint_index(name).map(|k| k - 6);
-            found.ok_or_else(|| CommandError::UnknownJoint { field: "joints", name: name.clone() })
+            found.ok_or_else(|| CommandError::UnknownJoint {
+                field: "joints",
+                name: name.clone(),
+            })
         };
         joints.iter().map(index).collect()
     }
@@ -260,7 +308,11 @@ impl Simulation {
 
     fn step_probed(&mut self, n: usize, probe: &mut dyn Probe) -> Result<StepReport, StepError> {
         let integrator = self.options.variant.integrator();
-        let scene = Scene { model: &self.model, terrain: &*self.terrain, options: &self.options };
+        let scene = Scene {
+            model: &self.model,
+            terrain: &*self.terrain,
+            options: &self.options,
+        };
         let mut total = StepReport::default();
         for _ in 0..n {
             let report = integrator.step(
@@ -300,7 +352,12 @@ impl Simulation {
     /// Kinetic and potential energy now, J.
     #[must_use]
     pub fn energy(&self) -> Energy {
-        momentum::energy(&self.model, &self.kinematics(), &self.state.v, &self.options.gravity)
+        momentum::energy(
+            &self.model,
+            &self.kinematics(),
+            &self.state.v,
+            &self.options.gravity,
+        )
     }
 
     /// Linear momentum, and angular momentum about the world's origin.
@@ -345,7 +402,10 @@ impl Simulation {
     /// Mean normal force of the last step on all that is no wheel, N.
     #[must_use]
     pub fn body_force(&self) -> f64 {
-        let boxes = self.active.iter().filter(|a| matches!(a.contact.part, Part::Box(_)));
+        let boxes = self
+            .active
+            .iter()
+            .filter(|a| matches!(a.contact.part, Part::Box(_)));
         boxes.map(|a| a.impulse[0]).sum::<f64>() / self.options.time_step
     }
 
@@ -367,19 +427,38 @@ impl Simulation {
     /// # Errors
     /// A snapshot of another model or with damaged contents; nothing is changed then.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), SnapshotError> {
-        let (expected, actual) = (self.model.n_joints(), snapshot.state.configuration.joints.len());
+        let (expected, actual) = (
+            self.model.n_joints(),
+            snapshot.state.configuration.joints.len(),
+        );
         if expected != actual || snapshot.wheel_torque.len() != self.model.wheels().len() {
             return Err(SnapshotError::OtherModel { expected, actual });
         }
         let command = &snapshot.command;
-        let held = command.held.iter().flatten().flat_map(|h| [h.set_point, h.stiffness, h.damping]);
-        let torques = command.torque.iter().chain(&snapshot.wheel_torque).chain(&snapshot.joint_torque);
+        let held = command
+            .held
+            .iter()
+            .flatten()
+            .flat_map(|h| [h.set_point, h.stiffness, h.damping]);
+        let torques = command
+            .torque
+            .iter()
+            .chain(&snapshot.wheel_torque)
+            .chain(&snapshot.joint_torque);
         let is_sound = snapshot.state.is_finite()
             && snapshot.state.v.len() == self.model.nv()
-            && [&command.torque, &snapshot.joint_torque].iter().all(|t| t.len() == expected)
+            && [&command.torque, &snapshot.joint_torque]
+                .iter()
+                .all(|t| t.len() == expected)
             && command.held.len() == expected
             && torques.copied().chain(held).all(f64::is_finite)
-            && snapshot.warm_start.impulses.iter().all(|(_, p)| p.iter().all(|x| x.is_finite()))
+            && [0, self.model.nv()].contains(&snapshot.warm_start.persistent.len())
+            && snapshot.warm_start.persistent.iter().all(|x| x.is_finite())
+            && snapshot
+                .warm_start
+                .impulses
+                .iter()
+                .all(|(_, p)| p.iter().all(|x| x.is_finite()))
             && snapshot.active.iter().all(|a| match a.contact.part {
                 Part::Wheel(i) => i < self.model.wheels().len(),
                 Part::Box(i) => i < self.model.boxes().len(),
@@ -399,10 +478,18 @@ impl Simulation {
 
 fn check(field: &'static str, values: &[f64], expected: usize) -> Result<(), CommandError> {
     if values.len() != expected {
-        return Err(CommandError::Length { field, expected, actual: values.len() });
+        return Err(CommandError::Length {
+            field,
+            expected,
+            actual: values.len(),
+        });
     }
     match values.iter().position(|x| !x.is_finite()) {
-        Some(index) => Err(CommandError::NotFinite { field, index, value: values[index] }),
+        Some(index) => Err(CommandError::NotFinite {
+            field,
+            index,
+            value: values[index],
+        }),
         None => Ok(()),
     }
 }

@@ -5,8 +5,8 @@
 //! finite when nothing slides. `α > 0` makes the system regular when `W` is not: every step is a proximal step, whose answer moves
 //! from the centre `c` no farther than `W` asks.
 
-use super::modes::{self, Proximal};
-use super::reduced_system::{self, Factors};
+use super::modes::{self, Prediction, Proximal};
+use super::reduced_system::{self, Factors, System};
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
 use super::{SolverOptions, auto::Prepared, nsgs};
@@ -18,12 +18,98 @@ pub(super) const FULL_STEPS: usize = 24;
 
 /// Steps with changing modes after which a few sweeps break the cycle.
 const CYCLE: usize = 8;
+const CYCLE_SWEEPS: usize = 3;
+
+/// Residual below which a stop of progress may be the rounding of `W p + q`.
+const ROUNDING_ASKED: f64 = 1e-7;
+
+/// Smallest `α` relative to the mean diagonal.
+const SMALLEST: f64 = 1e-14;
 
 /// A residual falling at least this much per step lets the old factors serve once more.
 const REUSE_CONTRACTION: f64 = 0.02;
 
 /// A regularised step with settled modes should gain at least this much, or `α` hides what is left.
 const SLOW: f64 = 0.1;
+
+/// Relative natural map at which a proximal step counts as solved: its error is amplified by `1/α` in the directions that `W`
+/// cannot see.
+const SOLVED: f64 = 1e-15;
+
+/// Settled steps after which the centre moves even so.
+const PATIENCE: usize = 4;
+
+/// What one step of the iteration hands to the next.
+#[derive(Clone, Copy, Debug)]
+struct Course {
+    /// Current `α`, 1/kg.
+    alpha: f64,
+    /// Kept factors.
+    factors: Factors,
+    /// Whether a symmetric factorisation may serve.
+    allow_symmetric: bool,
+    /// Whether the modes changed at all, so that the exact predictor serves.
+    exact: bool,
+    /// Steps since the modes last changed.
+    settled: usize,
+    /// Residual before the last step.
+    last: f64,
+}
+
+impl Course {
+    /// Decides, from the last step's `progress` (ratio of residuals), whether the kept factors and `α` still serve.
+    #[inline]
+    fn revise(&mut self, progress: f64, prediction: Prediction, smallest: f64) {
+        if self.settled > 1 && progress > SLOW && self.factors != Factors::None {
+            if self.factors == Factors::Symmetric && self.allow_symmetric {
+                // Perhaps W is not symmetric and half of it is not good enough.
+                self.allow_symmetric = false;
+            } else {
+                self.alpha = (0.01 * self.alpha).max(smallest);
+            }
+            self.factors = Factors::None;
+        }
+        if prediction.changed || (prediction.slides && progress > REUSE_CONTRACTION) {
+            self.factors = Factors::None;
+        }
+    }
+}
+
+/// Predicts the modes; after the first change the exact predictor serves.
+#[inline]
+fn predict<const D: usize>(
+    data: &Prepared<'_>,
+    course: &mut Course,
+    p: &[f64],
+    u: &[f64],
+    workspace: &mut SolverWorkspace,
+) -> Prediction {
+    let prox = Proximal {
+        alpha: course.alpha,
+        centre: &workspace.centre,
+    };
+    let (scales, contacts) = (&workspace.rho_modes, &mut workspace.contacts);
+    let mut prediction = modes::predict::<D>(data, scales, prox, course.exact, p, u, contacts);
+    if prediction.changed && !course.exact {
+        course.exact = true;
+        prediction = modes::predict::<D>(data, scales, prox, true, p, u, contacts);
+        prediction.changed = true;
+    }
+    if prediction.changed {
+        course.settled = 0;
+        return prediction;
+    }
+    course.settled += 1;
+    // After a change of modes the centre waits for the answer of its own proximal step, or the transient would stay in the
+    // impulses that W cannot see. The modes of the warm start need no such care.
+    if !course.exact
+        || course.settled > PATIENCE
+        || data.merit::<D>(&workspace.rho, prox, p, u).sqrt() * data.inverse_data <= SOLVED
+    {
+        workspace.centre.copy_from_slice(p);
+    }
+    prediction
+}
 
 /// Full Newton steps from `p`; in steady motion two or three of them solve the step.
 ///
@@ -38,17 +124,19 @@ pub(super) fn full_steps<const D: usize>(
     workspace: &mut SolverWorkspace,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
-    let mut alpha = options.regularisation * data.mean_diagonal;
-    let smallest = 1e-14 * data.mean_diagonal;
-    let mut factors = Factors::None;
-    let mut allow_symmetric = true;
-    let mut exact = false;
-    let mut last = f64::INFINITY;
-    let mut settled = 0;
+    let mut course = Course {
+        alpha: options.regularisation * data.mean_diagonal,
+        factors: Factors::None,
+        allow_symmetric: true,
+        exact: false,
+        settled: 0,
+        last: f64::INFINITY,
+    };
     workspace.centre.copy_from_slice(p);
     modes::recall::<D>(data.mu, p, &mut workspace.contacts);
     multiply_add(data.W, p, data.q, u);
-    for step in 0.. {
+    let mut step = 0;
+    loop {
         let residual = data.measure::<D>(&workspace.rho, p, u);
         if Prepared::accepts(options, residual) {
             return (SolveStatus::Converged, residual);
@@ -56,9 +144,9 @@ pub(super) fn full_steps<const D: usize>(
         if !residual.is_finite() {
             return (SolveStatus::NonFinite, residual);
         }
-        let progress = residual.relative / last;
+        let progress = residual.relative / course.last;
         if progress > 0.5
-            && residual.relative < 1e-7
+            && residual.relative < ROUNDING_ASKED
             && data.is_within_rounding::<D>(&workspace.rho, p, u)
         {
             return (SolveStatus::Converged, residual);
@@ -66,82 +154,43 @@ pub(super) fn full_steps<const D: usize>(
         if step == max_steps {
             return (SolveStatus::Stalled, residual);
         }
-        last = residual.relative;
-        let prox = Proximal {
-            alpha,
-            centre: &workspace.centre,
-        };
-        let mut prediction = modes::predict::<D>(
-            data,
-            &workspace.rho_modes,
-            prox,
-            exact,
-            p,
-            u,
-            &mut workspace.contacts,
-        );
-        if prediction.changed {
-            if !exact {
-                exact = true;
-                prediction = modes::predict::<D>(
-                    data,
-                    &workspace.rho_modes,
-                    prox,
-                    exact,
-                    p,
-                    u,
-                    &mut workspace.contacts,
-                );
-                prediction.changed = true;
-            }
-            settled = 0;
-            if step > 0 && step % CYCLE == 0 {
-                for _ in 0..3 {
-                    nsgs::sweep::<D>(data, prox, p);
-                }
-                multiply_add(data.W, p, data.q, u);
-                *iterations += 3;
-                last = f64::INFINITY;
-                factors = Factors::None;
-                continue;
-            }
-        } else {
-            settled += 1;
-            workspace.centre.copy_from_slice(p);
-        }
-        if settled > 1 && progress > SLOW && factors != Factors::None {
-            if factors == Factors::Symmetric && allow_symmetric {
-                // Perhaps W is not symmetric and half of it is not good enough.
-                allow_symmetric = false;
-            } else {
-                alpha = (0.01 * alpha).max(smallest);
-            }
-            factors = Factors::None;
-        }
-        let linear = factors == Factors::Symmetric || !prediction.slides;
-        if prediction.changed || (progress > REUSE_CONTRACTION && !linear) {
-            factors = Factors::None;
-        }
-        if factors == Factors::None {
-            factors =
-                reduced_system::factorise::<D>(data, alpha, prediction, allow_symmetric, workspace);
-            if factors == Factors::None && prediction.m > 0 {
-                return (SolveStatus::Stalled, residual);
-            }
-        }
+        course.last = residual.relative;
+        let prediction = predict::<D>(data, &mut course, p, u, workspace);
         *iterations += 1;
-        reduced_system::newton_point::<D>(
-            data,
-            alpha,
-            prediction.m,
-            factors,
-            true,
-            p,
-            u,
-            workspace,
-        );
-        p.copy_from_slice(&workspace.trial);
+        if prediction.changed && step > 0 && step % CYCLE == 0 {
+            let prox = Proximal {
+                alpha: course.alpha,
+                centre: &workspace.centre,
+            };
+            for _ in 0..CYCLE_SWEEPS {
+                nsgs::sweep::<D>(data, prox, p);
+            }
+            course.last = f64::INFINITY;
+            course.factors = Factors::None;
+        } else {
+            course.revise(progress, prediction, SMALLEST * data.mean_diagonal);
+            if course.factors == Factors::None {
+                course.factors = reduced_system::factorise::<D>(
+                    data,
+                    course.alpha,
+                    prediction,
+                    course.allow_symmetric,
+                    workspace,
+                );
+                if course.factors == Factors::None && prediction.m > 0 {
+                    return (SolveStatus::Stalled, residual);
+                }
+            }
+            let system = System {
+                alpha: course.alpha,
+                m: prediction.m,
+                factors: course.factors,
+                on_cone: true,
+            };
+            reduced_system::newton_point::<D>(data, system, p, u, workspace);
+            p.copy_from_slice(&workspace.trial);
+        }
         multiply_add(data.W, p, data.q, u);
+        step += 1;
     }
-    (SolveStatus::Stalled, Residual::UNSOLVED)
 }

@@ -9,7 +9,7 @@
 //! problem when backtracking fails.
 
 use super::modes::{self, Proximal};
-use super::reduced_system::{self, Factors};
+use super::reduced_system::{self, Factors, System};
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
 use super::{SolverOptions, auto::Prepared, nsgs};
@@ -22,30 +22,6 @@ const SHRINK: f64 = 0.1;
 const GROW: f64 = 10.0;
 /// Smallest `α` relative to the mean diagonal.
 const SMALLEST: f64 = 1e-13;
-
-/// Squared natural map of the regularised problem at `(p, u)`, `u = W p + q`, in (N s)².
-fn merit<const D: usize>(
-    data: &Prepared<'_>,
-    rho: &[f64],
-    prox: Proximal<'_>,
-    p: &[f64],
-    u: &[f64],
-) -> f64 {
-    let mut sum = 0.0;
-    for (i, (&mu, &rho)) in data.mu.iter().zip(rho).enumerate() {
-        let mut p_i = [0.0; D];
-        let mut u_i = [0.0; D];
-        for k in 0..D {
-            p_i[k] = p[D * i + k];
-            u_i[k] = u[D * i + k] + prox.alpha * (p_i[k] - prox.centre[D * i + k]);
-        }
-        let map = crate::law::coulomb::natural_map(&p_i, &u_i, mu, rho);
-        for x in map {
-            sum += x * x;
-        }
-    }
-    sum
-}
 
 /// Solves one regularised problem with the centre `workspace.centre`, from `p`; says whether its natural map, relative
 /// to the data, fell below `tolerance`. `u = W p + q` on return.
@@ -66,7 +42,7 @@ fn inner<const D: usize>(
             alpha,
             centre: &workspace.centre,
         };
-        let current = merit::<D>(data, &workspace.rho, prox, p, u);
+        let current = data.merit::<D>(&workspace.rho, prox, p, u);
         if !current.is_finite() {
             return false;
         }
@@ -86,16 +62,13 @@ fn inner<const D: usize>(
         *iterations += 1;
         let mut accepted = false;
         if factors != Factors::None || prediction.m == 0 {
-            reduced_system::newton_point::<D>(
-                data,
+            let system = System {
                 alpha,
-                prediction.m,
+                m: prediction.m,
                 factors,
-                false,
-                p,
-                u,
-                workspace,
-            );
+                on_cone: false,
+            };
+            reduced_system::newton_point::<D>(data, system, p, u, workspace);
             for ((d, t), x) in workspace
                 .direction
                 .iter_mut()
@@ -121,8 +94,7 @@ fn inner<const D: usize>(
                     workspace.trial[k] = p[k] + t * workspace.direction[k];
                     workspace.trial_velocity[k] = u[k] + t * workspace.image[k];
                 }
-                let value = merit::<D>(
-                    data,
+                let value = data.merit::<D>(
                     &workspace.rho,
                     prox,
                     &workspace.trial,

@@ -24,6 +24,19 @@ pub(super) enum Factors {
     General,
 }
 
+/// A factored reduced system, ready to be solved.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct System {
+    /// Regularisation that it was built with, 1/kg.
+    pub alpha: f64,
+    /// Number of unknowns.
+    pub m: usize,
+    /// Which factors the workspace holds.
+    pub factors: Factors,
+    /// Whether sliding impulses return radially to the cone after the step.
+    pub on_cone: bool,
+}
+
 /// Puts `p` where the linearised constraints hold (`p = 0` if open, `p_e = μ p_N` if sliding); says whether that moved it.
 #[inline]
 fn snap<const D: usize>(mu: &[f64], contacts: &[Linearised], p: &mut [f64]) -> bool {
@@ -267,51 +280,39 @@ fn back_substitute(factors: Factors, m: usize, workspace: &mut SolverWorkspace) 
     }
 }
 
-/// The Newton point of the regularised problem for the predicted modes and kept factors, from `(p, u)`, into
-/// `workspace.trial`. With `on_cone` sliding impulses are returned radially to the cone.
+/// The Newton point of the regularised problem for the predicted modes, from `(p, u)`, into `workspace.trial`.
 pub(super) fn newton_point<const D: usize>(
     data: &Prepared<'_>,
-    alpha: f64,
-    m: usize,
-    factors: Factors,
-    on_cone: bool,
+    system: System,
     p: &[f64],
     u: &[f64],
     workspace: &mut SolverWorkspace,
 ) {
-    workspace.trial.copy_from_slice(p);
-    let moved = snap::<D>(data.mu, &workspace.contacts, &mut workspace.trial);
-    if moved {
-        multiply_add(
-            data.W,
-            &workspace.trial,
-            data.q,
-            &mut workspace.trial_velocity,
-        );
+    let SolverWorkspace {
+        trial,
+        trial_velocity,
+        contacts,
+        centre,
+        rhs,
+        ..
+    } = workspace;
+    trial.copy_from_slice(p);
+    let mut u = u;
+    if snap::<D>(data.mu, contacts, trial) {
+        multiply_add(data.W, trial, data.q, trial_velocity);
+        u = trial_velocity;
     }
-    let u = if moved {
-        &workspace.trial_velocity[..]
-    } else {
-        u
-    };
     let prox = Proximal {
-        alpha,
-        centre: &workspace.centre,
+        alpha: system.alpha,
+        centre,
     };
-    right_hand_side::<D>(
-        data,
-        prox,
-        &workspace.contacts,
-        &workspace.trial,
-        u,
-        &mut workspace.rhs,
-    );
-    back_substitute(factors, m, workspace);
+    right_hand_side::<D>(data, prox, contacts, trial, u, rhs);
+    back_substitute(system.factors, system.m, workspace);
     apply::<D>(
         data.mu,
         &workspace.contacts,
         &workspace.rhs,
-        on_cone,
+        system.on_cone,
         &mut workspace.trial,
     );
 }

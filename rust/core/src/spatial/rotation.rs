@@ -45,7 +45,11 @@ impl HeadingPitchRoll {
         let pitch = R[(1, 0)].clamp(-1.0, 1.0).asin();
         if R[(0, 0)].hypot(R[(2, 0)]) < 1e-9 {
             let roll = R[(2, 1)].atan2(R[(2, 2)]);
-            return Self { heading: 0.0, pitch, roll };
+            return Self {
+                heading: 0.0,
+                pitch,
+                roll,
+            };
         }
         Self {
             heading: (-R[(2, 0)]).atan2(R[(0, 0)]),
@@ -83,7 +87,11 @@ impl CardanReport {
             let x = (-R[(1, 2)]).atan2(R[(1, 1)]);
             return Self { x, y, z: 0.0 };
         }
-        Self { x: R[(2, 1)].atan2(R[(2, 2)]), y, z: R[(1, 0)].atan2(R[(0, 0)]) }
+        Self {
+            x: R[(2, 1)].atan2(R[(2, 2)]),
+            y,
+            z: R[(1, 0)].atan2(R[(0, 0)]),
+        }
     }
 
     /// The attitude `R_WB` of these angles.
@@ -156,10 +164,24 @@ mod tests {
     #[test]
     fn nose_straight_up_keeps_the_attitude() {
         for pitch in [std::f64::consts::FRAC_PI_2, -std::f64::consts::FRAC_PI_2] {
-            let R = matrix(HeadingPitchRoll { heading: 0.3, pitch, roll: 0.4 }.to_quaternion());
+            let R = matrix(
+                HeadingPitchRoll {
+                    heading: 0.3,
+                    pitch,
+                    roll: 0.4,
+                }
+                .to_quaternion(),
+            );
             let again = matrix(HeadingPitchRoll::from_rotation(&R).to_quaternion());
             assert!((R - again).norm() < 1e-8);
-            let R = matrix(CardanReport { x: 0.3, y: pitch, z: 0.4 }.to_quaternion());
+            let R = matrix(
+                CardanReport {
+                    x: 0.3,
+                    y: pitch,
+                    z: 0.4,
+                }
+                .to_quaternion(),
+            );
             let again = matrix(CardanReport::from_rotation(&R).to_quaternion());
             assert!((R - again).norm() < 1e-8);
         }

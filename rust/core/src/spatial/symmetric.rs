@@ -25,13 +25,22 @@ impl SymmetricMatrix3 {
     /// From the lower triangle of a full matrix.
     #[must_use]
     pub fn from_matrix(m: &Matrix3<f64>) -> Self {
-        Self { xx: m[(0, 0)], yy: m[(1, 1)], zz: m[(2, 2)], xy: m[(1, 0)], xz: m[(2, 0)], yz: m[(2, 1)] }
+        Self {
+            xx: m[(0, 0)],
+            yy: m[(1, 1)],
+            zz: m[(2, 2)],
+            xy: m[(1, 0)],
+            xz: m[(2, 0)],
+            yz: m[(2, 1)],
+        }
     }
 
     /// As a full matrix.
     #[must_use]
     pub fn to_matrix(&self) -> Matrix3<f64> {
-        Matrix3::new(self.xx, self.xy, self.xz, self.xy, self.yy, self.yz, self.xz, self.yz, self.zz)
+        Matrix3::new(
+            self.xx, self.xy, self.xz, self.xy, self.yy, self.yz, self.xz, self.yz, self.zz,
+        )
     }
 
     /// True where the off-diagonal entries are exactly zero.
@@ -102,7 +111,9 @@ mod tests {
 
     #[test]
     fn agrees_with_full_matrices() {
-        let R = *UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -1.0, 0.7)).to_rotation_matrix().matrix();
+        let R = *UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -1.0, 0.7))
+            .to_rotation_matrix()
+            .matrix();
         let d = Vector3::new(1.0, 2.0, 3.5);
         let full = R * Matrix3::from_diagonal(&d) * R.transpose();
         let sym = SymmetricMatrix3::rotated_diagonal(&R, &d);
