@@ -13,6 +13,28 @@ import numpy.typing as npt
 _Array: TypeAlias = npt.NDArray[np.float64]
 _Coordinates: TypeAlias = Literal["report", "state"]
 
+__all__ = [
+    "CommandError",
+    "Contacts",
+    "Energy",
+    "FrictionContactSolution",
+    "ModelError",
+    "OptionError",
+    "Plane",
+    "ProblemError",
+    "RoverGymError",
+    "RoverModel",
+    "Simulation",
+    "Snapshot",
+    "SolverReport",
+    "StateError",
+    "StepError",
+    "StepReport",
+    "TerrainError",
+    "__version__",
+    "solve_friction_contact",
+]
+
 __version__: str
 
 class RoverGymError(Exception):
@@ -100,7 +122,7 @@ class RoverModel:
         self,
         q: npt.ArrayLike,
         qdot: npt.ArrayLike,
-        gravity: npt.ArrayLike = (0.0, -9.81, 0.0),
+        gravity: npt.ArrayLike | None = None,
         coordinates: _Coordinates = "report",
     ) -> _Array: ...
     def actuation_matrix(self) -> _Array: ...
@@ -121,9 +143,9 @@ class RoverModel:
 
 @final
 class Plane:
-    """The half-space n.x + offset >= 0 is free; the ground is below. `normal` is normalised."""
+    """The half-space n.x + offset >= 0 is free; the ground is below. `normal` (default: up) is normalised."""
 
-    def __new__(cls, normal: npt.ArrayLike = (0.0, 1.0, 0.0), offset: float = 0.0) -> Plane: ...
+    def __new__(cls, normal: npt.ArrayLike | None = None, offset: float = 0.0) -> Plane: ...
     @property
     def normal(self) -> _Array: ...
     @property
@@ -143,6 +165,8 @@ class StepReport:
     def steps(self) -> int: ...
     @property
     def iterations(self) -> int: ...
+    @property
+    def newton_iterations(self) -> int: ...
     @property
     def residual(self) -> float: ...
     @property
@@ -188,8 +212,11 @@ class Energy:
 class Snapshot:
     """Everything that a simulation needs to continue bit for bit; picklable."""
 
+    @staticmethod
+    def from_bytes(data: bytes) -> Snapshot: ...
+    def to_bytes(self) -> bytes: ...
     def __reduce__(self) -> Any: ...
-    def __eq__(self, other: object) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
 
 @final
@@ -199,7 +226,7 @@ class Simulation:
         model: RoverModel | None = None,
         terrain: Plane | None = None,
         *,
-        gravity: npt.ArrayLike = (0.0, -9.81, 0.0),
+        gravity: npt.ArrayLike | None = None,
         friction: float = 0.7,
         restitution: float = 0.0,
         time_step: float = 0.005,
@@ -227,8 +254,11 @@ class Simulation:
     @property
     def restitution(self) -> float: ...
     @property
+    def settings(self) -> dict[str, Any]:
+        """The keyword arguments that make a simulation with these options."""
+    @property
     def q(self) -> _Array:
-        """(nq,) public coordinates: x, y, z, roll, heading, pitch, joints."""
+        """(nq,) x, y, z, roll, heading, pitch, joints."""
     @property
     def v(self) -> _Array:
         """(nv,) trunk velocity (world, m/s), angular velocity (world, rad/s), joint rates."""
@@ -282,6 +312,8 @@ class Simulation:
     def poses(self) -> dict[str, tuple[_Array, _Array]]: ...
     def snapshot(self) -> Snapshot: ...
     def restore(self, snapshot: Snapshot) -> None: ...
+    def last_problem(self) -> tuple[_Array, _Array, _Array]:
+        """W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem."""
     def profile(self, n: int = 1000) -> dict[str, float]:
         """Mean microseconds per step by part (kinematics, mass_matrix, factor, ...) over n steps of a copy."""
     def __reduce__(self) -> Any: ...
@@ -296,6 +328,8 @@ class SolverReport:
     def iterations(self) -> int: ...
     @property
     def residual(self) -> float: ...
+    @property
+    def velocity_error(self) -> float: ...
     @property
     def solver(self) -> str: ...
 

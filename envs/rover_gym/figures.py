@@ -81,7 +81,7 @@ def wheel_traces(figure: Figure, trajectory: Trajectory) -> None:
     above, perspective = figure.subplots(1, 2)
     curves = reference_data()["published"]["fig_6_2_wheel_traces"]["curves"].values()
     for n, curve in enumerate(curves):
-        label = "" if n else "the report's: other mass table and torque"
+        label = "" if n else "the report's (parameters not stated)"
         perspective.plot(*np.array(curve).T, color="0.6", linewidth=0.9, linestyle="--", label=label)
     for i, wheel in enumerate(WHEELS):
         colour = COLOURS[wheel]
@@ -132,7 +132,7 @@ def reaction_force(figure: Figure, trajectory: Trajectory) -> None:
         title=f"ours, mean over each step of {_step(trajectory)}",
         xlabel="time (s)",
         ylabel="normal force on the wheel (N)",
-        xlim=(0.0, min(20.0, trajectory["time"][-1])),
+        xlim=(0.0, 10.0),
         ylim=(0.0, None),
         yscale="symlog",
     )
@@ -153,11 +153,11 @@ def steering_angles(figure: Figure, trajectory: Trajectory) -> None:
         title=f"ours, step {_step(trajectory)}; set-points -0.1 rad in front, else 0",
         xlabel="time (s)",
         ylabel="steering angle (rad)",
-        xlim=(0.0, min(20.0, trajectory["time"][-1])),
+        xlim=(0.0, 10.0),
     )
     published.set(title="the report's: set-points +0.1 rad in front, torque 0.3 N m, step 20 ms", xlabel="time (s)")
-    for axes in (ours, published):
-        axes.legend(loc="right")
+    ours.legend(loc="lower right")
+    published.legend(loc="right")
     figure.suptitle("Figure 6.5: steering angles under the PD controller")
 
 

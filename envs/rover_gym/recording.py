@@ -90,6 +90,7 @@ class Sampler:
                 "m/s, rad/s",
                 "trunk origin's velocity, world (m/s); trunk's angular velocity, world (rad/s); joint rates (rad/s)",
                 (model.nv,),
+                ("v_x", "v_y", "v_z", "omega_x", "omega_y", "omega_z", *model.dof_names[6:]),
             ),
             Channel("wheel_gaps", "m", "distance from wheel to ground, negative where they overlap", (n,), wheels),
             Channel(

@@ -124,7 +124,7 @@ def run(
     smallest_gap = float(sim.wheel_gaps.min())
     unconverged, worst = 0, 0.0
     sampler = Sampler(sim.model)
-    with Recorder(path, sampler.channels, _attributes(time_step, options)) as recorder:
+    with Recorder(path, sampler.channels, _attributes(sim)) as recorder:
         recorder.append(sampler.row(sim))
         start = time.perf_counter()
         for step in range(1, steps + 1):
@@ -142,23 +142,18 @@ def run(
     return SceneResult(Path(path), sim.time, wall_time, first_contact, smallest_gap, unconverged, worst)
 
 
-def _attributes(time_step: float, options: dict[str, Any]) -> dict[str, Any]:
-    plane = inclined_plane()
+def _attributes(sim: Simulation) -> dict[str, Any]:
     return {
         "title": "section 6.1 of the report: the rover on an inclined plane",
         "scene": {
-            "terrain": {"kind": "plane", "normal": plane.normal, "offset": plane.offset},
-            "gravity": GRAVITY,
-            "friction": FRICTION,
-            "restitution": RESTITUTION,
-            "wheel_radius": WHEEL_RADIUS,
-            "masses": MASSES,
-            "start": {"trunk": (0.0, DROP_HEIGHT, 0.0), "front_steering": FRONT_STEERING},
-            "wheel_torque": WHEEL_TORQUE,
-            "steering_gains": (STEERING_STIFFNESS, STEERING_DAMPING),
+            "terrain": {"kind": "plane", "normal": sim.terrain.normal, "offset": sim.terrain.offset},
+            "model": sim.model.to_dict(),
+            "q": sim.q,
+            "steering": sim.steering,
+            "wheel_torques": sim.wheel_torques,
         },
         "seed": "none: the scene has no randomness",
-        "solver": {"time_step": time_step, **options},
+        "solver": sim.settings,
     }
 
 

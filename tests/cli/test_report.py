@@ -25,7 +25,7 @@ def test_the_scene_is_recorded_and_drawn(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     trajectory = read_trajectory(tmp_path / "trajectory.h5")
     assert trajectory.attributes["complete"]
-    assert trajectory.attributes["scene"]["gravity"] == list(scene.GRAVITY)
+    assert trajectory.attributes["solver"]["gravity"] == list(scene.GRAVITY)
     assert trajectory["time"][-1] == pytest.approx(12.0)
     for name in FIGURES:
         head = (tmp_path / name).read_bytes()[:24]

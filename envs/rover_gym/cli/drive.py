@@ -120,9 +120,9 @@ class _Tape:
         )
         attributes = {
             "title": "an episode of Rover-v0 with the PD baseline",
-            "scene": {**arguments, "gravity": rover.gravity, **asdict(rover.start)},
+            "scene": {**arguments, **asdict(rover.start), "model": rover.model.to_dict(), "control_period": rover.dt},
             "seed": seed,
-            "solver": {"time_step": rover.simulation.time_step, "control_period": rover.dt},
+            "solver": rover.simulation.settings,
         }
         self.recorder = Recorder(path, channels, attributes)
 
@@ -151,7 +151,7 @@ def _table(results: Sequence[Episode]) -> Table:
             f"{episode.distance:.2f} m",
             f"{episode.time:.2f} s",
             f"{episode.energy:.0f} J",
-            f"{episode.slip:.3f}",
+            f"{episode.slip:.2%}",
             f"{episode.real_time_factor:.0f}",
         )
     if len(results) > 1:
@@ -165,7 +165,7 @@ def _table(results: Sequence[Episode]) -> Table:
                     ("distance", "{:.2f} m"),
                     ("time", "{:.2f} s"),
                     ("energy", "{:.0f} J"),
-                    ("slip", "{:.3f}"),
+                    ("slip", "{:.2%}"),
                     ("real_time_factor", "{:.0f}"),
                 )
             ),
