@@ -17,7 +17,10 @@ fn dropped(
 ) -> Simulation {
     let mut q = [0.0; 21];
     (q[1], q[3], q[4], q[5]) = (height, roll, heading, pitch);
-    simulation(model, Plane::ground(), options, &q, &[0.0; 21])
+    let mut dropped = simulation(model, Plane::ground(), options, &q, &[0.0; 21]);
+    // Free wheels would keep what speed an impact gives them.
+    dropped.brake();
+    dropped
 }
 
 /// Steps for some seconds; energy never exceeds what there was, nothing sinks into the ground for good.
