@@ -7,7 +7,7 @@ use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{Model, ModelDescription, coordinates};
 use rover_core::simulation::Simulation;
 
-use crate::scenes::{VARIANTS, at_rest, simulation};
+use crate::scenes::{VARIANTS, at_rest, count, simulation};
 
 fn dropped(
     model: Model,
@@ -28,7 +28,7 @@ fn settle(mut simulation: Simulation, seconds: f64, allowed: f64, label: &str) -
     let h = simulation.options().time_step;
     let before = simulation.energy().total();
     let mut fastest_fall = 0.0_f64;
-    for _ in 0..(seconds / h).round() as usize {
+    for _ in 0..count(seconds, h) {
         simulation.step(1).unwrap();
         let energy = simulation.energy().total();
         assert!(
