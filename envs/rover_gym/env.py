@@ -26,6 +26,7 @@ from rover_gym._core import (
 )
 from rover_gym.observation import (
     CONTACT_GAP,
+    LARGEST,
     N_ACTIONS,
     N_WHEELS,
     ObservationLayout,
@@ -296,7 +297,6 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
         self.observation_layout: ObservationLayout = build_layout(self.model, magnitude)
         self._inverse_scale = 1.0 / self.observation_layout.scale
-        self._no_weights = np.zeros(self.observation_layout.size, dtype=np.float32)
         self.observation_space = gym.spaces.Box(
             self.observation_layout.low, self.observation_layout.high, dtype=np.float32
         )
@@ -538,10 +538,10 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             )
         )
         values *= self._inverse_scale
-        with np.errstate(over="ignore"):  # an overflow is found, and ends the episode, below
-            observation = values.astype(np.float32)
-        # Zero times a number is zero, unless the number is infinite or not a number.
-        return observation if observation @ self._no_weights == 0.0 else None
+        # Numbers beyond float32 are found here; a NaN fails the comparison too.
+        if not np.abs(values).max() <= LARGEST:
+            return None
+        return values.astype(np.float32)
 
     def _slip_ratio(self, v: npt.NDArray[np.float64]) -> float:
         """Mean over the wheels in contact of |u_T| / max(|rim speed|, |ground speed|)."""

@@ -26,7 +26,8 @@ GAP_SCALE = 0.1
 WHEEL_RATE_SCALE = 10.0
 GOAL_SCALE = 10.0
 
-_LARGEST = float(np.finfo(np.float32).max)
+#: The largest finite entry.
+LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ def build_layout(model: RoverModel, gravity_magnitude: float) -> ObservationLayo
     for index in model.wheel_joint_indices:
         velocity_scale[index] = WHEEL_RATE_SCALE
 
-    any_number, no_less = (-_LARGEST, _LARGEST), (0.0, _LARGEST)
+    any_number, no_less = (-LARGEST, LARGEST), (0.0, LARGEST)
     rows: list[tuple[str, str, list[float], tuple[float, float], str]] = [
         ("q", "m, rad", [1.0] * nq, any_number, "trunk x, y, z, roll, heading, pitch; joint angles"),
         ("velocity", "m/s, rad/s", velocity_scale, any_number, "trunk linear, angular in its frame; joint rates"),

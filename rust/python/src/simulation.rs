@@ -171,7 +171,7 @@ impl Simulation {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
     #[pyo3(signature = (model = None, terrain = None, *, gravity = None, friction = 0.7, restitution = 0.0, time_step = 0.005,
-        variant = "linearised", theta = 0.5, forecast = 0.5, solver = "auto", tolerance = 1e-9, max_iterations = 1000,
+        variant = "linearised", theta = 0.5, forecast = 0.5, solver = "auto", tolerance = 1e-10, max_iterations = 1000,
         stabilisation = "projection", warm_start = true))]
     fn new(
         model: Option<RoverModel>,

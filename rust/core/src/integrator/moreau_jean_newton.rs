@@ -55,7 +55,7 @@ impl Integrator for MoreauJeanNewton {
         } = *scene;
         let (h, theta) = (options.time_step, options.theta);
         let ws = workspace;
-        ws.kinematics.update(model, &state.configuration);
+        ws.kinematics.update_for_step(model, &state.configuration);
         let start = ws.kinematics.base;
         ws.c_start.copy_from_slice(&ws.kinematics.c);
         body_momenta(
@@ -80,8 +80,8 @@ impl Integrator for MoreauJeanNewton {
             ws.configuration
                 .set_moved(&state.configuration, &ws.v_mean, theta * h);
             ws.end.set_moved(&state.configuration, &ws.v_mean, h);
-            ws.kinematics.update(model, &ws.configuration);
-            ws.kinematics_end.update(model, &ws.end);
+            ws.kinematics.update_for_step(model, &ws.configuration);
+            ws.kinematics_end.update_for_step(model, &ws.end);
             probe.end(Phase::Kinematics);
             if iteration == 0 {
                 // The set of contacts of a step is decided once, by the forecast.
@@ -123,7 +123,7 @@ impl Integrator for MoreauJeanNewton {
                 ws.p.copy_from_slice(&ws.p_last);
             }
             probe.end(Phase::Delassus);
-            let solved = solve_contacts(scene, ws, probe);
+            let solved = solve_contacts(scene, ws, iteration == 0, probe);
             ws.p_last.clone_from(&ws.p);
             report.iterations += solved.iterations;
             report.residual = solved.residual;

@@ -1,41 +1,85 @@
-//! Factorisations of the small dense systems of a Newton step, in place and without allocation.
+//! Factorisations of the dense systems of a Newton step, in place and without allocation.
+//!
+//! Both go by panels of [`PANEL`] rows: what is left of the matrix is loaded and stored once per panel, which serves six contacts
+//! (everything in registers and the first cache) as well as hundreds.
 
-/// Cholesky factor `A = L Lᵀ` of a symmetric matrix, row-major `m × m`, of which only the lower triangle is read.
+use crate::problem::dot;
+
+/// Rows that are eliminated together.
+const PANEL: usize = 4;
+
+/// `row -= Σ_k factors[k] panel[k]`, on equal ranges.
+#[inline]
+fn subtract_panel(row: &mut [f64], factors: [f64; PANEL], panel: [&[f64]; PANEL]) {
+    let n = row.len();
+    let [a, b, c, d] = panel.map(|x| &x[..n]);
+    for ((((x, a), b), c), d) in row.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+        *x -= (factors[0] * a + factors[1] * b) + (factors[2] * c + factors[3] * d);
+    }
+}
+
+/// `row -= factor other`, on equal ranges.
+#[inline]
+fn subtract(row: &mut [f64], factor: f64, other: &[f64]) {
+    for (x, y) in row.iter_mut().zip(other) {
+        *x -= factor * y;
+    }
+}
+
+/// The four rows of a panel that begins at row `first`, each from column `from`.
+#[inline]
+fn panel_rows(above: &[f64], m: usize, first: usize, from: usize) -> [&[f64]; PANEL] {
+    std::array::from_fn(|k| &above[(first + k) * m + from..(first + k + 1) * m])
+}
+
+/// Cholesky factor `A = Uᵀ U` of a symmetric matrix, row-major `m × m`, of which only the upper triangle is read.
 ///
-/// `L` replaces the lower triangle, with reciprocal diagonal. Returns `false` when a pivot is not positive; then `A` is spoilt.
+/// `U` replaces the upper triangle, with reciprocal diagonal. Returns `false` when a pivot is not positive; then `A` is spoilt.
 #[must_use]
 pub(super) fn cholesky(A: &mut [f64], m: usize) -> bool {
-    // Row by row (Cholesky–Banachiewicz): every inner product runs along two contiguous rows.
-    for i in 0..m {
-        let (above, rest) = A.split_at_mut(i * m);
-        let row = &mut rest[..m];
-        for (j, row_j) in above.chunks_exact(m).enumerate() {
-            let sum = row[j] - crate::problem::dot(&row[..j], &row_j[..j]);
-            row[j] = sum * row_j[j];
+    for first in (0..m).step_by(PANEL) {
+        let last = (first + PANEL).min(m);
+        for k in first..last {
+            let (above, rest) = A.split_at_mut(k * m);
+            let row = &mut rest[k..m];
+            for j in first..k {
+                let other = &above[j * m + k..(j + 1) * m];
+                subtract(row, other[0], other);
+            }
+            let pivot = row[0];
+            if pivot.is_nan() || pivot <= 0.0 {
+                return false;
+            }
+            let reciprocal = 1.0 / pivot.sqrt();
+            for x in &mut *row {
+                *x *= reciprocal;
+            }
+            row[0] = reciprocal;
         }
-        let pivot = row[i] - crate::problem::dot(&row[..i], &row[..i]);
-        if pivot.is_nan() || pivot <= 0.0 {
-            return false;
+        if last < first + PANEL {
+            break;
         }
-        row[i] = 1.0 / pivot.sqrt();
+        let (above, rest) = A.split_at_mut(last * m);
+        for (i, row) in rest.chunks_exact_mut(m).enumerate() {
+            let panel = panel_rows(above, m, first, last + i);
+            subtract_panel(&mut row[last + i..], panel.map(|u| u[0]), panel);
+        }
     }
     true
 }
 
-/// Solves `L Lᵀ x = b` in place of `b`, with the factor of [`cholesky`].
-pub(super) fn cholesky_solve(L: &[f64], m: usize, b: &mut [f64]) {
+/// Solves `Uᵀ U x = b` in place of `b`, with the factor of [`cholesky`].
+pub(super) fn cholesky_solve(U: &[f64], m: usize, b: &mut [f64]) {
     if m == 0 {
         return;
     }
-    for (i, row) in L.chunks_exact(m).enumerate() {
-        b[i] = (b[i] - crate::problem::dot(&row[..i], &b[..i])) * row[i];
-    }
-    for (i, row) in L.chunks_exact(m).enumerate().rev() {
+    for (i, row) in U.chunks_exact(m).enumerate() {
         let x = b[i] * row[i];
         b[i] = x;
-        for (value, l) in b[..i].iter_mut().zip(&row[..i]) {
-            *value -= l * x;
-        }
+        subtract(&mut b[i + 1..m], x, &row[i + 1..]);
+    }
+    for (i, row) in U.chunks_exact(m).enumerate().rev() {
+        b[i] = (b[i] - dot(&row[i + 1..], &b[i + 1..m])) * row[i];
     }
 }
 
@@ -44,38 +88,61 @@ pub(super) fn cholesky_solve(L: &[f64], m: usize, b: &mut [f64]) {
 /// Returns `false` at a zero or non-finite pivot.
 #[must_use]
 pub(super) fn lu(A: &mut [f64], m: usize, pivots: &mut [usize]) -> bool {
-    for k in 0..m {
-        let mut best = k;
-        let mut size = A[k * m + k].abs();
-        for i in k + 1..m {
-            let candidate = A[i * m + k].abs();
-            if candidate > size {
-                size = candidate;
-                best = i;
+    for first in (0..m).step_by(PANEL) {
+        let last = (first + PANEL).min(m);
+        for k in first..last {
+            if !exchange(A, m, k, pivots) {
+                return false;
+            }
+            let (above, below) = A.split_at_mut((k + 1) * m);
+            let pivot_row = &mut above[k * m..];
+            let reciprocal = 1.0 / pivot_row[k];
+            pivot_row[k] = reciprocal;
+            let tail = &pivot_row[k + 1..last];
+            for row in below.chunks_exact_mut(m) {
+                let factor = row[k] * reciprocal;
+                row[k] = factor;
+                subtract(&mut row[k + 1..last], factor, tail);
             }
         }
-        if !(size > 0.0 && size.is_finite()) {
-            return false;
+        if last == m {
+            break;
         }
-        pivots[k] = best;
-        if best != k {
-            let (upper, lower) = A.split_at_mut(best * m);
-            upper[k * m..(k + 1) * m].swap_with_slice(&mut lower[..m]);
-        }
-        let (upper, lower) = A.split_at_mut((k + 1) * m);
-        let pivot_row = &mut upper[k * m..];
-        let reciprocal = 1.0 / pivot_row[k];
-        pivot_row[k] = reciprocal;
-        let tail = &pivot_row[k + 1..m];
-        for row in lower.chunks_exact_mut(m) {
-            let factor = row[k] * reciprocal;
-            row[k] = factor;
-            for (value, u) in row[k + 1..].iter_mut().zip(tail) {
-                *value -= factor * u;
+        for k in first + 1..last {
+            let (above, rest) = A.split_at_mut(k * m);
+            let (factors, row) = rest[..m].split_at_mut(last);
+            for j in first..k {
+                subtract(row, factors[j], &above[j * m + last..(j + 1) * m]);
             }
+        }
+        let (above, below) = A.split_at_mut(last * m);
+        let panel = panel_rows(above, m, first, last);
+        for row in below.chunks_exact_mut(m) {
+            let (factors, row) = row.split_at_mut(last);
+            subtract_panel(row, std::array::from_fn(|k| factors[first + k]), panel);
         }
     }
     true
+}
+
+/// Brings the largest entry of column `k` at or below the diagonal onto it; `false` if it is zero or not finite.
+#[inline]
+fn exchange(A: &mut [f64], m: usize, k: usize, pivots: &mut [usize]) -> bool {
+    let mut best = k;
+    let mut size = A[k * m + k].abs();
+    for (i, row) in A.chunks_exact(m).enumerate().skip(k + 1) {
+        let candidate = row[k].abs();
+        if candidate > size {
+            size = candidate;
+            best = i;
+        }
+    }
+    pivots[k] = best;
+    if best != k {
+        let (above, below) = A.split_at_mut(best * m);
+        above[k * m..(k + 1) * m].swap_with_slice(&mut below[..m]);
+    }
+    size > 0.0 && size.is_finite()
 }
 
 /// Solves `A x = b` in place of `b`, with the factors of [`lu`].
@@ -87,10 +154,10 @@ pub(super) fn lu_solve(A: &[f64], m: usize, pivots: &[usize], b: &mut [f64]) {
         b.swap(k, pivots[k]);
     }
     for (i, row) in A.chunks_exact(m).enumerate() {
-        b[i] -= crate::problem::dot(&row[..i], &b[..i]);
+        b[i] -= dot(&row[..i], &b[..i]);
     }
     for (i, row) in A.chunks_exact(m).enumerate().rev() {
-        b[i] = (b[i] - crate::problem::dot(&row[i + 1..], &b[i + 1..m])) * row[i];
+        b[i] = (b[i] - dot(&row[i + 1..], &b[i + 1..m])) * row[i];
     }
 }
 

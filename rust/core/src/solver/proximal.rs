@@ -6,7 +6,7 @@
 //! When a step fails, the last good answer becomes the centre and `α` grows again.
 //!
 //! Inside: Newton steps with backtracking on the natural map of the regularised problem, and Gauss–Seidel sweeps on the same
-//! problem when backtracking fails.
+//! problem when backtracking fails. Once a step is cheap, a sprint with a small `α` tries to end the search at Newton's speed.
 
 use super::modes::{self, Proximal};
 use super::reduced_system::{self, Factors, System};
@@ -17,47 +17,199 @@ use crate::problem::{Residual, multiply_add};
 
 /// Most Newton steps for one value of `α`.
 const INNER_STEPS: usize = 30;
-/// Shrinking of `α` after a success, growth after a failure.
-const SHRINK: f64 = 0.1;
-const GROW: f64 = 10.0;
+/// Shrinking of `α` along Tikhonov's path.
+const PATH_SHRINK: f64 = 0.1;
+/// A proximal step that leaves more than this of the residual asks for a smaller `α`.
+const SLOW: f64 = 0.1;
+/// Steps of a sprint, and the steps of a proximal step that suggests one.
+const SPRINT: usize = 8;
+const CHEAP: usize = 3;
+/// Relative natural map asked of a step with a large `α`.
+const LOOSE: f64 = 1e-7;
+/// Relative natural map below which a failing descent is rounding.
+const ROUNDING: f64 = 1e-13;
+/// Halvings of a Newton step.
+const HALVINGS: usize = 6;
+/// Failed Newton steps in a row that end a descent, and the sweeps after each.
+const MAX_STUCK: usize = 4;
+const SWEEPS: usize = 10;
+/// Failures in a row after which the method gives up.
+const MAX_FAILURES: usize = 12;
 /// Smallest `α` relative to the mean diagonal.
 const SMALLEST: f64 = 1e-13;
 
-/// Solves one regularised problem with the centre `workspace.centre`, from `p`; says whether its natural map, relative
-/// to the data, fell below `tolerance`. `u = W p + q` on return.
-fn inner<const D: usize>(
+/// The choice of `α` from step to step.
+///
+/// A small `α` gains much per step, but below some bound the inner Newton fails, at ten times the cost of a step that succeeds. So after
+/// a failure the next attempt stays between the failed and the last proved value, and comes later.
+#[derive(Clone, Copy, Debug)]
+struct Course {
+    /// Current `α`, 1/kg.
+    alpha: f64,
+    /// Last `α` whose step succeeded, 1/kg.
+    proved: f64,
+    /// Whether the centre still is the start.
+    follows_path: bool,
+    /// Factor of the next reduction.
+    shrink: f64,
+    /// Successes since the last change of `α`.
+    successes: usize,
+    /// Successes that a reduction of `α` has to wait for.
+    patience: usize,
+    /// Failures in a row.
+    failures: usize,
+    /// Whether the last step was cheap.
+    cheap: bool,
+    /// Steps since the last sprint, and how many have to pass before the next.
+    since_sprint: usize,
+    sprint_wait: usize,
+}
+
+impl Course {
+    fn new(alpha: f64) -> Self {
+        Self {
+            alpha,
+            proved: f64::INFINITY,
+            follows_path: true,
+            shrink: PATH_SHRINK,
+            successes: 0,
+            patience: 1,
+            failures: 0,
+            cheap: false,
+            since_sprint: 0,
+            sprint_wait: 2,
+        }
+    }
+
+    /// Whether it is time for a sprint; Tikhonov's path is not left for one.
+    fn begins_sprint(&mut self) -> bool {
+        self.since_sprint += 1;
+        let begins = self.cheap && !self.follows_path && self.since_sprint > self.sprint_wait;
+        if begins {
+            self.since_sprint = 0;
+            self.cheap = false;
+        }
+        begins
+    }
+
+    fn succeed(&mut self, slow: bool, smallest: f64) {
+        self.follows_path = false;
+        self.failures = 0;
+        self.proved = self.alpha;
+        self.successes += 1;
+        if slow && self.successes >= self.patience {
+            self.alpha = (self.alpha * self.shrink).max(smallest);
+            self.successes = 0;
+        }
+    }
+
+    /// Whether another attempt is worth it.
+    fn fail(&mut self, largest: f64) -> bool {
+        self.follows_path = false;
+        self.failures += 1;
+        self.successes = 0;
+        self.patience = (2 * self.patience).min(16);
+        if self.proved > self.alpha && self.proved.is_finite() && self.failures < 4 {
+            self.shrink = (self.alpha / self.proved).sqrt().min(0.8);
+            self.alpha = if self.shrink > 0.6 {
+                self.proved
+            } else {
+                self.alpha / self.shrink
+            };
+        } else {
+            self.alpha = (10.0 * self.alpha).min(largest);
+            self.proved = self.alpha;
+        }
+        self.failures <= MAX_FAILURES
+    }
+}
+
+/// One regularised problem to solve.
+#[derive(Clone, Copy, Debug)]
+struct Task {
+    /// `α`, 1/kg; the centre is in the workspace.
+    alpha: f64,
+    /// Relative natural map to reach.
+    tolerance: f64,
+    /// Whether the exact predictor begins.
+    exact: bool,
+    /// Most Newton steps.
+    steps: usize,
+}
+
+/// Moves from `(p, u)` towards `workspace.trial` until the natural map falls; `false`, and no move, if it does not.
+fn backtrack<const D: usize>(
     data: &Prepared<'_>,
     alpha: f64,
-    tolerance: f64,
+    current: f64,
+    p: &mut [f64],
+    u: &mut [f64],
+    workspace: &mut SolverWorkspace,
+) -> bool {
+    let SolverWorkspace {
+        direction,
+        image,
+        trial,
+        trial_velocity,
+        centre,
+        rho,
+        ..
+    } = workspace;
+    for ((d, t), x) in direction.iter_mut().zip(&*trial).zip(&*p) {
+        *d = t - x;
+    }
+    trial_velocity.fill(0.0);
+    multiply_add(data.W, direction, trial_velocity, image);
+    let prox = Proximal { alpha, centre };
+    let mut t = 1.0;
+    for _ in 0..HALVINGS {
+        for k in 0..data.n {
+            trial[k] = p[k] + t * direction[k];
+            trial_velocity[k] = u[k] + t * image[k];
+        }
+        if data.merit::<D>(rho, prox, trial, trial_velocity) < (1.0 - 1e-3 * t) * current {
+            p.copy_from_slice(trial);
+            u.copy_from_slice(trial_velocity);
+            return true;
+        }
+        t *= 0.5;
+    }
+    false
+}
+
+/// Solves one regularised problem with the centre `workspace.centre`, from `p`; says whether its natural map fell below
+/// the tolerance. `u = W p + q` on return.
+fn descend<const D: usize>(
+    data: &Prepared<'_>,
+    task: Task,
     p: &mut [f64],
     u: &mut [f64],
     workspace: &mut SolverWorkspace,
     iterations: &mut usize,
 ) -> bool {
+    let Task {
+        alpha,
+        tolerance,
+        mut exact,
+        steps,
+    } = task;
     multiply_add(data.W, p, data.q, u);
     let threshold = (tolerance / data.inverse_data).powi(2);
     let mut stuck = 0;
-    for step in 0..INNER_STEPS {
+    for step in 0..=steps {
         let prox = Proximal {
             alpha,
             centre: &workspace.centre,
         };
         let current = data.merit::<D>(&workspace.rho, prox, p, u);
-        if !current.is_finite() {
-            return false;
+        if !current.is_finite() || step == steps {
+            return current <= threshold;
         }
         if current <= threshold {
-            return true;
+            break;
         }
-        let prediction = modes::predict::<D>(
-            data,
-            &workspace.rho_modes,
-            prox,
-            true,
-            p,
-            u,
-            &mut workspace.contacts,
-        );
+        let (scales, contacts) = (&workspace.rho_modes, &mut workspace.contacts);
+        let prediction = modes::predict::<D>(data, scales, prox, exact, p, u, contacts);
         let factors = reduced_system::factorise::<D>(data, alpha, prediction, false, workspace);
         *iterations += 1;
         let mut accepted = false;
@@ -69,68 +221,32 @@ fn inner<const D: usize>(
                 on_cone: false,
             };
             reduced_system::newton_point::<D>(data, system, p, u, workspace);
-            for ((d, t), x) in workspace
-                .direction
-                .iter_mut()
-                .zip(&workspace.trial)
-                .zip(&*p)
-            {
-                *d = t - x;
-            }
-            workspace.trial_velocity.fill(0.0);
-            multiply_add(
-                data.W,
-                &workspace.direction,
-                &workspace.trial_velocity,
-                &mut workspace.image,
-            );
-            let prox = Proximal {
-                alpha,
-                centre: &workspace.centre,
-            };
-            let mut t = 1.0;
-            for _ in 0..6 {
-                for k in 0..data.n {
-                    workspace.trial[k] = p[k] + t * workspace.direction[k];
-                    workspace.trial_velocity[k] = u[k] + t * workspace.image[k];
-                }
-                let value = data.merit::<D>(
-                    &workspace.rho,
-                    prox,
-                    &workspace.trial,
-                    &workspace.trial_velocity,
-                );
-                if value < (1.0 - 1e-3 * t) * current {
-                    accepted = true;
-                    break;
-                }
-                t *= 0.5;
-            }
-            if accepted {
-                p.copy_from_slice(&workspace.trial);
-                u.copy_from_slice(&workspace.trial_velocity);
-                stuck = 0;
-            }
+            accepted = backtrack::<D>(data, alpha, current, p, u, workspace);
         }
-        if !accepted {
-            if step > 0 && current.sqrt() * data.inverse_data < 1e-13 {
-                return true;
-            }
-            stuck += 1;
-            if stuck > 4 {
-                return false;
-            }
-            let prox = Proximal {
-                alpha,
-                centre: &workspace.centre,
-            };
-            for _ in 0..10 {
-                nsgs::sweep::<D>(data, prox, p);
-            }
-            multiply_add(data.W, p, data.q, u);
+        if accepted {
+            stuck = 0;
+            continue;
         }
+        if current.sqrt() * data.inverse_data < ROUNDING {
+            break;
+        }
+        // A contact that could open as well as carry has two exact answers; the projection stays with the one at hand.
+        exact = !exact;
+        stuck += 1;
+        if stuck > MAX_STUCK {
+            return false;
+        }
+        let prox = Proximal {
+            alpha,
+            centre: &workspace.centre,
+        };
+        for _ in 0..SWEEPS {
+            nsgs::sweep::<D>(data, prox, p);
+        }
+        multiply_add(data.W, p, data.q, u);
     }
-    false
+    multiply_add(data.W, p, data.q, u);
+    true
 }
 
 /// Proximal point from `p`. `u = W p + q` on return; the best impulse met is returned when nothing converges.
@@ -153,56 +269,76 @@ pub(super) fn solve<const D: usize>(
     workspace.best.copy_from_slice(p);
     workspace.accepted.copy_from_slice(p);
     workspace.centre.copy_from_slice(p);
-    let smallest = SMALLEST * data.mean_diagonal;
     let target = options.regularisation * data.mean_diagonal;
-    let mut alpha = data.mean_diagonal;
-    let mut path = true;
+    let mut course = Course::new(data.mean_diagonal);
     let mut last = f64::INFINITY;
     let limit = *iterations + options.max_newton_steps;
     let mut status = SolveStatus::MaxIterations;
-    let mut failures = 0;
     while *iterations < limit {
-        let tolerance = if alpha > target {
-            1e-7_f64.min(1e-2 * last)
+        let sprints = course.begins_sprint();
+        let task = if sprints {
+            let tolerance = 1e-2 * options.tolerance;
+            workspace.centre.copy_from_slice(p);
+            Task {
+                alpha: target,
+                tolerance,
+                exact: false,
+                steps: SPRINT,
+            }
         } else {
-            1e-2 * options.tolerance
+            let coarse = course.alpha > target;
+            let tolerance = if coarse {
+                LOOSE.min(1e-2 * last)
+            } else {
+                1e-2 * options.tolerance
+            };
+            Task {
+                alpha: course.alpha,
+                tolerance,
+                exact: true,
+                steps: INNER_STEPS,
+            }
         };
-        let solved = inner::<D>(data, alpha, tolerance, p, u, workspace, iterations);
-        multiply_add(data.W, p, data.q, u);
+        let before = *iterations;
+        let solved = descend::<D>(data, task, p, u, workspace, iterations);
         let residual = data.measure::<D>(&workspace.rho, p, u);
-        if Prepared::accepts(options, residual) {
+        if Prepared::accepts(options, residual)
+            || (residual.relative < LOOSE && data.is_within_rounding::<D>(&workspace.rho, p, u))
+        {
             return (SolveStatus::Converged, residual);
         }
         if residual.relative < best.relative {
             best = residual;
             workspace.best.copy_from_slice(p);
         }
-        if residual.relative < 1e-6 && data.is_within_rounding::<D>(&workspace.rho, p, u) {
-            return (SolveStatus::Converged, residual);
-        }
-        if solved {
-            workspace.accepted.copy_from_slice(p);
-            if path && alpha > target {
-                alpha = (alpha * SHRINK).max(target);
+        if sprints {
+            if residual.relative < SLOW * last {
+                last = residual.relative;
+                workspace.accepted.copy_from_slice(p);
             } else {
-                path = false;
-                workspace.centre.copy_from_slice(p);
-                if residual.relative > 0.1 * last {
-                    alpha = (alpha * SHRINK).max(smallest);
-                }
+                p.copy_from_slice(&workspace.accepted);
+                course.sprint_wait *= 2;
             }
+            workspace.centre.copy_from_slice(p);
+        } else if solved {
+            workspace.accepted.copy_from_slice(p);
+            let slow = residual.relative > SLOW * last;
             last = residual.relative;
-            failures = 0;
+            course.cheap = *iterations <= before + CHEAP;
+            if course.follows_path && course.alpha > target {
+                course.proved = course.alpha;
+                course.alpha = (course.alpha * PATH_SHRINK).max(target);
+            } else {
+                workspace.centre.copy_from_slice(p);
+                course.succeed(slow, SMALLEST * data.mean_diagonal);
+            }
         } else {
-            failures += 1;
-            if failures > 12 {
+            p.copy_from_slice(&workspace.accepted);
+            workspace.centre.copy_from_slice(p);
+            if !course.fail(100.0 * data.mean_diagonal) {
                 status = SolveStatus::Stalled;
                 break;
             }
-            path = false;
-            p.copy_from_slice(&workspace.accepted);
-            workspace.centre.copy_from_slice(p);
-            alpha = (alpha * GROW).min(100.0 * data.mean_diagonal);
         }
     }
     p.copy_from_slice(&workspace.best);

@@ -1,0 +1,130 @@
+//! Parked: loads on the flat, no creep on slopes, the slide beyond the friction angle.
+
+use nalgebra::Vector3;
+use rover_core::integrator::StepOptions;
+use rover_core::problem::{Dimension, FrictionContactProblem};
+use rover_core::solver::{SolverOptions, SolverWorkspace, solve};
+
+use crate::scenes::{VARIANTS, at_rest, on_slope};
+
+/// Closed form, N: front (trunk 40/102 + group)/2, side (trunk 62/204 + group)/2, group = axle or bogie + 2 steering + 2 wheels.
+const FRONT: f64 = 9.81 * (600.0 * 40.0 / 102.0 + 120.0) / 2.0;
+const SIDE: f64 = 9.81 * (600.0 * 62.0 / 204.0 + 120.0) / 2.0;
+
+#[test]
+fn loads_on_the_flat_are_the_closed_form() {
+    assert!((FRONT - 1742.718).abs() < 1e-3 && (SIDE - 1483.041).abs() < 1e-3);
+    for variant in VARIANTS {
+        let mut simulation = at_rest(StepOptions {
+            variant,
+            ..StepOptions::default()
+        });
+        for steps in [1, 1, 2000] {
+            assert!(simulation.step(steps).unwrap().is_converged());
+            for (i, force) in simulation.wheel_forces().iter().enumerate() {
+                let expected = if i < 2 { FRONT } else { SIDE };
+                assert!(
+                    (force[0] - expected).abs() < 1e-6 * expected,
+                    "{variant:?}, wheel {i}: {force:?}"
+                );
+                // no spurious squeeze between wheels that stand straight
+                assert!(
+                    force[1].hypot(force[2]) < 1e-4,
+                    "{variant:?}, wheel {i}: {force:?}"
+                );
+            }
+        }
+        assert!(simulation.state().v.iter().all(|v| v.abs() < 1e-12));
+    }
+}
+
+#[test]
+fn loads_do_not_depend_on_the_order_of_the_contacts() {
+    // W has rank 14 of 18 here: what pushes the wheels sideways against each other is not determined by the motion.
+    let mut simulation = at_rest(StepOptions::default());
+    simulation.step(1).unwrap();
+    let (W, q, mu) = simulation.last_problem();
+    let mut order = [0_usize, 1, 2, 3, 4, 5];
+    let mut workspace = SolverWorkspace::default();
+    let mut count = 0;
+    // All permutations by Heap's method, written as a counter array.
+    let mut counters = [0_usize; 6];
+    let mut i = 0;
+    loop {
+        let index = |row: usize| 3 * order[row / 3] + row % 3;
+        let W_permuted: Vec<f64> = (0..18)
+            .flat_map(|r| (0..18).map(move |c| (r, c)))
+            .map(|(r, c)| W[18 * index(r) + index(c)])
+            .collect();
+        let q_permuted: Vec<f64> = (0..18).map(|r| q[index(r)]).collect();
+        let (mut p, mut u) = ([0.0; 18], [0.0; 18]);
+        let problem =
+            FrictionContactProblem::new(Dimension::Three, &W_permuted, &q_permuted, mu).unwrap();
+        let report = solve(
+            &problem,
+            &SolverOptions::default(),
+            &mut p,
+            &mut u,
+            &mut workspace,
+        );
+        assert!(report.is_converged());
+        for (place, &contact) in order.iter().enumerate() {
+            let load = p[3 * place] / 0.005;
+            let expected = if contact < 2 { FRONT } else { SIDE };
+            assert!(
+                (load - expected).abs() < 1e-6 * expected,
+                "{order:?}: contact {contact} carries {load}"
+            );
+        }
+        count += 1;
+        while i < 6 && counters[i] >= i {
+            counters[i] = 0;
+            i += 1;
+        }
+        if i == 6 {
+            break;
+        }
+        order.swap(if i % 2 == 0 { 0 } else { counters[i] }, i);
+        counters[i] += 1;
+        i = 0;
+    }
+    assert_eq!(count, 720);
+}
+
+#[test]
+fn braked_on_a_slope_it_does_not_creep() {
+    for degrees in [15.0, 25.0, 30.0, 34.9] {
+        let mut simulation = on_slope(degrees, StepOptions::default());
+        simulation.brake();
+        simulation.step(2000).unwrap();
+        let before = simulation.state().configuration.position;
+        assert!(simulation.step(10_000).unwrap().is_converged());
+        let creep = (simulation.state().configuration.position - before).norm() / 50.0;
+        assert!(creep < 1e-9, "{degrees} degrees: {creep} m/s");
+        assert!(
+            simulation.state().v.iter().all(|v| v.abs() < 1e-8),
+            "{degrees} degrees: {:?}",
+            simulation.state().v
+        );
+    }
+}
+
+#[test]
+fn beyond_the_friction_angle_it_slides_as_coulomb_says() {
+    // a = g (sin α − μ cos α), all six wheels locked by their brakes
+    for degrees in [35.1, 36.0, 40.0] {
+        let a: f64 = f64::to_radians(degrees);
+        let expected = 9.81 * (a.sin() - 0.7 * a.cos());
+        let mut simulation = on_slope(degrees, StepOptions::default());
+        simulation.brake();
+        simulation.step(200).unwrap();
+        let speed = |v: &[f64]| Vector3::new(v[0], v[1], v[2]).norm();
+        let before = speed(&simulation.state().v);
+        simulation.step(200).unwrap();
+        let acceleration = speed(&simulation.state().v) - before;
+        assert!(
+            (acceleration - expected).abs() < 1e-6 * expected.max(0.1),
+            "{degrees}: {acceleration}, not {expected}"
+        );
+    }
+}

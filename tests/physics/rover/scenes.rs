@@ -1,0 +1,115 @@
+//! Machines, grounds and starts that the tests share.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use rover_core::geometry::Plane;
+use rover_core::integrator::{StepOptions, Variant};
+use rover_core::multibody::{Hold, Model, ModelDescription, coordinates};
+use rover_core::simulation::Simulation;
+
+/// Both time-stepping schemes.
+pub const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
+
+/// A golden file, parsed.
+pub fn golden(name: &str) -> serde_json::Value {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("../../tests/golden")
+        .join(name);
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// Numbers of any nesting, flattened.
+pub fn numbers(value: &serde_json::Value) -> Vec<f64> {
+    match value {
+        serde_json::Value::Array(items) => items.iter().flat_map(numbers).collect(),
+        other => vec![other.as_f64().unwrap()],
+    }
+}
+
+/// A simulation of a model on a plane, at public coordinates q and velocity v.
+pub fn simulation(
+    model: Model,
+    plane: Plane,
+    options: StepOptions,
+    q: &[f64],
+    v: &[f64],
+) -> Simulation {
+    let mut simulation = Simulation::new(Arc::new(model), Arc::new(plane), options).unwrap();
+    let configuration = coordinates::from_public(simulation.model(), q).unwrap();
+    simulation.set_state(configuration, v.to_vec());
+    simulation
+}
+
+/// The rover at rest on flat ground, touching it.
+pub fn at_rest(options: StepOptions) -> Simulation {
+    let mut q = [0.0; 21];
+    q[1] = 0.35;
+    simulation(Model::rover(), Plane::ground(), options, &q, &[0.0; 21])
+}
+
+/// The rover on a slope that rises along x, touching it.
+pub fn on_slope(degrees: f64, options: StepOptions) -> Simulation {
+    let a = degrees.to_radians();
+    let mut q = [0.0; 21];
+    (q[0], q[1], q[5]) = (-0.35 * a.sin(), 0.35 * a.cos(), a);
+    simulation(Model::rover(), slope(degrees), options, &q, &[0.0; 21])
+}
+
+/// A plane through the origin that rises along x.
+pub fn slope(degrees: f64) -> Plane {
+    let a = degrees.to_radians();
+    Plane::new([-a.sin(), a.cos(), 0.0], 0.0).unwrap()
+}
+
+/// The machine of the report's plane run: 880 kg table, wheel radius 0.30 m, gains of 1.5.
+pub fn report_machine() -> Model {
+    let masses = numbers(&golden("rover_model.json")["meta"]["masses_880"]);
+    let mut description = ModelDescription::rover();
+    for (solid, mass) in description.solids.iter_mut().zip(masses) {
+        solid.mass = mass;
+    }
+    set_steering_gains(&mut description, 1.5, 1.5);
+    set_wheel_radius(&mut description, 0.30);
+    Model::from_description(description).unwrap()
+}
+
+/// The machine of the independent check: radius 0.20 m, gains of 15000, steering mass centres 7.5 cm low.
+pub fn check_machine() -> Model {
+    let mut description = ModelDescription::rover();
+    set_steering_gains(&mut description, 15_000.0, 15_000.0);
+    set_wheel_radius(&mut description, 0.20);
+    for solid in &mut description.solids {
+        if solid.name.starts_with("steering") {
+            solid.centre_of_mass = Some([0.0, -0.075, 0.0]);
+        }
+    }
+    Model::from_description(description).unwrap()
+}
+
+pub fn set_wheel_radius(description: &mut ModelDescription, radius: f64) {
+    for wheel in &mut description.wheels {
+        wheel.radius = radius;
+    }
+}
+
+fn set_steering_gains(description: &mut ModelDescription, stiffness: f64, damping: f64) {
+    for solid in &mut description.solids {
+        if solid.name.starts_with("steering") {
+            solid.hold = Some(Hold { stiffness, damping });
+        }
+    }
+}
+
+/// Slope of log(error) over log(h) by least squares.
+pub fn order(steps: &[f64], errors: &[f64]) -> f64 {
+    let n = steps.len() as f64;
+    let (x, y): (Vec<f64>, Vec<f64>) = steps
+        .iter()
+        .zip(errors)
+        .map(|(h, e)| (h.ln(), e.ln()))
+        .unzip();
+    let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);
+    let covariance: f64 = x.iter().zip(&y).map(|(a, b)| (a - mx) * (b - my)).sum();
+    covariance / x.iter().map(|a| (a - mx).powi(2)).sum::<f64>()
+}

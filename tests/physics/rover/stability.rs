@@ -1,0 +1,273 @@
+//! Scenes where methods fail: everything stays finite, gains no energy, falls through nothing.
+
+use std::f64::consts::PI;
+
+use rover_core::geometry::Plane;
+use rover_core::integrator::{StepOptions, Variant};
+use rover_core::multibody::{Model, ModelDescription, coordinates};
+use rover_core::simulation::Simulation;
+
+use crate::scenes::{VARIANTS, at_rest, simulation};
+
+fn dropped(
+    model: Model,
+    options: StepOptions,
+    height: f64,
+    [roll, heading, pitch]: [f64; 3],
+) -> Simulation {
+    let mut q = [0.0; 21];
+    (q[1], q[3], q[4], q[5]) = (height, roll, heading, pitch);
+    simulation(model, Plane::ground(), options, &q, &[0.0; 21])
+}
+
+/// Steps for some seconds; energy never exceeds what there was, nothing sinks into the ground for good.
+fn settle(mut simulation: Simulation, seconds: f64, allowed: f64, label: &str) -> Simulation {
+    let h = simulation.options().time_step;
+    let before = simulation.energy().total();
+    let mut fastest_fall = 0.0_f64;
+    for _ in 0..(seconds / h).round() as usize {
+        simulation.step(1).unwrap();
+        let energy = simulation.energy().total();
+        assert!(
+            energy <= before + allowed,
+            "{label}: {energy} J from {before} at {} s",
+            simulation.state().time
+        );
+        fastest_fall = fastest_fall.max(-simulation.state().v[1]);
+        let deepest = simulation
+            .wheel_contacts()
+            .iter()
+            .fold(0.0_f64, |m, c| m.min(c.gap));
+        // A wheel moves by at most its speed times the step in the step that it lands in.
+        assert!(
+            deepest > -(fastest_fall + 12.0) * h - 1e-3,
+            "{label}: {deepest} m"
+        );
+    }
+    simulation
+}
+
+#[test]
+fn drops_from_two_metres_land_on_the_wheels() {
+    for variant in VARIANTS {
+        for h in [0.001, 0.005, 0.02, 0.05] {
+            let options = StepOptions {
+                variant,
+                time_step: h,
+                ..StepOptions::default()
+            };
+            let landed = settle(
+                dropped(Model::rover(), options, 2.35, [0.0; 3]),
+                6.0,
+                1e-6,
+                "2 m drop",
+            );
+            let height = landed.state().configuration.position.y;
+            assert!(
+                (height - 0.35).abs() < 1e-6,
+                "{variant:?}, {h}: rests at {height}"
+            );
+            let fastest = landed.state().v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            assert!(fastest < 1e-6, "{variant:?}, {h}: {fastest}");
+        }
+    }
+}
+
+#[test]
+fn upside_down_it_comes_to_rest_on_its_trunk() {
+    for variant in VARIANTS {
+        for h in [0.005, 0.02, 0.05] {
+            let options = StepOptions {
+                variant,
+                time_step: h,
+                ..StepOptions::default()
+            };
+            let landed = settle(
+                dropped(Model::rover(), options, 1.5, [PI, 0.0, 0.0]),
+                6.0,
+                1e-6,
+                "upside down",
+            );
+            let height = landed.state().configuration.position.y;
+            assert!(
+                (height - 0.2).abs() < 1e-3,
+                "{variant:?}, {h}: trunk at {height}"
+            );
+            let up = landed.state().configuration.attitude * nalgebra::Vector3::y();
+            assert!(up.y < -0.999, "{variant:?}, {h}: {up:?}");
+        }
+    }
+}
+
+#[test]
+fn rolling_over_and_nose_dives_stay_finite_and_lose_energy() {
+    for variant in VARIANTS {
+        for h in [0.005, 0.02, 0.05] {
+            for angles in [
+                [1.3, 0.0, 0.0],
+                [0.4, 2.0, -1.4],
+                [0.0, 0.0, PI / 2.0],
+                [-2.0, 1.0, 0.7],
+            ] {
+                let options = StepOptions {
+                    variant,
+                    time_step: h,
+                    ..StepOptions::default()
+                };
+                let start = dropped(Model::rover(), options, 1.6, angles);
+                // In flight the explicit gyroscopic terms may err by O(h²) of the kinetic energy.
+                let end = settle(
+                    start,
+                    4.0,
+                    1e4 * h * h,
+                    &format!("{variant:?}, h = {h}, {angles:?}"),
+                );
+                assert!(end.state().configuration.position.y > 0.05);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_wheel_lying_flat_carries_the_rover_without_a_jump() {
+    // On its side the rover stands on the faces of three wheels (and a corner of the trunk as it settles).
+    let options = StepOptions::default();
+    let mut end = settle(
+        dropped(Model::rover(), options, 0.75, [PI / 2.0, 0.0, 0.0]),
+        6.0,
+        1e-6,
+        "on its side",
+    );
+    let before = end.state().configuration.position;
+    end.step(1000).unwrap();
+    assert!((end.state().configuration.position - before).norm() < 1e-6);
+}
+
+#[test]
+fn mass_ratios_of_a_hundred_thousand_rest() {
+    for variant in VARIANTS {
+        for h in [0.005, 0.05] {
+            for (part, mass) in [("wheel", 6e-3), ("trunk", 3e6)] {
+                let mut description = ModelDescription::rover();
+                for solid in description
+                    .solids
+                    .iter_mut()
+                    .filter(|s| s.name.starts_with(part))
+                {
+                    solid.mass = mass;
+                }
+                let model = Model::from_description(description).unwrap();
+                let options = StepOptions {
+                    variant,
+                    time_step: h,
+                    ..StepOptions::default()
+                };
+                let rest = settle(
+                    dropped(model, options, 0.5, [0.0; 3]),
+                    3.0,
+                    1e-6 * mass.max(1.0),
+                    part,
+                );
+                assert!(
+                    rest.state().v.iter().all(|v| v.abs() < 1e-6),
+                    "{part}, {variant:?}, {h}"
+                );
+                assert!(
+                    (rest.state().configuration.position.y - 0.35).abs() < 1e-6,
+                    "{part}, {variant:?}, {h}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn turning_through_a_full_circle_is_smooth() {
+    // The report's coordinates are singular at a heading of 90 degrees; ours must not notice it.
+    for variant in VARIANTS {
+        let mut simulation = at_rest(StepOptions {
+            variant,
+            ..StepOptions::default()
+        });
+        simulation
+            .set_steering(&[-0.4, -0.4, 0.0, 0.4, 0.0, 0.4])
+            .unwrap();
+        simulation.set_wheel_torques(&[8.0; 6]).unwrap();
+        simulation.step(200).unwrap();
+        let mut turned = 0.0_f64;
+        let heading = |s: &Simulation| coordinates::to_public(&s.state().configuration)[4];
+        let (mut last, mut rate) = (heading(&simulation), simulation.state().v[4]);
+        let mut steps = 0;
+        while turned.abs() < 2.0 * PI {
+            simulation
+                .set_wheel_torques(
+                    &[if simulation.state().v[4].abs() > 0.6 {
+                        0.0
+                    } else {
+                        8.0
+                    }; 6],
+                )
+                .unwrap();
+            assert!(simulation.step(10).unwrap().is_converged());
+            let now = heading(&simulation);
+            turned += (now - last + PI).rem_euclid(2.0 * PI) - PI;
+            let change = (simulation.state().v[4] - rate).abs();
+            assert!(
+                change < 0.1,
+                "{variant:?}: the turn rate jumps by {change} rad/s at heading {now}"
+            );
+            (last, rate) = (now, simulation.state().v[4]);
+            steps += 1;
+            assert!(steps < 4000, "{variant:?}: turned only {turned} rad");
+        }
+    }
+}
+
+#[test]
+fn no_gain_and_no_step_make_a_held_joint_unstable() {
+    for (stiffness, damping) in [(1e2, 0.0), (1e9, 0.0), (0.0, 1e9), (1e9, 1e9), (1e12, 1e6)] {
+        for h in [0.001, 0.05] {
+            let mut simulation = at_rest(StepOptions {
+                time_step: h,
+                ..StepOptions::default()
+            });
+            let joints: Vec<String> = simulation
+                .model()
+                .bodies()
+                .iter()
+                .skip(1)
+                .map(|b| b.name.clone())
+                .collect();
+            simulation
+                .hold(&joints, Some(&[0.05; 15]), Some(stiffness), Some(damping))
+                .unwrap();
+            simulation.step(200).unwrap();
+            let fastest = simulation
+                .state()
+                .v
+                .iter()
+                .fold(0.0_f64, |m, v| m.max(v.abs()));
+            assert!(
+                fastest < 200.0,
+                "K_p {stiffness}, K_d {damping}, h {h}: {fastest} rad/s"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_step_that_overflows_leaves_the_state_alone() {
+    let mut simulation = at_rest(StepOptions {
+        variant: Variant::Linearised,
+        ..StepOptions::default()
+    });
+    let mut torques = vec![0.0; 15];
+    torques[3] = 1e308;
+    simulation.set_joint_torques(&torques).unwrap();
+    let before = simulation.snapshot();
+    let error = (0..100).find_map(|_| simulation.step(1).err());
+    assert!(error.is_some());
+    assert!(simulation.state().is_finite());
+    simulation.restore(&before).unwrap();
+    assert_eq!(simulation.snapshot(), before);
+}
