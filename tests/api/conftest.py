@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 import rover_gym
 
 GOLDEN = Path(__file__).parent.parent / "golden"

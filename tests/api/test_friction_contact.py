@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-import rover_gym
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+import rover_gym
 
 
 def test_a_block_pushed_into_the_ground_sticks_slides_or_flies():
