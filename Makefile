@@ -12,7 +12,6 @@ STAMPS := $(VENV)/stamps# in the environment, so that both go together
 UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
-export PYTHONDONTWRITEBYTECODE := 1
 
 .PHONY: help demo test check lint types format test-rust test-python docs bench pins clean
 

@@ -234,7 +234,7 @@ class Simulation:
         theta: float = 0.5,
         forecast: float = 0.5,
         solver: Literal["auto", "nsgs", "newton"] = "auto",
-        tolerance: float = 1e-10,
+        tolerance: float = 1e-12,
         max_iterations: int = 1000,
         stabilisation: Literal["projection", "none"] = "projection",
         warm_start: bool = True,

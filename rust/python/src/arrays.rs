@@ -84,11 +84,11 @@ pub fn fresh_rows<'py, const M: usize>(
 }
 
 /// Fresh (n, a, b) array from a row-major list.
-pub fn fresh_blocks<'py>(
-    py: Python<'py>,
+pub fn fresh_blocks(
+    py: Python<'_>,
     values: Vec<f64>,
     shape: [usize; 3],
-) -> PyResult<Bound<'py, PyArray3<f64>>> {
+) -> PyResult<Bound<'_, PyArray3<f64>>> {
     PyArray1::from_vec(py, values).reshape(shape)
 }
 

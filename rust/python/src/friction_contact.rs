@@ -123,12 +123,13 @@ pub fn solver_options(
             Value::Count(0),
         ));
     }
-    let mut options = SolverOptions::default();
-    options.method = method(name)?;
-    options.tolerance = tolerance;
-    options.max_newton_steps = max_iterations;
-    options.max_sweeps = max_iterations;
-    Ok(options)
+    Ok(SolverOptions {
+        method: method(name)?,
+        tolerance,
+        max_newton_steps: max_iterations,
+        max_sweeps: max_iterations,
+        ..SolverOptions::default()
+    })
 }
 
 /// Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K.

@@ -19,6 +19,9 @@ use crate::arrays::{fresh, fresh_blocks, fresh_matrix, fresh_rows, triple, vecto
 use crate::errors::{BorderError, Kind, Value};
 use crate::plane::Plane;
 
+/// A pair of fresh vectors.
+pub type Pair<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+
 /// A tree of solids under a free base, read from data. Immutable.
 #[pyclass(module = "rover_gym._core", frozen, from_py_object)]
 #[derive(Clone)]
@@ -149,6 +152,7 @@ impl RoverModel {
 
     /// Reads a model file (TOML). Raises ModelError, or OSError where there is no such file.
     #[staticmethod]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn from_file(path: PathBuf) -> PyResult<Self> {
         let bytes = std::fs::read(&path)?;
         let unreadable = || {
@@ -556,7 +560,7 @@ impl RoverModel {
         py: Python<'py>,
         q: &Bound<'_, PyAny>,
         v: &Bound<'_, PyAny>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+    ) -> PyResult<Pair<'py>> {
         let configuration =
             Coordinates::State.configuration(&self.inner, &vector(q, Kind::State, "q")?)?;
         let v = coordinates::checked_velocity(&self.inner, &vector(v, Kind::State, "v")?)
@@ -566,12 +570,13 @@ impl RoverModel {
     }
 
     /// The report's q and qdot to public q and state velocity.
+    #[allow(clippy::wrong_self_convention)] // the Python name: from the report's coordinates
     fn from_report<'py>(
         &self,
         py: Python<'py>,
         q: &Bound<'_, PyAny>,
         qdot: &Bound<'_, PyAny>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+    ) -> PyResult<Pair<'py>> {
         let q = vector(q, Kind::State, "q")?;
         let configuration = Coordinates::Report.configuration(&self.inner, &q)?;
         let v =
@@ -612,6 +617,7 @@ impl RoverModel {
     }
 
     #[staticmethod]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn _restore(text: &str, locked: Vec<(String, f64)>) -> PyResult<Self> {
         Self::rover_from_json(text, &locked)
     }

@@ -7,6 +7,8 @@ use rover_core::geometry::Plane as CorePlane;
 use crate::arrays::{fresh, triple};
 use crate::errors::{BorderError, Kind, Value};
 
+type Normal = (f64, f64, f64);
+
 /// The half-space n.x + offset >= 0 is free; the ground is below. `normal` is normalised.
 #[pyclass(module = "rover_gym._core", frozen, from_py_object)]
 #[derive(Clone)]
@@ -63,13 +65,11 @@ impl Plane {
         )
     }
 
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, ((f64, f64, f64), f64))> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, (Normal, f64)) {
         let n = slf.get().inner.normal();
-        Ok((
+        (
             slf.get_type().into_any(),
             ((n.x, n.y, n.z), slf.get().inner.offset()),
-        ))
+        )
     }
 }

@@ -13,7 +13,7 @@ use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Value};
 use crate::friction_contact::solver_options;
-use crate::model::{Coordinates, RoverModel, checked_gravity, poses, tags};
+use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::plane::Plane;
 use crate::snapshot::Snapshot;
 
@@ -118,6 +118,13 @@ pub struct Simulation {
     max_iterations: usize,
 }
 
+/// W, free velocity and friction coefficients.
+type Problem<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+);
+
 fn names(joints: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
     joints
         .extract::<String>()
@@ -171,7 +178,7 @@ impl Simulation {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
     #[pyo3(signature = (model = None, terrain = None, *, gravity = None, friction = 0.7, restitution = 0.0, time_step = 0.005,
-        variant = "linearised", theta = 0.5, forecast = 0.5, solver = "auto", tolerance = 1e-10, max_iterations = 1000,
+        variant = "linearised", theta = 0.5, forecast = 0.5, solver = "auto", tolerance = 1e-12, max_iterations = 1000,
         stabilisation = "projection", warm_start = true))]
     fn new(
         model: Option<RoverModel>,
@@ -333,11 +340,7 @@ impl Simulation {
         Ok(())
     }
 
-    #[allow(clippy::type_complexity)]
-    fn report_state<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+    fn report_state<'py>(&self, py: Python<'py>) -> PyResult<Pair<'py>> {
         let state = self.inner.state();
         let (q, qdot) =
             coordinates::to_report(&state.configuration, &state.v).map_err(BorderError::from)?;
@@ -450,11 +453,7 @@ impl Simulation {
         }
     }
 
-    #[allow(clippy::type_complexity)]
-    fn momentum<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
+    fn momentum<'py>(&self, py: Python<'py>) -> Pair<'py> {
         let momentum = self.inner.momentum();
         (
             fresh(py, momentum.linear.as_slice()),
@@ -488,15 +487,7 @@ impl Simulation {
     }
 
     /// W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem.
-    #[allow(clippy::type_complexity)]
-    fn last_problem<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(
-        Bound<'py, PyArray2<f64>>,
-        Bound<'py, PyArray1<f64>>,
-        Bound<'py, PyArray1<f64>>,
-    )> {
+    fn last_problem<'py>(&self, py: Python<'py>) -> PyResult<Problem<'py>> {
         let (W, q, mu) = self.inner.last_problem();
         let (n, size) = (mu.len(), 3 * mu.len());
         let q = if n == 0 { &q[..0] } else { q };

@@ -8,7 +8,7 @@ use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::coordinates;
 
-use crate::scenes::{VARIANTS, check_machine, simulation};
+use crate::scenes::{VARIANTS, check_machine, count, simulation};
 
 /// Distance (m) and heading error (rad) from where the three engines end.
 fn errors(variant: Variant, h: f64) -> (f64, f64) {
@@ -20,7 +20,7 @@ fn errors(variant: Variant, h: f64) -> (f64, f64) {
         ..StepOptions::default()
     };
     let mut simulation = simulation(check_machine(), Plane::ground(), options, &q, &[0.0; 21]);
-    let steps = |seconds: f64| (seconds / h).round() as usize;
+    let steps = |seconds: f64| count(seconds, h);
     assert!(simulation.step(steps(2.0)).unwrap().is_converged());
     let start = simulation.state().configuration.position;
     simulation

@@ -6,7 +6,7 @@ use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{Model, coordinates};
 use rover_core::simulation::Simulation;
 
-use crate::scenes::{VARIANTS, order, simulation};
+use crate::scenes::{VARIANTS, count, order, simulation};
 
 /// The rover tumbling high above the ground with all joints turning.
 fn tumbling(variant: Variant, time_step: f64, gravity: Vector3<f64>) -> Simulation {
@@ -69,7 +69,7 @@ fn energy_error_is_of_second_order() {
         let drift = steps.map(|h| {
             let mut simulation = tumbling(variant, h, Vector3::new(0.0, -9.81, 0.0));
             let before = simulation.energy().total();
-            simulation.step((2.0 / h).round() as usize).unwrap();
+            simulation.step(count(2.0, h)).unwrap();
             (simulation.energy().total() - before).abs()
         });
         let slope = order(&steps, &drift);
@@ -84,7 +84,7 @@ fn trajectories_converge_with_second_order() {
     for variant in VARIANTS {
         let end = |h: f64| {
             let mut simulation = tumbling(variant, h, Vector3::new(0.0, -9.81, 0.0));
-            simulation.step((1.0 / h).round() as usize).unwrap();
+            simulation.step(count(1.0, h)).unwrap();
             coordinates::to_public(&simulation.state().configuration)
         };
         let reference = end(1.0 / 12800.0);

@@ -4,7 +4,7 @@ use rover_core::geometry::Plane;
 use rover_core::integrator::{Stabilisation, StepOptions, Variant};
 use rover_core::simulation::Simulation;
 
-use crate::scenes::{VARIANTS, golden, numbers, report_machine, simulation};
+use crate::scenes::{VARIANTS, count, golden, numbers, report_machine, simulation};
 
 fn scene(variant: Variant, time_step: f64, stabilisation: Stabilisation) -> Simulation {
     let plane = Plane::new(
@@ -38,7 +38,7 @@ fn scene(variant: Variant, time_step: f64, stabilisation: Stabilisation) -> Simu
 
 /// Distance (m) of the trunk from the reference's at the end of 10 s, and the deepest gap on the way.
 fn run(mut simulation: Simulation, reference: &str) -> (f64, f64) {
-    let steps = (10.0 / simulation.options().time_step).round() as usize;
+    let steps = count(10.0, simulation.options().time_step);
     let mut deepest = 0.0_f64;
     for _ in 0..200 {
         assert!(simulation.step(steps / 200).unwrap().is_converged());

@@ -4,7 +4,7 @@ use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::Model;
 
-use crate::scenes::{VARIANTS, order, simulation};
+use crate::scenes::{VARIANTS, count, order, simulation};
 
 /// L1 error of the height over half a second of a drop, one to three bounces included (e = 0.5, no friction).
 ///
@@ -21,7 +21,7 @@ fn bouncing_error(variant: Variant, h: f64, clearance: f64) -> f64 {
     q[1] = 0.35 + clearance;
     let mut simulation = simulation(Model::rover(), Plane::ground(), options, &q, &[0.0; 21]);
     let mut sum = 0.0;
-    let n = (0.5 / h).round() as usize;
+    let n = count(0.5, h);
     for _ in 0..n {
         simulation.step(1).unwrap();
         let height = simulation.state().configuration.position.y - 0.35;
@@ -79,7 +79,7 @@ fn elastic_bounces_keep_their_energy_at_any_step() {
         let mut simulation = simulation(Model::rover(), Plane::ground(), options, &q, &[0.0; 21]);
         let before = simulation.energy().total();
         let mut largest = 0.0_f64;
-        for _ in 0..(5.0 / h) as usize {
+        for _ in 0..count(5.0, h) {
             simulation.step(1).unwrap();
             // ½ (v_k² + …) at the nodes of a parabola is exact; only the impact's phase is of order h
             largest = largest.max((simulation.energy().total() - before).abs());

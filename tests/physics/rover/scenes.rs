@@ -101,6 +101,12 @@ fn set_steering_gains(description: &mut ModelDescription, stiffness: f64, dampin
     }
 }
 
+/// Steps of `h` in so many seconds.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // rounded, positive, small
+pub fn count(seconds: f64, h: f64) -> usize {
+    (seconds / h).round() as usize
+}
+
 /// Slope of log(error) over log(h) by least squares.
 pub fn order(steps: &[f64], errors: &[f64]) -> f64 {
     let n = steps.len() as f64;

@@ -36,7 +36,7 @@ fn driving(heading: f64, steering: f64) -> Simulation {
 #[test]
 fn turning_the_scene_turns_the_answer() {
     let straight = driving(0.0, 0.2);
-    for heading in [0.7, 1.570_796, 3.0, -2.0] {
+    for heading in [0.7, std::f64::consts::FRAC_PI_2, 3.0, -2.0] {
         let turned = driving(heading, 0.2);
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), heading);
         let expected = turn * straight.state().configuration.position;

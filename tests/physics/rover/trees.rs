@@ -126,29 +126,29 @@ fn bad_descriptions_are_refused_by_field() {
         ("solids[1].mass", |d| d.solids[1].mass = f64::NAN),
         ("solids[1].parent", |d| d.solids[1].parent = None),
         ("solids[1].parent", |d| {
-            d.solids[1].parent = Some("rear_left".into())
+            d.solids[1].parent = Some("rear_left".into());
         }),
         ("solids[0].parent", |d| {
-            d.solids[0].parent = Some("front".into())
+            d.solids[0].parent = Some("front".into());
         }),
         ("solids[0].axis", |d| {
-            d.solids[0].axis = Some([1.0, 0.0, 0.0])
+            d.solids[0].axis = Some([1.0, 0.0, 0.0]);
         }),
         ("solids[2].name", |d| d.solids[2].name = "front".into()),
         ("solids[1].axis", |d| d.solids[1].axis = Some([0.0; 3])),
         ("solids[1].axis", |d| d.solids[1].axis = None),
         ("solids[1].position", |d| {
-            d.solids[1].position = Some([f64::INFINITY, 0.0, 0.0])
+            d.solids[1].position = Some([f64::INFINITY, 0.0, 0.0]);
         }),
         ("solids[1].position", |d| d.solids[1].position = None),
         ("solids[1].shape.radius", |d| {
             d.solids[1].shape = rover_core::multibody::Shape::Disc { radius: -0.1 }
         }),
         ("solids[1].inertia", |d| {
-            d.solids[1].inertia = Some([1.0, 1.0, 3.0, 0.0, 0.0, 0.0])
+            d.solids[1].inertia = Some([1.0, 1.0, 3.0, 0.0, 0.0, 0.0]);
         }),
         ("solids[1].inertia", |d| {
-            d.solids[1].inertia = Some([1.0, 1.0, 1.0, 5.0, 0.0, 0.0])
+            d.solids[1].inertia = Some([1.0, 1.0, 1.0, 5.0, 0.0, 0.0]);
         }),
         ("solids[1].collides", |d| d.solids[1].collides = true),
         ("solids[1].hold.stiffness", |d| {

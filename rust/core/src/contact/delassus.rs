@@ -6,6 +6,9 @@
 use super::contact_point::Contact;
 use crate::multibody::{FactoredMassMatrix, Kinematics, Model};
 
+/// One row of Z at one velocity: the columns n, t, b of a contact, padded so that two pairs of lanes carry it.
+type Columns = [f64; 4];
+
 /// The contacts of a step in matrix form. Scratch: grows to what was needed most, then reuses it.
 #[derive(Clone, Debug, Default)]
 pub struct ContactSystem {
@@ -13,7 +16,8 @@ pub struct ContactSystem {
     pub W: Vec<f64>,
     /// Local velocity `Hᵀ v` of the velocity handed to [`Self::assemble`] (3 n_c), m/s.
     pub u: Vec<f64>,
-    Z: Vec<f64>,
+    /// Z along each contact's path: `Z[c * stride + k]` belongs to the k-th velocity of the path.
+    Z: Vec<Columns>,
     bodies: Vec<usize>,
     stride: usize,
 }
@@ -25,7 +29,7 @@ impl ContactSystem {
         Self {
             W: Vec::with_capacity(9 * n * n),
             u: Vec::with_capacity(3 * n),
-            Z: Vec::with_capacity(3 * n * model.path_stride()),
+            Z: Vec::with_capacity(n * model.path_stride()),
             bodies: Vec::with_capacity(n),
             stride: model.path_stride(),
         }
@@ -49,27 +53,33 @@ impl ContactSystem {
         let (n, w) = (contacts.len(), self.stride);
         self.bodies.clear();
         self.bodies.extend(contacts.iter().map(|c| c.body));
-        self.Z.resize(3 * n * w, 0.0);
+        self.Z.resize(n * w, [0.0; 4]);
         self.u.resize(3 * n, 0.0);
         self.W.resize(9 * n * n, 0.0);
         for (c, contact) in contacts.iter().enumerate() {
             let path = model.path(contact.body);
-            for (k, d) in contact.frame.rows().iter().enumerate() {
-                let row = &mut self.Z[(3 * c + k) * w..][..path.len()];
-                kinematics.point_jacobian_row(path, &contact.point, d, row);
-                self.u[3 * c + k] = path_dot(path, row, v);
-                factor.half_solve_path(path, row);
-            }
+            let rows = &mut self.Z[c * w..][..path.len()];
+            jacobian_columns(kinematics, path, contact, rows);
+            let u = path_product(path, rows, v);
+            self.u[3 * c..][..3].copy_from_slice(&u[..3]);
+            factor.half_solve_path(path, rows);
         }
         let size = 3 * n;
         for c in 0..n {
             for d in 0..=c {
                 let shared = model.common_path(self.bodies[c], self.bodies[d]);
-                for i in 0..3 {
-                    let a = &self.Z[(3 * c + i) * w..][..shared];
-                    for j in 0..3 {
-                        let b = &self.Z[(3 * d + j) * w..][..shared];
-                        let value: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
+                let (a, b) = (&self.Z[c * w..][..shared], &self.Z[d * w..][..shared]);
+                // Nine sums that do not wait for each other.
+                let mut block = [[0.0; 4]; 3];
+                for (x, y) in a.iter().zip(b) {
+                    for (sums, factor) in block.iter_mut().zip(x) {
+                        for (sum, value) in sums.iter_mut().zip(y) {
+                            *sum += factor * value;
+                        }
+                    }
+                }
+                for (i, sums) in block.iter().enumerate() {
+                    for (j, &value) in sums[..3].iter().enumerate() {
                         self.W[(3 * c + i) * size + 3 * d + j] = value;
                         self.W[(3 * d + j) * size + 3 * c + i] = value;
                     }
@@ -80,9 +90,10 @@ impl ContactSystem {
 
     /// `out = Zᵀ y` (3 n_c): what a velocity change `y` in factor coordinates does at the contacts.
     pub fn local(&self, model: &Model, y: &[f64], out: &mut [f64]) {
-        for (row, value) in out.iter_mut().enumerate() {
-            let path = model.path(self.bodies[row / 3]);
-            *value = path_dot(path, &self.Z[row * self.stride..][..path.len()], y);
+        for (c, values) in out.chunks_exact_mut(3).enumerate() {
+            let path = model.path(self.bodies[c]);
+            let u = path_product(path, &self.Z[c * self.stride..][..path.len()], y);
+            values.copy_from_slice(&u[..3]);
         }
     }
 
@@ -105,13 +116,46 @@ impl ContactSystem {
 
     /// `y += Z p`: impulses to a velocity change in factor coordinates.
     pub fn add_impulses(&self, model: &Model, p: &[f64], y: &mut [f64]) {
-        for (row, &value) in p.iter().enumerate() {
-            let path = model.path(self.bodies[row / 3]);
-            for (z, &k) in self.Z[row * self.stride..].iter().zip(path) {
-                y[k] += z * value;
+        for (c, p) in p.chunks_exact(3).enumerate() {
+            let path = model.path(self.bodies[c]);
+            for (z, &k) in self.Z[c * self.stride..].iter().zip(path) {
+                y[k] += z[0] * p[0] + z[1] * p[1] + z[2] * p[2];
             }
         }
     }
+}
+
+/// `Hᵀ` of one contact along its path: for each velocity, what it moves the point along n, t, b.
+fn jacobian_columns(
+    kinematics: &Kinematics,
+    path: &[usize],
+    contact: &Contact,
+    rows: &mut [Columns],
+) {
+    let [n, t, b] = contact.frame.rows();
+    let x = &contact.point;
+    let (xn, xt, xb) = (x.cross(&n), x.cross(&t), x.cross(&b));
+    for i in 0..3 {
+        rows[i] = [n[i], t[i], b[i], 0.0];
+        rows[3 + i] = [xn[i], xt[i], xb[i], 0.0];
+    }
+    for (row, &k) in rows.iter_mut().zip(path).skip(6) {
+        // Velocity of the point when the joint turns at unit rate.
+        let velocity = kinematics.axis[k - 5].cross(&(x - kinematics.r[k - 5]));
+        *row = [velocity.dot(&n), velocity.dot(&t), velocity.dot(&b), 0.0];
+    }
+}
+
+/// Product of columns along a path with a full vector.
+#[inline]
+fn path_product(path: &[usize], rows: &[Columns], v: &[f64]) -> Columns {
+    let mut sums = [0.0; 4];
+    for (row, &k) in rows.iter().zip(path) {
+        for (sum, value) in sums.iter_mut().zip(row) {
+            *sum += value * v[k];
+        }
+    }
+    sums
 }
 
 /// `out = H p` (nv): generalized impulse, N s and N m s, of the impulses `p` (3 n_c) at the contacts.
@@ -135,14 +179,4 @@ pub fn generalized_impulse(
             out[k] += kinematics.axis[k - 5].dot(&(moment - kinematics.r[k - 5].cross(&force)));
         }
     }
-}
-
-/// Dot product of a row along a path with a full vector.
-#[inline]
-fn path_dot(path: &[usize], row: &[f64], v: &[f64]) -> f64 {
-    let base: f64 = row[..6].iter().zip(&v[..6]).map(|(a, b)| a * b).sum();
-    row[6..]
-        .iter()
-        .zip(&path[6..])
-        .fold(base, |sum, (a, &k)| sum + a * v[k])
 }

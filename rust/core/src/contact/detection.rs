@@ -72,7 +72,7 @@ pub fn detect(
                             frame: p.frame,
                             gap: p.gap,
                         });
-                    })
+                    });
                 }
             },
         );
@@ -175,7 +175,7 @@ pub fn wheel_contacts(
                             best.key.primitive = id;
                             (best.point, best.frame, best.gap) = (p.point, p.frame, p.gap);
                         }
-                    })
+                    });
                 }
             },
         );

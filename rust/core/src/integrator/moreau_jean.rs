@@ -55,9 +55,9 @@ impl Integrator for MoreauJean {
         let ws = workspace;
         ws.configuration
             .set_moved(&state.configuration, &state.v, (1.0 - theta) * h);
-        ws.kinematics.update(model, &ws.configuration);
+        ws.kinematics.update_for_step(model, &ws.configuration);
         ws.end.set_moved(&state.configuration, &state.v, h);
-        ws.kinematics_end.update(model, &ws.end);
+        ws.kinematics_end.update_for_step(model, &ws.end);
         probe.end(Phase::Kinematics);
         let activation = activation(model, options, &state.v, (1.0 - theta) * h);
         detect(
@@ -116,7 +116,7 @@ impl Integrator for MoreauJean {
         }
         add_correction(scene, warm_start, ws);
         probe.end(Phase::Bias);
-        let mut report = solve_contacts(scene, ws, probe);
+        let mut report = solve_contacts(scene, ws, true, probe);
         ws.end.copy_from(&ws.configuration);
         ws.end.advance(&ws.v, theta * h);
         ws.gap_end.clear();
@@ -278,10 +278,11 @@ pub(super) fn add_correction(scene: &Scene<'_>, warm_start: &WarmStart, ws: &mut
 
 /// Solves the assembled contacts for the free change `ws.y` (factor coordinates) from `ws.v`, and adds both to `ws.v`.
 ///
-/// Starts from `ws.p`.
+/// Starts from `ws.p`. `is_from_start`: `ws.v` is still the velocity before the step, whose local velocity is known.
 pub(super) fn solve_contacts(
     scene: &Scene<'_>,
     ws: &mut Workspace,
+    is_from_start: bool,
     probe: &mut dyn Probe,
 ) -> StepReport {
     let Scene { model, options, .. } = *scene;
@@ -292,13 +293,19 @@ pub(super) fn solve_contacts(
     };
     if n > 0 {
         ws.system.local(model, &ws.y, &mut ws.q_free);
-        ws.system.add_local_of_velocity(
-            model,
-            &ws.kinematics_end,
-            &ws.contacts,
-            &ws.v,
-            &mut ws.q_free,
-        );
+        if is_from_start {
+            for (q, u) in ws.q_free.iter_mut().zip(&ws.u_before) {
+                *q += u;
+            }
+        } else {
+            ws.system.add_local_of_velocity(
+                model,
+                &ws.kinematics_end,
+                &ws.contacts,
+                &ws.v,
+                &mut ws.q_free,
+            );
+        }
         for (q, u) in ws
             .q_free
             .chunks_exact_mut(3)

@@ -48,15 +48,10 @@ impl Integrator for MoreauJeanNewton {
         workspace: &mut Workspace,
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
-        let Scene {
-            model,
-            terrain,
-            options,
-        } = *scene;
+        let Scene { model, options, .. } = *scene;
         let (h, theta) = (options.time_step, options.theta);
         let ws = workspace;
-        ws.kinematics.update(model, &state.configuration);
-        let start = ws.kinematics.base;
+        ws.kinematics.update_for_step(model, &state.configuration);
         ws.c_start.copy_from_slice(&ws.kinematics.c);
         body_momenta(
             model,
@@ -74,57 +69,7 @@ impl Integrator for MoreauJeanNewton {
         let mut is_settled = false;
         let mut last_change = f64::INFINITY;
         for iteration in 0..options.newton_max_iterations {
-            for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(&state.v) {
-                *mean = theta * end + (1.0 - theta) * begin;
-            }
-            ws.configuration
-                .set_moved(&state.configuration, &ws.v_mean, theta * h);
-            ws.end.set_moved(&state.configuration, &ws.v_mean, h);
-            ws.kinematics.update(model, &ws.configuration);
-            ws.kinematics_end.update(model, &ws.end);
-            probe.end(Phase::Kinematics);
-            if iteration == 0 {
-                // The set of contacts of a step is decided once, by the forecast.
-                let activation = activation(model, options, &state.v, theta * h);
-                detect(
-                    model,
-                    &ws.kinematics,
-                    terrain,
-                    &state.v,
-                    &activation,
-                    &mut ws.contacts,
-                );
-            }
-            for contact in &mut ws.contacts {
-                relocate(model, &ws.kinematics_end, terrain, contact);
-            }
-            probe.end(Phase::Detection);
-            ws.mass_matrix.update(model, &ws.kinematics);
-            probe.end(Phase::MassMatrix);
-            momentum_residual(model, &options.gravity, h, theta, &start, ws);
-            set_held_theta(model, options, command, ws);
-            add_command(
-                options,
-                command,
-                &state.configuration.joints,
-                &state.v,
-                &ws.v,
-                &ws.theta_held,
-                &mut ws.y,
-            );
-            probe.end(Phase::Bias);
-            factorise(model, options, command, ws)
-                .ok_or(StepError::SingularMassMatrix { time: state.time })?;
-            ws.factor.half_solve(model, &mut ws.y);
-            probe.end(Phase::Factor);
-            assemble_contacts(scene, &state.v, warm_start, ws);
-            add_correction(scene, warm_start, ws);
-            if iteration > 0 {
-                ws.p.copy_from_slice(&ws.p_last);
-            }
-            probe.end(Phase::Delassus);
-            let solved = solve_contacts(scene, ws, probe);
-            ws.p_last.clone_from(&ws.p);
+            let solved = iterate(scene, command, state, warm_start, ws, iteration, probe)?;
             report.iterations += solved.iterations;
             report.residual = solved.residual;
             report.n_contacts = solved.n_contacts;
@@ -132,7 +77,6 @@ impl Integrator for MoreauJeanNewton {
             // ws.y is now the change of v in this iteration.
             let change = ws.y.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let size = ws.v.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
-            probe.end(Phase::Update);
             // Settled, or as settled as rounding allows: no longer shrinking, and small.
             let is_small = change <= options.newton_tolerance * size;
             let is_rounding = change <= ROUNDING * size && change >= 0.5 * last_change;
@@ -165,6 +109,85 @@ impl Integrator for MoreauJeanNewton {
             .extend(ws.contacts.iter().map(|contact| contact.gap));
         finish(scene, state, warm_start, ws, report, probe)
     }
+}
+
+/// One iteration: `ws.v` moves by `ws.y`.
+fn iterate(
+    scene: &Scene<'_>,
+    command: &Command,
+    state: &State,
+    warm_start: &WarmStart,
+    ws: &mut Workspace,
+    iteration: usize,
+    probe: &mut dyn Probe,
+) -> Result<StepReport, StepError> {
+    let Scene {
+        model,
+        terrain,
+        options,
+    } = *scene;
+    let (h, theta) = (options.time_step, options.theta);
+
+    for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(&state.v) {
+        *mean = theta * end + (1.0 - theta) * begin;
+    }
+    ws.configuration
+        .set_moved(&state.configuration, &ws.v_mean, theta * h);
+    ws.end.set_moved(&state.configuration, &ws.v_mean, h);
+    ws.kinematics.update_for_step(model, &ws.configuration);
+    ws.kinematics_end.update_for_step(model, &ws.end);
+    probe.end(Phase::Kinematics);
+    if iteration == 0 {
+        // The set of contacts of a step is decided once, by the forecast.
+        let activation = activation(model, options, &state.v, theta * h);
+        detect(
+            model,
+            &ws.kinematics,
+            terrain,
+            &state.v,
+            &activation,
+            &mut ws.contacts,
+        );
+    }
+    for contact in &mut ws.contacts {
+        relocate(model, &ws.kinematics_end, terrain, contact);
+    }
+    probe.end(Phase::Detection);
+    ws.mass_matrix.update(model, &ws.kinematics);
+    probe.end(Phase::MassMatrix);
+    momentum_residual(
+        model,
+        &options.gravity,
+        h,
+        theta,
+        &state.configuration.position,
+        ws,
+    );
+    set_held_theta(model, options, command, ws);
+    add_command(
+        options,
+        command,
+        &state.configuration.joints,
+        &state.v,
+        &ws.v,
+        &ws.theta_held,
+        &mut ws.y,
+    );
+    probe.end(Phase::Bias);
+    factorise(model, options, command, ws)
+        .ok_or(StepError::SingularMassMatrix { time: state.time })?;
+    ws.factor.half_solve(model, &mut ws.y);
+    probe.end(Phase::Factor);
+    assemble_contacts(scene, &state.v, warm_start, ws);
+    add_correction(scene, warm_start, ws);
+    if iteration > 0 {
+        ws.p.copy_from_slice(&ws.p_last);
+    }
+    probe.end(Phase::Delassus);
+    let solved = solve_contacts(scene, ws, iteration == 0, probe);
+    ws.p_last.clone_from(&ws.p);
+    probe.end(Phase::Update);
+    Ok(solved)
 }
 
 /// `ws.y = −(left side)` of the principle above at the iterate `ws.v`, without commands and contacts.

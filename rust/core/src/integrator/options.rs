@@ -48,7 +48,7 @@ pub struct StepOptions {
     pub penetration_tolerance: f64,
     /// Whether the solver starts from the last step's impulses. Default true.
     pub warm_start: bool,
-    /// Options of the contact solver. Default tolerance 1e-10.
+    /// Options of the contact solver. Default tolerance 1e-12: 5% dearer than 1e-10 on a drive, and a rover at rest is at rest.
     pub solver: SolverOptions,
     /// Newton variant: stop when no velocity changes by more than this, relative to 1 m/s and to the largest. Default 1e-12.
     pub newton_tolerance: f64,
@@ -69,10 +69,7 @@ impl Default for StepOptions {
             stabilisation: Stabilisation::default(),
             penetration_tolerance: 1e-8,
             warm_start: true,
-            solver: SolverOptions {
-                tolerance: 1e-10,
-                ..SolverOptions::default()
-            },
+            solver: SolverOptions::default(),
             newton_tolerance: 1e-12,
             newton_max_iterations: 20,
         }

@@ -46,6 +46,15 @@ impl Kinematics {
 
     /// Recomputes all poses.
     pub fn update(&mut self, model: &Model, configuration: &Configuration) {
+        self.update_poses::<true>(model, configuration);
+    }
+
+    /// Recomputes all that a step needs: spinners ([`super::Body::is_spinner`]) are left unturned about their own axis.
+    pub fn update_for_step(&mut self, model: &Model, configuration: &Configuration) {
+        self.update_poses::<false>(model, configuration);
+    }
+
+    fn update_poses<const SPIN: bool>(&mut self, model: &Model, configuration: &Configuration) {
         let bodies = model.bodies();
         self.base = configuration.position;
         self.R[0] = *configuration.attitude.to_rotation_matrix().matrix();
@@ -54,10 +63,14 @@ impl Kinematics {
         for (b, body) in bodies.iter().enumerate().skip(1) {
             let parent = self.R[body.parent];
             self.r[b] = self.r[body.parent] + parent * body.position;
-            let angle = configuration.joints[b - 1];
-            let (R, axis) = match &body.rotation {
-                None => body.axis.rotate(&parent, angle),
-                Some(fixed) => body.axis.rotate(&(parent * fixed), angle),
+            let frame = match &body.rotation {
+                None => parent,
+                Some(fixed) => parent * fixed,
+            };
+            let (R, axis) = if SPIN || !body.is_spinner {
+                body.axis.rotate(&frame, configuration.joints[b - 1])
+            } else {
+                (frame, frame * body.axis.direction())
             };
             self.R[b] = R;
             self.axis[b] = axis;

@@ -185,8 +185,9 @@ impl FactoredMassMatrix {
             if d.is_nan() || d <= 0.0 {
                 return false;
             }
-            self.inverse_root[k] = 1.0 / d.sqrt();
-            let inverse = 1.0 / d;
+            let inverse_root = 1.0 / d.sqrt();
+            self.inverse_root[k] = inverse_root;
+            let inverse = inverse_root * inverse_root;
             let path = path(model, k);
             for p in (0..n).rev() {
                 let a = row[p] * inverse;
@@ -212,17 +213,19 @@ impl FactoredMassMatrix {
         }
     }
 
-    /// `y ← D^(-1/2) L^(-T) y` for a vector along a path (nothing else is nonzero).
+    /// `y ← D^(-1/2) L^(-T) y` for several columns along a path (nothing else is nonzero).
     #[inline]
-    pub fn half_solve_path(&self, path: &[usize], y: &mut [f64]) {
+    pub fn half_solve_path<const N: usize>(&self, path: &[usize], y: &mut [[f64; N]]) {
         for (p, &k) in path.iter().enumerate().rev() {
             let (before, own) = y.split_at_mut(p);
             let value = own[0];
             let row = &self.rows[k * self.stride..][..p];
             for (x, entry) in before.iter_mut().zip(row) {
-                *x -= entry * value;
+                for (x, value) in x.iter_mut().zip(value) {
+                    *x -= entry * value;
+                }
             }
-            own[0] = value * self.inverse_root[k];
+            own[0] = value.map(|x| x * self.inverse_root[k]);
         }
     }
 

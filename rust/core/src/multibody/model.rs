@@ -34,6 +34,9 @@ pub struct Body {
     pub principal_axes: Option<Matrix3<f64>>,
     /// Gains with which the joint is held.
     pub hold: Hold,
+    /// Whether turning about its own joint changes nothing but its looks: an axisymmetric body about its own axis, with
+    /// nothing on it but wheels of the same axle. A step need not turn it.
+    pub is_spinner: bool,
 }
 
 /// The frame of a solid, fixed to a moving body.
@@ -218,6 +221,7 @@ impl Model {
                             stiffness: 0.0,
                             damping: 0.0,
                         }),
+                        is_spinner: false,
                     });
                     lumps.push(Lump::default());
                     Frame {
@@ -242,6 +246,7 @@ impl Model {
                         stiffness: 0.0,
                         damping: 0.0,
                     },
+                    is_spinner: false,
                 });
                 lumps.push(Lump::default());
                 Frame {
@@ -313,6 +318,7 @@ impl Model {
                 steering_limit: wheel.steering_limit.unwrap_or(0.0),
             });
         }
+        mark_spinners(&mut bodies, &wheels, &boxes);
         Ok(Self::with_tree(
             description,
             locked,
@@ -452,6 +458,35 @@ impl Model {
             .skip(1)
             .position(|b| b.name == name)
             .map(|k| k + 6)
+    }
+}
+
+/// Finds the bodies whose own rotation is only looks.
+fn mark_spinners(bodies: &mut [Body], wheels: &[Wheel], boxes: &[CollisionBox]) {
+    for b in 1..bodies.len() {
+        let body = &bodies[b];
+        let along = |x: &Vector3<f64>| x.cross(&body.axis.direction()).norm() < 1e-12;
+        let (axis, I) = (body.axis.direction(), body.principal_inertia);
+        let across = match body.axis {
+            JointAxis::X => [I.y, I.z],
+            JointAxis::Y => [I.x, I.z],
+            JointAxis::Z => [I.x, I.y],
+            JointAxis::General(_) => [f64::NAN; 2],
+        };
+        let is_symmetric =
+            body.principal_axes.is_none() && (across[0] - across[1]).abs() <= 1e-14 * I.sum();
+        let is_leaf = bodies.iter().skip(1).all(|other| other.parent != b)
+            && boxes.iter().all(|x| x.body != b);
+        let wheels_spin = wheels
+            .iter()
+            .filter(|w| w.body == b)
+            .all(|w| along(&w.centre) && along(&w.axle));
+        let is_spinner = is_leaf
+            && is_symmetric
+            && wheels_spin
+            && along(&body.centre_of_mass)
+            && axis.norm() > 0.0;
+        bodies[b].is_spinner = is_spinner;
     }
 }
 

@@ -249,6 +249,16 @@ fn run<const D: usize>(
             if status == SolveStatus::Converged {
                 return (Method::Newton, status, residual);
             }
+            // A warm start can mislead where zero does not: a rover that starts to slide took 263 steps from the one,
+            // 17 from the other.
+            if workspace.start.iter().any(|x| x.abs() > 0.0) {
+                p.fill(0.0);
+                let (status, residual) =
+                    newton::full_steps::<D>(data, options, steps, p, u, workspace, iterations);
+                if status == SolveStatus::Converged {
+                    return (Method::Newton, status, residual);
+                }
+            }
             p.copy_from_slice(&workspace.start);
             let (status, residual) =
                 proximal::solve::<D>(data, options, p, u, workspace, iterations);

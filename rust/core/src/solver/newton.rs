@@ -1,7 +1,7 @@
 //! Semismooth Newton on the contact modes.
 //!
-//! One step predicts each contact's mode ([`modes`](super::modes)) for the regularised velocity `û = W p + q + α (p − c)` and solves
-//! the equations of those modes ([`reduced_system`](super::reduced_system)). Once the modes are right the convergence is quadratic, and
+//! One step predicts each contact's mode ([`modes`]) for the regularised velocity `û = W p + q + α (p − c)` and solves
+//! the equations of those modes ([`reduced_system`]). Once the modes are right the convergence is quadratic, and
 //! finite when nothing slides. `α > 0` makes the system regular when `W` is not: every step is a proximal step, whose answer moves
 //! from the centre `c` no farther than `W` asks.
 

@@ -35,7 +35,7 @@ pub struct SolverOptions {
     /// Measured: smaller values let rounding (`ε/α`) leak into the impulses that `W` cannot see, larger ones cost
     /// refinement steps.
     pub regularisation: f64,
-    /// Most contacts that `Auto` takes to Newton without trying Gauss–Seidel first; default 16.
+    /// Most contacts that `Auto` takes to Newton without trying Gauss–Seidel first; default 32.
     pub direct_contacts: usize,
 }
 
@@ -48,7 +48,7 @@ impl Default for SolverOptions {
             max_newton_steps: 500,
             max_sweeps: 10_000,
             regularisation: 1e-6,
-            direct_contacts: 16,
+            direct_contacts: 32,
         }
     }
 }

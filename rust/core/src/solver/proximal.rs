@@ -92,11 +92,16 @@ impl Course {
         begins
     }
 
-    fn succeed(&mut self, slow: bool, smallest: f64) {
+    fn succeed(&mut self, slow: bool, steps: usize, smallest: f64) {
         self.follows_path = false;
         self.failures = 0;
+        self.cheap = steps <= CHEAP;
+        if self.alpha < self.proved {
+            self.patience = (self.patience / 2).max(1);
+        }
         self.proved = self.alpha;
-        self.successes += 1;
+        // Steps of a single solve say that a smaller α would do.
+        self.successes += if steps <= 1 { 4 } else { 1 };
         if slow && self.successes >= self.patience {
             self.alpha = (self.alpha * self.shrink).max(smallest);
             self.successes = 0;
@@ -324,13 +329,12 @@ pub(super) fn solve<const D: usize>(
             workspace.accepted.copy_from_slice(p);
             let slow = residual.relative > SLOW * last;
             last = residual.relative;
-            course.cheap = *iterations <= before + CHEAP;
             if course.follows_path && course.alpha > target {
                 course.proved = course.alpha;
                 course.alpha = (course.alpha * PATH_SHRINK).max(target);
             } else {
                 workspace.centre.copy_from_slice(p);
-                course.succeed(slow, SMALLEST * data.mean_diagonal);
+                course.succeed(slow, *iterations - before, SMALLEST * data.mean_diagonal);
             }
         } else {
             p.copy_from_slice(&workspace.accepted);

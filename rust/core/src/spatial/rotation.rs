@@ -42,8 +42,9 @@ impl HeadingPitchRoll {
     /// Angles of an attitude. With the nose straight up or down the heading is taken as 0.
     #[must_use]
     pub fn from_rotation(R: &Matrix3<f64>) -> Self {
-        let pitch = R[(1, 0)].clamp(-1.0, 1.0).asin();
-        if R[(0, 0)].hypot(R[(2, 0)]) < 1e-9 {
+        let horizontal = R[(0, 0)].hypot(R[(2, 0)]);
+        let pitch = R[(1, 0)].atan2(horizontal);
+        if horizontal < 1e-9 {
             let roll = R[(2, 1)].atan2(R[(2, 2)]);
             return Self {
                 heading: 0.0,
@@ -82,8 +83,9 @@ impl CardanReport {
     /// Angles of an attitude. At the singular heading the angle about z is taken as 0.
     #[must_use]
     pub fn from_rotation(R: &Matrix3<f64>) -> Self {
-        let y = (-R[(2, 0)]).clamp(-1.0, 1.0).asin();
-        if R[(0, 0)].hypot(R[(1, 0)]) < 1e-9 {
+        let across = R[(0, 0)].hypot(R[(1, 0)]);
+        let y = (-R[(2, 0)]).atan2(across);
+        if across < 1e-9 {
             let x = (-R[(1, 2)]).atan2(R[(1, 1)]);
             return Self { x, y, z: 0.0 };
         }
