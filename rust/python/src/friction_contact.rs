@@ -126,6 +126,7 @@ pub fn solver_options(
     Ok(SolverOptions {
         method: method(name)?,
         tolerance,
+        velocity_tolerance: tolerance.max(1e-9),
         max_newton_steps: max_iterations,
         max_sweeps: max_iterations,
         ..SolverOptions::default()

@@ -110,6 +110,7 @@ pub struct Model {
     /// How many leading path entries bodies `a` and `b` share: `common[a * n_bodies + b]`.
     common: Vec<usize>,
     mass: f64,
+    fingerprint: u64,
 }
 
 /// Mass, first moment and inertia about the body frame's origin, while solids are merged.
@@ -360,6 +361,7 @@ impl Model {
             }
         }
         let mass = bodies.iter().map(|b| b.mass).sum();
+        let fingerprint = fingerprint(&description, &locked);
         Self {
             description,
             locked,
@@ -372,6 +374,7 @@ impl Model {
             path_stride,
             common,
             mass,
+            fingerprint,
         }
     }
 
@@ -423,6 +426,12 @@ impl Model {
         self.bodies.len() - 1
     }
 
+    /// A number that two models share only if they have the same description and the same locked joints.
+    #[must_use]
+    pub fn fingerprint(&self) -> u64 {
+        self.fingerprint
+    }
+
     /// Total mass, kg.
     #[must_use]
     pub fn mass(&self) -> f64 {
@@ -459,6 +468,19 @@ impl Model {
             .position(|b| b.name == name)
             .map(|k| k + 6)
     }
+}
+
+/// FNV-1a over what tells models apart; the same on every machine and in every version.
+fn fingerprint(description: &ModelDescription, locked: &[(String, f64)]) -> u64 {
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let text = description.to_json().unwrap_or_default();
+    let angles = locked
+        .iter()
+        .flat_map(|(name, angle)| name.bytes().chain(angle.to_bits().to_le_bytes()));
+    for byte in text.bytes().chain(angles) {
+        hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+    }
+    hash
 }
 
 /// Finds the bodies whose own rotation is only looks.

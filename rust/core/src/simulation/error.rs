@@ -58,14 +58,11 @@ pub enum CommandError {
 /// A snapshot that does not fit the simulation.
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum SnapshotError {
-    /// Taken from a model of another size.
-    #[error("snapshot: belongs to a model of {actual} joints, this one has {expected}")]
-    OtherModel {
-        /// Joints of this model.
-        expected: usize,
-        /// Joints in the snapshot.
-        actual: usize,
-    },
+    /// Taken from another model.
+    #[error(
+        "snapshot: belongs to another model than this simulation's (or to other locked joints)"
+    )]
+    OtherModel,
     /// Not finite, or with contacts that the model cannot have.
     #[error("snapshot: its contents are damaged")]
     Damaged,

@@ -413,6 +413,7 @@ impl Simulation {
     #[must_use]
     pub fn snapshot(&self) -> Snapshot {
         Snapshot {
+            model: self.model.fingerprint(),
             state: self.state.clone(),
             command: self.command.clone(),
             wheel_torque: self.wheel_torque.clone(),
@@ -427,13 +428,10 @@ impl Simulation {
     /// # Errors
     /// A snapshot of another model or with damaged contents; nothing is changed then.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), SnapshotError> {
-        let (expected, actual) = (
-            self.model.n_joints(),
-            snapshot.state.configuration.joints.len(),
-        );
-        if expected != actual || snapshot.wheel_torque.len() != self.model.wheels().len() {
-            return Err(SnapshotError::OtherModel { expected, actual });
+        if snapshot.model != self.model.fingerprint() {
+            return Err(SnapshotError::OtherModel);
         }
+        let expected = self.model.n_joints();
         let command = &snapshot.command;
         let held = command
             .held
@@ -446,6 +444,8 @@ impl Simulation {
             .chain(&snapshot.wheel_torque)
             .chain(&snapshot.joint_torque);
         let is_sound = snapshot.state.is_finite()
+            && snapshot.state.configuration.joints.len() == expected
+            && snapshot.wheel_torque.len() == self.model.wheels().len()
             && snapshot.state.v.len() == self.model.nv()
             && [&command.torque, &snapshot.joint_torque]
                 .iter()

@@ -8,6 +8,8 @@ use crate::multibody::State;
 /// State, commands, the solver's starting point and the last step's contacts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Snapshot {
+    /// [`crate::multibody::Model::fingerprint`] of the machine.
+    pub model: u64,
     /// Where and how fast.
     pub state: State,
     /// Torques and held joints.

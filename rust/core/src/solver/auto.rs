@@ -4,7 +4,7 @@ use super::modes::Proximal;
 use super::nsgs::Budget;
 use super::report::{SolveReport, SolveStatus};
 use super::workspace::SolverWorkspace;
-use super::{Method, SolverOptions, newton, nsgs, proximal};
+use super::{Method, SolverOptions, newton, nsgs, pivoting, proximal};
 use crate::law::coulomb::natural_map;
 use crate::problem::{FrictionContactProblem, Residual, contact_scale, evaluate_contact};
 
@@ -243,21 +243,29 @@ fn run<const D: usize>(
                 }
                 workspace.start.copy_from_slice(p);
             }
+            let is_warm = workspace.start.iter().any(|x| x.abs() > 0.0);
             let steps = newton::FULL_STEPS.min(options.max_newton_steps);
+            if is_warm && data.mu.len() <= options.direct_contacts {
+                // Where the modes of the last step serve, this is the end; where they do not, more full steps seldom help.
+                let few = newton::WARM_STEPS.min(steps);
+                let (status, residual) =
+                    newton::full_steps::<D>(data, options, few, p, u, workspace, iterations);
+                if status == SolveStatus::Converged {
+                    return (Method::Newton, status, residual);
+                }
+                p.copy_from_slice(&workspace.start);
+                let (status, residual) =
+                    pivoting::pivots::<D>(data, options, p, u, workspace, iterations);
+                if status == SolveStatus::Converged {
+                    return (Method::Newton, status, residual);
+                }
+                // A warm start can mislead where zero does not.
+                p.fill(0.0);
+            }
             let (status, residual) =
                 newton::full_steps::<D>(data, options, steps, p, u, workspace, iterations);
             if status == SolveStatus::Converged {
                 return (Method::Newton, status, residual);
-            }
-            // A warm start can mislead where zero does not: a rover that starts to slide took 263 steps from the one,
-            // 17 from the other.
-            if workspace.start.iter().any(|x| x.abs() > 0.0) {
-                p.fill(0.0);
-                let (status, residual) =
-                    newton::full_steps::<D>(data, options, steps, p, u, workspace, iterations);
-                if status == SolveStatus::Converged {
-                    return (Method::Newton, status, residual);
-                }
             }
             p.copy_from_slice(&workspace.start);
             let (status, residual) =

@@ -3,6 +3,7 @@
 //! - [`one_contact`]: the exact solution of a single contact, the brick of Gauss–Seidel;
 //! - `nsgs`: nonsmooth Gauss–Seidel, cheap sweeps, good with many contacts;
 //! - `newton`: semismooth Newton on the contact modes, quadratic near the answer;
+//! - `pivoting`: one contact changes its mode at a time, from a warm start that full Newton steps do not profit from;
 //! - `proximal`: the proximal-point method around Newton, for whatever resists (redundant contacts, jammed stacks).
 //!
 //! [`Method::Auto`] takes few contacts to Newton at once and many to Gauss–Seidel first, and escalates when progress stops.
@@ -15,6 +16,7 @@ mod newton;
 mod nsgs;
 pub mod one_contact;
 mod options;
+mod pivoting;
 mod proximal;
 mod reduced_system;
 mod report;

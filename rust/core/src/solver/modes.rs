@@ -63,20 +63,65 @@ fn direction<const D: usize>(v: &[f64; D], norm: f64) -> [f64; 2] {
     }
 }
 
-/// The modes that the impulse itself shows, as the ones to compare the first prediction with.
+/// Direction and turning stiffness of a slide at impulse `p` and velocity `u` of one contact.
 #[inline]
-pub(super) fn recall<const D: usize>(mu: &[f64], p: &[f64], contacts: &mut [Linearised]) {
-    for ((contact, &mu), p) in contacts.iter_mut().zip(mu).zip(p.chunks_exact(D)) {
+pub(super) fn set_slide<const D: usize>(contact: &mut Linearised, p: &[f64], u: &[f64]) {
+    let p: [f64; D] = std::array::from_fn(|k| p[k]);
+    let norm = crate::cone::tangential_norm(&p);
+    contact.e = direction(&p, norm);
+    let along: f64 = p[1..].iter().zip(&u[1..]).map(|(p, u)| p * u).sum();
+    contact.gamma = if norm > 0.0 {
+        (-along / (norm * norm)).max(0.0)
+    } else {
+        0.0
+    };
+}
+
+/// Reads the modes off the impulse itself: what the last step's answer says of this one.
+///
+/// In steady motion these are the modes of the answer, and far better ones than a prediction from `u`: wheels that fight each other
+/// in a turn slide at 1e-6 m/s, a hundredth of what the free velocity changes from step to step, so the sign of their slip is lost in `u`
+/// until the modes are right. A contact without impulse is taken to stick if the ground approaches it, else to be open.
+#[inline]
+pub(super) fn recall<const D: usize>(
+    mu: &[f64],
+    p: &[f64],
+    u: &[f64],
+    contacts: &mut [Linearised],
+) -> Prediction {
+    let mut prediction = Prediction {
+        changed: false,
+        m: 0,
+        slides: false,
+    };
+    for ((contact, &mu), (p, u)) in contacts
+        .iter_mut()
+        .zip(mu)
+        .zip(p.chunks_exact(D).zip(u.chunks_exact(D)))
+    {
+        let p: [f64; D] = std::array::from_fn(|k| p[k]);
         let radius = mu * p[0];
-        let square: f64 = p[1..].iter().map(|x| x * x).sum();
-        contact.mode = if p[0] <= 0.0 {
-            ContactMode::Open
-        } else if square < radius * radius * (1.0 - 1e-9) {
-            ContactMode::Stick
-        } else {
-            ContactMode::Slide
+        let norm = crate::cone::tangential_norm(&p);
+        *contact = Linearised {
+            start: prediction.m,
+            ..Linearised::default()
         };
+        if p[0] <= 0.0 {
+            contact.mode = if u[0] < 0.0 {
+                ContactMode::Stick
+            } else {
+                ContactMode::Open
+            };
+        } else if mu > 0.0 && norm < radius * (1.0 - 1e-9) {
+            contact.mode = ContactMode::Stick;
+        } else {
+            contact.mode = ContactMode::Slide;
+            set_slide::<D>(contact, &p, u);
+            prediction.slides |= mu > 0.0;
+        }
+        prediction.m += n_unknowns::<D>(contact.mode, mu);
     }
+    prediction
 }
 
 /// Predicts the modes at `(p, u)`, `u = W p + q`; `contacts` receives them. `exact` chooses the predictor.
