@@ -55,6 +55,11 @@ docs: $(STAMPS)/test $(STAMPS)/core ## build the documentation, Rust and Python,
 
 bench: ## time a step and tell where the time goes (informs, does not gate)
 	cargo bench --locked
+	@if command -v valgrind > /dev/null; then cargo build --release --locked --quiet --example drive_steps; \
+	  count() { valgrind --tool=callgrind --callgrind-out-file=/dev/null target/release/examples/drive_steps $$1 2>&1 \
+	    | awk '/Collected/ { print $$NF }'; }; \
+	  awk -v a=$$(count 1) -v b=$$(count 1001) 'BEGIN { printf "\n%.0f instructions a step of the curve (callgrind)\n", (b - a) / 1000 }'; \
+	else echo "valgrind is not installed: no instruction counts"; fi
 
 pins: $(STAMPS)/venv ## resolve requirements/*.txt anew from pyproject.toml
 	$(call pin,demo) --extra demo --group build

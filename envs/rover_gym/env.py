@@ -429,7 +429,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         """Continues from a snapshot, bit for bit, taken from an environment with the same arguments.
 
         Raises:
-            StateError: This is no snapshot, or one of another model; nothing has changed.
+            StateError: This is no snapshot; nothing has changed.
         """
         if not isinstance(snapshot, EnvSnapshot):
             refuse(StateError, "snapshot", snapshot, "must come from RoverEnv.snapshot()")

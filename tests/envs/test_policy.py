@@ -96,14 +96,15 @@ def test_goal_anywhere_around_the_rover_is_reached(env: RoverEnv, bearing: float
     assert drive(env, 0, heading_deg=0.0, goal=goal)["success"]
 
 
-@pytest.mark.parametrize("first_seed", [0, 25, 50, 75])
-@pytest.mark.parametrize(
-    "arguments",
-    [{}, {"slope_deg": (0.0, 10.0), "goal_bearing_deg": (-180.0, 180.0)}, {"slope_deg": 10.0}],
-    ids=["flat", "slopes", "steepest"],
-)
-def test_goal_is_reached(arguments: dict[str, Any], first_seed: int) -> None:
-    # 98 of 100 are asked for; each quarter is held to 25 of 25, which is what was measured.
-    env = gym.make("Rover-v0", **arguments)
-    lost = [seed for seed in range(first_seed, first_seed + 25) if not drive(env, seed)["success"]]
+@pytest.mark.parametrize("first_seed", range(0, 100, 10))
+def test_goal_is_reached(first_seed: int) -> None:
+    # 98 of 100 are asked for; each ten is held to ten of ten, which is what was measured, here and with 100 episodes
+    # each on flat ground and on 10 degrees.
+    env = gym.make("Rover-v0", slope_deg=(0.0, 10.0), goal_bearing_deg=(-180.0, 180.0))
+    lost = [seed for seed in range(first_seed, first_seed + 10) if not drive(env, seed)["success"]]
     assert not lost
+
+
+@pytest.mark.parametrize("slope", [0.0, 10.0])
+def test_goal_is_reached_from_the_default_start(slope: float) -> None:
+    assert drive(gym.make("Rover-v0", slope_deg=slope), 0)["success"]

@@ -1,0 +1,110 @@
+"""`solve_friction_contact`: closed forms, Coulomb's law on random problems, bad input."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import rover_gym
+
+
+def test_a_block_pushed_into_the_ground_sticks_slides_or_flies():
+    eye = np.eye(3)
+    stick = rover_gym.solve_friction_contact(eye, [-1.0, 0.5, 0.0], [0.7])
+    np.testing.assert_allclose(stick.impulses, [[1.0, -0.5, 0.0]], atol=1e-12)
+    slide = rover_gym.solve_friction_contact(eye, [-1.0, 2.0, 0.0], [0.7])
+    np.testing.assert_allclose(slide.impulses, [[1.0, -0.7, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(slide.velocities, [[0.0, 1.3, 0.0]], atol=1e-12)
+    fly = rover_gym.solve_friction_contact(eye, [1.0, 2.0, 0.0], [0.7])
+    np.testing.assert_array_equal(fly.impulses, 0.0)
+    plane = rover_gym.solve_friction_contact(np.eye(2), [-1.0, 2.0], [0.7], dimension=2)
+    np.testing.assert_allclose(plane.impulses, [[1.0, -0.7]], atol=1e-12)
+    for answer in (stick, slide, fly, plane):
+        assert answer.report.status == "converged"
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n=st.integers(1, 6),
+    rank=st.integers(2, 20),
+    mu=st.floats(0.0, 1.0),
+    dimension=st.sampled_from([2, 3]),
+)
+def test_answers_obey_coulombs_law(seed, n, rank, mu, dimension):
+    rng = np.random.default_rng(seed)
+    size = n * dimension
+    rank = max(rank, dimension)
+    jacobian = rng.normal(size=(size, rank))
+    free = jacobian @ rng.normal(size=rank)
+    answer = rover_gym.solve_friction_contact(
+        jacobian @ jacobian.T, free, np.full(n, mu), tolerance=1e-10, dimension=dimension
+    )
+    # Few redundant random problems resist; what counts is that the report says so.
+    if not answer.report.is_converged:
+        assert answer.report.residual > 1e-10
+        return
+    p, u = answer.impulses, answer.velocities
+    np.testing.assert_allclose(u.ravel(), jacobian @ jacobian.T @ p.ravel() + free, atol=1e-9 * (1 + abs(free).max()))
+    scale = max(np.abs(free).max(), 1e-3)
+    impulse = max(np.abs(p).max(), 1e-3)
+    slip, push = np.linalg.norm(u[:, 1:], axis=1), np.linalg.norm(p[:, 1:], axis=1)
+    assert p[:, 0].min() >= -1e-6 * impulse
+    assert u[:, 0].min() >= -1e-6 * scale
+    assert (push <= mu * p[:, 0] + 1e-6 * impulse).all()
+    assert np.abs(p[:, 0] * u[:, 0]).max() <= 1e-6 * impulse * scale
+    # where it slips, friction is at its limit and opposes it
+    work = np.einsum("ij,ij->i", p[:, 1:], u[:, 1:])
+    assert np.abs(work + mu * p[:, 0] * slip).max() <= 1e-6 * impulse * scale
+
+
+@pytest.mark.parametrize("solver", ["auto", "nsgs", "newton"])
+def test_every_solver_gives_the_rovers_loads(sim, solver):
+    sim.step()
+    answer = rover_gym.solve_friction_contact(*sim.last_problem(), tolerance=1e-10, solver=solver, max_iterations=20000)
+    assert answer.report.is_converged
+    assert answer.impulses[:, 0].sum() == pytest.approx(960.0 * 9.81 * sim.time_step, rel=1e-6)
+    assert np.abs(answer.velocities).max() < 1e-9
+
+
+def test_a_warm_start_is_taken(sim):
+    sim.step()
+    problem = sim.last_problem()
+    cold = rover_gym.solve_friction_contact(*problem)
+    warm = rover_gym.solve_friction_contact(*problem, initial=cold.impulses)
+    assert warm.report.iterations < cold.report.iterations
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (np.eye(4), np.zeros(4), [0.5]),
+        (np.ones((3, 2)), np.zeros(3), [0.5]),
+        (np.eye(3), np.zeros(2), [0.5]),
+        (np.eye(3), np.zeros(3), [0.5, 0.5]),
+        (np.eye(3), np.zeros(3), [-0.5]),
+        (np.eye(3), [np.nan, 0.0, 0.0], [0.5]),
+        (np.full((3, 3), np.inf), np.zeros(3), [0.5]),
+        (np.diag([0.0, 1.0, 1.0]), np.zeros(3), [0.5]),
+        ([["a", "b"]], np.zeros(3), [0.5]),
+    ],
+)
+def test_a_bad_problem_is_refused(arguments):
+    with pytest.raises(rover_gym.ProblemError):
+        rover_gym.solve_friction_contact(*arguments)
+
+
+def test_bad_options_are_refused_by_field():
+    problem = (np.eye(3), np.zeros(3), [0.5])
+    for field, options in [
+        ("tolerance", {"tolerance": -1.0}),
+        ("dimension", {"dimension": 4}),
+        ("solver", {"solver": "lemke"}),
+        ("max_iterations", {"max_iterations": 0}),
+    ]:
+        with pytest.raises(rover_gym.OptionError) as caught:
+            rover_gym.solve_friction_contact(*problem, **options)
+        assert caught.value.field == field
+    with pytest.raises(rover_gym.ProblemError) as caught:
+        rover_gym.solve_friction_contact(*problem, initial=[np.nan, 0.0, 0.0])
+    assert caught.value.field == "initial"

@@ -1,0 +1,202 @@
+"""`RoverModel`: agreement with the reference, files, welding."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+import rover_gym
+
+
+def close(actual, expected):
+    expected = np.asarray(expected)
+    return np.abs(np.asarray(actual) - expected).max() <= 1e-10 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("table", ["masses_960", "masses_880"])
+def test_dynamics_agree_with_the_reference(reference, table):
+    model = rover_gym.RoverModel().replace(masses=reference["meta"][table])
+    for case in reference["cases"]:
+        expected = case[table]
+        q, qdot = case["q"], case["qdot"]
+        assert close(model.mass_matrix(q, coordinates="report"), expected["M"])
+        gravity = (0.0, -0.0981, 0.0)
+        assert close(model.bias(q, qdot, gravity=gravity, coordinates="report"), expected["bias"])
+        assert close(model.bias(q, np.zeros(21), gravity=gravity), expected["gravity"])
+        assert model.kinetic_energy(q, qdot) == pytest.approx(expected["kinetic_energy"], rel=1e-10)
+
+
+def test_places_and_contacts_agree_with_the_reference(reference):
+    model = rover_gym.RoverModel().replace(wheel_radius=0.30)
+    plane = rover_gym.Plane(reference["meta"]["plane_normal"])
+    for case in reference["cases"]:
+        tags = model.tags(case["q"])
+        assert close([tags[name] for name in model.solid_names], case["tags"])
+        assert close(tags["centre_of_mass"], case["centre_of_mass_960"])
+        assert close(model.wheel_gaps(case["q"], plane), case["plane"]["gap"])
+        assert close(model.wheel_contact_points(case["q"], plane), case["plane"]["contact_point"])
+        assert close(model.wheel_jacobians(case["q"], plane, coordinates="report"), case["plane"]["jacobian"])
+
+
+def test_axles_among_the_tags_are_the_wheels_third_axes(reference):
+    model = rover_gym.RoverModel()
+    q = reference["cases"][3]["q"]
+    tags, poses = model.tags(q), model.poses(q)
+    for wheel in model.wheel_names:
+        origin, rotation = poses[f"wheel_{wheel}"]
+        np.testing.assert_allclose(tags[f"axle_{wheel}"], rotation[:, 2], atol=1e-14)
+        np.testing.assert_allclose(tags[f"wheel_{wheel}"], origin, atol=1e-14)
+
+
+def test_both_coordinates_tell_one_motion(reference):
+    model = rover_gym.RoverModel()
+    case = reference["cases"][5]
+    q, v = model.from_report(case["q"], case["qdot"])
+    energy = model.kinetic_energy(case["q"], case["qdot"])
+    assert model.kinetic_energy(q, v, coordinates="state") == pytest.approx(energy, rel=1e-12)
+    assert 0.5 * v @ model.mass_matrix(q, coordinates="state") @ v == pytest.approx(energy, rel=1e-12)
+    again = model.to_report(q, v)
+    np.testing.assert_allclose(model.from_report(*again)[1], v, atol=1e-10)
+    np.testing.assert_allclose(model.tags(q, "state")["wheel_BR"], model.tags(case["q"])["wheel_BR"], atol=1e-12)
+
+
+def test_the_reports_coordinates_are_singular_at_a_right_angle_and_say_so():
+    model = rover_gym.RoverModel()
+    q = np.zeros(21)
+    q[4] = np.pi / 2
+    smallest = np.linalg.eigvalsh(model.mass_matrix(q, coordinates="report"))[0]
+    assert abs(smallest) < 1e-9
+    assert np.linalg.eigvalsh(model.mass_matrix(q, coordinates="state"))[0] > 1e-3
+    with pytest.raises(rover_gym.StateError) as caught:
+        model.to_report(q, np.zeros(21))
+    assert caught.value.field == "q[4]"
+
+
+def test_actuation_pushes_wheels_forward_and_steering_to_the_left():
+    model = rover_gym.RoverModel()
+    actuation = model.actuation_matrix()
+    assert actuation.shape == (21, 12)
+    for wheel, (rolling, steering) in enumerate(
+        zip(model.wheel_joint_indices, model.steering_joint_indices, strict=True)
+    ):
+        assert actuation[rolling, wheel] == -1.0  # a positive torque about +z drives backwards
+        assert actuation[steering, 6 + wheel] == 1.0
+    assert np.count_nonzero(actuation) == 12
+
+
+def test_files_and_dictionaries_bring_the_model_back(tmp_path):
+    model = rover_gym.RoverModel().replace(wheel_radius=0.2, masses={"trunk": 500.0})
+    path = tmp_path / "rover.toml"
+    model.to_file(path)
+    assert rover_gym.RoverModel.from_file(path) == model
+    assert rover_gym.RoverModel.from_dict(model.to_dict()) == model
+    assert rover_gym.RoverModel.from_text(model.to_text()) == model
+    welded = model.weld({"front_axle": 0.1})
+    assert pickle.loads(pickle.dumps(welded)) == welded  # noqa: S301
+    assert copy.deepcopy(welded) == welded != model
+    assert model.mass == pytest.approx(860.0)
+
+
+def test_welding_takes_the_coordinate_out_of_every_matrix():
+    full = rover_gym.RoverModel()
+    welded = full.weld(["steering_FL", "front_axle"])
+    kept = [k for k, name in enumerate(full.dof_names) if name not in ("steering_FL", "front_axle")]
+    assert welded.nv == 19
+    assert welded.dof_names == [full.dof_names[k] for k in kept]
+    q = np.linspace(-0.5, 0.5, 21)
+    q[[full.dof_names.index("steering_FL"), full.dof_names.index("front_axle")]] = 0.0
+    expected = full.mass_matrix(q, coordinates="state")[np.ix_(kept, kept)]
+    np.testing.assert_allclose(welded.mass_matrix(q[kept], coordinates="state"), expected, atol=1e-11)
+    assert welded.steering_joint_indices[0] == -1
+
+
+def corrupted(change):
+    description = rover_gym.RoverModel().to_dict()
+    change(description)
+    return description
+
+
+@pytest.mark.parametrize(
+    ("field", "change"),
+    [
+        ("solids[0].mass", lambda d: d["solids"][0].update(mass=-600.0)),
+        ("solids[2].mass", lambda d: d["solids"][2].update(mass=0.0)),
+        ("solids[1].inertia", lambda d: d["solids"][1].update(inertia=[1.0, 1.0, 5.0, 0.0, 0.0, 0.0])),
+        ("solids[4].parent", lambda d: d["solids"][4].update(parent="wheel_FR")),
+        ("solids[1].axis", lambda d: d["solids"][1].update(axis=[0.0, 0.0, 0.0])),
+        ("wheels[5].radius", lambda d: d["wheels"][5].update(radius=-0.1)),
+        ("wheels[0].solid", lambda d: d["wheels"][0].update(solid="nothing")),
+    ],
+)
+def test_a_bad_description_is_refused_by_field(field, change):
+    with pytest.raises(rover_gym.ModelError) as caught:
+        rover_gym.RoverModel.from_dict(corrupted(change))
+    assert caught.value.field == field
+    assert isinstance(caught.value, ValueError)
+    assert field in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "name = 'x'",
+        "name = 'x'\nsolids = []",
+        "name = 'x'\nsolids = [{ name = 'a', mass = nan, shape = { kind = 'disc', radius = 1.0 } }]",
+        "name = 'x'\nsolids = [{ name = 'a', mass = 1.0, shape = { kind = 'ball', radius = 1.0 } }]",
+        "\x00\x01 garbage [[",
+    ],
+)
+def test_a_corrupted_file_is_a_model_error(tmp_path, text):
+    path = tmp_path / "rover.toml"
+    path.write_text(text)
+    with pytest.raises(rover_gym.ModelError):
+        rover_gym.RoverModel.from_file(path)
+
+
+def test_a_binary_file_and_a_missing_one(tmp_path):
+    path = tmp_path / "rover.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(rover_gym.ModelError, match="UTF-8"):
+        rover_gym.RoverModel.from_file(path)
+    with pytest.raises(FileNotFoundError):
+        rover_gym.RoverModel.from_file(tmp_path / "nothing.toml")
+
+
+@pytest.mark.parametrize(
+    ("field", "call"),
+    [
+        ("q", lambda m: m.mass_matrix(np.zeros(20))),
+        ("q", lambda m: m.mass_matrix(np.zeros((3, 7)))),
+        ("q", lambda m: m.mass_matrix("text")),
+        ("q[2]", lambda m: m.tags([0.0, 0.0, np.nan] + [0.0] * 18)),
+        ("qdot[20]", lambda m: m.bias(np.zeros(21), [0.0] * 20 + [np.inf])),
+    ],
+)
+def test_a_bad_state_is_refused_by_field(field, call):
+    with pytest.raises(rover_gym.StateError) as caught:
+        call(rover_gym.RoverModel())
+    assert caught.value.field == field
+
+
+@pytest.mark.parametrize(
+    ("field", "call"),
+    [
+        ("coordinates", lambda m: m.mass_matrix(np.zeros(21), coordinates="cardan")),
+        ("gravity", lambda m: m.bias(np.zeros(21), np.zeros(21), gravity=(0.0, np.nan, 0.0))),
+    ],
+)
+def test_a_bad_option_is_refused_by_field(field, call):
+    with pytest.raises(rover_gym.OptionError) as caught:
+        call(rover_gym.RoverModel())
+    assert caught.value.field == field
+
+
+def test_unknown_joints_and_masses_are_refused():
+    with pytest.raises(rover_gym.ModelError, match="wheel_XX"):
+        rover_gym.RoverModel().weld(["wheel_XX"])
+    with pytest.raises(rover_gym.ModelError, match="boat"):
+        rover_gym.RoverModel().replace(masses={"boat": 1.0})
+    with pytest.raises(rover_gym.ModelError, match="16 entries"):
+        rover_gym.RoverModel().replace(masses=[1.0, 2.0])

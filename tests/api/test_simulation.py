@@ -1,0 +1,259 @@
+"""`Simulation`: state, commands, contacts, snapshots, bad input."""
+
+import copy
+import pickle
+import threading
+
+import numpy as np
+import pytest
+
+import rover_gym
+
+
+def drive(sim, steps=200):
+    sim.set_wheel_torques(np.full(6, 20.0))
+    sim.set_steering([0.2, 0.2, 0.0, -0.2, 0.0, -0.2])
+    return sim.step(steps)
+
+
+def test_loads_on_the_flat_are_the_closed_form(sim):
+    report = sim.step(10)
+    assert report.status == "converged"
+    assert report.steps == 10
+    np.testing.assert_allclose(sim.wheel_forces[:, 0], [1742.717647] * 2 + [1483.041176] * 4, rtol=1e-6)
+    assert sim.wheel_forces[:, 0].sum() == pytest.approx(960.0 * 9.81, rel=1e-9)
+
+
+def test_a_positive_wheel_command_drives_forward_and_positive_steering_turns_left(sim):
+    drive(sim, 400)
+    assert sim.q[0] > 0.5
+    assert sim.q[2] < -0.01  # left is towards -z
+    assert sim.q[4] > 0.01
+
+
+def test_contacts_are_told_wheel_by_wheel(sim):
+    sim.step()
+    contacts = sim.contacts
+    assert len(contacts) == 6
+    assert contacts.wheels.tolist() == [0, 1, 2, 3, 4, 5]
+    assert contacts.bodies == [f"wheel_{name}" for name in sim.model.wheel_names]
+    np.testing.assert_allclose(contacts.points[:, 1], 0.0, atol=1e-9)
+    identity = contacts.frames @ contacts.frames.transpose(0, 2, 1)
+    np.testing.assert_allclose(identity, np.tile(np.eye(3), (6, 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(contacts.impulses[:, 0], sim.wheel_forces[:, 0] * sim.time_step)
+    assert np.abs(contacts.velocities).max() < 1e-9
+
+
+def test_upside_down_the_trunk_carries_the_weight():
+    sim = rover_gym.Simulation()
+    q = np.zeros(21)
+    q[1], q[3] = 0.25, np.pi
+    sim.set_state(q)
+    sim.brake()
+    sim.step(600)
+    assert sim.contacts.wheels.max() == -1
+    assert sim.trunk_force == pytest.approx(960.0 * 9.81, rel=1e-3)
+    np.testing.assert_array_equal(sim.wheel_forces, 0.0)
+
+
+def test_set_state_takes_back_what_it_gave(sim):
+    drive(sim)
+    other = rover_gym.Simulation()
+    other.set_state(sim.q, sim.v)
+    np.testing.assert_allclose(other.q, sim.q, atol=1e-14)
+    np.testing.assert_array_equal(other.v, sim.v)
+    report = rover_gym.Simulation()
+    report.set_state(*sim.report_state(), coordinates="report")
+    np.testing.assert_allclose(report.rotation, sim.rotation, atol=1e-12)
+    np.testing.assert_allclose(report.v, sim.v, atol=1e-12)
+
+
+def test_arrays_are_fresh(sim):
+    q = sim.q
+    q[:] = 7.0
+    assert sim.q[0] == 0.0
+    assert sim.wheel_forces is not sim.wheel_forces
+
+
+@pytest.mark.parametrize("variant", ["linearised", "newton"])
+def test_snapshots_continue_bit_for_bit(variant):
+    sim = rover_gym.Simulation(variant=variant)
+    q = np.zeros(21)
+    q[1] = 0.4
+    sim.set_state(q)
+    drive(sim, 100)
+    snapshot = sim.snapshot()
+    twin = copy.deepcopy(sim)
+    pickled = pickle.loads(pickle.dumps(sim))  # noqa: S301
+    sim.step(100)
+    expected = (sim.q.tobytes(), sim.v.tobytes(), sim.wheel_forces.tobytes(), sim.time)
+    for other in (twin, pickled):
+        other.step(100)
+        assert (other.q.tobytes(), other.v.tobytes(), other.wheel_forces.tobytes(), other.time) == expected
+    sim.restore(pickle.loads(pickle.dumps(snapshot)))  # noqa: S301
+    assert sim.snapshot() == snapshot
+    assert hash(sim.snapshot()) == hash(snapshot)
+    sim.step(100)
+    assert (sim.q.tobytes(), sim.v.tobytes(), sim.wheel_forces.tobytes(), sim.time) == expected
+
+
+def test_settings_come_back():
+    sim = rover_gym.Simulation(friction=0.5, restitution=0.1, time_step=0.002, variant="newton", solver="nsgs")
+    again = rover_gym.Simulation(**sim.settings)
+    assert again.settings == sim.settings
+    assert again.friction == 0.5
+    assert again.settings["solver"] == "nsgs"
+
+
+def test_joints_can_be_free_driven_or_held(sim):
+    sim.hold("front_axle", 0.1, stiffness=1e6, damping=1e4)
+    sim.hold(["left_bogie", "right_bogie"])
+    sim.step(400)
+    index = sim.model.dof_names.index("front_axle")
+    assert sim.q[index] == pytest.approx(0.1, abs=1e-2)
+    sim.release(["front_axle", "left_bogie", "right_bogie"])
+    torques = np.zeros(15)
+    torques[3] = -30.0  # wheel FL, about +z: forward
+    sim.set_joint_torques(torques)
+    sim.step(100)
+    assert sim.v[sim.model.dof_names.index("wheel_FL")] < -0.1
+
+
+def test_a_welded_machine_steps_too():
+    steering = [f"steering_{wheel}" for wheel in ("FL", "FR", "ML", "BL", "MR", "BR")]
+    sim = rover_gym.Simulation(rover_gym.RoverModel().weld(steering))
+    q = np.zeros(15)
+    q[1] = 0.35
+    sim.set_state(q)
+    sim.set_wheel_torques([15.0] * 6)
+    assert sim.step(200).is_converged
+    assert sim.q[0] > 0.3
+    with pytest.raises(rover_gym.CommandError, match="set_points"):
+        sim.set_steering([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def test_torques_saturate_at_the_motors_limit(sim):
+    sim.set_wheel_torques([1e9, -1e9, 0.0, 1.0, 0.0, 0.0])
+    limit = sim.model.wheel_torque_limits[0]
+    assert sim.wheel_torques.tolist() == [limit, -limit, 0.0, 1.0, 0.0, 0.0]
+
+
+def test_the_interpreter_is_free_during_a_step(sim):
+    # Two threads, each with its own simulation over the same model: both finish, with equal bits.
+    sims = [copy.deepcopy(sim) for _ in range(2)]
+    threads = [threading.Thread(target=drive, args=(one, 2000)) for one in sims]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sims[0].q.tobytes() == sims[1].q.tobytes()
+
+
+def test_a_profile_names_the_parts_and_leaves_the_simulation_alone(sim):
+    before = sim.snapshot()
+    parts = sim.profile(50)
+    assert {"kinematics", "mass_matrix", "bias", "factor", "delassus", "solve"} <= set(parts)
+    assert all(value >= 0.0 for value in parts.values())
+    assert sim.snapshot() == before
+
+
+@pytest.mark.parametrize(
+    ("field", "options"),
+    [
+        ("time_step", {"time_step": 0.0}),
+        ("time_step", {"time_step": -0.01}),
+        ("time_step", {"time_step": np.nan}),
+        ("friction", {"friction": -0.1}),
+        ("restitution", {"restitution": 1.5}),
+        ("gravity", {"gravity": (0.0, np.inf, 0.0)}),
+        ("gravity", {"gravity": (0.0, 1.0)}),
+        ("theta", {"theta": 0.3}),
+        ("forecast", {"forecast": 2.0}),
+        ("variant", {"variant": "explicit"}),
+        ("solver", {"solver": "magic"}),
+        ("tolerance", {"tolerance": 0.0}),
+        ("max_iterations", {"max_iterations": 0}),
+        ("stabilisation", {"stabilisation": "glue"}),
+    ],
+)
+def test_a_bad_option_is_refused_by_field(field, options):
+    with pytest.raises(rover_gym.OptionError) as caught:
+        rover_gym.Simulation(**options)
+    assert caught.value.field == field
+    assert isinstance(caught.value, rover_gym.RoverGymError)
+
+
+def test_a_bad_terrain_is_refused():
+    with pytest.raises(rover_gym.TerrainError, match="terrain"):
+        rover_gym.Simulation(None, "swamp")
+    with pytest.raises(rover_gym.TerrainError) as caught:
+        rover_gym.Plane((0.0, 0.0, 0.0))
+    assert caught.value.field == "normal"
+    with pytest.raises(rover_gym.TerrainError) as caught:
+        rover_gym.Plane(offset=np.nan)
+    assert caught.value.field == "offset"
+    with pytest.raises(rover_gym.TerrainError):
+        rover_gym.Plane((1.0, 0.0, 0.0)).height(0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("error", "field", "call"),
+    [
+        (rover_gym.StateError, "q", lambda s: s.set_state(np.zeros(3))),
+        (rover_gym.StateError, "q[1]", lambda s: s.set_state([0.0, np.nan] + [0.0] * 19)),
+        (rover_gym.StateError, "qdot", lambda s: s.set_state(np.zeros(21), np.zeros(4))),
+        (rover_gym.StateError, "qdot[0]", lambda s: s.set_state(np.zeros(21), [np.inf] + [0.0] * 20)),
+        (rover_gym.OptionError, "coordinates", lambda s: s.set_state(np.zeros(21), coordinates="polar")),
+        (rover_gym.CommandError, "torques", lambda s: s.set_wheel_torques([1.0] * 5)),
+        (rover_gym.CommandError, "torques[2]", lambda s: s.set_wheel_torques([0.0, 0.0, np.nan, 0.0, 0.0, 0.0])),
+        (rover_gym.CommandError, "torques[0]", lambda s: s.set_joint_torques([np.inf] + [0.0] * 14)),
+        (rover_gym.CommandError, "set_points[1]", lambda s: s.set_steering([0.0, 3.0, 0.0, 0.0, 0.0, 0.0])),
+        (rover_gym.CommandError, "set_points[0]", lambda s: s.set_steering([np.nan] + [0.0] * 5)),
+        (rover_gym.CommandError, "joints", lambda s: s.hold("wheel_XX")),
+        (rover_gym.CommandError, "stiffness", lambda s: s.hold("front_axle", stiffness=-1.0)),
+        (rover_gym.CommandError, "set_points", lambda s: s.hold(["front_axle"], [0.0, 1.0])),
+        (rover_gym.OptionError, "n", lambda s: s.step(-1)),
+    ],
+)
+def test_bad_input_is_refused_by_field_before_anything_changes(sim, error, field, call):
+    drive(sim, 20)
+    before = sim.snapshot()
+    with pytest.raises(error) as caught:
+        call(sim)
+    assert caught.value.field == field
+    assert sim.snapshot() == before
+
+
+def test_a_damaged_or_foreign_snapshot_is_refused(sim):
+    drive(sim, 20)
+    before = sim.snapshot()
+    data = before.to_bytes()
+    with pytest.raises(rover_gym.StateError):
+        rover_gym.Snapshot.from_bytes(data[: len(data) // 2])
+    foreign = rover_gym.Simulation(rover_gym.RoverModel().weld(["front_axle"])).snapshot()
+    with pytest.raises(rover_gym.StateError, match="joints"):
+        sim.restore(foreign)
+    assert sim.snapshot() == before
+
+
+def test_a_step_that_overflows_is_an_error_and_changes_nothing(sim):
+    sim.set_joint_torques([0.0, 0.0, 0.0, 1e308] + [0.0] * 11)
+    sim.step()
+    before = sim.snapshot()
+    with pytest.raises(rover_gym.StepError) as caught:
+        sim.step()
+    assert sim.snapshot() == before
+    assert np.isfinite(sim.q).all()
+    assert isinstance(caught.value, RuntimeError)
+
+
+def test_too_few_iterations_are_reported_not_hidden():
+    sim = rover_gym.Simulation(solver="nsgs", max_iterations=1)
+    q = np.zeros(21)
+    q[1] = 0.30
+    sim.set_state(q)
+    report = sim.step()
+    assert report.status == "not_converged"
+    assert not report.is_converged
+    assert report.residual > 1e-12
+    assert np.isfinite(sim.q).all()
