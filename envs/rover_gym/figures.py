@@ -85,15 +85,14 @@ def wheel_traces(figure: Figure, trajectory: Trajectory) -> None:
         perspective.plot(*np.array(curve).T, color="0.6", linewidth=0.9, linestyle="--", label=label)
     for i, wheel in enumerate(WHEELS):
         colour = COLOURS[wheel]
-        above.plot(-centres[:, i, 2], centres[:, i, 0], color=colour, label=NAMES[wheel])
-        above.plot(-centres[0, i, 2], centres[0, i, 0], "o", color=colour, markersize=4)
+        above.plot(centres[:, i, 2], centres[:, i, 0], color=colour, label=NAMES[wheel])
+        above.plot(centres[0, i, 2], centres[0, i, 0], "o", color=colour, markersize=4)
         perspective.plot(
             *_on_the_page(100.0 * centres[:, i].T), color=colour, label="" if i else "ours, colours as left"
         )
-    above.set(title="from above; dots: the start", xlabel="to the left, -z (m)", ylabel="forward, x (m)")
-    above.invert_xaxis()
+    above.set(title="from above; dots are the start", xlabel="to the right, z (m)", ylabel="forward, x (m)")
     above.set_aspect("equal", adjustable="datalim")
-    above.legend(title="wheel centre")
+    above.legend(title="wheel centre", loc="upper right")
     perspective.set(
         title="in the report's perspective", xlabel="across its page (pixels)", ylabel="up its page (pixels)"
     )

@@ -38,10 +38,12 @@ def test_the_scene_is_recorded_and_drawn(tmp_path: Path) -> None:
 
 
 def test_the_run_lands_where_siconos_does(tmp_path: Path) -> None:
-    scene.run(tmp_path / "run.h5", duration=10.0, time_step=0.005, variant="newton")
+    # Without stabilisation the scheme is Siconos' own, so at its step the two differ by impact times alone.
+    scene.run(tmp_path / "run.h5", duration=10.0, time_step=0.005, variant="newton", stabilisation="none")
     rows = scene.distance_to_siconos(read_trajectory(tmp_path / "run.h5"))
     assert [step for step, _, _ in rows] == [0.005, 0.0002]
-    assert all(distance < 0.01 for _, _, distance in rows)  # m, the tolerance at 5 ms
+    assert rows[0][2] < 0.001  # m; 0.2 mm when written
+    assert rows[1][2] < 0.01  # m, the tolerance at 5 ms
 
 
 def test_the_scene_starts_as_the_reference_does() -> None:

@@ -21,6 +21,9 @@ def report(
     variant: Annotated[
         str, typer.Option(help="Time stepping: 'newton' (forces at the end of the step) or 'linearised'.")
     ] = "newton",
+    stabilisation: Annotated[
+        str, typer.Option(help="'none', as in the Siconos runs, or 'projection', which takes penetration away.")
+    ] = "none",
     output: Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)] = Path("runs/report"),
 ) -> None:
     """Drop the rover on the report's inclined plane, drive it with turned front wheels, and save the run.
@@ -35,12 +38,16 @@ def report(
             duration=duration,
             time_step=time_step,
             variant=variant,
+            stabilisation=stabilisation,
             progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
         )
     trajectory = read_trajectory(result.path)
 
     table = Table(title="Section 6.1: the rover on the inclined plane", show_header=False, title_justify="left")
-    table.add_row("simulated time", f"{result.duration:g} s, step {1e3 * time_step:g} ms")
+    table.add_row(
+        "simulated time",
+        f"{result.duration:g} s, step {1e3 * time_step:g} ms, {variant}, stabilisation {stabilisation}",
+    )
     table.add_row("real-time factor", f"{result.duration / result.wall_time:.0f} (stepping and recording)")
     if result.first_contact is not None:
         table.add_row("first contact", f"{result.first_contact:.3f} s")
