@@ -49,6 +49,17 @@ def test_axles_among_the_tags_are_the_wheels_third_axes(reference):
         np.testing.assert_allclose(tags[f"wheel_{wheel}"], origin, atol=1e-14)
 
 
+def test_the_models_tags_move_with_their_solids(reference):
+    model = rover_gym.RoverModel()
+    q = reference["cases"][4]["q"]
+    origin, rotation = model.poses(q)["trunk"]
+    np.testing.assert_allclose(model.tags(q)["nose"], origin + rotation @ (0.6, -0.2, 0.0), atol=1e-13)
+    description = model.to_dict()
+    description["tags"].append({"name": "mast", "solid": "wheel_FL", "position": [0.0, 0.0, 0.1]})
+    tagged = rover_gym.RoverModel.from_dict(description).tags(q)
+    np.testing.assert_allclose(tagged["mast"], tagged["wheel_FL"] + 0.1 * tagged["axle_FL"], atol=1e-13)
+
+
 def test_both_coordinates_tell_one_motion(reference):
     model = rover_gym.RoverModel()
     case = reference["cases"][5]

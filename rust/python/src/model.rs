@@ -102,7 +102,7 @@ impl RoverModel {
     }
 }
 
-/// Points with names: solids, wheel axles, mass centre.
+/// Points with names: solids, the model's tags, wheel axles, mass centre.
 pub fn tags<'py>(
     py: Python<'py>,
     model: &Model,
@@ -112,6 +112,13 @@ pub fn tags<'py>(
     for frame in model.frames() {
         let x = kinematics.base + kinematics.point(frame.body, &frame.position);
         tags.set_item(&frame.name, fresh(py, x.as_slice()))?;
+    }
+    for tag in &model.description().tags {
+        if let Some(frame) = model.frames().iter().find(|f| f.name == tag.solid) {
+            let local = frame.position + frame.rotation * Vector3::from(tag.position);
+            let x = kinematics.base + kinematics.point(frame.body, &local);
+            tags.set_item(&tag.name, fresh(py, x.as_slice()))?;
+        }
     }
     for wheel in model.wheels() {
         let s = kinematics.R[wheel.body] * wheel.axle;
@@ -472,7 +479,7 @@ impl RoverModel {
         Ok(momentum::energy(&self.inner, &kinematics, &v, &Vector3::zeros()).kinetic)
     }
 
-    /// {name: (3,)}: origins of the solids (m), unit axles `axle_FL`, ..., and `centre_of_mass`, world.
+    /// {name: (3,)}: origins of the solids and the model's tags (m), unit axles `axle_FL`, ..., and `centre_of_mass`, world.
     #[pyo3(signature = (q, coordinates = "report"))]
     fn tags<'py>(
         &self,

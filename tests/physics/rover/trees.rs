@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
-use rover_core::multibody::{Model, ModelDescription, ModelError};
+use rover_core::multibody::{Model, ModelDescription, ModelError, TagDescription};
 
 use crate::scenes::simulation;
 
@@ -115,11 +115,25 @@ fn a_free_top_precesses_as_the_closed_form_says() {
     assert!(error < 1e-5, "{error} rad");
 }
 
+fn tag(name: &str, solid: &str, x: f64) -> TagDescription {
+    TagDescription {
+        name: name.into(),
+        solid: solid.into(),
+        position: [x, 0.0, 0.0],
+    }
+}
+
 /// Every way to spoil a description, and the field that the error must name.
 #[test]
 fn bad_descriptions_are_refused_by_field() {
     type Spoil = fn(&mut ModelDescription);
-    let cases: [(&str, Spoil); 22] = [
+    let cases: [(&str, Spoil); 24] = [
+        ("tags[0].solid", |d| {
+            d.tags = vec![tag("point", "nothing", 0.0)]
+        }),
+        ("tags[1].name", |d| {
+            d.tags = vec![tag("point", "frame", 0.0), tag("front", "frame", 0.0)]
+        }),
         ("solids", |d| d.solids.clear()),
         ("solids[0].mass", |d| d.solids[0].mass = -1.0),
         ("solids[1].mass", |d| d.solids[1].mass = 0.0),

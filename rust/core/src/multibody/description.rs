@@ -20,6 +20,21 @@ pub struct ModelDescription {
     /// Wheels in the order of every public array.
     #[serde(default)]
     pub wheels: Vec<WheelDescription>,
+    /// Points with a name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tags: Vec<TagDescription>,
+}
+
+/// A point fixed to a solid.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TagDescription {
+    /// Its name.
+    pub name: String,
+    /// The solid that carries it.
+    pub solid: String,
+    /// Place in the solid's frame, m.
+    pub position: [f64; 3],
 }
 
 /// One solid and the revolute joint that carries it.
@@ -147,6 +162,7 @@ impl ModelDescription {
             name: String::new(),
             solids: Vec::new(),
             wheels: Vec::new(),
+            tags: Vec::new(),
         })
     }
 

@@ -15,7 +15,9 @@ pub mod momentum;
 pub mod state;
 
 pub use bias::bias;
-pub use description::{Hold, ModelDescription, Shape, SolidDescription, WheelDescription};
+pub use description::{
+    Hold, ModelDescription, Shape, SolidDescription, TagDescription, WheelDescription,
+};
 pub use error::{ModelError, StateError};
 pub use joint::JointAxis;
 pub use kinematics::Kinematics;

@@ -675,7 +675,30 @@ fn check(description: &ModelDescription) -> Result<(), ModelError> {
             });
         }
     }
-    check_wheels(description)
+    check_wheels(description)?;
+    check_tags(description)
+}
+
+fn check_tags(description: &ModelDescription) -> Result<(), ModelError> {
+    for (i, tag) in description.tags.iter().enumerate() {
+        let at = |what: &str| format!("tags[{i}].{what}");
+        let is_taken = description.tags[..i].iter().any(|t| t.name == tag.name)
+            || description.solids.iter().any(|s| s.name == tag.name);
+        if is_taken {
+            return Err(ModelError::DuplicateName {
+                field: at("name"),
+                name: tag.name.clone(),
+            });
+        }
+        if !description.solids.iter().any(|s| s.name == tag.solid) {
+            return Err(ModelError::UnknownName {
+                field: at("solid"),
+                name: tag.solid.clone(),
+            });
+        }
+        finite(&at("position"), &tag.position)?;
+    }
+    Ok(())
 }
 
 fn check_wheels(description: &ModelDescription) -> Result<(), ModelError> {
