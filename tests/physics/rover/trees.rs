@@ -129,10 +129,10 @@ fn bad_descriptions_are_refused_by_field() {
     type Spoil = fn(&mut ModelDescription);
     let cases: [(&str, Spoil); 24] = [
         ("tags[0].solid", |d| {
-            d.tags = vec![tag("point", "nothing", 0.0)]
+            d.tags = vec![tag("point", "nothing", 0.0)];
         }),
         ("tags[1].name", |d| {
-            d.tags = vec![tag("point", "frame", 0.0), tag("front", "frame", 0.0)]
+            d.tags = vec![tag("point", "frame", 0.0), tag("front", "frame", 0.0)];
         }),
         ("solids", |d| d.solids.clear()),
         ("solids[0].mass", |d| d.solids[0].mass = -1.0),
