@@ -13,7 +13,7 @@ UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
 
-.PHONY: help demo test check lint types format test-rust test-python docs bench pins clean
+.PHONY: help demo test check lint types format test-rust test-slow test-python docs bench pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -43,6 +43,9 @@ format: $(STAMPS)/test ## rewrite the sources as the linters want them
 
 test-rust: ## the Rust tests only
 	cargo test --locked --quiet
+
+test-slow: ## the Rust tests that take minutes: recorded contact problems of any size
+	cargo test --locked --release -- --ignored
 
 test-python: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core ## the Python tests only
 	$(BIN)/pytest --numprocesses auto
