@@ -5,6 +5,7 @@ listed FL, FR, ML, BL, MR, BR.
 """
 
 from collections.abc import Mapping, Sequence
+from os import PathLike
 from typing import Any, Literal, TypeAlias, final
 
 import numpy as np
