@@ -1,0 +1,2 @@
+//! Microseconds a step on spheres.
+fn main() {}
