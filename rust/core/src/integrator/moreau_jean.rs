@@ -109,7 +109,10 @@ impl Integrator for MoreauJean {
             );
             ws.factor.half_solve(model, &mut ws.y);
             if !is_last {
-                ws.system.add_impulses(model, &ws.p, &mut ws.y);
+                // An impact's impulses say nothing of this step's: with them v_m would be far off, and the bias is quadratic in it.
+                if is_persistent(scene, warm_start, ws) {
+                    ws.system.add_impulses(model, &ws.p, &mut ws.y);
+                }
                 ws.factor.half_solve_back(model, &mut ws.y);
                 for (mean, change) in ws.v_mean.iter_mut().zip(&ws.y) {
                     *mean += (1.0 - theta) * change;
@@ -251,14 +254,16 @@ pub(super) fn assemble_contacts(
     }
 }
 
+/// Whether the last step had the same contacts and none of them was new or struck, so that its impulses are those of this step but for O(h).
+fn is_persistent(scene: &Scene<'_>, warm_start: &WarmStart, ws: &Workspace) -> bool {
+    scene.options.warm_start && !warm_start.persistent.is_empty() && warm_start.is_of(&ws.contacts)
+}
+
 /// Adds the deferred correction r to `ws.y` where the last step had the same contacts and all of them persisted.
 ///
 /// `ws.p` must still hold the last step's impulses.
 pub(super) fn add_correction(scene: &Scene<'_>, warm_start: &WarmStart, ws: &mut Workspace) {
-    if !scene.options.warm_start
-        || warm_start.persistent.is_empty()
-        || !warm_start.is_of(&ws.contacts)
-    {
+    if !is_persistent(scene, warm_start, ws) {
         return;
     }
     let share = 1.0 - scene.options.theta;

@@ -14,7 +14,7 @@ use super::options::Stabilisation;
 use super::report::StepReport;
 use super::workspace::Workspace;
 use crate::problem::{Dimension, FrictionContactProblem};
-use crate::solver::solve;
+use crate::solver::{SolveReport, solve};
 
 /// Corrects `ws.end`, where the contacts are predicted to have the gaps `ws.gap_end`.
 pub(super) fn project(scene: &Scene<'_>, ws: &mut Workspace, report: &mut StepReport) {
@@ -39,20 +39,53 @@ pub(super) fn project(scene: &Scene<'_>, ws: &mut Workspace, report: &mut StepRe
     }
     ws.p_position.resize(ws.p.len(), 0.0);
     ws.u_position.resize(ws.p.len(), 0.0);
+    let limit = -FARTHEST * deepest;
+    let mut solved = displace(scene, ws);
+    if !solved.is_converged() || size(ws) > limit {
+        // Friction locks a wedge, or fights itself over nanometres: the shortest way out needs none.
+        ws.mu.fill(0.0);
+        solved = displace(scene, ws);
+        ws.mu.fill(options.friction_coefficient);
+    }
+    note(report, &solved);
+    let share = (limit / size(ws)).min(1.0);
+    ws.end.advance(&ws.y, share);
+}
+
+/// Solves for the displacement `ws.y` with the coefficients in `ws.mu`.
+fn displace(scene: &Scene<'_>, ws: &mut Workspace) -> SolveReport {
     ws.p_position.fill(0.0);
     let problem =
         FrictionContactProblem::from_assembled(Dimension::Three, &ws.system.W, &ws.q_free, &ws.mu);
     let solved = solve(
         &problem,
-        &options.solver,
+        &scene.options.solver,
         &mut ws.p_position,
         &mut ws.u_position,
         &mut ws.solver,
     );
-    note(report, &solved);
     ws.y.fill(0.0);
     ws.system
         .add_impulses(scene.model, &ws.p_position, &mut ws.y);
     ws.factor.half_solve_back(scene.model, &mut ws.y);
-    ws.end.advance(&ws.y, 1.0);
+    solved
 }
+
+/// How far a displacement goes, m: the contacts' points, the trunk's origin, and what turns by so much at arm's length.
+fn size(ws: &Workspace) -> f64 {
+    // d = W λ is what the answer u = d + (gap, 0, 0) holds beside the gaps.
+    let points = ws.u_position.iter().zip(&ws.q_free).map(|(u, q)| u - q);
+    let trunk = ws.y[..6].iter().copied();
+    let joints = ws.y[6..].iter().map(|angle| angle * JOINT_ARM);
+    let all = points.chain(trunk).chain(joints);
+    all.fold(0.0_f64, |m, d| m.max(d.abs()))
+}
+
+/// Arm at which a joint's turn counts, m. A freely steered wheel that is freed of 2 cm turns by 0.4 rad.
+const JOINT_ARM: f64 = 0.05;
+
+/// How far a displacement may go, as a multiple of the deepest penetration; the rest is left to the next steps.
+///
+/// A wheel that an impact left in the wedge between a stone and the ground is locked there by friction: the linearised problem
+/// then has its answer a metre away, and a rover was thrown up by that much over 2 cm.
+const FARTHEST: f64 = 4.0;
