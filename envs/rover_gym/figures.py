@@ -1,4 +1,4 @@
-"""The report's figures 6.2 to 6.5, drawn from a recorded run.
+"""The report's figures 6.2 to 6.5, drawn from a recorded run, and those of its section 6.2.
 
 Ours in colour, one colour a wheel; a Siconos run of the same scene dotted in black where it exists; the report's own
 curves in grey or in a panel of their own, since they were made with other parameters (the data's `meta` says which).
@@ -6,14 +6,17 @@ curves in grey or in a panel of their own, since they were made with other param
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym._core import SphereField
 from rover_gym.recording import MissingExtraError, Trajectory, read_trajectory
 from rover_gym.report import reference_data
+from rover_gym.rug import START as RUG_START
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +31,7 @@ NAMES = {
     "MR": "middle right",
     "BR": "back right",
 }
+SIDES = (("FL", "ML", "BL"), ("FR", "MR", "BR"))
 # Okabe and Ito's colours, told apart by colour-blind readers too.
 COLOURS = {"FL": "#0072B2", "FR": "#56B4E9", "ML": "#009E73", "BL": "#D55E00", "MR": "#CC79A7", "BR": "#E69F00"}
 PUBLISHED_STEP = 0.02  # s, of the runs behind the report's figures (inferred from the figures themselves)
@@ -51,6 +55,39 @@ def draw_all(recording: str | Path, folder: str | Path) -> list[Path]:
     Raises:
         MissingExtraError: matplotlib or h5py is not installed.
     """
+    return _draw(
+        recording,
+        folder,
+        {
+            "figure-6.2-wheel-traces": wheel_traces,
+            "figure-6.3-contact-distances": contact_distances,
+            "figure-6.4-reaction-force": reaction_force,
+            "figure-6.5-steering-angles": steering_angles,
+        },
+    )
+
+
+def draw_rug(recording: str | Path, folder: str | Path) -> list[Path]:
+    """Draws the figures of the run over the rug as PNG files into the folder and returns their paths.
+
+    Raises:
+        MissingExtraError: matplotlib or h5py is not installed.
+    """
+    return _draw(
+        recording,
+        folder,
+        {
+            "section-6.2-wheel-traces": rug_wheel_traces,
+            "section-6.2-contact-distances": rug_contact_distances,
+            "section-6.2-reaction-forces": rug_reaction_forces,
+        },
+    )
+
+
+def _draw(
+    recording: str | Path, folder: str | Path, figures: Mapping[str, Callable[[Figure, Trajectory], None]]
+) -> list[Path]:
+    """Draws figures, by file name, from one recording."""
     try:
         import matplotlib as mpl  # noqa: PLC0415 - only who draws needs it
         from matplotlib.figure import Figure  # noqa: PLC0415
@@ -62,12 +99,7 @@ def draw_all(recording: str | Path, folder: str | Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        for name, draw in (
-            ("figure-6.2-wheel-traces", wheel_traces),
-            ("figure-6.3-contact-distances", contact_distances),
-            ("figure-6.4-reaction-force", reaction_force),
-            ("figure-6.5-steering-angles", steering_angles),
-        ):
+        for name, draw in figures.items():
             figure = Figure(figsize=(11.0, 5.0))
             draw(figure, trajectory)
             paths.append(folder / f"{name}.png")
@@ -160,8 +192,66 @@ def steering_angles(figure: Figure, trajectory: Trajectory) -> None:
     figure.suptitle("Figure 6.5: steering angles under the PD controller")
 
 
-def _plot_wheels(axes: Axes, time: Any, values: Any) -> None:
+def rug_wheel_traces(figure: Figure, trajectory: Trajectory) -> None:
+    """Section 6.2: the paths of the six wheel centres, from above over the spheres, and from the side."""
+    field = SphereField.rug()
+    spheres, radii = field.centres, field.radii
+    centres = trajectory["wheel_centres"]
+    above, side = figure.subplots(1, 2)
+    middle = spheres[np.isclose(spheres[:, 2], spheres[np.argmin(np.abs(spheres[:, 2] - RUG_START[2])), 2])]
+    turn = np.linspace(0.0, 2.0 * np.pi, 60)
+    for axes, places, columns in ((above, spheres, (2, 0)), (side, middle, (0, 1))):
+        for place in places:
+            axes.plot(
+                place[columns[0]] + radii[0] * np.cos(turn),
+                place[columns[1]] + radii[0] * np.sin(turn),
+                color="0.85" if axes is above else "0.7",
+                linewidth=0.6,
+            )
     for i, wheel in enumerate(WHEELS):
+        colour = COLOURS[wheel]
+        above.plot(centres[:, i, 2], centres[:, i, 0], color=colour, label=NAMES[wheel])
+        above.plot(centres[0, i, 2], centres[0, i, 0], "o", color=colour, markersize=4)
+        side.plot(centres[:, i, 0], centres[:, i, 1], color=colour)
+    above.set(title="from above; dots are the start", xlabel="to the right, z (m)", ylabel="forward, x (m)")
+    side.set(title="from the right; spheres of the middle row", xlabel="forward, x (m)", ylabel="up, y (m)")
+    _close_up(above, centres[..., 2], centres[..., 0])
+    _close_up(side, centres[..., 0], centres[..., 1])
+    above.legend(title="wheel centre")
+    figure.suptitle(f"Section 6.2: traces of the wheels on the rug over {trajectory['time'][-1]:g} s")
+
+
+def rug_contact_distances(figure: Figure, trajectory: Trajectory) -> None:
+    """Section 6.2: the six gaps against time, left and right wheels apart."""
+    for axes, wheels in zip(figure.subplots(1, 2, sharey=True, sharex=True), SIDES, strict=True):
+        _plot_wheels(axes, trajectory["time"], 100.0 * trajectory["wheel_gaps"], wheels)
+        axes.set(title=f"step {_step(trajectory)}", xlabel="time (s)", ylim=(-1.0, 10.0))
+        axes.legend(loc="upper right")
+    figure.axes[0].set_ylabel("contact distance (cm)")
+    figure.suptitle("Section 6.2: contact distance between wheels and spheres")
+
+
+def rug_reaction_forces(figure: Figure, trajectory: Trajectory) -> None:
+    """Section 6.2: normal force on each wheel against time, left and right wheels apart."""
+    for axes, wheels in zip(figure.subplots(1, 2, sharey=True, sharex=True), SIDES, strict=True):
+        _plot_wheels(axes, trajectory["time"], trajectory["wheel_forces"][:, :, 0], wheels)
+        axes.set(title=f"mean over each step of {_step(trajectory)}", xlabel="time (s)", yscale="symlog")
+        axes.set_ylim(0.0, None)
+        axes.legend(loc="upper right")
+    figure.axes[0].set_ylabel("normal force on the wheel (N)")
+    figure.suptitle("Section 6.2: reaction forces of the wheels")
+
+
+def _close_up(axes: Axes, x: npt.NDArray[np.float64], y: npt.NDArray[np.float64]) -> None:
+    """Shows the traces with a margin, at one scale; the spheres beyond are cut."""
+    axes.set_xlim(x.min() - 1.0, x.max() + 1.0)
+    axes.set_ylim(y.min() - 1.0, y.max() + 1.0)
+    axes.set_aspect("equal", adjustable="datalim")
+
+
+def _plot_wheels(axes: Axes, time: Any, values: Any, wheels: tuple[str, ...] = WHEELS) -> None:
+    for wheel in wheels:
+        i = WHEELS.index(wheel)
         axes.plot(time, values[:, i], color=COLOURS[wheel], label=NAMES[wheel])
 
 
