@@ -28,6 +28,7 @@ use super::report::{StepReport, StepStatus};
 use super::workspace::{ActiveContact, WarmStart, Workspace};
 use super::{Integrator, Scene};
 use crate::contact::{Activation, Contact, detect, generalized_impulse, relocate};
+use crate::law::newton_impact::rebound;
 use crate::multibody::{Model, State, bias};
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::solver::{SolveReport, solve};
@@ -311,7 +312,7 @@ pub(super) fn solve_contacts(
             .chunks_exact_mut(3)
             .zip(ws.u_before.chunks_exact(3))
         {
-            q[0] += options.restitution * u[0];
+            q[0] += rebound(options.restitution, u[0]);
         }
         let problem = FrictionContactProblem::from_assembled(
             Dimension::Three,
@@ -329,7 +330,7 @@ pub(super) fn solve_contacts(
         note(&mut report, &solved);
         // u came with the restitution term inside: take it out again.
         for (u, before) in ws.u.chunks_exact_mut(3).zip(ws.u_before.chunks_exact(3)) {
-            u[0] -= options.restitution * before[0];
+            u[0] -= rebound(options.restitution, before[0]);
         }
         ws.system.add_impulses(model, &ws.p, &mut ws.y);
         probe.end(Phase::Solve);
