@@ -197,7 +197,7 @@ def rug_wheel_traces(figure: Figure, trajectory: Trajectory) -> None:
     field = SphereField.rug()
     spheres, radii = field.centres, field.radii
     centres = trajectory["wheel_centres"]
-    above, side = figure.subplots(1, 2)
+    above, side = figure.subplots(1, 2, width_ratios=(1, 2))
     middle = spheres[np.isclose(spheres[:, 2], spheres[np.argmin(np.abs(spheres[:, 2] - RUG_START[2])), 2])]
     turn = np.linspace(0.0, 2.0 * np.pi, 60)
     for axes, places, columns in ((above, spheres, (2, 0)), (side, middle, (0, 1))):
@@ -246,7 +246,7 @@ def _close_up(axes: Axes, x: npt.NDArray[np.float64], y: npt.NDArray[np.float64]
     """Shows the traces with a margin, at one scale; the spheres beyond are cut."""
     axes.set_xlim(x.min() - 1.0, x.max() + 1.0)
     axes.set_ylim(y.min() - 1.0, y.max() + 1.0)
-    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_aspect("equal", adjustable="box")
 
 
 def _plot_wheels(axes: Axes, time: Any, values: Any, wheels: tuple[str, ...] = WHEELS) -> None:

@@ -133,7 +133,8 @@ def heights(terrain: Plane | SphereField, points: npt.NDArray[np.float64]) -> np
     """`(n,)` height of the visible ground at (x, z), m."""
     if isinstance(terrain, Plane):
         n = terrain.normal
-        return np.asarray(-(points @ n[[0, 2]] + terrain.offset) / n[1])
+        level: npt.NDArray[np.float64] = -(points @ n[[0, 2]] + terrain.offset) / n[1]
+        return level
     return terrain.heights(points)
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.table import Table
@@ -31,7 +31,7 @@ def report(
     The trajectories are HDF5 files that describe themselves. The last lines of the first table compare with
     Siconos 4.4, which ran the same scene.
     """
-    options = {"time_step": time_step, "variant": variant, "stabilisation": stabilisation}
+    options: dict[str, Any] = {"time_step": time_step, "variant": variant, "stabilisation": stabilisation}
     with progress_bar() as bar:
 
         def follow(section: str) -> Callable[[float], None]:
