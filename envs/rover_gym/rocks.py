@@ -126,15 +126,15 @@ class HeightScan:
 def scan_points(offsets: npt.NDArray[np.float64], position: Point, heading: float) -> npt.NDArray[np.float64]:
     """`(n, 2)` x and z of the scan's points, m."""
     c, s = math.cos(heading), math.sin(heading)
-    return offsets @ np.array([[c, -s], [s, c]]) + position
+    points: npt.NDArray[np.float64] = offsets @ np.array([[c, -s], [s, c]]) + position
+    return points
 
 
 def heights(terrain: Plane | SphereField, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """`(n,)` height of the visible ground at (x, z), m."""
     if isinstance(terrain, Plane):
         n = terrain.normal
-        level: npt.NDArray[np.float64] = -(points @ n[[0, 2]] + terrain.offset) / n[1]
-        return level
+        return np.asarray(-(points @ n[[0, 2]] + terrain.offset) / n[1])
     return terrain.heights(points)
 
 
