@@ -194,7 +194,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | quantity        | at difficulty d      | meaning                                          |
     |-----------------|----------------------|--------------------------------------------------|
     | rock_abundance  | 0.2 d                | fraction of the ground that rocks of all sizes cover |
-    | max_rock_radius | 0.5 + 1.5 d          | radius of the largest rocks, in wheel radii      |
+    | max_rock_radius | 0.5 + 1.1 d          | radius of the largest rocks, in wheel radii      |
     | slope_deg       | uniform, 0 to 10 d   | slope of the plane                               |
 
     ## End

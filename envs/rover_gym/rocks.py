@@ -3,7 +3,7 @@
 One number in [0, 1] says how hard an episode is:
 
     abundance    k = 0.2 d           fraction of the ground that rocks cover
-    largest rock r = (0.5 + 1.5 d) R in wheel radii R; half of a rock is below the ground
+    largest rock r = (0.5 + 1.1 d) R in wheel radii R; half of a rock is below the ground
     slope          0 to 10 d         degrees
 
 What an argument fixes does not follow the difficulty.
@@ -22,7 +22,7 @@ from rover_gym.validation import Range, number, refuse, span, vector
 #: At difficulty 1; landing sites on Mars have 0.03 to 0.2 (Golombek and Rapp 1997).
 HARDEST_ABUNDANCE = 0.2
 #: Largest rock at difficulty 0 and at difficulty 1, in wheel radii.
-LARGEST_ROCK = (0.5, 2.0)
+LARGEST_ROCK = (0.5, 1.6)
 #: Steepest slope at difficulty 1, degrees.
 HARDEST_SLOPE_DEG = 10.0
 DEFAULT_DIFFICULTY = 0.5

@@ -125,7 +125,7 @@ def test_difficulty_is_an_option_of_the_reset(rocks: RoverEnv, difficulty: float
     assert drawn is not None
     assert rocks.difficulty == drawn.difficulty == difficulty
     assert drawn.abundance == pytest.approx(0.2 * difficulty)
-    assert drawn.max_radius == pytest.approx(0.5 + 1.5 * difficulty)
+    assert drawn.max_radius == pytest.approx(0.5 + 1.1 * difficulty)
     assert 0.0 <= rocks.start.slope <= math.radians(HARDEST_SLOPE_DEG) * difficulty
     field = field_of(rocks)
     assert (len(field) > 0) == (difficulty > 0.0)

@@ -7,10 +7,13 @@ from dataclasses import asdict
 from typing import Annotated
 
 import typer
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from rover_gym.baseline import DIFFICULTIES, ENDS, BaselineRow, measure_baseline
+from rover_gym.baseline import DIFFICULTIES, BaselineRow, measure_baseline
 from rover_gym.cli.console import console, plain_errors, progress_bar
+
+CAUSES = {"time": "time limit", "high_centred": "high centred", "roll_over": "roll over", "step_failed": "step failed"}
 
 
 @plain_errors
@@ -56,18 +59,19 @@ def baseline(
 def _table(rows: Sequence[BaselineRow], seed: int) -> Table:
     last = seed + rows[0].episodes - 1
     title = f"RoverRocks-v0 with the PD baseline, {rows[0].episodes} episodes a row, seeds {seed} to {last}"
-    table = Table(title=title, title_justify="left")
-    headings = ("difficulty", "success", "95% interval", "time", "energy", *(end.replace("_", " ") for end in ENDS))
-    for heading in headings:
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    for heading in ("difficulty", "success", "95% interval", "time to goal", "energy"):
         table.add_column(heading, justify="right")
+    table.add_column("other ends")
     for row in rows:
         low, high = row.interval
+        others = [f"{CAUSES[end]} {n}" for end, n in row.ends.items() if n and end != "goal"]
         table.add_row(
             f"{row.difficulty:g}",
             f"{row.success_rate:.1%}",
-            f"{low:.1%} to {high:.1%}",
+            f"{100.0 * low:.0f} to {high:.0%}",
             "-" if math.isnan(row.time_to_goal) else f"{row.time_to_goal:.1f} s",
             "-" if math.isnan(row.energy_per_metre) else f"{row.energy_per_metre:.0f} J/m",
-            *(str(row.ends[end]) for end in ENDS),
+            ", ".join(others),
         )
     return table
