@@ -5,6 +5,7 @@ listed FL, FR, ML, BL, MR, BR.
 """
 
 from collections.abc import Mapping, Sequence
+from os import PathLike
 from typing import Any, Literal, TypeAlias, final
 
 import numpy as np
@@ -27,6 +28,7 @@ __all__ = [
     "Simulation",
     "Snapshot",
     "SolverReport",
+    "SphereField",
     "StateError",
     "StepError",
     "StepReport",
@@ -130,11 +132,15 @@ class RoverModel:
     def tags(self, q: npt.ArrayLike, coordinates: _Coordinates = "report") -> dict[str, _Array]: ...
     def poses(self, q: npt.ArrayLike, coordinates: _Coordinates = "report") -> dict[str, tuple[_Array, _Array]]:
         """Origin (3,) and rotation matrix (3, 3) of every solid, world frame."""
-    def wheel_gaps(self, q: npt.ArrayLike, terrain: Plane, coordinates: _Coordinates = "report") -> _Array: ...
-    def wheel_contact_points(
-        self, q: npt.ArrayLike, terrain: Plane, coordinates: _Coordinates = "report"
+    def wheel_gaps(
+        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "report"
     ) -> _Array: ...
-    def wheel_jacobians(self, q: npt.ArrayLike, terrain: Plane, coordinates: _Coordinates = "report") -> _Array: ...
+    def wheel_contact_points(
+        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "report"
+    ) -> _Array: ...
+    def wheel_jacobians(
+        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "report"
+    ) -> _Array: ...
     def to_report(self, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[_Array, _Array]:
         """Public q and state velocity -> the report's q and qdot."""
     def from_report(self, q: npt.ArrayLike, qdot: npt.ArrayLike) -> tuple[_Array, _Array]:
@@ -151,6 +157,53 @@ class Plane:
     @property
     def offset(self) -> float: ...
     def height(self, x: float, z: float) -> float: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class SphereField:
+    """Fixed spheres, with or without a plane under them. Immutable."""
+
+    def __new__(cls, centres: npt.ArrayLike, radii: npt.ArrayLike, ground: Plane | None = None) -> SphereField:
+        """From centres (n, 3) and radii (n,), m. Raises TerrainError by field."""
+    @staticmethod
+    def from_file(path: str | PathLike[str], ground: Plane | None = None) -> SphereField:
+        """Reads a CSV file with the header x,y,z,radius (m)."""
+    @staticmethod
+    def rug() -> SphereField:
+        """The report's Fig. 6.6: 50 x 25 spheres of radius 0.5 m on a wave, without a plane."""
+    @staticmethod
+    def rocks(
+        abundance: float,
+        area: Sequence[float],
+        seed: int,
+        *,
+        max_diameter: float = 0.5,
+        min_diameter: float = 0.05,
+        burial: float = 0.5,
+        ground: Plane | None = None,
+        clear: npt.ArrayLike | None = None,
+    ) -> SphereField:
+        """Rocks with the size-frequency distribution of Mars on a plane (Golombek and Rapp 1997).
+
+        Args:
+            abundance: Fraction of the ground that rocks of all sizes cover, 0 to 0.5.
+            area: x_min, z_min, x_max, z_max, m.
+            seed: Equal seeds give equal rocks.
+            max_diameter: m.
+            min_diameter: m; the law has ever more, ever smaller rocks.
+            burial: Fraction of its diameter that a rock is sunk into the ground, 0 to 0.5.
+            ground: The plane; flat ground at height 0 by default.
+            clear: (n, 3) circles x, z, radius that no rock reaches into, m.
+        """
+    @property
+    def centres(self) -> _Array: ...
+    @property
+    def radii(self) -> _Array: ...
+    @property
+    def ground(self) -> Plane | None: ...
+    def heights(self, points: npt.ArrayLike) -> _Array:
+        """(m,) height y of the visible surface at the points (x, z) (m, 2); nan where there is none."""
+    def __len__(self) -> int: ...
     def __reduce__(self) -> Any: ...
 
 @final
@@ -224,7 +277,7 @@ class Simulation:
     def __new__(
         cls,
         model: RoverModel | None = None,
-        terrain: Plane | None = None,
+        terrain: Plane | SphereField | None = None,
         *,
         gravity: npt.ArrayLike | None = None,
         friction: float = 0.7,
@@ -242,7 +295,7 @@ class Simulation:
     @property
     def model(self) -> RoverModel: ...
     @property
-    def terrain(self) -> Plane: ...
+    def terrain(self) -> Plane | SphereField: ...
     @property
     def time(self) -> float: ...
     @property

@@ -214,14 +214,28 @@ impl From<StateError> for BorderError {
 
 impl From<TerrainError> for BorderError {
     fn from(e: TerrainError) -> Self {
-        let value = match &e {
-            TerrainError::NotFinite { value, .. } => Value::Number(*value),
-            TerrainError::NoDirection { value } => Value::Numbers(value.to_vec()),
+        let (index, value) = match &e {
+            TerrainError::NotFinite { value, .. } | TerrainError::OutOfRange { value, .. } => {
+                (None, Value::Number(*value))
+            }
+            TerrainError::NoDirection { value } => (None, Value::Numbers(value.to_vec())),
+            TerrainError::EntryNotFinite { index, value, .. }
+            | TerrainError::TooFar { index, value, .. }
+            | TerrainError::NonPositiveRadius {
+                index,
+                radius: value,
+            } => (Some(index), Value::Number(*value)),
+            TerrainError::MismatchedLengths { radii, .. } => (None, Value::Count(*radii)),
+            TerrainError::TooMany { count, .. } => (None, Value::Count(*count)),
+            TerrainError::Empty => (None, Value::Count(0)),
         };
         Self {
             kind: Kind::Terrain,
             message: e.to_string(),
-            field: Some(e.field().to_owned()),
+            field: Some(index.map_or_else(
+                || e.field().to_owned(),
+                |index| format!("{}[{index}]", e.field()),
+            )),
             value,
         }
     }

@@ -9,6 +9,7 @@ mod model;
 mod plane;
 mod simulation;
 mod snapshot;
+mod sphere_field;
 
 use pyo3::prelude::*;
 
@@ -19,6 +20,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
     module.add_class::<model::RoverModel>()?;
     module.add_class::<plane::Plane>()?;
+    module.add_class::<sphere_field::SphereField>()?;
     module.add_class::<contacts::Contacts>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<simulation::StepReport>()?;

@@ -17,7 +17,7 @@ use rover_core::nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arrays::{fresh, fresh_blocks, fresh_matrix, fresh_rows, triple, vector};
 use crate::errors::{BorderError, Kind, Value};
-use crate::plane::Plane;
+use crate::sphere_field::Ground;
 
 /// A pair of fresh vectors.
 pub type Pair<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
@@ -87,11 +87,15 @@ impl RoverModel {
     fn contacts(
         &self,
         q: &Bound<'_, PyAny>,
-        terrain: &Plane,
+        terrain: &Bound<'_, PyAny>,
         coordinates: &str,
     ) -> PyResult<(Vec<f64>, Coordinates, Kinematics, Vec<Contact>)> {
         let (q, kind, kinematics) = self.placed(q, coordinates)?;
-        let contacts = wheel_contacts(&self.inner, &kinematics, &terrain.inner);
+        let contacts = wheel_contacts(
+            &self.inner,
+            &kinematics,
+            &*Ground::parse(terrain)?.terrain(),
+        );
         Ok((q, kind, kinematics, contacts))
     }
 
@@ -507,7 +511,7 @@ impl RoverModel {
         &self,
         py: Python<'py>,
         q: &Bound<'_, PyAny>,
-        terrain: &Plane,
+        terrain: &Bound<'_, PyAny>,
         coordinates: &str,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let contacts = self.contacts(q, terrain, coordinates)?.3;
@@ -520,7 +524,7 @@ impl RoverModel {
         &self,
         py: Python<'py>,
         q: &Bound<'_, PyAny>,
-        terrain: &Plane,
+        terrain: &Bound<'_, PyAny>,
         coordinates: &str,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (_, _, kinematics, contacts) = self.contacts(q, terrain, coordinates)?;
@@ -537,7 +541,7 @@ impl RoverModel {
         &self,
         py: Python<'py>,
         q: &Bound<'_, PyAny>,
-        terrain: &Plane,
+        terrain: &Bound<'_, PyAny>,
         coordinates: &str,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let (q, kind, kinematics, contacts) = self.contacts(q, terrain, coordinates)?;

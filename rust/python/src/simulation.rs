@@ -16,6 +16,7 @@ use crate::friction_contact::solver_options;
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::plane::Plane;
 use crate::snapshot::Snapshot;
+use crate::sphere_field::Ground;
 
 /// What the solver says of the steps just taken (worst over the steps of one call).
 #[pyclass(module = "rover_gym._core", frozen)]
@@ -112,7 +113,7 @@ impl Energy {
 #[pyclass(module = "rover_gym._core")]
 pub struct Simulation {
     inner: CoreSimulation,
-    terrain: Plane,
+    terrain: Ground,
     /// Keyword arguments that it was made with, for pickling.
     solver: String,
     max_iterations: usize,
@@ -198,21 +199,10 @@ impl Simulation {
     ) -> PyResult<Self> {
         let model = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
         let terrain = match terrain {
-            None => Plane {
+            None => Ground::Plane(Plane {
                 inner: rover_core::geometry::Plane::ground(),
-            },
-            Some(given) => given.extract::<Plane>().map_err(|_| {
-                let shown = given
-                    .repr()
-                    .map_or_else(|_| String::new(), |r| r.to_string());
-                let message = format!("terrain: must be a Plane, is {shown}");
-                BorderError {
-                    kind: Kind::Terrain,
-                    message,
-                    field: Some("terrain".to_owned()),
-                    value: Value::Text(shown),
-                }
-            })?,
+            }),
+            Some(given) => Ground::parse(given)?,
         };
         let options = StepOptions {
             gravity: checked_gravity(gravity)?,
@@ -227,8 +217,8 @@ impl Simulation {
             solver: solver_options(solver, tolerance, max_iterations)?,
             ..StepOptions::default()
         };
-        let inner = CoreSimulation::new(model, Arc::new(terrain.inner), options)
-            .map_err(BorderError::from)?;
+        let inner =
+            CoreSimulation::new(model, terrain.terrain(), options).map_err(BorderError::from)?;
         Ok(Self {
             inner,
             terrain,
@@ -245,8 +235,8 @@ impl Simulation {
     }
 
     #[getter]
-    fn terrain(&self) -> Plane {
-        self.terrain.clone()
+    fn terrain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.terrain.to_object(py)
     }
 
     #[getter]
@@ -521,7 +511,7 @@ impl Simulation {
         let rebuild = slf.get_type().getattr("_rebuild")?;
         let arguments = (
             own.model(),
-            own.terrain(),
+            own.terrain(py)?,
             own.settings(py)?,
             own.snapshot(),
         );

@@ -19,7 +19,7 @@ pub enum Part {
 pub struct ContactKey {
     /// Wheels count from 0, boxes from 2^15.
     pub part: u16,
-    /// Rim point or corner.
+    /// Rim point or corner; on a sphere 0, or 1 where it is met and passed in one step.
     pub feature: u16,
     /// The ground's number of the primitive.
     pub primitive: u32,

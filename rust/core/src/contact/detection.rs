@@ -2,11 +2,13 @@
 
 use nalgebra::Vector3;
 
-use super::box_plane;
 use super::contact_frame::ContactFrame;
 use super::contact_point::{Contact, ContactKey, Part};
+use super::sweep::{DEEP, first_touch};
 use super::wheel_plane::{self, PlacedWheel};
-use crate::geometry::{Primitive, Terrain};
+use super::wheel_sphere::{self, NearestPoint};
+use super::{box_plane, box_sphere};
+use crate::geometry::{Primitive, Sphere, Terrain};
 use crate::multibody::{Kinematics, Model, Wheel};
 
 /// When a candidate becomes a contact of the step: `gap + lead · u_N ≤ 0`, or nearly at rest within `hover`.
@@ -26,26 +28,65 @@ pub struct Activation {
     pub margin: f64,
 }
 
+/// On a sphere: the nearest point of the pose.
+const NEAREST: u16 = 0;
+
+/// On a sphere: the point over the tangent plane where it was first met, for a part that passes it in this step.
+const PASSING: u16 = 1;
+
 /// Collects the contacts of a configuration with velocity `v` (nv) into `out`, cleared first.
+///
+/// `kinematics`: the poses at the step's midpoint, where they are measured; `end`: at its predicted end, which tells
+/// the motion within the step. They are left where they were measured: see [`relocate`].
 pub fn detect(
     model: &Model,
     kinematics: &Kinematics,
+    end: &Kinematics,
     terrain: &dyn Terrain,
     v: &[f64],
     activation: &Activation,
     out: &mut Vec<Contact>,
 ) {
     out.clear();
-    let reach = activation.hover.max(activation.margin);
-    let base = &kinematics.base;
-    let mut offer = |contact: Contact| {
+    let mut gate = Gate {
+        model,
+        kinematics,
+        v,
+        activation,
+        reach: activation.hover.max(activation.margin),
+        can_be_passed: terrain.can_be_passed(),
+        out,
+    };
+    for i in 0..model.wheels().len() {
+        wheel_candidates(i, end, terrain, &mut gate);
+    }
+    for i in 0..model.boxes().len() {
+        box_candidates(i, end, terrain, &mut gate);
+    }
+}
+
+/// Lets in the candidates that become contacts.
+struct Gate<'a> {
+    model: &'a Model,
+    kinematics: &'a Kinematics,
+    v: &'a [f64],
+    activation: &'a Activation,
+    reach: f64,
+    can_be_passed: bool,
+    out: &'a mut Vec<Contact>,
+}
+
+impl Gate<'_> {
+    #[inline]
+    fn offer(&mut self, contact: Contact) {
+        let activation = self.activation;
         let is_touching = contact.gap <= 0.0;
         if activation.lead.abs() > 0.0 || !is_touching {
-            let u_N = contact.frame.n.dot(&kinematics.point_velocity(
-                model,
+            let u_N = contact.frame.n.dot(&self.kinematics.point_velocity(
+                self.model,
                 contact.body,
                 &contact.point,
-                v,
+                self.v,
             ));
             let forecast = contact.gap + activation.lead * u_N;
             let is_hovering = contact.gap <= activation.hover && u_N.abs() <= activation.slow;
@@ -53,61 +94,143 @@ pub fn detect(
                 return;
             }
         }
-        out.push(contact);
+        self.out.push(contact);
+    }
+
+    /// A contact with a sphere: the nearest point's, or, where `touch` finds a normal, the passing one.
+    ///
+    /// `motion`: how far the part moves in half a step, at most.
+    #[inline]
+    fn offer_sphere(
+        &mut self,
+        (part, body, id): (Part, usize, u32),
+        sphere: &Sphere,
+        near: &NearestPoint,
+        motion: f64,
+        touch: impl FnOnce() -> Option<Vector3<f64>>,
+    ) {
+        let mut contact = Contact {
+            key: ContactKey::new(part, usize::from(NEAREST), id),
+            part,
+            body,
+            point: near.point,
+            frame: near.frame,
+            gap: near.gap,
+        };
+        if near.gap - motion < -DEEP * sphere.radius
+            && let Some(n) = touch()
+        {
+            contact.key.feature = PASSING;
+            contact.frame.n = n;
+            self.out.push(contact);
+        } else if near.gap <= self.reach {
+            self.offer(contact);
+        }
+    }
+}
+
+fn wheel_candidates(i: usize, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Gate<'_>) {
+    let kinematics = gate.kinematics;
+    let wheel = &gate.model.wheels()[i];
+    let (part, body) = (Part::Wheel(i), wheel.body);
+    let base = &kinematics.base;
+    let placed = place_wheel(kinematics, wheel);
+    let half_way = if gate.can_be_passed {
+        end.base - base + end.point(body, &wheel.centre) - placed.centre
+    } else {
+        Vector3::zeros()
     };
-    for (i, wheel) in model.wheels().iter().enumerate() {
-        let placed = place_wheel(kinematics, wheel);
-        let part = Part::Wheel(i);
-        terrain.visit_near(
-            &(base + placed.centre),
-            wheel.radius + reach,
-            &mut |id, primitive| match primitive {
-                Primitive::Plane(plane) => {
-                    wheel_plane::rim_points(&placed, plane, base, reach, |p| {
-                        offer(Contact {
-                            key: ContactKey::new(part, p.feature, id),
-                            part,
-                            body: wheel.body,
-                            point: p.point,
-                            frame: p.frame,
-                            gap: p.gap,
-                        });
+    let motion = half_way.norm();
+    terrain.visit_near(
+        &(base + placed.centre),
+        wheel.radius + gate.reach + motion,
+        &mut |id, primitive| match primitive {
+            Primitive::Plane(plane) => {
+                wheel_plane::rim_points(&placed, plane, base, gate.reach, |p| {
+                    gate.offer(Contact {
+                        key: ContactKey::new(part, p.feature, id),
+                        part,
+                        body,
+                        point: p.point,
+                        frame: p.frame,
+                        gap: p.gap,
                     });
-                }
-            },
-        );
-    }
-    for (i, solid) in model.boxes().iter().enumerate() {
-        let R = kinematics.R[solid.body] * solid.rotation;
-        let centre = kinematics.point(solid.body, &solid.centre);
-        let part = Part::Box(i);
-        terrain.visit_near(
-            &(base + centre),
-            solid.half_size.norm() + reach,
-            &mut |id, primitive| match primitive {
-                Primitive::Plane(plane) => {
-                    box_plane::corners(
-                        &centre,
-                        &R,
-                        &solid.half_size,
-                        plane,
-                        base,
-                        reach,
-                        |corner, point, gap| {
-                            offer(Contact {
-                                key: ContactKey::new(part, corner, id),
-                                part,
-                                body: solid.body,
-                                point,
-                                frame: ContactFrame::of_normal(plane.normal()),
-                                gap,
-                            });
-                        },
-                    );
-                }
-            },
-        );
-    }
+                });
+            }
+            Primitive::Sphere(sphere) => {
+                let near = wheel_sphere::nearest_point(&placed, sphere, base);
+                gate.offer_sphere((part, body, id), sphere, &near, motion, || {
+                    // The disc's axes are taken as those of the midpoint all along.
+                    let middle = sphere.centre - base - placed.centre;
+                    let distance = |x: &Vector3<f64>| {
+                        let ball = Sphere {
+                            centre: x + base + placed.centre,
+                            radius: 0.0,
+                        };
+                        let near = wheel_sphere::nearest_point(&placed, &ball, base);
+                        (near.frame.n, near.gap)
+                    };
+                    first_touch(distance, &middle, &(middle - half_way), sphere.radius)
+                });
+            }
+        },
+    );
+}
+
+fn box_candidates(i: usize, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Gate<'_>) {
+    let kinematics = gate.kinematics;
+    let solid = &gate.model.boxes()[i];
+    let (part, body) = (Part::Box(i), solid.body);
+    let base = &kinematics.base;
+    let R = kinematics.R[body] * solid.rotation;
+    let centre = kinematics.point(body, &solid.centre);
+    let end_centre = end.point(body, &solid.centre);
+    let size = solid.half_size.norm();
+    let motion = if gate.can_be_passed {
+        (end.base - base + end_centre - centre).norm()
+            + (end.R[body] - kinematics.R[body]).norm() * size
+    } else {
+        0.0
+    };
+    terrain.visit_near(
+        &(base + centre),
+        size + gate.reach + motion,
+        &mut |id, primitive| match primitive {
+            Primitive::Plane(plane) => {
+                box_plane::corners(
+                    &centre,
+                    &R,
+                    &solid.half_size,
+                    plane,
+                    base,
+                    gate.reach,
+                    |corner, point, gap| {
+                        gate.offer(Contact {
+                            key: ContactKey::new(part, corner, id),
+                            part,
+                            body,
+                            point,
+                            frame: ContactFrame::of_normal(plane.normal()),
+                            gap,
+                        });
+                    },
+                );
+            }
+            Primitive::Sphere(sphere) => {
+                let near = box_sphere::nearest_point(&centre, &R, &solid.half_size, sphere, base);
+                gate.offer_sphere((part, body, id), sphere, &near, motion, || {
+                    let middle = R.tr_mul(&(sphere.centre - base - centre));
+                    let end_R = end.R[body] * solid.rotation;
+                    let end = end_R.tr_mul(&(sphere.centre - end.base - end_centre));
+                    let distance = |x: &Vector3<f64>| {
+                        let (_, n, distance) = box_sphere::nearest_local(x, &solid.half_size);
+                        (n, distance)
+                    };
+                    first_touch(distance, &middle, &end, sphere.radius).map(|n| R * n)
+                });
+            }
+        },
+    );
 }
 
 fn place_wheel(kinematics: &Kinematics, wheel: &Wheel) -> PlacedWheel {
@@ -142,19 +265,46 @@ pub fn relocate(
             contact.point = box_plane::corner(&centre, &R, &solid.half_size, feature);
             contact.gap = plane.distance(&(base + contact.point));
         }
+        (Part::Wheel(i), Primitive::Sphere(sphere)) => {
+            let placed = place_wheel(kinematics, &model.wheels()[i]);
+            let near = if contact.key.feature == PASSING {
+                let n = &contact.frame.n;
+                wheel_sphere::point_over_tangent(&placed, n, &touch(&sphere, n, base))
+            } else {
+                wheel_sphere::nearest_point(&placed, &sphere, base)
+            };
+            (contact.point, contact.frame, contact.gap) = (near.point, near.frame, near.gap);
+        }
+        (Part::Box(i), Primitive::Sphere(sphere)) => {
+            let solid = &model.boxes()[i];
+            let R = kinematics.R[solid.body] * solid.rotation;
+            let centre = kinematics.point(solid.body, &solid.centre);
+            let half = &solid.half_size;
+            let near = if contact.key.feature == PASSING {
+                let n = &contact.frame.n;
+                box_sphere::point_over_tangent(&centre, &R, half, n, &touch(&sphere, n, base))
+            } else {
+                box_sphere::nearest_point(&centre, &R, half, &sphere, base)
+            };
+            (contact.point, contact.frame, contact.gap) = (near.point, near.frame, near.gap);
+        }
     }
 }
 
-/// Gap, lowest point (relative to the trunk origin) and frame of every wheel over a terrain: the nearest primitive's.
+/// The sphere's point with the outward normal n, relative to `base`.
+fn touch(sphere: &Sphere, n: &Vector3<f64>, base: &Vector3<f64>) -> Vector3<f64> {
+    sphere.centre - base + n * sphere.radius
+}
+
+/// Gap, nearest point (relative to the trunk origin) and frame of every wheel over a terrain: the nearest primitive's.
 ///
-/// A wheel that no primitive is near (which no plane allows) keeps a gap of +∞.
+/// A wheel with no primitive within [`FAR`] (which no plane allows) keeps a gap of +∞.
 #[must_use]
 pub fn wheel_contacts(
     model: &Model,
     kinematics: &Kinematics,
     terrain: &dyn Terrain,
 ) -> Vec<Contact> {
-    let base = &kinematics.base;
     let nearest = |(i, wheel): (usize, &Wheel)| {
         let placed = place_wheel(kinematics, wheel);
         let mut best = Contact {
@@ -165,21 +315,43 @@ pub fn wheel_contacts(
             frame: ContactFrame::of_wheel(&Vector3::y(), &placed.axle, &placed.spoke),
             gap: f64::INFINITY,
         };
-        terrain.visit_near(
-            &(base + placed.centre),
-            f64::INFINITY,
-            &mut |id, primitive| match primitive {
-                Primitive::Plane(plane) => {
-                    wheel_plane::rim_points(&placed, plane, base, f64::INFINITY, |p| {
-                        if p.feature == 0 && p.gap < best.gap {
-                            best.key.primitive = id;
-                            (best.point, best.frame, best.gap) = (p.point, p.frame, p.gap);
-                        }
-                    });
-                }
-            },
-        );
+        // What is not visited is further from the centre than `reach`, thus from the wheel than reach − R.
+        let mut reach = 2.0 * wheel.radius;
+        while reach < FAR && best.gap + wheel.radius > reach {
+            look_around(&placed, kinematics, terrain, reach, &mut best);
+            reach *= 2.0;
+        }
         best
     };
     model.wheels().iter().enumerate().map(nearest).collect()
+}
+
+/// How far a wheel looks for the nearest ground, m.
+const FAR: f64 = 1e4;
+
+/// Enters the nearest primitive within `reach` of a wheel's centre into `best`, if it is nearer than that.
+fn look_around(
+    placed: &PlacedWheel,
+    kinematics: &Kinematics,
+    terrain: &dyn Terrain,
+    reach: f64,
+    best: &mut Contact,
+) {
+    let base = &kinematics.base;
+    terrain.visit_near(&(base + placed.centre), reach, &mut |id, primitive| {
+        let (point, frame, gap) = match primitive {
+            Primitive::Plane(plane) => {
+                let rim = wheel_plane::rim_point(placed, plane, base, 0);
+                (rim.point, rim.frame, rim.gap)
+            }
+            Primitive::Sphere(sphere) => {
+                let near = wheel_sphere::nearest_point(placed, sphere, base);
+                (near.point, near.frame, near.gap)
+            }
+        };
+        if gap < best.gap {
+            best.key.primitive = id;
+            (best.point, best.frame, best.gap) = (point, frame, gap);
+        }
+    });
 }

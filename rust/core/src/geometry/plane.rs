@@ -79,6 +79,11 @@ impl Terrain for Plane {
     }
 
     #[inline]
+    fn can_be_passed(&self) -> bool {
+        false
+    }
+
+    #[inline]
     fn primitive(&self, _id: u32) -> Primitive {
         Primitive::Plane(*self)
     }

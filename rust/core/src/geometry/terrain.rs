@@ -3,12 +3,15 @@
 use nalgebra::Vector3;
 
 use super::plane::Plane;
+use super::sphere::Sphere;
 
 /// A convex piece of ground whose distance to a wheel or a box has a closed form.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Primitive {
     /// A half-space.
     Plane(Plane),
+    /// A ball.
+    Sphere(Sphere),
 }
 
 /// The ground. Immutable, shared between threads.
@@ -16,6 +19,12 @@ pub trait Terrain: Send + Sync {
     /// Visits every primitive that comes closer than `reach` (m) to `centre` (world, m), with a number that
     /// names it for as long as the terrain lives. May visit others too; must not depend on those far away.
     fn visit_near(&self, centre: &Vector3<f64>, reach: f64, visit: &mut dyn FnMut(u32, &Primitive));
+
+    /// Whether a part can be past a primitive after one step: a ball, but no half-space. Only then is the motion within a
+    /// step looked at.
+    fn can_be_passed(&self) -> bool {
+        true
+    }
 
     /// The primitive of a number that [`Self::visit_near`] gave.
     fn primitive(&self, id: u32) -> Primitive;

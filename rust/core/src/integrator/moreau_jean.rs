@@ -64,6 +64,7 @@ impl Integrator for MoreauJean {
         detect(
             model,
             &ws.kinematics,
+            &ws.kinematics_end,
             terrain,
             &state.v,
             &activation,

@@ -143,6 +143,7 @@ fn iterate(
         detect(
             model,
             &ws.kinematics,
+            &ws.kinematics_end,
             terrain,
             &state.v,
             &activation,

@@ -1,0 +1,253 @@
+//! Field of fixed spheres, with or without a plane under them.
+
+use nalgebra::Vector3;
+
+use super::ball_tree::BallTree;
+use super::error::TerrainError;
+use super::plane::Plane;
+use super::rocks::Rocks;
+use super::sphere::Sphere;
+use super::terrain::{Primitive, Terrain};
+
+/// Most spheres of a field: about a gigabyte.
+pub const MAX_SPHERES: usize = 10_000_000;
+
+/// Largest coordinate and radius of a sphere, m: there a double still resolves a nanometre.
+pub const MAX_SIZE: f64 = 1e6;
+
+/// Spheres and an optional ground plane. Immutable.
+///
+/// Primitive 0 is the plane, whether there is one or not; sphere i (from 0, as given) is primitive i + 1.
+#[derive(Clone, Debug)]
+pub struct SphereField {
+    spheres: Vec<Sphere>,
+    ground: Option<Plane>,
+    tree: BallTree,
+}
+
+impl SphereField {
+    /// From centres (n, 3) and radii (n), m.
+    ///
+    /// # Errors
+    /// `MismatchedLengths`, `TooMany`, `Empty`, `EntryNotFinite`, `NonPositiveRadius`, `TooFar`.
+    pub fn new(
+        centres: &[[f64; 3]],
+        radii: &[f64],
+        ground: Option<Plane>,
+    ) -> Result<Self, TerrainError> {
+        if centres.len() != radii.len() {
+            return Err(TerrainError::MismatchedLengths {
+                centres: centres.len(),
+                radii: radii.len(),
+            });
+        }
+        check_count(centres.len())?;
+        if centres.is_empty() && ground.is_none() {
+            return Err(TerrainError::Empty);
+        }
+        let mut spheres = Vec::with_capacity(centres.len());
+        for (index, (centre, &radius)) in centres.iter().zip(radii).enumerate() {
+            for &value in centre {
+                check_entry("centres", index, value)?;
+            }
+            check_entry("radii", index, radius)?;
+            if radius <= 0.0 {
+                return Err(TerrainError::NonPositiveRadius { index, radius });
+            }
+            spheres.push(Sphere {
+                centre: Vector3::from(*centre),
+                radius,
+            });
+        }
+        let tree = BallTree::new(&spheres);
+        Ok(Self {
+            spheres,
+            ground,
+            tree,
+        })
+    }
+
+    /// The rug of the report's Fig. 6.6: 50 x 25 spheres of radius 0.5 m at x = 0.6 i, z = 0.6 j,
+    /// y = −0.5 + 0.5 sin(x/5 + π/2), without a plane.
+    #[must_use]
+    pub fn rug() -> Self {
+        let spheres: Vec<Sphere> = (0..50)
+            .flat_map(|i| (0..25).map(move |j| (0.6 * f64::from(i), 0.6 * f64::from(j))))
+            .map(|(x, z)| Sphere {
+                centre: Vector3::new(
+                    x,
+                    -0.5 + 0.5 * (x / 5.0 + std::f64::consts::FRAC_PI_2).sin(),
+                    z,
+                ),
+                radius: 0.5,
+            })
+            .collect();
+        Self {
+            tree: BallTree::new(&spheres),
+            spheres,
+            ground: None,
+        }
+    }
+
+    /// Rocks strewn over a plane with the size–frequency distribution of Mars: see [`Rocks`].
+    ///
+    /// # Errors
+    /// A number out of its range; `TooMany`.
+    pub fn rocks(rocks: &Rocks) -> Result<Self, TerrainError> {
+        let spheres = rocks.sample()?;
+        let tree = BallTree::new(&spheres);
+        Ok(Self {
+            spheres,
+            ground: Some(rocks.ground),
+            tree,
+        })
+    }
+
+    /// Height y (m) of the visible surface at (x, z): the highest of ground and spheres; `None` where there is neither.
+    #[must_use]
+    pub fn height(&self, x: f64, z: f64) -> Option<f64> {
+        let of_plane = |plane: &Plane| {
+            let n = plane.normal();
+            (n.y.abs() > 1e-12).then(|| -(n.x * x + n.z * z + plane.offset()) / n.y)
+        };
+        let mut highest = self.ground.as_ref().and_then(of_plane);
+        self.tree.visit_column(x, z, |sphere| {
+            let across = (sphere.centre.x - x).hypot(sphere.centre.z - z);
+            let top = sphere.centre.y + (sphere.radius.powi(2) - across.powi(2)).max(0.0).sqrt();
+            highest = Some(highest.map_or(top, |y| y.max(top)));
+        });
+        highest
+    }
+
+    /// The spheres in the order they were given.
+    #[must_use]
+    pub fn spheres(&self) -> &[Sphere] {
+        &self.spheres
+    }
+
+    /// The plane under them.
+    #[must_use]
+    pub fn ground(&self) -> Option<&Plane> {
+        self.ground.as_ref()
+    }
+}
+
+/// Refuses more spheres than a field may have.
+pub(super) fn check_count(count: usize) -> Result<(), TerrainError> {
+    if count > MAX_SPHERES {
+        return Err(TerrainError::TooMany {
+            count,
+            limit: MAX_SPHERES,
+        });
+    }
+    Ok(())
+}
+
+fn check_entry(field: &'static str, index: usize, value: f64) -> Result<(), TerrainError> {
+    if !value.is_finite() {
+        return Err(TerrainError::EntryNotFinite {
+            field,
+            index,
+            value,
+        });
+    }
+    if value.abs() > MAX_SIZE {
+        return Err(TerrainError::TooFar {
+            field,
+            index,
+            value,
+            limit: MAX_SIZE,
+        });
+    }
+    Ok(())
+}
+
+impl Terrain for SphereField {
+    fn visit_near(
+        &self,
+        centre: &Vector3<f64>,
+        reach: f64,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
+        if let Some(plane) = self.ground {
+            visit(0, &Primitive::Plane(plane));
+        }
+        self.tree.visit_near(centre, reach, |index, sphere| {
+            visit(index + 1, &Primitive::Sphere(*sphere));
+        });
+    }
+
+    fn can_be_passed(&self) -> bool {
+        !self.spheres.is_empty()
+    }
+
+    fn primitive(&self, id: u32) -> Primitive {
+        match (id, self.ground) {
+            (0, Some(plane)) => Primitive::Plane(plane),
+            (id, _) => Primitive::Sphere(self.spheres[id as usize - 1]),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bad_fields_are_refused_by_field_and_index() {
+        let one = [[0.0; 3]];
+        let refused = |centres: &[[f64; 3]], radii: &[f64]| {
+            let error = SphereField::new(centres, radii, None).unwrap_err();
+            (error.field(), error.to_string())
+        };
+        let cases = [
+            (refused(&one, &[]), "radii"),
+            (refused(&one, &[-1.0]), "radii[0]: must be positive, is -1"),
+            (refused(&one, &[0.0]), "radii[0]: must be positive"),
+            (refused(&one, &[f64::NAN]), "radii[0]: must be finite"),
+            (refused(&one, &[1e7]), "radii[0]: must be at most"),
+            (
+                refused(&[[0.0; 3], [0.0, f64::NAN, 0.0]], &[1.0, 1.0]),
+                "centres[1]: must be finite",
+            ),
+            (
+                refused(&[[0.0, 0.0, 1e300]], &[1.0]),
+                "centres[0]: must be at most",
+            ),
+            (refused(&[], &[]), "centres: a field needs"),
+        ];
+        for ((field, message), begin) in cases {
+            assert!(message.starts_with(begin), "{message}");
+            assert!(begin.starts_with(field), "{field}");
+        }
+        let many = check_count(MAX_SPHERES + 1).unwrap_err();
+        assert_eq!(many.field(), "centres");
+        assert!(SphereField::new(&[], &[], Some(Plane::ground())).is_ok());
+    }
+
+    #[test]
+    fn the_rug_is_the_reports() {
+        let rug = SphereField::rug();
+        assert_eq!(rug.spheres().len(), 1250);
+        let last = rug.spheres()[1249];
+        assert!((last.centre - Vector3::new(29.4, 0.0, 14.4)).xz().norm() < 1e-12);
+        assert!((rug.spheres()[0].centre.y).abs() < 1e-15);
+        assert!(rug.ground().is_none());
+    }
+
+    #[test]
+    fn primitives_have_the_numbers_that_a_visit_gives() {
+        let field = SphereField::new(
+            &[[0.0; 3], [5.0, 0.0, 0.0]],
+            &[1.0, 2.0],
+            Some(Plane::ground()),
+        )
+        .unwrap();
+        let mut seen = Vec::new();
+        field.visit_near(&Vector3::new(0.0, 1.5, 0.0), 1.0, &mut |id, primitive| {
+            assert_eq!(*primitive, field.primitive(id));
+            seen.push(id);
+        });
+        assert_eq!(seen, [0, 1]);
+    }
+}

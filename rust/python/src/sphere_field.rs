@@ -1,0 +1,269 @@
+//! `SphereField`, and the terrain that a simulation takes: a plane or a field.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use rover_core::geometry::{Clearing, Rocks, SphereField as CoreField, Terrain};
+
+use crate::arrays::{array, fresh, fresh_rows, vector};
+use crate::errors::{BorderError, Kind, Value};
+use crate::plane::Plane;
+
+/// Fixed spheres, with or without a plane under them. Immutable.
+#[pyclass(module = "rover_gym._core", frozen, from_py_object)]
+#[derive(Clone)]
+pub struct SphereField {
+    pub inner: Arc<CoreField>,
+}
+
+/// What a simulation stands on.
+#[derive(Clone, FromPyObject)]
+pub enum Ground {
+    /// A plane.
+    Plane(Plane),
+    /// A field of spheres.
+    Field(SphereField),
+}
+
+impl Ground {
+    /// The core's view of it.
+    pub fn terrain(&self) -> Arc<dyn Terrain> {
+        match self {
+            Self::Plane(plane) => Arc::new(plane.inner),
+            Self::Field(field) => field.inner.clone(),
+        }
+    }
+
+    /// Any object as ground, or a `TerrainError`.
+    pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<Self> {
+        given.extract::<Self>().map_err(|_| {
+            let shown = given
+                .repr()
+                .map_or_else(|_| String::new(), |r| r.to_string());
+            let message = format!("terrain: must be a Plane or a SphereField, is {shown}");
+            let (field, value) = (Some("terrain".to_owned()), Value::Text(shown));
+            BorderError {
+                kind: Kind::Terrain,
+                message,
+                field,
+                value,
+            }
+            .into()
+        })
+    }
+
+    /// Back to Python.
+    pub fn to_object<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(match self {
+            Self::Plane(plane) => plane.clone().into_pyobject(py)?.into_any(),
+            Self::Field(field) => field.clone().into_pyobject(py)?.into_any(),
+        })
+    }
+}
+
+/// (n, width) numbers.
+fn rows<const N: usize>(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<[f64; N]>> {
+    let given = array(value, Kind::Terrain, field)?;
+    let view = given.as_array();
+    let is_empty = view.is_empty();
+    if !is_empty && (view.ndim() != 2 || view.shape()[1] != N) {
+        let message = format!("{field}: needs shape (n, {N}), has {:?}", view.shape());
+        let (name, value) = (Some(field.to_owned()), Value::Count(view.ndim()));
+        return Err(BorderError {
+            kind: Kind::Terrain,
+            message,
+            field: name,
+            value,
+        }
+        .into());
+    }
+    let flat: Vec<f64> = view.iter().copied().collect();
+    Ok(flat
+        .chunks_exact(N)
+        .map(|row| std::array::from_fn(|k| row[k]))
+        .collect())
+}
+
+fn build(centres: &[[f64; 3]], radii: &[f64], ground: Option<Plane>) -> PyResult<SphereField> {
+    let field = CoreField::new(centres, radii, ground.map(|plane| plane.inner))
+        .map_err(BorderError::from)?;
+    Ok(SphereField {
+        inner: Arc::new(field),
+    })
+}
+
+#[pymethods]
+impl SphereField {
+    #[new]
+    #[pyo3(signature = (centres, radii, ground = None))]
+    fn new(
+        centres: &Bound<'_, PyAny>,
+        radii: &Bound<'_, PyAny>,
+        ground: Option<Plane>,
+    ) -> PyResult<Self> {
+        build(
+            &rows::<3>(centres, "centres")?,
+            &vector(radii, Kind::Terrain, "radii")?,
+            ground,
+        )
+    }
+
+    /// Reads a CSV file with the header x,y,z,radius (m).
+    #[staticmethod]
+    #[pyo3(signature = (path, ground = None))]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
+    fn from_file(py: Python<'_>, path: PathBuf, ground: Option<Plane>) -> PyResult<Self> {
+        let bytes = std::fs::read(&path)?;
+        let refuse = |message: String| {
+            let (field, value) = (
+                Some("path".to_owned()),
+                Value::Text(path.display().to_string()),
+            );
+            PyErr::from(BorderError {
+                kind: Kind::Terrain,
+                message,
+                field,
+                value,
+            })
+        };
+        let text = String::from_utf8(bytes)
+            .map_err(|_| refuse(format!("path: {} is not text", path.display())))?;
+        let mut lines = text.lines();
+        let header: Vec<String> = lines
+            .next()
+            .unwrap_or("")
+            .split(',')
+            .map(|s| s.trim().to_lowercase())
+            .collect();
+        if header != ["x", "y", "z", "radius"] {
+            return Err(refuse(format!(
+                "path: {} must begin with the header x,y,z,radius",
+                path.display()
+            )));
+        }
+        let body: Vec<&str> = lines.collect();
+        let kwargs = pyo3::types::PyDict::new(py);
+        kwargs.set_item("delimiter", ",")?;
+        kwargs.set_item("ndmin", 2)?;
+        let table = py
+            .import("numpy")?
+            .call_method("loadtxt", (body,), Some(&kwargs))
+            .map_err(|e| {
+                refuse(format!(
+                    "path: {} is not a table of numbers ({})",
+                    path.display(),
+                    e.value(py)
+                ))
+            })?;
+        let table = rows::<4>(&table, "path")?;
+        let centres: Vec<[f64; 3]> = table.iter().map(|r| [r[0], r[1], r[2]]).collect();
+        let radii: Vec<f64> = table.iter().map(|r| r[3]).collect();
+        build(&centres, &radii, ground)
+    }
+
+    /// The report's Fig. 6.6: 50 x 25 spheres of radius 0.5 m on a wave, without a plane.
+    #[staticmethod]
+    fn rug() -> Self {
+        Self {
+            inner: Arc::new(CoreField::rug()),
+        }
+    }
+
+    /// Rocks with the size-frequency distribution of Mars (Golombek and Rapp 1997) on a plane.
+    #[staticmethod]
+    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
+    #[pyo3(signature = (abundance, area, seed, *, max_diameter = 0.5, min_diameter = 0.05, burial = 0.5, ground = None, clear = None))]
+    fn rocks(
+        abundance: f64,
+        area: [f64; 4],
+        seed: u64,
+        max_diameter: f64,
+        min_diameter: f64,
+        burial: f64,
+        ground: Option<Plane>,
+        clear: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let [x_min, z_min, x_max, z_max] = area;
+        let clear = clear.map_or_else(|| Ok(Vec::new()), |c| rows::<3>(c, "clear"))?;
+        let rocks = Rocks {
+            abundance,
+            area: [x_max - x_min, z_max - z_min],
+            middle: [0.5 * (x_min + x_max), 0.5 * (z_min + z_max)],
+            seed,
+            max_diameter,
+            min_diameter,
+            burial,
+            clearings: clear
+                .iter()
+                .map(|&[x, z, radius]| Clearing { x, z, radius })
+                .collect(),
+            ground: ground.map_or_else(rover_core::geometry::Plane::ground, |plane| plane.inner),
+        };
+        Ok(Self {
+            inner: Arc::new(CoreField::rocks(&rocks).map_err(BorderError::from)?),
+        })
+    }
+
+    #[getter]
+    fn centres<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let centres: Vec<[f64; 3]> = self
+            .inner
+            .spheres()
+            .iter()
+            .map(|s| s.centre.into())
+            .collect();
+        fresh_rows(py, &centres)
+    }
+
+    #[getter]
+    fn radii<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.inner.spheres().iter().map(|s| s.radius))
+    }
+
+    #[getter]
+    fn ground(&self) -> Option<Plane> {
+        self.inner.ground().map(|plane| Plane { inner: *plane })
+    }
+
+    /// (m,) height y of the visible surface at the points (x, z) (m, 2); nan where there is none.
+    fn heights<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let points = rows::<2>(points, "points")?;
+        let heights: Vec<f64> = points
+            .iter()
+            .map(|&[x, z]| self.inner.height(x, z).unwrap_or(f64::NAN))
+            .collect();
+        Ok(fresh(py, &heights))
+    }
+
+    fn __len__(&self) -> usize {
+        self.inner.spheres().len()
+    }
+
+    fn __repr__(&self) -> String {
+        let ground = if self.inner.ground().is_some() {
+            "on a plane"
+        } else {
+            "without a plane"
+        };
+        format!(
+            "SphereField({} spheres, {ground})",
+            self.inner.spheres().len()
+        )
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let py = slf.py();
+        let own = slf.get();
+        let arguments = (own.centres(py)?, own.radii(py), own.ground());
+        Ok((
+            slf.get_type().into_any(),
+            arguments.into_pyobject(py)?.into_any(),
+        ))
+    }
+}

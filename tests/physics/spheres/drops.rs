@@ -1,0 +1,114 @@
+//! Energy through random drops onto rocks.
+
+use std::sync::Arc;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use rover_core::geometry::SphereField;
+use rover_core::integrator::StepOptions;
+use rover_core::multibody::{Configuration, Model};
+use rover_core::simulation::Simulation;
+
+use crate::sphere_scenes::{Random, rocks};
+
+/// Worst of so many drops.
+struct Worst {
+    /// Work of the contacts in a step over the kinetic energy before it.
+    work: f64,
+    /// Total energy over that of the start, as a share of the start's kinetic energy: what the drop as a whole gains.
+    gain: f64,
+    unsolved: usize,
+    steps: usize,
+}
+
+/// Work of the last step's impulses, J: the kinetic energy that they make, `pᵀ (u⁺ + u_free) / 2 = pᵀ u⁺ − pᵀ W p / 2`.
+fn contact_work(simulation: &Simulation) -> f64 {
+    let active = simulation.contacts();
+    let (W, _, _) = simulation.last_problem();
+    let p: Vec<f64> = active.iter().flat_map(|a| a.impulse).collect();
+    let u: Vec<f64> = active.iter().flat_map(|a| a.velocity).collect();
+    let mut work = 0.0;
+    for (i, row) in W.chunks_exact(p.len().max(1)).enumerate().take(p.len()) {
+        let product: f64 = row.iter().zip(&p).map(|(w, p)| w * p).sum();
+        work += p[i] * (u[i] - 0.5 * product);
+    }
+    work
+}
+
+/// Drops the rover, turned at random, on one field of rocks; wheels are free and joints too.
+fn drop_often(drops: u64, restitution: f64, friction_coefficient: f64) -> Worst {
+    let field = Arc::new(SphereField::rocks(&rocks(11)).unwrap());
+    let model = Arc::new(Model::rover());
+    let options = StepOptions {
+        restitution,
+        friction_coefficient,
+        ..StepOptions::default()
+    };
+    let mut random = Random(42);
+    let mut worst = Worst {
+        work: f64::NEG_INFINITY,
+        gain: f64::NEG_INFINITY,
+        unsolved: 0,
+        steps: 0,
+    };
+    for _ in 0..drops {
+        let mut simulation =
+            Simulation::new(model.clone(), field.clone(), options.clone()).unwrap();
+        let tilt = [
+            random.between(-0.6, 0.6),
+            random.between(-3.1, 3.1),
+            random.between(-0.6, 0.6),
+        ];
+        let attitude = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), tilt[1])
+            * UnitQuaternion::from_euler_angles(tilt[0], 0.0, tilt[2]);
+        let start = Configuration {
+            position: Vector3::new(
+                random.between(-4.0, 4.0),
+                random.between(0.9, 1.1),
+                random.between(-2.0, 2.0),
+            ),
+            attitude,
+            joints: (0..15).map(|_| random.between(-0.2, 0.2)).collect(),
+        };
+        let mut v: Vec<f64> = (0..21).map(|_| random.between(-0.5, 0.5)).collect();
+        v[1] = random.between(-4.0, -2.0);
+        simulation.set_state(start, v);
+        // The steering's springs are not in the energy: let them go.
+        let held: Vec<String> = simulation
+            .model()
+            .bodies()
+            .iter()
+            .skip(1)
+            .map(|b| b.name.clone())
+            .collect();
+        simulation.release(&held).unwrap();
+        let start = simulation.energy();
+        for _ in 0..60 {
+            let kinetic = simulation.energy().kinetic;
+            let report = simulation.step(1).unwrap();
+            worst.unsolved += usize::from(!report.is_converged());
+            worst.steps += 1;
+            let now = simulation.energy().total();
+            worst.work = worst.work.max(contact_work(&simulation) / kinetic.max(1.0));
+            worst.gain = worst.gain.max((now - start.total()) / start.kinetic);
+        }
+    }
+    worst
+}
+
+#[allow(clippy::print_stderr)] // the figure is the point
+fn report(name: &str, worst: &Worst) {
+    eprintln!(
+        "{name}: contacts make at most {:.2e} of the kinetic energy in a step, a drop {:.2e}; {} of {} steps not converged",
+        worst.work, worst.gain, worst.unsolved, worst.steps
+    );
+}
+
+#[test]
+fn energy_never_grows() {
+    let worst = drop_often(100, 0.0, 0.7);
+    report("e = 0, friction", &worst);
+    let worst = drop_often(100, 0.3, 0.0);
+    report("e = 0.3, no friction", &worst);
+    let worst = drop_often(100, 0.3, 0.7);
+    report("e = 0.3, friction", &worst);
+}
