@@ -15,8 +15,7 @@ import numpy.typing as npt
 
 from rover_gym._core import SphereField
 from rover_gym.recording import MissingExtraError, Trajectory, read_trajectory
-from rover_gym.report import reference_data
-from rover_gym.rug import START as RUG_START
+from rover_gym.report import WHEEL_RADIUS, reference_data
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -193,39 +192,43 @@ def steering_angles(figure: Figure, trajectory: Trajectory) -> None:
 
 
 def rug_wheel_traces(figure: Figure, trajectory: Trajectory) -> None:
-    """Section 6.2: the paths of the six wheel centres, from above over the spheres, and from the side."""
-    field = SphereField.rug()
-    spheres, radii = field.centres, field.radii
+    """Section 6.2: the paths of the wheel centres from above, and those of the left wheels from the side."""
     centres = trajectory["wheel_centres"]
-    above, side = figure.subplots(1, 2, width_ratios=(1, 2))
-    middle = spheres[np.isclose(spheres[:, 2], spheres[np.argmin(np.abs(spheres[:, 2] - RUG_START[2])), 2])]
-    turn = np.linspace(0.0, 2.0 * np.pi, 60)
-    for axes, places, columns in ((above, spheres, (2, 0)), (side, middle, (0, 1))):
-        for place in places:
-            axes.plot(
-                place[columns[0]] + radii[0] * np.cos(turn),
-                place[columns[1]] + radii[0] * np.sin(turn),
-                color="0.85" if axes is above else "0.7",
-                linewidth=0.6,
-            )
+    above, side = figure.subplots(1, 2, width_ratios=(1, 1.6))
+    field = SphereField.rug()
+    for (x, _, z), radius in zip(field.centres, field.radii, strict=True):
+        _circle(above, z, x, radius, color="0.85")
     for i, wheel in enumerate(WHEELS):
         colour = COLOURS[wheel]
         above.plot(centres[:, i, 2], centres[:, i, 0], color=colour, label=NAMES[wheel])
         above.plot(centres[0, i, 2], centres[0, i, 0], "o", color=colour, markersize=4)
-        side.plot(centres[:, i, 0], centres[:, i, 1], color=colour)
+        if wheel in SIDES[0]:
+            side.plot(centres[:, i, 0], centres[:, i, 1], color=colour)
+            side.plot(centres[0, i, 0], centres[0, i, 1], "o", color=colour, markersize=4)
+            x, y, z = centres[-1, i]
+            _circle(side, x, y, WHEEL_RADIUS, color=colour)
+            across = x + np.linspace(-1.2 * WHEEL_RADIUS, 1.2 * WHEEL_RADIUS, 200)
+            side.plot(across, field.heights(np.stack((across, np.full(200, z)), axis=1)), color="0.4")
     above.set(title="from above; dots are the start", xlabel="to the right, z (m)", ylabel="forward, x (m)")
-    side.set(title="from the right; spheres of the middle row", xlabel="forward, x (m)", ylabel="up, y (m)")
-    _close_up(above, centres[..., 2], centres[..., 0])
-    _close_up(side, centres[..., 0], centres[..., 1])
-    above.legend(title="wheel centre")
-    figure.suptitle(f"Section 6.2: traces of the wheels on the rug over {trajectory['time'][-1]:g} s")
+    side.set(
+        title="the left wheels from the right; at the end, with the rug under them",
+        xlabel="forward, x (m)",
+        ylabel="up, y (m)",
+    )
+    _close_up(above, centres[..., 2], centres[..., 0], 0.7)
+    _close_up(side, centres[..., 0], centres[..., 1], 0.4)
+    figure.legend(*above.get_legend_handles_labels(), loc="outside lower center", ncols=6)
+    figure.suptitle(f"Section 6.2: traces of the wheel centres on the rug over {trajectory['time'][-1]:g} s")
 
 
 def rug_contact_distances(figure: Figure, trajectory: Trajectory) -> None:
     """Section 6.2: the six gaps against time, left and right wheels apart."""
-    for axes, wheels in zip(figure.subplots(1, 2, sharey=True, sharex=True), SIDES, strict=True):
+    panels = figure.subplots(1, 2, sharey=True, sharex=True)
+    for axes, wheels, name in zip(panels, SIDES, ("left", "right"), strict=True):
         _plot_wheels(axes, trajectory["time"], 100.0 * trajectory["wheel_gaps"], wheels)
-        axes.set(title=f"step {_step(trajectory)}", xlabel="time (s)", ylim=(-1.0, 10.0))
+        axes.set(
+            title=f"{name} wheels, step {_step(trajectory)}", xlabel="time (s)", xlim=(0.0, 25.0), ylim=(-1.0, 5.0)
+        )
         axes.legend(loc="upper right")
     figure.axes[0].set_ylabel("contact distance (cm)")
     figure.suptitle("Section 6.2: contact distance between wheels and spheres")
@@ -233,19 +236,25 @@ def rug_contact_distances(figure: Figure, trajectory: Trajectory) -> None:
 
 def rug_reaction_forces(figure: Figure, trajectory: Trajectory) -> None:
     """Section 6.2: normal force on each wheel against time, left and right wheels apart."""
-    for axes, wheels in zip(figure.subplots(1, 2, sharey=True, sharex=True), SIDES, strict=True):
+    panels = figure.subplots(1, 2, sharey=True, sharex=True)
+    for axes, wheels, name in zip(panels, SIDES, ("left", "right"), strict=True):
         _plot_wheels(axes, trajectory["time"], trajectory["wheel_forces"][:, :, 0], wheels)
-        axes.set(title=f"mean over each step of {_step(trajectory)}", xlabel="time (s)", yscale="symlog")
-        axes.set_ylim(0.0, None)
+        axes.set(title=f"{name} wheels, mean over each step of {_step(trajectory)}", xlabel="time (s)", yscale="symlog")
+        axes.set(xlim=(0.0, 25.0), ylim=(0.0, None))
         axes.legend(loc="upper right")
     figure.axes[0].set_ylabel("normal force on the wheel (N)")
     figure.suptitle("Section 6.2: reaction forces of the wheels")
 
 
-def _close_up(axes: Axes, x: npt.NDArray[np.float64], y: npt.NDArray[np.float64]) -> None:
-    """Shows the traces with a margin, at one scale; the spheres beyond are cut."""
-    axes.set_xlim(x.min() - 1.0, x.max() + 1.0)
-    axes.set_ylim(y.min() - 1.0, y.max() + 1.0)
+def _circle(axes: Axes, x: float, y: float, radius: float, color: str) -> None:
+    turn = np.linspace(0.0, 2.0 * np.pi, 60)
+    axes.plot(x + radius * np.cos(turn), y + radius * np.sin(turn), color=color, linewidth=0.8)
+
+
+def _close_up(axes: Axes, x: npt.NDArray[np.float64], y: npt.NDArray[np.float64], margin: float) -> None:
+    """Shows the traces with a margin (m), at one scale; what lies beyond is cut."""
+    axes.set_xlim(x.min() - margin, x.max() + margin)
+    axes.set_ylim(y.min() - margin, y.max() + margin)
     axes.set_aspect("equal", adjustable="box")
 
 
