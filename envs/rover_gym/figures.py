@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from rover_gym._core import SphereField
 from rover_gym.recording import MissingExtraError, Trajectory, read_trajectory
-from rover_gym.report import WHEEL_RADIUS, reference_data
+from rover_gym.report import WHEEL_RADIUS, reference_data, report_model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -196,6 +196,8 @@ def rug_wheel_traces(figure: Figure, trajectory: Trajectory) -> None:
     centres = trajectory["wheel_centres"]
     above, side = figure.subplots(1, 2, width_ratios=(1, 1.6))
     field = SphereField.rug()
+    # The wheels lean, so they touch a little beside their centres' z.
+    touching = report_model().wheel_contact_points(trajectory["q"][-1], field, coordinates="state")[:, 2]
     for (x, _, z), radius in zip(field.centres, field.radii, strict=True):
         _circle(above, z, x, radius, color="0.85")
     for i, wheel in enumerate(WHEELS):
@@ -205,10 +207,10 @@ def rug_wheel_traces(figure: Figure, trajectory: Trajectory) -> None:
         if wheel in SIDES[0]:
             side.plot(centres[:, i, 0], centres[:, i, 1], color=colour)
             side.plot(centres[0, i, 0], centres[0, i, 1], "o", color=colour, markersize=4)
-            x, y, z = centres[-1, i]
+            x, y = centres[-1, i, :2]
             _circle(side, x, y, WHEEL_RADIUS, color=colour)
             across = x + np.linspace(-1.2 * WHEEL_RADIUS, 1.2 * WHEEL_RADIUS, 200)
-            side.plot(across, field.heights(np.stack((across, np.full(200, z)), axis=1)), color="0.4")
+            side.plot(across, field.heights(np.stack((across, np.full(200, touching[i])), axis=1)), color="0.4")
     above.set(title="from above; dots are the start", xlabel="to the right, z (m)", ylabel="forward, x (m)")
     side.set(
         title="the left wheels from the right; at the end, with the rug under them",

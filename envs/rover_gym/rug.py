@@ -1,8 +1,8 @@
 """Section 6.2 of the report: the rover dropped on a rug of 1250 fixed spheres, driven, its front wheels turned.
 
 The rug is that of the report's Fig. 6.6, in SI units; rover, gravity and steering are those of section 6.1. The rover
-weighs 86 N and its motors push with 8 N, too little to lift the wheels out of the dimples between the spheres: it lands,
-rocks to and fro and has come to rest before 25 s.
+weighs 86 N and its motors push with 8 N, too little to lift the wheels out of the dimples between the spheres: it
+lands, rocks to and fro and has come to rest before 25 s.
 """
 
 from collections.abc import Callable

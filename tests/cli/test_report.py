@@ -67,6 +67,21 @@ def test_the_rover_drives_over_the_rug(tmp_path: Path) -> None:
     assert result.smallest_gap > -0.01  # m
 
 
+def test_gaps_on_the_rug_are_those_of_points_on_the_rim() -> None:
+    sim = rug.scene()
+    field = sim.terrain
+    turn = np.linspace(0.0, 2.0 * np.pi, 20_001)
+    for _ in range(5):
+        sim.step(250)
+        poses = sim.poses()
+        for wheel, gap in zip(sim.model.to_dict()["wheels"], sim.wheel_gaps, strict=True):
+            centre, rotation = poses[wheel["solid"]]
+            rim = centre + scene.WHEEL_RADIUS * np.stack((np.cos(turn), np.sin(turn)), axis=1) @ rotation[:, :2].T
+            near = field.centres[np.linalg.norm(field.centres - centre, axis=1) < 1.5]
+            distance = np.linalg.norm(rim[:, None] - near, axis=2).min() - 0.5
+            assert gap == pytest.approx(distance, abs=1e-7)
+
+
 def test_without_matplotlib_the_error_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     result = CliRunner().invoke(app, ["report", "--figures", "--duration", "0.1", "--output", str(tmp_path)])
