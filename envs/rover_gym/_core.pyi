@@ -357,6 +357,9 @@ class Simulation:
     @property
     def trunk_force(self) -> float:
         """N: mean normal force on trunk and beams in the last step (high-centred if large)."""
+    @property
+    def deepest_overlap(self) -> float:
+        """Deepest gap of any wheel or box with the ground now, m: 0 where nothing overlaps, else negative."""
     def energy(self) -> Energy: ...
     def momentum(self) -> tuple[_Array, _Array]:
         """Linear (3,) kg m/s and angular momentum about the world origin (3,) kg m2/s."""

@@ -437,6 +437,11 @@ impl Simulation {
         self.inner.body_force()
     }
 
+    #[getter]
+    fn deepest_overlap(&self) -> f64 {
+        self.inner.deepest_overlap()
+    }
+
     fn energy(&self) -> Energy {
         Energy {
             inner: self.inner.energy(),

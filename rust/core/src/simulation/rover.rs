@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::error::{CommandError, SnapshotError};
 use super::profile::Stopwatch;
 use super::snapshot::Snapshot;
-use crate::contact::{Contact, ContactFrame, Part, detection::wheel_contacts};
+use crate::contact::{Activation, Contact, ContactFrame, Part, detect, detection::wheel_contacts};
 use crate::geometry::Terrain;
 use crate::integrator::{
     ActiveContact, Command, HeldJoint, NoProbe, OptionsError, Probe, Scene, StepError, StepOptions,
@@ -376,6 +376,25 @@ impl Simulation {
     #[must_use]
     pub fn wheel_contacts(&self) -> Vec<Contact> {
         wheel_contacts(&self.model, &self.kinematics(), &*self.terrain)
+    }
+
+    /// Deepest gap (m) of any wheel or box with the ground now: 0 where nothing overlaps, else negative.
+    #[must_use]
+    pub fn deepest_overlap(&self) -> f64 {
+        let mut contacts = Vec::new();
+        let at_rest = vec![0.0; self.model.nv()];
+        let touching = Activation::default();
+        detect(
+            &self.model,
+            &self.kinematics(),
+            &*self.terrain,
+            &at_rest,
+            &touching,
+            &mut contacts,
+        );
+        contacts
+            .iter()
+            .fold(0.0, |deepest, contact| deepest.min(contact.gap))
     }
 
     /// Mean contact force of the last step on every wheel along its frame's n, t, b, N.
