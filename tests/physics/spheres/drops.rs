@@ -16,6 +16,8 @@ struct Worst {
     work: f64,
     /// Total energy over that of the start, as a share of the start's kinetic energy: what the drop as a whole gains.
     gain: f64,
+    /// The same from one step to the next: projection lifts what an impact left inside a rock.
+    rise: f64,
     unsolved: usize,
     steps: usize,
 }
@@ -47,6 +49,7 @@ fn drop_often(drops: u64, restitution: f64, friction_coefficient: f64) -> Worst 
     let mut worst = Worst {
         work: f64::NEG_INFINITY,
         gain: f64::NEG_INFINITY,
+        rise: f64::NEG_INFINITY,
         unsolved: 0,
         steps: 0,
     };
@@ -82,6 +85,7 @@ fn drop_often(drops: u64, restitution: f64, friction_coefficient: f64) -> Worst 
             .collect();
         simulation.release(&held).unwrap();
         let start = simulation.energy();
+        let mut before = start.total();
         for _ in 0..60 {
             let kinetic = simulation.energy().kinetic;
             let report = simulation.step(1).unwrap();
@@ -90,6 +94,8 @@ fn drop_often(drops: u64, restitution: f64, friction_coefficient: f64) -> Worst 
             let now = simulation.energy().total();
             worst.work = worst.work.max(contact_work(&simulation) / kinetic.max(1.0));
             worst.gain = worst.gain.max((now - start.total()) / start.kinetic);
+            worst.rise = worst.rise.max((now - before) / start.kinetic);
+            before = now;
         }
     }
     worst
@@ -97,18 +103,33 @@ fn drop_often(drops: u64, restitution: f64, friction_coefficient: f64) -> Worst 
 
 #[allow(clippy::print_stderr)] // the figure is the point
 fn report(name: &str, worst: &Worst) {
+    let Worst {
+        work,
+        gain,
+        rise,
+        unsolved,
+        steps,
+    } = worst;
     eprintln!(
-        "{name}: contacts make at most {:.2e} of the kinetic energy in a step, a drop {:.2e}; {} of {} steps not converged",
-        worst.work, worst.gain, worst.unsolved, worst.steps
+        "{name}: of the kinetic energy contacts make at most {work:.2e} in a step, a step as a whole {rise:.2e}, a drop {gain:.2e}; \
+         {unsolved} of {steps} steps not converged"
     );
 }
 
 #[test]
-fn energy_never_grows() {
-    let worst = drop_often(100, 0.0, 0.7);
-    report("e = 0, friction", &worst);
-    let worst = drop_often(100, 0.3, 0.0);
+fn without_restitution_energy_never_grows() {
+    let worst = drop_often(1000, 0.0, 0.7);
+    report("e = 0", &worst);
+}
+
+#[test]
+fn without_friction_energy_never_grows() {
+    let worst = drop_often(1000, 0.3, 0.0);
     report("e = 0.3, no friction", &worst);
-    let worst = drop_often(100, 0.3, 0.7);
+}
+
+#[test]
+fn with_restitution_and_friction_the_worst_gain_is_known() {
+    let worst = drop_often(1000, 0.3, 0.7);
     report("e = 0.3, friction", &worst);
 }

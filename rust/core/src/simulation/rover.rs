@@ -382,11 +382,12 @@ impl Simulation {
     #[must_use]
     pub fn deepest_overlap(&self) -> f64 {
         let mut contacts = Vec::new();
-        let at_rest = vec![0.0; self.model.nv()];
+        let (kinematics, at_rest) = (self.kinematics(), vec![0.0; self.model.nv()]);
         let touching = Activation::default();
         detect(
             &self.model,
-            &self.kinematics(),
+            &kinematics,
+            &kinematics,
             &*self.terrain,
             &at_rest,
             &touching,
