@@ -18,7 +18,7 @@ export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-demo: $(STAMPS)/demo $(STAMPS)/core ## set up, drive Rover-v0 to a goal, redraw the report's section 6.1 under runs/
+demo: $(STAMPS)/demo $(STAMPS)/core ## set up, drive Rover-v0 to a goal, redraw the report's sections 6.1 and 6.2 under runs/
 	$(BIN)/rover drive --output runs/drive
 	$(BIN)/rover report --figures --output runs/report
 

@@ -3,7 +3,7 @@
 import copy
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -20,6 +20,7 @@ from rover_gym._core import (
     RoverModel,
     Simulation,
     Snapshot,
+    SphereField,
     StateError,
     StepError,
     TerrainError,
@@ -32,10 +33,19 @@ from rover_gym.observation import (
     ObservationLayout,
     build_layout,
 )
+from rover_gym.rocks import (
+    MAX_GOAL_DISTANCE,
+    RockDistribution,
+    Rocks,
+    check_rocks,
+    check_scan,
+    heights,
+    scan_points,
+)
 from rover_gym.start import Start, StartDistribution, resting_pose, sample_start, tilted_plane
 from rover_gym.validation import Range, known_keys, number, refuse, span, vector
 
-TERRAINS = ("plane",)
+TERRAINS = ("plane", "sphere_field")
 SOLVER_OPTIONS = (
     "variant",
     "theta",
@@ -46,7 +56,7 @@ SOLVER_OPTIONS = (
     "stabilisation",
     "warm_start",
 )
-RESET_OPTIONS = ("slope_deg", "uphill_deg", "position", "heading_deg", "goal", "q", "v")
+RESET_OPTIONS = ("difficulty", "slope_deg", "uphill_deg", "position", "heading_deg", "goal", "q", "v")
 
 #: Steeper ground than this is a wall to a wheel.
 MAX_SLOPE_DEG = 60.0
@@ -61,10 +71,12 @@ SLIP_SPEED = 0.05
 
 @dataclass
 class _Episode:
-    """What an episode remembers beside the simulation's state."""
+    """What an episode remembers beside the simulation's state; entries are replaced, never changed in place."""
 
     start: Start
     plane: Plane
+    terrain: Plane | SphereField
+    rocks: Rocks | None
     q: npt.NDArray[np.float64]
     distance: float
     observation: npt.NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, np.float32))
@@ -124,11 +136,11 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     |-------|------------------|-----------------------------------------------------------|------------|--------------|
     | 0-20  | q                | trunk x, y, z, roll, heading, pitch; joint angles         | m, rad     | 1            |
     | 21-41 | velocity         | trunk linear and angular in the trunk frame; joint rates  | m/s, rad/s | 1, wheels 10 |
-    | 42-47 | wheel_gap        | distance of each wheel to the ground                      | m          | 0.1          |
+    | 42-47 | wheel_gap        | distance of each wheel to ground and rocks                | m          | 0.1          |
     | 48-53 | wheel_contact    | 1 where the gap is at most 1 mm, else 0                   |            | 1            |
-    | 54-59 | normal_force     | ground on wheel, along the ground's normal                | N          | m g / 6      |
-    | 60-71 | tangential_force | ground on wheel, rolling then lateral, wheel by wheel     | N          | m g / 6      |
-    | 72-74 | ground_normal    | the ground's normal in the trunk frame                    |            | 1            |
+    | 54-59 | normal_force     | ground or rock on wheel, along the contact's normal       | N          | m g / 6      |
+    | 60-71 | tangential_force | the same, rolling then lateral, wheel by wheel            | N          | m g / 6      |
+    | 72-74 | ground_normal    | the normal of the ground plane in the trunk frame         |            | 1            |
     | 75-76 | goal             | goal ahead and to the right of the trunk, horizontal      | m          | 10           |
     | 77    | goal_distance    | horizontal distance from the trunk's origin to the goal   | m          | 10           |
     | 78-89 | previous_action  | the action before this observation, 0 at reset            |            | 1            |
@@ -136,6 +148,11 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     The trunk frame is x forward, y up, z to the right of the trunk. `q` is the simulation's, with the
     wheels' angles wrapped to one turn. Forces are those of the last physics step, zero at reset.
+
+    With `height_scan` one more field follows, `height_scan`: heights in m, scale 1, of the visible ground, rocks
+    included, over the trunk's origin, at a grid of points around it in the heading frame. The first entries
+    are the row farthest ahead, from the left to the right, the last ones the row farthest behind. True
+    stands for 13 rows of 9 points, 0.25 m apart: 117 entries, 1.5 m ahead and behind, 1 m to either side.
 
     ## Reward
 
@@ -161,9 +178,24 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     heading drawn from `heading_deg`; the goal lies at a distance from `goal_distance` in a direction
     from `goal_bearing_deg`, seen from the heading. It has no brakes: without torque it rolls downhill.
 
-    `reset(options=...)` fixes what it names: `slope_deg`, `uphill_deg`, `position` (x, z),
+    `reset(options=...)` fixes what it names: `difficulty`, `slope_deg`, `uphill_deg`, `position` (x, z),
     `heading_deg`, `goal` (x, z), or the whole state as `q` (21,) with `v` (21,), as
     `Simulation.set_state` takes them. Unknown names are refused with `OptionError`.
+
+    ## Rocks
+
+    With `terrain="sphere_field"`, as in `RoverRocks-v0`, fixed spheres lie on the plane, half below the
+    ground, with the sizes that Golombek and Rapp (1997) found on Mars, the smallest 5 cm wide. They lie at
+    random up to 4 m beyond the rectangle that start and goal span; two circles, around start
+    and goal, in which the rover has room to turn, stay clear. Each reset draws another field. One number d,
+    the difficulty, says how hard it is; `reset(options={"difficulty": 0.3})` sets it for one episode, and
+    an argument that is not None takes its quantity out of the difficulty's hands.
+
+    | quantity        | at difficulty d      | meaning                                          |
+    |-----------------|----------------------|--------------------------------------------------|
+    | rock_abundance  | 0.2 d                | fraction of the ground that rocks of all sizes cover |
+    | max_rock_radius | 0.5 + 1.1 d          | radius of the largest rocks, in wheel radii      |
+    | slope_deg       | uniform, 0 to 10 d   | slope of the plane                               |
 
     ## End
 
@@ -188,8 +220,12 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     | name              | default        | meaning                                                         |
     |-------------------|----------------|-----------------------------------------------------------------|
-    | terrain           | "plane"        | the ground; only the plane for now                              |
-    | slope_deg         | 0              | slope, or range, 0 to 60                                        |
+    | terrain           | "plane"        | the ground: "plane" or "sphere_field"                           |
+    | difficulty        | None           | of the rocks, or range, 0 to 1; None: 0.5                       |
+    | rock_abundance    | None           | 0 to 0.5; None: by the difficulty                               |
+    | max_rock_radius   | None           | in wheel radii, 0.3 to 10; None: by the difficulty              |
+    | height_scan       | False          | observe heights: True or (rows, columns, spacing in m)          |
+    | slope_deg         | None           | slope, or range, 0 to 60; None: 0, among rocks by the difficulty |
     | uphill_deg        | (-180, 180)    | direction of steepest ascent, or range                          |
     | heading_deg       | (-180, 180)    | start heading, or range                                         |
     | goal_distance     | (5, 10)        | m, or range                                                     |
@@ -209,7 +245,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     ## Version history
 
-    - v0: plane ground. Numbers may change until the first release.
+    - v0: plane ground and rocks. Numbers may change until the first release.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": []}  # type: ignore[misc]
@@ -218,7 +254,11 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         self,
         *,
         terrain: str = "plane",
-        slope_deg: float | Range = 0.0,
+        difficulty: float | Range | None = None,
+        rock_abundance: float | None = None,
+        max_rock_radius: float | None = None,
+        height_scan: bool | tuple[int, int, float] = False,
+        slope_deg: float | Range | None = None,
         uphill_deg: float | Range = (-180.0, 180.0),
         heading_deg: float | Range = (-180.0, 180.0),
         goal_distance: float | Range = (5.0, 10.0),
@@ -238,11 +278,28 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     ) -> None:
         if terrain not in TERRAINS:
             refuse(TerrainError, "terrain", terrain, f"unknown; known are {', '.join(TERRAINS)}")
+        self._rock_distribution: RockDistribution | None = None
+        if terrain == "sphere_field":
+            self._rock_distribution = check_rocks(difficulty, rock_abundance, max_rock_radius)
+        else:
+            for name, value in (
+                ("difficulty", difficulty),
+                ("rock_abundance", rock_abundance),
+                ("max_rock_radius", max_rock_radius),
+            ):
+                if value is not None:
+                    refuse(OptionError, name, value, "needs terrain 'sphere_field'")
+        self._slope_by_difficulty = slope_deg is None and self._rock_distribution is not None
+        scan = check_scan(height_scan)
+        self._scan_offsets = None if scan is None else scan.offsets
+        farthest = None if self._rock_distribution is None else MAX_GOAL_DISTANCE
         self._start_distribution = StartDistribution(
-            slope=_radians(span("slope_deg", slope_deg, at_least=0.0, at_most=MAX_SLOPE_DEG)),
+            slope=_radians(
+                span("slope_deg", 0.0 if slope_deg is None else slope_deg, at_least=0.0, at_most=MAX_SLOPE_DEG)
+            ),
             uphill=_radians(span("uphill_deg", uphill_deg)),
             heading=_radians(span("heading_deg", heading_deg)),
-            goal_distance=span("goal_distance", goal_distance, above=0.0),
+            goal_distance=span("goal_distance", goal_distance, above=0.0, at_most=farthest),
             goal_bearing=_radians(span("goal_bearing_deg", goal_bearing_deg)),
         )
         self.goal_tolerance = number("goal_tolerance", goal_tolerance, above=0.0)
@@ -295,7 +352,9 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         self._rim_per_rate: list[float] = (self.model.wheel_radii * self._drive_signs).tolist()
         self._trunk_load_limit = TRUNK_LOAD * self.model.mass * magnitude
 
-        self.observation_layout: ObservationLayout = build_layout(self.model, magnitude)
+        self.observation_layout: ObservationLayout = build_layout(
+            self.model, magnitude, 0 if self._scan_offsets is None else len(self._scan_offsets)
+        )
         self._inverse_scale = 1.0 / self.observation_layout.scale
         self.observation_space = gym.spaces.Box(
             self.observation_layout.low, self.observation_layout.high, dtype=np.float32
@@ -318,6 +377,17 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         """The episode's slope, pose and goal as they were drawn."""
         return self._running().start
 
+    @property
+    def rocks(self) -> Rocks | None:
+        """The episode's difficulty and rocks as they were drawn; None on the plane."""
+        return self._running().rocks
+
+    @property
+    def difficulty(self) -> float | None:
+        """The episode's difficulty; None on the plane."""
+        rocks = self.rocks
+        return None if rocks is None else rocks.difficulty
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
@@ -327,18 +397,26 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             OptionError: An option is unknown or out of its range; nothing has changed.
             StateError: `q` or `v` has a wrong shape or an entry that is not finite.
         """
-        fixed, q, v = self._check_reset_options(options)
+        fixed, difficulty, q, v = self._check_reset_options(options)
         super().reset(seed=seed)
 
-        start = sample_start(self.np_random, self._start_distribution, **fixed)
+        distribution, rocks = self._start_distribution, None
+        if self._rock_distribution is not None:
+            rocks = self._rock_distribution.sample(self.np_random, difficulty)
+            if self._slope_by_difficulty:
+                distribution = replace(distribution, slope=rocks.slope)
+        start = sample_start(self.np_random, distribution, **fixed)
         plane = tilted_plane(start.slope, start.uphill)
-        simulation = self._simulate(plane)
+        terrain = plane if rocks is None else rocks.lay_out(self.model, start, plane, self.goal_tolerance)
+        simulation = self._simulate(terrain)
         if q is None:
             q = resting_pose(self.model, plane, start.position, start.heading)
         simulation.set_state(q, v)
         self._simulation = simulation
         distance = math.hypot(start.goal[0] - q[0], start.goal[1] - q[2])
-        self._episode = _Episode(start=start, plane=plane, q=simulation.q, distance=distance)
+        self._episode = _Episode(
+            start=start, plane=plane, terrain=terrain, rocks=rocks, q=simulation.q, distance=distance
+        )
 
         rotation = simulation.rotation
         observation = self._observe(self._episode, simulation.v, rotation)
@@ -421,7 +499,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         """The state of the environment and of its random generator, to `restore` later."""
         return EnvSnapshot(
             simulation=self._simulation.snapshot(),
-            episode=copy.deepcopy(self._running()),
+            episode=copy.copy(self._running()),
             random_state=copy.deepcopy(self.np_random.bit_generator.state),
         )
 
@@ -433,14 +511,14 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         """
         if not isinstance(snapshot, EnvSnapshot):
             refuse(StateError, "snapshot", snapshot, "must come from RoverEnv.snapshot()")
-        simulation = self._simulate(snapshot.episode.plane)
+        simulation = self._simulate(snapshot.episode.terrain)
         simulation.restore(snapshot.simulation)
         self._simulation = simulation
-        self._episode = copy.deepcopy(snapshot.episode)
+        self._episode = copy.copy(snapshot.episode)
         self.np_random.bit_generator.state = copy.deepcopy(dict(snapshot.random_state))
 
-    def _simulate(self, plane: Plane) -> Simulation:
-        return Simulation(self.model, plane, **self._simulation_options)
+    def _simulate(self, terrain: Plane | SphereField) -> Simulation:
+        return Simulation(self.model, terrain, **self._simulation_options)
 
     def _drive(self, torques: npt.NDArray[np.float64], set_points: npt.NDArray[np.float64]) -> dict[str, Any]:
         """One control period of physics; returns what the solver says of it."""
@@ -470,11 +548,16 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     def _check_reset_options(
         self, options: Mapping[str, Any] | None
-    ) -> tuple[dict[str, Any], npt.NDArray[np.float64] | None, npt.NDArray[np.float64] | None]:
-        """The arguments of `sample_start`, and the whole state where it is given."""
+    ) -> tuple[dict[str, Any], float | None, npt.NDArray[np.float64] | None, npt.NDArray[np.float64] | None]:
+        """The arguments of `sample_start`, the difficulty, and the whole state where it is given."""
         given = _mapping("options", options)
         known_keys("options", given, RESET_OPTIONS)
         fixed: dict[str, Any] = {}
+        difficulty = None
+        if "difficulty" in given:
+            difficulty = number("options.difficulty", given["difficulty"], at_least=0.0, at_most=1.0)
+            if self._rock_distribution is None:
+                refuse(OptionError, "options.difficulty", difficulty, "needs terrain 'sphere_field'")
         if "slope_deg" in given:
             fixed["slope"] = math.radians(
                 number("options.slope_deg", given["slope_deg"], at_least=0.0, at_most=MAX_SLOPE_DEG)
@@ -498,7 +581,12 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             fixed["position"], fixed["heading"] = (float(q[0]), float(q[2])), float(q[4])
             if "v" in given:
                 v = np.array(vector("options.v", given["v"], self.model.nv, error=StateError))
-        return fixed, q, v
+        if self._rock_distribution is not None and "goal" in fixed:
+            distance = math.dist(fixed["goal"], fixed.get("position", (0.0, 0.0)))
+            if not distance <= MAX_GOAL_DISTANCE:
+                reason = f"must be within {MAX_GOAL_DISTANCE:g} m of the start"
+                refuse(OptionError, "options.goal", given["goal"], reason)
+        return fixed, difficulty, q, v
 
     def _observe(
         self,
@@ -517,6 +605,10 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         joints[wheels] -= math.tau * np.round(joints[wheels] / math.tau)
         ahead, right = episode.start.goal[0] - q[0], episode.start.goal[1] - q[2]
         c, s = math.cos(q[4]), math.sin(q[4])
+        scan: tuple[npt.NDArray[np.float64], ...] = ()
+        if self._scan_offsets is not None:
+            points = scan_points(self._scan_offsets, (q[0], q[2]), q[4])
+            scan = (heights(episode.terrain, points) - q[1],)
         values = np.concatenate(
             (
                 joints,
@@ -535,6 +627,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
                 ),
                 episode.previous_action,
                 (min(episode.stuck_time / self._stuck_limit, 1.0),),
+                *scan,
             )
         )
         values *= self._inverse_scale

@@ -1,4 +1,4 @@
-"""The report's figures 6.2 to 6.5, drawn from a recorded run.
+"""The report's figures 6.2 to 6.5, drawn from a recorded run, and those of its section 6.2.
 
 Ours in colour, one colour a wheel; a Siconos run of the same scene dotted in black where it exists; the report's own
 curves in grey or in a panel of their own, since they were made with other parameters (the data's `meta` says which).
@@ -6,14 +6,16 @@ curves in grey or in a panel of their own, since they were made with other param
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym._core import SphereField
 from rover_gym.recording import MissingExtraError, Trajectory, read_trajectory
-from rover_gym.report import reference_data
+from rover_gym.report import WHEEL_RADIUS, reference_data, report_model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +30,7 @@ NAMES = {
     "MR": "middle right",
     "BR": "back right",
 }
+SIDES = (("FL", "ML", "BL"), ("FR", "MR", "BR"))
 # Okabe and Ito's colours, told apart by colour-blind readers too.
 COLOURS = {"FL": "#0072B2", "FR": "#56B4E9", "ML": "#009E73", "BL": "#D55E00", "MR": "#CC79A7", "BR": "#E69F00"}
 PUBLISHED_STEP = 0.02  # s, of the runs behind the report's figures (inferred from the figures themselves)
@@ -51,6 +54,39 @@ def draw_all(recording: str | Path, folder: str | Path) -> list[Path]:
     Raises:
         MissingExtraError: matplotlib or h5py is not installed.
     """
+    return _draw(
+        recording,
+        folder,
+        {
+            "figure-6.2-wheel-traces": wheel_traces,
+            "figure-6.3-contact-distances": contact_distances,
+            "figure-6.4-reaction-force": reaction_force,
+            "figure-6.5-steering-angles": steering_angles,
+        },
+    )
+
+
+def draw_rug(recording: str | Path, folder: str | Path) -> list[Path]:
+    """Draws the figures of the run over the rug as PNG files into the folder and returns their paths.
+
+    Raises:
+        MissingExtraError: matplotlib or h5py is not installed.
+    """
+    return _draw(
+        recording,
+        folder,
+        {
+            "section-6.2-wheel-traces": rug_wheel_traces,
+            "section-6.2-contact-distances": rug_contact_distances,
+            "section-6.2-reaction-forces": rug_reaction_forces,
+        },
+    )
+
+
+def _draw(
+    recording: str | Path, folder: str | Path, figures: Mapping[str, Callable[[Figure, Trajectory], None]]
+) -> list[Path]:
+    """Draws figures, by file name, from one recording."""
     try:
         import matplotlib as mpl  # noqa: PLC0415 - only who draws needs it
         from matplotlib.figure import Figure  # noqa: PLC0415
@@ -62,12 +98,7 @@ def draw_all(recording: str | Path, folder: str | Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
     with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        for name, draw in (
-            ("figure-6.2-wheel-traces", wheel_traces),
-            ("figure-6.3-contact-distances", contact_distances),
-            ("figure-6.4-reaction-force", reaction_force),
-            ("figure-6.5-steering-angles", steering_angles),
-        ):
+        for name, draw in figures.items():
             figure = Figure(figsize=(11.0, 5.0))
             draw(figure, trajectory)
             paths.append(folder / f"{name}.png")
@@ -160,8 +191,78 @@ def steering_angles(figure: Figure, trajectory: Trajectory) -> None:
     figure.suptitle("Figure 6.5: steering angles under the PD controller")
 
 
-def _plot_wheels(axes: Axes, time: Any, values: Any) -> None:
+def rug_wheel_traces(figure: Figure, trajectory: Trajectory) -> None:
+    """Section 6.2: the paths of the wheel centres from above, and those of the left wheels from the side."""
+    centres = trajectory["wheel_centres"]
+    above, side = figure.subplots(1, 2, width_ratios=(1, 1.6))
+    field = SphereField.rug()
+    # The wheels lean, so they touch a little beside their centres' z.
+    touching = report_model().wheel_contact_points(trajectory["q"][-1], field, coordinates="state")[:, 2]
+    for (x, _, z), radius in zip(field.centres, field.radii, strict=True):
+        _circle(above, z, x, radius, color="0.85")
     for i, wheel in enumerate(WHEELS):
+        colour = COLOURS[wheel]
+        above.plot(centres[:, i, 2], centres[:, i, 0], color=colour, label=NAMES[wheel])
+        above.plot(centres[0, i, 2], centres[0, i, 0], "o", color=colour, markersize=4)
+        if wheel in SIDES[0]:
+            side.plot(centres[:, i, 0], centres[:, i, 1], color=colour)
+            side.plot(centres[0, i, 0], centres[0, i, 1], "o", color=colour, markersize=4)
+            x, y = centres[-1, i, :2]
+            _circle(side, x, y, WHEEL_RADIUS, color=colour)
+            across = x + np.linspace(-1.2 * WHEEL_RADIUS, 1.2 * WHEEL_RADIUS, 200)
+            side.plot(across, field.heights(np.stack((across, np.full(200, touching[i])), axis=1)), color="0.4")
+    above.set(title="from above; dots are the start", xlabel="to the right, z (m)", ylabel="forward, x (m)")
+    side.set(
+        title="the left wheels from the right; at the end, with the rug under them",
+        xlabel="forward, x (m)",
+        ylabel="up, y (m)",
+    )
+    _close_up(above, centres[..., 2], centres[..., 0], 0.7)
+    _close_up(side, centres[..., 0], centres[..., 1], 0.4)
+    figure.legend(*above.get_legend_handles_labels(), loc="outside lower center", ncols=6)
+    figure.suptitle(f"Section 6.2: traces of the wheel centres on the rug over {trajectory['time'][-1]:g} s")
+
+
+def rug_contact_distances(figure: Figure, trajectory: Trajectory) -> None:
+    """Section 6.2: the six gaps against time, left and right wheels apart."""
+    panels = figure.subplots(1, 2, sharey=True, sharex=True)
+    for axes, wheels, name in zip(panels, SIDES, ("left", "right"), strict=True):
+        _plot_wheels(axes, trajectory["time"], 100.0 * trajectory["wheel_gaps"], wheels)
+        axes.set(
+            title=f"{name} wheels, step {_step(trajectory)}", xlabel="time (s)", xlim=(0.0, 25.0), ylim=(-1.0, 5.0)
+        )
+        axes.legend(loc="upper right")
+    figure.axes[0].set_ylabel("contact distance (cm)")
+    figure.suptitle("Section 6.2: contact distance between wheels and spheres")
+
+
+def rug_reaction_forces(figure: Figure, trajectory: Trajectory) -> None:
+    """Section 6.2: normal force on each wheel against time, left and right wheels apart."""
+    panels = figure.subplots(1, 2, sharey=True, sharex=True)
+    for axes, wheels, name in zip(panels, SIDES, ("left", "right"), strict=True):
+        _plot_wheels(axes, trajectory["time"], trajectory["wheel_forces"][:, :, 0], wheels)
+        axes.set(title=f"{name} wheels, mean over each step of {_step(trajectory)}", xlabel="time (s)", yscale="symlog")
+        axes.set(xlim=(0.0, 25.0), ylim=(0.0, None))
+        axes.legend(loc="upper right")
+    figure.axes[0].set_ylabel("normal force on the wheel (N)")
+    figure.suptitle("Section 6.2: reaction forces of the wheels")
+
+
+def _circle(axes: Axes, x: float, y: float, radius: float, color: str) -> None:
+    turn = np.linspace(0.0, 2.0 * np.pi, 60)
+    axes.plot(x + radius * np.cos(turn), y + radius * np.sin(turn), color=color, linewidth=0.8)
+
+
+def _close_up(axes: Axes, x: npt.NDArray[np.float64], y: npt.NDArray[np.float64], margin: float) -> None:
+    """Shows the traces with a margin (m), at one scale; what lies beyond is cut."""
+    axes.set_xlim(x.min() - margin, x.max() + margin)
+    axes.set_ylim(y.min() - margin, y.max() + margin)
+    axes.set_aspect("equal", adjustable="box")
+
+
+def _plot_wheels(axes: Axes, time: Any, values: Any, wheels: tuple[str, ...] = WHEELS) -> None:
+    for wheel in wheels:
+        i = WHEELS.index(wheel)
         axes.plot(time, values[:, i], color=COLOURS[wheel], label=NAMES[wheel])
 
 

@@ -110,8 +110,8 @@ class ObservationLayout(Mapping[str, slice]):
         return {field.name: values[..., field.slice].copy() for field in self.fields}
 
 
-def build_layout(model: RoverModel, gravity_magnitude: float) -> ObservationLayout:
-    """The layout of `Rover-v0` for a model under a gravity of so many m/s2."""
+def build_layout(model: RoverModel, gravity_magnitude: float, n_scan: int = 0) -> ObservationLayout:
+    """The layout of `Rover-v0` for a model under a gravity of so many m/s2, with a height scan of so many points."""
     nq, nv = model.nq, model.nv
     wheel_load = model.mass * gravity_magnitude / N_WHEELS
 
@@ -124,16 +124,25 @@ def build_layout(model: RoverModel, gravity_magnitude: float) -> ObservationLayo
     rows: list[tuple[str, str, list[float], tuple[float, float], str]] = [
         ("q", "m, rad", [1.0] * nq, any_number, "trunk x, y, z, roll, heading, pitch; joint angles"),
         ("velocity", "m/s, rad/s", velocity_scale, any_number, "trunk linear, angular in its frame; joint rates"),
-        ("wheel_gap", "m", [GAP_SCALE] * N_WHEELS, any_number, "distance of each wheel to the ground"),
+        ("wheel_gap", "m", [GAP_SCALE] * N_WHEELS, any_number, "distance of each wheel to ground and rocks"),
         ("wheel_contact", "", [1.0] * N_WHEELS, (0.0, 1.0), "1 where the gap is at most 1 mm, else 0"),
-        ("normal_force", "N", [wheel_load] * N_WHEELS, any_number, "ground on wheel, along the ground's normal"),
-        ("tangential_force", "N", [wheel_load] * 2 * N_WHEELS, any_number, "ground on wheel, rolling then lateral"),
-        ("ground_normal", "", [1.0] * 3, (-1.0, 1.0), "the ground's normal in the trunk frame"),
+        (
+            "normal_force",
+            "N",
+            [wheel_load] * N_WHEELS,
+            any_number,
+            "ground or rock on wheel, along the contact's normal",
+        ),
+        ("tangential_force", "N", [wheel_load] * 2 * N_WHEELS, any_number, "the same, rolling then lateral"),
+        ("ground_normal", "", [1.0] * 3, (-1.0, 1.0), "the normal of the ground plane in the trunk frame"),
         ("goal", "m", [GOAL_SCALE] * 2, any_number, "goal ahead and to the right of the trunk, horizontal"),
         ("goal_distance", "m", [GOAL_SCALE], no_less, "horizontal distance to the goal"),
         ("previous_action", "", [1.0] * N_ACTIONS, (-1.0, 1.0), "the action before this observation"),
         ("stuck", "", [1.0], (0.0, 1.0), "fraction of the time to high-centring"),
     ]
+    if n_scan:
+        meaning = "heights of ground and rocks over the trunk's origin, from the front, each row from the left"
+        rows.append(("height_scan", "m", [1.0] * n_scan, any_number, meaning))
     fields: list[ObservationField] = []
     start = 0
     for name, unit, scale, (low, high), meaning in rows:

@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym._core import Plane, RoverModel, StateError
+from rover_gym._core import StateError
 from rover_gym.env import RoverEnv, drive_signs
 from rover_gym.observation import N_ACTIONS, N_WHEELS
+from rover_gym.start import wheel_centres
 from rover_gym.validation import refuse
 
 _Row = Sequence[float]
@@ -169,12 +170,6 @@ class PDPolicy:
         """
         tangent = math.tan(min(self._max_steering, math.radians(89.0)))
         return min(tangent / (abs(x) + abs(z) * tangent) for x, z in self._wheels)
-
-
-def wheel_centres(model: RoverModel) -> npt.NDArray[np.float64]:
-    """`(6, 2)` x and z of the wheels relative to the trunk's origin, joints at zero, m."""
-    points = model.wheel_contact_points(np.zeros(model.nq), Plane(), coordinates="state")
-    return np.asarray(points)[:, [0, 2]]
 
 
 def _turn_and_straight(ahead: float, left: float, radius: float) -> float:

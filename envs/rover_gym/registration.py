@@ -1,16 +1,23 @@
 """Registers the environments of this package with Gymnasium."""
 
+from collections.abc import Mapping
+
 import gymnasium as gym
 
 #: Steps until truncation: 60 s at the default control frequency of 20 Hz.
 MAX_EPISODE_STEPS = 1200
 
+#: One class, by name and arguments.
+ENVIRONMENTS: Mapping[str, Mapping[str, str]] = {"Rover-v0": {}, "RoverRocks-v0": {"terrain": "sphere_field"}}
+
 
 def register_environments() -> None:
-    """Makes `Rover-v0` known to `gymnasium.make`; a second call changes nothing."""
-    if "Rover-v0" not in gym.registry:
-        gym.register(
-            id="Rover-v0",
-            entry_point="rover_gym.env:RoverEnv",
-            max_episode_steps=MAX_EPISODE_STEPS,
-        )
+    """Makes the environments known to `gymnasium.make`; a second call changes nothing."""
+    for name, arguments in ENVIRONMENTS.items():
+        if name not in gym.registry:
+            gym.register(
+                id=name,
+                entry_point="rover_gym.env:RoverEnv",
+                max_episode_steps=MAX_EPISODE_STEPS,
+                kwargs=dict(arguments),
+            )

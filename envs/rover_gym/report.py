@@ -6,7 +6,7 @@ wheel torque 0.2 N m, steering gains 1.5. The same scene was run with Siconos 4.
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -70,12 +70,7 @@ def scene(time_step: float = 0.005, **options: Any) -> Simulation:
     Raises:
         OptionError: An option is out of its range.
     """
-    model = RoverModel().replace(
-        wheel_radius=WHEEL_RADIUS,
-        masses=MASSES,
-        steering_stiffness=STEERING_STIFFNESS,
-        steering_damping=STEERING_DAMPING,
-    )
+    model = report_model()
     sim = Simulation(
         model,
         inclined_plane(),
@@ -85,15 +80,30 @@ def scene(time_step: float = 0.005, **options: Any) -> Simulation:
         time_step=time_step,
         **options,
     )
-    steering = np.zeros(len(model.wheel_names))
+    start(sim, (0.0, DROP_HEIGHT, 0.0), WHEEL_TORQUE)
+    return sim
+
+
+def report_model() -> RoverModel:
+    """The rover of the report's runs."""
+    return RoverModel().replace(
+        wheel_radius=WHEEL_RADIUS,
+        masses=MASSES,
+        steering_stiffness=STEERING_STIFFNESS,
+        steering_damping=STEERING_DAMPING,
+    )
+
+
+def start(sim: Simulation, place: tuple[float, float, float], wheel_torque: float) -> None:
+    """Puts the rover's trunk upright at a place (m), its front wheels turned, and switches the motors on (N m)."""
+    steering = np.zeros(len(sim.model.wheel_names))
     steering[:2] = FRONT_STEERING
-    q = np.zeros(model.nq)
-    q[1] = DROP_HEIGHT
-    q[model.steering_joint_indices] = steering
+    q = np.zeros(sim.model.nq)
+    q[:3] = place
+    q[sim.model.steering_joint_indices] = steering
     sim.set_state(q)
     sim.set_steering(steering)
-    sim.set_wheel_torques(np.full(len(model.wheel_names), WHEEL_TORQUE))
-    return sim
+    sim.set_wheel_torques(np.full(len(sim.model.wheel_names), wheel_torque))
 
 
 def run(
@@ -119,14 +129,40 @@ def run(
         StepError: A step could not be taken; what came before is on the disk.
     """
     sim = scene(time_step, **options)
-    steps = round(duration / time_step)
+    terrain = {"kind": "plane", "normal": inclined_plane().normal, "offset": inclined_plane().offset}
+    attributes = describe(sim, "section 6.1 of the report: the rover on an inclined plane", terrain)
+    return record(sim, path, attributes, duration=duration, progress=progress)
+
+
+def record(
+    sim: Simulation,
+    path: str | Path,
+    attributes: Mapping[str, Any],
+    *,
+    duration: float,
+    progress: Callable[[float], None] = lambda _: None,
+) -> SceneResult:
+    """Runs a simulation from its present state and records every step.
+
+    Args:
+        sim: The simulation.
+        path: HDF5 file to write.
+        attributes: Facts about the run, from `describe`.
+        duration: Time to simulate, s.
+        progress: Called with the simulated time now and then.
+
+    Raises:
+        MissingExtraError: h5py is not installed.
+        StepError: A step could not be taken; what came before is on the disk.
+    """
+    steps = round(duration / sim.time_step)
     first_contact: float | None = None
     smallest_gap = float(sim.wheel_gaps.min())
     unconverged, worst = 0, 0.0
     sampler = Sampler(sim.model)
-    with Recorder(path, sampler.channels, _attributes(sim)) as recorder:
+    with Recorder(path, sampler.channels, attributes) as recorder:
         recorder.append(sampler.row(sim))
-        start = time.perf_counter()
+        begin = time.perf_counter()
         for step in range(1, steps + 1):
             report = sim.step()
             recorder.append(sampler.row(sim, residual=report.residual, iterations=report.iterations))
@@ -137,16 +173,17 @@ def run(
                 first_contact = sim.time
             if step % 100 == 0:
                 progress(sim.time)
-        wall_time = time.perf_counter() - start
+        wall_time = time.perf_counter() - begin
         recorder.note(wall_time=wall_time, unconverged_steps=unconverged)
     return SceneResult(Path(path), sim.time, wall_time, first_contact, smallest_gap, unconverged, worst)
 
 
-def _attributes(sim: Simulation) -> dict[str, Any]:
+def describe(sim: Simulation, title: str, terrain: Mapping[str, Any]) -> dict[str, Any]:
+    """The attributes of a recording, from the simulation at its start."""
     return {
-        "title": "section 6.1 of the report: the rover on an inclined plane",
+        "title": title,
         "scene": {
-            "terrain": {"kind": "plane", "normal": sim.terrain.normal, "offset": sim.terrain.offset},
+            "terrain": dict(terrain),
             "model": sim.model.to_dict(),
             "q": sim.q,
             "steering": sim.steering,

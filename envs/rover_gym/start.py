@@ -111,3 +111,9 @@ def resting_pose(model: RoverModel, plane: Plane, position: Point, heading: floa
     # Raising the trunk by dy opens every gap by dy n_y.
     q[1] -= model.wheel_gaps(q, plane, coordinates="state").min() / n[1]
     return q
+
+
+def wheel_centres(model: RoverModel) -> npt.NDArray[np.float64]:
+    """`(6, 2)` x and z of the wheels relative to the trunk's origin, joints at zero, m."""
+    points = model.wheel_contact_points(np.zeros(model.nq), Plane(), coordinates="state")
+    return np.asarray(points)[:, [0, 2]]

@@ -52,6 +52,15 @@ def test_the_same_seed_drives_the_same_way(tmp_path: Path) -> None:
     assert np.array_equal(a["q"], b["q"])
 
 
+def test_rocks_are_driven_over_and_recorded(tmp_path: Path) -> None:
+    arguments = ("--terrain", "sphere_field", "--difficulty", "0.5", "--time-limit", "2", "--output", str(tmp_path))
+    result = rover("drive", *arguments)
+    assert result.exit_code == 0, result.output
+    scene = read_trajectory(tmp_path / "episode-0.h5").attributes["scene"]
+    assert scene["terrain"] == "sphere_field"
+    assert scene["rocks"]["difficulty"] == 0.5
+
+
 def test_a_short_time_limit_ends_the_episode_without_success() -> None:
     result = rover("drive", "--time-limit", "1")
     assert result.exit_code == 0, result.output
@@ -64,6 +73,8 @@ def test_a_short_time_limit_ends_the_episode_without_success() -> None:
     [
         (["--terrain", "sea"], "terrain"),
         (["--slope", "-3"], "slope_deg"),
+        (["--difficulty", "0.5"], "difficulty"),
+        (["--terrain", "sphere_field", "--difficulty", "1.5"], "difficulty"),
         (["--slope", "nan"], "slope_deg"),
         (["--friction", "-1"], "friction"),
         (["--time-step", "0"], "time_step"),

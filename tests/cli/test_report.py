@@ -1,4 +1,4 @@
-"""`rover report`: section 6.1, run, recorded and drawn."""
+"""`rover report`: sections 6.1 and 6.2, run, recorded and drawn."""
 
 import struct
 import sys
@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rover_gym import report as scene
+from rover_gym import rug
 from rover_gym.cli import app
 from rover_gym.recording import read_trajectory
 
@@ -17,6 +18,9 @@ FIGURES = (
     "figure-6.3-contact-distances.png",
     "figure-6.4-reaction-force.png",
     "figure-6.5-steering-angles.png",
+    "section-6.2-wheel-traces.png",
+    "section-6.2-contact-distances.png",
+    "section-6.2-reaction-forces.png",
 )
 
 
@@ -50,6 +54,32 @@ def test_the_scene_starts_as_the_reference_does() -> None:
     # The gaps at the start, from the Siconos run: they fix plane, wheel radius, geometry and attitude.
     reference = scene.reference_data()["siconos"][0]
     assert scene.scene().wheel_gaps == pytest.approx(np.array(reference["gap"][0]), abs=1e-6)
+
+
+def test_the_rover_drives_over_the_rug(tmp_path: Path) -> None:
+    result = rug.run(tmp_path / "rug.h5", duration=20.0)
+    trajectory = read_trajectory(result.path)
+    assert trajectory.attributes["scene"]["terrain"]["kind"] == "sphere_field"
+    assert trajectory["q"][0, :3] == pytest.approx(rug.START)
+    assert np.isfinite(trajectory["q"]).all()
+    assert result.first_contact is not None
+    assert result.unconverged_steps == 0
+    assert result.smallest_gap > -0.01  # m
+
+
+def test_gaps_on_the_rug_are_those_of_points_on_the_rim() -> None:
+    sim = rug.scene()
+    field = sim.terrain
+    turn = np.linspace(0.0, 2.0 * np.pi, 20_001)
+    for _ in range(5):
+        sim.step(250)
+        poses = sim.poses()
+        for wheel, gap in zip(sim.model.to_dict()["wheels"], sim.wheel_gaps, strict=True):
+            centre, rotation = poses[wheel["solid"]]
+            rim = centre + scene.WHEEL_RADIUS * np.stack((np.cos(turn), np.sin(turn)), axis=1) @ rotation[:, :2].T
+            near = field.centres[np.linalg.norm(field.centres - centre, axis=1) < 1.5]
+            distance = np.linalg.norm(rim[:, None] - near, axis=2).min() - 0.5
+            assert gap == pytest.approx(distance, abs=1e-7)
 
 
 def test_without_matplotlib_the_error_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

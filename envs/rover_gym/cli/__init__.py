@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from rover_gym._core import __version__
+from rover_gym.cli.baseline import baseline
 from rover_gym.cli.drive import drive
 from rover_gym.cli.report import report
 
@@ -15,6 +16,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command()(drive)
+app.command()(baseline)
 app.command()(report)
 
 

@@ -26,8 +26,11 @@ CONTROL_PERIOD = 0.05  # s, of Rover-v0
 @plain_errors
 def drive(
     *,
-    terrain: Annotated[str, typer.Option(help="The ground; only 'plane' for now.")] = "plane",
-    slope: Annotated[float, typer.Option(help="Slope of the ground, degrees.")] = 0.0,
+    terrain: Annotated[str, typer.Option(help="The ground: 'plane', or 'sphere_field' for rocks.")] = "plane",
+    difficulty: Annotated[float | None, typer.Option(help="Of the rocks, from 0 to 1; 0.5 if not given.")] = None,
+    slope: Annotated[
+        float | None, typer.Option(help="Slope of the ground, degrees; if not given 0, among rocks by the difficulty.")
+    ] = None,
     uphill: Annotated[
         float | None, typer.Option(help="Direction of steepest ascent, degrees to the left of x; drawn if not given.")
     ] = None,
@@ -52,10 +55,11 @@ def drive(
     """Drive Rover-v0 to its goal with the PD baseline and print what the episodes came to."""
     arguments: dict[str, Any] = {
         "terrain": terrain,
-        "slope_deg": slope,
         "friction": friction,
         "time_step": time_step,
     }
+    arguments |= {} if difficulty is None else {"difficulty": difficulty}
+    arguments |= {} if slope is None else {"slope_deg": slope}
     arguments |= {} if uphill is None else {"uphill_deg": uphill}
     arguments |= {} if heading is None else {"heading_deg": heading}
     options = {} if goal is None else {"goal": goal}
@@ -120,7 +124,13 @@ class _Tape:
         )
         attributes = {
             "title": "an episode of Rover-v0 with the PD baseline",
-            "scene": {**arguments, **asdict(rover.start), "model": rover.model.to_dict(), "control_period": rover.dt},
+            "scene": {
+                **arguments,
+                **asdict(rover.start),
+                **_rocks(rover),
+                "model": rover.model.to_dict(),
+                "control_period": rover.dt,
+            },
             "seed": seed,
             "solver": rover.simulation.settings,
         }
@@ -138,6 +148,11 @@ class _Tape:
                 "reward_terms": [info["reward_terms"][name] for name in WEIGHTS],
             }
         )
+
+
+def _rocks(rover: RoverEnv) -> dict[str, Any]:
+    """What `SphereField.rocks` was made from, for a scene's description."""
+    return {} if rover.rocks is None else {"rocks": asdict(rover.rocks)}
 
 
 def _table(results: Sequence[Episode]) -> Table:

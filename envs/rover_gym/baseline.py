@@ -1,0 +1,99 @@
+"""How far the PD baseline gets among the rocks: its success rate by difficulty."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import gymnasium as gym
+
+from rover_gym.episodes import Episode, run_episode
+from rover_gym.policy import PDPolicy
+
+DIFFICULTIES = (0.0, 0.25, 0.5, 0.75, 1.0)
+ENDS = ("goal", "time", "high_centred", "roll_over", "step_failed")
+
+
+@dataclass(frozen=True)
+class BaselineRow:
+    """What the episodes at one difficulty came to.
+
+    Attributes:
+        difficulty: In [0, 1].
+        episodes: How many.
+        successes: How many reached the goal.
+        success_rate: The share of them.
+        interval: Wilson's 95% interval of the success rate.
+        time_to_goal: Mean over the episodes that reached it, s; NaN where none did.
+        energy_per_metre: Work through the wheel motors over way driven, all episodes, J/m.
+        ends: How often episodes ended for each cause.
+    """
+
+    difficulty: float
+    episodes: int
+    successes: int
+    success_rate: float
+    interval: tuple[float, float]
+    time_to_goal: float
+    energy_per_metre: float
+    ends: dict[str, int]
+
+
+def measure_baseline(
+    difficulties: Sequence[float] = DIFFICULTIES,
+    *,
+    episodes: int = 200,
+    seed: int = 0,
+    progress: Callable[[float, int], None] = lambda _difficulty, _done: None,
+) -> list[BaselineRow]:
+    """Drives `RoverRocks-v0` with the PD baseline, the same seeds at every difficulty.
+
+    Args:
+        difficulties: Each in [0, 1].
+        episodes: How many at each difficulty.
+        seed: Seed of the first; the next ones count up.
+        progress: Called with the difficulty and the number of episodes done, after each.
+
+    Raises:
+        OptionError: A difficulty is out of its range.
+    """
+    env = gym.make("RoverRocks-v0")
+    policy = PDPolicy(env)
+    rows = []
+    for difficulty in difficulties:
+        results = []
+        for number in range(seed, seed + episodes):
+            results.append(run_episode(env, policy, number, options={"difficulty": difficulty}))
+            progress(difficulty, len(results))
+        rows.append(_summarise(difficulty, results))
+    return rows
+
+
+def wilson_interval(successes: int, n: int, z: float = 1.959963984540054) -> tuple[float, float]:
+    """Wilson's score interval of a proportion: unlike the normal one it stays within [0, 1] and has width at 0 and 1.
+
+    Args:
+        successes: How many of the trials succeeded.
+        n: How many trials; at least one.
+        z: Quantile of the normal distribution; the default makes it a 95% interval.
+    """
+    share = successes / n
+    centre = (share + z * z / (2 * n)) / (1 + z * z / n)
+    half = z / (1 + z * z / n) * math.sqrt(share * (1 - share) / n + z * z / (4 * n * n))
+    return (max(0.0, centre - half), min(1.0, centre + half))
+
+
+def _summarise(difficulty: float, results: Sequence[Episode]) -> BaselineRow:
+    times = [episode.time for episode in results if episode.success]
+    way = sum(episode.distance for episode in results)
+    counts = Counter(episode.end for episode in results)
+    return BaselineRow(
+        difficulty=difficulty,
+        episodes=len(results),
+        successes=len(times),
+        success_rate=len(times) / len(results),
+        interval=wilson_interval(len(times), len(results)),
+        time_to_goal=sum(times) / len(times) if times else math.nan,
+        energy_per_metre=sum(episode.energy for episode in results) / way if way > 0.0 else math.nan,
+        ends={end: counts[end] for end in ENDS},
+    )

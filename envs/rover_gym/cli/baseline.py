@@ -1,0 +1,77 @@
+"""`rover baseline`: success of the PD baseline among rocks, by difficulty."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from rover_gym.baseline import DIFFICULTIES, BaselineRow, measure_baseline
+from rover_gym.cli.console import console, plain_errors, progress_bar
+
+CAUSES = {"time": "time limit", "high_centred": "high centred", "roll_over": "roll over", "step_failed": "step failed"}
+
+
+@plain_errors
+def baseline(
+    difficulty: Annotated[
+        list[float] | None,
+        typer.Option(help="A difficulty from 0 to 1; may be given several times. Five, if not given."),
+    ] = None,
+    episodes: Annotated[int, typer.Option(min=1, help="How many episodes at each difficulty.")] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode; the next ones count up.")] = 0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+) -> None:
+    """Drive RoverRocks-v0 with the PD baseline at several difficulties and print how often it reached the goal.
+
+    The interval is Wilson's, 95%. Time is the mean of the episodes that reached the goal; energy the work through
+    the wheel motors over the way driven.
+    """
+    difficulties = tuple(difficulty) if difficulty else DIFFICULTIES
+    with progress_bar() as bar:
+        task = bar.add_task("baseline", total=episodes * len(difficulties), state="")
+        rows = measure_baseline(
+            difficulties,
+            episodes=episodes,
+            seed=seed,
+            progress=lambda level, done: bar.update(
+                task, advance=1, state=f"difficulty {level:g}, {done} of {episodes}"
+            ),
+        )
+    if as_json:
+        # JSON knows no NaN: where no episode reached the goal, its time is null.
+        plain = [
+            {
+                name: None if isinstance(value, float) and math.isnan(value) else value
+                for name, value in asdict(row).items()
+            }
+            for row in rows
+        ]
+        typer.echo(json.dumps({"environment": "RoverRocks-v0", "seed": seed, "rows": plain}, indent=2))
+    else:
+        console().print(_table(rows, seed))
+
+
+def _table(rows: Sequence[BaselineRow], seed: int) -> Table:
+    last = seed + rows[0].episodes - 1
+    title = f"RoverRocks-v0 with the PD baseline, {rows[0].episodes} episodes a row, seeds {seed} to {last}"
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    for heading in ("difficulty", "success", "95% interval", "time to goal", "energy"):
+        table.add_column(heading, justify="right")
+    table.add_column("other ends")
+    for row in rows:
+        low, high = row.interval
+        others = [f"{CAUSES[end]} {n}" for end, n in row.ends.items() if n and end != "goal"]
+        table.add_row(
+            f"{row.difficulty:g}",
+            f"{row.success_rate:.1%}",
+            f"{100.0 * low:.0f} to {high:.0%}",
+            "-" if math.isnan(row.time_to_goal) else f"{row.time_to_goal:.1f} s",
+            "-" if math.isnan(row.energy_per_metre) else f"{row.energy_per_metre:.0f} J/m",
+            ", ".join(others),
+        )
+    return table

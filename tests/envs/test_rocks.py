@@ -1,0 +1,363 @@
+"""`RoverRocks-v0`: fields by difficulty, start and goal clear, the height scan, the baseline among rocks."""
+
+import ast
+import copy
+import inspect
+import math
+import pickle
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from rover_gym import OptionError, PDPolicy, Plane, RoverEnv, RoverGymError, SphereField, TerrainError
+from rover_gym.baseline import ENDS, measure_baseline, wilson_interval
+from rover_gym.rocks import (
+    HARDEST_SLOPE_DEG,
+    MARGIN,
+    HeightScan,
+    RockDistribution,
+    clear_radius,
+    heights,
+    scan_points,
+)
+
+NAN, INF = float("nan"), float("inf")
+
+
+@pytest.fixture
+def rocks() -> Iterator[RoverEnv]:
+    """A bare `RoverRocks-v0`, reset with seed 0."""
+    with gym.make("RoverRocks-v0") as made:
+        rover: Any = made.unwrapped
+        rover.reset(seed=0)
+        yield rover
+
+
+def field_of(env: RoverEnv) -> SphereField:
+    terrain = env.simulation.terrain
+    assert isinstance(terrain, SphereField)
+    return terrain
+
+
+def rollout(env: Any, n_steps: int, seed: int = 7) -> list[Any]:
+    """Observations, rewards, ends and infos under random actions, across a reset."""
+    rng = np.random.default_rng(seed)
+    seen: list[Any] = []
+    for i in range(n_steps):
+        seen.append(env.step(rng.uniform(-1.0, 1.0, 12).astype(np.float32)))
+        if i == n_steps // 2:
+            seen.append(env.reset())
+    return seen
+
+
+def assert_equal_bits(a: list[Any], b: list[Any]) -> None:
+    for one, other in zip(a, b, strict=True):
+        assert one[0].tobytes() == other[0].tobytes()
+        assert one[1:] == other[1:]
+
+
+@pytest.mark.parametrize("arguments", [{}, {"height_scan": True}])
+def test_checkers_have_nothing_to_say(arguments: dict[str, Any]) -> None:
+    check_env(gym.make("RoverRocks-v0", **arguments).unwrapped)
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    checker.check_env(gym.make("RoverRocks-v0", **arguments).unwrapped, warn=True)
+
+
+def test_both_names_make_the_same_episodes() -> None:
+    names = ({"id": "RoverRocks-v0"}, {"id": "Rover-v0", "terrain": "sphere_field"})
+    a, b = (gym.make(**arguments) for arguments in names)
+    assert_equal_bits([a.reset(seed=4), *rollout(a, 20)], [b.reset(seed=4), *rollout(b, 20)])
+
+
+def test_same_seed_same_bits() -> None:
+    runs = []
+    for _ in range(2):
+        env = gym.make("RoverRocks-v0", difficulty=(0.0, 1.0), height_scan=True)
+        runs.append([env.reset(seed=11), *rollout(env, 40)])
+    assert_equal_bits(*runs)
+
+
+def test_fields_differ_by_seed_and_from_episode_to_episode(rocks: RoverEnv) -> None:
+    fields = [field_of(rocks).centres]
+    rocks.reset()
+    fields.append(field_of(rocks).centres)
+    rocks.reset(seed=1)
+    fields.append(field_of(rocks).centres)
+    rocks.reset(seed=0)
+    np.testing.assert_array_equal(field_of(rocks).centres, fields[0])
+    assert len({centres.tobytes() for centres in fields}) == 3
+
+
+def test_snapshot_and_copies_continue_bit_for_bit() -> None:
+    env = RoverEnv(terrain="sphere_field", difficulty=1.0)
+    env.reset(seed=3)
+    rollout(env, 11, seed=5)
+    snapshot = env.snapshot()
+    others = [copy.deepcopy(env), pickle.loads(pickle.dumps(env))]  # noqa: S301 - our own bytes
+    first = rollout(env, 20)
+    env.restore(snapshot)
+    assert_equal_bits(first, rollout(env, 20))
+    fresh = RoverEnv(terrain="sphere_field", difficulty=1.0)
+    fresh.reset(seed=99)
+    fresh.restore(pickle.loads(pickle.dumps(snapshot)))  # noqa: S301 - our own bytes
+    for other in (*others, fresh):
+        assert_equal_bits(first, rollout(other, 20))
+
+
+def test_vector_environment_equals_single_ones() -> None:
+    vector = gym.make_vec("RoverRocks-v0", num_envs=2, vectorization_mode="sync")
+    observations, _ = vector.reset(seed=[3, 4], options={"difficulty": 0.8})
+    for i in range(2):
+        single = gym.make("RoverRocks-v0")
+        np.testing.assert_array_equal(single.reset(seed=3 + i, options={"difficulty": 0.8})[0], observations[i])
+    vector.close()
+
+
+@pytest.mark.parametrize("difficulty", [0.0, 0.3, 1.0])
+def test_difficulty_is_an_option_of_the_reset(rocks: RoverEnv, difficulty: float) -> None:
+    rocks.reset(seed=2, options={"difficulty": difficulty})
+    drawn = rocks.rocks
+    assert drawn is not None
+    assert rocks.difficulty == drawn.difficulty == difficulty
+    assert drawn.abundance == pytest.approx(0.2 * difficulty)
+    assert drawn.max_radius == pytest.approx(0.5 + 1.1 * difficulty)
+    assert 0.0 <= rocks.start.slope <= math.radians(HARDEST_SLOPE_DEG) * difficulty
+    field = field_of(rocks)
+    assert (len(field) > 0) == (difficulty > 0.0)
+    assert (field.radii <= drawn.max_radius * rocks.model.wheel_radii[0] * (1.0 + 1e-12)).all()
+    # For one episode only.
+    rocks.reset()
+    assert rocks.difficulty == 0.5
+
+
+def test_difficulty_shifts_no_other_draw(rocks: RoverEnv) -> None:
+    starts = []
+    for difficulty in (0.0, 1.0):
+        rocks.reset(seed=2, options={"difficulty": difficulty})
+        starts.append(replace(rocks.start, slope=0.0))
+    assert starts[0] == starts[1]
+
+
+def test_range_of_difficulties_is_drawn_from() -> None:
+    env = RoverEnv(terrain="sphere_field", difficulty=(0.2, 0.4))
+    drawn = []
+    for seed in range(20):
+        env.reset(seed=seed)
+        assert env.difficulty is not None
+        drawn.append(env.difficulty)
+    assert min(drawn) >= 0.2
+    assert max(drawn) <= 0.4
+    assert len(set(drawn)) == 20
+
+
+def test_arguments_take_their_quantity_from_the_difficulty() -> None:
+    env = RoverEnv(terrain="sphere_field", rock_abundance=0.05, max_rock_radius=0.7, slope_deg=3.0)
+    for difficulty in (0.0, 1.0):
+        env.reset(seed=1, options={"difficulty": difficulty})
+        assert env.rocks is not None
+        assert (env.rocks.abundance, env.rocks.max_radius) == (0.05, 0.7)
+        assert env.start.slope == math.radians(3.0)
+
+
+def test_difficulty_table_of_the_card_is_the_map() -> None:
+    card = inspect.getdoc(RoverEnv) or ""
+    section = card.split("## Rocks\n")[1].split("\n## ")[0]
+    lines = [line for line in section.splitlines() if line.startswith("|")][2:]
+    said = {cells[1].strip(): cells[2].strip() for cells in (line.split("|") for line in lines)}
+    abundance, radius = said["rock_abundance"], said["max_rock_radius"]
+    low, slope = (float(word) for word in said["slope_deg"].removeprefix("uniform, ").removesuffix(" d").split(" to "))
+    factor = float(abundance.removesuffix(" d"))
+    constant, rate = (ast.literal_eval(word.removesuffix(" d")) for word in radius.split(" + "))
+    rng = np.random.default_rng(0)
+    for d in (0.0, 0.25, 1.0):
+        drawn = RockDistribution().sample(rng, d)
+        assert drawn.abundance == pytest.approx(factor * d)
+        assert drawn.max_radius == pytest.approx(constant + rate * d)
+        assert drawn.slope == pytest.approx((math.radians(low), math.radians(slope) * d))
+    assert f"up to {MARGIN:g} m beyond" in section
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_start_and_goal_are_clear(rocks: RoverEnv, seed: int) -> None:
+    rocks.reset(seed=seed, options={"difficulty": 1.0})
+    field = field_of(rocks)
+    on_the_map = field.centres[:, [0, 2]]
+    for place in (rocks.start.position, rocks.goal):
+        distance = np.linalg.norm(on_the_map - place, axis=1) - field.radii
+        assert distance.min() >= clear_radius(rocks.model) - 1e-9
+
+
+def test_rover_rests_on_the_ground_as_on_the_plane(rocks: RoverEnv, env: RoverEnv) -> None:
+    place: dict[str, Any] = {"position": (2.0, 1.0), "goal": (8.0, 1.0), "heading_deg": 30.0}
+    options = {"slope_deg": 8.0, "uphill_deg": 20.0, **place}
+    among, _ = rocks.reset(seed=0, options={"difficulty": 1.0, **options})
+    alone, _ = env.reset(seed=0, options=options)
+    np.testing.assert_array_equal(among, alone)
+    _, _, _, _, info = rocks.step(np.zeros(12, np.float32))
+    assert info["solver"]["status"] == "converged"
+
+
+def test_ground_normal_is_the_planes(rocks: RoverEnv) -> None:
+    observation, _ = rocks.reset(seed=0, options={"slope_deg": 8.0})
+    ground = field_of(rocks).ground
+    assert ground is not None
+    seen = observation[rocks.observation_layout["ground_normal"]]
+    np.testing.assert_allclose(seen, rocks.simulation.rotation.T @ ground.normal, atol=1e-6)
+
+
+@pytest.mark.parametrize("scan", [True, (3, 5, 0.4)])
+def test_height_scan_is_the_terrain_in_the_heading_frame(scan: Any) -> None:
+    env = RoverEnv(terrain="sphere_field", difficulty=1.0, height_scan=scan)
+    env.reset(seed=5)
+    for _ in range(60):
+        observation, *_ = env.step(np.array([0.3] * 6 + [0.5] * 6, np.float32))
+    grid = HeightScan() if scan is True else HeightScan(*scan)
+    values = env.observation_layout.split(observation)["height_scan"].reshape(grid.rows, grid.columns)
+    q = env.simulation.q
+    ahead = np.array([math.cos(q[4]), -math.sin(q[4])])
+    right = np.array([math.sin(q[4]), math.cos(q[4])])
+    for i in range(grid.rows):
+        for j in range(grid.columns):
+            a = ((grid.rows - 1) / 2 - i) * grid.spacing
+            r = (j - (grid.columns - 1) / 2) * grid.spacing
+            point = q[[0, 2]] + a * ahead + r * right
+            expected = field_of(env).heights(point[None, :])[0] - q[1]
+            assert values[i, j] == pytest.approx(expected, abs=1e-5)
+    rocky = field_of(env).heights(scan_points(grid.offsets, (q[0], q[2]), q[4]))
+    assert np.isfinite(rocky).all()
+
+
+def test_height_scan_comes_after_the_base_observation() -> None:
+    plain, seeing = RoverEnv(terrain="sphere_field"), RoverEnv(terrain="sphere_field", height_scan=True)
+    base, _ = plain.reset(seed=3)
+    whole, _ = seeing.reset(seed=3)
+    assert whole.shape == seeing.observation_space.shape == (91 + 117,)
+    assert whole in seeing.observation_space
+    np.testing.assert_array_equal(whole[:91], base)
+    assert list(seeing.observation_layout)[:-1] == list(plain.observation_layout)
+    assert seeing.observation_layout["height_scan"] == slice(91, 208)
+    # What the card says of the grid.
+    grid = HeightScan()
+    assert (grid.rows, grid.columns, grid.spacing) == (13, 9, 0.25)
+    np.testing.assert_allclose(grid.offsets[[0, 8, -1]], [[1.5, -1.0], [1.5, 1.0], [-1.5, 1.0]])
+    # The baseline does not look at it.
+    np.testing.assert_array_equal(PDPolicy(plain).predict(base)[0], PDPolicy(seeing).predict(whole)[0])
+
+
+def test_height_scan_works_on_the_plane() -> None:
+    env = RoverEnv(height_scan=(2, 2, 1.0), slope_deg=10.0, heading_deg=0.0, uphill_deg=0.0)
+    observation, _ = env.reset(seed=0)
+    values = env.observation_layout.split(observation)["height_scan"]
+    rise = math.tan(math.radians(10.0)) * np.array([0.5, 0.5, -0.5, -0.5])
+    np.testing.assert_allclose(values, rise - env.simulation.q[1], atol=1e-6)
+    plane = Plane((0.1, 1.0, -0.2), 0.3)
+    points = np.array([[1.0, 2.0], [-3.0, 0.5]])
+    np.testing.assert_allclose(heights(plane, points), [plane.height(*point) for point in points])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "field"),
+    [
+        ({"terrain": "sphere-field"}, TerrainError, "terrain"),
+        ({"difficulty": -0.1}, OptionError, "difficulty"),
+        ({"difficulty": 1.1}, OptionError, "difficulty"),
+        ({"difficulty": NAN}, OptionError, "difficulty"),
+        ({"difficulty": (0.0, 2.0)}, OptionError, "difficulty[1]"),
+        ({"difficulty": "hard"}, OptionError, "difficulty"),
+        ({"rock_abundance": -0.1}, OptionError, "rock_abundance"),
+        ({"rock_abundance": 0.6}, OptionError, "rock_abundance"),
+        ({"rock_abundance": NAN}, OptionError, "rock_abundance"),
+        ({"max_rock_radius": 0.0}, OptionError, "max_rock_radius"),
+        ({"max_rock_radius": 11.0}, OptionError, "max_rock_radius"),
+        ({"goal_distance": (5.0, 1e6)}, OptionError, "goal_distance[1]"),
+        ({"height_scan": 3}, OptionError, "height_scan"),
+        ({"height_scan": (0, 3, 0.1)}, OptionError, "height_scan[0]"),
+        ({"height_scan": (3, 2.5, 0.1)}, OptionError, "height_scan[1]"),
+        ({"height_scan": (3, 3, 0.0)}, OptionError, "height_scan[2]"),
+        ({"terrain": "plane", "difficulty": 0.5}, OptionError, "difficulty"),
+        ({"terrain": "plane", "rock_abundance": 0.1}, OptionError, "rock_abundance"),
+        ({"terrain": "plane", "max_rock_radius": 1.0}, OptionError, "max_rock_radius"),
+    ],
+)
+def test_bad_arguments(arguments: dict[str, Any], error: type[RoverGymError], field: str) -> None:
+    with pytest.raises(error) as caught:
+        gym.make("RoverRocks-v0", **arguments)
+    assert caught.value.field == field
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        ({"difficulty": 1.5}, "options.difficulty"),
+        ({"difficulty": -1e-9}, "options.difficulty"),
+        ({"difficulty": NAN}, "options.difficulty"),
+        ({"difficulty": (0.0, 1.0)}, "options.difficulty"),
+        ({"goal": (1e6, 0.0)}, "options.goal"),
+    ],
+)
+def test_bad_options_change_nothing(rocks: RoverEnv, options: dict[str, Any], field: str) -> None:
+    before = rocks.snapshot()
+    with pytest.raises(OptionError) as caught:
+        rocks.reset(seed=5, options=options)
+    assert caught.value.field == field
+    after = rocks.snapshot()
+    assert (after.simulation, after.random_state) == (before.simulation, before.random_state)
+
+
+def test_the_plane_knows_no_difficulty(env: RoverEnv) -> None:
+    assert env.rocks is None
+    assert env.difficulty is None
+    with pytest.raises(OptionError) as caught:
+        env.reset(options={"difficulty": 0.5})
+    assert caught.value.field == "options.difficulty"
+
+
+@pytest.mark.parametrize(
+    ("centres", "radii", "ground", "field"),
+    [
+        ([[0.0, 0.0, 0.0]], [-1.0], Plane(), "radii[0]"),
+        ([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], [0.1, 0.0], None, "radii[1]"),
+        ([[0.0, 0.0, 0.0]], [NAN], None, "radii[0]"),
+        ([[NAN, 0.0, 0.0]], [1.0], Plane(), "centres[0]"),
+        ([[0.0, 0.0, 0.0], [0.0, INF, 0.0]], [1.0, 1.0], None, "centres[1]"),
+        (np.zeros((0, 3)), np.zeros(0), None, "centres"),
+        ([[0.0, 0.0, 0.0]], [1.0, 2.0], None, "radii"),
+        ([[0.0, 0.0]], [1.0], None, "centres"),
+    ],
+)
+def test_bad_spheres(centres: Any, radii: Any, ground: Plane | None, field: str) -> None:
+    with pytest.raises(TerrainError) as caught:
+        SphereField(centres, radii, ground=ground)
+    assert caught.value.field == field
+
+
+def test_bad_abundance_of_a_field() -> None:
+    for abundance in (-0.1, 0.9, NAN):
+        with pytest.raises(TerrainError) as caught:
+            SphereField.rocks(abundance, (-5.0, -5.0, 5.0, 5.0), 0)
+        assert caught.value.field == "abundance"
+
+
+def test_baseline_reaches_its_goal_where_it_is_easy_and_not_always_where_it_is_hard() -> None:
+    easy, hard = measure_baseline((0.0, 1.0), episodes=20, seed=1000)
+    assert easy.success_rate >= 0.95
+    assert hard.success_rate <= 0.9
+    for row in (easy, hard):
+        assert sum(row.ends.values()) == row.episodes == 20
+        assert list(row.ends) == list(ENDS)
+        assert row.ends["goal"] == row.successes
+        assert row.ends["step_failed"] == 0
+    assert hard.energy_per_metre > easy.energy_per_metre
+
+
+def test_wilsons_interval_solves_his_equation() -> None:
+    # The interval holds the p with (s/n - p)^2 <= z^2 p (1 - p) / n.
+    z = 1.959963984540054
+    for successes, n in ((0, 10), (3, 10), (10, 10), (150, 200)):
+        for p in wilson_interval(successes, n):
+            assert (successes / n - p) ** 2 == pytest.approx(z * z * p * (1 - p) / n, abs=1e-12)
