@@ -415,7 +415,7 @@ def test_ten_minutes_of_driving_over_rocks() -> None:
             observation, reward, terminated, _, info = env.step(action)
             assert np.isfinite(observation).all()
             assert math.isfinite(reward)
-            # What is not solved to the tolerance of 1e-12 misses it by little, and seldom: measured, 2e-12 once in 12 000 periods.
+            # What misses the tolerance of 1e-12 misses it by little and seldom: 2e-12, once in 12 000 periods.
             assert info["solver"]["residual"] < 1e-9, (seed, info["time"], info["solver"])
             unsolved += info["solver"]["status"] != "converged"
             periods += 1
