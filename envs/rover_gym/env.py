@@ -42,7 +42,7 @@ from rover_gym.rocks import (
     heights,
     scan_points,
 )
-from rover_gym.start import Start, StartDistribution, resting_pose, sample_start, tilted_plane
+from rover_gym.start import Start, StartDistribution, resting_pose, sample_start, slope_of, tilted_plane
 from rover_gym.validation import Range, known_keys, number, refuse, span, vector
 
 TERRAINS = ("plane", "sphere_field")
@@ -64,6 +64,9 @@ MAX_SLOPE_DEG = 60.0
 # High-centring: the trunk carries this share of the weight while the rover stays slower than this.
 TRUNK_LOAD = 0.1
 STUCK_SPEED = 0.05
+
+# A rover that stands deeper than this in the ground at its start, m, stands wrong.
+START_OVERLAP = 0.01
 
 # Below this speed, m/s, of wheel and rim alike a slip ratio says nothing.
 SLIP_SPEED = 0.05
@@ -220,7 +223,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     | name              | default        | meaning                                                         |
     |-------------------|----------------|-----------------------------------------------------------------|
-    | terrain           | "plane"        | the ground: "plane" or "sphere_field"                           |
+    | terrain           | "plane"        | "plane", "sphere_field" or a `SphereField` on a ground plane    |
     | difficulty        | None           | of the rocks, or range, 0 to 1; None: 0.5                       |
     | rock_abundance    | None           | 0 to 0.5; None: by the difficulty                               |
     | max_rock_radius   | None           | in wheel radii, 0.3 to 10; None: by the difficulty              |
@@ -253,7 +256,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     def __init__(
         self,
         *,
-        terrain: str = "plane",
+        terrain: str | SphereField = "plane",
         difficulty: float | Range | None = None,
         rock_abundance: float | None = None,
         max_rock_radius: float | None = None,
@@ -276,8 +279,9 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         solver_options: Mapping[str, Any] | None = None,
         reward_weights: Mapping[str, float] | None = None,
     ) -> None:
-        if terrain not in TERRAINS:
-            refuse(TerrainError, "terrain", terrain, f"unknown; known are {', '.join(TERRAINS)}")
+        self._field = terrain if isinstance(terrain, SphereField) else None
+        if self._field is None and terrain not in TERRAINS:
+            refuse(TerrainError, "terrain", terrain, f"unknown; known are {', '.join(TERRAINS)} and a SphereField")
         self._rock_distribution: RockDistribution | None = None
         if terrain == "sphere_field":
             self._rock_distribution = check_rocks(difficulty, rock_abundance, max_rock_radius)
@@ -302,6 +306,11 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             goal_distance=span("goal_distance", goal_distance, above=0.0, at_most=farthest),
             goal_bearing=_radians(span("goal_bearing_deg", goal_bearing_deg)),
         )
+        if self._field is not None:
+            if slope_deg is not None:
+                refuse(OptionError, "slope_deg", slope_deg, "is the given field's own")
+            slope, uphill = slope_of(self._field)
+            self._start_distribution = replace(self._start_distribution, slope=(slope, slope), uphill=(uphill, uphill))
         self.goal_tolerance = number("goal_tolerance", goal_tolerance, above=0.0)
         self._cos_max_tilt = math.cos(math.radians(number("max_tilt_deg", max_tilt_deg, above=0.0, at_most=180.0)))
         self._stuck_limit = number("stuck_time", stuck_time, above=0.0)
@@ -396,6 +405,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         Raises:
             OptionError: An option is unknown or out of its range; nothing has changed.
             StateError: `q` or `v` has a wrong shape or an entry that is not finite.
+            TerrainError: The rover would stand in the ground or in a sphere; the running episode goes on.
         """
         fixed, difficulty, q, v = self._check_reset_options(options)
         super().reset(seed=seed)
@@ -407,11 +417,18 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
                 distribution = replace(distribution, slope=rocks.slope)
         start = sample_start(self.np_random, distribution, **fixed)
         plane = tilted_plane(start.slope, start.uphill)
-        terrain = plane if rocks is None else rocks.lay_out(self.model, start, plane, self.goal_tolerance)
+        terrain: Plane | SphereField = plane
+        if self._field is not None and self._field.ground is not None:
+            plane, terrain = self._field.ground, self._field
+        elif rocks is not None:
+            terrain = rocks.lay_out(self.model, start, plane, self.goal_tolerance)
         simulation = self._simulate(terrain)
         if q is None:
             q = resting_pose(self.model, plane, start.position, start.heading)
         simulation.set_state(q, v)
+        if simulation.deepest_overlap < -START_OVERLAP:
+            reason = "is how deep (m) the rover stands in the ground or in a sphere at its start"
+            refuse(TerrainError, "terrain", simulation.deepest_overlap, reason)
         self._simulation = simulation
         distance = math.hypot(start.goal[0] - q[0], start.goal[1] - q[2])
         self._episode = _Episode(

@@ -11,8 +11,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym._core import Plane, RoverModel
-from rover_gym.validation import Range
+from rover_gym._core import Plane, RoverModel, SphereField, TerrainError
+from rover_gym.validation import Range, refuse
 
 Point: TypeAlias = tuple[float, float]
 
@@ -85,6 +85,19 @@ def tilted_plane(slope: float, uphill: float) -> Plane:
             math.sin(slope) * math.sin(uphill),
         )
     )
+
+
+def slope_of(field: SphereField) -> tuple[float, float]:
+    """Slope and direction of steepest ascent (rad) of a field's ground.
+
+    Raises:
+        TerrainError: The field has no ground that a rover could stand on.
+    """
+    ground = field.ground
+    if ground is None or ground.normal[1] <= 0.0:
+        refuse(TerrainError, "terrain", field, "needs a ground plane to stand on, facing up")
+    x, y, z = ground.normal
+    return math.acos(min(y, 1.0)), math.atan2(z, -x)
 
 
 def resting_pose(model: RoverModel, plane: Plane, position: Point, heading: float) -> npt.NDArray[np.float64]:

@@ -1,13 +1,30 @@
-//! A drive in a curve, for counting instructions: `valgrind --tool=callgrind drive_steps 1000 [newton]`.
+//! A drive in a curve, for counting instructions: `valgrind --tool=callgrind drive_steps 1000 [linearised|newton] [spheres]`.
 //!
-//! Arguments: number of 5 ms steps (after 400 of run-in), and the variant.
+//! Arguments: number of 5 ms steps (after 400 of run-in), the variant, and how many spheres lie about just under the ground, so that they are looked
+//! at and never touched.
 
 use std::sync::Arc;
 
-use rover_core::geometry::Plane;
+use rover_core::geometry::{Plane, SphereField, Terrain};
 use rover_core::integrator::{StepError, StepOptions, Variant};
 use rover_core::multibody::{Configuration, Model};
 use rover_core::simulation::Simulation;
+
+/// A plane, with spheres of 5 cm in rows half a metre apart, 1 mm below it.
+fn ground(n_spheres: u32) -> Option<Arc<dyn Terrain>> {
+    if n_spheres == 0 {
+        return Some(Arc::new(Plane::ground()));
+    }
+    let rows = f64::from(n_spheres).sqrt().ceil();
+    let place = |i: u32| {
+        let row = (f64::from(i) / rows).floor();
+        let x = 0.5 * (f64::from(i) - rows * row) - 0.25 * rows;
+        [x, -0.051, 0.5 * row - 0.25 * rows]
+    };
+    let centres: Vec<[f64; 3]> = (0..n_spheres).map(place).collect();
+    let field = SphereField::new(&centres, &vec![0.05; centres.len()], Some(Plane::ground()));
+    field.ok().map(|field| Arc::new(field) as Arc<dyn Terrain>)
+}
 
 fn main() -> Result<(), StepError> {
     let arguments: Vec<String> = std::env::args().collect();
@@ -28,8 +45,11 @@ fn main() -> Result<(), StepError> {
         variant,
         ..StepOptions::default()
     };
-    let Ok(mut simulation) = Simulation::new(model.clone(), Arc::new(Plane::ground()), options)
-    else {
+    let n_spheres = arguments.get(3).and_then(|n| n.parse().ok()).unwrap_or(0);
+    let Some(terrain) = ground(n_spheres) else {
+        return Ok(());
+    };
+    let Ok(mut simulation) = Simulation::new(model.clone(), terrain, options) else {
         return Ok(());
     };
     simulation.set_state(start, vec![0.0; model.nv()]);

@@ -158,6 +158,10 @@ fn wheel_candidates(i: usize, end: &Kinematics, terrain: &dyn Terrain, gate: &mu
                 });
             }
             Primitive::Sphere(sphere) => {
+                let aside = placed.axle.dot(&(sphere.centre - base - placed.centre));
+                if aside.abs() > sphere.radius + gate.reach + motion {
+                    return;
+                }
                 let near = wheel_sphere::nearest_point(&placed, sphere, base);
                 gate.offer_sphere((part, body, id), sphere, &near, motion, || {
                     // The disc's axes are taken as those of the midpoint all along.
@@ -217,16 +221,21 @@ fn box_candidates(i: usize, end: &Kinematics, terrain: &dyn Terrain, gate: &mut 
                 );
             }
             Primitive::Sphere(sphere) => {
+                let local = R.tr_mul(&(sphere.centre - base - centre));
+                let outside = (local.abs() - solid.half_size).map(|x| x.max(0.0));
+                let within = sphere.radius + gate.reach + motion;
+                if outside.norm_squared() > within * within {
+                    return;
+                }
                 let near = box_sphere::nearest_point(&centre, &R, &solid.half_size, sphere, base);
                 gate.offer_sphere((part, body, id), sphere, &near, motion, || {
-                    let middle = R.tr_mul(&(sphere.centre - base - centre));
                     let end_R = end.R[body] * solid.rotation;
                     let end = end_R.tr_mul(&(sphere.centre - end.base - end_centre));
                     let distance = |x: &Vector3<f64>| {
                         let (_, n, distance) = box_sphere::nearest_local(x, &solid.half_size);
                         (n, distance)
                     };
-                    first_touch(distance, &middle, &end, sphere.radius).map(|n| R * n)
+                    first_touch(distance, &local, &end, sphere.radius).map(|n| R * n)
                 });
             }
         },
@@ -265,30 +274,41 @@ pub fn relocate(
             contact.point = box_plane::corner(&centre, &R, &solid.half_size, feature);
             contact.gap = plane.distance(&(base + contact.point));
         }
-        (Part::Wheel(i), Primitive::Sphere(sphere)) => {
+        (_, Primitive::Sphere(sphere)) => relocate_on_sphere(model, kinematics, &sphere, contact),
+    }
+}
+
+fn relocate_on_sphere(
+    model: &Model,
+    kinematics: &Kinematics,
+    sphere: &Sphere,
+    contact: &mut Contact,
+) {
+    let base = &kinematics.base;
+    let n = &contact.frame.n;
+    let is_passing = contact.key.feature == PASSING;
+    let near = match contact.part {
+        Part::Wheel(i) => {
             let placed = place_wheel(kinematics, &model.wheels()[i]);
-            let near = if contact.key.feature == PASSING {
-                let n = &contact.frame.n;
-                wheel_sphere::point_over_tangent(&placed, n, &touch(&sphere, n, base))
+            if is_passing {
+                wheel_sphere::point_over_tangent(&placed, n, &touch(sphere, n, base))
             } else {
-                wheel_sphere::nearest_point(&placed, &sphere, base)
-            };
-            (contact.point, contact.frame, contact.gap) = (near.point, near.frame, near.gap);
+                wheel_sphere::nearest_point(&placed, sphere, base)
+            }
         }
-        (Part::Box(i), Primitive::Sphere(sphere)) => {
+        Part::Box(i) => {
             let solid = &model.boxes()[i];
             let R = kinematics.R[solid.body] * solid.rotation;
             let centre = kinematics.point(solid.body, &solid.centre);
             let half = &solid.half_size;
-            let near = if contact.key.feature == PASSING {
-                let n = &contact.frame.n;
-                box_sphere::point_over_tangent(&centre, &R, half, n, &touch(&sphere, n, base))
+            if is_passing {
+                box_sphere::point_over_tangent(&centre, &R, half, n, &touch(sphere, n, base))
             } else {
-                box_sphere::nearest_point(&centre, &R, half, &sphere, base)
-            };
-            (contact.point, contact.frame, contact.gap) = (near.point, near.frame, near.gap);
+                box_sphere::nearest_point(&centre, &R, half, sphere, base)
+            }
         }
-    }
+    };
+    (contact.point, contact.frame, contact.gap) = (near.point, near.frame, near.gap);
 }
 
 /// The sphere's point with the outward normal n, relative to `base`.
