@@ -318,7 +318,7 @@ fn touch(sphere: &Sphere, n: &Vector3<f64>, base: &Vector3<f64>) -> Vector3<f64>
 
 /// Gap, nearest point (relative to the trunk origin) and frame of every wheel over a terrain: the nearest primitive's.
 ///
-/// A wheel with no primitive within [`FAR`] (which no plane allows) keeps a gap of +∞.
+/// A wheel with no primitive within 10 km (which no plane allows) keeps a gap of +∞.
 #[must_use]
 pub fn wheel_contacts(
     model: &Model,
