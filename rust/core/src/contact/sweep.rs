@@ -11,8 +11,7 @@ use nalgebra::Vector3;
 
 /// Depth in radii of the sphere up to which the nearest point of the pose itself is used.
 ///
-/// Measured on 2 m drops onto stones of 2 to 20 cm: from 0.1 to 0.5 nothing passes; at 0.25 a wheel that drives over a stone of 5 cm at
-/// 1 m/s never sees a sweep.
+/// Measured on drops from 2 m at 20 ms onto stones of 2 to 50 cm: 0.1 and 0.25 leave a wheel at most 0.3 radii inside, 0.5 leaves it 0.39.
 pub(super) const DEEP: f64 = 0.25;
 
 /// Most iterations for one crossing; a graze that needs more is not deep.
