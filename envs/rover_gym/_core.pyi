@@ -179,7 +179,7 @@ class SphereField:
         *,
         max_diameter: float = 0.5,
         min_diameter: float = 0.05,
-        burial: float = 0.5,
+        burial: float | tuple[float, float] | None = None,
         ground: Plane | None = None,
         clear: npt.ArrayLike | None = None,
     ) -> SphereField:
@@ -191,7 +191,8 @@ class SphereField:
             seed: Equal seeds give equal rocks.
             max_diameter: m.
             min_diameter: m; the law has ever more, ever smaller rocks.
-            burial: Fraction of its diameter that a rock is sunk into the ground, 0 to 0.5.
+            burial: Fraction of its diameter that a rock is sunk into the ground, 0 to 0.5, or a range to draw it from
+                for each rock; 0.5 by default.
             ground: The plane; flat ground at height 0 by default.
             clear: (n, 3) circles x, z, radius that no rock reaches into, m.
         """

@@ -70,6 +70,13 @@ def test_rocks_keep_clear_and_sink_in():
     assert np.isfinite(y).all()
 
 
+def test_rocks_stand_at_random_heights_where_asked():
+    field = SphereField.rocks(0.2, (-5.0, -5.0, 5.0, 5.0), 1, burial=(0.1, 0.5))
+    sunk = 0.5 * (1.0 - field.centres[:, 1] / field.radii)
+    assert 0.1 <= sunk.min() < 0.15
+    assert 0.45 < sunk.max() <= 0.5
+
+
 def test_a_wheel_feels_the_nearest_of_ground_and_spheres():
     model = rover_gym.RoverModel()
     q = np.zeros(21)
@@ -105,6 +112,7 @@ def test_a_bad_file_is_a_terrain_error(tmp_path, text, message):
         ("abundance", {"abundance": np.nan}),
         ("max_diameter", {"max_diameter": -1.0}),
         ("burial", {"burial": 2.0}),
+        ("burial", {"burial": (0.4, 0.2)}),
         ("area", {"area": (0.0, 0.0, 0.0, 1.0)}),
         ("clear", {"clear": [(0.0, 1.0)]}),
     ],

@@ -174,17 +174,24 @@ impl SphereField {
     /// Rocks with the size-frequency distribution of Mars (Golombek and Rapp 1997) on a plane.
     #[staticmethod]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
-    #[pyo3(signature = (abundance, area, seed, *, max_diameter = 0.5, min_diameter = 0.05, burial = 0.5, ground = None, clear = None))]
+    #[pyo3(signature = (abundance, area, seed, *, max_diameter = 0.5, min_diameter = 0.05, burial = None, ground = None, clear = None))]
     fn rocks(
         abundance: f64,
         area: [f64; 4],
         seed: u64,
         max_diameter: f64,
         min_diameter: f64,
-        burial: f64,
+        burial: Option<&Bound<'_, PyAny>>,
         ground: Option<Plane>,
         clear: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let burial = match burial {
+            None => [0.5; 2],
+            Some(given) => given
+                .extract::<f64>()
+                .map(|x| [x; 2])
+                .or_else(|_| given.extract::<[f64; 2]>())?,
+        };
         let [x_min, z_min, x_max, z_max] = area;
         let clear = clear.map_or_else(|| Ok(Vec::new()), |c| rows::<3>(c, "clear"))?;
         let rocks = Rocks {

@@ -148,7 +148,7 @@ fn with_restitution_and_friction_the_worst_gain_is_known() {
     let worst = drop_often(1000, 0.3, 0.7);
     report("e = 0.3, friction", &worst);
     // Newton's law with friction can add energy (Kane's paradox). Measured: one impact in 1000 drops makes 1.9 times the kinetic
-    // energy before it (a wheel wedged with one steering joint folded), and the drop ends with 1.9 times what it began with.
+    // energy before it, and that drop ends with 1.9 times what it began with.
     assert!(worst.work < 4.0, "{}", worst.work);
     assert!(worst.gain < 4.0, "{}", worst.gain);
     assert!(

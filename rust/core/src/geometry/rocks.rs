@@ -47,8 +47,9 @@ pub struct Rocks {
     pub max_diameter: f64,
     /// Smallest diameter, m: the law has ever more, ever smaller rocks.
     pub min_diameter: f64,
-    /// Fraction of its diameter that a rock is sunk into the ground, in [0, ½], so that it covers what the law says.
-    pub burial: f64,
+    /// Range, from and to, of the fraction of its diameter that a rock is sunk into the ground, each in [0, ½], so that a rock covers what
+    /// the law says. Drawn for each rock.
+    pub burial: [f64; 2],
     /// Where no rock lies.
     pub clearings: Vec<Clearing>,
     /// The ground; must not be vertical.
@@ -65,7 +66,7 @@ impl Default for Rocks {
             seed: 0,
             max_diameter: 0.5,
             min_diameter: 0.05,
-            burial: 0.5,
+            burial: [0.5; 2],
             clearings: Vec::new(),
             ground: Plane::ground(),
         }
@@ -158,12 +159,18 @@ impl Rocks {
             smallest > 0.0 && smallest <= largest,
             "positive and at most max_diameter",
         )?;
-        let burial = self.burial;
+        let [burial, deepest] = self.burial;
         demand(
             "burial",
             burial,
             (0.0..=0.5).contains(&burial),
             "in [0, 0.5]",
+        )?;
+        demand(
+            "burial",
+            deepest,
+            (burial..=0.5).contains(&deepest),
+            "in [0, 0.5], and not below where the range begins",
         )?;
         for clearing in &self.clearings {
             for value in [clearing.x, clearing.z] {
@@ -205,7 +212,13 @@ impl Rocks {
                 is_clear.then_some((x, z))
             });
             if let Some((x, z)) = place {
-                spheres.push(self.rest(x, z, radius));
+                let [least, most] = self.burial;
+                let burial = if most > least {
+                    least + (most - least) * random.uniform()
+                } else {
+                    least
+                };
+                spheres.push(self.rest(x, z, radius, burial));
             }
         }
         Ok(spheres)
@@ -228,11 +241,11 @@ impl Rocks {
     }
 
     /// A rock on the ground, sunk in by `burial`.
-    fn rest(&self, x: f64, z: f64, radius: f64) -> Sphere {
+    fn rest(&self, x: f64, z: f64, radius: f64, burial: f64) -> Sphere {
         let n = self.ground.normal();
         let y = -(n.x * x + n.z * z + self.ground.offset()) / n.y;
         Sphere {
-            centre: Vector3::new(x, y, z) + n * (radius * (1.0 - 2.0 * self.burial)),
+            centre: Vector3::new(x, y, z) + n * (radius * (1.0 - 2.0 * burial)),
             radius,
         }
     }
@@ -317,7 +330,7 @@ mod tests {
         };
         let rocks = Rocks {
             abundance: 0.2,
-            burial: 0.2,
+            burial: [0.2; 2],
             clearings: vec![clearing],
             ground: Plane::new([-0.2, 1.0, 0.1], 0.4).unwrap(),
             ..Rocks::default()
@@ -371,7 +384,7 @@ mod tests {
             ),
             (
                 Rocks {
-                    burial: 0.7,
+                    burial: [0.7; 2],
                     ..Rocks::default()
                 },
                 "burial",

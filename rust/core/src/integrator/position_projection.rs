@@ -14,7 +14,7 @@ use super::options::Stabilisation;
 use super::report::StepReport;
 use super::workspace::Workspace;
 use crate::problem::{Dimension, FrictionContactProblem};
-use crate::solver::{SolveReport, solve};
+use crate::solver::{SolveReport, SolveStatus, solve};
 
 /// Corrects `ws.end`, where the contacts are predicted to have the gaps `ws.gap_end`.
 pub(super) fn project(scene: &Scene<'_>, ws: &mut Workspace, report: &mut StepReport) {
@@ -41,7 +41,8 @@ pub(super) fn project(scene: &Scene<'_>, ws: &mut Workspace, report: &mut StepRe
     ws.u_position.resize(ws.p.len(), 0.0);
     let limit = -FARTHEST * deepest;
     let mut solved = displace(scene, ws);
-    if !solved.is_converged() || size(ws) > limit {
+    let is_finite = solved.status != SolveStatus::NonFinite;
+    if is_finite && (!solved.is_converged() || size(ws) > limit) {
         // Friction locks a wedge, or fights itself over nanometres: the shortest way out needs none.
         ws.mu.fill(0.0);
         solved = displace(scene, ws);
