@@ -4,33 +4,14 @@
 //! 5 cm, 2 s of rest, then 10 s with front steering set-points −0.1 rad and 20 N m a wheel: displacement 12.585 m along and 18.770 m across
 //! the start heading, heading change 1.896 rad.
 
-use rover_core::geometry::Plane;
-use rover_core::integrator::{StepOptions, Variant};
-use rover_core::multibody::coordinates;
+use rover_core::integrator::Variant;
 
-use crate::scenes::{VARIANTS, check_machine, count, simulation};
+use crate::scenes::{VARIANTS, check_drive};
 
 /// Distance (m) and heading error (rad) from where the three engines end.
 fn errors(variant: Variant, h: f64) -> (f64, f64) {
-    let mut q = [0.0; 21];
-    q[1] = 0.50;
-    let options = StepOptions {
-        variant,
-        time_step: h,
-        ..StepOptions::default()
-    };
-    let mut simulation = simulation(check_machine(), Plane::ground(), options, &q, &[0.0; 21]);
-    let steps = |seconds: f64| count(seconds, h);
-    assert!(simulation.step(steps(2.0)).unwrap().is_converged());
-    let start = simulation.state().configuration.position;
-    simulation
-        .set_steering(&[-0.1, -0.1, 0.0, 0.0, 0.0, 0.0])
-        .unwrap();
-    simulation.set_wheel_torques(&[20.0; 6]).unwrap();
-    let driven = simulation.step(steps(10.0)).unwrap();
-    assert!(driven.is_converged(), "{variant:?} at {h} s: {driven:?}");
-    let moved = simulation.state().configuration.position - start;
-    let heading = coordinates::to_public(&simulation.state().configuration)[4];
+    let (moved, heading, report) = check_drive(variant, h);
+    assert!(report.is_converged(), "{variant:?} at {h} s: {report:?}");
     (
         (moved.x - 12.585).hypot(moved.z - 18.770),
         (heading.abs() - 1.896).abs(),

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use nalgebra::Vector3;
 use rover_core::geometry::Plane;
-use rover_core::integrator::{StepOptions, Variant};
+use rover_core::integrator::{Stabilisation, StepOptions, StepReport, Variant};
 use rover_core::multibody::{Hold, Model, ModelDescription, coordinates};
 use rover_core::simulation::Simulation;
 
@@ -99,6 +100,59 @@ fn set_steering_gains(description: &mut ModelDescription, stiffness: f64, dampin
             solid.hold = Some(Hold { stiffness, damping });
         }
     }
+}
+
+/// The report's section 6.1, motors on.
+pub fn report_scene(variant: Variant, time_step: f64, stabilisation: Stabilisation) -> Simulation {
+    let plane = Plane::new(
+        [
+            -0.099_334_665_397_530_61,
+            0.990_033_288_920_620_5,
+            0.099_833_416_646_828_17,
+        ],
+        0.0,
+    )
+    .unwrap();
+    let gravity = Vector3::new(0.0, -0.0981, 0.0);
+    let options = StepOptions {
+        variant,
+        time_step,
+        stabilisation,
+        gravity,
+        restitution: 0.3,
+        ..StepOptions::default()
+    };
+    let mut q = [0.0; 21];
+    (q[1], q[7], q[8]) = (0.955, -0.1, -0.1);
+    let mut simulation = simulation(report_machine(), plane, options, &q, &[0.0; 21]);
+    simulation
+        .set_steering(&[-0.1, -0.1, 0.0, 0.0, 0.0, 0.0])
+        .unwrap();
+    // +0.2 N m about the wheel axes, which drives towards −x
+    simulation.set_wheel_torques(&[-0.2; 6]).unwrap();
+    simulation
+}
+
+/// The drive of the independent check: displacement (m) and heading (rad) after 10 s, and the report of all steps.
+pub fn check_drive(variant: Variant, h: f64) -> (Vector3<f64>, f64, StepReport) {
+    let mut q = [0.0; 21];
+    q[1] = 0.50;
+    let options = StepOptions {
+        variant,
+        time_step: h,
+        ..StepOptions::default()
+    };
+    let mut simulation = simulation(check_machine(), Plane::ground(), options, &q, &[0.0; 21]);
+    let mut report = simulation.step(count(2.0, h)).unwrap();
+    let start = simulation.state().configuration.position;
+    simulation
+        .set_steering(&[-0.1, -0.1, 0.0, 0.0, 0.0, 0.0])
+        .unwrap();
+    simulation.set_wheel_torques(&[20.0; 6]).unwrap();
+    report.merge(&simulation.step(count(10.0, h)).unwrap());
+    let end = &simulation.state().configuration;
+    let heading = coordinates::to_public(end)[4];
+    (end.position - start, heading, report)
 }
 
 /// Steps of `h` in so many seconds.
