@@ -18,7 +18,7 @@ export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-demo: $(STAMPS)/demo $(STAMPS)/core ## set up, drive Rover-v0 to a goal, redraw the report's sections 6.1 and 6.2 under runs/
+demo: $(STAMPS)/demo $(STAMPS)/core $(STAMPS)/debian-demo ## set up, drive Rover-v0 to a goal, redraw the report's sections 6.1 and 6.2 under runs/
 	$(BIN)/rover drive --output runs/drive
 	$(BIN)/rover report --figures --output runs/report
 
@@ -47,7 +47,7 @@ test-rust: ## the Rust tests only
 test-slow: ## the Rust tests that take minutes: recorded contact problems of any size
 	cargo test --locked --release -- --ignored
 
-test-python: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core ## the Python tests only
+test-python: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core $(STAMPS)/debian-demo $(STAMPS)/debian-test ## the Python tests only
 	$(BIN)/pytest --numprocesses auto
 
 docs: $(STAMPS)/test $(STAMPS)/core ## build the documentation, Rust and Python, warnings denied
@@ -82,6 +82,16 @@ $(STAMPS)/venv: requirements/demo.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check "$$(grep '^uv==' $<)"
 	@mkdir -p $(@D) && touch $@
+
+# Debian packages: installed where that is allowed, otherwise named.
+$(STAMPS)/debian-%: requirements/debian-%.txt | $(STAMPS)/venv
+	@if command -v dpkg-query > /dev/null; then \
+	  missing=$$(for name in $$(cat $<); do dpkg-query -W -f '$${Status}' $$name 2> /dev/null | grep -q 'ok installed' || echo $$name; done); \
+	  if [ -n "$$missing" ] && [ $$(id -u) = 0 ]; then \
+	    apt-get -qq update && DEBIAN_FRONTEND=noninteractive apt-get -qq install --no-install-recommends $$missing > /dev/null; \
+	  elif [ -n "$$missing" ]; then echo "please install: sudo apt-get install" $$missing; fi; \
+	else echo "not Debian: rendering and the browser tests need what these Debian packages hold:" $$(cat $<); fi
+	@touch $@
 
 $(STAMPS)/demo $(STAMPS)/test $(STAMPS)/train: $(STAMPS)/%: requirements/%.txt $(STAMPS)/venv
 	$(UV) --requirement $<
