@@ -84,7 +84,7 @@ $(STAMPS)/venv: requirements/demo.txt
 	@mkdir -p $(@D) && touch $@
 
 # Debian packages: installed where that is allowed, otherwise named.
-$(STAMPS)/debian-%: requirements/debian-%.txt | $(STAMPS)/venv
+$(STAMPS)/debian-%: requirements/debian/%.txt | $(STAMPS)/venv
 	@if command -v dpkg-query > /dev/null; then \
 	  missing=$$(for name in $$(cat $<); do dpkg-query -W -f '$${Status}' $$name 2> /dev/null | grep -q 'ok installed' || echo $$name; done); \
 	  if [ -n "$$missing" ] && [ $$(id -u) = 0 ]; then \
