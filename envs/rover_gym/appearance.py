@@ -208,7 +208,8 @@ def _about_y(angle: float) -> npt.NDArray[np.float64]:
 
 
 def _box_mesh(size: tuple[float, ...]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
-    vertices, triangles = [], []
+    vertices: list[list[npt.NDArray[np.float64]]] = []
+    triangles: list[list[list[int]]] = []
     for axis in range(3):
         for sign in (-1.0, 1.0):
             n, u = sign * np.eye(3)[axis], np.eye(3)[(axis + 1) % 3]
