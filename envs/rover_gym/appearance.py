@@ -122,10 +122,11 @@ def _shape_parts(solid: Mapping[str, Any]) -> Iterator[Part]:
 
 
 def _trunk_marks(name: str, size: tuple[float, ...], centre: Vector) -> Iterator[Part]:
-    """A coloured strip across the front face, and a dark deck of panels on top that leaves the front rim free."""
+    """A coloured strip over the front edge, seen from before and behind, and a dark deck of panels on the rest."""
     x, y, z = size
-    front = (centre[0] + x / 2, centre[1] + 0.22 * y, centre[2])
-    yield _box(name, (PLATE, 0.2 * y, 0.8 * z), front, NOSE_COLOUR)
+    front, top = centre[0] + x / 2, centre[1] + y / 2
+    yield _box(name, (PLATE, 0.25 * y, 0.8 * z), (front, top - 0.125 * y + PLATE / 4, centre[2]), NOSE_COLOUR)
+    yield _box(name, (0.06 * x, PLATE, 0.8 * z), (front - 0.03 * x, top, centre[2]), NOSE_COLOUR)
     rows, columns, gap = 3, 2, 0.03
     length, width = 0.82 * x / rows, 0.92 * z / columns
     for row in range(rows):
