@@ -26,8 +26,8 @@ class RenderOptions:
         width: Pixels, even: a video's frames must be.
         height: Pixels, even.
         camera: "follow" looks from behind, above and the right and turns smoothly with the rover; "side" looks from
-            its right, low above the ground; "top" from straight above, x up. A pair (eye, target) of points in the world,
-            m, stands still.
+            its right, low above the ground; "top" from straight above, x up. A pair (eye, target) of points in the
+            world, m, stands still.
         show_forces: Draws contact forces as arrows, in front of everything.
         antialiasing: Smooths edges; in software a frame then takes about twice as long.
     """

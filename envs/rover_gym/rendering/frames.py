@@ -23,7 +23,7 @@ FORCE_LENGTH = 0.45  # m, of the arrow of a wheel's mean share of the weight
 
 VIEW_ANGLE = 34.0  # degrees, vertical
 # Eye and target in the trunk's heading frame, m: ahead, up, right.
-FOLLOW_EYE, FOLLOW_TARGET = np.array([-3.3, 1.75, 2.5]), np.array([0.25, 0.05, -0.1])
+FOLLOW_EYE, FOLLOW_TARGET = np.array([-3.3, 1.55, 2.5]), np.array([0.3, 0.25, -0.1])
 SIDE_EYE, SIDE_TARGET = np.array([0.1, 0.45, 4.0]), np.array([0.1, 0.05, 0.0])
 TOP_HEIGHT = 8.0  # m above the trunk
 FOLLOW_TIME = 0.25, 0.8  # s, time constants with which the view's centre and heading catch up

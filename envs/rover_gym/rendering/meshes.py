@@ -85,8 +85,8 @@ def actor_with(mapper: vtkMapper, *, lit: bool = True) -> vtkActor:
     actor = vtkActor()
     actor.SetMapper(mapper)
     surface = actor.GetProperty()
-    surface.SetAmbient(0.38)
-    surface.SetDiffuse(0.72)
+    surface.SetAmbient(0.45)
+    surface.SetDiffuse(0.66)
     surface.SetInterpolationToGouraud()
     surface.SetLighting(lit)
     return actor

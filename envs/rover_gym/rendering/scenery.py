@@ -31,9 +31,9 @@ TILE = 0.5  # m, of the checkered ground
 NEAR, FAR = 20.0, 160.0  # m, half edges of the checkered ground and of the ground beyond
 HAZE = 12.0, 60.0  # m, where it begins and where the ground has the horizon's colour
 
-# Spheres are drawn by distance from the rover, in whole metres: (to this far, m; facets around; with a shadow).
-# Most of a frame's time goes into facets, and far ones are smaller than a pixel.
-SPHERE_RANGES = ((4.0, 20, True), (14.0, 8, True), (math.inf, 6, False))
+# Spheres are drawn with as many facets as their size in the picture deserves, since most of a frame's time goes into
+# facets: (within this many radii of the rover, but at most so many m; facets around; with a shadow).
+SPHERE_RANGES = ((40.0, 4.0, 18, True), (250.0, 12.0, 8, True), (math.inf, math.inf, 6, False))
 
 Goal = tuple[float, float]
 
@@ -60,8 +60,8 @@ def headlight(intensity: float) -> vtkLight:
 
 def sky() -> vtkActor:
     """A dome around the origin, y up, coloured by elevation; below the horizon it is haze."""
-    elevation = np.radians([-90.0, 0.0, 3.0, 8.0, 18.0, 40.0, 90.0])
-    share = np.array([0.0, 0.0, 0.12, 0.35, 0.62, 0.88, 1.0])[:, None]
+    elevation = np.radians([-90.0, 0.0, 2.0, 5.0, 10.0, 20.0, 45.0, 90.0])
+    share = np.array([0.0, 0.0, 0.12, 0.3, 0.52, 0.75, 0.92, 1.0])[:, None]
     bands = np.array(look.SKY_COLOUR) + share * (np.array(look.SKY_COLOUR_2) - look.SKY_COLOUR)
     around = 24
     a, e = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, around, endpoint=False), elevation)
@@ -142,10 +142,10 @@ class RockActors:
         self._place: tuple[float, ...] | None = None
         self._sets = [vtkPolyData() for _ in SPHERE_RANGES]
         self.actors: list[vtkActor] = []
-        for points, (_, facets, shadowed) in zip(self._sets, SPHERE_RANGES, strict=True):
+        for points, (_, _, facets, shadowed) in zip(self._sets, SPHERE_RANGES, strict=True):
             self.actors.append(actor_with(_spheres(points, facets, coloured=True)))
             if shadowed and ground is not None:
-                self.actors.append(_shadow(actor_with(_spheres(points, min(facets, 12), coloured=False)), ground))
+                self.actors.append(_shadow(actor_with(_spheres(points, min(facets, 10), coloured=False)), ground))
 
     def follow(self, position: Array) -> None:
         """Sorts the spheres by their distance from a place."""
@@ -154,10 +154,10 @@ class RockActors:
             return
         self._place = place
         distance = np.linalg.norm(self._centres - place, axis=1) - self._radii
-        nearest = -math.inf
-        for points, (reach, _, _) in zip(self._sets, SPHERE_RANGES, strict=True):
-            chosen = (nearest <= distance) & (distance < reach)
-            nearest = reach
+        left = np.full(len(distance), True)
+        for points, (radii_away, reach, _, _) in zip(self._sets, SPHERE_RANGES, strict=True):
+            chosen = left & (distance <= np.minimum(radii_away * self._radii, reach))
+            left &= ~chosen
             set_points(points, self._centres[chosen])
             set_colours(points, self._colours[chosen])
             radii = numpy_to_vtk(self._radii[chosen], deep=True)
