@@ -537,7 +537,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         info = self._info(episode, cos_tilt, slip_ratio, termination=termination, terms=terms, solver=solver)
         return observation, sum(terms.values()), termination != "", False, info
 
-    def render(self) -> npt.NDArray[np.uint8] | None:  # type: ignore[override] # a frame and nothing else
+    def render(self) -> npt.NDArray[np.uint8] | None:
         """The present state as a frame, (height, width, 3) uint8; None, with a warning, without a render mode.
 
         Raises:

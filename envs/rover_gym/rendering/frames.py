@@ -96,6 +96,7 @@ class FrameRenderer:
         self._overlay.AddActor(_arrow_actor(self._arrows))
         self._pixels = vtkUnsignedCharArray()
         self._terrain: Plane | SphereField | None = None
+        self._goal: tuple[Goal | None, float] = (None, 0.0)
         self._stage: list[vtkActor] = []
         self.set_scene(terrain, goal=goal, goal_tolerance=goal_tolerance)
 
@@ -266,10 +267,10 @@ def _solids(model: RoverModel) -> dict[str, vtkActor]:
         pieces.setdefault(part.solid, []).append((placed, triangles, colours))
     actors = {}
     for solid, meshes in pieces.items():
-        vertices, triangles, colours = zip(*meshes, strict=True)
-        firsts = np.cumsum([0, *map(len, vertices[:-1])])
-        faces = np.vstack([faces + first for faces, first in zip(triangles, firsts, strict=True)])
-        actors[solid] = actor_of(mesh(np.vstack(vertices), faces, np.vstack(colours)))
+        firsts = np.cumsum([0, *(len(placed) for placed, _, _ in meshes[:-1])])
+        faces = np.vstack([faces + first for (_, faces, _), first in zip(meshes, firsts, strict=True)])
+        everywhere = np.vstack([placed for placed, _, _ in meshes])
+        actors[solid] = actor_of(mesh(everywhere, faces, np.vstack([colours for _, _, colours in meshes])))
     return actors
 
 
