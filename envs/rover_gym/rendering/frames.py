@@ -1,6 +1,7 @@
 """The frame: the rover, what stands around it, contact forces and the camera."""
 
 import ctypes
+import math
 from types import TracebackType
 from typing import Self
 
@@ -120,7 +121,7 @@ class FrameRenderer:
             self._stage += flag(goal, goal_tolerance, terrain, self._ground)
         for actor in self._stage:
             self._scene.AddActor(actor)
-        self._view: tuple[float, Array, float] | None = None
+        self._view: tuple[tuple[float, ...], Array, float] | None = None
 
     def render(self, simulation: Simulation) -> npt.NDArray[np.uint8]:
         """The simulation's present state, (height, width, 3) uint8, the first row on top."""
@@ -200,16 +201,20 @@ class FrameRenderer:
         set_pose(self._sky, dome)
 
     def _follow(self, simulation: Simulation, position: Array, up: Array) -> tuple[Array, float]:
-        """Centre and heading of the view: they follow the rover's as simulated time goes on, and jump with a reset."""
+        """Centre and heading of the view: they follow the rover's as time goes on, and jump when its state is set."""
         ahead = level(simulation.rotation[:, 0], up)
         heading = float(np.arctan2(-ahead[2], ahead[0]))
-        time = simulation.time
-        if self._view is not None and 0.0 <= time - self._view[0] < 1.0:
+        seen = (simulation.time, *position, heading)
+        if self._view is not None:
             before, centre, old = self._view
-            near, turn = (1.0 - np.exp(-(time - before) / constant) for constant in FOLLOW_TIME)
-            position = centre + near * (position - centre)
-            heading = old + float(turn) * float(np.remainder(heading - old + np.pi, 2.0 * np.pi) - np.pi)
-        self._view = (time, position, heading)
+            if seen == before:
+                return centre, old
+            elapsed = seen[0] - before[0]
+            if 0.0 < elapsed < 1.0:
+                near, turn = (1.0 - math.exp(-elapsed / constant) for constant in FOLLOW_TIME)
+                position = centre + near * (position - centre)
+                heading = old + turn * math.remainder(heading - old, math.tau)
+        self._view = (seen, position, heading)
         return position, heading
 
     def _above_ground(self, eye: Array, up: Array) -> Array:
