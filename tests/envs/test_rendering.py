@@ -436,5 +436,5 @@ def test_a_window_shows_the_frames(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rover_gym.rendering.frames._has_osmesa", lambda: False)
     monkeypatch.setitem(os.environ, "VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
-    with pytest.raises(RuntimeError, match="apt-get install libegl1"):
+    with pytest.raises(OSError, match="apt-get install libegl1"):
         FrameRenderer(RoverModel(), Plane())

@@ -49,7 +49,7 @@ class FrameRenderer:
 
     Raises:
         OptionError: An option is out of its range.
-        RuntimeError: No OpenGL library works on this machine; the message names the packages that bring one.
+        OSError: No OpenGL library works on this machine; the message names the packages that bring one.
     """
 
     def __init__(
@@ -242,9 +242,8 @@ def _open_window(width: int, height: int) -> vtkRenderWindow:
         window = vtkRenderWindow()
         # The last kind that VTK tries; without its library it would end the process at the first frame.
         if window.IsA("vtkOSOpenGLRenderWindow") and not _has_osmesa():
-            raise RuntimeError(
-                "no OpenGL library works here: install Mesa's, on Debian with"
-                " apt-get install libegl1 libgl1-mesa-dri, or libosmesa6"
+            raise OSError(
+                "no OpenGL library works here: install Mesa's, on Debian with apt-get install libegl1 libgl1-mesa-dri"
             )
         window.SetOffScreenRendering(True)
         window.SetMultiSamples(0)  # in software, multisampling costs several times the rest of a frame
