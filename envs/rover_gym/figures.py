@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym._core import SphereField
-from rover_gym.recording import MissingExtraError, Trajectory, read_trajectory
+from rover_gym.extras import MissingExtraError
+from rover_gym.recording import Trajectory, read_trajectory
 from rover_gym.report import WHEEL_RADIUS, reference_data, report_model
 
 if TYPE_CHECKING:
