@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rover_gym._core import Plane, SphereField
 from rover_gym.extras import require
 from rover_gym.figures.derived import Array
-from rover_gym.figures.style import COLOURS, WHEELS, title, wheel_legend
+from rover_gym.figures.style import COLOURS, NESTED_WIDTHS, WHEELS, title, wheel_legend
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,9 +17,10 @@ if TYPE_CHECKING:
     from rover_gym.figures.style import Sheet
     from rover_gym.run import Run
 
-MARGIN = 1.0  # m, shown around the way
-N_HEADINGS = 12  # how many arrows show the heading along the way
-ARROW = 0.6  # m
+MARGIN = 0.1  # shown around the way, of its larger extent
+RATIO = 1.5  # of the map, width to height
+N_HEADINGS = 10  # how many arrows show the heading along the way
+ARROW = 0.045  # of the map's width
 
 
 class Footprints(NamedTuple):
@@ -41,18 +42,19 @@ def path_from_above(figure: Sheet, run: Run) -> None:
     axes = figure.subplots()
     trajectory = run.trajectory
     trunk, centres = trajectory["q"][:, :3], trajectory["wheel_centres"]
-    _show_extent(axes, run, figure)
-    others = {}
+    _show_extent(axes, run)
+    others: dict[str, dict[str, Any]] = {}
     if isinstance(run.terrain, SphereField):
         _draw_spheres(figure, axes, run.terrain)
-    for i, wheel in enumerate(WHEELS):
-        axes.plot(centres[:, i, 2], centres[:, i, 0], color=COLOURS[wheel], linewidth=1.0, label=f"_{wheel} track")
-    axes.plot(trunk[:, 2], trunk[:, 0], color="black", linewidth=1.3, linestyle=(0, (5, 2)), label="_trunk")
-    others["trunk's origin"] = {"color": "black", "linestyle": (0, (5, 2))}
+    for wheel in reversed(WHEELS):  # the tracks of the wheels behind wide, those ahead narrow over them
+        x, _, z = centres[:, WHEELS.index(wheel)].T
+        axes.plot(z, x, color=COLOURS[wheel], linewidth=NESTED_WIDTHS[wheel[0]], label=f"_{wheel} track")
+    axes.plot(trunk[:, 2], trunk[:, 0], color="black", linewidth=1.0, label="_trunk")
+    others["trunk's origin"] = {"color": "black", "linewidth": 1.0}
     axes.plot(trunk[0, 2], trunk[0, 0], "o", color="black", markersize=6, zorder=4, label="_start")
     others["start"] = {"marker": "o", "color": "black", "linestyle": "none"}
     if run.goal is not None:
-        style = {"marker": "*", "color": "#DDCC00", "markeredgecolor": "black", "markersize": 15}
+        style: dict[str, Any] = {"marker": "*", "color": "#DDCC00", "markeredgecolor": "black", "markersize": 15}
         axes.plot(run.goal[1], run.goal[0], zorder=5, label="_goal", **style)
         others["goal"] = {**style, "markersize": 10, "linestyle": "none"}
     _draw_headings(axes, trajectory["q"])
@@ -74,7 +76,9 @@ def footprints(field: SphereField) -> Footprints:
 
 def _draw_spheres(figure: Sheet, axes: Axes, field: SphereField) -> None:
     collections = require("matplotlib.collections", "demo")
-    prints = footprints(field)
+    prints = _within(axes, footprints(field))
+    if len(prints.radii) == 0:
+        return
     upward = np.argsort(prints.heights)  # the highest last, so that it covers the others
     diameters = 2.0 * prints.radii[upward]
     circles = collections.EllipseCollection(
@@ -99,34 +103,47 @@ def _draw_spheres(figure: Sheet, axes: Axes, field: SphereField) -> None:
     bar.ax.set_ylim(low, low + span)
 
 
+def _within(axes: Axes, prints: Footprints) -> Footprints:
+    """The spheres that the axes show."""
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    x, z = prints.centres.T
+    r = prints.radii
+    seen = (z + r > left) & (z - r < right) & (x + r > bottom) & (x - r < top) & (r > 0.0)
+    return Footprints(*(values[seen] for values in prints))
+
+
 def _draw_headings(axes: Axes, q: Array) -> None:
     """Arrows along the heading, at equal ways along the path."""
     way = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(q[:, [0, 2]], axis=0).T))))
     rows = np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], N_HEADINGS)))
     heading = q[rows, 4]
+    length = ARROW * float(np.ptp(axes.get_xlim()))
     axes.quiver(
         q[rows, 2],
         q[rows, 0],
-        -ARROW * np.sin(heading),
-        ARROW * np.cos(heading),
+        -length * np.sin(heading),
+        length * np.cos(heading),
         angles="xy",
         scale_units="xy",
         scale=1.0,
-        width=0.003,
+        width=0.0045,
         color="black",
         zorder=3,
     )
 
 
-def _show_extent(axes: Axes, run: Run, figure: Sheet) -> None:
+def _show_extent(axes: Axes, run: Run) -> None:
     """Shows way and goal with a margin, at one scale, and no more of the ground than fills the axes."""
     places = [run.trajectory["wheel_centres"][..., [2, 0]].reshape(-1, 2)]
     if run.goal is not None:
         places.append(np.array([[run.goal[1], run.goal[0]]]))
     seen = np.concatenate(places)
-    low, high = seen.min(axis=0) - MARGIN, seen.max(axis=0) + MARGIN
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    extent = (high - low).max() * 2.0 * MARGIN + (high - low)
+    height = max(extent[1], extent[0] / RATIO)
+    half = 0.5 * height * np.array([RATIO, 1.0])
+    (left, bottom), (right, top) = 0.5 * (low + high) - half, 0.5 * (low + high) + half
+    axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
     axes.set_autoscale_on(False)
 
 

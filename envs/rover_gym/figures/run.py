@@ -68,13 +68,17 @@ def draw_run(run: Run, folder: str | Path, *, file_format: str = "png", with_ove
     check_format(file_format)
     paths = []
     for name, drawing in drawable(run).items():
-        one = {name: partial(drawing.draw, run=run)}
+        one = {name: partial(_fill, draw=drawing.draw, run=run)}
         paths += save_figures(one, folder, height=drawing.height, file_format=file_format)
     if with_overview:
         rows = (len(drawable(run)) + 1) // 2
         page = {"overview": partial(overview, run=run)}
         paths += save_figures(page, folder, width=2.0 * WIDTH, height=6.5 * rows, file_format=file_format)
     return paths
+
+
+def _fill(figure: Sheet, draw: Callable[[Sheet, Run], None], run: Run) -> None:
+    draw(figure, run)
 
 
 def overview(figure: Sheet, run: Run) -> None:

@@ -116,7 +116,7 @@ def plot_wheels(
     are seen.
     """
     for wheel in reversed(wheels) if nested else wheels:
-        width = {"linewidth": NESTED_WIDTHS[wheel[0]]} if nested else {}
+        width: dict[str, Any] = {"linewidth": NESTED_WIDTHS[wheel[0]]} if nested else {}
         axes.plot(time, values[:, WHEELS.index(wheel)], color=COLOURS[wheel], label=NAMES[wheel], **width, **style)
 
 
