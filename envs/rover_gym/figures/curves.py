@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rover_gym.figures.derived import Array, contact_velocities, motor_work, slip_ratios, smooth
+from rover_gym.figures.signals import SMOOTHED, WINDOW, linear_then_log, plot_raw_and_smooth, round_up
 from rover_gym.figures.style import (
-    COLOURS,
     DARK,
     QUANTITY_COLOURS,
     SIDES,
     WHEELS,
-    explain_lines,
     panel_legend,
     plot_wheels,
     title,
@@ -30,8 +29,6 @@ if TYPE_CHECKING:
     from rover_gym.run import Run
 
 SET_POINT: dict[str, Any] = {"linestyle": (0, (1, 1.5)), "linewidth": 1.0}
-WINDOW = 0.5  # s, of the smoothed curves: a few strides of the chatter, far less than a manoeuvre
-SMOOTHED = f"bold: smoothed over {WINDOW:g} s; light: every sample"
 
 
 def wheel_gaps(figure: Sheet, run: Run) -> None:
@@ -43,7 +40,7 @@ def wheel_gaps(figure: Sheet, run: Run) -> None:
         plot_wheels(axes, run.time, gaps, wheels, nested=True)
         axes.set(ylabel=f"gap, {name} wheels (mm)")
     largest, smallest = float(np.nanmax(gaps)), float(np.nanmin(gaps))
-    _linear_then_log(panels[0], 10.0, min(smallest, -1.0), max(largest, 1.0))
+    linear_then_log(panels[0], 10.0, min(smallest, -1.0), max(largest, 1.0))
     panels[1].set(xlabel="time (s)")
     title(figure, "Gaps between wheels and ground, negative where they overlap", run)
     wheel_legend(figure)
@@ -57,12 +54,12 @@ def wheel_loads(figure: Sheet, run: Run) -> None:
     share = run.model.mass * float(np.linalg.norm(gravity)) / len(WHEELS)
     for axes, wheels, name in zip(panels, SIDES, ("left", "right"), strict=True):
         axes.axhline(share, color=DARK, linewidth=0.8, linestyle=(0, (4, 3)))
-        _raw_and_smooth(axes, run.time, forces, wheels)
+        plot_raw_and_smooth(axes, run.time, forces, wheels)
         axes.set(ylabel=f"load, {name} wheels (N)")
-    _linear_then_log(panels[0], _round_up(1.8 * share), 0.0, float(np.nanmax(forces)))
+    linear_then_log(panels[0], round_up(1.8 * share), 0.0, float(np.nanmax(forces)))
     panels[1].set(xlabel="time (s)")
     title(figure, f"Normal force on the wheels, mean over {_averaged(run)}", run)
-    wheel_legend(figure, {f"a sixth of the weight, {share:.3g} N": {"color": DARK, "linestyle": (0, (4, 3))}}, SMOOTHED)
+    wheel_legend(figure, {f"a sixth of the weight, {share:.4g} N": {"color": DARK, "linestyle": (0, (4, 3))}}, SMOOTHED)
 
 
 def slip(figure: Sheet, run: Run) -> None:
@@ -72,11 +69,11 @@ def slip(figure: Sheet, run: Run) -> None:
     u = contact_velocities(run)
     sliding = 1e3 * np.hypot(u[..., 1], u[..., 2])
     for axes, wheels, name in zip((left, right), SIDES, ("left", "right"), strict=True):
-        _raw_and_smooth(axes, run.time, sliding, wheels)
+        plot_raw_and_smooth(axes, run.time, sliding, wheels)
         axes.set(ylabel=f"sliding,\n{name} wheels (mm/s)")
     largest = float(np.nanmax(sliding, initial=0.0))
     # Rolling wheels creep by the solver's tolerance: an axis in nm/s would show nothing else.
-    _linear_then_log(left, 10.0, -0.05, max(largest, 1.0))
+    linear_then_log(left, 10.0, -0.05, max(largest, 1.0))
 
     recorded = "slip_ratio" in run.trajectory.data
     ratios = 100.0 * (run.trajectory["slip_ratio"] if recorded else _mean_over_wheels(slip_ratios(run)))
@@ -129,7 +126,8 @@ def torques(figure: Sheet, run: Run) -> None:
     panels[0, 0].set(ylabel="driving torque (N m)")
     panels[1, 0].set(ylabel="steering angle (°)")
     low, high = panels[0, 0].get_ylim()
-    panels[0, 0].set_ylim(min(low, 0.0), max(high, 0.0))  # a constant torque is seen against zero
+    margin = 0.05 * max(high, -low)
+    panels[0, 0].set_ylim(min(low, -margin), max(high, margin))  # a constant torque is seen against zero
     _at_least(panels[1, 0], 1.0)
     title(figure, "Driving torques and steering", run)
     wheel_legend(figure, {"steering set-point": {"color": DARK, **SET_POINT}})
@@ -183,23 +181,12 @@ def contact_solver(figure: Sheet, run: Run) -> None:
     largest = float(iterations.max())
     typical = max(float(np.percentile(iterations, 99.0)), 10.0)
     if largest > 10.0 * typical:
-        _linear_then_log(below, _round_up(typical), 0.0, largest)
+        linear_then_log(below, round_up(typical), 0.0, largest)
     else:
         below.set_ylim(0.0, max(1.05 * largest, 1.0))
     for axes in (above, below):
         panel_legend(axes)
     title(figure, "Contact solver", run)
-
-
-def _raw_and_smooth(axes: Axes, time: Array, values: Array, wheels: tuple[str, ...]) -> None:
-    """Every sample in a light line, and the smoothed curve; values (n, 6)."""
-    measured = np.array(values)
-    measured[0] = np.nan  # no step had been taken
-    smoothed = smooth(time, measured, WINDOW)
-    for wheel in wheels:
-        i = WHEELS.index(wheel)
-        axes.plot(time, values[:, i], color=COLOURS[wheel], linewidth=0.5, alpha=0.35, label=f"_{wheel} samples")
-    plot_wheels(axes, time, smoothed, wheels)
 
 
 def _mean_over_wheels(values: Array) -> Array:
@@ -220,37 +207,9 @@ def _averaged(run: Run) -> str:
     return "the last time step" if step is None else f"the last time step of {1e3 * step:g} ms"
 
 
-def _round_up(value: float) -> float:
-    """The next number whose half is round too."""
-    scale = 10.0 ** np.floor(np.log10(value))
-    return float(
-        scale * next(digit for digit in (1.0, 2.0, 4.0, 6.0, 8.0, 10.0) if digit >= value / scale * (1 - 1e-9))
-    )
-
-
 def _at_least(axes: Axes, span: float) -> None:
     """Widens the axis to a span at least, so that round-off does not fill it."""
     low, high = axes.get_ylim()
     if high - low < span:
         middle = 0.5 * (low + high)
         axes.set_ylim(middle - 0.5 * span, middle + 0.5 * span)
-
-
-def _linear_then_log(axes: Axes, threshold: float, low: float, high: float) -> None:
-    """A linear axis, or, where the values go far beyond the threshold, one that is logarithmic from there on."""
-    if high <= 2.0 * threshold and low >= -2.0 * threshold:
-        margin = 0.05 * (high - low)
-        axes.set_ylim(low - margin if low < 0.0 else 0.0, high + margin)
-        return
-    decades = np.log10(max(high / threshold, 1.0)) + np.log10(max(-low / threshold, 1.0))
-    axes.set_yscale("symlog", linthresh=threshold, linscale=max(float(decades), 0.8))
-    axes.set_ylim(1.15 * low if low < 0.0 else 0.0, 1.3 * high)
-    ticks = [0.5 * threshold, threshold]
-    tick = 10.0 ** np.ceil(np.log10(1.5 * threshold))
-    while tick <= 1.3 * high:
-        ticks.append(tick)
-        tick *= 10.0
-    below = [-tick for tick in ticks if -tick >= 1.15 * low]
-    axes.set_yticks([*below, 0.0, *ticks], labels=[f"{tick:g}" for tick in (*below, 0.0, *ticks)])
-    axes.set_yticks([], minor=True)
-    explain_lines(axes, threshold)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 MARGIN = 0.1  # shown around the way, of its larger extent
 RATIO = 1.5  # of the map, width to height
-N_HEADINGS = 10  # how many arrows show the heading along the way
+HEADING_DISTANCE = 1.8  # between the arrows that show the heading, in their lengths
 ARROW = 0.045  # of the map's width
 
 
@@ -96,7 +96,7 @@ def _draw_spheres(figure: Sheet, axes: Axes, field: SphereField) -> None:
     circles.set_array(prints.heights[upward])
     low = 0.0 if field.ground is not None else float(prints.heights.min())
     span = max(float(prints.heights.max()) - low, 1e-6)
-    circles.set_clim(low - 0.1 * span, low + 1.7 * span)  # light greys only, so that the tracks stand out
+    circles.set_clim(low - 0.1 * span, low + 2.2 * span)  # light greys only, so that the tracks stand out
     axes.add_collection(circles, autolim=False)
     above = "the ground" if field.ground is not None else "y = 0"
     bar = figure.colorbar(circles, ax=axes, shrink=0.8, pad=0.02, label=f"top of the sphere above {above} (m)")
@@ -113,11 +113,13 @@ def _within(axes: Axes, prints: Footprints) -> Footprints:
 
 
 def _draw_headings(axes: Axes, q: Array) -> None:
-    """Arrows along the heading, at equal ways along the path."""
-    way = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(q[:, [0, 2]], axis=0).T))))
-    rows = np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], N_HEADINGS)))
-    heading = q[rows, 4]
+    """Arrows along the heading, none near another: a rover that rocks to and fro would blacken the map."""
     length = ARROW * float(np.ptp(axes.get_xlim()))
+    rows = [0]
+    for row, place in enumerate(q[:, [0, 2]]):
+        if np.hypot(*(q[rows][:, [0, 2]] - place).T).min() > HEADING_DISTANCE * length:
+            rows.append(row)
+    heading = q[rows, 4]
     axes.quiver(
         q[rows, 2],
         q[rows, 0],

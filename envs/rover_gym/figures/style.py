@@ -36,7 +36,7 @@ COLOURS = {"FL": "#0072B2", "FR": "#56B4E9", "ML": "#009E73", "BL": "#D55E00", "
 QUANTITY_COLOURS = ("#332288", "#CC6677", "#117733", "#882255", "#999933")
 DARK = "0.25"
 #: Of nested lines: front, middle and back wheels, points.
-NESTED_WIDTHS = {"F": 0.9, "M": 1.9, "B": 3.0}
+NESTED_WIDTHS = {"F": 0.8, "M": 1.6, "B": 2.6}
 #: Width of a figure, inches. Shown 800 pixels wide, as a README does, type of 10 points is 12 pixels high.
 WIDTH = 9.0
 STYLE: dict[str, Any] = {
@@ -76,22 +76,6 @@ def wheel_legend(figure: Sheet, others: Mapping[str, Mapping[str, Any]] | None =
 def panel_legend(axes: Axes) -> None:
     """The legend of one panel, in a row above it, where it covers no curve."""
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.1)
-
-
-def explain_lines(axes: Axes, threshold: float) -> None:
-    """Marks where an axis turns logarithmic."""
-    axes.axhline(threshold, color="0.6", linewidth=0.5)
-    axes.annotate(
-        "logarithmic above this line",
-        (1.0, threshold),
-        xycoords=("axes fraction", "data"),
-        xytext=(-3, 2),
-        textcoords="offset points",
-        ha="right",
-        va="bottom",
-        fontsize=7.5,
-        color="0.45",
-    )
 
 
 def circle(axes: Axes, x: float, y: float, radius: float, color: str) -> None:
