@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.figures.saving import save_figures
-from rover_gym.figures.style import COLOURS, NAMES, WHEELS, plot_wheels, step_size
+from rover_gym.figures.style import COLOURS, NAMES, QUANTITY_COLOURS, WHEELS, plot_wheels, step_size
 from rover_gym.recording import Trajectory, read_trajectory
 from rover_gym.report import reference_data
 
@@ -26,7 +26,7 @@ PUBLISHED_STEP = 0.02  # s, of the runs behind the report's figures (inferred fr
 
 
 def draw_all(recording: str | Path, folder: str | Path) -> list[Path]:
-    """Draws the four figures as PNG files into the folder and returns their paths.
+    """Draws the report's figures 6.2 to 6.5, and our way beside that of Siconos, as PNG files into the folder and returns their paths.
 
     Raises:
         MissingExtraError: matplotlib or h5py is not installed.
@@ -37,6 +37,7 @@ def draw_all(recording: str | Path, folder: str | Path) -> list[Path]:
         "figure-6.3-contact-distances": contact_distances,
         "figure-6.4-reaction-force": reaction_force,
         "figure-6.5-steering-angles": steering_angles,
+        "section-6.1-beside-siconos": beside_siconos,
     }
     return save_figures({name: partial(draw, trajectory=trajectory) for name, draw in drawings.items()}, folder)
 
@@ -79,7 +80,7 @@ def contact_distances(figure: Figure, trajectory: Trajectory) -> None:
         xlim=(0.0, 10.0),
         ylim=(-1.0, 5.0),
     )
-    published.set(title="the report's: plane (0.15, 0, 0.15), steering +0.1 rad, step 20 ms", xlabel="time (s)")
+    published.set(title="the report's: plane (0.15, 0, 0.15),\nsteering +0.1 rad, step 20 ms", xlabel="time (s)")
     for axes in (ours, published):
         axes.legend(loc="upper right")
     figure.suptitle("Figure 6.3: contact distance between wheels and plane")
@@ -101,7 +102,7 @@ def reaction_force(figure: Figure, trajectory: Trajectory) -> None:
         ylim=(0.0, None),
         yscale="symlog",
     )
-    published.set(title="the report's: plane (0.15, 0, 0.15), step 20 ms, cut at 250 N", xlabel="time (s)")
+    published.set(title="the report's: plane (0.15, 0, 0.15),\nstep 20 ms, cut at 250 N", xlabel="time (s)")
     for axes in (ours, published):
         axes.legend(loc="upper right")
     figure.suptitle("Figure 6.4: reaction force of the front wheels")
@@ -115,15 +116,38 @@ def steering_angles(figure: Figure, trajectory: Trajectory) -> None:
     _plot_siconos(ours, "steering")
     _plot_published(published, "fig_6_5_steering")
     ours.set(
-        title=f"ours, step {step_size(trajectory)}; set-points -0.1 rad in front, else 0",
+        title=f"ours, step {step_size(trajectory)};\nset-points -0.1 rad in front, else 0",
         xlabel="time (s)",
         ylabel="steering angle (rad)",
         xlim=(0.0, 10.0),
     )
-    published.set(title="the report's: set-points +0.1 rad in front, torque 0.3 N m, step 20 ms", xlabel="time (s)")
+    published.set(title="the report's: set-points +0.1 rad in front,\ntorque 0.3 N m, step 20 ms", xlabel="time (s)")
     ours.legend(loc="lower right")
     published.legend(loc="right")
     figure.suptitle("Figure 6.5: steering angles under the PD controller")
+
+
+def beside_siconos(figure: Figure, trajectory: Trajectory) -> None:
+    """The trunk's way in our run and in those of Siconos 4.4 over the same scene, and the distance between them."""
+    ways, distances = figure.subplots(1, 2)
+    time, trunk = trajectory["time"], trajectory["q"][:, :3]
+    for i, name in enumerate(("x, forward", "y, up", "z, to the right")):
+        ways.plot(time, trunk[:, i], color=QUANTITY_COLOURS[i], label=f"{name}: ours")
+    references = sorted(reference_data()["siconos"], key=lambda run: -run["step"])
+    for i, run in enumerate(references):
+        at, theirs = np.array(run["t"]), np.array(run["trunk"])
+        seen = at <= time[-1] + 1e-9
+        ours = np.stack([np.interp(at[seen], time, column) for column in trunk.T], axis=1)
+        apart = 1e3 * np.linalg.norm(ours - theirs[seen], axis=1)
+        step = f"Siconos, step {1e3 * run['step']:g} ms"
+        distances.plot(at[seen], np.maximum(apart, 1e-4), color=QUANTITY_COLOURS[3 + i], label=f"from {step}")
+    for column in range(3):  # the last one, of the smallest step
+        ways.plot(at, theirs[:, column], "k:", linewidth=1.0, label="" if column else step)
+    ways.set(title="the trunk's origin", xlabel="time (s)", ylabel="place (m)", xlim=(0.0, 10.0), ylim=(-1.2, 1.2))
+    distances.set(title="how far ours is from theirs", xlabel="time (s)", ylabel="distance (mm)", yscale="log")
+    for axes in (ways, distances):
+        axes.legend(loc="best")
+    figure.suptitle(f"Section 6.1: our run, step {step_size(trajectory)}, beside Siconos 4.4")
 
 
 def _plot_siconos(axes: Axes, name: str, scale: float = 1.0) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from rover_gym._core import SphereField
 from rover_gym.figures.saving import save_figures
+from rover_gym.figures.signals import SMOOTHED, linear_then_log, plot_raw_and_smooth
 from rover_gym.figures.style import COLOURS, NAMES, SIDES, WHEELS, circle, close_up, plot_wheels, step_size
 from rover_gym.recording import Trajectory, read_trajectory
 from rover_gym.report import WHEEL_RADIUS, report_model
@@ -55,7 +56,7 @@ def wheel_traces(figure: Figure, trajectory: Trajectory) -> None:
             side.plot(across, field.heights(np.stack((across, np.full(200, touching[i])), axis=1)), color="0.4")
     above.set(title="from above; dots are the start", xlabel="to the right, z (m)", ylabel="forward, x (m)")
     side.set(
-        title="the left wheels from the right; at the end, with the rug under them",
+        title="the left wheels from the right;\nat the end, with the rug under them",
         xlabel="forward, x (m)",
         ylabel="up, y (m)",
     )
@@ -82,11 +83,10 @@ def reaction_forces(figure: Figure, trajectory: Trajectory) -> None:
     """Section 6.2: normal force on each wheel against time, left and right wheels apart."""
     panels = figure.subplots(1, 2, sharey=True, sharex=True)
     for axes, wheels, name in zip(panels, SIDES, ("left", "right"), strict=True):
-        plot_wheels(axes, trajectory["time"], trajectory["wheel_forces"][:, :, 0], wheels)
-        axes.set(
-            title=f"{name} wheels, mean over each step of {step_size(trajectory)}", xlabel="time (s)", yscale="symlog"
-        )
-        axes.set(xlim=(0.0, 25.0), ylim=(0.0, None))
-        axes.legend(loc="upper right")
+        plot_raw_and_smooth(axes, trajectory["time"], trajectory["wheel_forces"][:, :, 0], wheels)
+        axes.set(title=f"{name} wheels, mean over each step of {step_size(trajectory)}", xlabel="time (s)")
+        axes.set_xlim(0.0, 25.0)
+        axes.legend(loc="upper right", title=SMOOTHED.replace("; ", "\n"), title_fontsize=8.0)
+    linear_then_log(panels[0], 40.0, 0.0, float(trajectory["wheel_forces"][:, :, 0].max()))
     figure.axes[0].set_ylabel("normal force on the wheel (N)")
     figure.suptitle("Section 6.2: reaction forces of the wheels")
