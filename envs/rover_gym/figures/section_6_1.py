@@ -26,7 +26,7 @@ PUBLISHED_STEP = 0.02  # s, of the runs behind the report's figures (inferred fr
 
 
 def draw_all(recording: str | Path, folder: str | Path) -> list[Path]:
-    """Draws the report's figures 6.2 to 6.5, and our way beside that of Siconos, as PNG files into the folder and returns their paths.
+    """Draws the report's figures 6.2 to 6.5, and our way beside Siconos', as PNG files and returns their paths.
 
     Raises:
         MissingExtraError: matplotlib or h5py is not installed.
@@ -144,7 +144,12 @@ def beside_siconos(figure: Figure, trajectory: Trajectory) -> None:
     for column in range(3):  # the last one, of the smallest step
         ways.plot(at, theirs[:, column], "k:", linewidth=1.0, label="" if column else step)
     ways.set(title="the trunk's origin", xlabel="time (s)", ylabel="place (m)", xlim=(0.0, 10.0), ylim=(-1.2, 1.2))
-    distances.set(title="how far ours is from theirs", xlabel="time (s)", ylabel="distance (mm)", yscale="log")
+    distances.set(
+        title="how far ours is from theirs,\nwhich are rounded to 0.1 µm",
+        xlabel="time (s)",
+        ylabel="distance (mm)",
+        yscale="log",
+    )
     for axes in (ways, distances):
         axes.legend(loc="best")
     figure.suptitle(f"Section 6.1: our run, step {step_size(trajectory)}, beside Siconos 4.4")

@@ -31,7 +31,7 @@ def linear_then_log(axes: Axes, threshold: float, low: float, high: float) -> No
     """A linear axis, or, where the values go far beyond the threshold, one that is logarithmic from there on."""
     if high <= 2.0 * threshold and low >= -2.0 * threshold:
         margin = 0.05 * (high - low)
-        axes.set_ylim(low - margin if low < 0.0 else 0.0, high + margin)
+        axes.set_ylim(low - margin if low < 0.0 else 0.0, max(high + margin, 0.1 * threshold))
         return
     decades = np.log10(max(high / threshold, 1.0)) + np.log10(max(-low / threshold, 1.0))
     axes.set_yscale("symlog", linthresh=threshold, linscale=max(float(decades), 0.8))
