@@ -164,14 +164,15 @@ def contact_solver(figure: Sheet, run: Run) -> None:
     """Residual and iterations of the contact solver, one point a row."""
     above, below = figure.subplots(2, 1, sharex=True)
     residual = run.trajectory["solver_residual"]
-    dots: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 3.0, "color": QUANTITY_COLOURS[0]}
+    tolerance = run.trajectory.attributes.get("solver", {}).get("tolerance")
+    values = residual[residual > 0.0]  # without a contact there is nothing to solve
+    values = np.append(values, [1e-15] if tolerance is None else [tolerance, 1e-3 * tolerance])
     above.set_yscale("log")
+    above.set_ylim(values.min() / 3.0, 3.0 * values.max())
+    dots: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 3.0, "color": QUANTITY_COLOURS[0]}
     above.plot(run.time, np.where(residual > 0.0, residual, np.nan), label="worst residual since the last row", **dots)
-    settings = run.trajectory.attributes.get("solver", {})
-    if "tolerance" in settings:
-        label = f"tolerance, {settings['tolerance']:g}"
-        above.axhline(settings["tolerance"], color=QUANTITY_COLOURS[1], linewidth=1.0, label=label)
-        above.set_ylim(top=max(3.0 * settings["tolerance"], 3.0 * float(residual.max())))
+    if tolerance is not None:
+        above.axhline(tolerance, color=QUANTITY_COLOURS[1], linewidth=1.0, label=f"tolerance, {tolerance:g}")
     above.set(ylabel="residual (1)")
     iterations = run.trajectory["solver_iterations"]
     dots["color"] = QUANTITY_COLOURS[2]
