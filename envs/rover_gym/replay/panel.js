@@ -83,7 +83,7 @@
   };
 
   add(panel, "h1", {}, data.title);
-  add(panel, "p", {}, "Drag to orbit, right button to pan, wheel to zoom, space to pause; click a curve to go there.");
+  add(panel, "p", {}, "Drag to orbit, right button to pan, scroll to zoom, space to pause; click a curve to go there.");
   const clock = add(panel, "p");
   const updates = data.charts.map(draw);
   let shown = null;

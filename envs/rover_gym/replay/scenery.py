@@ -1,4 +1,4 @@
-"""What stands around the rover in every format: a checkered patch of ground, spheres, the goal, a place to look from."""
+"""What stands around the rover in every format: a checkered patch of ground, spheres, the goal, an eye."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def ground_tiles(run: Run) -> tuple[Array, Triangles, Triangles] | None:
 
 
 def goal_parts(run: Run) -> tuple[Part, ...]:
-    """A pole with a ball-like knob at the goal, its foot in the world's frame; empty where there is no goal."""
+    """A pole with a knob at the goal, in the world's frame; none where there is no goal."""
     if run.goal is None:
         return ()
     x, z = run.goal
@@ -90,8 +90,7 @@ def goal_parts(run: Run) -> tuple[Part, ...]:
     upright = np.eye(3)
     pole = Part("", "cylinder", (0.02, GOAL_POLE), (x, y + GOAL_POLE / 2, z), upright, GOAL_COLOUR)
     knob = Part("", "cylinder", (0.09, 0.18), (x, y + GOAL_POLE, z), upright, GOAL_COLOUR)
-    foot = Part("", "cylinder", (0.5, 0.01), (x, y, z), upright, GOAL_COLOUR)
-    return pole, knob, foot
+    return pole, knob
 
 
 def coloured_meshes(parts: tuple[Part, ...]) -> Iterator[tuple[Colour, Array, Triangles]]:
@@ -128,7 +127,7 @@ def sphere_mesh(rings: int = 8) -> tuple[Array, Triangles]:
     return vertices.reshape(-1, 3), triangles[proper].astype(np.int32)
 
 
-def first_view(run: Run, distance: float = 3.2) -> View:
+def first_view(run: Run, distance: float = 4.0) -> View:
     """From beside and a little behind the rover at its start, so that it drives away from the eye."""
     path = trunk_path(run)
     way = (path[-1] - path[0])[[0, 2]]
@@ -139,4 +138,4 @@ def first_view(run: Run, distance: float = 3.2) -> View:
     beside = np.array([-ahead[1], ahead[0]])
     back = -0.62 * ahead + 0.62 * beside
     eye = path[0] + distance * np.array([back[0], 0.48, back[1]])
-    return View(eye, path[0] - np.array([0.0, 0.1, 0.0]))
+    return View(eye, path[0])
