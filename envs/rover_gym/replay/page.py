@@ -64,12 +64,13 @@ def write_page(run: Run, path: str | Path, *, follow: bool = True) -> Path:
         server.initial_camera.fov = view.field_of_view
         recording = server.get_scene_serializer()
         turns = continuous(quaternions(run.rotations))
-        for frame, pause in enumerate(np.diff(run.time, append=run.time[-1])):
-            world.position = _shortened(-centre[frame])
-            for i, solid in enumerate(solids):
-                solid.position = _shortened(run.positions[frame, i])
-                solid.wxyz = _shortened(turns[frame, i])
-            recording.insert_sleep(float(pause))
+        with server.atomic():  # or each of the thousands of updates would wake the server's thread
+            for frame, pause in enumerate(np.diff(run.time, append=run.time[-1])):
+                world.position = _shortened(-centre[frame])
+                for i, solid in enumerate(solids):
+                    solid.position = _shortened(run.positions[frame, i])
+                    solid.wxyz = _shortened(turns[frame, i])
+                recording.insert_sleep(float(pause))
         page = recording.as_html()
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
