@@ -257,3 +257,9 @@ def test_it_plays(shown: Shown) -> None:
     shown.browser.find_element(By.CSS_SELECTOR, "#root button").click()
     await_that(lambda: (slider(shown.browser) or 0.0) > 0.25, "a later time")
     go_to(shown.browser, 0.0)
+
+
+def test_a_missing_browser_is_named_and_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shutil, "which", lambda _: None)
+    with pytest.raises(pytest.fail.Exception, match="chromium and chromium-driver"):
+        programs()
