@@ -25,8 +25,8 @@ Vector: TypeAlias = tuple[float, float, float]
 GROUND_COLOUR: Colour = (0.72, 0.45, 0.30)
 GROUND_COLOUR_2: Colour = (0.65, 0.39, 0.26)  # the other fields of the checkered ground
 ROCK_COLOUR: Colour = (0.50, 0.33, 0.25)
-SKY_COLOUR: Colour = (0.93, 0.83, 0.72)  # at the horizon
-SKY_COLOUR_2: Colour = (0.62, 0.66, 0.72)  # overhead
+SKY_COLOUR: Colour = (0.89, 0.77, 0.65)  # at the horizon
+SKY_COLOUR_2: Colour = (0.50, 0.58, 0.68)  # overhead
 GOAL_COLOUR: Colour = (0.10, 0.62, 0.36)
 FORCE_COLOUR: Colour = (0.85, 0.10, 0.35)
 TRUNK_COLOUR: Colour = (0.90, 0.90, 0.88)
@@ -122,10 +122,11 @@ def _shape_parts(solid: Mapping[str, Any]) -> Iterator[Part]:
 
 
 def _trunk_marks(name: str, size: tuple[float, ...], centre: Vector) -> Iterator[Part]:
-    """A coloured strip across the front face, and a dark deck of panels on top that leaves the front rim free."""
+    """A coloured strip over the front edge, seen from before and behind, and a dark deck of panels on the rest."""
     x, y, z = size
-    front = (centre[0] + x / 2, centre[1] + 0.22 * y, centre[2])
-    yield _box(name, (PLATE, 0.2 * y, 0.8 * z), front, NOSE_COLOUR)
+    front, top = centre[0] + x / 2, centre[1] + y / 2
+    yield _box(name, (PLATE, 0.25 * y, 0.8 * z), (front, top - 0.125 * y + PLATE / 4, centre[2]), NOSE_COLOUR)
+    yield _box(name, (0.06 * x, PLATE, 0.8 * z), (front - 0.03 * x, top, centre[2]), NOSE_COLOUR)
     rows, columns, gap = 3, 2, 0.03
     length, width = 0.82 * x / rows, 0.92 * z / columns
     for row in range(rows):
@@ -208,7 +209,8 @@ def _about_y(angle: float) -> npt.NDArray[np.float64]:
 
 
 def _box_mesh(size: tuple[float, ...]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
-    vertices, triangles = [], []
+    vertices: list[list[npt.NDArray[np.float64]]] = []
+    triangles: list[list[list[int]]] = []
     for axis in range(3):
         for sign in (-1.0, 1.0):
             n, u = sign * np.eye(3)[axis], np.eye(3)[(axis + 1) % 3]
