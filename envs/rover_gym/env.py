@@ -3,8 +3,8 @@
 import copy
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -33,6 +33,7 @@ from rover_gym.observation import (
     ObservationLayout,
     build_layout,
 )
+from rover_gym.render_options import RENDER_MODES, RenderOptions, check_render_mode, check_render_options
 from rover_gym.rocks import (
     MAX_GOAL_DISTANCE,
     RockDistribution,
@@ -44,6 +45,9 @@ from rover_gym.rocks import (
 )
 from rover_gym.start import Start, StartDistribution, resting_pose, sample_start, slope_of, tilted_plane
 from rover_gym.validation import Range, known_keys, number, refuse, span, vector
+
+if TYPE_CHECKING:
+    from rover_gym.rendering import FrameRenderer
 
 TERRAINS = ("plane", "sphere_field")
 SOLVER_OPTIONS = (
@@ -245,13 +249,23 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | model             | None           | a `RoverModel` with six driven, steered wheels; None: the rover |
     | solver_options    | None           | further options of `Simulation`, by name                        |
     | reward_weights    | None           | weights to replace, by term                                     |
+    | render_mode       | None           | "rgb_array": `render()` returns a frame                         |
+    | render_options    | None           | width, height, camera, show_forces, antialiasing, by name       |
+
+    ## Frames
+
+    With `render_mode="rgb_array"` `render()` returns the present state as (height, width, 3) uint8, 640 x 480 by
+    default; `gymnasium.make(..., render_mode="human")` shows the same in a window. Both need `rover-gym[render]`, no
+    display is needed for the first. The cameras "follow", "side" and "top" go with the rover, a pair of points (eye,
+    target) stands still; `show_forces` draws the contact forces of the last physics step as arrows.
+    `metadata["render_fps"]` is the control frequency, so that a video runs in real time.
 
     ## Version history
 
     - v0: plane ground and rocks. Numbers may change until the first release.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}  # type: ignore[misc]
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 20}  # noqa: RUF012 - as Gymnasium declares it
 
     def __init__(
         self,
@@ -278,6 +292,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         model: RoverModel | None = None,
         solver_options: Mapping[str, Any] | None = None,
         reward_weights: Mapping[str, float] | None = None,
+        render_mode: str | None = None,
+        render_options: Mapping[str, Any] | None = None,
     ) -> None:
         self._field = terrain if isinstance(terrain, SphereField) else None
         if self._field is None and terrain not in TERRAINS:
@@ -370,6 +386,15 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         )
         self.action_space = gym.spaces.Box(-1.0, 1.0, (N_ACTIONS,), np.float32)
         self._episode: _Episode | None = None
+
+        check_render_mode(render_mode)
+        self.render_mode = render_mode
+        self.render_options: RenderOptions = check_render_options(
+            "render_options", _mapping("render_options", render_options)
+        )
+        fps = round(frequency, 9)
+        self.metadata = {**type(self).metadata, "render_fps": int(fps) if fps.is_integer() else fps}
+        self._renderer: FrameRenderer | None = None
 
     @property
     def simulation(self) -> Simulation:
@@ -511,6 +536,30 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         }
         info = self._info(episode, cos_tilt, slip_ratio, termination=termination, terms=terms, solver=solver)
         return observation, sum(terms.values()), termination != "", False, info
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """The present state as a frame, (height, width, 3) uint8; None, with a warning, without a render mode.
+
+        Raises:
+            ResetNeeded: The environment has not been reset.
+            RuntimeError: No OpenGL library works on this machine; the message names the packages that bring one.
+        """
+        if self.render_mode is None:
+            gym.logger.warn('RoverEnv: render() needs render_mode="rgb_array" when the environment is made')
+            return None
+        episode = self._running()
+        if self._renderer is None:
+            from rover_gym.rendering import FrameRenderer  # noqa: PLC0415 - only who looks needs a renderer
+
+            self._renderer = FrameRenderer(self.model, episode.terrain, **asdict(self.render_options))
+        self._renderer.set_scene(episode.terrain, goal=episode.start.goal, goal_tolerance=self.goal_tolerance)
+        return self._renderer.render(self._simulation)
+
+    def close(self) -> None:
+        """Frees the renderer, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
 
     def snapshot(self) -> EnvSnapshot:
         """The state of the environment and of its random generator, to `restore` later."""

@@ -94,6 +94,13 @@ def test_a_killed_run_is_read_back_as_far_as_it_came(tmp_path: Path) -> None:
     sim.step(50)
     trunk = run.model.solid_names.index("trunk")
     assert run.positions[-1, trunk] == pytest.approx(sim.poses()["trunk"][0], abs=1e-12)
+    result = CliRunner().invoke(app, ["replay", str(path), "--vrml", str(tmp_path / "killed.wrl"), "--fps", "1000"])
+    assert result.exit_code == 0, result.output
+    place = (tmp_path / "killed.wrl").read_text(encoding="utf-8").partition("DEF trunk_place")[2].partition("\n")[0]
+    keys, _, values = place.partition("keyValue")
+    assert len(keys.split()) - len("PositionInterpolator { key [ ]".split()) == 50
+    last = [float(word) for word in values.strip("[] }").split(",")[-1].split()]
+    assert last == pytest.approx(sim.poses()["trunk"][0], abs=1e-6)
 
 
 def test_frames_are_the_samples_nearest_to_a_films_times(tmp_path: Path) -> None:

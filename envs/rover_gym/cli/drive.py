@@ -19,6 +19,7 @@ from rover_gym.episodes import Episode, run_episode
 from rover_gym.policy import PDPolicy
 from rover_gym.recording import Channel, Recorder, Sampler, describe
 from rover_gym.rewards import WEIGHTS
+from rover_gym.video import VideoWriter
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
 
@@ -51,6 +52,9 @@ def drive(
             file_okay=False, help="Folder for trajectories (HDF5) and summary.json; nothing is saved without."
         ),
     ] = None,
+    video: Annotated[
+        Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes, one after the other.")
+    ] = None,
 ) -> None:
     """Drive Rover-v0 to its goal with the PD baseline and print what the episodes came to."""
     arguments: dict[str, Any] = {
@@ -63,14 +67,19 @@ def drive(
     arguments |= {} if uphill is None else {"uphill_deg": uphill}
     arguments |= {} if heading is None else {"heading_deg": heading}
     options = {} if goal is None else {"goal": goal}
-    env = gym.make("Rover-v0", max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments)
+    filming: dict[str, Any] = {}
+    if video is not None:
+        filming = {"render_mode": "rgb_array", "render_options": {"antialiasing": True}}
+    env = gym.make("Rover-v0", max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments, **filming)
     policy = PDPolicy(env)
 
     results, paths = [], []
-    with progress_bar() as bar:
+    with progress_bar() as bar, ExitStack() as stack:
+        stack.callback(env.close)
+        film = None if video is None else stack.enter_context(VideoWriter(video, env.metadata["render_fps"]))
         for number in range(seed, seed + episodes):
             path = None if output is None else output / f"episode-{number}.h5"
-            results.append(_drive_one(env, policy, number, arguments, options, path, bar))
+            results.append(_drive_one(env, policy, number, arguments, options, path, bar, film))
             paths += [path] if path else []
 
     console().print(_table(results))
@@ -78,6 +87,7 @@ def drive(
         summary = {"arguments": arguments | options, "episodes": [asdict(episode) for episode in results]}
         paths.append(output / "summary.json")
         paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    paths += [] if video is None else [video]
     for path in paths:
         say_path("written", path)
 
@@ -90,8 +100,9 @@ def _drive_one(
     options: Mapping[str, Any],
     path: Path | None,
     bar: Progress,
+    film: VideoWriter | None,
 ) -> Episode:
-    """One episode, recorded if there is a path."""
+    """One episode, recorded if there is a path, filmed if there is a film."""
     task = bar.add_task(f"seed {seed}", total=None, state="")
     with ExitStack() as stack:
         tape: _Tape | None = None
@@ -104,6 +115,8 @@ def _drive_one(
                     tape = _Tape(path, rover, seed, arguments)
                     stack.enter_context(tape.recorder)
                 tape.append(rover, info)
+            if film is not None and (frame := rover.render()) is not None:
+                film.append(frame)
 
         episode = run_episode(env, policy, seed, options=options, on_step=on_step)
     bar.remove_task(task)
