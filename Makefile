@@ -18,9 +18,11 @@ export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-demo: $(STAMPS)/demo $(STAMPS)/core $(STAMPS)/debian-demo ## set up, drive Rover-v0 to a goal, redraw the report's sections 6.1 and 6.2 under runs/
+demo: $(STAMPS)/demo $(STAMPS)/core $(STAMPS)/debian-demo ## set up, drive Rover-v0 to a goal, plot the drive, redraw the report's sections 6.1 and 6.2, write a replay page, under runs/
 	$(BIN)/rover drive --output runs/drive
+	$(BIN)/rover plot runs/drive/episode-0.h5 --output runs/drive/plots
 	$(BIN)/rover report --figures --output runs/report
+	$(BIN)/rover replay runs/drive/episode-0.h5 --html runs/replay.html
 
 test: check test-rust docs test-python ## set up and run every check and every test (what .ci/run calls)
 

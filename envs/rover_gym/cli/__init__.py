@@ -7,6 +7,8 @@ import typer
 from rover_gym._core import __version__
 from rover_gym.cli.baseline import baseline
 from rover_gym.cli.drive import drive
+from rover_gym.cli.plot import plot
+from rover_gym.cli.replay import replay
 from rover_gym.cli.report import report
 
 app = typer.Typer(
@@ -18,6 +20,8 @@ app = typer.Typer(
 app.command()(drive)
 app.command()(baseline)
 app.command()(report)
+app.command()(plot)
+app.command()(replay)
 
 
 def _print_version(wanted: bool) -> None:

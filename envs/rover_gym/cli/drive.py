@@ -17,7 +17,7 @@ from rover_gym.cli.console import console, plain_errors, progress_bar, say_path
 from rover_gym.env import RoverEnv
 from rover_gym.episodes import Episode, run_episode
 from rover_gym.policy import PDPolicy
-from rover_gym.recording import Channel, Recorder, Sampler
+from rover_gym.recording import Channel, Recorder, Sampler, describe
 from rover_gym.rewards import WEIGHTS
 from rover_gym.video import VideoWriter
 
@@ -135,19 +135,10 @@ class _Tape:
             Channel("motor_energy", "J", "work through the wheel motors since the start, driving or braking"),
             Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
         )
-        attributes = {
-            "title": "an episode of Rover-v0 with the PD baseline",
-            "scene": {
-                **arguments,
-                **asdict(rover.start),
-                **_rocks(rover),
-                "model": rover.model.to_dict(),
-                "control_period": rover.dt,
-            },
-            "seed": seed,
-            "solver": rover.simulation.settings,
-        }
-        self.recorder = Recorder(path, channels, attributes)
+        scene = {**arguments, **asdict(rover.start), **_rocks(rover), "control_period": rover.dt}
+        title = "an episode of Rover-v0 with the PD baseline"
+        attributes = describe(rover.simulation, title, scene, seed=seed)
+        self.recorder = Recorder(path, channels, attributes, terrain=rover.simulation.terrain)
 
     def append(self, rover: RoverEnv, info: Mapping[str, Any]) -> None:
         """Adds the environment's present state."""
