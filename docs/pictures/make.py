@@ -1,6 +1,7 @@
 """Draws the pictures of the README and the manual anew: `.venv/bin/python docs/pictures/make.py`."""
 
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -18,14 +19,13 @@ def rocks(path: Path) -> None:
     """The rover on its way to a goal among rocks."""
     env = gym.make("RoverRocks-v0", difficulty=1.0, slope_deg=4.0, uphill_deg=150.0)
     policy = rover_gym.PDPolicy(env)
-    rover = env.unwrapped
-    assert isinstance(rover, rover_gym.RoverEnv)
+    rover: Any = env.unwrapped
     observation, _ = env.reset(seed=22, options={"heading_deg": 0.0, "goal": (6.5, 1.5)})
     for _ in range(81):
         observation, *_ = env.step(policy.predict(observation)[0])
     # From the right, low, so that the wheels on the rocks are seen, and the goal ahead.
     centre = rover.simulation.q[:3]
-    eye, target = centre + (-2.75, 1.0, 2.05), centre + (0.75, 0.06, 0.22)
+    eye, target = centre + np.array([[-2.75, 1.0, 2.05], [0.75, 0.06, 0.22]])
     with FrameRenderer(
         rover.model,
         rover.simulation.terrain,

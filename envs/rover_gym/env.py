@@ -542,7 +542,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
         Raises:
             ResetNeeded: The environment has not been reset.
-            RuntimeError: No OpenGL library works on this machine; the message names the packages that bring one.
+            OSError: No OpenGL library works on this machine; the message names the packages that bring one.
         """
         if self.render_mode is None:
             gym.logger.warn('RoverEnv: render() needs render_mode="rgb_array" when the environment is made')

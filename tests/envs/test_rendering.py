@@ -23,6 +23,7 @@ from rover_gym import OptionError, Plane, RoverEnv, RoverModel, Simulation, Sphe
 from rover_gym import appearance as look
 from rover_gym.recording import MissingExtraError
 from rover_gym.rendering import FrameRenderer
+from rover_gym.rendering.frames import contact_forces
 from rover_gym.start import resting_pose, tilted_plane
 
 Frame = npt.NDArray[np.uint8]
@@ -206,6 +207,19 @@ def test_forces_are_drawn_on_request_and_grow_with_the_load(
     assert seen[9.81, True] > 60
     # Arrows are as long as the force is in wheel loads, whatever the gravity.
     assert seen[3.72, True] == pytest.approx(seen[9.81, True], rel=0.15)
+
+
+def test_the_arrows_of_a_parked_rover_carry_its_weight(model: RoverModel) -> None:
+    plane = tilted_plane(np.radians(10.0), 0.5)
+    simulation = parked(model, plane, heading=0.3)
+    assert [array.shape for array in contact_forces(simulation)] == [(0, 3), (0, 3)], "no step, no contact"
+    simulation.brake()
+    simulation.step(400)
+    points, forces = contact_forces(simulation)
+    # N, against 9418 N of weight; and the same about the mass centre, N m.
+    np.testing.assert_allclose(forces.sum(axis=0), -model.mass * simulation.gravity, atol=0.5)
+    arms = points - simulation.centre_of_mass()
+    np.testing.assert_allclose(np.cross(arms, forces).sum(axis=0), 0.0, atol=0.5)
 
 
 def test_the_camera_follows_and_the_rover_stays_in_the_middle(renderer: Callable[..., FrameRenderer]) -> None:
@@ -436,5 +450,5 @@ def test_a_window_shows_the_frames(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rover_gym.rendering.frames._has_osmesa", lambda: False)
     monkeypatch.setitem(os.environ, "VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
-    with pytest.raises(RuntimeError, match="apt-get install libegl1"):
+    with pytest.raises(OSError, match="apt-get install libegl1"):
         FrameRenderer(RoverModel(), Plane())

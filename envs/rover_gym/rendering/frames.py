@@ -24,7 +24,7 @@ FORCE_LENGTH = 0.45  # m, of the arrow of a wheel's mean share of the weight
 
 VIEW_ANGLE = 34.0  # degrees, vertical
 # Eye and target in the trunk's heading frame, m: ahead, up, right.
-FOLLOW_EYE, FOLLOW_TARGET = np.array([-3.3, 1.55, 2.5]), np.array([0.3, 0.25, -0.1])
+FOLLOW_EYE, FOLLOW_TARGET = np.array([-3.5, 1.5, 1.95]), np.array([0.5, 0.22, 0.25])
 SIDE_EYE, SIDE_TARGET = np.array([0.1, 0.45, 4.0]), np.array([0.1, 0.05, 0.0])
 TOP_HEIGHT = 8.0  # m above the trunk
 FOLLOW_TIME = 0.25, 0.8  # s, time constants with which the view's centre and heading catch up
@@ -49,7 +49,7 @@ class FrameRenderer:
 
     Raises:
         OptionError: An option is out of its range.
-        RuntimeError: No OpenGL library works on this machine; the message names the packages that bring one.
+        OSError: No OpenGL library works on this machine; the message names the packages that bring one.
     """
 
     def __init__(
@@ -163,12 +163,10 @@ class FrameRenderer:
                     set_pose(self._shadows[solid], self._ground.flatten @ pose)
 
     def _place_arrows(self, simulation: Simulation) -> None:
-        contacts = simulation.contacts
+        points, forces = contact_forces(simulation)
         load = self._wheel_mass * float(np.linalg.norm(simulation.gravity))
-        # Rows of a frame are n, t, b; so a force in the world is the sum of its components times the rows.
-        forces = np.einsum("ci,cij->cj", contacts.impulses, contacts.frames) / simulation.time_step
-        set_points(self._arrows, contacts.points)
-        lengths = numpy_to_vtk((FORCE_LENGTH / load if load > 0.0 else 0.0) * forces.reshape(-1, 3), deep=True)
+        set_points(self._arrows, points)
+        lengths = numpy_to_vtk((FORCE_LENGTH / load if load > 0.0 else 0.0) * forces, deep=True)
         lengths.SetName("force")
         self._arrows.GetPointData().AddArray(lengths)
         self._arrows.Modified()
@@ -226,6 +224,14 @@ class FrameRenderer:
         return eye + max(missing, 0.0) / max(float(n @ up), 0.2) * up
 
 
+def contact_forces(simulation: Simulation) -> tuple[Array, Array]:
+    """Points (n, 3), m, and mean forces (n, 3) on the rover over the last step, N, both in the world frame."""
+    contacts = simulation.contacts
+    # Rows of a frame are n, t, b: a force in the world is the sum of its components times the rows.
+    forces = np.einsum("ci,cij->cj", contacts.impulses, contacts.frames) / simulation.time_step
+    return contacts.points.reshape(-1, 3), forces.reshape(-1, 3)
+
+
 class _Quiet:
     """Keeps VTK's log off the standard error: which displays it tried before one worked is no news to a user."""
 
@@ -242,9 +248,8 @@ def _open_window(width: int, height: int) -> vtkRenderWindow:
         window = vtkRenderWindow()
         # The last kind that VTK tries; without its library it would end the process at the first frame.
         if window.IsA("vtkOSOpenGLRenderWindow") and not _has_osmesa():
-            raise RuntimeError(
-                "no OpenGL library works here: install Mesa's, on Debian with"
-                " apt-get install libegl1 libgl1-mesa-dri, or libosmesa6"
+            raise OSError(
+                "no OpenGL library works here: install Mesa's, on Debian with apt-get install libegl1 libgl1-mesa-dri"
             )
         window.SetOffScreenRendering(True)
         window.SetMultiSamples(0)  # in software, multisampling costs several times the rest of a frame
