@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -22,6 +23,7 @@ from rover_gym.replay import write_page
 from rover_gym.run import Run, read_run
 
 ROCKS = SphereField([[1.6, 0.0, 0.6], [1.2, 0.05, -1.3], [-0.9, 0.0, 1.3]], [0.25, 0.2, 0.15], Plane())
+PEAK = 1e5  # N, of an impact
 PATIENCE = 120.0  # s: without a GPU, on a busy machine, a frame takes seconds
 
 
@@ -81,7 +83,9 @@ def drive(path: Path) -> Run:
         for _ in range(100):
             sim.step(4)
             recorder.append(sampler.row(sim))
-    return read_run(path).resample(10.0)
+    run = read_run(path).resample(10.0)
+    run.trajectory["wheel_forces"][12, 0, 0] = PEAK
+    return run
 
 
 @pytest.fixture(scope="module")
@@ -236,6 +240,12 @@ def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown)
         expected = [word for name, load in zip(names, loads, strict=True) for word in (name, f"{load:.1f}")]
         assert readings(browser)[0] == expected
     assert len(positions[0]) == 2
+    # One impact does not flatten the other curves: the axis ends below it, and says so.
+    assert browser.find_element(By.CSS_SELECTOR, "#panel .peak").text == "cut off, peak 100000 N"
+    curves = browser.find_elements(By.CSS_SELECTOR, "#panel .curve")[:6]
+    heights = [float(y) for curve in curves for y in re.findall(r"[\d.]+ ([\d.]+)", curve.get_attribute("d") or "")]
+    assert min(heights) == pytest.approx(6.0, abs=0.1)  # the top
+    assert np.mean(np.array(heights) < 130.0) > 0.5  # the rest fills the chart
     assert positions[1][0] - positions[0][0] == pytest.approx(0.5 * (330 - 42 - 6), abs=2.0)  # half of the axis
 
 

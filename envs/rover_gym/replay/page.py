@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 #: One colour a wheel, Okabe and Ito's, told apart by colour-blind readers too.
 WHEEL_COLOURS = ("#0072B2", "#56B4E9", "#009E73", "#D55E00", "#CC79A7", "#E69F00")
 LARGE = 0.12  # m, radius from which a sphere is drawn with more triangles
+MANY = 1000  # spheres, from which it is drawn with fewer again
 FOLLOW_TIME = 1.0  # s, over which the path that the eye follows is smoothed
 
 Array = npt.NDArray[np.float64]
@@ -109,7 +110,10 @@ def _build(run: Run, scene: Any) -> tuple[Any, list[Any]]:
         _add_meshes(scene, "/world/ground", squares, cast_shadow=False)
     _add_meshes(scene, "/world/goal", coloured_meshes(goal_parts(run)))
     centres, radii = spheres(run)
-    for name, rings, chosen in (("pebbles", 5, radii < LARGE), ("rocks", 10, radii >= LARGE)):
+    for name, rings, chosen in (
+        ("pebbles", 5, radii < LARGE),
+        ("rocks", 10 if len(radii) < MANY else 7, radii >= LARGE),
+    ):
         if chosen.any():
             vertices, triangles = sphere_mesh(rings)
             scene.add_batched_meshes_simple(

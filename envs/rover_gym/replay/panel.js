@@ -31,7 +31,12 @@
     let low = known.reduce((a, b) => Math.min(a, b), 0);
     let high = known.reduce((a, b) => Math.max(a, b), 0);
     if (high - low < 1e-9) high = low + 1;
-    const y = (value) => box.top + ((high - value) / (high - low)) * (box.height - box.top - box.bottom);
+    // One impact must not flatten all the rest: the axis then covers the bulk, and the peak is told in words.
+    const peak = high;
+    const sorted = Float64Array.from(known).sort();
+    const bulk = sorted[Math.floor(0.95 * (sorted.length - 1))] ?? 0;
+    if (bulk > 0 && high > 4 * bulk) high = 1.5 * bulk;
+    const y = (value) => box.top + ((high - Math.min(value, high)) / (high - low)) * (box.height - box.top - box.bottom);
 
     add(panel, "h2", {}, `${chart.title} (${chart.unit})`);
     const svg = add(panel, "svg", { viewBox: `0 0 ${box.width} ${box.height}` });
@@ -53,6 +58,10 @@
       });
       add(svg, "path", { class: "curve", stroke: data.wheels[wheel].colour, d: points.join("") });
     });
+    if (peak > high) {
+      const place = { class: "peak", x: box.width - box.right - 2, y: box.top + 10, "text-anchor": "end" };
+      add(svg, "text", place, `cut off, peak ${Number(peak.toPrecision(3))} ${chart.unit}`);
+    }
     const cursor = add(svg, "line", { class: "cursor", y1: box.top, y2: box.height - box.bottom });
     const legend = add(panel, "div", { class: "legend" });
     const readings = data.wheels.map(({ name, colour }) => {
