@@ -95,7 +95,7 @@ pub trait MechanicalSystem {
     fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<Self::Contact>);
 
     /// Measures point, frame and gap of each contact anew at the end's pose: the same features.
-    fn relocate(&self, contacts: &mut [Self::Contact]);
+    fn relocate(&mut self, contacts: &mut [Self::Contact]);
 
     /// μ of one contact.
     fn friction_coefficient(&self, options: &StepOptions, _contact: &Self::Contact) -> f64 {

@@ -9,7 +9,7 @@
 //! What the velocity law leaves of penetration, [`position_projection`] removes.
 //!
 //! A scheme is written once, over what a [`MechanicalSystem`] can do: the rover's tree of solids ([`tree_system`]) and the planar
-//! systems (`planar`) step through the same code.
+//! systems ([`crate::planar`]) step through the same code.
 
 pub mod command;
 pub mod error;

@@ -268,17 +268,22 @@ pub(super) fn finish<S: MechanicalSystem>(
     mut report: StepReport,
     probe: &mut dyn Probe,
 ) -> Result<StepReport, StepError> {
+    let StateMut {
+        configuration,
+        v,
+        time,
+    } = state;
     let d = S::DIMENSION.components();
     position_projection::project(system, options, ws, &mut report);
     probe.end(Phase::Projection);
     let is_finite = system.is_finite(&ws.end) && ws.v.iter().chain(&ws.p).all(|x| x.is_finite());
     if !is_finite {
-        return Err(StepError::NonFinite { time: *state.time });
+        return Err(StepError::NonFinite { time: *time });
     }
     system.normalise(&mut ws.end);
-    std::mem::swap(state.configuration, &mut ws.end);
-    state.v.copy_from_slice(&ws.v);
-    *state.time += options.time_step;
+    std::mem::swap(configuration, &mut ws.end);
+    v.copy_from_slice(&ws.v);
+    *time += options.time_step;
     let slow = 2.0 * options.gravity.norm() * options.time_step;
     let is_persistent = warm_start.is_of(&ws.contacts)
         && ws.u_before.iter().step_by(d).all(|u_N| u_N.abs() <= slow);

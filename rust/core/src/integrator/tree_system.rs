@@ -163,7 +163,7 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     #[inline]
-    fn relocate(&self, contacts: &mut [Contact]) {
+    fn relocate(&mut self, contacts: &mut [Contact]) {
         for contact in contacts {
             relocate(
                 self.model,

@@ -500,7 +500,12 @@ impl Simulation {
     }
 }
 
-fn check(field: &'static str, values: &[f64], expected: usize) -> Result<(), CommandError> {
+/// A command of `expected` finite entries.
+pub(crate) fn check(
+    field: &'static str,
+    values: &[f64],
+    expected: usize,
+) -> Result<(), CommandError> {
     if values.len() != expected {
         return Err(CommandError::Length {
             field,
