@@ -283,7 +283,7 @@ mod tests {
                 .map(|f| f.distance.abs())
                 .fold(f64::INFINITY, f64::min);
             assert!(
-                (nearest - sampled).abs() < 2e-6,
+                (-1e-12..1e-5).contains(&(sampled - nearest)),
                 "{c:?} {nearest} {sampled} {found:?}"
             );
             let is_inside = c.y < ground.height(c.x);
