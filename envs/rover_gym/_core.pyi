@@ -10,6 +10,7 @@ from typing import Any, Literal, TypeAlias, final, overload
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import disjoint_base
 
 _Array: TypeAlias = npt.NDArray[np.float64]
 _Coordinates: TypeAlias = Literal["report", "state"]
@@ -500,10 +501,11 @@ class PlanarSnapshot:
     @staticmethod
     def from_bytes(data: bytes) -> PlanarSnapshot: ...
     def to_bytes(self) -> bytes: ...
-    def __eq__(self, other: object) -> bool: ...
+    def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
     def __reduce__(self) -> Any: ...
 
+@disjoint_base
 class PlanarSimulation:
     """A planar machine on a ground, stepped by the rover's own schemes: what the two kinds below share."""
 

@@ -156,8 +156,16 @@ def _lift(sim: PlanarSimulation, clearance: float) -> None:
         sim.set_state(q, v)
 
 
+def _words(ground: Ground) -> str:
+    if isinstance(ground, Line):
+        return f"a line of {np.degrees(np.arctan(ground.slope)):g} degrees"
+    if isinstance(ground, Sine):
+        return f"a sine of {ground.amplitude:g} m, {ground.wavelength:g} m long"
+    return "a step" if isinstance(ground, Polyline) else "a table of points"
+
+
 def _run(sim: PlanarSimulation, who: str, duration: float, path: Path) -> None:
-    title = f"{who} on {sim.ground!r}"
+    title = f"{who} on {_words(sim.ground)}"
     with progress_bar() as bar:
         task = bar.add_task(who, total=duration, state="")
         rows = record(
