@@ -7,7 +7,7 @@ use rover_core::simulation::{Batch, Simulation as CoreSimulation};
 
 use crate::arrays::array;
 use crate::errors::{BorderError, Kind, Value};
-use crate::reading::{scan_points, slices};
+use crate::reading::{place, scan_points, slices};
 use crate::simulation::{Origin, Simulation};
 
 /// Many rovers stepped side by side on several threads.
@@ -122,9 +122,15 @@ impl SimulationBatch {
         Ok(rows)
     }
 
-    fn replace(&mut self, index: usize, simulation: &Simulation) -> PyResult<()> {
+    #[pyo3(signature = (index, simulation, target = None))]
+    fn replace(
+        &mut self,
+        index: usize,
+        simulation: &Simulation,
+        target: Option<[f64; 2]>,
+    ) -> PyResult<()> {
         self.inner
-            .replace(index, simulation.inner.clone())
+            .replace(index, simulation.inner.clone(), place(target)?)
             .map_err(BorderError::from)?;
         self.origins[index] = simulation.origin.clone();
         Ok(())
