@@ -111,6 +111,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | success         | w on the step that reaches the goal                            | 10       |
     | failure         | w on a step that ends in failure                               | -10      |
 
+    On a step that the physics could not take, only `failure` counts.
+
     ## Start
 
     The ground is a plane through the origin with slope and direction of steepest ascent drawn

@@ -324,9 +324,9 @@ def advance(
         + 2 * (now.cos_tilt < task.cos_max_tilt)
         + 4 * (progress.stuck_time >= task.stuck_time)
     )
+    failed = ~finite
     sound = finite.all() and not messages
     if not sound:
-        failed = ~finite
         if messages:
             failed = failed | np.isin(np.arange(finite.size).reshape(finite.shape), list(messages))
         reasons = reasons + 8 * failed
@@ -346,8 +346,8 @@ def advance(
     if finite.ndim:
         terms["time"] = np.full(finite.shape, terms["time"])
     if not sound:
-        # What is not finite earns nothing, and the last finite observation stays.
-        terms = {name: np.where(np.isfinite(term), term, 0.0)[()] for name, term in terms.items()}
+        # Where the physics failed its numbers earn nothing, and the last finite observation stays.
+        terms = {name: term if name == "failure" else np.where(failed, 0.0, term)[()] for name, term in terms.items()}
         observation = np.where(finite[..., None], observation, observation_before)
     progress.observation = observation
     reward: Quantity = 0.0

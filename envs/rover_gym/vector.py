@@ -64,7 +64,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Array]):
         return self.get_attr("np_random")
 
     @np_random.setter
-    def np_random(self, value: object) -> None:
+    def np_random(self, value: object) -> None:  # noqa: ARG002 - a setter must take it
         raise AttributeError("the rovers have random generators of their own: reset(seed=...) makes them anew")
 
     @property

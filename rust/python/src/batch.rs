@@ -65,8 +65,7 @@ impl SimulationBatch {
             .iter()
             .map(|simulation| simulation.borrow(py).origin.clone())
             .collect();
-        let inner =
-            Batch::new(rovers, scan_points(scan)?, threads).map_err(BorderError::from)?;
+        let inner = Batch::new(rovers, scan_points(scan)?, threads).map_err(BorderError::from)?;
         Ok(Self { inner, origins })
     }
 

@@ -147,7 +147,11 @@ impl Batch {
         let n_wheels = self.rovers[0].model().wheels().len();
         let width = self.layout.size();
         assert_eq!(torques.len(), n_rovers * n_wheels, "one torque a wheel");
-        assert_eq!(set_points.len(), n_rovers * n_wheels, "one set-point a wheel");
+        assert_eq!(
+            set_points.len(),
+            n_rovers * n_wheels,
+            "one set-point a wheel"
+        );
         assert_eq!(rows.len(), n_rovers * width, "one row a rover");
         let is_active = |index: usize| active.is_none_or(|active| active[index]);
 
