@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from rover_gym.batch import Rover, RoverBatch
 from rover_gym.env import RoverEnv
-from rover_gym.observation import LARGEST
+from rover_gym.observation import LARGEST, N_ACTIONS
 from rover_gym.recording import MissingExtraError
 from rover_gym.registration import MAX_EPISODE_STEPS
 from rover_gym.task import check_actions
@@ -78,7 +78,7 @@ class RoverVecEnv(VecEnv):
         Raises:
             CommandError: They have a wrong shape or an entry outside [-1, 1]; nothing has changed.
         """
-        self._actions = check_actions(actions, (self.num_envs, *self.action_space.shape))
+        self._actions = check_actions(actions, (self.num_envs, N_ACTIONS))
 
     def step_wait(self) -> VecEnvStepReturn:
         """Applies them for one control period; rovers whose episode ends start the next."""

@@ -18,7 +18,7 @@ from rover_gym.validation import refuse
 _Info = dict[str, Any]
 
 
-class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Array]):
+class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
     """Rovers that are stepped by the compiled core, many at a time, on several threads.
 
     Each goes bit for bit as a `RoverEnv` of the same arguments and seed would, inside a `TimeLimit` and a
@@ -58,8 +58,8 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Array]):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._ended: Mask = np.zeros(self.num_envs, np.bool_)
 
-    @property
-    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+    @property  # type: ignore[override] # as SyncVectorEnv's
+    def np_random(self) -> tuple[np.random.Generator, ...]:
         """The rovers' random generators."""
         return self.get_attr("np_random")
 

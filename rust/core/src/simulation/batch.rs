@@ -205,6 +205,7 @@ impl Batch {
                     .zip(targets)
                     .zip(rows.par_chunks_exact_mut(width))
                     .enumerate()
+                    .with_max_len(1) // rovers differ in cost, and a task costs little beside one
                     .for_each(move_one);
             }),
         }
