@@ -23,10 +23,10 @@ fn commands(
     field: &'static str,
     shape: [usize; 2],
 ) -> PyResult<Vec<f64>> {
-    if let Ok(ready) = value.extract::<PyReadonlyArray2<'_, f64>>() {
-        if ready.as_array().shape() == shape {
-            return Ok(ready.as_array().iter().copied().collect());
-        }
+    if let Ok(ready) = value.extract::<PyReadonlyArray2<'_, f64>>()
+        && ready.as_array().shape() == shape
+    {
+        return Ok(ready.as_array().iter().copied().collect());
     }
     let given = array(value, Kind::Command, field)?;
     let view = given.as_array();
@@ -46,6 +46,7 @@ fn commands(
 #[pymethods]
 impl SimulationBatch {
     #[new]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     #[pyo3(signature = (simulations, *, scan = None, threads = None))]
     fn new(
         simulations: Vec<Py<Simulation>>,

@@ -11,7 +11,7 @@ use crate::errors::{BorderError, Kind, Value};
 pub fn slices<'py>(py: Python<'py>, layout: &ReadingLayout) -> PyResult<Bound<'py, PyDict>> {
     let names = PyDict::new(py);
     for (name, place) in layout.fields() {
-        let (start, stop) = (place.start as isize, place.end as isize);
+        let (start, stop) = (place.start.cast_signed(), place.end.cast_signed());
         names.set_item(name, PySlice::new(py, start, stop, 1))?;
     }
     Ok(names)
