@@ -11,6 +11,7 @@ from rover_gym.cli.planar import planar
 from rover_gym.cli.plot import plot
 from rover_gym.cli.replay import replay
 from rover_gym.cli.report import report
+from rover_gym.cli.speed import speed
 
 app = typer.Typer(
     help="Drive a six-wheel Mars rover in a nonsmooth simulator.",
@@ -24,6 +25,7 @@ app.command()(report)
 app.command()(plot)
 app.command()(replay)
 app.add_typer(planar, name="planar")
+app.command()(speed)
 
 
 def _print_version(wanted: bool) -> None:

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod arrays;
+mod batch;
 mod contacts;
 mod errors;
 mod friction_contact;
@@ -9,6 +10,7 @@ mod model;
 mod planar;
 mod planar_ground;
 mod plane;
+mod reading;
 mod simulation;
 mod snapshot;
 mod sphere_field;
@@ -25,6 +27,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<sphere_field::SphereField>()?;
     module.add_class::<contacts::Contacts>()?;
     module.add_class::<simulation::Simulation>()?;
+    module.add_class::<batch::SimulationBatch>()?;
     module.add_class::<simulation::StepReport>()?;
     module.add_class::<simulation::Energy>()?;
     module.add_class::<snapshot::Snapshot>()?;
