@@ -1,0 +1,190 @@
+"""Trained policies: small networks that came from stable-baselines3 and run with NumPy alone.
+
+A policy is a folder with
+
+    policy.json   the environment's arguments it was trained for, its commands, what it came from
+    policy.npz    float32 arrays: the features' mean and standard deviation, weights and biases
+
+and, where it was trained by `training/train_ppo.py`, the run's config, curve and evaluation.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym._core import OptionError, StateError
+from rover_gym.command import N_COMMANDS, CommandController, CommandLimits
+from rover_gym.env import RoverEnv
+from rover_gym.features import LARGEST_FEATURE, Features
+from rover_gym.policy import rover_env
+from rover_gym.validation import refuse
+
+#: The policies that come with the package, by terrain.
+SHIPPED: Mapping[str, str] = {"plane": "plane", "sphere_field": "rocks"}
+
+FOLDER = Path(__file__).parent / "data" / "policies"
+
+# A training file of another make is refused, not misread.
+FORMAT = 1
+
+Array = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Network:
+    """A multilayer perceptron with tanh between its layers.
+
+    Attributes:
+        mean: `(features,)` taken off the features.
+        deviation: `(features,)` by which they are then divided, before they are cut at `LARGEST_FEATURE`.
+        weights: Each `(outputs, inputs)`.
+        biases: Each `(outputs,)`.
+    """
+
+    mean: Array
+    deviation: Array
+    weights: tuple[Array, ...]
+    biases: tuple[Array, ...]
+
+    def __call__(self, features: Array) -> Array:
+        """The outputs `(n, outputs)` for features `(n, features)`, cut to [-1, 1] as stable-baselines3 does."""
+        x = np.clip((features - self.mean) / self.deviation, -LARGEST_FEATURE, LARGEST_FEATURE)
+        for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+            x = np.tanh(x @ weight.T + bias)
+        return np.clip(x @ self.weights[-1].T + self.biases[-1], -1.0, 1.0)
+
+    def save(self, path: Path) -> None:
+        """Writes the arrays."""
+        layers = {f"weight_{i}": weight for i, weight in enumerate(self.weights)}
+        layers |= {f"bias_{i}": bias for i, bias in enumerate(self.biases)}
+        np.savez_compressed(path, mean=self.mean, deviation=self.deviation, **layers)
+
+    @classmethod
+    def read(cls, path: Path) -> "Network":
+        """Reads what `save` wrote."""
+        with np.load(path) as arrays:
+            n = sum(name.startswith("weight_") for name in arrays.files)
+            return cls(
+                mean=arrays["mean"],
+                deviation=arrays["deviation"],
+                weights=tuple(arrays[f"weight_{i}"] for i in range(n)),
+                biases=tuple(arrays[f"bias_{i}"] for i in range(n)),
+            )
+
+
+@dataclass(frozen=True)
+class PolicyCard:
+    """What a policy needs to run, and where it came from.
+
+    Attributes:
+        environment: Arguments of the environment that the policy's observation needs.
+        command: What its commands stand for.
+        guided: Whether its actions are offsets to the guide's command.
+        source: What it came from, for the reader: seed, steps, versions, revision.
+    """
+
+    environment: Mapping[str, Any]
+    command: CommandLimits
+    guided: bool
+    source: Mapping[str, Any]
+
+    def save(self, path: Path) -> None:
+        """Writes the card as JSON."""
+        plain = {"format": FORMAT, **asdict(self)}
+        path.write_text(json.dumps(plain, indent=2) + "\n", encoding="utf-8")
+
+    @classmethod
+    def read(cls, path: Path) -> "PolicyCard":
+        """Reads what `save` wrote.
+
+        Raises:
+            OptionError: The file has another format.
+        """
+        plain = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(plain, dict) or plain.get("format") != FORMAT:
+            refuse(OptionError, "policy", str(path), f"must be a policy of format {FORMAT}")
+        return cls(
+            environment=plain["environment"],
+            command=CommandLimits(**plain["command"]),
+            guided=plain["guided"],
+            source=plain["source"],
+        )
+
+
+def policy_folder(terrain: str) -> Path:
+    """The folder of the policy that comes with the package for a terrain.
+
+    Raises:
+        OptionError: There is none.
+    """
+    if terrain not in SHIPPED:
+        refuse(OptionError, "policy", terrain, f"none was trained; there are some for {', '.join(SHIPPED)}")
+    return FOLDER / SHIPPED[terrain]
+
+
+def policy_arguments(folder: Path) -> dict[str, Any]:
+    """The arguments with which a policy's environment must be made."""
+    arguments = dict(PolicyCard.read(folder / "policy.json").environment)
+    if isinstance(arguments.get("height_scan"), list):
+        arguments["height_scan"] = tuple(arguments["height_scan"])
+    return arguments
+
+
+class TrainedPolicy:
+    """Drives `Rover-v0` by a trained network; stateless, with stable-baselines3's `predict`.
+
+    Args:
+        env: A `Rover-v0` made with the policy's arguments, wrapped or not, or a vector of them. It is read once.
+        network: From features to commands.
+        card: What the commands stand for.
+    """
+
+    def __init__(self, env: Any, network: Network, card: PolicyCard) -> None:
+        rover: RoverEnv = rover_env(env)
+        self.card = card
+        self._size = rover.observation_layout.size
+        self._features = Features(rover)
+        self._controller = CommandController(rover, card.command, guided=card.guided)
+        self._network = network
+        inputs, outputs = network.weights[0].shape[1], network.weights[-1].shape[0]
+        if inputs != self._features.size:
+            reason = f"needs an environment made with {dict(card.environment)}: {inputs} features"
+            refuse(OptionError, "policy", self._features.size, reason)
+        if outputs != N_COMMANDS:
+            refuse(OptionError, "policy", outputs, f"must have {N_COMMANDS} outputs")
+
+    @classmethod
+    def load(cls, env: Any, folder: str | Path) -> "TrainedPolicy":
+        """The policy of a folder.
+
+        Raises:
+            OptionError: The environment was not made with the policy's arguments.
+        """
+        path = Path(folder)
+        return cls(env, Network.read(path / "policy.npz"), PolicyCard.read(path / "policy.json"))
+
+    def predict(
+        self,
+        observation: npt.NDArray[np.float32],
+        state: tuple[npt.NDArray[Any], ...] | None = None,
+        episode_start: npt.NDArray[np.bool_] | None = None,  # noqa: ARG002 - the signature is stable-baselines3's
+        deterministic: bool = True,  # noqa: ARG002
+    ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...] | None]:
+        """The action for an observation `(size,)`, or the actions `(n, 12)` for a batch `(n, size)`.
+
+        Raises:
+            StateError: The observation has a wrong shape or an entry that is not finite.
+        """
+        given = np.asarray(observation)
+        if given.ndim not in (1, 2) or given.shape[-1] != self._size:
+            refuse(StateError, "observation", given.shape, f"must be (..., {self._size})")
+        if not np.isfinite(given).all():
+            refuse(StateError, "observation", observation, "must be finite")
+        rows = np.atleast_2d(given)
+        actions = self._controller.act(rows, self._network(self._features(rows)))
+        return (actions[0] if given.ndim == 1 else actions), state
