@@ -26,6 +26,7 @@ __all__ = [
     "RoverGymError",
     "RoverModel",
     "Simulation",
+    "SimulationBatch",
     "Snapshot",
     "SolverReport",
     "SphereField",
@@ -88,7 +89,9 @@ class RoverModel:
         steering_stiffness: float | None = None,
         steering_damping: float | None = None,
         wheel_torque_limit: float | None = None,
-    ) -> RoverModel: ...
+        mass_scale: float | None = None,
+    ) -> RoverModel:
+        """A model that differs in what is given. `mass_scale` multiplies masses and inertias."""
     def weld(self, joints: Mapping[str, float] | Sequence[str]) -> RoverModel: ...
     @property
     def name(self) -> str: ...
@@ -361,6 +364,14 @@ class Simulation:
     @property
     def deepest_overlap(self) -> float:
         """Deepest gap of any wheel or box with the ground now, m: 0 where nothing overlaps, else negative."""
+    def reading(self, scan: npt.ArrayLike | None = None) -> _Array:
+        """All that a controller looks at as one fresh row; `reading_layout` names its parts.
+
+        `solver`, `work` and `positive_work` are those of the last call of `step`. `scan` (n, 2): points ahead and to
+        the right of the trunk's origin in the heading frame, m, whose heights over the origin come last.
+        """
+    def reading_layout(self, n_scan: int = 0) -> dict[str, slice]:
+        """Names and places of the numbers in a reading."""
     def energy(self) -> Energy: ...
     def momentum(self) -> tuple[_Array, _Array]:
         """Linear (3,) kg m/s and angular momentum about the world origin (3,) kg m2/s."""
@@ -374,6 +385,40 @@ class Simulation:
     def profile(self, n: int = 1000) -> dict[str, float]:
         """Mean microseconds per step by part (kinematics, mass_matrix, factor, ...) over n steps of a copy."""
     def __reduce__(self) -> Any: ...
+
+@final
+class SimulationBatch:
+    """Many rovers stepped side by side on several threads, bit for bit as each would be alone."""
+
+    def __new__(
+        cls, simulations: Sequence[Simulation], *, scan: npt.ArrayLike | None = None, threads: int | None = None
+    ) -> SimulationBatch:
+        """Copies the simulations, whose models must be of one size. `threads`: None for one a core."""
+    @property
+    def threads(self) -> int: ...
+    @property
+    def reading_layout(self) -> dict[str, slice]:
+        """Names and places of the numbers in a row of readings."""
+    def step(
+        self,
+        torques: npt.ArrayLike,
+        set_points: npt.ArrayLike,
+        n: int = 1,
+        *,
+        active: npt.NDArray[np.bool_] | None = None,
+    ) -> tuple[_Array, dict[int, str]]:
+        """Commands (n_rovers, 6) as `set_wheel_torques` and `set_steering` take them, then n steps.
+
+        Rovers that are not `active` keep still. Returns a fresh row of readings a rover, and why a rover could not
+        take a step, by its number; the others have gone on.
+        """
+    def readings(self) -> _Array:
+        """(n_rovers, size) as the rovers are now."""
+    def replace(self, index: int, simulation: Simulation) -> None:
+        """Puts a copy of a simulation, with its own terrain, in a place."""
+    def simulation(self, index: int) -> Simulation:
+        """A copy of one rover, to look at."""
+    def __len__(self) -> int: ...
 
 @final
 class SolverReport:

@@ -97,6 +97,11 @@ class ObservationLayout(Mapping[str, slice]):
         """(size,) upper bounds of the observation space."""
         return np.repeat([f.high for f in self.fields], [f.size for f in self.fields]).astype(np.float32)
 
+    @property
+    def unbounded(self) -> npt.NDArray[np.float64]:
+        """(size,) 1 for entries without bounds, 0 for flags, fractions, unit vectors, distances and actions."""
+        return ((self.low <= -LARGEST) & (self.high >= LARGEST)).astype(np.float64)
+
     def split(self, observation: npt.ArrayLike) -> dict[str, npt.NDArray[np.float64]]:
         """The fields' values in SI units, as fresh arrays `(..., field size)`.
 

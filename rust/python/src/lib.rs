@@ -2,11 +2,13 @@
 #![forbid(unsafe_code)]
 
 mod arrays;
+mod batch;
 mod contacts;
 mod errors;
 mod friction_contact;
 mod model;
 mod plane;
+mod reading;
 mod simulation;
 mod snapshot;
 mod sphere_field;
@@ -23,6 +25,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<sphere_field::SphereField>()?;
     module.add_class::<contacts::Contacts>()?;
     module.add_class::<simulation::Simulation>()?;
+    module.add_class::<batch::SimulationBatch>()?;
     module.add_class::<simulation::StepReport>()?;
     module.add_class::<simulation::Energy>()?;
     module.add_class::<snapshot::Snapshot>()?;

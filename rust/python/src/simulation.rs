@@ -6,7 +6,7 @@ use pyo3::types::{PyDict, PyTuple};
 use rover_core::integrator::{Stabilisation, StepOptions, StepReport as CoreReport, Variant};
 use rover_core::multibody::{Energy as CoreEnergy, Model, coordinates};
 use rover_core::nalgebra::DMatrix;
-use rover_core::simulation::Simulation as CoreSimulation;
+use rover_core::simulation::{ReadingLayout, Simulation as CoreSimulation};
 use std::sync::Arc;
 
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
@@ -15,6 +15,7 @@ use crate::errors::{BorderError, Kind, Value};
 use crate::friction_contact::solver_options;
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::plane::Plane;
+use crate::reading::{scan_points, slices};
 use crate::snapshot::Snapshot;
 use crate::sphere_field::Ground;
 
@@ -112,9 +113,14 @@ impl Energy {
 /// A rover on a terrain, stepped through time.
 #[pyclass(module = "rover_gym._core")]
 pub struct Simulation {
-    inner: CoreSimulation,
+    pub inner: CoreSimulation,
+    pub origin: Origin,
+}
+
+/// What a simulation was made with and the core does not keep, for pickling.
+#[derive(Clone)]
+pub struct Origin {
     terrain: Ground,
-    /// Keyword arguments that it was made with, for pickling.
     solver: String,
     max_iterations: usize,
 }
@@ -219,12 +225,12 @@ impl Simulation {
         };
         let inner =
             CoreSimulation::new(model, terrain.terrain(), options).map_err(BorderError::from)?;
-        Ok(Self {
-            inner,
+        let origin = Origin {
             terrain,
             solver: solver.to_owned(),
             max_iterations,
-        })
+        };
+        Ok(Self { inner, origin })
     }
 
     #[getter]
@@ -236,7 +242,7 @@ impl Simulation {
 
     #[getter]
     fn terrain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.terrain.to_object(py)
+        self.origin.terrain.to_object(py)
     }
 
     #[getter]
@@ -276,9 +282,9 @@ impl Simulation {
         settings.set_item("variant", name_of(o.variant, &VARIANTS))?;
         settings.set_item("theta", o.theta)?;
         settings.set_item("forecast", o.forecast)?;
-        settings.set_item("solver", &self.solver)?;
+        settings.set_item("solver", &self.origin.solver)?;
         settings.set_item("tolerance", o.solver.tolerance)?;
-        settings.set_item("max_iterations", self.max_iterations)?;
+        settings.set_item("max_iterations", self.origin.max_iterations)?;
         settings.set_item("stabilisation", name_of(o.stabilisation, &STABILISATIONS))?;
         settings.set_item("warm_start", o.warm_start)?;
         Ok(settings)
@@ -440,6 +446,23 @@ impl Simulation {
     #[getter]
     fn deepest_overlap(&self) -> f64 {
         self.inner.deepest_overlap()
+    }
+
+    #[pyo3(signature = (scan = None))]
+    fn reading<'py>(
+        &self,
+        py: Python<'py>,
+        scan: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let scan = scan_points(scan)?;
+        let mut row = vec![0.0; ReadingLayout::new(self.model_ref(), scan.len()).size()];
+        self.inner.read(&scan, &mut row);
+        Ok(PyArray1::from_vec(py, row))
+    }
+
+    #[pyo3(signature = (n_scan = 0))]
+    fn reading_layout<'py>(&self, py: Python<'py>, n_scan: usize) -> PyResult<Bound<'py, PyDict>> {
+        slices(py, &ReadingLayout::new(self.model_ref(), n_scan))
     }
 
     fn energy(&self) -> Energy {

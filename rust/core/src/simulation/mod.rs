@@ -1,10 +1,14 @@
 //! A machine on a terrain, stepped through time.
 
+pub mod batch;
 pub mod error;
 pub mod profile;
+pub mod reading;
 pub mod rover;
 pub mod snapshot;
 
-pub use error::{CommandError, SnapshotError};
+pub use batch::Batch;
+pub use error::{BatchError, CommandError, SnapshotError};
+pub use reading::ReadingLayout;
 pub use rover::Simulation;
 pub use snapshot::Snapshot;
