@@ -281,11 +281,6 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         return self._simulation
 
     @property
-    def scan_offsets(self) -> npt.NDArray[np.float64] | None:
-        """`(n, 2)` the height scan's points ahead and to the right of the trunk's origin, m; None without a scan."""
-        return None if self._scan_offsets is None else self._scan_offsets.copy()
-
-    @property
     def goal(self) -> tuple[float, float]:
         """The episode's goal (x, z), m."""
         return self._running().start.goal

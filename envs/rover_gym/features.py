@@ -2,13 +2,16 @@
 
 Place on the map, heading and the wheels' angles say nothing about the way ahead, so they are left out. The goal
 is a direction and a distance, and the height scan becomes heights over the ground plane, so that rocks look alike
-on any slope.
+on any slope. Of a fine scan the highest point in each cell of some neighbours is shown: what matters of a rock is
+how tall it is, which a coarse scan that meets its flank does not tell.
 """
 
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym._core import OptionError
 from rover_gym.env import RoverEnv
+from rover_gym.validation import refuse
 
 # Entries beyond this are cut: they come from impacts and free wheels.
 LARGEST_FEATURE = 5.0
@@ -22,9 +25,10 @@ class Features:
 
     Args:
         rover: The environment, read once for the layout.
+        pool: Cells of the scan are so many points long and wide; the scan's rows and columns must be multiples.
     """
 
-    def __init__(self, rover: RoverEnv) -> None:
+    def __init__(self, rover: RoverEnv, pool: int = 1) -> None:
         layout = rover.observation_layout
         q, velocity = layout["q"].start, layout["velocity"].start
         wheels = set(rover.model.wheel_joint_indices)
@@ -40,10 +44,10 @@ class Features:
             taken += list(range(layout[name].start, layout[name].stop))
         self._taken = np.array(taken)
         self._scan = layout["height_scan"] if "height_scan" in layout else None
-        offsets = rover.scan_offsets
+        offsets = rover.task.scan
         self._offsets = np.zeros((0, 2)) if offsets is None else offsets
-        self._seen = np.flatnonzero(self._offsets[:, 0] >= -BEHIND)
-        self.size = len(self._taken) + 7 + (1 + len(self._seen) if self._scan is not None else 0)
+        self._cells = _cells(self._offsets, pool)
+        self.size = len(self._taken) + 7 + (0 if self._scan is None else 1 + len(self._cells))
 
     def __call__(self, observations: npt.NDArray[np.floating]) -> npt.NDArray[np.float32]:
         """The features of observations, scaled as the environment gives them."""
@@ -62,7 +66,7 @@ class Features:
             # Over the ground plane, whose level the lowest point of the scan tells.
             rocks = seen[:, self._scan] - slope @ self._offsets.T
             level = rocks.min(axis=1, keepdims=True)
-            parts += [-level, 10.0 * (rocks - level)[:, self._seen]]
+            parts += [-level, 10.0 * ((rocks - level)[:, self._cells].max(axis=2))]
         return np.clip(np.concatenate(parts, axis=1), -LARGEST_FEATURE, LARGEST_FEATURE).astype(np.float32)
 
     def _slope(self, seen: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
@@ -75,3 +79,16 @@ class Features:
         ahead = np.cos(pitch) * n[:, 0] - np.sin(pitch) * y
         up = np.sin(pitch) * n[:, 0] + np.cos(pitch) * y
         return -np.stack((ahead, right), axis=1) / np.maximum(up, 0.1)[:, None]
+
+
+def _cells(offsets: npt.NDArray[np.float64], pool: int) -> npt.NDArray[np.intp]:
+    """`(cells, pool * pool)` the points of each cell that is not too far behind."""
+    if len(offsets) == 0:
+        return np.zeros((0, 1), np.intp)
+    columns = int(np.count_nonzero(offsets[:, 0] == offsets[0, 0]))
+    rows = len(offsets) // columns
+    if pool < 1 or rows % pool or columns % pool:
+        refuse(OptionError, "pool", pool, f"must divide the scan's {rows} rows and {columns} columns")
+    points = np.arange(rows * columns).reshape(rows // pool, pool, columns // pool, pool)
+    cells = points.transpose(0, 2, 1, 3).reshape(-1, pool * pool)
+    return cells[offsets[cells, 0].mean(axis=1) >= -BEHIND]

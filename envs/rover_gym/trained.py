@@ -83,12 +83,14 @@ class PolicyCard:
 
     Attributes:
         environment: Arguments of the environment that the policy's observation needs.
+        pool: Cells of the height scan are so many points long and wide.
         command: What its commands stand for.
         guided: Whether its actions are offsets to the guide's command.
         source: What it came from, for the reader: seed, steps, versions, revision.
     """
 
     environment: Mapping[str, Any]
+    pool: int
     command: CommandLimits
     guided: bool
     source: Mapping[str, Any]
@@ -110,6 +112,7 @@ class PolicyCard:
             refuse(OptionError, "policy", str(path), f"must be a policy of format {FORMAT}")
         return cls(
             environment=plain["environment"],
+            pool=plain["pool"],
             command=CommandLimits(**plain["command"]),
             guided=plain["guided"],
             source=plain["source"],
@@ -148,7 +151,7 @@ class TrainedPolicy:
         rover: RoverEnv = rover_env(env)
         self.card = card
         self._size = rover.observation_layout.size
-        self._features = Features(rover)
+        self._features = Features(rover, card.pool)
         self._controller = CommandController(rover, card.command, guided=card.guided)
         self._network = network
         inputs, outputs = network.weights[0].shape[1], network.weights[-1].shape[0]
@@ -167,6 +170,18 @@ class TrainedPolicy:
         """
         path = Path(folder)
         return cls(env, Network.read(path / "policy.npz"), PolicyCard.read(path / "policy.json"))
+
+    @classmethod
+    def untrained(cls, env: Any, card: PolicyCard) -> "TrainedPolicy":
+        """A policy whose actions are zero: the guide alone, or, without one, a rover that stands."""
+        features = Features(rover_env(env), card.pool).size
+        zero = Network(
+            mean=np.zeros(features, np.float32),
+            deviation=np.ones(features, np.float32),
+            weights=(np.zeros((N_COMMANDS, features), np.float32),),
+            biases=(np.zeros(N_COMMANDS, np.float32),),
+        )
+        return cls(env, zero, card)
 
     def predict(
         self,

@@ -19,6 +19,7 @@ import yaml
 from rover_gym._core import OptionError
 from rover_gym.command import CommandLimits
 from rover_gym.env import RoverEnv
+from rover_gym.features import Features
 from rover_gym.validation import number, refuse
 
 T = TypeVar("T")
@@ -108,8 +109,10 @@ class TrainingConfig:
         environment: Arguments of `RoverEnv`.
         total_steps: Decisions of all environments together.
         num_envs: How many rovers drive at once.
+        threads: That step them.
         max_episode_steps: Control periods until an episode is cut.
         repeat: Control periods for which a command holds.
+        pool: Cells of the height scan are so many points long and wide.
         guided: Whether actions are offsets to the guide's command.
         command: What a command of one stands for.
         ppo: Hyperparameters.
@@ -121,8 +124,10 @@ class TrainingConfig:
     environment: Mapping[str, Any]
     total_steps: int
     num_envs: int = 32
+    threads: int = 1
     max_episode_steps: int = 600
     repeat: int = 2
+    pool: int = 1
     guided: bool = True
     command: CommandLimits = CommandLimits()
     ppo: PPOConfig = PPOConfig()
@@ -131,12 +136,12 @@ class TrainingConfig:
     checkpoint_every: int = 100_000
 
     def __post_init__(self) -> None:
-        for name in ("total_steps", "num_envs", "max_episode_steps", "repeat", "checkpoint_every"):
+        for name in ("total_steps", "num_envs", "threads", "max_episode_steps", "repeat", "pool", "checkpoint_every"):
             number(name, getattr(self, name), at_least=1)
         if self.curriculum is not None and self.environment.get("terrain") != "sphere_field":
             refuse(OptionError, "curriculum", self.curriculum, "needs environment.terrain 'sphere_field'")
         for arguments in (self.environment, {**self.environment, **self.evaluation.environment}):
-            rover(arguments)
+            Features(rover(arguments), self.pool)
 
     def to_yaml(self) -> str:
         """The configuration as `read_config` reads it."""
