@@ -1,4 +1,4 @@
-"""`rover drive`: episodes of `Rover-v0` with the PD baseline."""
+"""`rover drive`: episodes of `Rover-v0` with the PD baseline or a trained policy."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -13,12 +13,15 @@ import typer
 from rich.progress import Progress
 from rich.table import Table
 
+from rover_gym._core import OptionError
 from rover_gym.cli.console import console, plain_errors, progress_bar, say_path
 from rover_gym.env import RoverEnv
-from rover_gym.episodes import Episode, run_episode
+from rover_gym.episodes import Episode, Policy, run_episode
 from rover_gym.policy import PDPolicy
 from rover_gym.recording import Channel, Recorder, Sampler
 from rover_gym.rewards import WEIGHTS
+from rover_gym.trained import TrainedPolicy, policy_arguments, policy_folder
+from rover_gym.validation import refuse
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
 
@@ -40,6 +43,9 @@ def drive(
     goal: Annotated[
         tuple[float, float] | None, typer.Option(metavar="X Z", help="Goal on the map, m; drawn if not given.")
     ] = None,
+    policy: Annotated[
+        str, typer.Option(help="'pd' for the baseline, 'trained' for the package's trained one, or such a one's folder.")
+    ] = "pd",
     friction: Annotated[float, typer.Option(help="Coulomb's coefficient.")] = 0.7,
     time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
     time_limit: Annotated[float, typer.Option(min=CONTROL_PERIOD, help="Time limit of an episode, s.")] = 60.0,
@@ -52,7 +58,7 @@ def drive(
         ),
     ] = None,
 ) -> None:
-    """Drive Rover-v0 to its goal with the PD baseline and print what the episodes came to."""
+    """Drive Rover-v0 to its goal with the PD baseline or a trained policy and print what the episodes came to."""
     arguments: dict[str, Any] = {
         "terrain": terrain,
         "friction": friction,
@@ -63,19 +69,22 @@ def drive(
     arguments |= {} if uphill is None else {"uphill_deg": uphill}
     arguments |= {} if heading is None else {"heading_deg": heading}
     options = {} if goal is None else {"goal": goal}
+    folder = _policy_folder(policy, terrain)
+    arguments |= {} if folder is None else policy_arguments(folder)
     env = gym.make("Rover-v0", max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments)
-    policy = PDPolicy(env)
+    driver: Policy = PDPolicy(env) if folder is None else TrainedPolicy.load(env, folder)
+    name = "the PD baseline" if folder is None else "a trained policy"
 
     results, paths = [], []
     with progress_bar() as bar:
         for number in range(seed, seed + episodes):
             path = None if output is None else output / f"episode-{number}.h5"
-            results.append(_drive_one(env, policy, number, arguments, options, path, bar))
+            results.append(_drive_one(env, driver, name, number, arguments, options, path, bar))
             paths += [path] if path else []
 
-    console().print(_table(results))
+    console().print(_table(results, name))
     if output is not None:
-        summary = {"arguments": arguments | options, "episodes": [asdict(episode) for episode in results]}
+        summary = {"policy": policy, "arguments": arguments | options, "episodes": [asdict(episode) for episode in results]}
         paths.append(output / "summary.json")
         paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     for path in paths:
@@ -84,7 +93,8 @@ def drive(
 
 def _drive_one(
     env: gym.Env[Any, Any],
-    policy: PDPolicy,
+    policy: Policy,
+    name: str,
     seed: int,
     arguments: Mapping[str, Any],
     options: Mapping[str, Any],
@@ -101,7 +111,7 @@ def _drive_one(
             bar.update(task, state=f"{info['time']:.1f} s, {info['distance_to_goal']:.1f} m to go")
             if path is not None:
                 if tape is None:  # after the reset, when the start is known
-                    tape = _Tape(path, rover, seed, arguments)
+                    tape = _Tape(path, rover, name, seed, arguments)
                     stack.enter_context(tape.recorder)
                 tape.append(rover, info)
 
@@ -113,7 +123,7 @@ def _drive_one(
 class _Tape:
     """Records an episode: the simulation, and what the environment makes of it."""
 
-    def __init__(self, path: Path, rover: RoverEnv, seed: int, arguments: Mapping[str, Any]) -> None:
+    def __init__(self, path: Path, rover: RoverEnv, policy: str, seed: int, arguments: Mapping[str, Any]) -> None:
         self._sampler = Sampler(rover.model)
         channels = (
             *self._sampler.channels,
@@ -123,7 +133,7 @@ class _Tape:
             Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
         )
         attributes = {
-            "title": "an episode of Rover-v0 with the PD baseline",
+            "title": f"an episode of Rover-v0 with {policy}",
             "scene": {
                 **arguments,
                 **asdict(rover.start),
@@ -155,8 +165,18 @@ def _rocks(rover: RoverEnv) -> dict[str, Any]:
     return {} if rover.rocks is None else {"rocks": asdict(rover.rocks)}
 
 
-def _table(results: Sequence[Episode]) -> Table:
-    table = Table(title="Rover-v0 with the PD baseline", title_justify="left")
+def _policy_folder(policy: str, terrain: str) -> Path | None:
+    """The folder of a trained policy; None for the baseline."""
+    if policy == "pd":
+        return None
+    folder = policy_folder(terrain) if policy == "trained" else Path(policy)
+    if not (folder / "policy.json").exists():
+        refuse(OptionError, "policy", policy, "must be 'pd', 'trained' or the folder of a trained policy")
+    return folder
+
+
+def _table(results: Sequence[Episode], name: str) -> Table:
+    table = Table(title=f"Rover-v0 with {name}", title_justify="left")
     for heading in ("seed", "success", "distance", "time", "energy", "slip", "real-time factor"):
         table.add_column(heading, justify="right")
     for episode in results:
