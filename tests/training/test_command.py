@@ -127,7 +127,7 @@ def test_a_policy_is_saved_and_read_back(tmp_path: Path) -> None:
     actions, state = TrainedPolicy.load(ROVER, tmp_path).predict(seen)
     assert state is None
     np.testing.assert_array_equal(actions, TrainedPolicy(ROVER, network, CARD).predict(seen)[0])
-    np.testing.assert_allclose(TrainedPolicy.load(ROVER, tmp_path).predict(seen[0])[0], actions[0], atol=1e-6)
+    np.testing.assert_allclose(TrainedPolicy.load(ROVER, tmp_path).predict(seen[0])[0], actions[0], atol=1e-4)
 
 
 def test_the_guide_alone_drives_on_the_plane() -> None:
