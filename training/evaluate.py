@@ -37,7 +37,9 @@ def evaluate(
     output: Annotated[Path, typer.Option(file_okay=False, help="Folder of table, data and plot.")] = Path(
         "runs/evaluation"
     ),
-    guide: Annotated[bool, typer.Option(help="Also drive the guide alone, that the first policy's actions offset.")] = True,
+    guide: Annotated[
+        bool, typer.Option(help="Also drive the guide alone, that the first policy's actions offset.")
+    ] = True,
     threads: Annotated[int, typer.Option(min=1, help="That step the rovers.")] = 1,
 ) -> None:
     """Drive every policy and the baseline over the same fields."""
@@ -50,11 +52,11 @@ def evaluate(
 
     makers: list[tuple[str, Callable[[Any], Policy], dict[str, Any]]] = [("PD baseline", PDPolicy, {})]
     if guide and first.guided:
-        makers.append(
-            ("guide alone", lambda env: TrainedPolicy.untrained(env, first), policy_arguments(folders[0]))
-        )
+        makers.append(("guide alone", lambda env: TrainedPolicy.untrained(env, first), policy_arguments(folders[0])))
     for given, folder in zip(policies, folders, strict=True):
-        makers.append((given.name, lambda env, folder=folder: TrainedPolicy.load(env, folder), policy_arguments(folder)))
+        makers.append(
+            (given.name, lambda env, folder=folder: TrainedPolicy.load(env, folder), policy_arguments(folder))
+        )
 
     drives: dict[str, list[Drive]] = {}
     with progress_bar() as bar:

@@ -21,7 +21,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from rover_gym.cli.console import plain_errors, say_path
 from rover_gym.learning.build import build_env, normalised
 from rover_gym.learning.callbacks import CheckpointCallback, CurriculumCallback, SameFieldsEvalCallback
-from rover_gym.learning.config import PPOConfig, TrainingConfig, read_config
+from rover_gym.learning.config import PPOConfig, read_config
 from rover_gym.learning.export import export
 from rover_gym.learning.provenance import provenance
 
@@ -57,11 +57,13 @@ def train(
     curve = folder / (f"curve-{part}.monitor.csv" if part else "curve.monitor.csv")
     rovers = build_env(settings, seed=stream, monitor=curve)
     watched = build_env(
-        settings, num_envs=min(settings.num_envs, settings.evaluation.episodes), environment=settings.evaluation.environment
+        settings,
+        num_envs=min(settings.num_envs, settings.evaluation.episodes),
+        environment=settings.evaluation.environment,
     )
     if latest is None:
         envs = normalised(rovers, settings)
-        model = PPO("MlpPolicy", envs, seed=stream, **hyperparameters(settings.ppo, total_steps))
+        model = PPO("MlpPolicy", envs, seed=stream, **hyperparameters(settings.ppo))
     else:
         envs = VecNormalize.load(str(checkpoints / f"{latest['name']}.pkl"), rovers)
         model = PPO.load(checkpoints / f"{latest['name']}.zip", env=envs, device="cpu")
@@ -107,7 +109,7 @@ def train(
     say_path("policy", folder / "policy")
 
 
-def hyperparameters(ppo: PPOConfig, total_steps: int) -> dict[str, object]:
+def hyperparameters(ppo: PPOConfig) -> dict[str, object]:
     """Keyword arguments of stable-baselines3's PPO."""
     first, last = ppo.learning_rate, ppo.final_learning_rate
     return {

@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from rover_gym import OptionError, PDPolicy, RoverEnv, StateError
+from rover_gym import OptionError, PDPolicy, Plane, RoverEnv, SphereField, StateError
 from rover_gym.command import CommandController, CommandLimits
 from rover_gym.features import Features
 from rover_gym.trained import Network, PolicyCard, TrainedPolicy
@@ -34,7 +34,7 @@ def observations(n: int) -> np.ndarray[Any, np.dtype[np.float32]]:
 
 def test_without_sideways_motion_the_wheels_stand_as_the_baselines() -> None:
     controller, baseline = CommandController(ROVER, guided=False), PDPolicy(ROVER)
-    (seen,) = [observations(1)]
+    seen = observations(1)
     for entry in (-1.0, -0.3, 0.0, 0.6, 1.0):
         action = controller.act(seen, np.array([[0.5, entry, 0.0]]))[0]
         angles = baseline.steering_angles(entry * controller.limits.curvature)
@@ -89,8 +89,6 @@ def test_features_know_neither_place_nor_heading() -> None:
 
 
 def test_a_slope_shows_no_rocks_and_a_rock_shows_its_height() -> None:
-    from rover_gym import Plane, SphereField
-
     slope = math.radians(8.0)
     ground = Plane((-math.sin(slope), math.cos(slope), 0.0))
     centre = (1.25, 1.25 * math.tan(slope), 0.05)

@@ -9,6 +9,7 @@ from rover_gym import OptionError, RoverGymError
 
 pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
 
+from rover_gym.learning.build import build_env
 from rover_gym.learning.config import parse_config, read_config
 
 CONFIGS = Path(__file__).parents[2] / "training" / "configs"
@@ -74,8 +75,6 @@ def test_randomisation_reaches_the_environment() -> None:
         SMALLEST
         | {"environment": {"terrain": "plane", "friction": [0.5, 0.9], "mass_scale": [0.8, 1.2], "gravity_scale": 0.38}}
     )
-    from rover_gym.learning.build import build_env
-
     venv = build_env(config, num_envs=4)
     venv.reset()
     domains = venv.get_attr("domain")

@@ -2,7 +2,7 @@
 
 import csv
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +13,14 @@ import yaml
 pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
 
 import torch
-from conftest import Script
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 from rover_gym.learning.build import build_env
 from rover_gym.learning.config import read_config
 from rover_gym.trained import Network, TrainedPolicy
+
+Script = Callable[..., Any]
 
 ENVIRONMENTS: Mapping[str, dict[str, Any]] = {
     "plane": {"terrain": "plane", "goal_distance": 2.0, "friction": [0.5, 0.8]},
@@ -50,7 +51,9 @@ def a_config(folder: Path, name: str) -> Path:
 @pytest.fixture(scope="module", params=["plane", "rocks"])
 def run(request: pytest.FixtureRequest, train: Script, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp(request.param)
-    result = train("--config", a_config(folder, request.param), "--output", folder / "run", "--seed", 3, "--no-progress")
+    result = train(
+        "--config", a_config(folder, request.param), "--output", folder / "run", "--seed", 3, "--no-progress"
+    )
     assert result.exit_code == 0, result.output
     return folder / "run"
 
@@ -97,7 +100,7 @@ def test_the_saved_policy_acts_like_the_model(run: Path) -> None:
         np.testing.assert_allclose(network(features), actions, atol=1e-5)
         features, *_ = venv.step(actions)
 
-    rover = venv.get_attr("model") and venv.unwrapped.prototype
+    rover = venv.unwrapped.prototype
     seen = rover.reset(seed=1)[0]
     one, two = (TrainedPolicy.load(rover, run / "policy").predict(seen)[0] for _ in range(2))
     np.testing.assert_array_equal(one, two)

@@ -44,7 +44,8 @@ def drive(
         tuple[float, float] | None, typer.Option(metavar="X Z", help="Goal on the map, m; drawn if not given.")
     ] = None,
     policy: Annotated[
-        str, typer.Option(help="'pd' for the baseline, 'trained' for the package's trained one, or such a one's folder.")
+        str,
+        typer.Option(help="'pd' for the baseline, 'trained' for the package's trained one, or such a one's folder."),
     ] = "pd",
     friction: Annotated[float, typer.Option(help="Coulomb's coefficient.")] = 0.7,
     time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
@@ -84,7 +85,11 @@ def drive(
 
     console().print(_table(results, name))
     if output is not None:
-        summary = {"policy": policy, "arguments": arguments | options, "episodes": [asdict(episode) for episode in results]}
+        summary = {
+            "policy": policy,
+            "arguments": arguments | options,
+            "episodes": [asdict(episode) for episode in results],
+        }
         paths.append(output / "summary.json")
         paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     for path in paths:

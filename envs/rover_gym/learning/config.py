@@ -1,10 +1,10 @@
 """The configuration of a training: a YAML file, every key of which is known and checked.
 
-    environment    arguments of `RoverEnv`; randomisation and reward weights among them
-    command        what the policy's actions stand for (`rover_gym.command`)
-    curriculum     difficulty of the rocks by what has been learned; none on the plane
-    ppo            hyperparameters of stable-baselines3's PPO
-    evaluation     of the policy while it learns, on an environment of its own
+environment    arguments of `RoverEnv`; randomisation and reward weights among them
+command        what the policy's actions stand for (`rover_gym.command`)
+curriculum     difficulty of the rocks by what has been learned; none on the plane
+ppo            hyperparameters of stable-baselines3's PPO
+evaluation     of the policy while it learns, on an environment of its own
 """
 
 import dataclasses
@@ -129,9 +129,9 @@ class TrainingConfig:
     repeat: int = 2
     pool: int = 1
     guided: bool = True
-    command: CommandLimits = CommandLimits()
-    ppo: PPOConfig = PPOConfig()
-    evaluation: Evaluation = Evaluation()
+    command: CommandLimits = field(default_factory=CommandLimits)
+    ppo: PPOConfig = field(default_factory=PPOConfig)
+    evaluation: Evaluation = field(default_factory=Evaluation)
     curriculum: Curriculum | None = None
     checkpoint_every: int = 100_000
 

@@ -44,7 +44,5 @@ def export(
     folder.mkdir(parents=True, exist_ok=True)
     network_of(model, normalisation).save(folder / "policy.npz")
     seen = {name: value for name, value in config.environment.items() if name == "height_scan"}
-    card = PolicyCard(
-        environment=seen, pool=config.pool, command=config.command, guided=config.guided, source=source
-    )
+    card = PolicyCard(environment=seen, pool=config.pool, command=config.command, guided=config.guided, source=source)
     card.save(folder / "policy.json")
