@@ -48,6 +48,7 @@ def train(
     latest = json.loads((checkpoints / "latest.json").read_text(encoding="utf-8")) if resume else None
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "config.yaml").write_text(settings.to_yaml(), encoding="utf-8")
+    origin = provenance()
     clock, cpu_clock = time.perf_counter(), time.process_time()
 
     # Small networks: a second thread makes them slower.
@@ -100,7 +101,7 @@ def train(
         "wall_seconds": round(time.perf_counter() - clock, 1),
         "cpu_seconds": round(time.process_time() - cpu_clock, 1),
         "resumed_from": part,
-        **provenance(),
+        **origin,
     }
     (folder / "run.json").write_text(json.dumps(source, indent=2) + "\n", encoding="utf-8")
     export(model, envs, settings, folder / "policy", source)

@@ -60,7 +60,9 @@ def drive_all(
     threads: int | None = 1,
     progress: Callable[[int], None] = lambda _done: None,
 ) -> list[Drive]:
-    """One episode a seed; an episode depends on its seed and the policy alone, but for the rounding of a network's batches.
+    """One episode a seed.
+
+    An episode depends on its seed and the policy alone, but for the rounding of a network's batches.
 
     Args:
         make_policy: From an environment, to read layout and constants from, to a policy.

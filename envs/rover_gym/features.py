@@ -43,7 +43,7 @@ class Features:
         for name in ("wheel_gap", "wheel_contact", "normal_force", "tangential_force", "previous_action", "stuck"):
             taken += list(range(layout[name].start, layout[name].stop))
         self._taken = np.array(taken)
-        self._scan = layout["height_scan"] if "height_scan" in layout else None
+        self._scan = layout.get("height_scan")
         offsets = rover.task.scan
         self._offsets = np.zeros((0, 2)) if offsets is None else offsets
         self._cells = _cells(self._offsets, pool)
