@@ -90,8 +90,9 @@ def drive_all(
     observation = batch.observation
     places = _places(batch, observation)
     done: dict[int, Drive] = {}
+    state = None
     while active.any():
-        actions, _ = policy.predict(observation)
+        actions, state = policy.predict(observation, state, steps == 0)
         outcome, terminated, _ = batch.step(actions, active)
         observation = outcome.observation
         now = _places(batch, observation)

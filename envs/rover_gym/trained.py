@@ -84,6 +84,7 @@ class PolicyCard:
     Attributes:
         environment: Arguments of the environment that the policy's observation needs.
         pool: Cells of the height scan are so many points long and wide.
+        hold: How long a command holds, s.
         command: What its commands stand for.
         guided: Whether its actions are offsets to the guide's command.
         source: What it came from, for the reader: seed, steps, versions, revision.
@@ -91,6 +92,7 @@ class PolicyCard:
 
     environment: Mapping[str, Any]
     pool: int
+    hold: float
     command: CommandLimits
     guided: bool
     source: Mapping[str, Any]
@@ -113,6 +115,7 @@ class PolicyCard:
         return cls(
             environment=plain["environment"],
             pool=plain["pool"],
+            hold=plain["hold"],
             command=CommandLimits(**plain["command"]),
             guided=plain["guided"],
             source=plain["source"],
@@ -139,7 +142,7 @@ def policy_arguments(folder: Path) -> dict[str, Any]:
 
 
 class TrainedPolicy:
-    """Drives `Rover-v0` by a trained network; stateless, with stable-baselines3's `predict`.
+    """Drives `Rover-v0` by a trained network, with stable-baselines3's `predict`.
 
     Args:
         env: A `Rover-v0` made with the policy's arguments, wrapped or not, or a vector of them. It is read once.
@@ -154,6 +157,7 @@ class TrainedPolicy:
         self._features = Features(rover, card.pool)
         self._controller = CommandController(rover, card.command, guided=card.guided)
         self._network = network
+        self._repeat = max(1, round(card.hold / rover.dt))
         inputs, outputs = network.weights[0].shape[1], network.weights[-1].shape[0]
         if inputs != self._features.size:
             reason = f"needs an environment made with {dict(card.environment)}: {inputs} features"
@@ -187,10 +191,13 @@ class TrainedPolicy:
         self,
         observation: npt.NDArray[np.float32],
         state: tuple[npt.NDArray[Any], ...] | None = None,
-        episode_start: npt.NDArray[np.bool_] | None = None,  # noqa: ARG002 - the signature is stable-baselines3's
-        deterministic: bool = True,  # noqa: ARG002
+        episode_start: npt.NDArray[np.bool_] | None = None,
+        deterministic: bool = True,  # noqa: ARG002 - the signature is stable-baselines3's
     ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...] | None]:
         """The action for an observation `(size,)`, or the actions `(n, 12)` for a batch `(n, size)`.
+
+        A command holds for `card.hold` seconds, which the returned state counts: hand it in again with the next
+        observation, and say with `episode_start` `(n,)` where an episode begins. Without a state the command is new.
 
         Raises:
             StateError: The observation has a wrong shape or an entry that is not finite.
@@ -201,5 +208,14 @@ class TrainedPolicy:
         if not np.isfinite(given).all():
             refuse(StateError, "observation", observation, "must be finite")
         rows = np.atleast_2d(given)
-        actions = self._controller.act(rows, self._network(self._features(rows)))
-        return (actions[0] if given.ndim == 1 else actions), state
+        if state is None:
+            commands, age = np.zeros((len(rows), N_COMMANDS), np.float32), np.zeros(len(rows), np.int64)
+        else:
+            commands, age = state[0].copy(), state[1].copy()
+        if episode_start is not None:
+            age[np.broadcast_to(episode_start, age.shape)] = 0
+        new = age % self._repeat == 0
+        if new.any():
+            commands[new] = self._network(self._features(rows[new]))
+        actions = self._controller.act(rows, commands)
+        return (actions[0] if given.ndim == 1 else actions), (commands, age + 1)

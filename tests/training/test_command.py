@@ -16,7 +16,7 @@ from rover_gym.wrappers import DriveByCommand
 
 ROVER = RoverEnv()
 RNG = np.random.default_rng(0)
-CARD = PolicyCard(environment={}, pool=1, command=CommandLimits(), guided=True, source={})
+CARD = PolicyCard(environment={}, pool=1, hold=0.1, command=CommandLimits(), guided=True, source={})
 
 
 def observations(n: int) -> np.ndarray[Any, np.dtype[np.float32]]:
@@ -123,7 +123,7 @@ def test_a_policy_is_saved_and_read_back(tmp_path: Path) -> None:
     CARD.save(tmp_path / "policy.json")
     seen = observations(4)
     actions, state = TrainedPolicy.load(ROVER, tmp_path).predict(seen)
-    assert state is None
+    np.testing.assert_array_equal(state[1], 1)
     np.testing.assert_array_equal(actions, TrainedPolicy(ROVER, network, CARD).predict(seen)[0])
     np.testing.assert_allclose(TrainedPolicy.load(ROVER, tmp_path).predict(seen[0])[0], actions[0], atol=1e-4)
 
@@ -137,6 +137,21 @@ def test_the_guide_alone_drives_on_the_plane() -> None:
         observation, _, terminated, truncated, info = env.step(policy.predict(observation)[0])
         ended = terminated or truncated
     assert info["is_success"]
+
+
+def test_a_command_holds_as_long_as_it_says() -> None:
+    size = Features(ROVER).size
+    weights = (RNG.normal(size=(3, size)).astype(np.float32),)
+    policy = TrainedPolicy(ROVER, Network(np.zeros(size), np.ones(size), weights, (np.zeros(3, np.float32),)), CARD)
+    rows, state, held = observations(4), None, []
+    # 0.1 s are two control periods; the second rover's episode begins anew at the second step.
+    for row in range(3):
+        _, state = policy.predict(rows[[row, row]], state, np.array([row == 0, row <= 1]))
+        held.append(state[0])
+    np.testing.assert_array_equal(held[1][0], held[0][0])
+    assert not np.array_equal(held[2][0], held[0][0])
+    assert not np.array_equal(held[1][1], held[0][1])
+    np.testing.assert_array_equal(held[2][1], held[1][1])
 
 
 @pytest.mark.parametrize("bad", [np.zeros(3, np.float32), np.full(91, np.nan, np.float32)])

@@ -11,7 +11,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 
-from rover_gym.learning.config import TrainingConfig
+from rover_gym.learning.config import TrainingConfig, rover
 from rover_gym.trained import Network, PolicyCard
 
 
@@ -44,5 +44,12 @@ def export(
     folder.mkdir(parents=True, exist_ok=True)
     network_of(model, normalisation).save(folder / "policy.npz")
     seen = {name: value for name, value in config.environment.items() if name == "height_scan"}
-    card = PolicyCard(environment=seen, pool=config.pool, command=config.command, guided=config.guided, source=source)
+    card = PolicyCard(
+        environment=seen,
+        pool=config.pool,
+        hold=config.repeat * rover(config.environment).dt,
+        command=config.command,
+        guided=config.guided,
+        source=source,
+    )
     card.save(folder / "policy.json")
