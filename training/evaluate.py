@@ -2,7 +2,9 @@
 
     python training/evaluate.py runs/train/rocks-seed1 runs/train/rocks-seed2 --difficulty 1 --output runs/evaluation
 
-Prints a table and writes evaluation.json, evaluation.md and evaluation.png. Intervals are 95%. The seeds lie beyond
+Prints a table and writes evaluation.json, evaluation.md, evaluation.png and every policy's episodes, which a later
+evaluation of the same scene into the same folder reads instead of driving them again: give another folder, or remove
+them, when a policy has changed. Intervals are 95%. The seeds lie beyond
 those of training, so the fields are new to the policies.
 """
 
@@ -10,12 +12,14 @@ import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from matplotlib.figure import Figure
 from rich.console import Console
+from rich.progress import Progress, TaskID
 
 from rover_gym import PDPolicy
 from rover_gym.cli.console import plain_errors, progress_bar, say_path
@@ -54,27 +58,26 @@ def evaluate(
     if guide and first.guided:
         makers.append(("guide alone", lambda env: TrainedPolicy.untrained(env, first), policy_arguments(folders[0])))
     for given, folder in zip(policies, folders, strict=True):
-        makers.append(
-            (given.name, lambda env, folder=folder: TrainedPolicy.load(env, folder), policy_arguments(folder))
-        )
+        makers.append((given.name, partial(_load, folder), policy_arguments(folder)))
 
+    output.mkdir(parents=True, exist_ok=True)
     drives: dict[str, list[Drive]] = {}
     with progress_bar() as bar:
         for name, make_policy, further in makers:
             task = bar.add_task(name, total=episodes, state="")
-            drives[name] = drive_all(
+            drives[name] = _drive(
+                output / f"episodes-{name.replace(' ', '-')}.json",
                 make_policy,
                 seeds,
-                arguments=arguments | further,
-                threads=threads,
-                progress=lambda done, task=task: bar.update(task, completed=done, state=f"{done} of {episodes}"),
+                arguments | further,
+                threads,
+                partial(_show, bar, task, episodes),
             )
     rows = [summarise(name, found) for name, found in drives.items()]
     trained = [row.policy for row in rows[-len(policies) :]]
     if len(trained) > 1:
         rows.append(summarise(f"all {len(trained)} together", [drive for name in trained for drive in drives[name]]))
 
-    output.mkdir(parents=True, exist_ok=True)
     table = _markdown(rows)
     Console(highlight=False, soft_wrap=True).print(table, markup=False)
     (output / "evaluation.md").write_text(table + "\n", encoding="utf-8")
@@ -88,6 +91,34 @@ def evaluate(
     _plot(rows, output / "evaluation.png")
     for path in ("evaluation.md", "evaluation.json", "evaluation.png"):
         say_path("written", output / path)
+
+
+def _load(folder: Path, env: Any) -> Policy:
+    return TrainedPolicy.load(env, folder)
+
+
+def _show(bar: Progress, task: TaskID, episodes: int, done: int) -> None:
+    bar.update(task, completed=done, state=f"{done} of {episodes}")
+
+
+def _drive(
+    path: Path,
+    make_policy: Callable[[Any], Policy],
+    seeds: Sequence[int],
+    arguments: dict[str, Any],
+    threads: int,
+    progress: Callable[[int], None],
+) -> list[Drive]:
+    """The episodes of one policy, from an earlier evaluation where that was the same."""
+    scene = json.loads(json.dumps({"environment": arguments, "seeds": [seeds[0], seeds[-1]]}))
+    if path.exists():
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        if kept["scene"] == scene:
+            return [Drive(**drive) for drive in kept["drives"]]
+    drives = drive_all(make_policy, seeds, arguments=arguments, threads=threads, progress=progress)
+    plain = {"scene": scene, "drives": [asdict(drive) for drive in drives]}
+    path.write_text(json.dumps(plain) + "\n", encoding="utf-8")
+    return drives
 
 
 def _markdown(rows: Sequence[Summary]) -> str:

@@ -9,7 +9,7 @@ episode), stable-baselines3's log (CSV and TensorBoard), evaluations, checkpoint
 import json
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import torch
 import typer
@@ -110,7 +110,7 @@ def train(
     say_path("policy", folder / "policy")
 
 
-def hyperparameters(ppo: PPOConfig) -> dict[str, object]:
+def hyperparameters(ppo: PPOConfig) -> dict[str, Any]:
     """Keyword arguments of stable-baselines3's PPO."""
     first, last = ppo.learning_rate, ppo.final_learning_rate
     return {

@@ -67,7 +67,8 @@ class Features:
             rocks = seen[:, self._scan] - slope @ self._offsets.T
             level = rocks.min(axis=1, keepdims=True)
             parts += [-level, 10.0 * ((rocks - level)[:, self._cells].max(axis=2))]
-        return np.clip(np.concatenate(parts, axis=1), -LARGEST_FEATURE, LARGEST_FEATURE).astype(np.float32)
+        features: npt.NDArray[np.float32] = np.concatenate(parts, axis=1).astype(np.float32)
+        return features.clip(-LARGEST_FEATURE, LARGEST_FEATURE)
 
     def _slope(self, seen: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
         """`(n, 2)` rise of the ground plane per metre ahead and to the right, in the heading frame."""
@@ -78,7 +79,8 @@ class Features:
         right = np.sin(roll) * n[:, 1] + np.cos(roll) * n[:, 2]
         ahead = np.cos(pitch) * n[:, 0] - np.sin(pitch) * y
         up = np.sin(pitch) * n[:, 0] + np.cos(pitch) * y
-        return -np.stack((ahead, right), axis=1) / np.maximum(up, 0.1)[:, None]
+        rise: npt.NDArray[np.floating] = -np.stack((ahead, right), axis=1) / np.maximum(up, 0.1)[:, None]
+        return rise
 
 
 def _cells(offsets: npt.NDArray[np.float64], pool: int) -> npt.NDArray[np.intp]:
@@ -91,4 +93,5 @@ def _cells(offsets: npt.NDArray[np.float64], pool: int) -> npt.NDArray[np.intp]:
         refuse(OptionError, "pool", pool, f"must divide the scan's {rows} rows and {columns} columns")
     points = np.arange(rows * columns).reshape(rows // pool, pool, columns // pool, pool)
     cells = points.transpose(0, 2, 1, 3).reshape(-1, pool * pool)
-    return cells[offsets[cells, 0].mean(axis=1) >= -BEHIND]
+    seen: npt.NDArray[np.intp] = cells[offsets[cells, 0].mean(axis=1) >= -BEHIND]
+    return seen

@@ -56,11 +56,12 @@ class Network:
         x = np.clip((features - self.mean) / self.deviation, -LARGEST_FEATURE, LARGEST_FEATURE)
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
             x = np.tanh(x @ weight.T + bias)
-        return np.clip(x @ self.weights[-1].T + self.biases[-1], -1.0, 1.0)
+        outputs: Array = x @ self.weights[-1].T + self.biases[-1]
+        return outputs.clip(-1.0, 1.0)
 
     def save(self, path: Path) -> None:
         """Writes the arrays."""
-        layers = {f"weight_{i}": weight for i, weight in enumerate(self.weights)}
+        layers: dict[str, Any] = {f"weight_{i}": weight for i, weight in enumerate(self.weights)}
         layers |= {f"bias_{i}": bias for i, bias in enumerate(self.biases)}
         np.savez_compressed(path, mean=self.mean, deviation=self.deviation, **layers)
 

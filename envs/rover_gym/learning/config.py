@@ -145,7 +145,8 @@ class TrainingConfig:
 
     def to_yaml(self) -> str:
         """The configuration as `read_config` reads it."""
-        return yaml.safe_dump(_plain(asdict(self)), sort_keys=False)
+        text: str = yaml.safe_dump(_plain(asdict(self)), sort_keys=False)
+        return text
 
 
 def rover(arguments: Mapping[str, Any]) -> RoverEnv:

@@ -8,7 +8,6 @@ import numpy as np
 import torch
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.policies import ActorCriticPolicy
-from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 
 from rover_gym.learning.config import TrainingConfig, rover
@@ -23,7 +22,7 @@ def network_of(model: OnPolicyAlgorithm, normalisation: VecNormalize) -> Network
     layers = [layer for layer in policy.mlp_extractor.policy_net if isinstance(layer, torch.nn.Linear)]
     layers.append(policy.action_net)  # type: ignore[arg-type]
     statistics = normalisation.obs_rms
-    if not isinstance(statistics, RunningMeanStd):
+    if isinstance(statistics, dict):
         raise TypeError(f"one normalised observation is needed, not {statistics!r}")
     return Network(
         mean=statistics.mean.astype(np.float32),

@@ -34,14 +34,13 @@ class CommandVecEnv(VecEnvWrapper):
         self.features = features
         self.controller = controller
         self.repeat = repeat
-        self._seen = np.zeros((self.num_envs, features.size), np.float32)
+        self._seen: npt.NDArray[Any] = np.zeros((self.num_envs, features.size), np.float32)
         self._commands = np.zeros((self.num_envs, N_COMMANDS), np.float32)
 
     def reset(self) -> VecEnvObs:
         """The features after a reset of all."""
-        seen = self.venv.reset()
-        self._seen = seen
-        return self.features(seen)
+        self._seen = np.asarray(self.venv.reset())
+        return self.features(self._seen)
 
     def step_async(self, actions: npt.NDArray[Any]) -> None:
         """Keeps the commands for `step_wait`."""
@@ -56,9 +55,10 @@ class CommandVecEnv(VecEnvWrapper):
         for _ in range(self.repeat):
             actions = self.controller.act(self._seen, self._commands)
             actions[ended] = 0.0
-            self._seen, step_rewards, dones, infos = self.venv.step(actions)
+            seen, step_rewards, dones, infos = self.venv.step(actions)
+            self._seen = np.asarray(seen)
             rewards += np.where(ended, 0.0, step_rewards)
-            for i in np.flatnonzero(dones & ~ended):
+            for i in np.flatnonzero(dones & ~ended).tolist():
                 final[i] = infos[i]
                 final[i]["terminal_observation"] = self.features(final[i]["terminal_observation"][None])[0]
             ended |= dones
