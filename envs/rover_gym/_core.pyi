@@ -364,11 +364,12 @@ class Simulation:
     @property
     def deepest_overlap(self) -> float:
         """Deepest gap of any wheel or box with the ground now, m: 0 where nothing overlaps, else negative."""
-    def reading(self, scan: npt.ArrayLike | None = None) -> _Array:
+    def reading(self, target: Sequence[float] | None = None, scan: npt.ArrayLike | None = None) -> _Array:
         """All that a controller looks at as one fresh row; `reading_layout` names its parts.
 
-        `solver`, `work` and `positive_work` are those of the last call of `step`. `scan` (n, 2): points ahead and to
-        the right of the trunk's origin in the heading frame, m, whose heights over the origin come last.
+        `solver`, `work` and `positive_work` are those of the last call of `step`. `target`: a place on the map (x, z),
+        m; the origin by default. `scan` (n, 2): points ahead and to the right of the trunk's origin in the heading
+        frame, m, whose heights over the origin come last.
         """
     def reading_layout(self, n_scan: int = 0) -> dict[str, slice]:
         """Names and places of the numbers in a reading."""
@@ -414,8 +415,8 @@ class SimulationBatch:
         """
     def readings(self) -> _Array:
         """(n_rovers, size) as the rovers are now."""
-    def replace(self, index: int, simulation: Simulation) -> None:
-        """Puts a copy of a simulation, with its own terrain, in a place."""
+    def replace(self, index: int, simulation: Simulation, target: Sequence[float] | None = None) -> None:
+        """Puts a copy of a simulation, with its own terrain, in a place. `target` (x, z): what its readings look at."""
     def simulation(self, index: int) -> Simulation:
         """A copy of one rover, to look at."""
     def __len__(self) -> int: ...

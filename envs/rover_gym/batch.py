@@ -75,14 +75,16 @@ class RoverBatch:
         """
         generator = self.generator(i, seed)
         scene, simulation = draw_scene(self.task, generator, self._difficulties[i], options or ResetOptions())
-        reading = simulation.reading(self.task.scan)
-        if not self._progress.begin(self.task, i, scene, reading, draw_noise(self.task, (generator,))):
+        reading = simulation.reading(scene.start.goal, self.task.scan)
+        noise = draw_noise(self.task, (generator,))
+        progress = Progress.begin(self.task, scene, reading, None if noise is None else noise[0])
+        if progress is None:
             refuse(StateError, "q", None if options is None else options.q, "must be observable in float32")
-        self.simulations.replace(i, simulation)
+        self.simulations.replace(i, simulation, scene.start.goal)
+        self._progress.put(i, progress)
         self._scenes[i] = scene
         self._steps[i] = 0
-        outcome = report(self.task, self._progress.row(i), reading[None])
-        return outcome.info(0)
+        return report(self.task, progress, reading).info()
 
     def step(self, actions: object, active: Mask | None = None) -> tuple[Outcome, Mask, Mask]:
         """Applies actions `(n, 12)` for one control period.

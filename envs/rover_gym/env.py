@@ -111,6 +111,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | success         | w on the step that reaches the goal                            | 10       |
     | failure         | w on a step that ends in failure                               | -10      |
 
+    On a step that the physics could not take, only `failure` counts.
+
     ## Start
 
     The ground is a plane through the origin with slope and direction of steepest ascent drawn
@@ -272,7 +274,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         self.action_space = gym.spaces.Box(-1.0, 1.0, (N_ACTIONS,), np.float32)
         self._simulation = Simulation(self.model, Plane(), **self.task.simulation_options)
         self._scene: Scene | None = None
-        self._progress = Progress.of(self.task, 1)
+        self._progress: Progress
         self._difficulty: Range | None = None
 
     @property
@@ -319,12 +321,13 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         checked = check_reset_options(self.task, options)
         super().reset(seed=seed)
         scene, simulation = draw_scene(self.task, self.np_random, self._difficulty, checked)
-        reading = simulation.reading(self.task.scan)
-        if not self._progress.begin(self.task, 0, scene, reading, draw_noise(self.task, (self.np_random,))):
+        reading = simulation.reading(scene.start.goal, self.task.scan)
+        progress = Progress.begin(self.task, scene, reading, self._draw_noise())
+        if progress is None:
             refuse(StateError, "q", checked.q, "must be observable in float32")
-        self._simulation, self._scene = simulation, scene
-        outcome = report(self.task, self._progress, reading[None])
-        return outcome.observation[0].copy(), outcome.info(0)
+        self._simulation, self._scene, self._progress = simulation, scene, progress
+        outcome = report(self.task, progress, reading)
+        return outcome.observation, outcome.info()
 
     def step(
         self, action: npt.NDArray[np.float32]
@@ -336,22 +339,24 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
                 [-1, 1]; nothing has changed.
             ResetNeeded: The environment has not been reset.
         """
-        self._running()
+        goal = self._running().start.goal
         simulation = self._simulation
-        commands = check_actions(action, (N_ACTIONS,))[None]
-        torques, set_points = motor_commands(self.task, self._progress, commands)
-        simulation.set_wheel_torques(torques[0])
-        simulation.set_steering(set_points[0])
+        command = check_actions(action, (N_ACTIONS,))
+        torques, set_points = motor_commands(self.task, self._progress, command)
+        simulation.set_wheel_torques(torques)
+        simulation.set_steering(set_points)
         messages: dict[int, str] = {}
         try:
             simulation.step(self.task.substeps)
         except StepError as error:
             messages[0] = str(error)
-        readings = simulation.reading(self.task.scan)[None]
+        reading = simulation.reading(goal, self.task.scan)
+        outcome = advance(self.task, self._progress, command, reading, messages, self._draw_noise())
+        return outcome.observation, float(outcome.reward), bool(outcome.termination), False, outcome.info()
+
+    def _draw_noise(self) -> npt.NDArray[np.float64] | None:
         noise = draw_noise(self.task, (self.np_random,))
-        outcome = advance(self.task, self._progress, commands, readings, messages, noise)
-        ended = bool(outcome.termination[0])
-        return outcome.observation[0].copy(), float(outcome.reward[0]), ended, False, outcome.info(0)
+        return None if noise is None else noise[0]
 
     def set_difficulty(self, difficulty: float | Range) -> None:
         """Sets the rocks' difficulty, or the range it is drawn from, from the next reset on.

@@ -18,9 +18,6 @@ from rover_gym.validation import refuse
 N_WHEELS = 6
 N_ACTIONS = 12
 
-#: A wheel touches when its gap is at most this, m. Resting wheels show gaps below a micrometre.
-CONTACT_GAP = 1e-3
-
 # Scales of one entry each; the forces are measured in mean wheel loads, m g / 6.
 GAP_SCALE = 0.1
 WHEEL_RATE_SCALE = 10.0

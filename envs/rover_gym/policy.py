@@ -196,6 +196,7 @@ def rover_env(env: Any) -> RoverEnv:
     inner = getattr(env, "unwrapped", env)
     if not isinstance(inner, RoverEnv) and getattr(inner, "envs", None):
         inner = getattr(inner.envs[0], "unwrapped", inner.envs[0])
+    inner = getattr(inner, "prototype", inner)  # what the rovers of a native batch are made like
     if not isinstance(inner, RoverEnv):
         raise TypeError(f"PDPolicy drives Rover-v0, not {inner!r}")
     return inner

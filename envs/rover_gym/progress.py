@@ -1,20 +1,21 @@
-"""What a control period comes to: observation, reward and end of episodes, computed for n rovers at once.
+"""What a control period comes to: observation, reward and end of an episode, for one rover or for n at once.
 
-`RoverEnv` is a batch of one, so a rover sees the same bits alone and among others. For that every sum is written out:
-NumPy's reductions and products round differently for different shapes.
+The same functions serve both. A quantity is a float for one rover and an array `(n,)` for n; the arithmetic is written
+out, entry by entry, since NumPy's reductions and products round differently for different shapes. So a rover sees the
+same bits alone and among others.
 """
 
 import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym import rewards
-from rover_gym.observation import CONTACT_GAP, LARGEST, N_ACTIONS, N_WHEELS
+from rover_gym.observation import N_ACTIONS, N_WHEELS
 from rover_gym.randomisation import Domain
 from rover_gym.scene import Scene
 from rover_gym.task import Task
@@ -23,6 +24,9 @@ Array: TypeAlias = npt.NDArray[np.float64]
 Mask: TypeAlias = npt.NDArray[np.bool_]
 Observations: TypeAlias = npt.NDArray[np.float32]
 
+#: A float for one rover, an array `(n,)` for n.
+Quantity: TypeAlias = Any
+
 #: High-centring: the trunk carries much of the weight while the rover stays slower than this, m/s.
 STUCK_SPEED = 0.05
 
@@ -30,77 +34,106 @@ STUCK_SPEED = 0.05
 TERMINATIONS = np.array(["", "goal", "roll_over", "high_centred", "step_failed"], dtype=object)
 GOAL, ROLL_OVER, HIGH_CENTRED, STEP_FAILED = range(1, 5)
 
+# Of several reasons the one that counts: failed, then goal, then rolled over, then stuck, by the sum of
+# 8 (failed), 4 (stuck), 2 (rolled over) and 1 (goal).
+_COUNTS = np.array([0, 1, 2, 1, 3, 1, 2, 1] + 8 * [STEP_FAILED])
+
+STATUSES = np.array(["converged", "not_converged", "failed"], dtype=object)
+FAILED = 2
+
 DOMAIN = tuple(entry.name for entry in fields(Domain))
 GAIN = slice(DOMAIN.index("actuator_gain"), DOMAIN.index("actuator_gain") + 1)
 
-STATUSES = np.array(["converged", "not_converged", "failed"], dtype=object)
+
+class Scalars(NamedTuple):
+    """What a reading says in single numbers, by the names of the core, in its order."""
+
+    distance: Quantity
+    cos_tilt: Quantity
+    speed: Quantity
+    trunk_force: Quantity
+    slip_ratio: Quantity
+    work: Quantity
+    positive_work: Quantity
+    time: Quantity
+    not_converged: Quantity
+    iterations: Quantity
+    residual: Quantity
+    n_contacts: Quantity
+
+    @classmethod
+    def of(cls, task: Task, readings: Array) -> "Scalars":
+        """From a reading `(size,)` or n of them."""
+        columns = readings[..., task.scalars]
+        return cls(*(columns.tolist() if columns.ndim == 1 else columns.T.copy()))
 
 
 @dataclass
 class Progress:
-    """What episodes remember beside the simulations' states, one row a rover.
+    """What episodes remember beside the simulations' states: of one rover, or one row a rover.
 
     Attributes:
-        goal: `(n, 2)` x and z, m.
-        distance: `(n,)` horizontal, to the goal, m.
-        previous_action: `(n, 12)`.
-        energy: `(n,)` J, braking counted.
-        energy_positive: `(n,)` J, driving only.
-        stuck_time: `(n,)` s.
-        domain: `(n, 4)` what `Domain` holds, in its order.
-        trunk_load_limit: `(n,)` N.
-        difficulty: `(n,)`.
-        observation: `(n, size) float32`, the last one.
+        distance: Horizontal, to the goal, m.
+        previous_action: `(..., 12)`.
+        energy: J, braking counted.
+        energy_positive: J, driving only.
+        stuck_time: s.
+        domain: `(..., 4)` what `Domain` holds, in its order.
+        trunk_load_limit: N.
+        difficulty: Of the rocks.
+        observation: `(..., size) float32`, the last one.
     """
 
-    goal: Array
-    distance: Array
+    distance: Quantity
     previous_action: Array
-    energy: Array
-    energy_positive: Array
-    stuck_time: Array
+    energy: Quantity
+    energy_positive: Quantity
+    stuck_time: Quantity
     domain: Array
-    trunk_load_limit: Array
-    difficulty: Array
+    trunk_load_limit: Quantity
+    difficulty: Quantity
     observation: Observations
 
     @classmethod
     def of(cls, task: Task, n: int) -> "Progress":
         """Of n rovers that have not begun."""
+        distance, energy, energy_positive, stuck_time, trunk_load_limit, difficulty = np.zeros((6, n))
         return cls(
-            goal=np.zeros((n, 2)),
-            distance=np.zeros(n),
+            distance=distance,
             previous_action=np.zeros((n, N_ACTIONS)),
-            energy=np.zeros(n),
-            energy_positive=np.zeros(n),
-            stuck_time=np.zeros(n),
+            energy=energy,
+            energy_positive=energy_positive,
+            stuck_time=stuck_time,
             domain=np.ones((n, len(DOMAIN))),
-            trunk_load_limit=np.zeros(n),
-            difficulty=np.zeros(n),
+            trunk_load_limit=trunk_load_limit,
+            difficulty=difficulty,
             observation=np.zeros((n, task.layout.size), np.float32),
         )
 
-    def begin(self, task: Task, i: int, scene: Scene, reading: Array, noise: Array | None) -> bool:
-        """Begins an episode of rover i; false where float32 cannot hold its observation, and nothing has changed."""
-        goal = np.array([scene.start.goal])
-        distance = distance_to(goal, reading[None])
-        previous_action, stuck_time = np.zeros((1, N_ACTIONS)), np.zeros(1)
-        observation, sound = observe(task, reading[None], goal, distance, previous_action, stuck_time, noise)
-        if not sound[0]:
-            return False
-        self.goal[i] = goal[0]
-        self.distance[i] = distance[0]
-        self.previous_action[i] = 0.0
-        self.energy[i] = self.energy_positive[i] = self.stuck_time[i] = 0.0
-        self.domain[i] = tuple(scene.domain.as_info().values())
-        self.trunk_load_limit[i] = task.trunk_load_limit(scene.domain)
-        self.difficulty[i] = scene.difficulty
-        self.observation[i] = observation[0]
-        return True
+    @classmethod
+    def begin(cls, task: Task, scene: Scene, reading: Array, noise: Array | None) -> "Progress | None":
+        """Of one rover at the start of an episode; None where float32 cannot hold its observation."""
+        previous_action = np.zeros(N_ACTIONS)
+        with np.errstate(over="ignore", invalid="ignore"):
+            observation, finite = observe(task, reading, previous_action, 0.0, noise)
+        if not finite:
+            return None
+        return cls(
+            distance=Scalars.of(task, reading).distance,
+            previous_action=previous_action,
+            energy=0.0,
+            energy_positive=0.0,
+            stuck_time=0.0,
+            domain=np.array(list(scene.domain.as_info().values())),
+            trunk_load_limit=task.trunk_load_limit(scene.domain),
+            difficulty=scene.difficulty,
+            observation=observation,
+        )
 
-    def row(self, i: int) -> "Progress":
-        """Rover i alone, as a view."""
-        return Progress(**{name: value[i : i + 1] for name, value in vars(self).items()})
+    def put(self, i: int, one: "Progress") -> None:
+        """Makes one rover's progress that of rover i."""
+        for name, value in vars(self).items():
+            value[i] = getattr(one, name)
 
     def copy(self) -> "Progress":
         """A deep copy."""
@@ -109,105 +142,92 @@ class Progress:
 
 @dataclass
 class Outcome:
-    """What a control period, or a reset, came to, one row a rover.
+    """What a control period, or a reset, came to: for one rover, or one row a rover.
 
     Attributes:
-        observation: `(n, size) float32`.
-        reward: `(n,)`, the sum of the terms.
-        termination: `(n,)` index into `TERMINATIONS`.
-        time: `(n,)` s.
-        distance: `(n,)` m.
-        energy: `(n,)` J.
-        energy_positive: `(n,)` J.
-        slip_ratio: `(n,)`.
-        tilt: `(n,)` rad.
-        difficulty: `(n,)`.
-        domain: `(n, 4)`.
-        terms: `(n,)` each, by name.
-        status: `(n,)` index into `STATUSES`.
-        iterations: `(n,)`.
-        residual: `(n,)`.
-        n_contacts: `(n,)`.
+        observation: `(..., size) float32`.
+        reward: The sum of the terms.
+        termination: Index into `TERMINATIONS`.
+        progress: Of the episodes; it goes on, so infos are to be asked for before the next reset.
+        scalars: From the readings.
+        terms: Of the reward, by name.
         messages: Why a rover could not take a step, by its number.
     """
 
     observation: Observations
-    reward: Array
-    termination: npt.NDArray[np.int64]
-    time: Array
-    distance: Array
-    energy: Array
-    energy_positive: Array
-    slip_ratio: Array
-    tilt: Array
-    difficulty: Array
-    domain: Array
-    terms: dict[str, Array]
-    status: npt.NDArray[np.int64]
-    iterations: npt.NDArray[np.int64]
-    residual: Array
-    n_contacts: npt.NDArray[np.int64]
+    reward: Quantity
+    termination: Any
+    progress: Progress
+    scalars: Scalars
+    terms: dict[str, Quantity]
     messages: Mapping[int, str] = field(default_factory=dict)
 
-    def info(self, i: int) -> dict[str, Any]:
-        """What `RoverEnv.step` says in its info of rover i."""
-        termination = TERMINATIONS[self.termination[i]]
+    def info(self, i: int | None = None) -> dict[str, Any]:
+        """What `RoverEnv.step` says in its info: of the one rover, or of rover i."""
+
+        def of(quantity: Quantity) -> float:
+            return float(quantity if i is None else quantity[i])
+
+        progress, now = self.progress, self.scalars
+        termination = TERMINATIONS[self.termination if i is None else self.termination[i]]
+        message = self.messages.get(i or 0, "")
+        failed = message != ""
         return {
-            "time": float(self.time[i]),
+            "time": of(now.time),
             "success": termination == "goal",
             "is_success": termination == "goal",
             "termination": termination,
-            "distance_to_goal": float(self.distance[i]),
-            "energy": float(self.energy[i]),
-            "energy_positive": float(self.energy_positive[i]),
-            "slip_ratio": float(self.slip_ratio[i]),
-            "tilt": float(self.tilt[i]),
-            "difficulty": float(self.difficulty[i]),
-            "domain": dict(zip(DOMAIN, self.domain[i].tolist(), strict=True)),
-            "reward_terms": {name: float(term[i]) for name, term in self.terms.items()},
+            "distance_to_goal": of(now.distance),
+            "energy": of(progress.energy),
+            "energy_positive": of(progress.energy_positive),
+            "slip_ratio": of(now.slip_ratio),
+            "tilt": float(tilt_of(of(now.cos_tilt))),
+            "difficulty": of(progress.difficulty),
+            "domain": dict(zip(DOMAIN, (progress.domain if i is None else progress.domain[i]).tolist(), strict=True)),
+            "reward_terms": {name: of(term) for name, term in self.terms.items()},
             "solver": {
-                "status": STATUSES[self.status[i]],
-                "iterations": int(self.iterations[i]),
-                "residual": float(self.residual[i]),
-                "n_contacts": int(self.n_contacts[i]),
-                "message": self.messages.get(i, ""),
+                "status": STATUSES[FAILED if failed else int(of(now.not_converged))],
+                "iterations": 0 if failed else int(of(now.iterations)),
+                "residual": math.inf if failed else of(now.residual),
+                "n_contacts": 0 if failed else int(of(now.n_contacts)),
+                "message": message,
             },
         }
 
     def vector_info(self) -> dict[str, Any]:
-        """The same of all rovers: an array a key, with Gymnasium's masks."""
+        """The same of all n rovers: an array a key, with Gymnasium's masks."""
         n = len(self.reward)
-        success = self.termination == GOAL
-        message = np.full(n, "", dtype=object)
-        for i, text in self.messages.items():
-            message[i] = text
-        return _masked(
-            {
-                "time": self.time.copy(),
-                "success": success,
-                "is_success": success.copy(),
-                "termination": TERMINATIONS[self.termination],
-                "distance_to_goal": self.distance.copy(),
-                "energy": self.energy.copy(),
-                "energy_positive": self.energy_positive.copy(),
-                "slip_ratio": self.slip_ratio.copy(),
-                "tilt": self.tilt,
-                "difficulty": self.difficulty.copy(),
-                "domain": _masked(dict(zip(DOMAIN, self.domain.T.copy(), strict=True)), n),
-                "reward_terms": _masked(dict(self.terms), n),
-                "solver": _masked(
-                    {
-                        "status": STATUSES[self.status],
-                        "iterations": self.iterations,
-                        "residual": self.residual,
-                        "n_contacts": self.n_contacts,
-                        "message": message,
-                    },
-                    n,
-                ),
-            },
-            n,
+        progress, now = self.progress, self.scalars
+        status, iterations, n_contacts = (
+            column.astype(np.int64) for column in (now.not_converged, now.iterations, now.n_contacts)
         )
+        residual, message = now.residual.copy(), np.full(n, "", dtype=object)
+        for i, text in self.messages.items():
+            status[i], iterations[i], residual[i], n_contacts[i], message[i] = FAILED, 0, math.inf, 0, text
+        success = self.termination == GOAL
+        solver = {
+            "status": STATUSES[status],
+            "iterations": iterations,
+            "residual": residual,
+            "n_contacts": n_contacts,
+            "message": message,
+        }
+        values = {
+            "time": now.time,
+            "success": success,
+            "is_success": success.copy(),
+            "termination": TERMINATIONS[self.termination],
+            "distance_to_goal": now.distance.copy(),
+            "energy": progress.energy.copy(),
+            "energy_positive": progress.energy_positive.copy(),
+            "slip_ratio": now.slip_ratio,
+            "tilt": tilt_of(now.cos_tilt),
+            "difficulty": progress.difficulty.copy(),
+            "domain": _masked(dict(zip(DOMAIN, progress.domain.T.copy(), strict=True)), n),
+            "reward_terms": _masked(dict(self.terms), n),
+            "solver": _masked(solver, n),
+        }
+        return _masked(values, n)
 
 
 def _masked(values: dict[str, Any], n: int) -> dict[str, Any]:
@@ -217,54 +237,31 @@ def _masked(values: dict[str, Any], n: int) -> dict[str, Any]:
 
 
 def motor_commands(task: Task, progress: Progress, commands: Array) -> tuple[Array, Array]:
-    """Wheel torques `(n, 6)` N m and steering set-points `(n, 6)` rad of actions `(n, 12)`."""
-    torques = commands[:, :N_WHEELS] * task.torque_limits * progress.domain[:, GAIN]
-    return torques, commands[:, N_WHEELS:] * task.max_steering
-
-
-def distance_to(goal: Array, readings: Array) -> Array:
-    """`(n,)` horizontal distance from the trunk's origin, m."""
-    dx, dz = goal[:, 0] - readings[:, 0], goal[:, 1] - readings[:, 2]
-    distance: Array = np.sqrt(dx * dx + dz * dz)
-    return distance
+    """Wheel torques `(..., 6)` N m and steering set-points `(..., 6)` rad of actions `(..., 12)`."""
+    torques = commands[..., :N_WHEELS] * task.torque_limits * progress.domain[..., GAIN]
+    return torques, commands[..., N_WHEELS:] * task.max_steering
 
 
 def observe(
-    task: Task,
-    readings: Array,
-    goal: Array,
-    distance: Array,
-    previous_action: Array,
-    stuck_time: Array,
-    noise: Array | None,
-) -> tuple[Observations, Mask]:
-    """Observations `(n, size)`, and which of them float32 can hold; the others are zero."""
-    layout, places = task.layout, task.places
-    values = np.empty((len(readings), layout.size))
-    # Pose, velocities and gaps lie in a reading as in an observation, and so do forces and the ground's normal.
-    contact, normal = layout["wheel_contact"], layout["ground_normal"]
-    values[:, : contact.start] = readings[:, : contact.start]
-    values[:, contact] = readings[:, places["wheel_gaps"]] <= CONTACT_GAP
-    values[:, contact.stop : normal.stop] = readings[:, places["normal_forces"].start : places["ground_normal"].stop]
-    ahead, right = goal[:, 0] - readings[:, 0], goal[:, 1] - readings[:, 2]
-    first = places["heading"].start
-    c, s = readings[:, first], readings[:, first + 1]
-    first = layout["goal"].start
-    values[:, first] = ahead * c - right * s
-    values[:, first + 1] = ahead * s + right * c
-    values[:, first + 2] = distance
-    values[:, layout["previous_action"]] = previous_action
-    values[:, layout["stuck"].start] = np.minimum(stuck_time / task.stuck_time, 1.0)
+    task: Task, readings: Array, previous_action: Array, stuck_time: Quantity, noise: Array | None
+) -> tuple[Observations, Any]:
+    """Observations `(..., size)`, and which of them float32 can hold; the others are zero."""
+    values = np.empty((*readings.shape[:-1], task.layout.size))
+    # A reading begins as an observation does.
+    n = task.n_shared
+    values[..., :n] = readings[..., :n]
+    values[..., n : n + N_ACTIONS] = previous_action
+    values[..., n + N_ACTIONS] = np.minimum(stuck_time / task.stuck_time, 1.0)
     if task.scan is not None:
-        values[:, layout["height_scan"]] = readings[:, places["heights"]]
+        values[..., n + N_ACTIONS + 1 :] = readings[..., task.places["heights"]]
     values *= task.inverse_scale
     if noise is not None:
         values += noise
-    # Numbers beyond float32 are found here; a NaN fails the comparison too.
-    sound: Mask = np.abs(values).max(axis=1) <= LARGEST
-    if not sound.all():
-        values[~sound] = 0.0
-    return values.astype(np.float32), sound
+    observation = values.astype(np.float32)
+    finite = np.isfinite(observation).all(axis=-1)
+    if not finite.all():
+        observation[~finite] = 0.0
+    return observation, finite
 
 
 def draw_noise(task: Task, generators: Sequence[np.random.Generator | None]) -> Array | None:
@@ -278,26 +275,15 @@ def draw_noise(task: Task, generators: Sequence[np.random.Generator | None]) -> 
     return noise
 
 
-def report(task: Task, progress: Progress, readings: Array) -> Outcome:
-    """The outcome of a reset: nothing has been earned."""
-    n = len(readings)
+def report(task: Task, progress: Progress, reading: Array) -> Outcome:
+    """The outcome of one rover's reset: nothing has been earned."""
     return Outcome(
         observation=progress.observation.copy(),
-        reward=np.zeros(n),
-        termination=np.zeros(n, np.int64),
-        time=_column(task, readings, "time"),
-        distance=progress.distance,
-        energy=progress.energy,
-        energy_positive=progress.energy_positive,
-        slip_ratio=np.zeros(n),
-        tilt=_tilt(_column(task, readings, "cos_tilt")),
-        difficulty=progress.difficulty,
-        domain=progress.domain,
-        terms={name: np.zeros(n) for name in task.reward_weights},
-        status=np.zeros(n, np.int64),
-        iterations=np.zeros(n, np.int64),
-        residual=np.zeros(n),
-        n_contacts=np.zeros(n, np.int64),
+        reward=0.0,
+        termination=0,
+        progress=progress,
+        scalars=Scalars.of(task, reading),
+        terms=dict.fromkeys(task.reward_weights, 0.0),
     )
 
 
@@ -314,114 +300,78 @@ def advance(
     Args:
         task: The task.
         progress: Is brought up to date.
-        commands: `(n, 12)` the actions.
-        readings: `(n, size)` after the period.
+        commands: `(..., 12)` the actions.
+        readings: `(..., size)` after the period.
         messages: Why a rover could not take a step, by its number.
-        noise: `(n, size)` of the observations, or None.
+        noise: `(..., size)` of the observations, or None.
     """
-    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite ends the episode, below
-        return _advance(task, progress, commands, readings, messages, noise)
+    dt, w = task.dt, task.reward_weights
+    now = Scalars.of(task, readings)
+    torque_change, steering_change = _squares(commands - progress.previous_action)
+    distance_before, observation_before = progress.distance, progress.observation
 
-
-def _advance(
-    task: Task,
-    progress: Progress,
-    commands: Array,
-    readings: Array,
-    messages: Mapping[int, str],
-    noise: Array | None,
-) -> Outcome:
-    n = len(readings)
-    change = commands - progress.previous_action
-    change *= change
-    work = _column(task, readings, "work")
-    cos_tilt = _column(task, readings, "cos_tilt")
-    slip_ratio = _column(task, readings, "slip_ratio")
-    previous_distance = progress.distance
-    carried = _column(task, readings, "trunk_force") > progress.trunk_load_limit
-    halted = _column(task, readings, "speed") <= STUCK_SPEED
-
-    progress.distance = distance_to(progress.goal, readings)
+    progress.distance = now.distance
     progress.previous_action = commands
-    progress.energy = progress.energy + work
-    progress.energy_positive = progress.energy_positive + _column(task, readings, "positive_work")
-    progress.stuck_time = np.where(carried & halted, progress.stuck_time + task.dt, 0.0)
-    observation, sound = observe(task, readings, progress.goal, progress.distance, commands, progress.stuck_time, noise)
+    progress.energy = progress.energy + now.work
+    progress.energy_positive = progress.energy_positive + now.positive_work
+    stuck = (now.trunk_force > progress.trunk_load_limit) & (now.speed <= STUCK_SPEED)
+    progress.stuck_time = (progress.stuck_time + dt) * stuck
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite ends the episode
+        observation, finite = observe(task, readings, commands, progress.stuck_time, noise)
 
-    first = task.places["solver"].start
-    status, iterations, n_contacts = (readings[:, first + k].astype(np.int64) for k in (0, 1, 3))
-    residual = readings[:, first + 2]
-    finite = sound
-    if messages:
-        failed = list(messages)
-        sound = finite.copy()
-        sound[failed] = False
-        status[failed], iterations[failed], n_contacts[failed] = 2, 0, 0
-        residual = residual.copy()
-        residual[failed] = math.inf
+    reasons = (
+        (now.distance <= task.goal_tolerance)
+        + 2 * (now.cos_tilt < task.cos_max_tilt)
+        + 4 * (progress.stuck_time >= task.stuck_time)
+    )
+    failed = ~finite
+    sound = finite.all() and not messages
+    if not sound:
+        if messages:
+            failed = failed | np.isin(np.arange(finite.size).reshape(finite.shape), list(messages))
+        reasons = reasons + 8 * failed
+    termination = _COUNTS[reasons]
 
-    termination = np.zeros(n, np.int64)
-    termination[progress.stuck_time >= task.stuck_time] = HIGH_CENTRED
-    termination[cos_tilt < task.cos_max_tilt] = ROLL_OVER
-    termination[progress.distance <= task.goal_tolerance] = GOAL
-    termination[~sound] = STEP_FAILED
-
-    w, dt = task.reward_weights, task.dt
-    reached = termination == GOAL
     terms = {
-        "progress": rewards.progress(w["progress"], previous_distance, progress.distance),
-        "time": np.full(n, rewards.time(w["time"], dt)),
-        "energy": rewards.energy(w["energy"], work),
-        "slip": rewards.slip(w["slip"], slip_ratio, dt),
-        "tilt": rewards.tilt(w["tilt"], cos_tilt, dt),
-        "torque_change": rewards.torque_change(w["torque_change"], _sum_of_six(change, 0)),
-        "steering_change": rewards.steering_change(w["steering_change"], _sum_of_six(change, N_WHEELS)),
-        "success": rewards.success(w["success"], reached),
-        "failure": rewards.failure(w["failure"], (termination != 0) & ~reached),
+        "progress": rewards.progress(w["progress"], distance_before, now.distance),
+        "time": rewards.time(w["time"], dt),
+        "energy": rewards.energy(w["energy"], now.work),
+        "slip": rewards.slip(w["slip"], now.slip_ratio, dt),
+        "tilt": rewards.tilt(w["tilt"], now.cos_tilt, dt),
+        "torque_change": rewards.torque_change(w["torque_change"], torque_change),
+        "steering_change": rewards.steering_change(w["steering_change"], steering_change),
+        "success": rewards.success(w["success"], termination == GOAL),
+        "failure": rewards.failure(w["failure"], termination > GOAL),
     }
-    if not sound.all():
-        # Where the physics failed, numbers that are not finite earn nothing; the observation is the last finite one.
-        failed_step = termination == STEP_FAILED
-        for term in terms.values():
-            term[failed_step & ~np.isfinite(term)] = 0.0
-        observation[~finite] = progress.observation[~finite]
+    if finite.ndim:
+        terms["time"] = np.full(finite.shape, terms["time"])
+    if not sound:
+        # Where the physics failed its numbers earn nothing, and the last finite observation stays.
+        terms = {name: term if name == "failure" else np.where(failed, 0.0, term)[()] for name, term in terms.items()}
+        observation = np.where(finite[..., None], observation, observation_before)
     progress.observation = observation
-    reward = np.zeros(n)
+    reward: Quantity = 0.0
     for term in terms.values():
         reward = reward + term
     return Outcome(
         observation=observation.copy(),
         reward=reward,
         termination=termination,
-        time=_column(task, readings, "time"),
-        distance=progress.distance,
-        energy=progress.energy,
-        energy_positive=progress.energy_positive,
-        slip_ratio=slip_ratio,
-        tilt=_tilt(cos_tilt),
-        difficulty=progress.difficulty,
-        domain=progress.domain,
+        progress=progress,
+        scalars=now,
         terms=terms,
-        status=status,
-        iterations=iterations,
-        residual=residual,
-        n_contacts=n_contacts,
         messages=messages,
     )
 
 
-def _column(task: Task, readings: Array, name: str) -> Array:
-    return readings[:, task.places[name].start]
+def _squares(change: Array) -> tuple[Quantity, Quantity]:
+    """Sums of squares over the first and over the last six of twelve entries."""
+    squared = change * change
+    columns = squared.tolist() if squared.ndim == 1 else squared.T
+    t, s = columns[:N_WHEELS], columns[N_WHEELS:]
+    return t[0] + t[1] + t[2] + t[3] + t[4] + t[5], s[0] + s[1] + s[2] + s[3] + s[4] + s[5]
 
 
-def _sum_of_six(values: Array, first: int) -> Array:
-    total = values[:, first] + values[:, first + 1]
-    for k in range(first + 2, first + N_WHEELS):
-        total = total + values[:, k]
-    return total
-
-
-def _tilt(cos_tilt: Array) -> Array:
-    # A fresh array, so that rovers in any place of a batch go the same way through NumPy's loops.
-    tilt: Array = np.arccos(np.minimum(np.maximum(cos_tilt, -1.0), 1.0))
-    return tilt
+def tilt_of(cos_tilt: Quantity) -> Quantity:
+    """Angle from the vertical, rad."""
+    return np.arccos(np.minimum(np.maximum(cos_tilt, -1.0), 1.0))

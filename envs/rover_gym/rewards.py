@@ -7,13 +7,11 @@ are numbers, or arrays with one entry a rover.
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TypeVar
+from typing import Any, TypeAlias
 
-import numpy as np
-import numpy.typing as npt
-
-#: A number, or one a rover.
-Quantity = TypeVar("Quantity", float, npt.NDArray[np.float64])
+#: A float for one rover, an array `(n,)` for n; a truth value likewise.
+Quantity: TypeAlias = Any
+Flag: TypeAlias = Any
 
 #: Default weights. With them a 7 m drive on flat ground earns about 15: 7 for the way, 10 at the goal.
 WEIGHTS: Mapping[str, float] = MappingProxyType(
@@ -66,11 +64,11 @@ def steering_change(weight: float, squared_change: Quantity) -> Quantity:
     return weight * squared_change / 6.0
 
 
-def success(weight: float, reached: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
+def success(weight: float, reached: Flag) -> Quantity:
     """`w` on the step that reaches the goal."""
-    return np.where(reached, weight, 0.0)
+    return weight * reached + 0.0  # no negative zero
 
 
-def failure(weight: float, failed: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
-    """`w` on the step that ends in a roll-over, a high-centring or a step that could not be taken."""
-    return np.where(failed, weight, 0.0)
+def failure(weight: float, failed: Flag) -> Quantity:
+    """`w` on a step that ends in a roll-over, a high-centring or a step that could not be taken."""
+    return weight * failed + 0.0

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from rover_gym.batch import Rover, RoverBatch
 from rover_gym.env import RoverEnv
+from rover_gym.observation import LARGEST, N_ACTIONS
 from rover_gym.recording import MissingExtraError
 from rover_gym.registration import MAX_EPISODE_STEPS
 from rover_gym.task import check_actions
@@ -77,7 +78,7 @@ class RoverVecEnv(VecEnv):
         Raises:
             CommandError: They have a wrong shape or an entry outside [-1, 1]; nothing has changed.
         """
-        self._actions = check_actions(actions, (self.num_envs, *self.action_space.shape))
+        self._actions = check_actions(actions, (self.num_envs, N_ACTIONS))
 
     def step_wait(self) -> VecEnvStepReturn:
         """Applies them for one control period; rovers whose episode ends start the next."""
@@ -95,7 +96,9 @@ class RoverVecEnv(VecEnv):
             for i in ended:
                 self.reset_infos[i] = self.batch.reset(i)
             observation[ended] = self.batch.observation[ended]
-        return observation, outcome.reward.astype(np.float32), dones, infos
+        # Only a rover that flies off with 1e37 m/s earns what float32 cannot hold.
+        reward = np.clip(outcome.reward, -LARGEST, LARGEST).astype(np.float32)
+        return observation, reward, dones, infos
 
     def close(self) -> None:
         """Nothing to give back."""
@@ -111,7 +114,7 @@ class RoverVecEnv(VecEnv):
             AttributeError: The attribute is one that `RoverEnv` has.
         """
         for rover in self._chosen(indices):
-            if hasattr(self.prototype, attr_name) or isinstance(getattr(Rover, attr_name, None), property):
+            if attr_name in vars(self.prototype) or hasattr(RoverEnv, attr_name) or hasattr(Rover, attr_name):
                 raise AttributeError(f"{attr_name} of a rover cannot be set; env_method('set_difficulty', ...) can")
             setattr(rover, attr_name, value)
 
@@ -133,4 +136,6 @@ class RoverVecEnv(VecEnv):
         return [self.batch.rovers[i] for i in self._get_indices(indices)]
 
     def _find(self, rover: Rover, name: str) -> Any:
-        return getattr(rover, name) if hasattr(rover, name) else getattr(self.prototype, name)
+        # Not by hasattr, which would call a property.
+        owner = rover if name in vars(rover) or name in vars(Rover) else self.prototype
+        return getattr(owner, name)

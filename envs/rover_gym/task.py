@@ -70,6 +70,8 @@ class Task:
         inverse_scale: `(size,)` entries of the observation per SI unit.
         noisy: `(size,)` standard deviation of each entry's noise; None without noise.
         places: Where things lie in a reading.
+        n_shared: So many entries a reading and an observation begin with, in the same order.
+        scalars: Where single numbers lie in a reading: the distance to the target and what follows.
     """
 
     model: RoverModel
@@ -93,6 +95,8 @@ class Task:
     inverse_scale: npt.NDArray[np.float64]
     noisy: npt.NDArray[np.float64] | None
     places: Mapping[str, slice]
+    n_shared: int
+    scalars: slice
 
     def simulate(self, terrain: Plane | SphereField, domain: Domain) -> Simulation:
         """A rover on a terrain, at rest in the zero configuration."""
@@ -226,6 +230,8 @@ def check_task(
         inverse_scale=1.0 / layout.scale,
         noisy=None if domain.observation_noise == 0.0 else domain.observation_noise * layout.unbounded,
         places=places,
+        n_shared=places["target"].stop,
+        scalars=slice(places["target"].stop - 1, places["solver"].stop),
     )
 
 

@@ -308,8 +308,8 @@ def test_observation_that_is_not_finite_terminates_openly(env: RoverEnv, value: 
     last, *_ = env.step(action_of(0.1))
     simulation = env.simulation
 
-    def reading(scan: Any) -> np.ndarray[Any, Any]:
-        row = simulation.reading(scan)
+    def reading(*arguments: Any) -> np.ndarray[Any, Any]:
+        row = simulation.reading(*arguments)
         row[simulation.reading_layout()["wheel_gaps"]] = value
         return row
 

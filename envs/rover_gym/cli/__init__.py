@@ -8,6 +8,7 @@ from rover_gym._core import __version__
 from rover_gym.cli.baseline import baseline
 from rover_gym.cli.drive import drive
 from rover_gym.cli.report import report
+from rover_gym.cli.speed import speed
 
 app = typer.Typer(
     help="Drive a six-wheel Mars rover in a nonsmooth simulator.",
@@ -18,6 +19,7 @@ app = typer.Typer(
 app.command()(drive)
 app.command()(baseline)
 app.command()(report)
+app.command()(speed)
 
 
 def _print_version(wanted: bool) -> None:

@@ -7,7 +7,7 @@ use rover_core::simulation::{Batch, Simulation as CoreSimulation};
 
 use crate::arrays::array;
 use crate::errors::{BorderError, Kind, Value};
-use crate::reading::{scan_points, slices};
+use crate::reading::{place, scan_points, slices};
 use crate::simulation::{Origin, Simulation};
 
 /// Many rovers stepped side by side on several threads.
@@ -65,8 +65,7 @@ impl SimulationBatch {
             .iter()
             .map(|simulation| simulation.borrow(py).origin.clone())
             .collect();
-        let inner =
-            Batch::new(rovers, scan_points(scan)?, threads).map_err(BorderError::from)?;
+        let inner = Batch::new(rovers, scan_points(scan)?, threads).map_err(BorderError::from)?;
         Ok(Self { inner, origins })
     }
 
@@ -122,9 +121,15 @@ impl SimulationBatch {
         Ok(rows)
     }
 
-    fn replace(&mut self, index: usize, simulation: &Simulation) -> PyResult<()> {
+    #[pyo3(signature = (index, simulation, target = None))]
+    fn replace(
+        &mut self,
+        index: usize,
+        simulation: &Simulation,
+        target: Option<[f64; 2]>,
+    ) -> PyResult<()> {
         self.inner
-            .replace(index, simulation.inner.clone())
+            .replace(index, simulation.inner.clone(), place(target)?)
             .map_err(BorderError::from)?;
         self.origins[index] = simulation.origin.clone();
         Ok(())

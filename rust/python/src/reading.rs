@@ -33,3 +33,17 @@ pub fn scan_points(given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<[f64; 2]>> 
     let flat: Vec<f64> = view.iter().copied().collect();
     Ok(flat.chunks_exact(2).map(|p| [p[0], p[1]]).collect())
 }
+
+/// A finite place on the map; the origin where nothing is given.
+pub fn place(target: Option<[f64; 2]>) -> PyResult<[f64; 2]> {
+    let target = target.unwrap_or_default();
+    match target.iter().position(|x| !x.is_finite()) {
+        None => Ok(target),
+        Some(index) => {
+            let value = target[index];
+            let field = format!("target[{index}]");
+            let message = format!("{field}: must be finite, is {value}");
+            Err(BorderError::option(&field, message, Value::Number(value)).into())
+        }
+    }
+}

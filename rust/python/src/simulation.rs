@@ -6,7 +6,7 @@ use pyo3::types::{PyDict, PyTuple};
 use rover_core::integrator::{Stabilisation, StepOptions, StepReport as CoreReport, Variant};
 use rover_core::multibody::{Energy as CoreEnergy, Model, coordinates};
 use rover_core::nalgebra::DMatrix;
-use rover_core::simulation::{ReadingLayout, Simulation as CoreSimulation};
+use rover_core::simulation::{Look, ReadingLayout, Simulation as CoreSimulation};
 use std::sync::Arc;
 
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
@@ -15,7 +15,7 @@ use crate::errors::{BorderError, Kind, Value};
 use crate::friction_contact::solver_options;
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::plane::Plane;
-use crate::reading::{scan_points, slices};
+use crate::reading::{place, scan_points, slices};
 use crate::snapshot::Snapshot;
 use crate::sphere_field::Ground;
 
@@ -448,15 +448,20 @@ impl Simulation {
         self.inner.deepest_overlap()
     }
 
-    #[pyo3(signature = (scan = None))]
+    #[pyo3(signature = (target = None, scan = None))]
     fn reading<'py>(
         &self,
         py: Python<'py>,
+        target: Option<[f64; 2]>,
         scan: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let scan = scan_points(scan)?;
+        let look = Look {
+            target: place(target)?,
+            scan: &scan,
+        };
         let mut row = vec![0.0; ReadingLayout::new(self.model_ref(), scan.len()).size()];
-        self.inner.read(&scan, &mut row);
+        self.inner.read(&look, &mut row);
         Ok(PyArray1::from_vec(py, row))
     }
 

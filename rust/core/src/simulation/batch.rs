@@ -8,19 +8,23 @@ use rayon::slice::ParallelSliceMut;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::error::BatchError;
-use super::reading::ReadingLayout;
+use super::reading::{Look, ReadingLayout};
 use super::rover::Simulation;
 use crate::integrator::StepError;
 
 /// One rover with the places for its error and its reading.
 type Place<'a> = (
-    (&'a mut Simulation, &'a mut Option<StepError>),
+    (
+        (&'a mut Simulation, &'a mut Option<StepError>),
+        &'a [f64; 2],
+    ),
     &'a mut [f64],
 );
 
 /// Rovers with the threads that step them.
 pub struct Batch {
     rovers: Vec<Simulation>,
+    targets: Vec<[f64; 2]>,
     scan: Vec<[f64; 2]>,
     layout: ReadingLayout,
     errors: Vec<Option<StepError>>,
@@ -57,6 +61,7 @@ impl Batch {
         };
         let batch = Self {
             errors: vec![None; rovers.len()],
+            targets: vec![[0.0; 2]; rovers.len()],
             pool: (threads > 1).then(|| start(threads)).transpose()?,
             rovers,
             scan,
@@ -99,17 +104,23 @@ impl Batch {
         &self.layout
     }
 
-    /// Puts another rover, with its own terrain, in a place.
+    /// Puts another rover, with its own terrain, in a place; `target` (x, z, m) is what its readings look at.
     ///
     /// # Errors
     /// `NoSuchRover`, `Differs`; nothing is changed then.
-    pub fn replace(&mut self, index: usize, rover: Simulation) -> Result<(), BatchError> {
+    pub fn replace(
+        &mut self,
+        index: usize,
+        rover: Simulation,
+        target: [f64; 2],
+    ) -> Result<(), BatchError> {
         let len = self.rovers.len();
         if index >= len {
             return Err(BatchError::NoSuchRover { index, len });
         }
         self.check(index, &rover)?;
         self.rovers[index] = rover;
+        self.targets[index] = target;
         Ok(())
     }
 
@@ -136,7 +147,11 @@ impl Batch {
         let n_wheels = self.rovers[0].model().wheels().len();
         let width = self.layout.size();
         assert_eq!(torques.len(), n_rovers * n_wheels, "one torque a wheel");
-        assert_eq!(set_points.len(), n_rovers * n_wheels, "one set-point a wheel");
+        assert_eq!(
+            set_points.len(),
+            n_rovers * n_wheels,
+            "one set-point a wheel"
+        );
         assert_eq!(rows.len(), n_rovers * width, "one row a rover");
         let is_active = |index: usize| active.is_none_or(|active| active[index]);
 
@@ -162,19 +177,24 @@ impl Batch {
         }
 
         let scan = &self.scan;
-        let move_one = |(index, ((rover, error), row)): (usize, Place<'_>)| {
+        let move_one = |(index, (((rover, error), target), row)): (usize, Place<'_>)| {
             *error = if is_active(index) {
                 rover.step(n).err()
             } else {
                 None
             };
-            rover.read(scan, row);
+            let look = Look {
+                target: *target,
+                scan,
+            };
+            rover.read(&look, row);
         };
-        let (rovers, errors) = (&mut self.rovers, &mut self.errors);
+        let (rovers, errors, targets) = (&mut self.rovers, &mut self.errors, &self.targets);
         match &self.pool {
             None => rovers
                 .iter_mut()
                 .zip(errors)
+                .zip(targets)
                 .zip(rows.chunks_exact_mut(width))
                 .enumerate()
                 .for_each(move_one),
@@ -182,8 +202,10 @@ impl Batch {
                 rovers
                     .par_iter_mut()
                     .zip(errors)
+                    .zip(targets)
                     .zip(rows.par_chunks_exact_mut(width))
                     .enumerate()
+                    .with_max_len(1) // rovers differ in cost, and a task costs little beside one
                     .for_each(move_one);
             }),
         }
@@ -197,8 +219,13 @@ impl Batch {
     pub fn read(&self, rows: &mut [f64]) {
         let width = self.layout.size();
         assert_eq!(rows.len(), self.rovers.len() * width, "one row a rover");
-        for (rover, row) in self.rovers.iter().zip(rows.chunks_exact_mut(width)) {
-            rover.read(&self.scan, row);
+        let rovers = self.rovers.iter().zip(&self.targets);
+        for ((rover, target), row) in rovers.zip(rows.chunks_exact_mut(width)) {
+            let look = Look {
+                target: *target,
+                scan: &self.scan,
+            };
+            rover.read(&look, row);
         }
     }
 

@@ -9,6 +9,6 @@ pub mod snapshot;
 
 pub use batch::Batch;
 pub use error::{BatchError, CommandError, SnapshotError};
-pub use reading::ReadingLayout;
+pub use reading::{Look, ReadingLayout};
 pub use rover::Simulation;
 pub use snapshot::Snapshot;

@@ -12,6 +12,18 @@ use crate::multibody::{Model, coordinates};
 /// Below this speed of rim and ground alike a slip ratio says nothing, m/s.
 pub const SLIP_SPEED: f64 = 0.05;
 
+/// A wheel touches when its gap is at most this, m. Resting wheels show gaps below a micrometre.
+pub const CONTACT_GAP: f64 = 1e-3;
+
+/// What a reading is asked for.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Look<'a> {
+    /// A place on the map, x and z, m.
+    pub target: [f64; 2],
+    /// Points ahead and to the right of the trunk's origin in the heading frame, m, whose heights are wanted.
+    pub scan: &'a [[f64; 2]],
+}
+
 /// Names and places of the numbers in a reading, in order. SI units.
 ///
 /// | name | size | meaning |
@@ -20,10 +32,11 @@ pub const SLIP_SPEED: f64 = 0.05;
 /// | `body_velocity` | 6 | trunk, linear then angular, in the trunk's frame |
 /// | `joint_rates` | nv − 6 | |
 /// | `wheel_gaps` | n | distance to the ground, one a wheel |
+/// | `wheel_contacts` | n | 1 where the gap is at most [`CONTACT_GAP`], else 0 |
 /// | `normal_forces` | n | mean of the last step, N |
 /// | `tangential_forces` | 2 n | rolling, lateral, wheel by wheel, N |
 /// | `ground_normal` | 3 | in the trunk's frame; zero where there is no ground plane |
-/// | `heading` | 2 | its cosine and sine |
+/// | `target` | 3 | a place on the map: ahead and to the right of the trunk's origin, and how far; horizontal |
 /// | `cos_tilt` | 1 | between the trunk's y axis and up, against gravity |
 /// | `speed` | 1 | of the trunk's origin, horizontal |
 /// | `trunk_force` | 1 | mean normal force of the last step on all that is no wheel, N |
@@ -49,10 +62,11 @@ impl ReadingLayout {
             ("body_velocity", 6),
             ("joint_rates", model.n_joints()),
             ("wheel_gaps", n),
+            ("wheel_contacts", n),
             ("normal_forces", n),
             ("tangential_forces", 2 * n),
             ("ground_normal", 3),
-            ("heading", 2),
+            ("target", 3),
             ("cos_tilt", 1),
             ("speed", 1),
             ("trunk_force", 1),
@@ -103,11 +117,9 @@ impl Row<'_> {
 impl Simulation {
     /// Writes a reading in the order of [`ReadingLayout`].
     ///
-    /// `scan`: points ahead and to the right of the trunk's origin in the heading frame (m) whose heights are wanted.
-    ///
     /// # Panics
     /// If `out` has not the size of the layout of this model and scan.
-    pub fn read(&self, scan: &[[f64; 2]], out: &mut [f64]) {
+    pub fn read(&self, look: &Look<'_>, out: &mut [f64]) {
         let model = self.model();
         let mut row = Row { out, filled: 0 };
         let state = self.state();
@@ -128,7 +140,10 @@ impl Simulation {
         row.put(angular.iter().copied());
         row.put(v[6..].iter().copied());
 
-        row.put(self.wheel_contacts().iter().map(|contact| contact.gap));
+        let wheels = self.wheel_contacts();
+        row.put(wheels.iter().map(|wheel| wheel.gap));
+        let touches = |gap: f64| f64::from(u8::from(gap <= CONTACT_GAP));
+        row.put(wheels.iter().map(|wheel| touches(wheel.gap)));
         let forces = self.wheel_forces();
         row.put(forces.iter().map(|force| force[0]));
         row.put(forces.iter().flat_map(|force| [force[1], force[2]]));
@@ -137,7 +152,12 @@ impl Simulation {
         row.put(normal.iter().copied());
 
         let (sine, cosine) = heading.sin_cos();
-        row.put([cosine, sine]);
+        let (dx, dz) = (look.target[0] - x, look.target[1] - z);
+        row.put([
+            dx * cosine - dz * sine,
+            dx * sine + dz * cosine,
+            dx.hypot(dz),
+        ]);
         let gravity = &self.options().gravity;
         let up = gravity.try_normalize(0.0).map_or(Vector3::y(), |g| -g);
         row.put([
@@ -159,7 +179,7 @@ impl Simulation {
             report.n_contacts as f64,
         ]);
 
-        for [ahead, right] in scan {
+        for [ahead, right] in look.scan {
             let at_x = x + (ahead * cosine + right * sine);
             let at_z = z + (right * cosine - ahead * sine);
             let height = self.terrain().height(at_x, at_z);
