@@ -47,6 +47,8 @@ def train(
     """Train and print the throughput."""
     # One thread a process: the networks are small.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+    # Ray's own default lets its workers wait for everything else on the machine.
+    os.environ.setdefault("RAY_worker_niceness", "0")
     ray.init(address=address, num_cpus=None if address else max(3, os.cpu_count() or 1), log_to_driver=False)
     register_env("Rover", make_rover)
     environment: dict[str, Any] = {"command": {"repeat": REPEAT}, "max_episode_steps": 600}

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from rover_gym.baseline import ENDS, wilson_interval
 from rover_gym.batch import RoverBatch
 from rover_gym.episodes import Policy
+from rover_gym.progress import tilt_of
 from rover_gym.registration import MAX_EPISODE_STEPS
 
 Interval = tuple[float, float]
@@ -97,14 +98,15 @@ def drive_all(
         observation = outcome.observation
         now = _places(batch, observation)
         sums[:, 0] += np.linalg.norm(now - places, axis=1)
-        sums[:, 1] += outcome.slip_ratio
-        sums[:, 2] += outcome.tilt
-        np.maximum(sums[:, 3], outcome.tilt, out=sums[:, 3])
+        tilt = tilt_of(outcome.scalars.cos_tilt)
+        sums[:, 1] += outcome.scalars.slip_ratio
+        sums[:, 2] += tilt
+        np.maximum(sums[:, 3], tilt, out=sums[:, 3])
         places = now
         steps += 1
         for i in np.flatnonzero(active & (terminated | (steps >= limit))).tolist():
             info = outcome.info(i)
-            way, slip, tilt, largest = sums[i].tolist()
+            way, slip, lean, largest = sums[i].tolist()
             done[running[i]] = Drive(
                 seed=running[i],
                 end=info["termination"] or "time",
@@ -112,7 +114,7 @@ def drive_all(
                 distance=way,
                 energy=info["energy"],
                 slip=slip / steps[i].item(),
-                tilt=tilt / steps[i].item(),
+                tilt=lean / steps[i].item(),
                 max_tilt=largest,
             )
             progress(len(done))
