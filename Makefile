@@ -32,7 +32,7 @@ lint: $(STAMPS)/test ## formatting and lint, Rust and Python
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 
-types: $(STAMPS)/test $(STAMPS)/core ## mypy, and the stub against the compiled module
+types: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core ## mypy, and the stub against the compiled module
 	$(BIN)/mypy
 	MYPYPATH=envs $(BIN)/stubtest rover_gym._core
 

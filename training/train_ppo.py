@@ -69,7 +69,7 @@ def train(
         envs = VecNormalize.load(str(checkpoints / f"{latest['name']}.pkl"), rovers)
         model = PPO.load(checkpoints / f"{latest['name']}.zip", env=envs, device="cpu")
         model.set_random_seed(stream)
-    model.set_logger(configure(str(folder / "log"), ["csv", "tensorboard"]))
+    model.set_logger(configure(str(folder / (f"log-{part}" if part else "log")), ["csv", "tensorboard"]))
 
     curriculum = None
     if settings.curriculum is not None:
@@ -92,6 +92,7 @@ def train(
         progress_bar=progress,
     )
 
+    model.logger.close()
     checkpoint.write()
     source = {
         "algorithm": "stable-baselines3 PPO",

@@ -134,6 +134,20 @@ def policy_folder(terrain: str) -> Path:
     return FOLDER / SHIPPED[terrain]
 
 
+def find_policy(policy: str, terrain: str) -> Path | None:
+    """The folder of "trained", the package's own for a terrain, or of a path; None for "pd", the baseline.
+
+    Raises:
+        OptionError: There is no policy.
+    """
+    if policy == "pd":
+        return None
+    folder = policy_folder(terrain) if policy == "trained" else Path(policy)
+    if not (folder / "policy.json").exists():
+        refuse(OptionError, "policy", policy, "must be 'pd', 'trained' or the folder of a trained policy")
+    return folder
+
+
 def policy_arguments(folder: Path) -> dict[str, Any]:
     """The arguments with which a policy's environment must be made."""
     arguments = dict(PolicyCard.read(folder / "policy.json").environment)

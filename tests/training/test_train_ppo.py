@@ -34,7 +34,7 @@ def a_config(folder: Path, name: str) -> Path:
         "environment": {**ENVIRONMENTS[name], "control_frequency": 10, "time_step": 0.02},
         "total_steps": 2048,
         "num_envs": 8,
-        "max_episode_steps": 40,
+        "max_episode_steps": 60,
         "pool": 2 if name == "rocks" else 1,
         "guided": name == "rocks",
         "ppo": {"n_steps": 64, "batch_size": 128, "n_epochs": 2, "net_arch": [16, 16]},
@@ -71,8 +71,8 @@ def test_the_run_leaves_what_it_was(run: Path) -> None:
 def test_returns_are_finite_and_the_curve_has_every_episode(run: Path) -> None:
     lines = (run / "curve.monitor.csv").read_text(encoding="utf-8").splitlines()[1:]
     rows = list(csv.DictReader(lines))
-    # 2048 decisions of 2 periods, episodes of at most 40.
-    assert len(rows) >= 2048 * 2 // 40 - 8
+    # 2048 decisions of 2 periods, episodes of at most 60.
+    assert len(rows) >= 2048 * 2 // 60 - 8
     assert np.isfinite([float(row["r"]) for row in rows]).all()
     evaluations = np.load(run / "evaluations.npz")
     assert evaluations["timesteps"].tolist() == [1024, 2048]

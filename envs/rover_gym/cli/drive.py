@@ -13,15 +13,13 @@ import typer
 from rich.progress import Progress
 from rich.table import Table
 
-from rover_gym._core import OptionError
 from rover_gym.cli.console import console, plain_errors, progress_bar, say_path
 from rover_gym.env import RoverEnv
 from rover_gym.episodes import Episode, Policy, run_episode
 from rover_gym.policy import PDPolicy
 from rover_gym.recording import Channel, Recorder, Sampler
 from rover_gym.rewards import WEIGHTS
-from rover_gym.trained import TrainedPolicy, policy_arguments, policy_folder
-from rover_gym.validation import refuse
+from rover_gym.trained import TrainedPolicy, find_policy, policy_arguments
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
 
@@ -70,7 +68,7 @@ def drive(
     arguments |= {} if uphill is None else {"uphill_deg": uphill}
     arguments |= {} if heading is None else {"heading_deg": heading}
     options = {} if goal is None else {"goal": goal}
-    folder = _policy_folder(policy, terrain)
+    folder = find_policy(policy, terrain)
     arguments |= {} if folder is None else policy_arguments(folder)
     env = gym.make("Rover-v0", max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments)
     driver: Policy = PDPolicy(env) if folder is None else TrainedPolicy.load(env, folder)
@@ -168,16 +166,6 @@ class _Tape:
 def _rocks(rover: RoverEnv) -> dict[str, Any]:
     """What `SphereField.rocks` was made from, for a scene's description."""
     return {} if rover.rocks is None else {"rocks": asdict(rover.rocks)}
-
-
-def _policy_folder(policy: str, terrain: str) -> Path | None:
-    """The folder of a trained policy; None for the baseline."""
-    if policy == "pd":
-        return None
-    folder = policy_folder(terrain) if policy == "trained" else Path(policy)
-    if not (folder / "policy.json").exists():
-        refuse(OptionError, "policy", policy, "must be 'pd', 'trained' or the folder of a trained policy")
-    return folder
 
 
 def _table(results: Sequence[Episode], name: str) -> Table:

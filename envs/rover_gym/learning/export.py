@@ -22,8 +22,6 @@ def network_of(model: OnPolicyAlgorithm, normalisation: VecNormalize) -> Network
     layers = [layer for layer in policy.mlp_extractor.policy_net if isinstance(layer, torch.nn.Linear)]
     layers.append(policy.action_net)  # type: ignore[arg-type]
     statistics = normalisation.obs_rms
-    if isinstance(statistics, dict):  # of a dictionary of observations
-        raise TypeError(f"one normalised observation is needed, not {sorted(statistics)}")
     return Network(
         mean=statistics.mean.astype(np.float32),
         deviation=np.sqrt(statistics.var + normalisation.epsilon).astype(np.float32),
