@@ -32,7 +32,7 @@ SEED_STRIDE = 1000
 @plain_errors
 def train(
     config: Annotated[Path, typer.Option(exists=True, dir_okay=False, help="YAML file; see training/configs.")],
-    seed: Annotated[int, typer.Option(min=0, max=499, help="Seed of network, exploration and fields.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, max=498, help="Seed of network, exploration and fields.")] = 1,
     output: Annotated[
         Path | None, typer.Option(file_okay=False, help="The run's folder; runs/train/NAME-seedN if not given.")
     ] = None,
