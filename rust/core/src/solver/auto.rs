@@ -6,13 +6,13 @@ use super::report::{SolveReport, SolveStatus};
 use super::workspace::SolverWorkspace;
 use super::{Method, SolverOptions, newton, nsgs, pivoting, proximal};
 use crate::law::coulomb::natural_map;
-use crate::problem::{FrictionContactProblem, Residual, contact_scale, evaluate_contact};
+use crate::problem::{FrictionContactProblem, Operator, Residual, evaluate_contact};
 
 /// The problem's slices and the scales derived from them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Prepared<'a> {
-    /// Delassus operator, row-major `n × n`, 1/kg.
-    pub W: &'a [f64],
+    /// Delassus operator, 1/kg.
+    pub W: Operator<'a>,
     /// Free velocity (n), m/s.
     pub q: &'a [f64],
     /// Friction coefficients.
@@ -28,10 +28,11 @@ pub(super) struct Prepared<'a> {
 impl<'a> Prepared<'a> {
     fn new<const D: usize>(
         problem: &FrictionContactProblem<'a>,
+        W: Operator<'a>,
         workspace: &mut SolverWorkspace,
     ) -> Self {
-        let (W, q, mu, n) = (
-            problem.operator(),
+        let dimension = problem.dimension();
+        let (q, mu, n) = (
             problem.free_velocity(),
             problem.friction_coefficients(),
             problem.n_unknowns(),
@@ -39,13 +40,14 @@ impl<'a> Prepared<'a> {
         let mut trace = 0.0;
         let mut data = 0.0;
         for i in 0..mu.len() {
-            let rho = contact_scale(problem, i);
-            workspace.rho[i] = rho;
-            let normal = W[D * i * (n + 1)];
+            let normal = W.diagonal(dimension, n, i, 0);
             let mut tangential = 0.0;
             for k in 1..D {
-                tangential += W[(D * i + k) * (n + 1)];
+                tangential += W.diagonal(dimension, n, i, k);
             }
+            let own = normal + tangential;
+            let rho = if own > 0.0 { D as f64 / own } else { 1.0 };
+            workspace.rho[i] = rho;
             trace += normal + tangential;
             tangential /= (D - 1) as f64;
             workspace.rho_modes[i] = [
@@ -83,12 +85,7 @@ impl<'a> Prepared<'a> {
     /// Diagonal block of contact `i`, 1/kg.
     #[inline]
     pub fn block<const D: usize>(&self, i: usize) -> [[f64; D]; D] {
-        let mut block = [[0.0; D]; D];
-        for (r, row) in block.iter_mut().enumerate() {
-            let start = (D * i + r) * self.n + D * i;
-            row.copy_from_slice(&self.W[start..start + D]);
-        }
-        block
+        self.W.block(self.n, i)
     }
 
     /// Residual of `(p, u)`; the same numbers as [`crate::problem::evaluate`], with the scales already at hand.
@@ -143,11 +140,7 @@ impl<'a> Prepared<'a> {
         self.mu.iter().zip(rho).enumerate().all(|(i, (&mu, &rho))| {
             let violation = evaluate_contact::<D>(p, u, D * i, mu, rho).sqrt() / rho;
             let size: f64 = (D * i..D * (i + 1))
-                .map(|r| {
-                    let row = &self.W[r * self.n..(r + 1) * self.n];
-                    let terms: f64 = row.iter().zip(p).map(|(w, p)| (w * p).abs()).sum();
-                    terms + self.q[r].abs()
-                })
+                .map(|r| self.W.row_magnitude(r, p) + self.q[r].abs())
                 .sum();
             violation <= 4.0 * f64::EPSILON * size
         })
@@ -162,13 +155,29 @@ pub(super) fn solve_in<const D: usize>(
     u: &mut [f64],
     workspace: &mut SolverWorkspace,
 ) -> SolveReport {
-    workspace.fit(problem);
     if p.iter().any(|x| !x.is_finite()) {
         p.fill(0.0);
     }
-    let data = Prepared::new::<D>(problem, workspace);
+    // Taken out of the workspace while the solve borrows it.
+    let mut storage = std::mem::take(&mut workspace.storage);
+    let W = storage.choose(problem, options.direct_contacts);
+    workspace.fit(problem.n_contacts(), problem.n_unknowns(), W);
+    let data = Prepared::new::<D>(problem, W, workspace);
+    let report = judge::<D>(&data, options, p, u, workspace);
+    workspace.storage = storage;
+    report
+}
+
+/// Runs the method and judges what it returns.
+fn judge<const D: usize>(
+    data: &Prepared<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    workspace: &mut SolverWorkspace,
+) -> SolveReport {
     let mut iterations = 0;
-    let (method, status, residual) = run::<D>(&data, options, p, u, workspace, &mut iterations);
+    let (method, status, residual) = run::<D>(data, options, p, u, workspace, &mut iterations);
     // An infinite velocity can hide from the natural map of an open contact.
     let is_finite = residual.is_finite() && p.iter().chain(u.iter()).all(|x| x.is_finite());
     if status == SolveStatus::NonFinite || !is_finite {

@@ -10,6 +10,7 @@
 //! Every report is computed from the returned impulse, never from inside an iteration.
 
 mod auto;
+mod block_lu;
 mod dense;
 mod modes;
 mod newton;
@@ -20,6 +21,7 @@ mod pivoting;
 mod proximal;
 mod reduced_system;
 mod report;
+mod storage;
 mod workspace;
 
 pub use options::{Method, SolverOptions};

@@ -10,7 +10,7 @@ use super::reduced_system::{self, Factors, System};
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
 use super::{SolverOptions, auto::Prepared, nsgs};
-use crate::problem::{Residual, multiply_add};
+use crate::problem::Residual;
 
 /// Most full steps before the safeguarded method takes over. Measured on the recorded problems: modes that full steps find at
 /// all are found within about ten.
@@ -123,7 +123,7 @@ fn give_best(
     workspace: &SolverWorkspace,
 ) -> (SolveStatus, Residual) {
     p.copy_from_slice(&workspace.best);
-    multiply_add(data.W, p, data.q, u);
+    data.W.multiply_add(p, data.q, u);
     (SolveStatus::Stalled, best)
 }
 
@@ -149,7 +149,7 @@ pub(super) fn full_steps<const D: usize>(
         last: f64::INFINITY,
     };
     workspace.centre.copy_from_slice(p);
-    multiply_add(data.W, p, data.q, u);
+    data.W.multiply_add(p, data.q, u);
     let recalled = modes::recall::<D>(data.mu, p, u, &mut workspace.contacts);
     let is_warm = p.iter().any(|x| x.abs() > 0.0);
     let mut step = 0;
@@ -219,7 +219,7 @@ pub(super) fn full_steps<const D: usize>(
             reduced_system::newton_point::<D>(data, system, p, u, workspace);
             p.copy_from_slice(&workspace.trial);
         }
-        multiply_add(data.W, p, data.q, u);
+        data.W.multiply_add(p, data.q, u);
         step += 1;
     }
 }
