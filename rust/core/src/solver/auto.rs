@@ -1,5 +1,6 @@
 //! The choice of method, and what all methods share: prepared scales, the acceptance test, the final report.
 
+use super::methods::{Algorithm, Outcome};
 use super::modes::Proximal;
 use super::nsgs::Budget;
 use super::report::{SolveReport, SolveStatus};
@@ -148,7 +149,7 @@ impl<'a> Prepared<'a> {
 }
 
 /// Solves in dimension `D`, see [`solve`](super::solve).
-pub(super) fn solve_in<const D: usize>(
+pub(super) fn solve_in<A: Algorithm, const D: usize>(
     problem: &FrictionContactProblem<'_>,
     options: &SolverOptions,
     p: &mut [f64],
@@ -163,13 +164,13 @@ pub(super) fn solve_in<const D: usize>(
     let W = storage.choose(problem, options.direct_contacts);
     workspace.fit(problem.n_contacts(), problem.n_unknowns(), W);
     let data = Prepared::new::<D>(problem, W, workspace);
-    let report = judge::<D>(&data, options, p, u, workspace);
+    let report = judge::<A, D>(&data, options, p, u, workspace);
     workspace.storage = storage;
     report
 }
 
 /// Runs the method and judges what it returns.
-fn judge<const D: usize>(
+fn judge<A: Algorithm, const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
     p: &mut [f64],
@@ -177,7 +178,7 @@ fn judge<const D: usize>(
     workspace: &mut SolverWorkspace,
 ) -> SolveReport {
     let mut iterations = 0;
-    let (method, status, residual) = run::<D>(data, options, p, u, workspace, &mut iterations);
+    let (method, status, residual) = A::run::<D>(data, options, p, u, workspace, &mut iterations);
     // An infinite velocity can hide from the natural map of an open contact.
     let is_finite = residual.is_finite() && p.iter().chain(u.iter()).all(|x| x.is_finite());
     if status == SolveStatus::NonFinite || !is_finite {
@@ -200,86 +201,91 @@ fn judge<const D: usize>(
     }
 }
 
-fn run<const D: usize>(
+/// Sweeps of [`Method::Auto`] over few contacts from rest, only to find the modes.
+const COLD_SWEEPS: usize = 3;
+
+/// Most sweeps of [`Method::Auto`] over many contacts before Newton: dense, a Newton step costs about `n` of them, block-sparse about fifty.
+fn sweep_budget(data: &Prepared<'_>) -> usize {
+    match data.W {
+        Operator::Dense(_) => 2 * data.n,
+        Operator::BlockSparse(_) => SPARSE_SWEEPS,
+    }
+}
+const SPARSE_SWEEPS: usize = 200;
+
+/// [`Method::Auto`]: what is cheap first, what is robust last.
+pub(super) fn escalate<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
     workspace: &mut SolverWorkspace,
     iterations: &mut usize,
-) -> (Method, SolveStatus, Residual) {
-    match options.method {
-        Method::GaussSeidel => {
-            let budget = Budget {
-                sweeps: options.max_sweeps,
-                predict: false,
-            };
-            workspace.start.copy_from_slice(p);
-            let (status, residual) =
-                nsgs::sweeps::<D>(data, options, budget, p, u, workspace, iterations);
-            (Method::GaussSeidel, status, residual)
+) -> Outcome {
+    workspace.start.copy_from_slice(p);
+    let steps = newton::FULL_STEPS.min(options.max_newton_steps);
+    let full = newton::Plan {
+        max_steps: steps,
+        only_modes: false,
+    };
+    let is_few = data.mu.len() <= options.direct_contacts;
+    let is_warm = p.iter().any(|x| x.abs() > 0.0);
+    if !is_few {
+        let budget = Budget {
+            sweeps: sweep_budget(data),
+            predict: true,
+        };
+        let (status, residual) =
+            nsgs::sweeps::<D>(data, options, budget, p, u, workspace, iterations);
+        if matches!(status, SolveStatus::Converged | SolveStatus::NonFinite) {
+            return (Method::GaussSeidel, status, residual);
         }
-        Method::Newton => {
-            let (status, residual) = newton::full_steps::<D>(
-                data,
-                options,
-                options.max_newton_steps,
-                p,
-                u,
-                workspace,
-                iterations,
-            );
-            (Method::Newton, status, residual)
+        workspace.start.copy_from_slice(p);
+    } else if is_warm {
+        // Where the modes of the last step serve, this is the end; where they do not, more full steps seldom help.
+        let few = newton::Plan {
+            max_steps: newton::WARM_STEPS.min(steps),
+            ..full
+        };
+        let (status, residual) =
+            newton::full_steps::<D>(data, options, few, p, u, workspace, iterations);
+        if status == SolveStatus::Converged {
+            return (Method::Newton, status, residual);
         }
-        Method::ProximalPoint => {
-            workspace.start.copy_from_slice(p);
-            let (status, residual) =
-                proximal::solve::<D>(data, options, p, u, workspace, iterations);
-            (Method::ProximalPoint, status, residual)
+        p.copy_from_slice(&workspace.start);
+        let (status, residual) = pivoting::pivots::<D>(data, options, p, u, workspace, iterations);
+        if status == SolveStatus::Converged {
+            return (Method::Newton, status, residual);
         }
-        Method::Auto => {
-            workspace.start.copy_from_slice(p);
-            if data.mu.len() > options.direct_contacts {
-                // A Newton step costs as much as about n sweeps.
-                let budget = Budget {
-                    sweeps: 2 * data.n,
-                    predict: true,
-                };
-                let (status, residual) =
-                    nsgs::sweeps::<D>(data, options, budget, p, u, workspace, iterations);
-                if matches!(status, SolveStatus::Converged | SolveStatus::NonFinite) {
-                    return (Method::GaussSeidel, status, residual);
-                }
-                workspace.start.copy_from_slice(p);
-            }
-            let is_warm = workspace.start.iter().any(|x| x.abs() > 0.0);
-            let steps = newton::FULL_STEPS.min(options.max_newton_steps);
-            if is_warm && data.mu.len() <= options.direct_contacts {
-                // Where the modes of the last step serve, this is the end; where they do not, more full steps seldom help.
-                let few = newton::WARM_STEPS.min(steps);
-                let (status, residual) =
-                    newton::full_steps::<D>(data, options, few, p, u, workspace, iterations);
-                if status == SolveStatus::Converged {
-                    return (Method::Newton, status, residual);
-                }
-                p.copy_from_slice(&workspace.start);
-                let (status, residual) =
-                    pivoting::pivots::<D>(data, options, p, u, workspace, iterations);
-                if status == SolveStatus::Converged {
-                    return (Method::Newton, status, residual);
-                }
-                // A warm start can mislead where zero does not.
-                p.fill(0.0);
-            }
-            let (status, residual) =
-                newton::full_steps::<D>(data, options, steps, p, u, workspace, iterations);
-            if status == SolveStatus::Converged {
-                return (Method::Newton, status, residual);
-            }
-            p.copy_from_slice(&workspace.start);
-            let (status, residual) =
-                proximal::solve::<D>(data, options, p, u, workspace, iterations);
-            (Method::ProximalPoint, status, residual)
+        // A warm start can mislead where zero does not.
+        p.fill(0.0);
+    } else if data.mu.len() > 0 {
+        // Sweeps depend on the order of the contacts; the answer does not, since only the modes are taken from them.
+        let prox = Proximal {
+            alpha: 0.0,
+            centre: &workspace.start,
+        };
+        for _ in 0..COLD_SWEEPS {
+            nsgs::sweep::<D>(data, prox, p);
         }
+        *iterations += COLD_SWEEPS;
+        let guided = newton::Plan {
+            max_steps: newton::WARM_STEPS.min(steps),
+            only_modes: true,
+        };
+        let (status, residual) =
+            newton::full_steps::<D>(data, options, guided, p, u, workspace, iterations);
+        if status == SolveStatus::Converged {
+            return (Method::Newton, status, residual);
+        }
+        p.fill(0.0);
     }
+    let (status, residual) =
+        newton::full_steps::<D>(data, options, full, p, u, workspace, iterations);
+    if status == SolveStatus::Converged {
+        return (Method::Newton, status, residual);
+    }
+    p.copy_from_slice(&workspace.start);
+    let (status, residual) = proximal::solve::<D>(data, options, p, u, workspace, iterations);
+    (Method::ProximalPoint, status, residual)
 }

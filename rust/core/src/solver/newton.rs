@@ -127,6 +127,15 @@ fn give_best(
     (SolveStatus::Stalled, best)
 }
 
+/// How [`full_steps`] begins and how long it goes on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plan {
+    /// Most steps.
+    pub max_steps: usize,
+    /// Whether `p` only tells the modes, and the search starts from zero with them.
+    pub only_modes: bool,
+}
+
 /// Full Newton steps from `p`; in steady motion two or three of them solve the step.
 ///
 /// The proximal centre stays at the start until the modes settle and follows the iterate then, so that the last steps refine what the
@@ -134,7 +143,7 @@ fn give_best(
 pub(super) fn full_steps<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
-    max_steps: usize,
+    plan: Plan,
     p: &mut [f64],
     u: &mut [f64],
     workspace: &mut SolverWorkspace,
@@ -148,10 +157,14 @@ pub(super) fn full_steps<const D: usize>(
         settled: 0,
         last: f64::INFINITY,
     };
-    workspace.centre.copy_from_slice(p);
     data.W.multiply_add(p, data.q, u);
     let recalled = modes::recall::<D>(data.mu, p, u, &mut workspace.contacts);
     let is_warm = p.iter().any(|x| x.abs() > 0.0);
+    if plan.only_modes {
+        p.fill(0.0);
+        u.copy_from_slice(data.q);
+    }
+    workspace.centre.copy_from_slice(p);
     let mut step = 0;
     let mut best = Residual::UNSOLVED;
     loop {
@@ -176,7 +189,7 @@ pub(super) fn full_steps<const D: usize>(
         {
             return (SolveStatus::Converged, residual);
         }
-        if step == max_steps {
+        if step == plan.max_steps {
             return give_best(data, best, p, u, workspace);
         }
         course.last = residual.relative;

@@ -13,6 +13,8 @@ use crate::problem::Operator;
 pub struct SolverWorkspace {
     /// Scale of each contact in the residual, kg.
     pub(super) rho: Vec<f64>,
+    /// Inverse of the scales, 1/kg: ADMM's penalty at `σ = 1`.
+    pub(super) weights: Vec<f64>,
     /// Scales of the mode prediction, normal and tangential, kg.
     pub(super) rho_modes: Vec<[f64; 2]>,
     /// Mode and frame of each contact in the current linearisation.
@@ -82,6 +84,7 @@ impl SolverWorkspace {
 
     fn resize(&mut self, n_contacts: usize, n: usize) {
         self.rho.resize(n_contacts, 0.0);
+        self.weights.resize(n_contacts, 0.0);
         self.rho_modes.resize(n_contacts, [0.0; 2]);
         self.contacts.resize(n_contacts, Linearised::default());
         for buffer in [
