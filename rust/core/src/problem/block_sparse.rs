@@ -130,6 +130,22 @@ impl BlockSparseDelassus {
         }
     }
 
+    /// The rows of some contacts that are coupled with one another only; `place[i]` is where contact `i` goes. `contacts` ascends.
+    pub(crate) fn restricted(&self, contacts: &[usize], place: &[usize]) -> Self {
+        let mut part = Self::default();
+        part.clear(self.components);
+        for &i in contacts {
+            let first = part.columns.len();
+            part.diagonal
+                .push(first + self.diagonal[i] - self.row_starts[i]);
+            part.columns
+                .extend(self.neighbours(i).iter().map(|&j| place[j]));
+            part.blocks.extend_from_slice(self.row(i));
+            part.row_starts.push(part.columns.len());
+        }
+        part
+    }
+
     fn clear(&mut self, components: usize) {
         self.components = components;
         for list in [

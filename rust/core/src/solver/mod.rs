@@ -16,6 +16,7 @@ mod admm;
 mod auto;
 mod block_lu;
 mod dense;
+mod islands;
 mod methods;
 mod modes;
 mod newton;

@@ -6,7 +6,7 @@
 use crate::problem::{BlockSparseDelassus, FrictionContactProblem, Operator};
 
 /// Largest share of blocks that the sparse storage is chosen for.
-const SPARSE_SHARE: f64 = 0.25;
+const SPARSE_SHARE: f64 = 0.15;
 
 /// Memory for the storage that the caller did not choose.
 #[derive(Clone, Debug, Default)]

@@ -1,6 +1,7 @@
 //! Scratch memory of a solve, kept between solves so that none of them allocates.
 
 use super::block_lu::BlockLu;
+use super::islands::Islands;
 use super::modes::Linearised;
 use super::storage::Storage;
 use crate::problem::Operator;
@@ -46,6 +47,8 @@ pub struct SolverWorkspace {
     pub(super) is_analysed: bool,
     /// `W` in the storage that suits its size.
     pub(super) storage: Storage,
+    /// Problems of the islands.
+    pub(super) islands: Option<Box<Islands>>,
 }
 
 impl SolverWorkspace {
