@@ -159,10 +159,18 @@ pub(super) fn solve_in<A: Algorithm, const D: usize>(
     if p.iter().any(|x| !x.is_finite()) {
         p.fill(0.0);
     }
+    let (n_contacts, n) = (problem.n_contacts(), problem.n_unknowns());
+    if let W @ Operator::Dense(_) = problem.operator()
+        && n_contacts <= options.direct_contacts
+    {
+        workspace.fit(n_contacts, n, W);
+        let data = Prepared::new::<D>(problem, W, workspace);
+        return judge::<A, D>(&data, options, p, u, workspace);
+    }
     // Taken out of the workspace while the solve borrows it.
     let mut storage = std::mem::take(&mut workspace.storage);
     let W = storage.choose(problem, options.direct_contacts);
-    workspace.fit(problem.n_contacts(), problem.n_unknowns(), W);
+    workspace.fit(n_contacts, n, W);
     let data = Prepared::new::<D>(problem, W, workspace);
     let report = judge::<A, D>(&data, options, p, u, workspace);
     workspace.storage = storage;
