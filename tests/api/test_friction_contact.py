@@ -80,7 +80,9 @@ def test_block_rows_and_an_unsymmetric_operator_are_taken_as_they_are(solver, di
     impulses = np.tile([1.0, 0.2, -0.1][:d], 2)
     sparse = ([0, 2, 4], [0, 1, 0, 1], blocks)
     for operator in (W, sparse):
-        answer = rover_gym.solve_friction_contact(operator, -W @ impulses, [0.5, 0.5], 1e-10, dimension=d, solver=solver)
+        answer = rover_gym.solve_friction_contact(
+            operator, -W @ impulses, [0.5, 0.5], 1e-10, dimension=d, solver=solver
+        )
         assert answer.report.is_converged
         assert answer.report.law == "coulomb"
         np.testing.assert_allclose(answer.impulses.ravel(), impulses, atol=1e-8)
