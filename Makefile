@@ -13,7 +13,7 @@ UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
 
-.PHONY: help demo test check lint types format test-rust test-slow test-python docs bench train train-rllib pins clean
+.PHONY: help demo test check lint types format test-rust test-slow test-python docs bench profiles train train-rllib pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -73,6 +73,9 @@ train: $(STAMPS)/train $(STAMPS)/demo $(STAMPS)/core ## train a policy for the r
 train-rllib: ## train Rover-v0 on a local Ray with 1 and with 2 workers; Ray wants a virtual environment of its own
 	@$(MAKE) --no-print-directory VENV=$(VENV)-rllib $(VENV)-rllib/stamps/ray
 	$(VENV)-rllib/bin/python training/train_rllib.py --workers 1 --workers 2 --iterations 4
+
+profiles: $(STAMPS)/test $(STAMPS)/core ## performance profiles of the contact solvers, with Siconos' where it is installed
+	$(BIN)/python tests/comparison/solver_profiles.py
 
 pins: $(STAMPS)/venv ## resolve requirements/*.txt anew from pyproject.toml
 	$(call pin,demo) --extra demo --group build
