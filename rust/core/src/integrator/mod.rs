@@ -8,6 +8,7 @@
 //! Both treat impacts and persistent contact by the same law at velocity level and search for no event.
 //! What the velocity law leaves of penetration, [`position_projection`] removes.
 
+pub mod accuracy;
 pub mod command;
 pub mod error;
 pub mod fitted_theta;
@@ -19,6 +20,7 @@ pub mod probe;
 pub mod report;
 pub mod workspace;
 
+pub use accuracy::Accuracy;
 pub use command::{Command, HeldJoint};
 pub use error::{OptionsError, StepError};
 pub use options::{Stabilisation, StepOptions, Variant};
