@@ -18,7 +18,6 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 
 from comparison.peers import Variant, load
@@ -154,15 +153,6 @@ def versions() -> dict[str, str]:
         except metadata.PackageNotFoundError:
             continue
     return found
-
-
-def pareto(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """(cost, error) pairs that no other pair beats in both, by rising cost."""
-    front: list[tuple[float, float]] = []
-    for cost, error in sorted(points):
-        if np.isfinite(error) and (not front or error < front[-1][1]):
-            front.append((cost, error))
-    return front
 
 
 if __name__ == "__main__":

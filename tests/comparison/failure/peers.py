@@ -84,12 +84,12 @@ def wheel_spin(variant: Variant) -> Iterator[Finding]:
 
 def drop(variant: Variant) -> Iterator[Finding]:
     """From 2 m: how far the trunk goes below its height at rest, which is how deep the wheels go."""
-    runner = _build(variant, _flat("drop", RoverModel().to_dict(), 2.35, Phase(1.0)))
-    lowest = 2.35
-    for _ in range(steps_in(1.0, STEP)):
-        runner.advance(1)
-        lowest = min(lowest, float(runner.position()[1]))
-    depth = max(0.35 - lowest, 0.0)
+    depth = 0.0
+    for extra in (0.0, 0.004, 0.008):  # the impact falls elsewhere in its step
+        runner = _build(variant, _flat("drop", RoverModel().to_dict(), 2.35 + extra, Phase(1.0)))
+        for _ in range(steps_in(1.0, STEP)):
+            runner.advance(1)
+            depth = max(depth, 0.35 - float(runner.position()[1]))
     yield Finding("dropped from 2 m, depth", "0; half a step's way is 6 mm", variant.engine + ", " + variant.name, depth, 7e-3, "m")
 
 

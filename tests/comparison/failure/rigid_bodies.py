@@ -40,7 +40,7 @@ def relaxed(W: Array, q: Array, mu: Array, initial: Array | None) -> tuple[Array
         for k in range(n):
             new[k] = onto_cone(new[k], mu[k])
         change, p = np.abs(new - p).max(), new
-        if change < 1e-15 * max(np.abs(p).max(), 1e-300):
+        if change <= 1e-13 * max(np.abs(p).max(), 1e-300):
             return p, True, iteration
     return p, False, 20_000
 
