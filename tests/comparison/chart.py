@@ -1,19 +1,16 @@
 """Error against CPU time, every engine beside every other: `python -m comparison.chart [--quick]`.
 
 All engines of one scene and one step run one after the other, so that a busy machine is busy for all; a run that took
-less than a second is repeated and the least time kept. One thread. Writes `chart.json` and the pictures.
+less than a second is repeated and the least time kept. One thread. Writes `chart.json`, the pictures and the tables of
+`docs/comparison.md`.
 """
-
-import os
-
-for _library in ("OMP", "OPENBLAS", "MKL"):  # before NumPy is loaded: one thread for every engine
-    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 import argparse
 import json
 import platform
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -21,10 +18,13 @@ from typing import Any
 from rich.console import Console
 
 from comparison.peers import Variant, load
+from comparison.peers.ours import OurRunner
 from comparison.references import load as load_reference
 from comparison.run import run
 from comparison.scene import STEPS, RoverScene, Trace
 from comparison.scenes import flat_drive, parked, rocks, rug
+from comparison.tables import fill
+from rover_gym import accuracy_options
 
 OUTPUT = Path(__file__).parents[2] / "docs" / "comparison"
 PACKAGES = ("rover-gym", "mujoco", "drake", "pybullet", "pin", "numpy")
@@ -84,7 +84,34 @@ def measure(
             rows.append(row)
             console.print(
                 f"{measured.scene.name:<11} {step * 1e3:>6g} ms  {variant.engine + ': ' + variant.name:<34}"
-                + (row["failure"] if trace.failure else f"{row['error']:>10.2e} {measured.unit} {cost * 1e3:>9.2f} ms/s")
+                + (
+                    row["failure"]
+                    if trace.failure
+                    else f"{row['error']:>10.2e} {measured.unit} {cost * 1e3:>9.2f} ms/s"
+                )
+            )
+    return rows
+
+
+def presets(chosen: list[Measured], console: Console) -> list[dict[str, Any]]:
+    """Error and cost of every named accuracy in every scene."""
+    rows = []
+    for name in ("fast", "balanced", "reference"):
+        options = accuracy_options(name)
+        step = options.pop("time_step")
+        variant = Variant("rover-gym", name, partial(OurRunner, **options), "", "")
+        for measured in chosen:
+            traces = [run(variant, measured.scene, step, cap=1e3) for _ in range(1 if name == "reference" else 3)]
+            cost = min(t.cpu / t.simulated for t in traces)
+            row = {
+                "accuracy": name,
+                "scene": measured.scene.name,
+                "error": measured.error(traces[0]),
+                "cpu_ms_per_s": 1e3 * cost,
+            }
+            rows.append(row)
+            console.print(
+                f"{measured.scene.name:<11} {name:<10} {row['error']:.2e} {measured.unit} {1e3 * cost:.2f} ms/s"
             )
     return rows
 
@@ -110,6 +137,7 @@ def main() -> None:
         kept = []
         if arguments.scenes and path.exists():
             kept = [r for r in json.loads(path.read_text())["points"] if r["scene"] not in arguments.scenes]
+        by_name = presets(scenes(), console)
         points = kept + [row for m in chosen for row in measure(m, variants, steps, cap, console)]
         data = {
             "meta": {
@@ -126,13 +154,17 @@ def main() -> None:
                 for v in variants
             ],
             "missing": missing,
+            "presets": by_name,
             "points": points,
         }
         path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
     from comparison.drawing import draw  # noqa: PLC0415 - Matplotlib would load before the engines
 
-    for picture in draw(json.loads(path.read_text(encoding="utf-8")), arguments.output):
+    data = json.loads(path.read_text(encoding="utf-8"))
+    for picture in draw(data, arguments.output):
         console.print(str(picture))
+    if arguments.output == OUTPUT:
+        fill(OUTPUT.with_suffix(".md"), data)
 
 
 def processor() -> str:

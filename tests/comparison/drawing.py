@@ -37,7 +37,9 @@ def curves(data: dict[str, Any], scene: str) -> list[Curve]:
     out = []
     for engine in data["engines"]:
         key = (engine["engine"], engine["variant"])
-        rows = [p for p in data["points"] if p["scene"] == scene and (p["engine"], p["variant"]) == key and "error" in p]
+        rows = [
+            p for p in data["points"] if p["scene"] == scene and (p["engine"], p["variant"]) == key and "error" in p
+        ]
         if rows:
             rows.sort(key=lambda p: p["step"])
             step, cost, error = (np.array([p[k] for p in rows]) for k in ("step", "cpu_ms_per_s", "error"))
@@ -78,8 +80,14 @@ def _steps(axes: Axes, curve: Curve, wanted: tuple[float, ...], size: float) -> 
     for h, x, y in zip(step, cost, error, strict=True):
         if np.isclose(h, wanted).any():
             axes.annotate(
-                f"{h * 1e3:g} ms", (x, y), (-7, -5), textcoords="offset points", ha="right", va="top",
-                fontsize=size, color=COLOURS[OURS],
+                f"{h * 1e3:g} ms",
+                (x, y),
+                (-7, -5),
+                textcoords="offset points",
+                ha="right",
+                va="top",
+                fontsize=size,
+                color=COLOURS[OURS],
             )
 
 
@@ -87,8 +95,14 @@ def _plot(axes: Axes, shown: list[Curve]) -> None:
     for engine, _, cost, error in shown:
         own = engine["engine"] == OURS
         axes.plot(
-            cost, error, color=COLOURS[engine["engine"]], linestyle=STYLES.get(engine["variant"], "-"),
-            linewidth=2.6 if own else 1.5, marker="o", markersize=6 if own else 4, zorder=4 if own else 3,
+            cost,
+            error,
+            color=COLOURS[engine["engine"]],
+            linestyle=STYLES.get(engine["variant"], "-"),
+            linewidth=2.6 if own else 1.5,
+            marker="o",
+            markersize=6 if own else 4,
+            zorder=4 if own else 3,
         )
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -116,18 +130,35 @@ def flat_drive(data: dict[str, Any], path: Path) -> Path:
     axes.set_xlim(0.8 * left, 4.0 * right)  # room for labels
     _shade(axes, shown)
     for curve in shown:
-        engine, step, cost, error = curve
+        engine, _, cost, error = curve
         text, index, offset, side = LABELS[engine["engine"], engine["variant"]]
         index = min(index, len(cost) - 1)
         axes.annotate(
-            text, (cost[index], error[index]), offset, textcoords="offset points", ha=side, fontsize=10.5,
-            color=COLOURS[engine["engine"]], fontweight="bold" if engine["engine"] == OURS else "normal", zorder=5,
+            text,
+            (cost[index], error[index]),
+            offset,
+            textcoords="offset points",
+            ha=side,
+            fontsize=10.5,
+            color=COLOURS[engine["engine"]],
+            fontweight="bold" if engine["engine"] == OURS else "normal",
+            zorder=5,
         )
         if engine["engine"] == OURS:
             _steps(axes, curve, (1e-1, 2e-2, 5e-3, 1e-3, 1e-4), 9)
     axes.axhline(GOAL[1], color="#999999", linewidth=0.9, linestyle=(0, (2, 3)), zorder=1)
-    axes.annotate("1 cm", (axes.get_xlim()[1], GOAL[1]), (-2, 3), textcoords="offset points", ha="right", fontsize=9, color="#777777")
-    axes.text(0.02, 0.03, "reached by nothing here", transform=axes.transAxes, fontsize=9, color="#a98d6d", style="italic")
+    axes.annotate(
+        "1 cm",
+        (axes.get_xlim()[1], GOAL[1]),
+        (-2, 3),
+        textcoords="offset points",
+        ha="right",
+        fontsize=9,
+        color="#777777",
+    )
+    axes.text(
+        0.02, 0.03, "reached by nothing here", transform=axes.transAxes, fontsize=9, color="#a98d6d", style="italic"
+    )
     axes.set_xlabel("CPU time of one thread, ms per simulated second", fontsize=10.5)
     axes.set_ylabel("error of the path (RMS), m", fontsize=10.5)
     axes.set_title("A drive of 22 m in a curve, one point per step size, 0.1 to 100 ms", fontsize=11.5, loc="left")
@@ -156,7 +187,11 @@ def others(data: dict[str, Any], path: Path) -> Path:
         _finish(axes)
     lines = [
         plt.Line2D(
-            [], [], color=COLOURS[e["engine"]], linestyle=STYLES.get(e["variant"], "-"), marker="o",
+            [],
+            [],
+            color=COLOURS[e["engine"]],
+            linestyle=STYLES.get(e["variant"], "-"),
+            marker="o",
             linewidth=2.6 if e["engine"] == OURS else 1.5,
             label=OURS if e["engine"] == OURS else f"{e['engine']}: {e['variant']}",
         )

@@ -1,8 +1,8 @@
 """Makes the reference paths of the chart: `python -m comparison.references` (ten minutes).
 
 Flat drive: Pinocchio's loop at 1 and 0.5 ms, extrapolated to a step of 0; it shares no code with this project's
-dynamics, contact geometry or solver. Rug and rocks: this project's Newton variant at 0.05 ms. Each file says how far the
-other of the two is away.
+dynamics, contact geometry or solver. Rug and rocks: this project's Newton variant at 0.05 ms. Each file says how far
+the other of the two is away.
 """
 
 import json
@@ -45,9 +45,7 @@ def _save(name: str, path: Array, meta: dict[str, Any]) -> None:
 def make_flat_drive() -> None:
     """The flat drive's path in x and z since the end of the rest."""
     scene = flat_drive.scene()
-    coarse, fine = (
-        flat_drive.driven(run(pinocchio_admm.VARIANTS[0], scene, step, NO_CAP)) for step in (1e-3, 5e-4)
-    )
+    coarse, fine = (flat_drive.driven(run(pinocchio_admm.VARIANTS[0], scene, step, NO_CAP)) for step in (1e-3, 5e-4))
     path = 2.0 * fine - coarse
     own = _ours(scene)[:, [0, 2]]
     first = round(flat_drive.REST / 0.1)

@@ -3,11 +3,6 @@
 Writes `docs/comparison/stability.json` and the tables of `docs/stability.md` from it.
 """
 
-import os
-
-for _library in ("OMP", "OPENBLAS", "MKL"):
-    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
-
 import argparse
 import json
 from collections.abc import Iterable
@@ -29,8 +24,11 @@ def _report(console: Console, findings: Iterable[Finding]) -> list[Finding]:
     out = []
     for f in findings:
         out.append(f)
-        console.print(f"{'holds' if f.holds else 'FAILS'}  {f.scene:<46} {f.method:<34} {f.number:>9.1e} {f.unit:<12} {f.how}",
-                      markup=False, highlight=False)
+        console.print(
+            f"{'holds' if f.holds else 'FAILS'}  {f.scene:<46} {f.method:<34} {f.number:>9.1e} {f.unit:<12} {f.how}",
+            markup=False,
+            highlight=False,
+        )
     return out
 
 
@@ -54,9 +52,14 @@ def measure(console: Console, *, with_peers: bool) -> dict[str, Any]:
                 except (RuntimeError, ArithmeticError) as error:
                     name = f"{variant.engine}, {variant.name}"
                     how = f"the engine stops: {str(error).splitlines()[0][:100]}"
-                    found += _report(console, [Finding(scene.__name__.replace("_", " "), "", name, float("inf"), 0.0, "", how)])
+                    found += _report(
+                        console, [Finding(scene.__name__.replace("_", " "), "", name, float("inf"), 0.0, "", how)]
+                    )
         groups["peers"] = found
-    rows = {group: [asdict(f) | {"holds": f.holds, "number": _number(f.number)} for f in found] for group, found in groups.items()}
+    rows = {
+        group: [asdict(f) | {"holds": f.holds, "number": _number(f.number)} for f in found]
+        for group, found in groups.items()
+    }
     return {"meta": {"command": "make stability", "peers_missing": missing}, "findings": rows}
 
 
@@ -82,7 +85,9 @@ def table(rows: list[dict[str, Any]]) -> str:
         own = {row["method"]: row for row in rows if row["scene"] == scene}
         first = next(iter(own.values()))
         cells = [_cell(own[m]) if m in own else "" for m in methods]
-        lines.append(f"| {scene} | {first['expected']} | {first['limit']:g} {first['unit']} | " + " | ".join(cells) + " |")
+        lines.append(
+            f"| {scene} | {first['expected']} | {first['limit']:g} {first['unit']} | " + " | ".join(cells) + " |"
+        )
     return "\n".join(lines)
 
 
@@ -95,8 +100,14 @@ def page(data: dict[str, Any]) -> str:
     """The generated half of the page."""
     found = data["findings"]
     parts = [
-        "## Law and solvers\n", table(found["bodies"]), "\nHow they fail:\n", remarks(found["bodies"]),
-        "\n## The rover\n", table(found["rover"]), "\nHow they fail:\n", remarks(found["rover"]),
+        "## Law and solvers\n",
+        table(found["bodies"]),
+        "\nHow they fail:\n",
+        remarks(found["bodies"]),
+        "\n## The rover\n",
+        table(found["rover"]),
+        "\nHow they fail:\n",
+        remarks(found["rover"]),
     ]
     if "peers" in found:
         parts += ["\n## Beside other engines\n", table(found["peers"]), "\nHow they fail:\n", remarks(found["peers"])]

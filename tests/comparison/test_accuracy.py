@@ -16,7 +16,7 @@ BOUNDS = {"fast": 0.005, "balanced": 0.00125, "reference": 0.00005}
 
 
 def drive_error(accuracy: str | float) -> float:
-    def build(scene: object, time_step: float) -> OurRunner:
+    def build(scene: object, _: float) -> OurRunner:
         return OurRunner(scene, **rover_gym.accuracy_options(accuracy))  # type: ignore[arg-type]
 
     step = rover_gym.accuracy_options(accuracy)["time_step"]

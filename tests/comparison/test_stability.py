@@ -60,7 +60,15 @@ def test_a_number_that_is_not_finite_does_not_hold() -> None:
 
 def test_the_table_has_a_line_a_scene_and_a_column_a_method() -> None:
     rows = [
-        {"scene": scene, "expected": "0", "method": method, "number": number, "limit": 1.0, "unit": "m", "holds": number <= 1.0}
+        {
+            "scene": scene,
+            "expected": "0",
+            "method": method,
+            "number": number,
+            "limit": 1.0,
+            "unit": "m",
+            "holds": number <= 1.0,
+        }
         for scene in ("a", "b")
         for method, number in (("x", 0.5), ("y", 2.0))
     ]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from comparison.failure.finding import Finding
-from comparison.failure.rigid_bodies import G, Contact, Solver, World, box_inertia, corners, ours, relaxed, stack
+from comparison.failure.rigid_bodies import Contact, G, Solver, World, box_inertia, corners, ours, relaxed, stack
 from rover_gym import solve_friction_contact
 
 SOLVERS: dict[str, Solver] = {f"solver {name}": ours(name) for name in ("auto", "nsgs", "newton")}
@@ -17,7 +17,9 @@ def _fast(world: World) -> float:
     return float(np.abs(world.v).max())
 
 
-def light_under_heavy(solvers: dict[str, Solver], ratios: tuple[float, ...] = (1.0, 1e2, 1e4, 1e6)) -> Iterator[Finding]:
+def light_under_heavy(
+    solvers: dict[str, Solver], ratios: tuple[float, ...] = (1.0, 1e2, 1e4, 1e6)
+) -> Iterator[Finding]:
     """A cube under one that is up to a million times heavier, at rest."""
     for name, solve in solvers.items():
         base = 0.0
@@ -30,7 +32,12 @@ def light_under_heavy(solvers: dict[str, Solver], ratios: tuple[float, ...] = (1
             base = base or cost
             remark = "" if world.converged else "not converged"
             yield Finding(
-                f"cube under one {ratio:g} times heavier", "rest", name, _fast(world), 1e-9, "m/s",
+                f"cube under one {ratio:g} times heavier",
+                "rest",
+                name,
+                _fast(world),
+                1e-9,
+                "m/s",
                 remark or (f"{cost / base:.1f} times the cost of ratio 1" if ratio > 1.0 else ""),
             )
 
@@ -48,7 +55,12 @@ def dragged(solvers: dict[str, Solver], ratios: tuple[float, ...] = (1e2, 1e4, 1
                 world.step(solve)
             off = float(np.abs(world.v[:, 0] / expected - 1.0).max())
             yield Finding(
-                f"dragged under a slab {ratio:g} times heavier", "both at (mu2 - mu1) g t / 2", name, off, 1e-6, "relative",
+                f"dragged under a slab {ratio:g} times heavier",
+                "both at (mu2 - mu1) g t / 2",
+                name,
+                off,
+                1e-6,
+                "relative",
                 "" if world.converged else "not converged",
             )
 
@@ -71,7 +83,7 @@ def driven_particle(solvers: dict[str, Solver]) -> Iterator[Finding]:
 
 
 def off_axis_push(solvers: dict[str, Solver], angles: tuple[float, ...] = (0.0, 17.0, 45.0, 73.0)) -> Iterator[Finding]:
-    """SimBenchmark's rolling test: a box with 25 balls on it is pushed; a = 0.7385 and 2/7 of it, in every direction."""
+    """SimBenchmark's rolling test: a box with 25 balls on it is pushed: 0.7385 m/s² and 2/7 of it any way."""
     side, radius, push = 20.0, 0.5, 150.0
     spots = [(4.0 * i - 8.0, 4.0 * j - 8.0) for i in range(5) for j in range(5)]
     # F = m_box a + 25 m_ball 2/7 a + mu (m_box + 25 m_ball) g
@@ -82,8 +94,10 @@ def off_axis_push(solvers: dict[str, Solver], angles: tuple[float, ...] = (0.0, 
             d = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees)), 0.0])
 
             def contacts(world: World) -> list[Contact]:
-                x, y, z = world.places[0]
-                found = [Contact(0, -1, (x + cx, y + cy, 0.0), (0.0, 0.0, 1.0), 0.4) for cx, cy in corners((side, side))]
+                x, y, _ = world.places[0]
+                found = [
+                    Contact(0, -1, (x + cx, y + cy, 0.0), (0.0, 0.0, 1.0), 0.4) for cx, cy in corners((side, side))
+                ]
                 balls = world.places[1:]
                 return found + [
                     Contact(i, 0, (b[0], b[1], 1.0), (0.0, 0.0, 1.0), 0.8) for i, b in enumerate(balls, start=1)
@@ -102,7 +116,8 @@ def off_axis_push(solvers: dict[str, Solver], angles: tuple[float, ...] = (0.0, 
                 world.step(solve)
             expected = a * 5e-2
             worst = max(
-                worst, abs(float(world.v[0] [:3] @ d) / expected - 1.0),
+                worst,
+                abs(float(world.v[0][:3] @ d) / expected - 1.0),
                 float(np.abs(world.v[1:, :3] @ d / (expected * 2.0 / 7.0) - 1.0).max()),
             )
             sideways = world.v[0, :3] @ np.array([-d[1], d[0], 0.0])
@@ -114,8 +129,11 @@ def off_axis_push(solvers: dict[str, Solver], angles: tuple[float, ...] = (0.0, 
 def stacks(solvers: dict[str, Solver]) -> Iterator[Finding]:
     """Towers at rest, their lowest contacts carrying the weight."""
     towers = {
-        "stack of 5": [1.0] * 5, "stack of 10": [1.0] * 10, "stack of 20": [1.0] * 20,
-        "stack of 5, top 1000 times heavier": [1.0] * 4 + [1000.0], "stack of 10, masses 2^i": [2.0**i for i in range(10)],
+        "stack of 5": [1.0] * 5,
+        "stack of 10": [1.0] * 10,
+        "stack of 20": [1.0] * 20,
+        "stack of 5, top 1000 times heavier": [1.0] * 4 + [1000.0],
+        "stack of 10, masses 2^i": [2.0**i for i in range(10)],
     }
     for name, solve in solvers.items():
         for title, masses in towers.items():
@@ -136,10 +154,16 @@ def elastic_bounce(solvers: dict[str, Solver]) -> Iterator[Finding]:
         worst = 0.0
         for h in (1e-4, 1e-3, 1e-2, 5e-2):
             world = World(
-                np.full(1, 10.0), np.full((1, 3), 0.04), np.array([[0.0, 0.0, 5.0]]),
-                lambda w: [Contact(0, -1, (0.0, 0.0, w.places[0, 2] - 0.1), (0.0, 0.0, 1.0), 0.0)]
-                if w.places[0, 2] - 0.1 + 0.5 * w.h * w.v[0, 2] <= 0.0 else [],
-                h, restitution=1.0,
+                np.full(1, 10.0),
+                np.full((1, 3), 0.04),
+                np.array([[0.0, 0.0, 5.0]]),
+                lambda w: (
+                    [Contact(0, -1, (0.0, 0.0, w.places[0, 2] - 0.1), (0.0, 0.0, 1.0), 0.0)]
+                    if w.places[0, 2] - 0.1 + 0.5 * w.h * w.v[0, 2] <= 0.0
+                    else []
+                ),
+                h,
+                restitution=1.0,
             )
             start = 10.0 * G * 5.0
             for _ in range(round(4.0 / h)):
@@ -153,10 +177,16 @@ def zeno_ball(solvers: dict[str, Solver]) -> Iterator[Finding]:
     """A ball with e = 0.9 from 1 m rests after sqrt(2h/g) (1 + e)/(1 - e) = 8.578949 s."""
     for name, solve in solvers.items():
         world = World(
-            np.ones(1), np.ones((1, 3)), np.array([[0.0, 0.0, 1.0]]),
-            lambda w: [Contact(0, -1, w.places[0], (0.0, 0.0, 1.0), 0.0)]
-            if w.places[0, 2] + 0.5 * w.h * w.v[0, 2] <= 0.0 else [],
-            H, restitution=0.9,
+            np.ones(1),
+            np.ones((1, 3)),
+            np.array([[0.0, 0.0, 1.0]]),
+            lambda w: (
+                [Contact(0, -1, w.places[0], (0.0, 0.0, 1.0), 0.0)]
+                if w.places[0, 2] + 0.5 * w.h * w.v[0, 2] <= 0.0
+                else []
+            ),
+            H,
+            restitution=0.9,
         )
         moved, at_rest = 0.0, 0.0
         for k in range(9500):
@@ -165,7 +195,9 @@ def zeno_ball(solvers: dict[str, Solver]) -> Iterator[Finding]:
                 at_rest = (k + 1) * H
             if (k + 1) * H > 9.0:
                 moved = max(moved, abs(float(world.v[0, 2])))
-        yield Finding("Zeno ball, e = 0.9", "at rest after 8.5789 s", name, moved, 1e-12, "m/s", f"at rest from {at_rest:.3f} s")
+        yield Finding(
+            "Zeno ball, e = 0.9", "at rest after 8.5789 s", name, moved, 1e-12, "m/s", f"at rest from {at_rest:.3f} s"
+        )
 
 
 def cradle(solvers: dict[str, Solver]) -> Iterator[Finding]:
@@ -176,9 +208,17 @@ def cradle(solvers: dict[str, Solver]) -> Iterator[Finding]:
             v = np.zeros((n, 6))
             v[0, 0] = 1.0
             world = World(
-                np.ones(n), np.ones((n, 3)), np.array([(float(i), 0.0, 0.0) for i in range(n)]),
-                lambda w: [Contact(i + 1, i, w.places[i] + np.array([0.5, 0.0, 0.0]), (1.0, 0.0, 0.0), 0.0) for i in range(len(w.masses) - 1)],
-                H, restitution=e, gravity=0.0, v=v,
+                np.ones(n),
+                np.ones((n, 3)),
+                np.array([(float(i), 0.0, 0.0) for i in range(n)]),
+                lambda w: [
+                    Contact(i + 1, i, w.places[i] + np.array([0.5, 0.0, 0.0]), (1.0, 0.0, 0.0), 0.0)
+                    for i in range(len(w.masses) - 1)
+                ],
+                H,
+                restitution=e,
+                gravity=0.0,
+                v=v,
             )
             world.step(solve)
             off = float(np.abs(world.v[:, 0] - np.array(expected)).max())
@@ -186,12 +226,18 @@ def cradle(solvers: dict[str, Solver]) -> Iterator[Finding]:
         v = np.zeros((3, 6))
         v[0, 0] = 1.0
         world = World(
-            np.ones(3), np.ones((3, 3)), np.array([(1.05 * i, 0.0, 0.0) for i in range(3)]),
+            np.ones(3),
+            np.ones((3, 3)),
+            np.array([(1.05 * i, 0.0, 0.0) for i in range(3)]),
             lambda w: [
-                Contact(i + 1, i, w.places[i] + np.array([0.5, 0.0, 0.0]), (1.0, 0.0, 0.0), 0.0) for i in range(2)
+                Contact(i + 1, i, w.places[i] + np.array([0.5, 0.0, 0.0]), (1.0, 0.0, 0.0), 0.0)
+                for i in range(2)
                 if w.places[i + 1, 0] - w.places[i, 0] - 1.0 + 0.5 * w.h * (w.v[i + 1, 0] - w.v[i, 0]) <= 0.0
             ],
-            H, restitution=1.0, gravity=0.0, v=v,
+            H,
+            restitution=1.0,
+            gravity=0.0,
+            v=v,
         )
         for _ in range(300):
             world.step(solve)
@@ -215,8 +261,15 @@ def painleve(solvers: dict[str, Solver]) -> Iterator[Finding]:  # noqa: ARG001 -
         spread = abs(impulses[1] / impulses[3] - 1.0) if impulses[3] else np.inf
         sticking = -np.linalg.solve(W, np.array([0.0, -1.0]))
         off = max(spread, abs(impulses[3] / float(sticking[0]) - 1.0))
-        yield Finding("Painlevé's rod, mu 2, 60 degrees", "impulse finite, of any step", f"solver {name}", off, 1e-2, "relative",
-                      f"impulse {impulses[3]:.4f} N s a kg")
+        yield Finding(
+            "Painlevé's rod, mu 2, 60 degrees",
+            "impulse finite, of any step",
+            f"solver {name}",
+            off,
+            1e-2,
+            "relative",
+            f"impulse {impulses[3]:.4f} N s a kg",
+        )
 
 
 def wedge(solvers: dict[str, Solver]) -> Iterator[Finding]:
@@ -224,17 +277,29 @@ def wedge(solvers: dict[str, Solver]) -> Iterator[Finding]:
     a = np.radians(20.0)
     for name, solve in {**solvers, "convex law": relaxed}.items():
         for mu in (0.2, 0.9):
+
             def contacts(world: World, mu: float = mu) -> list[Contact]:
                 return [
-                    Contact(0, -1, world.places[0] + np.array([x, side * 0.1, z]), (0.0, -side * np.cos(a), np.sin(a)), mu)
-                    for side in (-1, 1) for x in (-0.1, 0.1) for z in (-0.1, 0.1)
+                    Contact(
+                        0, -1, world.places[0] + np.array([x, side * 0.1, z]), (0.0, -side * np.cos(a), np.sin(a)), mu
+                    )
+                    for side in (-1, 1)
+                    for x in (-0.1, 0.1)
+                    for z in (-0.1, 0.1)
                 ]
 
             world = World(np.ones(1), np.full((1, 3), 0.01), np.zeros((1, 3)), contacts, H)
             for _ in range(20):
                 world.step(solve)
-            yield Finding(f"cube in a groove, mu {mu:g}", "rest", name, _fast(world), 1e-10, "m/s",
-                          "" if world.converged else "not converged")
+            yield Finding(
+                f"cube in a groove, mu {mu:g}",
+                "rest",
+                name,
+                _fast(world),
+                1e-10,
+                "m/s",
+                "" if world.converged else "not converged",
+            )
 
 
 def many_legs(solvers: dict[str, Solver]) -> Iterator[Finding]:
@@ -243,14 +308,24 @@ def many_legs(solvers: dict[str, Solver]) -> Iterator[Finding]:
     feet = rng.uniform(-1.0, 1.0, (100, 2))
     for name, solve in solvers.items():
         world = World(
-            np.full(1, 50.0), np.array([box_inertia(50.0, (2.0, 2.0, 0.1))]), np.array([[0.0, 0.0, 1.0]]),
-            lambda w: [Contact(0, -1, (x, y, 0.0), (0.0, 0.0, 1.0), 0.5) for x, y in feet], H,
+            np.full(1, 50.0),
+            np.array([box_inertia(50.0, (2.0, 2.0, 0.1))]),
+            np.array([[0.0, 0.0, 1.0]]),
+            lambda _: [Contact(0, -1, (x, y, 0.0), (0.0, 0.0, 1.0), 0.5) for x, y in feet],
+            H,
         )
         begin = time.process_time()
         world.step(solve)
         remark = f"{(time.process_time() - begin) * 1e3:.0f} ms, {world.iterations} iterations"
-        yield Finding("table on 100 legs", "rest", name, _fast(world), 1e-10, "m/s",
-                      remark if world.converged else f"not converged; {remark}")
+        yield Finding(
+            "table on 100 legs",
+            "rest",
+            name,
+            _fast(world),
+            1e-10,
+            "m/s",
+            remark if world.converged else f"not converged; {remark}",
+        )
 
 
 def billiard(solvers: dict[str, Solver]) -> Iterator[Finding]:
@@ -258,29 +333,49 @@ def billiard(solvers: dict[str, Solver]) -> Iterator[Finding]:
     d = 1.0
     rack = [(0.5 * np.sqrt(3.0) * row * d, (column - 0.5 * row) * d) for row in range(5) for column in range(row + 1)]
     places = np.array([(-d, 0.0, 0.0)] + [(x, y, 0.0) for x, y in rack])
-    pairs = [
-        (i, j) for i in range(16) for j in range(i + 1, 16) if np.linalg.norm(places[i] - places[j]) < 1.0001 * d
-    ]
+    pairs = [(i, j) for i in range(16) for j in range(i + 1, 16) if np.linalg.norm(places[i] - places[j]) < 1.0001 * d]
     mirror = [int(np.argmin(np.linalg.norm(places - p * np.array([1.0, -1.0, 1.0]), axis=1))) for p in places]
     for name, solve in solvers.items():
         for mu in (0.0, 0.3):
             v = np.zeros((16, 6))
             v[0, 0] = 1.0
             world = World(
-                np.ones(16), np.full((16, 3), 0.1), places.copy(),
-                lambda w, mu=mu: [
+                np.ones(16),
+                np.full((16, 3), 0.1),
+                places.copy(),
+                lambda _, mu=mu: [
                     Contact(j, i, 0.5 * (places[i] + places[j]), places[j] - places[i], mu) for i, j in pairs
                 ],
-                H, restitution=0.8, gravity=0.0, v=v,
+                H,
+                restitution=0.8,
+                gravity=0.0,
+                v=v,
             )
             world.step(solve)
             image = world.v[mirror] * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
-            yield Finding(f"billiard, mu {mu:g}", "mirror symmetry", name, float(np.abs(world.v - image).max()), 1e-11, "m/s",
-                          "" if world.converged else "not converged")
+            yield Finding(
+                f"billiard, mu {mu:g}",
+                "mirror symmetry",
+                name,
+                float(np.abs(world.v - image).max()),
+                1e-11,
+                "m/s",
+                "" if world.converged else "not converged",
+            )
 
 
 #: The scenes in the order of the table.
 SCENES = (
-    light_under_heavy, dragged, driven_particle, off_axis_push, stacks, elastic_bounce, painleve, zeno_ball, cradle, billiard,
-    wedge, many_legs,
+    light_under_heavy,
+    dragged,
+    driven_particle,
+    off_axis_push,
+    stacks,
+    elastic_bounce,
+    painleve,
+    zeno_ball,
+    cradle,
+    billiard,
+    wedge,
+    many_legs,
 )

@@ -1,4 +1,4 @@
-"""Scenes of the rover for every installed engine, this project's defaults among them. Step 2 ms, each at its settings of the chart."""
+"""Scenes of the rover for every installed engine, ours at its defaults among them; step 2 ms, settings of the chart."""
 
 import math
 from collections.abc import Iterator
@@ -38,7 +38,9 @@ def creep(variant: Variant) -> Iterator[Finding]:
         speed = float(np.linalg.norm(runner.position() - before)) / 2.0
         upright = float(runner.rotation()[1, 1]) > 0.5
         how = "" if speed <= 1e-9 else ("creeps" if speed < 0.1 else "slides") if upright else "overturns"
-        yield Finding(f"parked on {degrees:g} degrees", "0", variant.engine + ", " + variant.name, speed, 1e-9, "m/s", how)
+        yield Finding(
+            f"parked on {degrees:g} degrees", "0", variant.engine + ", " + variant.name, speed, 1e-9, "m/s", how
+        )
 
 
 def slide(variant: Variant) -> Iterator[Finding]:
@@ -49,13 +51,23 @@ def slide(variant: Variant) -> Iterator[Finding]:
     runner.advance(steps_in(1.0, STEP))
     a = G * (math.sin(math.radians(40.0)) - 0.7 * math.cos(math.radians(40.0)))
     off = abs((runner.speed() - before) / a - 1.0)
-    yield Finding("sliding on 40 degrees", "1.0455 m/s²: g (sin - mu cos)", variant.engine + ", " + variant.name, off, 1e-3, "relative",
-                  f"{runner.speed() - before:.4f} m/s²")
+    yield Finding(
+        "sliding on 40 degrees",
+        "1.0455 m/s²: g (sin - mu cos)",
+        variant.engine + ", " + variant.name,
+        off,
+        1e-3,
+        "relative",
+        f"{runner.speed() - before:.4f} m/s²",
+    )
 
 
 def mass_ratios(variant: Variant) -> Iterator[Finding]:
     """Trunk a hundred times heavier, wheels a thousand times lighter: dropped from 5 cm, it stands."""
-    for title, part, factor in (("trunk 100 times heavier", "trunk", 100.0), ("wheels 1000 times lighter", "wheel", 1e-3)):
+    for title, part, factor in (
+        ("trunk 100 times heavier", "trunk", 100.0),
+        ("wheels 1000 times lighter", "wheel", 1e-3),
+    ):
         machine = RoverModel().to_dict()
         for solid in machine["solids"]:
             if solid["name"].startswith(part):
@@ -66,8 +78,20 @@ def mass_ratios(variant: Variant) -> Iterator[Finding]:
             runner.advance(steps_in(0.2, STEP))
             highest = max(highest, runner.speed())
         off = float(abs(runner.position()[1] - 0.35))
-        how = "" if off <= 1e-3 else f"stands {1e3 * (0.35 - runner.position()[1]):.0f} mm too low, moves at {runner.speed():.1e} m/s"
-        yield Finding(title, "stands at 0.35 m", variant.engine + ", " + variant.name, max(off, runner.speed()), 1e-3, "m, m/s", how)
+        how = (
+            ""
+            if off <= 1e-3
+            else f"stands {1e3 * (0.35 - runner.position()[1]):.0f} mm too low, moves at {runner.speed():.1e} m/s"
+        )
+        yield Finding(
+            title,
+            "stands at 0.35 m",
+            variant.engine + ", " + variant.name,
+            max(off, runner.speed()),
+            1e-3,
+            "m, m/s",
+            how,
+        )
 
 
 def wheel_spin(variant: Variant) -> Iterator[Finding]:
@@ -78,8 +102,15 @@ def wheel_spin(variant: Variant) -> Iterator[Finding]:
     runner.advance(steps_in(2.3, STEP))
     off = abs(runner.speed() / (0.7 * G * 2.3) - 1.0)
     upright = float(runner.rotation()[1, 1]) > 0.5
-    yield Finding("wheels spinning at 260 N m", "15.79 m/s: mu g t", variant.engine + ", " + variant.name, off, 1e-2, "relative",
-                  f"{runner.speed():.2f} m/s" + ("" if upright else ", overturned"))
+    yield Finding(
+        "wheels spinning at 260 N m",
+        "15.79 m/s: mu g t",
+        variant.engine + ", " + variant.name,
+        off,
+        1e-2,
+        "relative",
+        f"{runner.speed():.2f} m/s" + ("" if upright else ", overturned"),
+    )
 
 
 def drop(variant: Variant) -> Iterator[Finding]:
@@ -90,7 +121,14 @@ def drop(variant: Variant) -> Iterator[Finding]:
         for _ in range(steps_in(1.0, STEP)):
             runner.advance(1)
             depth = max(depth, 0.35 - float(runner.position()[1]))
-    yield Finding("dropped from 2 m, depth", "0; half a step's way is 6 mm", variant.engine + ", " + variant.name, depth, 7e-3, "m")
+    yield Finding(
+        "dropped from 2 m, depth",
+        "0; half a step's way is 6 mm",
+        variant.engine + ", " + variant.name,
+        depth,
+        7e-3,
+        "m",
+    )
 
 
 #: The scenes in the order of the table.

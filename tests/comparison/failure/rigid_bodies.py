@@ -1,7 +1,7 @@
-"""Free rigid bodies with given contacts, stepped by Moreau and Jean's scheme: enough to put a law and its solver to the test.
+"""Free rigid bodies with given contacts, stepped by Moreau and Jean's scheme: a test bench for law and solver.
 
-The contact problem of each step is assembled here, densely, and handed to the solver under test. Bodies are few and turn little
-in these scenes, so inertia is taken about the axes of the world.
+The contact problem of a step is assembled here, densely, and handed to the solver under test. Bodies are few and turn
+little in these scenes, so inertia is taken about the axes of the world.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,7 +23,13 @@ def ours(name: str, tolerance: float = 1e-12, dimension: int = 3) -> Solver:
 
     def solve(W: Array, q: Array, mu: Array, initial: Array | None) -> tuple[Array, bool, int]:
         answer = solve_friction_contact(
-            W, q, mu, tolerance, dimension=3 if dimension == 3 else 2, solver=name, initial=initial  # type: ignore[arg-type]
+            W,
+            q,
+            mu,
+            tolerance,
+            dimension=3 if dimension == 3 else 2,
+            solver=name,
+            initial=initial,  # type: ignore[arg-type]
         )
         return answer.impulses, answer.report.is_converged, answer.report.iterations
 
@@ -90,7 +96,9 @@ class World:
 
     def inverse_masses(self) -> Array:
         """(6 n,) of the diagonal mass matrix."""
-        return np.concatenate([np.concatenate([np.full(3, 1.0 / m), 1.0 / J]) for m, J in zip(self.masses, self.inertias, strict=True)])
+        return np.concatenate(
+            [np.concatenate([np.full(3, 1.0 / m), 1.0 / J]) for m, J in zip(self.masses, self.inertias, strict=True)]
+        )
 
     def jacobian(self, contacts: list[Contact]) -> Array:
         """(3 n_c, 6 n) local velocities from body velocities."""
@@ -144,7 +152,9 @@ def corners(size: Sequence[float]) -> list[tuple[float, float]]:
     return [(sx * size[0] / 2.0, sy * size[1] / 2.0) for sx in (-1, 1) for sy in (-1, 1)]
 
 
-def stack(masses: Sequence[float], h: float, friction: Sequence[float], size: Sequence[float] = (0.2, 0.2, 0.2)) -> World:
+def stack(
+    masses: Sequence[float], h: float, friction: Sequence[float], size: Sequence[float] = (0.2, 0.2, 0.2)
+) -> World:
     """Boxes on each other, four contacts between neighbours; `friction` from the ground up."""
     n = len(masses)
 

@@ -57,7 +57,9 @@ def loads() -> Iterator[Finding]:
         expected = np.array([FRONT] * 2 + [SIDE] * 4)
         off = float(np.abs(simulation.wheel_forces[:, 0] / expected - 1.0).max())
         remark = "" if off < 1e-6 else "another balance: W has rank 14 of 18, and braked wheels can squeeze each other"
-        yield Finding("standing on the flat, wheel loads", "1742.718 and 1483.041 N", name, off, 1e-6, "relative", remark)
+        yield Finding(
+            "standing on the flat, wheel loads", "1742.718 and 1483.041 N", name, off, 1e-6, "relative", remark
+        )
         yield Finding("standing on the flat, drift", "rest", name, fastest(simulation), 1e-12, "m/s")
 
 
@@ -90,11 +92,15 @@ def incline() -> Iterator[Finding]:
             simulation.step(steps)
             if ratio < 1.0:
                 creep = float(np.linalg.norm(simulation.q[:3] - before)) / (0.005 * steps)
-                yield Finding("incline at 0.999 mu, braked", "sticks", name, creep, 1e-12, "m/s", "creep over 10000 steps")
+                yield Finding(
+                    "incline at 0.999 mu, braked", "sticks", name, creep, 1e-12, "m/s", "creep over 10000 steps"
+                )
             else:
                 a = G * (math.sin(slope) - 0.7 * math.cos(slope))
                 off = float(np.linalg.norm(simulation.v[:3] - v0)) / 10.0 / a - 1.0
-                yield Finding("incline at 1.001 mu, braked", "slides with g (sin - mu cos)", name, abs(off), 1e-6, "relative")
+                yield Finding(
+                    "incline at 1.001 mu, braked", "slides with g (sin - mu cos)", name, abs(off), 1e-6, "relative"
+                )
 
 
 def heading() -> Iterator[Finding]:
@@ -114,8 +120,15 @@ def heading() -> Iterator[Finding]:
             condition = max(condition, float(eigenvalues[-1] / eigenvalues[0]))
             if simulation.time > 60.0:
                 break
-        yield Finding("heading through 90 degrees", "no spike in the turn rate (10 ms)", name, jump, 0.1, "rad/s",
-                      f"condition of M at most {condition:.0f}")
+        yield Finding(
+            "heading through 90 degrees",
+            "no spike in the turn rate (10 ms)",
+            name,
+            jump,
+            0.1,
+            "rad/s",
+            f"condition of M at most {condition:.0f}",
+        )
     model = RoverModel()
     q, v = np.zeros(21), np.zeros(21)
     q[1], v[4], v[3] = 0.35, 0.5, 0.1  # turning, and rolling a little as on any ground
@@ -130,8 +143,15 @@ def heading() -> Iterator[Finding]:
         how = f"at 90 degrees the rates are {rates:.1e} rad/s"
     except RoverGymError as error:
         how = f"at 90 degrees: {error}"
-    yield Finding("heading through 90 degrees", "finite rates", "the report's Cardan coordinates", largest, 1.0, "rad/s",
-                  f"largest coordinate rate at 89.999 degrees; condition of M {eigenvalues[-1] / eigenvalues[0]:.0e}; {how}")
+    yield Finding(
+        "heading through 90 degrees",
+        "finite rates",
+        "the report's Cardan coordinates",
+        largest,
+        1.0,
+        "rad/s",
+        f"largest coordinate rate at 89.999 degrees; condition of M {eigenvalues[-1] / eigenvalues[0]:.0e}; {how}",
+    )
 
 
 def wedged() -> Iterator[Finding]:
@@ -140,13 +160,23 @@ def wedged() -> Iterator[Finding]:
         model = RoverModel()
         poses = model.poses(np.zeros(21), "state")
         places = np.array([poses[w][0] for w in model.solid_names if w.startswith("wheel")])
-        centres = np.concatenate([places + [dx, -0.12, 0.0] for dx in (-0.16, 0.16)])
+        centres = np.concatenate([places + np.array([dx, -0.12, 0.0]) for dx in (-0.16, 0.16)])
         simulation = start(q={1: 0.02}, terrain=SphereField(centres, np.full(len(centres), 0.1)), **options)
         simulation.brake()
         simulation.step(2000)
-        yield Finding("wheels wedged between two spheres", "rest", name, fastest(simulation), 1e-9, "m/s",
-                      f"{len(simulation.contacts)} contacts")
-        for title, pose in (("on its back", {1: 0.5, 3: math.pi}), ("on its side, wheels flat on the ground", {1: 0.75, 3: math.pi / 2})):
+        yield Finding(
+            "wheels wedged between two spheres",
+            "rest",
+            name,
+            fastest(simulation),
+            1e-9,
+            "m/s",
+            f"{len(simulation.contacts)} contacts",
+        )
+        for title, pose in (
+            ("on its back", {1: 0.5, 3: math.pi}),
+            ("on its side, wheels flat on the ground", {1: 0.75, 3: math.pi / 2}),
+        ):
             simulation = start(q=pose, **options)
             simulation.brake()
             simulation.step(3000)
@@ -157,7 +187,10 @@ def wedged() -> Iterator[Finding]:
 def masses() -> Iterator[Finding]:
     """Trunk a hundred times heavier, wheels a thousand times lighter, dropped from 5 cm."""
     for name, options in METHODS.items():
-        for title, part, factor in (("trunk 100 times heavier", "trunk", 100.0), ("wheels 1000 times lighter", "wheel", 1e-3)):
+        for title, part, factor in (
+            ("trunk 100 times heavier", "trunk", 100.0),
+            ("wheels 1000 times lighter", "wheel", 1e-3),
+        ):
             description = RoverModel().to_dict()
             for solid in description["solids"]:
                 if solid["name"].startswith(part):
@@ -171,8 +204,15 @@ def masses() -> Iterator[Finding]:
                 gain = max(gain, simulation.energy().total / before - 1.0)
                 deepest = min(deepest, float(simulation.wheel_gaps.min()))
             off = max(fastest(simulation), abs(float(simulation.q[1]) - 0.35), gain)
-            yield Finding(title, "rest at 0.35 m, no energy gained", name, off, 1e-6, "m/s, m, relative",
-                          f"deepest {-deepest * 1e3:.2g} mm in landing")
+            yield Finding(
+                title,
+                "rest at 0.35 m, no energy gained",
+                name,
+                off,
+                1e-6,
+                "m/s, m, relative",
+                f"deepest {-deepest * 1e3:.2g} mm in landing",
+            )
 
 
 def wheel_spin() -> Iterator[Finding]:
@@ -184,8 +224,15 @@ def wheel_spin() -> Iterator[Finding]:
         simulation.step(460)
         expected = 0.7 * G * simulation.time
         off = abs(float(simulation.v[0]) / expected - 1.0)
-        yield Finding("wheels spinning at 260 N m for 2.3 s", "15.8 m/s: mu g t", name, off, 1e-2, "relative",
-                      f"{simulation.v[0]:.2f} m/s")
+        yield Finding(
+            "wheels spinning at 260 N m for 2.3 s",
+            "15.8 m/s: mu g t",
+            name,
+            off,
+            1e-2,
+            "relative",
+            f"{simulation.v[0]:.2f} m/s",
+        )
 
 
 def drop() -> Iterator[Finding]:
@@ -199,8 +246,15 @@ def drop() -> Iterator[Finding]:
                 simulation.step()
                 deepest = min(deepest, float(simulation.wheel_gaps.min()))
             left = abs(float(simulation.q[1]) - 0.35)
-            yield Finding(f"dropped from 2 m{title}", "stands at 0.35 m", name, left, 1e-6, "m",
-                          f"{-deepest * 1e3:.2g} mm deep in the step of the impact")
+            yield Finding(
+                f"dropped from 2 m{title}",
+                "stands at 0.35 m",
+                name,
+                left,
+                1e-6,
+                "m",
+                f"{-deepest * 1e3:.2g} mm deep in the step of the impact",
+            )
 
 
 def mirror() -> Iterator[Finding]:
@@ -214,8 +268,15 @@ def mirror() -> Iterator[Finding]:
         simulation.set_wheel_torques(np.full(6, 40.0))
         simulation.step(400)
         off = float(np.abs(simulation.q[[2, 3, 4]]).max())
-        yield Finding("symmetric rover on symmetric rocks, 2 s", "no drift, roll or heading", name, off, 1e-9, "m, rad",
-                      f"{simulation.q[0]:.2f} m driven")
+        yield Finding(
+            "symmetric rover on symmetric rocks, 2 s",
+            "no drift, roll or heading",
+            name,
+            off,
+            1e-9,
+            "m, rad",
+            f"{simulation.q[0]:.2f} m driven",
+        )
 
 
 def froude() -> Iterator[Finding]:
@@ -235,7 +296,10 @@ def froude() -> Iterator[Finding]:
                         value = solid["shape"][key]
                         solid["shape"][key] = [L * c for c in value] if isinstance(value, list) else L * value
                 if solid.get("hold"):
-                    solid["hold"] = {"stiffness": solid["hold"]["stiffness"] * L**4, "damping": solid["hold"]["damping"] * L**4.5}
+                    solid["hold"] = {
+                        "stiffness": solid["hold"]["stiffness"] * L**4,
+                        "damping": solid["hold"]["damping"] * L**4.5,
+                    }
             for wheel in description["wheels"]:
                 wheel["radius"] *= L
                 wheel["torque_limit"] *= L**4
@@ -252,7 +316,9 @@ def dzhanibekov() -> Iterator[Finding]:
     """A solid with moments 1, 2, 3 spinning about the middle one turns over with a period of 39.105734 s."""
     description = {
         "name": "solid",
-        "solids": [{"name": "body", "mass": 1.0, "shape": {"kind": "box", "size": [1, 1, 1]}, "inertia": [1, 2, 3, 0, 0, 0]}],
+        "solids": [
+            {"name": "body", "mass": 1.0, "shape": {"kind": "box", "size": [1, 1, 1]}, "inertia": [1, 2, 3, 0, 0, 0]}
+        ],
         "wheels": [],
     }
     for name, options in VARIANTS.items():
@@ -269,11 +335,28 @@ def dzhanibekov() -> Iterator[Finding]:
             k = np.flatnonzero((w[:-1] > 0.0) & (w[1:] <= 0.0))
             crossings = t[k] + h * w[k] / (w[k] - w[k + 1])
             period = float(np.diff(crossings).mean()) if len(crossings) > 1 else math.inf
-            yield Finding(f"Dzhanibekov, step {h * 1e3:g} ms", "period 39.105734 s", name, abs(period / 39.105734 - 1.0), 1e-4,
-                          "relative", f"{period:.6f} s")
+            yield Finding(
+                f"Dzhanibekov, step {h * 1e3:g} ms",
+                "period 39.105734 s",
+                name,
+                abs(period / 39.105734 - 1.0),
+                1e-4,
+                "relative",
+                f"{period:.6f} s",
+            )
 
 
 #: The scenes in the order of the table.
 SCENES = (
-    loads, straight, incline, heading, wedged, masses, wheel_spin, drop, mirror, froude, dzhanibekov,
+    loads,
+    straight,
+    incline,
+    heading,
+    wedged,
+    masses,
+    wheel_spin,
+    drop,
+    mirror,
+    froude,
+    dzhanibekov,
 )

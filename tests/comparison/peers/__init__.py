@@ -1,4 +1,4 @@
-"""One file per engine. Each has `VARIANTS`, a tuple of `Variant`, and raises ImportError where its engine is missing."""
+"""One file an engine, each with `VARIANTS`, a tuple of `Variant`; ImportError where its engine is missing."""
 
 import importlib
 from types import ModuleType

@@ -76,9 +76,7 @@ class BulletRunner:
             path = Path(folder) / "rover.urdf"
             path.write_text(description(scene), encoding="utf-8")
             w, x, y, z = quaternion_of(rotation_of(scene.q))
-            self.rover = c.loadURDF(
-                str(path), list(scene.q[:3]), [x, y, z, w], flags=c.URDF_USE_INERTIA_FROM_FILE
-            )
+            self.rover = c.loadURDF(str(path), list(scene.q[:3]), [x, y, z, w], flags=c.URDF_USE_INERTIA_FROM_FILE)
         for ground in grounds:
             c.changeDynamics(ground, -1, lateralFriction=1.0)  # Bullet multiplies the two
         self.joint = {c.getJointInfo(self.rover, j)[12].decode(): j for j in range(c.getNumJoints(self.rover))}

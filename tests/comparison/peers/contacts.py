@@ -16,7 +16,9 @@ def _frame(n: Array, s: Array) -> Array:
     return np.array([t, np.cross(t, n) * -1.0, n])
 
 
-def contacts(scene: RoverScene, centres: list[Array], axles: list[Array], radii: list[float], reach: float) -> list[Contact]:
+def contacts(
+    scene: RoverScene, centres: list[Array], axles: list[Array], radii: list[float], reach: float
+) -> list[Contact]:
     """Wheel, point (m), frame (rows t, b, n) and gap (m) of every contact nearer than `reach` (m)."""
     found: list[Contact] = []
     for wheel, (c, s, R) in enumerate(zip(centres, axles, radii, strict=True)):

@@ -1,7 +1,7 @@
 """Siconos' friction-contact solver (nonsmooth Gauss-Seidel) in a time-stepping loop, on flat ground.
 
-Debian's python3-siconos needs NumPy 1, so it runs in the system's Python, as a process of its own. Mass matrix, bias and
-contact Jacobians there are this project's, through the same compiled module; solver and step are not. Siconos' own
+Debian's python3-siconos needs NumPy 1, so it runs in the system's Python, as a process of its own. Mass matrix, bias
+and contact Jacobians there are this project's, through the same compiled module; solver and step are not. Siconos' own
 mechanics, which assembles the rover in Python too, is slower.
 """
 
@@ -24,7 +24,7 @@ CHILD = Path(__file__).with_name("siconos_child.py")
 
 def _check() -> None:
     try:
-        probe = subprocess.run(  # noqa: S603 - the system's own interpreter
+        probe = subprocess.run(
             [SYSTEM_PYTHON, str(CHILD), str(_core.__file__), "--probe"], capture_output=True, text=True, check=False
         )
     except OSError as error:
@@ -43,7 +43,7 @@ class SiconosRunner:
     def __init__(self, scene: RoverScene, time_step: float, *, tolerance: float) -> None:
         if len(scene.spheres):
             raise NotImplementedError("only one contact a wheel: no scenes of spheres")
-        self.child = subprocess.Popen(  # noqa: S603
+        self.child = subprocess.Popen(
             [SYSTEM_PYTHON, str(CHILD), str(_core.__file__)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

@@ -1,7 +1,7 @@
 """Seven seconds over a field of small rocks on a plane: 111 spheres of up to 15 cm, half buried.
 
-Wheels of radius 0.20 m, the built-in steering gains, 1 s of rest, then 6 s with 20 N m a wheel. Wheels climb, slip and drop;
-the path is still smooth enough in its data to converge. Reference: this project's Newton variant at a step of 0.05 ms.
+Wheels of radius 0.20 m, the built-in steering gains, 1 s of rest, then 6 s with 20 N m a wheel. Wheels climb, slip and
+drop; the path still converges. Reference: this project's Newton variant at a step of 0.05 ms.
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
 """The report's rug: 1250 fixed spheres under the rover, gravity 0.0981 m/s², the first 10 s.
 
 The rover of the report's runs (wheels of radius 0.30 m, 880 kg) is dropped on the rug and driven with 0.4 N m a wheel.
-Restitution is 0 here, since no peer has Newton's: everything else is section 6.2 of the report. Reference: this project's
-Newton variant at a step of 0.05 ms; Pinocchio's loop, which shares no code with it, comes as near as the results say.
+Restitution is 0, since no peer has Newton's; the rest is section 6.2 of the report. Reference: this project's Newton
+variant at a step of 0.05 ms.
 """
 
 import numpy as np
