@@ -93,7 +93,11 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 def remarks(rows: list[dict[str, Any]]) -> str:
     """How what fails fails."""
-    return "\n".join(f"- {r['scene']}, {r['method']}: {r['how']}." for r in rows if not r["holds"] and r["how"])
+    grouped: dict[tuple[str, str], list[str]] = {}
+    for row in rows:
+        if not row["holds"] and row["how"]:
+            grouped.setdefault((row["method"], row["how"]), []).append(row["scene"])
+    return "\n".join(f"- {method}: {'; '.join(scenes)}: {how}." for (method, how), scenes in grouped.items())
 
 
 def page(data: dict[str, Any]) -> str:

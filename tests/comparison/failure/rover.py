@@ -346,6 +346,68 @@ def dzhanibekov() -> Iterator[Finding]:
             )
 
 
+def disk(radius: float) -> dict[str, Any]:
+    """A thin disc of 1 kg, free, its axle along z."""
+    solid = {"name": "disk", "mass": 1.0, "shape": {"kind": "disc", "radius": radius}}
+    wheel = {"name": "D", "solid": "disk", "axle": [0, 0, 1], "radius": radius, "torque_limit": 1.0, "drive_sign": -1.0}
+    return {"name": "disk", "solids": [solid], "wheels": [wheel]}
+
+
+def euler_disk() -> Iterator[Finding]:
+    """A disk of radius 0.0375 m in steady precession about its resting centre: Omega² = 4 g / (a sin alpha)."""
+    a, step = 0.0375, 2e-5
+    for name, options in VARIANTS.items():
+        for alpha in (0.5, 0.2, 0.1):
+            omega = math.sqrt(4.0 * G / (a * math.sin(alpha)))
+            spin = -omega * math.sin(alpha) * np.array([0.0, -math.sin(alpha), math.cos(alpha)])
+            simulation = start(
+                disk(a),
+                q={1: a * math.sin(alpha), 3: alpha - math.pi / 2.0},
+                v={3: spin[0], 4: spin[1], 5: spin[2]},
+                time_step=step,
+                **options,
+            )
+            turned, before = 0.0, simulation.rotation[:, 2]
+            for _ in range(round(0.2 / step)):
+                simulation.step()
+                axle = simulation.rotation[:, 2]
+                turned += math.atan2(
+                    before[2] * axle[0] - before[0] * axle[2], before[0] * axle[0] + before[2] * axle[2]
+                )
+                before = axle
+            rate = turned / simulation.time
+            expected = f"{omega:.4f} rad/s"
+            off = abs(rate / omega - 1.0)
+            yield Finding(
+                f"Euler's disk, alpha {alpha:g}, step 0.02 ms",
+                expected,
+                name,
+                off,
+                1e-2,
+                "relative",
+                f"{rate:.4f} rad/s",
+            )
+
+
+def rolling_disk() -> Iterator[Finding]:
+    """An upright disk of radius 0.1 m rolls stably above omega = sqrt(g / (3 a)) = 5.7184 rad/s and falls below."""
+    a = 0.1
+    critical = math.sqrt(G / (3.0 * a))
+    for name, options in VARIANTS.items():
+        for ratio, stays in ((1.15, True), (0.85, False)):
+            omega = -ratio * critical  # about +z it would roll backwards
+            simulation = start(disk(a), q={1: a, 3: 1e-3}, v={0: -omega * a, 5: omega}, time_step=1e-3, **options)
+            leaning = 0.0
+            for _ in range(3000):
+                simulation.step()
+                leaning = max(leaning, abs(float(simulation.rotation[1, 2])))
+            off = leaning if stays else max(0.5 - leaning, 0.0)
+            title = f"rolling disk at {ratio:g} of its critical speed"
+            yield Finding(
+                title, "stays upright" if stays else "falls", name, off, 0.05, "1", f"leans by up to {leaning:.2g}"
+            )
+
+
 #: The scenes in the order of the table.
 SCENES = (
     loads,
@@ -359,4 +421,6 @@ SCENES = (
     mirror,
     froude,
     dzhanibekov,
+    euler_disk,
+    rolling_disk,
 )
