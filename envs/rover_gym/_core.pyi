@@ -6,35 +6,46 @@ listed FL, FR, ML, BL, MR, BR.
 
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from typing import Any, Literal, TypeAlias, final
+from typing import Any, Literal, TypeAlias, final, overload
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import disjoint_base
 
 _Array: TypeAlias = npt.NDArray[np.float64]
 _Coordinates: TypeAlias = Literal["report", "state"]
 
 __all__ = [
+    "BallSimulation",
     "CommandError",
     "Contacts",
     "Energy",
     "FrictionContactSolution",
+    "Line",
     "ModelError",
     "OptionError",
+    "PlanarContacts",
+    "PlanarSimulation",
+    "PlanarSnapshot",
     "Plane",
+    "Polyline",
     "ProblemError",
     "RoverGymError",
     "RoverModel",
     "Simulation",
     "SimulationBatch",
+    "Sine",
     "Snapshot",
     "SolverReport",
     "SphereField",
+    "Spline",
     "StateError",
     "StepError",
     "StepReport",
     "TerrainError",
+    "TwoWheelRoverSimulation",
     "__version__",
+    "accuracy_options",
     "solve_friction_contact",
 ]
 
@@ -286,16 +297,40 @@ class Simulation:
         gravity: npt.ArrayLike | None = None,
         friction: float = 0.7,
         restitution: float = 0.0,
-        time_step: float = 0.005,
-        variant: Literal["linearised", "newton"] = "linearised",
+        time_step: float | None = None,
+        variant: Literal["linearised", "newton"] | None = None,
         theta: float = 0.5,
         forecast: float = 0.5,
-        solver: Literal["auto", "nsgs", "newton"] = "auto",
-        tolerance: float = 1e-12,
+        solver: Literal["auto", "nsgs", "newton", "proximal", "admm"] = "auto",
+        tolerance: float | None = None,
         max_iterations: int = 1000,
         stabilisation: Literal["projection", "none"] = "projection",
         warm_start: bool = True,
-    ) -> Simulation: ...
+        accuracy: Literal["fast", "balanced", "reference"] | float | None = None,
+    ) -> Simulation:
+        """A rover on a terrain.
+
+        Args:
+            model: The machine; the built-in rover by default.
+            terrain: Flat ground by default.
+            gravity: (3,) m/s2; (0, -9.81, 0) by default.
+            friction: Coulomb's coefficient of every contact.
+            restitution: Newton's, in [0, 1].
+            time_step: s; 0.005 by default.
+            variant: "linearised" by default; "newton" solves for the forces at the end of the step.
+            theta: Weight of the step's end, in [0.5, 1].
+            forecast: A contact takes part where gap + forecast h u_N <= 0.
+            solver: Of the contact problem.
+            tolerance: Relative, of the contact solver; 1e-12 by default.
+            max_iterations: Of the contact solver.
+            stabilisation: What is done about penetration.
+            warm_start: Whether the solver starts from the last step's impulses.
+            accuracy: Chooses time_step, variant and tolerance, which then cannot be given: by name, or by the error (m)
+                allowed on a path of 20 m on flat ground. docs/accuracy.md says what each costs and gives.
+
+        Raises:
+            OptionError: An option is out of its range, or is given beside `accuracy`.
+        """
     @property
     def model(self) -> RoverModel: ...
     @property
@@ -388,6 +423,225 @@ class Simulation:
     def __reduce__(self) -> Any: ...
 
 @final
+class Line:
+    """The ground y = slope x + offset (m) of a planar scene; x forward, y up.
+
+    Raises:
+        TerrainError: A number is not finite.
+    """
+
+    def __new__(cls, slope: float = 0.0, offset: float = 0.0) -> Line: ...
+    @property
+    def slope(self) -> float: ...
+    @property
+    def offset(self) -> float: ...
+    @overload
+    def height(self, x: float) -> float: ...
+    @overload
+    def height(self, x: Sequence[float] | _Array) -> _Array: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class Sine:
+    """The ground y = amplitude sin(2 pi x / wavelength + phase) + offset, m.
+
+    Raises:
+        TerrainError: A number is not finite, or the wavelength is not positive.
+    """
+
+    def __new__(cls, amplitude: float, wavelength: float, phase: float = 0.0, offset: float = 0.0) -> Sine: ...
+    @property
+    def amplitude(self) -> float: ...
+    @property
+    def wavelength(self) -> float: ...
+    @property
+    def phase(self) -> float: ...
+    @property
+    def offset(self) -> float: ...
+    @overload
+    def height(self, x: float) -> float: ...
+    @overload
+    def height(self, x: Sequence[float] | _Array) -> _Array: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class Spline:
+    """The natural cubic spline through points (m), continued by its tangents: a ground with continuous curvature.
+
+    Raises:
+        TerrainError: Fewer than two points, lengths that differ, an entry that is not finite, x that does not
+            increase.
+    """
+
+    def __new__(cls, x: npt.ArrayLike, y: npt.ArrayLike) -> Spline: ...
+    @property
+    def x(self) -> _Array: ...
+    @property
+    def y(self) -> _Array: ...
+    @overload
+    def height(self, x: float) -> float: ...
+    @overload
+    def height(self, x: Sequence[float] | _Array) -> _Array: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class Polyline:
+    """Straight pieces between points (m), which may stand above each other: steps, ramps, kerbs, with corners.
+
+    Raises:
+        TerrainError: Fewer than two points, lengths that differ, an entry that is not finite, x that decreases, a
+            point twice.
+    """
+
+    def __new__(cls, x: npt.ArrayLike, y: npt.ArrayLike) -> Polyline: ...
+    @staticmethod
+    def step(x: float, height: float) -> Polyline:
+        """Level ground at height 0 with a step up (or down, if negative) at x, m."""
+    @property
+    def x(self) -> _Array: ...
+    @property
+    def y(self) -> _Array: ...
+    @overload
+    def height(self, x: float) -> float: ...
+    @overload
+    def height(self, x: Sequence[float] | _Array) -> _Array: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class PlanarContacts:
+    """The contacts of a planar simulation's last step, as fresh arrays with one row a contact."""
+
+    @property
+    def discs(self) -> npt.NDArray[np.int64]:
+        """(n,) which disc touches: 0 the ball or wheel A, 1 wheel B."""
+    @property
+    def points(self) -> _Array:
+        """(n, 2) points of the ground, world, m."""
+    @property
+    def normals(self) -> _Array:
+        """(n, 2) unit normals out of the ground; the tangent is (n_y, -n_x)."""
+    @property
+    def gaps(self) -> _Array:
+        """(n,) m."""
+    @property
+    def impulses(self) -> _Array:
+        """(n, 2) along normal and tangent, N s."""
+    @property
+    def velocities(self) -> _Array:
+        """(n, 2) of the rim against the ground after the step, along normal and tangent, m/s."""
+    def __len__(self) -> int: ...
+
+@final
+class PlanarSnapshot:
+    """Everything that a planar simulation needs to continue bit for bit; picklable."""
+
+    @staticmethod
+    def from_bytes(data: bytes) -> PlanarSnapshot: ...
+    def to_bytes(self) -> bytes: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __reduce__(self) -> Any: ...
+
+@disjoint_base
+class PlanarSimulation:
+    """A planar machine on a ground, stepped by the rover's own schemes: what the two kinds below share."""
+
+    @property
+    def ground(self) -> Line | Sine | Spline | Polyline: ...
+    @property
+    def time(self) -> float: ...
+    @property
+    def time_step(self) -> float: ...
+    @property
+    def q(self) -> _Array:
+        """(nv,) coordinates: m, m, then rad; angles turn to the left."""
+    @property
+    def v(self) -> _Array:
+        """(nv,) their rates."""
+    @property
+    def centres(self) -> _Array:
+        """(n_discs, 2) centres of the ball or of wheels A, B, world, m."""
+    @property
+    def gaps(self) -> _Array:
+        """(n_discs,) distance to the ground now, m; negative where they overlap."""
+    @property
+    def torques(self) -> _Array: ...
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The keyword arguments that describe the machine."""
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The keyword arguments that make a simulation with these options."""
+    def set_state(self, q: npt.ArrayLike, v: npt.ArrayLike | None = None) -> None:
+        """Sets coordinates and rates (default: at rest). Time goes to 0, warm start is dropped, torques stay."""
+    def set_torques(self, torques: npt.ArrayLike) -> None:
+        """(n_discs,) N m, positive drives forward; the rover's act between body and wheels."""
+    def step(self, n: int = 1) -> StepReport: ...
+    @property
+    def contacts(self) -> PlanarContacts: ...
+    def energy(self) -> Energy: ...
+    def mass_matrix(self) -> _Array:
+        """(nv, nv) at the current state."""
+    def last_problem(self) -> tuple[_Array, _Array, _Array]:
+        """W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem."""
+    def snapshot(self) -> PlanarSnapshot: ...
+    def restore(self, snapshot: PlanarSnapshot) -> None: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class BallSimulation(PlanarSimulation):
+    """A disc on a ground: coordinates x, y (centre, m) and theta (rad).
+
+    `inertia` (kg m2) is a homogeneous disc's if not given. Options as `Simulation`'s, but for gravity (x, y), and
+    `contact`: "nearest" (the disc touches where the ground is nearest to its centre) or "centre_height" (the
+    report's: the centre itself stops at the ground).
+
+    Raises:
+        ModelError: Mass, radius or inertia is not finite and positive.
+        TerrainError: `ground` is none.
+        OptionError: An option is out of its range.
+    """
+
+    def __new__(
+        cls,
+        ground: Line | Sine | Spline | Polyline,
+        *,
+        mass: float = 3.0,
+        radius: float = 1.5,
+        inertia: float | None = None,
+        **options: Any,
+    ) -> BallSimulation: ...
+
+@final
+class TwoWheelRoverSimulation(PlanarSimulation):
+    """Body and two driven wheels: coordinates x, y (body's mass centre, m), theta, theta_A, theta_B (rad).
+
+    A is the back wheel, B the front one; their angles are absolute. `wheel_*` take one number or one a wheel. `axle_a`,
+    `axle_b`: axles relative to the body's mass centre in its own axes, m; (-0.4, 0) and (0.4, 0) if not given.
+    `inertia` is a rod's from axle to axle and `wheel_inertia` a disc's if not given. Defaults are the scale of the
+    report's granular run. Options as `BallSimulation`'s.
+
+    Raises:
+        ModelError: A mass, radius or inertia is not finite and positive, or the wheels overlap.
+        TerrainError: `ground` is none.
+        OptionError: An option is out of its range.
+    """
+
+    def __new__(
+        cls,
+        ground: Line | Sine | Spline | Polyline,
+        *,
+        mass: float = 130.0,
+        inertia: float | None = None,
+        wheel_mass: float | npt.ArrayLike | None = None,
+        wheel_radius: float | npt.ArrayLike | None = None,
+        wheel_inertia: float | npt.ArrayLike | None = None,
+        axle_a: npt.ArrayLike | None = None,
+        axle_b: npt.ArrayLike | None = None,
+        **options: Any,
+    ) -> TwoWheelRoverSimulation: ...
+
+@final
 class SimulationBatch:
     """Many rovers stepped side by side on several threads, bit for bit as each would be alone."""
 
@@ -424,17 +678,24 @@ class SimulationBatch:
 @final
 class SolverReport:
     @property
-    def status(self) -> Literal["converged", "not_converged"]: ...
+    def status(self) -> Literal["converged", "relaxed", "not_converged"]:
+        """ "relaxed": the convex relaxation is solved, not Coulomb's law."""
     @property
     def is_converged(self) -> bool: ...
     @property
     def iterations(self) -> int: ...
     @property
-    def residual(self) -> float: ...
+    def residual(self) -> float:
+        """Violation of Coulomb's law relative to the data, computed from the returned impulses."""
     @property
-    def velocity_error(self) -> float: ...
+    def velocity_error(self) -> float:
+        """Largest violation of Coulomb's law at one contact, m/s."""
     @property
-    def solver(self) -> str: ...
+    def solver(self) -> str:
+        """The method that answered; never "auto"."""
+    @property
+    def law(self) -> Literal["coulomb", "relaxed"]:
+        """The law that the answer obeys."""
 
 @final
 class FrictionContactSolution:
@@ -445,15 +706,38 @@ class FrictionContactSolution:
     @property
     def report(self) -> SolverReport: ...
 
+def accuracy_options(accuracy: Literal["fast", "balanced", "reference"] | float) -> dict[str, Any]:
+    """The keyword arguments time_step, variant and tolerance of `Simulation` that an accuracy stands for."""
+
 def solve_friction_contact(
-    W: npt.ArrayLike,
+    W: npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
     q: npt.ArrayLike,
     mu: npt.ArrayLike,
     tolerance: float = 1e-8,
     *,
     dimension: Literal[2, 3] = 3,
-    solver: Literal["auto", "nsgs", "newton"] = "auto",
+    solver: Literal["auto", "nsgs", "newton", "proximal", "admm", "relaxed"] = "auto",
     max_iterations: int = 1000,
     initial: npt.ArrayLike | None = None,
 ) -> FrictionContactSolution:
-    """Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K, for any W (n_c d, n_c d)."""
+    """Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K, for any W (n_c d, n_c d).
+
+    Args:
+        W: Delassus operator, 1/kg, used as it is (it need not be symmetric or regular). For many contacts its block
+            rows ``(indptr (n_c + 1,), indices (n_blocks,), data (n_blocks, d, d))``: each row ascending, with its
+            diagonal block.
+        q: Free velocity (n_c d,), m/s, contact by contact: normal, tangent (, tangent).
+        mu: Friction coefficients (n_c,).
+        tolerance: Largest relative residual of a converged answer; its velocities are also right to
+            max(tolerance, 1e-9) m/s.
+        dimension: Components of a contact, 2 or 3.
+        solver: "auto" escalates from what is cheap to what is robust; "nsgs", "newton", "proximal", "admm" are single
+            methods of Coulomb's law; "relaxed" solves its convex relaxation, another law, and so never counts as
+            converged.
+        max_iterations: Most Newton steps, sweeps or ADMM iterations.
+        initial: Warm start (n_c d,), N s.
+
+    Raises:
+        ProblemError: Wrong shapes or entries.
+        OptionError: Unknown solver or dimension, tolerance or max_iterations out of range.
+    """

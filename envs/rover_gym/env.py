@@ -2,8 +2,8 @@
 
 import copy
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -14,11 +14,15 @@ from rover_gym._core import Plane, RoverModel, Simulation, Snapshot, SphereField
 from rover_gym.observation import N_ACTIONS, N_WHEELS, ObservationLayout
 from rover_gym.progress import Progress, advance, draw_noise, motor_commands, report
 from rover_gym.randomisation import Domain
+from rover_gym.render_options import RENDER_MODES, RenderOptions, check_render_mode, check_render_options
 from rover_gym.rocks import Rocks
 from rover_gym.scene import Scene, check_difficulty, check_reset_options, draw_scene
 from rover_gym.start import Start
-from rover_gym.task import Task, check_actions, check_task
+from rover_gym.task import Task, check_actions, check_task, mapping
 from rover_gym.validation import Range, refuse
+
+if TYPE_CHECKING:
+    from rover_gym.rendering import FrameRenderer
 
 #: Below this speed, m/s, of wheel and rim alike a slip ratio says nothing: the core's `SLIP_SPEED`.
 SLIP_SPEED = 0.05
@@ -196,13 +200,23 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | model             | None           | a `RoverModel` with six driven, steered wheels; None: the rover |
     | solver_options    | None           | further options of `Simulation`, by name                        |
     | reward_weights    | None           | weights to replace, by term                                     |
+    | render_mode       | None           | "rgb_array": `render()` returns a frame                         |
+    | render_options    | None           | width, height, camera, show_forces, antialiasing, by name       |
+
+    ## Frames
+
+    With `render_mode="rgb_array"` `render()` returns the present state as (height, width, 3) uint8, 640 x 480 by
+    default; `gymnasium.make(..., render_mode="human")` shows the same in a window. Both need `rover-gym[render]`, no
+    display is needed for the first. The cameras "follow", "side" and "top" go with the rover, a pair of points (eye,
+    target) stands still; `show_forces` draws the contact forces of the last physics step as arrows.
+    `metadata["render_fps"]` is the control frequency, so that a video runs in real time.
 
     ## Version history
 
     - v0: plane ground and rocks. Numbers may change until the first release.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}  # type: ignore[misc]
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 20}  # noqa: RUF012 - as Gymnasium declares it
 
     def __init__(
         self,
@@ -233,6 +247,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         model: RoverModel | None = None,
         solver_options: Mapping[str, Any] | None = None,
         reward_weights: Mapping[str, float] | None = None,
+        render_mode: str | None = None,
+        render_options: Mapping[str, Any] | None = None,
     ) -> None:
         self.task: Task = check_task(
             terrain=terrain,
@@ -276,6 +292,15 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         self._scene: Scene | None = None
         self._progress: Progress
         self._difficulty: Range | None = None
+
+        check_render_mode(render_mode)
+        self.render_mode = render_mode
+        self.render_options: RenderOptions = check_render_options(
+            "render_options", mapping("render_options", render_options)
+        )
+        fps = round(1.0 / self.dt, 9)
+        self.metadata = {**type(self).metadata, "render_fps": int(fps) if fps.is_integer() else fps}
+        self._renderer: FrameRenderer | None = None
 
     @property
     def simulation(self) -> Simulation:
@@ -365,6 +390,30 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             OptionError: It is not within 0 to 1, or there are no rocks; nothing has changed.
         """
         self._difficulty = check_difficulty(self.task, difficulty)
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """The present state as a frame, (height, width, 3) uint8; None, with a warning, without a render mode.
+
+        Raises:
+            ResetNeeded: The environment has not been reset.
+            OSError: No OpenGL library works on this machine; the message names the packages that bring one.
+        """
+        if self.render_mode is None:
+            gym.logger.warn('RoverEnv: render() needs render_mode="rgb_array" when the environment is made')
+            return None
+        scene = self._running()
+        if self._renderer is None:
+            from rover_gym.rendering import FrameRenderer  # noqa: PLC0415 - only who looks needs a renderer
+
+            self._renderer = FrameRenderer(self.model, scene.terrain, **asdict(self.render_options))
+        self._renderer.set_scene(scene.terrain, goal=scene.start.goal, goal_tolerance=self.goal_tolerance)
+        return self._renderer.render(self._simulation)
+
+    def close(self) -> None:
+        """Frees the renderer, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
 
     def snapshot(self) -> EnvSnapshot:
         """The state of the environment and of its random generator, to `restore` later."""

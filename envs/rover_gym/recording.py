@@ -1,8 +1,8 @@
 """Trajectories in HDF5, an open format that any language reads.
 
 A file describes itself: each data set carries `unit` and `description` (and `columns` where its columns have names),
-the file carries the scene, the seed, the versions and the solver settings. Rows reach the disk while the run goes,
-and between two flushes the file is at rest, so a run that is killed keeps all but the last rows.
+the file carries the scene, the ground, the seed, the versions and the solver settings. Rows reach the disk while the
+run goes, and between two flushes the file is at rest, so a run that is killed keeps all but the last rows.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym._core import RoverModel, Simulation, __version__
+from rover_gym._core import Plane, RoverGymError, RoverModel, Simulation, SphereField, __version__
+from rover_gym.extras import MissingExtraError, require
+from rover_gym.validation import refuse
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -26,23 +28,29 @@ if TYPE_CHECKING:
     import h5py
 
 FORMAT = "rover-gym trajectory"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+TERRAIN = "terrain"  # the group that holds the ground
+
+__all__ = [
+    "FORMAT",
+    "FORMAT_VERSION",
+    "Channel",
+    "MissingExtraError",
+    "Recorder",
+    "RecordingError",
+    "Sampler",
+    "Trajectory",
+    "describe",
+    "read_trajectory",
+]
 
 
-class MissingExtraError(ImportError):
-    """A command needs packages that the base installation does not bring."""
-
-    def __init__(self, package: str, extra: str) -> None:
-        """Names the package that is missing and the extra that brings it."""
-        super().__init__(f"{package} is not installed: pip install 'rover-gym[{extra}]'", name=package)
+class RecordingError(RoverGymError, ValueError):
+    """A file is no trajectory of this format, or does not hold what was asked of it."""
 
 
 def _import_h5py() -> Any:
-    try:
-        import h5py  # noqa: PLC0415 - only who records needs it
-    except ModuleNotFoundError as error:
-        raise MissingExtraError("h5py", "demo") from error
-    return h5py
+    return require("h5py", "demo")
 
 
 @dataclass(frozen=True)
@@ -144,7 +152,9 @@ class Recorder:
     Args:
         path: The file to make; an existing one is replaced. Its folder is made.
         channels: What a row holds.
-        attributes: Facts about the run, stored at the root: strings, numbers and arrays as they are, the rest as JSON.
+        attributes: Facts about the run, stored at the root: strings, numbers and arrays as they are, the rest as JSON;
+            `describe` makes them of a simulation.
+        terrain: The ground, stored in the group `terrain`; a replay needs it.
         rows_per_flush: How many rows may be lost at a kill.
     """
 
@@ -154,6 +164,7 @@ class Recorder:
         channels: Sequence[Channel],
         attributes: Mapping[str, Any] | None = None,
         *,
+        terrain: Plane | SphereField | None = None,
         rows_per_flush: int = 200,
     ) -> None:
         hdf5 = _import_h5py()
@@ -186,6 +197,8 @@ class Recorder:
             data.attrs["description"] = channel.description
             if channel.columns:
                 data.attrs["columns"] = list(channel.columns)
+        if terrain is not None:
+            _write_terrain(self._file.create_group(TERRAIN), terrain)
         self._file.flush()
 
     def append(self, row: Mapping[str, npt.ArrayLike]) -> None:
@@ -249,11 +262,13 @@ class Trajectory:
         data: The data sets by name, (n, ...) float64.
         units: Their units.
         attributes: What the file says of the run; JSON values are decoded.
+        terrain: The ground, or None where the file holds none.
     """
 
     data: Mapping[str, npt.NDArray[np.float64]]
     units: Mapping[str, str]
     attributes: Mapping[str, Any]
+    terrain: Plane | SphereField | None = None
 
     def __getitem__(self, name: str) -> npt.NDArray[np.float64]:
         """The data set of that name."""
@@ -264,19 +279,85 @@ def read_trajectory(path: str | Path) -> Trajectory:
     """Reads a file that `Recorder` wrote, complete or not.
 
     Raises:
-        ValueError: The file is no trajectory of this format.
-        OSError: The file cannot be read as HDF5.
+        RecordingError: The file is no trajectory of this format and version.
+        OSError: The file is not there or cannot be read.
     """
     h5py = _import_h5py()
+    path = Path(path)
+    with path.open("rb"):  # a file that is not there, or may not be read, says so itself
+        pass
+    if not h5py.is_hdf5(path):
+        refuse(RecordingError, "path", str(path), f"is no {FORMAT}: not HDF5")
     with h5py.File(path, "r") as file:
-        if file.attrs.get("format") != FORMAT or file.attrs["format_version"] != FORMAT_VERSION:
-            raise ValueError(f"{path} is no {FORMAT} of version {FORMAT_VERSION}")
-        rows = min(len(data) for data in file.values())  # a kill within a flush leaves some a few rows longer
+        version = file.attrs.get("format_version")
+        if file.attrs.get("format") != FORMAT:
+            refuse(RecordingError, "path", str(path), f"is no {FORMAT}")
+        if version != FORMAT_VERSION:
+            reason = f"is a {FORMAT} of version {version}, this rover-gym reads {FORMAT_VERSION}: record it again"
+            refuse(RecordingError, "path", str(path), reason)
+        sets = {name: data for name, data in file.items() if isinstance(data, h5py.Dataset)}
+        rows = min(len(data) for data in sets.values())  # a kill within a flush leaves some a few rows longer
         return Trajectory(
-            data={name: data[:rows] for name, data in file.items()},
-            units={name: data.attrs["unit"] for name, data in file.items()},
+            data={name: data[:rows] for name, data in sets.items()},
+            units={name: data.attrs["unit"] for name, data in sets.items()},
             attributes={key: _decode(value) for key, value in file.attrs.items()},
+            terrain=_read_terrain(file[TERRAIN]) if TERRAIN in file else None,
         )
+
+
+def describe(
+    sim: Simulation, title: str, scene: Mapping[str, Any] | None = None, *, seed: int | str = "none"
+) -> dict[str, Any]:
+    """The attributes of a recording, from the simulation at its start.
+
+    Args:
+        sim: The simulation; its model, state, commands and settings are described.
+        title: What is run, in words.
+        scene: What else the scene was made from.
+        seed: Seed of the run, or why there is none.
+    """
+    return {
+        "title": title,
+        "scene": {
+            **(scene or {}),
+            "model": sim.model.to_dict(),
+            "q": sim.q,
+            "steering": sim.steering,
+            "wheel_torques": sim.wheel_torques,
+        },
+        "seed": seed,
+        "solver": sim.settings,
+    }
+
+
+def _write_terrain(group: h5py.Group, terrain: Plane | SphereField) -> None:
+    def write(name: str, value: npt.ArrayLike, unit: str, description: str, columns: Sequence[str] = ()) -> None:
+        data = group.create_dataset(name, data=np.asarray(value, dtype=np.float64))
+        data.attrs["unit"] = unit
+        data.attrs["description"] = description
+        if columns:
+            data.attrs["columns"] = list(columns)
+
+    field = terrain if isinstance(terrain, SphereField) else None
+    plane = terrain if isinstance(terrain, Plane) else terrain.ground
+    group.attrs["kind"] = "plane" if field is None else "sphere_field"
+    group.attrs["description"] = "the ground, fixed; free is what lies outside all spheres and above the plane"
+    axes = ("x", "y", "z")
+    if plane is not None:
+        write("plane_normal", plane.normal, "1", "unit normal n of the plane, to the free side, world", axes)
+        write("plane_offset", plane.offset, "m", "d of the plane n.x + d = 0")
+    if field is not None:
+        write("sphere_centres", field.centres, "m", "centres of the spheres, world", axes)
+        write("sphere_radii", field.radii, "m", "radii of the spheres")
+
+
+def _read_terrain(group: h5py.Group) -> Plane | SphereField:
+    plane = Plane(group["plane_normal"][:], float(group["plane_offset"][()])) if "plane_normal" in group else None
+    if "sphere_centres" in group:
+        return SphereField(group["sphere_centres"][:], group["sphere_radii"][:], plane)
+    if plane is None:
+        refuse(RecordingError, TERRAIN, group.attrs.get("kind"), "holds neither a plane nor spheres")
+    return plane
 
 
 def _to_plain(value: Any) -> Any:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from rover_gym._core import Plane, RoverModel, Simulation
-from rover_gym.recording import Recorder, Sampler, Trajectory
+from rover_gym.recording import Recorder, Sampler, Trajectory, describe
 
 #: The 880 kg table of the plane run, kg, in the order of Table 4.1.
 MASSES = (700.0, 20.0, 6.0, 6.0, 14.0, 14.0, 20.0, 6.0, 6.0, 14.0, 14.0, 20.0, 6.0, 6.0, 14.0, 14.0)
@@ -29,6 +29,7 @@ FRONT_STEERING = -0.1  # rad, start and set-point of both front wheels
 WHEEL_TORQUE = -0.2  # N m, drives towards -x
 STEERING_STIFFNESS = 1.5  # N m/rad
 STEERING_DAMPING = 1.5  # N m s/rad
+SEED = "none: the scene has no randomness"
 
 
 @dataclass(frozen=True)
@@ -129,8 +130,10 @@ def run(
         StepError: A step could not be taken; what came before is on the disk.
     """
     sim = scene(time_step, **options)
-    terrain = {"kind": "plane", "normal": inclined_plane().normal, "offset": inclined_plane().offset}
-    attributes = describe(sim, "section 6.1 of the report: the rover on an inclined plane", terrain)
+    terrain = {"kind": "plane", "made_by": "rover_gym.report.inclined_plane()"}
+    attributes = describe(
+        sim, "section 6.1 of the report: the rover on an inclined plane", {"terrain": terrain}, seed=SEED
+    )
     return record(sim, path, attributes, duration=duration, progress=progress)
 
 
@@ -160,7 +163,7 @@ def record(
     smallest_gap = float(sim.wheel_gaps.min())
     unconverged, worst = 0, 0.0
     sampler = Sampler(sim.model)
-    with Recorder(path, sampler.channels, attributes) as recorder:
+    with Recorder(path, sampler.channels, attributes, terrain=sim.terrain) as recorder:
         recorder.append(sampler.row(sim))
         begin = time.perf_counter()
         for step in range(1, steps + 1):
@@ -176,22 +179,6 @@ def record(
         wall_time = time.perf_counter() - begin
         recorder.note(wall_time=wall_time, unconverged_steps=unconverged)
     return SceneResult(Path(path), sim.time, wall_time, first_contact, smallest_gap, unconverged, worst)
-
-
-def describe(sim: Simulation, title: str, terrain: Mapping[str, Any]) -> dict[str, Any]:
-    """The attributes of a recording, from the simulation at its start."""
-    return {
-        "title": title,
-        "scene": {
-            "terrain": dict(terrain),
-            "model": sim.model.to_dict(),
-            "q": sim.q,
-            "steering": sim.steering,
-            "wheel_torques": sim.wheel_torques,
-        },
-        "seed": "none: the scene has no randomness",
-        "solver": sim.settings,
-    }
 
 
 @cache

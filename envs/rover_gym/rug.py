@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from rover_gym._core import Simulation, SphereField
-from rover_gym.report import GRAVITY, SceneResult, describe, record, report_model, start
+from rover_gym.recording import describe
+from rover_gym.report import GRAVITY, SEED, SceneResult, record, report_model, start
 
 FRICTION = 0.8
 RESTITUTION = 0.1
@@ -65,5 +66,7 @@ def run(
     """
     sim = scene(time_step, **options)
     terrain = {"kind": "sphere_field", "made_by": "SphereField.rug()"}
-    attributes = describe(sim, "section 6.2 of the report: the rover on the rug of spheres", terrain)
+    attributes = describe(
+        sim, "section 6.2 of the report: the rover on the rug of spheres", {"terrain": terrain}, seed=SEED
+    )
     return record(sim, path, attributes, duration=duration, progress=progress)

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import imageio_ffmpeg
 import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
@@ -102,3 +103,14 @@ def test_version_and_help() -> None:
     assert rover("--version").output.startswith("rover-gym ")
     assert "drive" in rover("--help").output
     assert rover("no-such-command").exit_code == 2
+
+
+def test_episodes_are_filmed(tmp_path: Path) -> None:
+    path = tmp_path / "films" / "rocks.mp4"
+    arguments = ("--terrain", "sphere_field", "--time-limit", "0.3", "--episodes", "2", "--video", str(path))
+    result = rover("drive", *arguments)
+    assert result.exit_code == 0, result.output
+    assert str(path) in result.output.replace("\n", "")
+    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
+    assert frames == 2 * 7  # the start and six steps each
+    assert seconds == pytest.approx(14 / 20, abs=0.06)

@@ -9,8 +9,9 @@ import h5py
 import numpy as np
 import pytest
 
-from rover_gym import RoverModel, Simulation
-from rover_gym.recording import Channel, MissingExtraError, Recorder, Sampler, read_trajectory
+from rover_gym import Plane, RoverModel, Simulation, SphereField
+from rover_gym.extras import MissingExtraError
+from rover_gym.recording import Channel, Recorder, RecordingError, Sampler, read_trajectory
 
 TIME = Channel("time", "s", "time since the start")
 POINT = Channel("point", "m", "a point, world", (3,), ("x", "y", "z"))
@@ -103,8 +104,57 @@ def test_a_row_that_does_not_fit_is_refused_and_nothing_added(
 def test_another_hdf5_file_is_refused(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["time"] = [1.0]
-    with pytest.raises(ValueError, match="is no rover-gym trajectory"):
+    with pytest.raises(RecordingError, match="is no rover-gym trajectory") as caught:
         read_trajectory(tmp_path / "other.h5")
+    assert caught.value.field == "path"
+    assert caught.value.value == str(tmp_path / "other.h5")
+
+
+def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("no run", encoding="utf-8")
+    with pytest.raises(RecordingError, match="not HDF5"):
+        read_trajectory(tmp_path / "notes.txt")
+    with pytest.raises(FileNotFoundError):
+        read_trajectory(tmp_path / "nowhere.h5")
+
+
+def test_a_file_of_an_older_version_is_refused_by_its_version(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "old.h5", [TIME]) as recorder:
+        recorder.append({"time": 0.0})
+    with h5py.File(tmp_path / "old.h5", "a") as file:
+        file.attrs["format_version"] = 1
+    with pytest.raises(RecordingError, match="of version 1, this rover-gym reads 2"):
+        read_trajectory(tmp_path / "old.h5")
+
+
+@pytest.mark.parametrize(
+    "terrain",
+    [
+        Plane((0.1, 1.0, -0.2), 0.3),
+        SphereField.rug(),
+        SphereField([[1.0, 0.1, -2.0]], [0.4], Plane((0.0, 1.0, 0.1), -0.2)),
+    ],
+)
+def test_the_ground_comes_back_and_describes_itself(terrain: Plane | SphereField, tmp_path: Path) -> None:
+    with Recorder(tmp_path / "run.h5", [TIME], terrain=terrain) as recorder:
+        recorder.append({"time": 0.0})
+    again = read_trajectory(tmp_path / "run.h5").terrain
+    assert type(again) is type(terrain)
+    planes = [terrain, again]
+    if isinstance(terrain, SphereField) and isinstance(again, SphereField):
+        assert np.array_equal(again.centres, terrain.centres)
+        assert np.array_equal(again.radii, terrain.radii)
+        planes = [terrain.ground, again.ground]
+    if planes[0] is None:
+        assert planes[1] is None
+    else:
+        assert planes[1].normal == pytest.approx(planes[0].normal, abs=1e-15)
+        assert planes[1].offset == planes[0].offset
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert file["terrain"].attrs["kind"] in ("plane", "sphere_field")
+        for data in file["terrain"].values():
+            assert data.attrs["unit"]
+            assert data.attrs["description"]
 
 
 def test_without_h5py_the_error_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

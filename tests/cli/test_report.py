@@ -18,6 +18,7 @@ FIGURES = (
     "figure-6.3-contact-distances.png",
     "figure-6.4-reaction-force.png",
     "figure-6.5-steering-angles.png",
+    "section-6.1-beside-siconos.png",
     "section-6.2-wheel-traces.png",
     "section-6.2-contact-distances.png",
     "section-6.2-reaction-forces.png",

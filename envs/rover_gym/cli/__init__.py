@@ -7,6 +7,9 @@ import typer
 from rover_gym._core import __version__
 from rover_gym.cli.baseline import baseline
 from rover_gym.cli.drive import drive
+from rover_gym.cli.planar import planar
+from rover_gym.cli.plot import plot
+from rover_gym.cli.replay import replay
 from rover_gym.cli.report import report
 from rover_gym.cli.speed import speed
 
@@ -19,6 +22,9 @@ app = typer.Typer(
 app.command()(drive)
 app.command()(baseline)
 app.command()(report)
+app.command()(plot)
+app.command()(replay)
+app.add_typer(planar, name="planar")
 app.command()(speed)
 
 

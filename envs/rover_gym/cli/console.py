@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from rover_gym._core import RoverGymError
-from rover_gym.recording import MissingExtraError
+from rover_gym.extras import MissingExtraError
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -1,4 +1,4 @@
-"""`rover drive`: episodes of `Rover-v0` with the PD baseline."""
+"""`rover drive`: episodes of `Rover-v0` with the PD baseline or a trained policy."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -15,10 +15,12 @@ from rich.table import Table
 
 from rover_gym.cli.console import console, plain_errors, progress_bar, say_path
 from rover_gym.env import RoverEnv
-from rover_gym.episodes import Episode, run_episode
+from rover_gym.episodes import Episode, Policy, run_episode
 from rover_gym.policy import PDPolicy
-from rover_gym.recording import Channel, Recorder, Sampler
+from rover_gym.recording import Channel, Recorder, Sampler, describe
 from rover_gym.rewards import WEIGHTS
+from rover_gym.trained import TrainedPolicy, find_policy, policy_arguments
+from rover_gym.video import VideoWriter
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
 
@@ -40,6 +42,10 @@ def drive(
     goal: Annotated[
         tuple[float, float] | None, typer.Option(metavar="X Z", help="Goal on the map, m; drawn if not given.")
     ] = None,
+    policy: Annotated[
+        str,
+        typer.Option(help="'pd' for the baseline, 'trained' for the package's trained one, or such a one's folder."),
+    ] = "pd",
     friction: Annotated[float, typer.Option(help="Coulomb's coefficient.")] = 0.7,
     time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
     time_limit: Annotated[float, typer.Option(min=CONTROL_PERIOD, help="Time limit of an episode, s.")] = 60.0,
@@ -51,8 +57,11 @@ def drive(
             file_okay=False, help="Folder for trajectories (HDF5) and summary.json; nothing is saved without."
         ),
     ] = None,
+    video: Annotated[
+        Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes, one after the other.")
+    ] = None,
 ) -> None:
-    """Drive Rover-v0 to its goal with the PD baseline and print what the episodes came to."""
+    """Drive Rover-v0 to its goal with the PD baseline or a trained policy and print what the episodes came to."""
     arguments: dict[str, Any] = {
         "terrain": terrain,
         "friction": friction,
@@ -63,35 +72,50 @@ def drive(
     arguments |= {} if uphill is None else {"uphill_deg": uphill}
     arguments |= {} if heading is None else {"heading_deg": heading}
     options = {} if goal is None else {"goal": goal}
-    env = gym.make("Rover-v0", max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments)
-    policy = PDPolicy(env)
+    folder = find_policy(policy, terrain)
+    arguments |= {} if folder is None else policy_arguments(folder)
+    filming: dict[str, Any] = {}
+    if video is not None:
+        filming = {"render_mode": "rgb_array", "render_options": {"antialiasing": True}}
+    env = gym.make("Rover-v0", max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments, **filming)
+    driver: Policy = PDPolicy(env) if folder is None else TrainedPolicy.load(env, folder)
+    name = "the PD baseline" if folder is None else "a trained policy"
 
     results, paths = [], []
-    with progress_bar() as bar:
+    with progress_bar() as bar, ExitStack() as stack:
+        stack.callback(env.close)
+        film = None if video is None else stack.enter_context(VideoWriter(video, env.metadata["render_fps"]))
         for number in range(seed, seed + episodes):
             path = None if output is None else output / f"episode-{number}.h5"
-            results.append(_drive_one(env, policy, number, arguments, options, path, bar))
+            results.append(_drive_one(env, driver, name, number, arguments, options, path, bar, film))
             paths += [path] if path else []
 
-    console().print(_table(results))
+    console().print(_table(results, name))
     if output is not None:
-        summary = {"arguments": arguments | options, "episodes": [asdict(episode) for episode in results]}
+        summary = {
+            "policy": policy,
+            "arguments": arguments | options,
+            "episodes": [asdict(episode) for episode in results],
+        }
         paths.append(output / "summary.json")
         paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    paths += [] if video is None else [video]
     for path in paths:
         say_path("written", path)
 
 
 def _drive_one(
     env: gym.Env[Any, Any],
-    policy: PDPolicy,
+    policy: Policy,
+    name: str,
     seed: int,
     arguments: Mapping[str, Any],
     options: Mapping[str, Any],
     path: Path | None,
     bar: Progress,
+    film: VideoWriter | None,
 ) -> Episode:
-    """One episode, recorded if there is a path."""
+    """One episode, recorded if there is a path, filmed if there is a film."""
     task = bar.add_task(f"seed {seed}", total=None, state="")
     with ExitStack() as stack:
         tape: _Tape | None = None
@@ -101,9 +125,11 @@ def _drive_one(
             bar.update(task, state=f"{info['time']:.1f} s, {info['distance_to_goal']:.1f} m to go")
             if path is not None:
                 if tape is None:  # after the reset, when the start is known
-                    tape = _Tape(path, rover, seed, arguments)
+                    tape = _Tape(path, rover, name, seed, arguments)
                     stack.enter_context(tape.recorder)
                 tape.append(rover, info)
+            if film is not None and (frame := rover.render()) is not None:
+                film.append(frame)
 
         episode = run_episode(env, policy, seed, options=options, on_step=on_step)
     bar.remove_task(task)
@@ -113,7 +139,7 @@ def _drive_one(
 class _Tape:
     """Records an episode: the simulation, and what the environment makes of it."""
 
-    def __init__(self, path: Path, rover: RoverEnv, seed: int, arguments: Mapping[str, Any]) -> None:
+    def __init__(self, path: Path, rover: RoverEnv, policy: str, seed: int, arguments: Mapping[str, Any]) -> None:
         self._sampler = Sampler(rover.model)
         channels = (
             *self._sampler.channels,
@@ -122,19 +148,10 @@ class _Tape:
             Channel("motor_energy", "J", "work through the wheel motors since the start, driving or braking"),
             Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
         )
-        attributes = {
-            "title": "an episode of Rover-v0 with the PD baseline",
-            "scene": {
-                **arguments,
-                **asdict(rover.start),
-                **_rocks(rover),
-                "model": rover.model.to_dict(),
-                "control_period": rover.dt,
-            },
-            "seed": seed,
-            "solver": rover.simulation.settings,
-        }
-        self.recorder = Recorder(path, channels, attributes)
+        scene = {**arguments, **asdict(rover.start), **_rocks(rover), "control_period": rover.dt}
+        title = f"an episode of Rover-v0 with {policy}"
+        attributes = describe(rover.simulation, title, scene, seed=seed)
+        self.recorder = Recorder(path, channels, attributes, terrain=rover.simulation.terrain)
 
     def append(self, rover: RoverEnv, info: Mapping[str, Any]) -> None:
         """Adds the environment's present state."""
@@ -155,8 +172,8 @@ def _rocks(rover: RoverEnv) -> dict[str, Any]:
     return {} if rover.rocks is None else {"rocks": asdict(rover.rocks)}
 
 
-def _table(results: Sequence[Episode]) -> Table:
-    table = Table(title="Rover-v0 with the PD baseline", title_justify="left")
+def _table(results: Sequence[Episode], name: str) -> Table:
+    table = Table(title=f"Rover-v0 with {name}", title_justify="left")
     for heading in ("seed", "success", "distance", "time", "energy", "slip", "real-time factor"):
         table.add_column(heading, justify="right")
     for episode in results:

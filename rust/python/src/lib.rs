@@ -1,12 +1,15 @@
 //! The border between `rover-core` and Python: conversions, exceptions, array views. No mechanics.
 #![forbid(unsafe_code)]
 
+mod accuracy;
 mod arrays;
 mod batch;
 mod contacts;
 mod errors;
 mod friction_contact;
 mod model;
+mod planar;
+mod planar_ground;
 mod plane;
 mod reading;
 mod simulation;
@@ -31,9 +34,11 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<snapshot::Snapshot>()?;
     module.add_class::<friction_contact::SolverReport>()?;
     module.add_class::<friction_contact::FrictionContactSolution>()?;
+    module.add_function(wrap_pyfunction!(accuracy::accuracy_options, module)?)?;
     module.add_function(wrap_pyfunction!(
         friction_contact::solve_friction_contact,
         module
     )?)?;
+    planar::register(module)?;
     Ok(())
 }

@@ -3,16 +3,19 @@
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use rover_core::integrator::{Stabilisation, StepOptions, StepReport as CoreReport, Variant};
+use rover_core::integrator::{
+    Accuracy, Stabilisation, StepOptions, StepReport as CoreReport, Variant,
+};
 use rover_core::multibody::{Energy as CoreEnergy, Model, coordinates};
 use rover_core::nalgebra::DMatrix;
 use rover_core::simulation::{Look, ReadingLayout, Simulation as CoreSimulation};
 use std::sync::Arc;
 
+use crate::accuracy;
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Value};
-use crate::friction_contact::solver_options;
+use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::plane::Plane;
 use crate::reading::{place, scan_points, slices};
@@ -126,7 +129,7 @@ pub struct Origin {
 }
 
 /// W, free velocity and friction coefficients.
-type Problem<'py> = (
+pub type Problem<'py> = (
     Bound<'py, PyArray2<f64>>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<f64>>,
@@ -139,7 +142,8 @@ fn names(joints: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
         .or_else(|_| joints.extract())
 }
 
-fn choice<T: Copy>(
+/// The value that a word stands for.
+pub fn choice<T: Copy>(
     field: &'static str,
     given: &str,
     choices: &[(&str, T)],
@@ -158,20 +162,43 @@ fn choice<T: Copy>(
     })
 }
 
-const VARIANTS: [(&str, Variant); 2] = [
+/// Schemes by name.
+pub const VARIANTS: [(&str, Variant); 2] = [
     ("linearised", Variant::Linearised),
     ("newton", Variant::Newton),
 ];
-const STABILISATIONS: [(&str, Stabilisation); 2] = [
+/// Stabilisations by name.
+pub const STABILISATIONS: [(&str, Stabilisation); 2] = [
     ("projection", Stabilisation::Projection),
     ("none", Stabilisation::None),
 ];
 
-fn name_of<T: PartialEq + Copy>(value: T, choices: &[(&'static str, T)]) -> &'static str {
+/// The word that stands for a value.
+pub fn name_of<T: PartialEq + Copy>(value: T, choices: &[(&'static str, T)]) -> &'static str {
     choices
         .iter()
         .find(|(_, v)| *v == value)
         .map_or("", |(name, _)| name)
+}
+
+/// A number of steps.
+pub fn step_count(n: i64) -> Result<usize, BorderError> {
+    usize::try_from(n).map_err(|_| {
+        let message = format!("n: must not be negative, is {n}");
+        BorderError::option("n", message, Value::Number(n as f64))
+    })
+}
+
+impl From<CoreReport> for StepReport {
+    fn from(inner: CoreReport) -> Self {
+        Self { inner }
+    }
+}
+
+impl From<CoreEnergy> for Energy {
+    fn from(inner: CoreEnergy) -> Self {
+        Self { inner }
+    }
 }
 
 impl Simulation {
@@ -184,24 +211,25 @@ impl Simulation {
 impl Simulation {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (model = None, terrain = None, *, gravity = None, friction = 0.7, restitution = 0.0, time_step = 0.005,
-        variant = "linearised", theta = 0.5, forecast = 0.5, solver = "auto", tolerance = 1e-12, max_iterations = 1000,
-        stabilisation = "projection", warm_start = true))]
+    #[pyo3(signature = (model = None, terrain = None, *, gravity = None, friction = 0.7, restitution = 0.0, time_step = None,
+        variant = None, theta = 0.5, forecast = 0.5, solver = "auto", tolerance = None, max_iterations = 1000,
+        stabilisation = "projection", warm_start = true, accuracy = None))]
     fn new(
         model: Option<RoverModel>,
         terrain: Option<&Bound<'_, PyAny>>,
         gravity: Option<&Bound<'_, PyAny>>,
         friction: f64,
         restitution: f64,
-        time_step: f64,
-        variant: &str,
+        time_step: Option<f64>,
+        variant: Option<&str>,
         theta: f64,
         forecast: f64,
         solver: &str,
-        tolerance: f64,
+        tolerance: Option<f64>,
         max_iterations: usize,
         stabilisation: &str,
         warm_start: bool,
+        accuracy: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let model = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
         let terrain = match terrain {
@@ -210,17 +238,35 @@ impl Simulation {
             }),
             Some(given) => Ground::parse(given)?,
         };
+        let chosen = match accuracy {
+            None => Accuracy::BALANCED,
+            Some(given) => {
+                let chosen = accuracy::parse(given)?;
+                let clash = [
+                    ("time_step", time_step.is_some()),
+                    ("variant", variant.is_some()),
+                    ("tolerance", tolerance.is_some()),
+                ];
+                if let Some((field, _)) = clash.iter().find(|(_, given)| *given) {
+                    let message =
+                        format!("{field}: accuracy chooses it, so it cannot be given beside");
+                    return Err(BorderError::option(field, message, Value::Nothing).into());
+                }
+                chosen
+            }
+        };
+        let tolerance = tolerance.unwrap_or(chosen.tolerance);
         let options = StepOptions {
             gravity: checked_gravity(gravity)?,
             friction_coefficient: friction,
             restitution,
-            time_step,
+            time_step: time_step.unwrap_or(chosen.time_step),
             theta,
             forecast,
-            variant: choice("variant", variant, &VARIANTS)?,
+            variant: variant.map_or(Ok(chosen.variant), |v| choice("variant", v, &VARIANTS))?,
             stabilisation: choice("stabilisation", stabilisation, &STABILISATIONS)?,
             warm_start,
-            solver: solver_options(solver, tolerance, max_iterations)?,
+            solver: solver_options(solver, tolerance, max_iterations, &SIMULATION_SOLVERS)?,
             ..StepOptions::default()
         };
         let inner =
@@ -411,13 +457,7 @@ impl Simulation {
 
     #[pyo3(signature = (n = 1))]
     fn step(&mut self, py: Python<'_>, n: i64) -> PyResult<StepReport> {
-        let steps = usize::try_from(n).map_err(|_| {
-            BorderError::option(
-                "n",
-                format!("n: must not be negative, is {n}"),
-                Value::Number(n as f64),
-            )
-        })?;
+        let steps = step_count(n)?;
         let inner = &mut self.inner;
         let report = py.detach(|| inner.step(steps)).map_err(BorderError::from)?;
         Ok(StepReport { inner: report })

@@ -11,4 +11,5 @@ pub use batch::Batch;
 pub use error::{BatchError, CommandError, SnapshotError};
 pub use reading::{Look, ReadingLayout};
 pub use rover::Simulation;
+pub(crate) use rover::check as check_command;
 pub use snapshot::Snapshot;

@@ -1,0 +1,72 @@
+"""How signals are drawn that jump from step to step, and axes for values of very different size."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rover_gym.figures.derived import Array, smooth
+from rover_gym.figures.style import COLOURS, WHEELS, plot_wheels
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+WINDOW = 0.5  # s, of the smoothed curves: a few strides of the chatter, far less than a manoeuvre
+SMOOTHED = f"bold: smoothed over {WINDOW:g} s; light: every sample"
+
+
+def plot_raw_and_smooth(axes: Axes, time: Array, values: Array, wheels: tuple[str, ...]) -> None:
+    """Every sample in a light line, and the smoothed curve; values (n, 6)."""
+    measured = np.array(values)
+    measured[0] = np.nan  # no step had been taken
+    smoothed = smooth(time, measured, WINDOW)
+    for wheel in wheels:
+        i = WHEELS.index(wheel)
+        axes.plot(time, values[:, i], color=COLOURS[wheel], linewidth=0.5, alpha=0.35, label=f"_{wheel} samples")
+    plot_wheels(axes, time, smoothed, wheels)
+
+
+def linear_then_log(axes: Axes, threshold: float, low: float, high: float) -> None:
+    """A linear axis, or, where the values go far beyond the threshold, one that is logarithmic from there on."""
+    if high <= 2.0 * threshold and low >= -2.0 * threshold:
+        margin = 0.05 * (high - low)
+        axes.set_ylim(low - margin if low < 0.0 else 0.0, max(high + margin, 0.1 * threshold))
+        return
+    decades = np.log10(max(high / threshold, 1.0)) + np.log10(max(-low / threshold, 1.0))
+    axes.set_yscale("symlog", linthresh=threshold, linscale=max(float(decades), 0.8))
+    axes.set_ylim(1.15 * low if low < 0.0 else 0.0, 1.3 * high)
+    ticks = [0.5 * threshold, threshold]
+    tick = 10.0 ** np.ceil(np.log10(1.5 * threshold))
+    while tick <= 1.3 * high:
+        ticks.append(tick)
+        tick *= 10.0
+    below = [-tick for tick in ticks if -tick >= 1.15 * low]
+    axes.set_yticks([*below, 0.0, *ticks], labels=[f"{tick:g}" for tick in (*below, 0.0, *ticks)])
+    axes.set_yticks([], minor=True)
+    _explain(axes, threshold)
+
+
+def round_up(value: float) -> float:
+    """The next number whose half is round too."""
+    scale = 10.0 ** np.floor(np.log10(value))
+    return float(
+        scale * next(digit for digit in (1.0, 2.0, 4.0, 6.0, 8.0, 10.0) if digit >= value / scale * (1 - 1e-9))
+    )
+
+
+def _explain(axes: Axes, threshold: float) -> None:
+    """Marks where an axis turns logarithmic."""
+    axes.axhline(threshold, color="0.6", linewidth=0.5)
+    axes.annotate(
+        "logarithmic above this line",
+        (1.0, threshold),
+        xycoords=("axes fraction", "data"),
+        xytext=(-3, 2),
+        textcoords="offset points",
+        ha="right",
+        va="bottom",
+        fontsize=7.5,
+        color="0.45",
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5},
+    )

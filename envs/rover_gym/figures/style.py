@@ -1,0 +1,109 @@
+"""What every figure shares: the wheels, their colours, sizes of type, and a few strokes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.extras import require
+from rover_gym.recording import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+    from rover_gym.run import Run
+
+    #: A figure, or a part of a page.
+    Sheet: TypeAlias = Figure | SubFigure
+
+WHEELS = ("FL", "FR", "ML", "BL", "MR", "BR")
+NAMES = {
+    "FL": "front left",
+    "FR": "front right",
+    "ML": "middle left",
+    "BL": "back left",
+    "MR": "middle right",
+    "BR": "back right",
+}
+SIDES = (("FL", "ML", "BL"), ("FR", "MR", "BR"))
+# Okabe and Ito's colours, told apart by colour-blind readers too.
+COLOURS = {"FL": "#0072B2", "FR": "#56B4E9", "ML": "#009E73", "BL": "#D55E00", "MR": "#CC79A7", "BR": "#E69F00"}
+#: For what is not a wheel's (Paul Tol's "muted" colours, told apart by colour-blind readers too).
+QUANTITY_COLOURS = ("#332288", "#CC6677", "#117733", "#882255", "#999933")
+DARK = "0.25"
+#: Of nested lines: front, middle and back wheels, points.
+NESTED_WIDTHS = {"F": 0.8, "M": 1.6, "B": 2.6}
+#: Width of a figure, inches. Shown 800 pixels wide, as a README does, type of 10 points is 12 pixels high.
+WIDTH = 9.0
+STYLE: dict[str, Any] = {
+    "axes.grid": True,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": "medium",
+    "axes.xmargin": 0.01,
+    "figure.constrained_layout.use": True,
+    "figure.dpi": 150,
+    "figure.titlesize": "large",
+    "font.size": 10.0,
+    "grid.alpha": 0.3,
+    "legend.fontsize": 9.0,
+    "legend.framealpha": 0.9,
+    "lines.linewidth": 1.2,
+    "svg.hashsalt": "rover-gym",  # the same figure gives the same file
+}
+
+
+def title(figure: Sheet, what: str, run: Run) -> None:
+    """Writes over a figure what it shows, and of which run."""
+    broken_off = "" if run.trajectory.attributes.get("complete", True) else " (the recording was broken off)"
+    figure.suptitle(f"{what}\n{run.title}{broken_off}")
+
+
+def wheel_legend(figure: Sheet, others: Mapping[str, Mapping[str, Any]] | None = None, note: str | None = None) -> None:
+    """One legend below the figure: left wheels over right ones, other lines by their style, a note on the lines."""
+    lines = require("matplotlib.lines", "demo")
+    pairs = [wheel for pair in zip(*SIDES, strict=True) for wheel in pair]
+    entries = {NAMES[wheel]: {"color": COLOURS[wheel]} for wheel in pairs} | dict(others or {})
+    handles = [lines.Line2D([], [], label=label, **style) for label, style in entries.items()]
+    columns = (len(handles) + 1) // 2
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, title=note, title_fontsize=9.0)
+
+
+def panel_legend(axes: Axes) -> None:
+    """The legend of one panel, in a row above it, where it covers no curve."""
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.1)
+
+
+def circle(axes: Axes, x: float, y: float, radius: float, color: str) -> None:
+    """Draws a circle's line."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 60)
+    axes.plot(x + radius * np.cos(turn), y + radius * np.sin(turn), color=color, linewidth=0.8)
+
+
+def close_up(axes: Axes, x: npt.NDArray[np.float64], y: npt.NDArray[np.float64], margin: float) -> None:
+    """Shows the traces with a margin (m), at one scale; what lies beyond is cut."""
+    axes.set_xlim(x.min() - margin, x.max() + margin)
+    axes.set_ylim(y.min() - margin, y.max() + margin)
+    axes.set_aspect("equal", adjustable="box")
+
+
+def plot_wheels(
+    axes: Axes, time: Any, values: Any, wheels: tuple[str, ...] = WHEELS, *, nested: bool = False, **style: Any
+) -> None:
+    """One line a wheel, in its colour: values (n, 6) over time (n,), s.
+
+    Nested lines are wide for the back wheels and narrow for the front ones, over them: all of several equal curves
+    are seen.
+    """
+    for wheel in reversed(wheels) if nested else wheels:
+        width: dict[str, Any] = {"linewidth": NESTED_WIDTHS[wheel[0]]} if nested else {}
+        axes.plot(time, values[:, WHEELS.index(wheel)], color=COLOURS[wheel], label=NAMES[wheel], **width, **style)
+
+
+def step_size(trajectory: Trajectory) -> str:
+    """The time step of the run, as text."""
+    return f"{1e3 * trajectory.attributes['solver']['time_step']:g} ms"

@@ -1,0 +1,304 @@
+"""The frame: the rover, what stands around it, contact forces and the camera."""
+
+import ctypes
+import math
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - what draws: it registers itself when imported
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkLogger, vtkUnsignedCharArray
+from vtkmodules.vtkCommonDataModel import vtkPolyData
+from vtkmodules.vtkFiltersSources import vtkArrowSource
+from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkRenderer, vtkRenderWindow
+
+from rover_gym import appearance as look
+from rover_gym._core import Plane, RoverModel, Simulation, SphereField
+from rover_gym.render_options import Camera, check_render_options
+from rover_gym.rendering.meshes import Array, Faces, actor_of, actor_with, level, mesh, set_points, set_pose
+from rover_gym.rendering.scenery import FAR, Goal, Ground, RockActors, flag, headlight, shadow_of, sky, sun
+
+FORCE_LENGTH = 0.45  # m, of the arrow of a wheel's mean share of the weight
+
+VIEW_ANGLE = 34.0  # degrees, vertical
+# Eye and target in the trunk's heading frame, m: ahead, up, right.
+FOLLOW_EYE, FOLLOW_TARGET = np.array([-3.5, 1.5, 1.95]), np.array([0.5, 0.22, 0.25])
+SIDE_EYE, SIDE_TARGET = np.array([0.1, 0.45, 4.0]), np.array([0.1, 0.05, 0.0])
+TOP_HEIGHT = 8.0  # m above the trunk
+FOLLOW_TIME = 0.25, 0.8  # s, time constants with which the view's centre and heading catch up
+EYE_HEIGHT = 0.4  # m, the least above the ground
+
+
+class FrameRenderer:
+    """Draws frames of a rover on its terrain; a context manager.
+
+    Equal sequences of simulated states give equal frames. Not to be shared between threads.
+
+    Args:
+        model: The rover.
+        terrain: Its ground.
+        width: Pixels, even.
+        height: Pixels, even.
+        camera: "follow", "side", "top" or a fixed pair (eye, target), m: see `RenderOptions`.
+        show_forces: Draws contact forces as arrows.
+        antialiasing: Smooths edges.
+        goal: A flag stands at this (x, z), m.
+        goal_tolerance: Radius of the ring around the flag, m.
+
+    Raises:
+        OptionError: An option is out of its range.
+        OSError: No OpenGL library works on this machine; the message names the packages that bring one.
+    """
+
+    def __init__(
+        self,
+        model: RoverModel,
+        terrain: Plane | SphereField,
+        *,
+        width: int = 640,
+        height: int = 480,
+        camera: Camera = "follow",
+        show_forces: bool = False,
+        antialiasing: bool = False,
+        goal: Goal | None = None,
+        goal_tolerance: float = 0.5,
+    ) -> None:
+        options = {
+            "width": width,
+            "height": height,
+            "camera": camera,
+            "show_forces": show_forces,
+            "antialiasing": antialiasing,
+        }
+        self.options = check_render_options("", options)
+        self._wheel_mass = model.mass / len(model.wheel_radii)
+        self._window = _open_window(self.options.width, self.options.height)
+        self._scene = vtkRenderer()
+        self._scene.SetUseFXAA(self.options.antialiasing)
+        # Arrows begin inside wheels: a second layer draws them in front of everything.
+        self._overlay = vtkRenderer()
+        self._overlay.SetLayer(1)
+        self._overlay.SetActiveCamera(self._scene.GetActiveCamera())
+        self._window.SetNumberOfLayers(2)
+        for renderer in (self._scene, self._overlay):
+            renderer.AutomaticLightCreationOff()
+            renderer.AddLight(sun(0.85))
+            renderer.AddLight(headlight(0.25))
+            self._window.AddRenderer(renderer)
+        self._sky = sky()
+        self._scene.AddActor(self._sky)
+        self._solids = _solids(model)
+        for actor in self._solids.values():
+            self._scene.AddActor(actor)
+        self._arrows = vtkPolyData()
+        set_points(self._arrows, np.zeros((0, 3)))
+        self._overlay.AddActor(_arrow_actor(self._arrows))
+        self._pixels = vtkUnsignedCharArray()
+        self._terrain: Plane | SphereField | None = None
+        self._goal: tuple[Goal | None, float] = (None, 0.0)
+        self._stage: list[vtkActor] = []
+        self.set_scene(terrain, goal=goal, goal_tolerance=goal_tolerance)
+
+    def set_scene(self, terrain: Plane | SphereField, *, goal: Goal | None = None, goal_tolerance: float = 0.5) -> None:
+        """Changes ground and goal, as at the reset of an episode; costs nothing where they are the same objects."""
+        if terrain is self._terrain and (goal, goal_tolerance) == self._goal:
+            return
+        self._terrain, self._goal = terrain, (goal, goal_tolerance)
+        for actor in self._stage:
+            self._scene.RemoveActor(actor)
+        plane = terrain if isinstance(terrain, Plane) else terrain.ground
+        self._plane = plane
+        self._ground = None if plane is None else Ground(plane)
+        self._rocks = RockActors(terrain, self._ground) if isinstance(terrain, SphereField) else None
+        self._shadows: dict[str, vtkActor] = {}
+        self._stage = [] if self._rocks is None else list(self._rocks.actors)
+        if self._ground is not None:
+            self._shadows = {solid: shadow_of(actor, self._ground) for solid, actor in self._solids.items()}
+            self._stage += [self._ground.actor, *self._shadows.values()]
+        if goal is not None:
+            self._stage += flag(goal, goal_tolerance, terrain, self._ground)
+        for actor in self._stage:
+            self._scene.AddActor(actor)
+        self._view: tuple[tuple[float, ...], Array, float] | None = None
+
+    def render(self, simulation: Simulation) -> npt.NDArray[np.uint8]:
+        """The simulation's present state, (height, width, 3) uint8, the first row on top."""
+        self._place_rover(simulation)
+        position = simulation.q[:3]
+        if self._ground is not None:
+            self._ground.follow(position)
+        if self._rocks is not None:
+            self._rocks.follow(position)
+        if self.options.show_forces:
+            self._place_arrows(simulation)
+        self._place_camera(simulation, position)
+        with _Quiet():
+            self._window.Render()
+        width, height = self.options.width, self.options.height
+        self._window.GetPixelData(0, 0, width - 1, height - 1, 0, self._pixels, 0)
+        pixels: npt.NDArray[np.uint8] = vtk_to_numpy(self._pixels)
+        return pixels.reshape(height, width, 3)[::-1].copy()  # VTK's first row is the lowest
+
+    def close(self) -> None:
+        """Frees the window and its memory; the renderer cannot be used afterwards."""
+        self._window.Finalize()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _place_rover(self, simulation: Simulation) -> None:
+        pose = np.eye(4)
+        for solid, (origin, rotation) in simulation.poses().items():
+            if solid in self._solids:
+                pose[:3, :3], pose[:3, 3] = rotation, origin
+                set_pose(self._solids[solid], pose)
+                if self._ground is not None:
+                    set_pose(self._shadows[solid], self._ground.flatten @ pose)
+
+    def _place_arrows(self, simulation: Simulation) -> None:
+        points, forces = contact_forces(simulation)
+        load = self._wheel_mass * float(np.linalg.norm(simulation.gravity))
+        set_points(self._arrows, points)
+        lengths = numpy_to_vtk((FORCE_LENGTH / load if load > 0.0 else 0.0) * forces, deep=True)
+        lengths.SetName("force")
+        self._arrows.GetPointData().AddArray(lengths)
+        self._arrows.Modified()
+
+    def _place_camera(self, simulation: Simulation, position: Array) -> None:
+        up = _up(simulation.gravity)
+        view_up = up
+        if not isinstance(self.options.camera, str):
+            eye, target = (np.array(point) for point in self.options.camera)
+        elif self.options.camera == "top":
+            eye, target = position + TOP_HEIGHT * up, position
+            view_up = level(np.array([1.0, 0.0, 0.0]), up)
+        else:
+            centre, heading = self._follow(simulation, position, up)
+            ahead = level(np.array([np.cos(heading), 0.0, -np.sin(heading)]), up)
+            frame = np.array([ahead, up, np.cross(ahead, up)])
+            side = self.options.camera == "side"
+            eye = self._above_ground(centre + (SIDE_EYE if side else FOLLOW_EYE) @ frame, up)
+            target = centre + (SIDE_TARGET if side else FOLLOW_TARGET) @ frame
+        camera = self._scene.GetActiveCamera()
+        camera.SetViewAngle(VIEW_ANGLE)
+        camera.SetPosition(*eye)
+        camera.SetFocalPoint(*target)
+        camera.SetViewUp(*view_up)
+        camera.SetClippingRange(0.1, 2.5 * FAR)
+        # The sky stands level around the eye, so that a slope is seen against it.
+        ahead = level(np.array([1.0, 0.0, 0.0]), up)
+        dome = np.eye(4)
+        dome[:3] = np.column_stack((ahead, up, np.cross(ahead, up), eye))
+        set_pose(self._sky, dome)
+
+    def _follow(self, simulation: Simulation, position: Array, up: Array) -> tuple[Array, float]:
+        """Centre and heading of the view: they follow the rover's as time goes on, and jump when its state is set."""
+        ahead = level(simulation.rotation[:, 0], up)
+        heading = float(np.arctan2(-ahead[2], ahead[0]))
+        seen = (simulation.time, *position, heading)
+        if self._view is not None:
+            before, centre, old = self._view
+            if seen == before:
+                return centre, old
+            elapsed = seen[0] - before[0]
+            if 0.0 < elapsed < 1.0:
+                near, turn = (1.0 - math.exp(-elapsed / constant) for constant in FOLLOW_TIME)
+                position = centre + near * (position - centre)
+                heading = old + turn * math.remainder(heading - old, math.tau)
+        self._view = (seen, position, heading)
+        return position, heading
+
+    def _above_ground(self, eye: Array, up: Array) -> Array:
+        """The eye, lifted where a slope would bury it."""
+        if self._plane is None:
+            return eye
+        n = self._plane.normal
+        missing = EYE_HEIGHT - (float(n @ eye) + self._plane.offset)
+        return eye + max(missing, 0.0) / max(float(n @ up), 0.2) * up
+
+
+def contact_forces(simulation: Simulation) -> tuple[Array, Array]:
+    """Points (n, 3), m, and mean forces (n, 3) on the rover over the last step, N, both in the world frame."""
+    contacts = simulation.contacts
+    # Rows of a frame are n, t, b: a force in the world is the sum of its components times the rows.
+    forces = np.einsum("ci,cij->cj", contacts.impulses, contacts.frames) / simulation.time_step
+    return contacts.points.reshape(-1, 3), forces.reshape(-1, 3)
+
+
+class _Quiet:
+    """Keeps VTK's log off the standard error: which displays it tried before one worked is no news to a user."""
+
+    def __enter__(self) -> None:
+        self._verbosity = vtkLogger.ConvertToVerbosity(vtkLogger.GetCurrentVerbosityCutoff())
+        vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+
+    def __exit__(self, *_: object) -> None:
+        vtkLogger.SetStderrVerbosity(self._verbosity)
+
+
+def _open_window(width: int, height: int) -> vtkRenderWindow:
+    with _Quiet():
+        window = vtkRenderWindow()
+        # The last kind that VTK tries; without its library it would end the process at the first frame.
+        if window.IsA("vtkOSOpenGLRenderWindow") and not _has_osmesa():
+            raise OSError(
+                "no OpenGL library works here: install Mesa's, on Debian with apt-get install libegl1 libgl1-mesa-dri"
+            )
+        window.SetOffScreenRendering(True)
+        window.SetMultiSamples(0)  # in software, multisampling costs several times the rest of a frame
+        window.SetSize(width, height)
+    return window
+
+
+def _has_osmesa() -> bool:
+    for name in ("libOSMesa.so", "libOSMesa.so.8", "libOSMesa.so.6", "osmesa.dll"):
+        try:
+            ctypes.CDLL(name)
+        except OSError:
+            continue
+        return True
+    return False
+
+
+def _solids(model: RoverModel) -> dict[str, vtkActor]:
+    """One actor a solid, of all the parts that ride on it."""
+    pieces: dict[str, list[tuple[Array, Faces, Array]]] = {}
+    for part in look.rover_parts(model):
+        vertices, triangles = look.part_mesh(part)
+        placed = vertices @ part.rotation.T + part.position
+        colours = np.broadcast_to(np.array(part.colour), placed.shape)
+        pieces.setdefault(part.solid, []).append((placed, triangles, colours))
+    actors = {}
+    for solid, meshes in pieces.items():
+        firsts = np.cumsum([0, *(len(placed) for placed, _, _ in meshes[:-1])])
+        faces = np.vstack([faces + first for (_, faces, _), first in zip(meshes, firsts, strict=True)])
+        everywhere = np.vstack([placed for placed, _, _ in meshes])
+        actors[solid] = actor_of(mesh(everywhere, faces, np.vstack([colours for _, _, colours in meshes])))
+    return actors
+
+
+def _arrow_actor(data: vtkPolyData) -> vtkActor:
+    """An arrow at each point along the array "force", as long as it says."""
+    source = vtkArrowSource(tip_length=0.28, tip_radius=0.07, shaft_radius=0.025, tip_resolution=12, shaft_resolution=8)
+    mapper = vtkGlyph3DMapper()
+    mapper.SetInputData(data)
+    mapper.SetSourceConnection(source.GetOutputPort())
+    mapper.SetOrientationArray("force")
+    mapper.SetScaleArray("force")
+    mapper.SetScaleModeToScaleByMagnitude()
+    mapper.ScalarVisibilityOff()
+    actor = actor_with(mapper)
+    actor.GetProperty().SetColor(*look.FORCE_COLOUR)
+    return actor
+
+
+def _up(gravity: Array) -> Array:
+    magnitude = float(np.linalg.norm(gravity))
+    return -gravity / magnitude if magnitude > 0.0 else np.array([0.0, 1.0, 0.0])

@@ -1,0 +1,7 @@
+"""Saved runs as files that other programs show: a page for the browser, VRML97, glTF."""
+
+from rover_gym.replay.gltf import write_gltf
+from rover_gym.replay.page import write_page
+from rover_gym.replay.vrml import write_vrml
+
+__all__ = ["write_gltf", "write_page", "write_vrml"]

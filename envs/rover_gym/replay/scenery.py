@@ -1,0 +1,141 @@
+"""What stands around the rover in every format: a checkered patch of ground, spheres, the goal, an eye."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym._core import Plane, SphereField
+from rover_gym.appearance import GOAL_COLOUR, Colour, Part, part_mesh, rover_parts
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rover_gym.run import Run
+
+TILE = 0.5  # m, edge of the ground's squares
+MARGIN = 5.0  # m of ground about the path
+GOAL_POLE = 0.8  # m, height
+
+Array = npt.NDArray[np.float64]
+Triangles = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class View:
+    """Where to look from: eye and target, world, m, and the vertical field of view, rad."""
+
+    eye: Array
+    target: Array
+    field_of_view: float = np.pi / 4
+
+
+def trunk_path(run: Run) -> Array:
+    """(n, 3) origin of the trunk, world, m."""
+    path: Array = run.trajectory["q"][:, :3]
+    return path
+
+
+def ground_plane(run: Run) -> Plane | None:
+    """The plane of the ground, if there is one."""
+    return run.terrain if isinstance(run.terrain, Plane) else run.terrain.ground
+
+
+def spheres(run: Run) -> tuple[Array, Array]:
+    """Centres (n, 3) and radii (n,) of the ground's spheres, m."""
+    if isinstance(run.terrain, SphereField):
+        return run.terrain.centres, run.terrain.radii
+    return np.empty((0, 3)), np.empty(0)
+
+
+def ground_tiles(run: Run) -> tuple[Array, Triangles, Triangles] | None:
+    """Squares of the plane about path and goal: vertices (n, 3), m, and the triangles of both colours.
+
+    Each square has vertices of its own: two triangles, counter-clockwise seen from above. None without a plane.
+    """
+    plane = ground_plane(run)
+    if plane is None:
+        return None
+    n = plane.normal
+    along = np.eye(3)[0] if abs(n[0]) < 0.9 else np.eye(3)[1]
+    t = along - (along @ n) * n
+    t /= np.linalg.norm(t)
+    tangents = np.stack((t, np.cross(n, t)))
+    places = trunk_path(run)
+    if run.goal is not None:
+        x, z = run.goal
+        places = np.vstack((places, (x, plane.height(x, z), z)))
+    places = places @ tangents.T
+    low = np.floor((places.min(axis=0) - MARGIN) / TILE).astype(int)
+    high = np.ceil((places.max(axis=0) + MARGIN) / TILE).astype(int)
+    i, k = (grid.ravel() for grid in np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1])))
+    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+    squares = np.stack((i, k), axis=1)[:, None] + corners
+    vertices = (TILE * squares @ tangents).reshape(-1, 3) - plane.offset * n
+    triangles = (4 * np.arange(len(i))[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])).astype(np.int32)
+    dark = (i + k) % 2 == 1
+    return vertices, triangles[~dark].reshape(-1, 3), triangles[dark].reshape(-1, 3)
+
+
+def goal_parts(run: Run) -> tuple[Part, ...]:
+    """A pole with a knob at the goal, in the world's frame; none where there is no goal."""
+    if run.goal is None:
+        return ()
+    x, z = run.goal
+    plane = ground_plane(run)
+    y = 0.0 if plane is None else plane.height(x, z)
+    upright = np.eye(3)
+    pole = Part("", "cylinder", (0.02, GOAL_POLE), (x, y + GOAL_POLE / 2, z), upright, GOAL_COLOUR)
+    knob = Part("", "cylinder", (0.09, 0.18), (x, y + GOAL_POLE, z), upright, GOAL_COLOUR)
+    return pole, knob
+
+
+def coloured_meshes(parts: tuple[Part, ...]) -> Iterator[tuple[Colour, Array, Triangles]]:
+    """The parts' surfaces in their solid's frame, one mesh a colour."""
+    for colour in dict.fromkeys(part.colour for part in parts):
+        vertices, triangles, n = [], [], 0
+        for part in parts:
+            if part.colour == colour:
+                points, corners = part_mesh(part)
+                vertices.append(points @ part.rotation.T + np.array(part.position))
+                triangles.append(corners + n)
+                n += len(points)
+        yield colour, np.vstack(vertices), np.vstack(triangles).astype(np.int32)
+
+
+def parts_by_solid(run: Run) -> dict[str, tuple[Part, ...]]:
+    """The rover's parts, by the solid that they ride on; every solid has its entry."""
+    parts = rover_parts(run.model)
+    return {name: tuple(part for part in parts if part.solid == name) for name in run.model.solid_names}
+
+
+def sphere_mesh(rings: int = 8) -> tuple[Array, Triangles]:
+    """The unit sphere: vertices (n, 3), on it, and triangles, counter-clockwise seen from outside."""
+    columns = 2 * rings
+    polar, around = np.meshgrid(
+        np.linspace(0.0, np.pi, rings + 1), np.linspace(0.0, 2.0 * np.pi, columns + 1), indexing="ij"
+    )
+    vertices = np.stack((np.sin(polar) * np.cos(around), np.cos(polar), np.sin(polar) * np.sin(around)), axis=-1)
+    i, k = (grid.ravel() for grid in np.meshgrid(np.arange(rings), np.arange(columns), indexing="ij"))
+    a = i * (columns + 1) + k
+    b = a + columns + 1
+    triangles = np.concatenate((np.stack((a, a + 1, b + 1), axis=1), np.stack((a, b + 1, b), axis=1)))
+    proper = np.concatenate((i != 0, i != rings - 1))  # at the poles one of a square's two triangles is a line
+    return vertices.reshape(-1, 3), triangles[proper].astype(np.int32)
+
+
+def first_view(run: Run, distance: float = 4.0) -> View:
+    """From beside and a little behind the rover at its start, so that it drives away from the eye."""
+    path = trunk_path(run)
+    way = (path[-1] - path[0])[[0, 2]]
+    if np.linalg.norm(way) < 0.1:  # it stays: look at its nose
+        heading = run.trajectory["q"][0, 4]
+        way = -np.array([np.cos(heading), -np.sin(heading)])
+    ahead = way / np.linalg.norm(way)
+    beside = np.array([-ahead[1], ahead[0]])
+    back = -0.62 * ahead + 0.62 * beside
+    eye = path[0] + distance * np.array([back[0], 0.48, back[1]])
+    return View(eye, path[0])

@@ -1,0 +1,139 @@
+"""VRML97 (ISO/IEC 14772): a text file with the whole motion, which old and new VRML and X3D viewers play.
+
+Every solid is a `Transform` whose place and turn come from a `PositionInterpolator` and an `OrientationInterpolator`,
+both driven by one `TimeSensor`. VRML's axes are the world's: y up, metres, rotations as axis and angle.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR, SKY_COLOUR, SKY_COLOUR_2, Colour, Part
+from rover_gym.replay.rotation import axis_angles, continuous, quaternions
+from rover_gym.replay.scenery import first_view, goal_parts, ground_tiles, parts_by_solid, spheres
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from rover_gym.run import Run
+
+Array = npt.NDArray[np.float64]
+
+
+def write_vrml(run: Run, path: str | Path) -> Path:
+    """Writes a run as VRML97.
+
+    Args:
+        run: The run; every sample becomes a key of the motion.
+        path: The file to write, by custom `.wrl`. Its folder is made.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        for line in _lines(run):
+            file.write(line + "\n")
+    return path
+
+
+def _lines(run: Run) -> Iterator[str]:
+    yield "#VRML V2.0 utf8"
+    yield f"WorldInfo {{ title {_string(run.title)} }}"
+    yield 'NavigationInfo { type [ "EXAMINE", "ANY" ] }'
+    yield f"Background {{ skyColor [ {_numbers(SKY_COLOUR_2)}, {_numbers(SKY_COLOUR)} ] skyAngle [ 1.571 ] }}"
+    view = first_view(run)
+    turn = axis_angles(quaternions(_looking(view.target - view.eye)))
+    yield (
+        f'Viewpoint {{ description "start" position {_numbers(view.eye)} orientation {_numbers(turn)}'
+        f" fieldOfView {_numbers([view.field_of_view])} }}"
+    )
+    yield from _ground(run)
+    for part in goal_parts(run):
+        yield _part(part)
+    duration = float(run.time[-1] - run.time[0])
+    yield f"DEF Clock TimeSensor {{ cycleInterval {_numbers([max(duration, 1e-3)])} loop TRUE }}"
+    fractions = (run.time - run.time[0]) / duration if duration > 0.0 else np.zeros(run.n_frames)
+    keys = _numbers(fractions)
+    turns = axis_angles(continuous(quaternions(run.rotations)))
+    for i, (solid, parts) in enumerate(parts_by_solid(run).items()):
+        yield (
+            f"DEF {solid} Transform {{ translation {_numbers(run.positions[0, i])}"
+            f" rotation {_numbers(turns[0, i])} children ["
+        )
+        for part in parts:
+            yield _part(part)
+        yield "] }"
+        places = ", ".join(_numbers(place) for place in run.positions[:, i])
+        yield f"DEF {solid}_place PositionInterpolator {{ key [ {keys} ] keyValue [ {places} ] }}"
+        rotations = ", ".join(_numbers(turn) for turn in turns[:, i])
+        yield f"DEF {solid}_turn OrientationInterpolator {{ key [ {keys} ] keyValue [ {rotations} ] }}"
+        for interpolator, field in (("place", "translation"), ("turn", "rotation")):
+            yield f"ROUTE Clock.fraction_changed TO {solid}_{interpolator}.set_fraction"
+            yield f"ROUTE {solid}_{interpolator}.value_changed TO {solid}.set_{field}"
+
+
+def _ground(run: Run) -> Iterator[str]:
+    tiles = ground_tiles(run)
+    if tiles is not None:
+        vertices, light, dark = tiles
+        points = ", ".join(_numbers(vertex) for vertex in vertices)
+        corners = ", ".join(f"{a} {b} {c} -1" for a, b, c in np.vstack((light, dark)))
+        colours = f"{_numbers(GROUND_COLOUR)}, {_numbers(GROUND_COLOUR_2)}"
+        indices = " ".join(["0"] * len(light) + ["1"] * len(dark))
+        yield (
+            "DEF Ground Shape { appearance Appearance { material Material { } } geometry IndexedFaceSet { solid FALSE"
+            f" colorPerVertex FALSE coord Coordinate {{ point [ {points} ] }} coordIndex [ {corners} ]"
+            f" color Color {{ color [ {colours} ] }} colorIndex [ {indices} ] }} }}"
+        )
+    centres, radii = spheres(run)
+    if len(radii):
+        yield "DEF Spheres Group { children ["
+        look = f"DEF Rock {_appearance(ROCK_COLOUR)}"
+        for centre, radius in zip(centres, radii, strict=True):
+            yield (
+                f"Transform {{ translation {_numbers(centre)} children Shape {{ appearance {look}"
+                f" geometry Sphere {{ radius {_numbers([radius])} }} }} }}"
+            )
+            look = "USE Rock"
+        yield "] }"
+
+
+def _part(part: Part) -> str:
+    if part.kind == "box":
+        geometry = f"Box {{ size {_numbers(part.size)} }}"
+    else:
+        radius, height = part.size
+        geometry = f"Cylinder {{ radius {_numbers([radius])} height {_numbers([height])} }}"  # about y, as ours
+    turn = axis_angles(quaternions(part.rotation))
+    return (
+        f"Transform {{ translation {_numbers(part.position)} rotation {_numbers(turn)}"
+        f" children Shape {{ appearance {_appearance(part.colour)} geometry {geometry} }} }}"
+    )
+
+
+def _appearance(colour: Colour) -> str:
+    return f"Appearance {{ material Material {{ diffuseColor {_numbers(colour)} }} }}"
+
+
+def _looking(way: Array) -> Array:
+    """Rotation of a camera, which looks along its -z with y up, to look along `way`."""
+    z = -way / np.linalg.norm(way)
+    x = np.cross((0.0, 1.0, 0.0), z)
+    x /= np.linalg.norm(x)
+    return np.column_stack((x, np.cross(z, x), z))
+
+
+def _numbers(values: Iterable[float]) -> str:
+    # Places to 0.1 micrometre and turns to 1e-7; a viewer keeps single precision anyway.
+    return " ".join(f"{round(float(value), 7) + 0.0:.9g}" for value in values)
+
+
+def _string(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'

@@ -1,0 +1,275 @@
+"""The replay page in a real browser: it loads alone, shows the rover, and timeline, scene and curves go together."""
+
+import io
+import json
+import re
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from PIL import Image
+from selenium import webdriver
+from selenium.common.exceptions import TimeoutException, WebDriverException
+from selenium.webdriver.common.by import By
+
+from rover_gym import Plane, RoverModel, Simulation, SphereField
+from rover_gym.appearance import GROUND_COLOUR, TRUNK_COLOUR
+from rover_gym.recording import Recorder, Sampler, describe
+from rover_gym.replay import write_page
+from rover_gym.run import Run, read_run
+
+ROCKS = SphereField([[1.6, 0.0, 0.6], [1.2, 0.05, -1.3], [-0.9, 0.0, 1.3]], [0.25, 0.2, 0.15], Plane())
+PEAK = 1e5  # N, of an impact
+PATIENCE = 120.0  # s: without a GPU, on a busy machine, a frame takes seconds
+
+
+class Shown(NamedTuple):
+    """A page that is open, and the run that it should show."""
+
+    browser: webdriver.Chrome
+    run: Run
+    page: Path
+
+
+def programs() -> tuple[str, str]:
+    """Chromium and its driver, or a failure that names the packages: a missing browser must not pass for a test."""
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    driver = shutil.which("chromedriver")
+    if browser is None or driver is None:
+        pytest.fail("the browser test needs Debian's chromium and chromium-driver: sudo apt-get install them")
+    return browser, driver
+
+
+def start_browser(profile: Path) -> webdriver.Chrome:
+    binary, driver = programs()
+    options = webdriver.ChromeOptions()
+    options.binary_location = binary
+    for argument in (
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--use-angle=swiftshader",
+        "--enable-unsafe-swiftshader",
+        "--disable-dev-shm-usage",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+        "--disable-quic",
+        "--disable-extensions",
+        "--no-first-run",
+        "--hide-scrollbars",
+        "--window-size=820,560",
+        f"--user-data-dir={profile}",
+    ):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    return webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+
+
+def drive(path: Path) -> Run:
+    """Two seconds over a few rocks, at 10 frames a second."""
+    sim = Simulation(RoverModel(), ROCKS)
+    q = np.zeros(sim.model.nq)
+    q[1] = 0.4
+    sim.set_state(q)
+    sim.set_wheel_torques(np.full(6, 20.0))
+    sampler = Sampler(sim.model)
+    with Recorder(path, sampler.channels, describe(sim, "a drive over rocks"), terrain=sim.terrain) as recorder:
+        recorder.append(sampler.row(sim))
+        for _ in range(100):
+            sim.step(4)
+            recorder.append(sampler.row(sim))
+    run = read_run(path).resample(10.0)
+    run.trajectory["wheel_forces"][12, 0, 0] = PEAK
+    return run
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown]:
+    folder = tmp_path_factory.mktemp("page")
+    run = drive(folder / "run.h5")
+    page = write_page(run, folder / "replay.html")
+    browser = start_browser(folder / "profile")
+    try:
+        browser.set_page_load_timeout(PATIENCE)
+        browser.set_script_timeout(PATIENCE)
+        browser.get_log("performance")  # what the browser's own first tab did
+        browser.get(page.as_uri())
+        await_that(lambda: slider(browser) is not None, "the player's timeline")
+        go_to(browser, 0.0)  # it plays from the start; what follows looks at times of its own choice
+        yield Shown(browser, run, page)
+    finally:
+        browser.quit()
+
+
+def await_that(condition: Callable[[], bool], what: str) -> None:
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end, f"{what} did not come within {PATIENCE:g} s"
+        time.sleep(0.1)
+
+
+def slider(browser: webdriver.Chrome) -> float | None:
+    """What the timeline says, s."""
+    found = browser.find_elements(By.CSS_SELECTOR, "#root [role=slider]")
+    return float(found[0].get_attribute("aria-valuenow") or "nan") if found else None
+
+
+def go_to(browser: webdriver.Chrome, moment: float) -> None:
+    """Types a time into the player's field, which pauses it."""
+    browser.execute_script(
+        "const field = document.querySelector('#root input');"
+        "Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set.call(field, arguments[0]);"
+        "field.dispatchEvent(new Event('input', {bubbles: true}));",
+        f"{moment:.3f}",
+    )
+    await_that(lambda: slider(browser) == pytest.approx(moment, abs=1e-3), f"{moment} s on the timeline")
+    frames(browser, 2)
+
+
+def frames(browser: webdriver.Chrome, n: int) -> None:
+    """Waits until the browser has drawn some frames."""
+    browser.execute_async_script(
+        "const [n, done] = arguments; let left = n;"
+        "const tick = () => (left-- > 0 ? requestAnimationFrame(tick) : done()); tick();",
+        n,
+    )
+
+
+def picture(browser: webdriver.Chrome) -> np.ndarray:
+    """(height, width, 3) what the scene shows, without the message that WebGL runs in software."""
+    browser.execute_script("document.querySelectorAll('.mantine-Notifications-root').forEach((node) => node.remove());")
+    (canvas, *_) = browser.find_elements(By.CSS_SELECTOR, "#root canvas[data-engine]")
+    box = canvas.rect
+    end = time.monotonic() + PATIENCE
+    while True:
+        try:
+            png = browser.get_screenshot_as_png()
+            break
+        except (TimeoutException, WebDriverException):  # the driver waits 10 s for a frame; a busy machine needs more
+            if time.monotonic() > end:
+                raise
+    image = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=np.float64)
+    x, y, width, height = (round(box[key]) for key in ("x", "y", "width", "height"))
+    return image[y : y + height, x : x + width]
+
+
+def messages(browser: webdriver.Chrome, method: str) -> list[dict[str, Any]]:
+    found = [json.loads(entry["message"])["message"] for entry in browser.get_log("performance")]
+    return [message["params"] for message in found if message["method"] == method]
+
+
+def test_the_page_loads_without_errors_and_without_the_network(shown: Shown) -> None:
+    asked = [params["request"]["url"] for params in messages(shown.browser, "Network.requestWillBeSent")]
+    assert shown.page.as_uri() in asked
+    inside = ("data:", "blob:", "chrome:", shown.page.as_uri())
+    assert [url[:100] for url in asked if not url.startswith(inside)] == []
+    assert messages(shown.browser, "Network.webSocketCreated") == []
+    severe = [entry for entry in shown.browser.get_log("browser") if entry["level"] == "SEVERE"]
+    assert severe == []
+    assert shown.browser.title == "a drive over rocks"
+
+
+def test_the_scene_shows_rover_rocks_and_ground_the_right_way_up(shown: Shown) -> None:
+    go_to(shown.browser, 0.0)
+    image = picture(shown.browser)
+    height, width, _ = image.shape
+    assert image.std(axis=(0, 1)).min() > 10.0  # not blank
+    red, green, blue = np.moveaxis(image, -1, 0)
+    ground = (red - blue > 0.5 * 255 * (GROUND_COLOUR[0] - GROUND_COLOUR[2])) & (red > green)
+    assert ground[height // 2 :].mean() > 0.5  # warm below
+    assert ground[: height // 12].mean() < 0.2  # sky above
+    # The trunk is the one thing that is both light and grey, and stands in the middle.
+    light = (image.min(axis=-1) > 0.5 * 255 * min(TRUNK_COLOUR)) & (np.ptp(image, axis=-1) < 60.0)
+    light[: height // 6] = False  # the sky
+    rows, columns = np.nonzero(light)
+    assert len(rows) > 0.005 * light.size
+    assert abs(columns.mean() / width - 0.5) < 0.15
+    assert 0.25 < rows.mean() / height < 0.65
+    # Its wheels and its shadow are dark, and below it.
+    dark = image.max(axis=-1) < 90.0
+    assert dark[round(rows.mean()) :].mean() > 0.005
+
+
+def test_the_timeline_moves_the_rover(shown: Shown) -> None:
+    go_to(shown.browser, 0.3)
+    first = picture(shown.browser)
+    again = picture(shown.browser)
+    go_to(shown.browser, 1.6)
+    later = picture(shown.browser)
+    go_to(shown.browser, 0.3)
+    back = picture(shown.browser)
+    changed = (np.abs(later - first).max(axis=-1) > 30.0).mean()
+    assert changed > 0.05
+    assert (np.abs(again - first).max(axis=-1) > 30.0).mean() < 0.1 * changed  # paused, it stands still
+    assert (np.abs(back - first).max(axis=-1) > 30.0).mean() < 0.1 * changed  # and back in time it is as it was
+
+
+def cursors(browser: webdriver.Chrome) -> list[float]:
+    found = browser.find_elements(By.CSS_SELECTOR, "#panel .cursor")
+    return [float(cursor.get_attribute("x1") or "nan") for cursor in found]
+
+
+def readings(browser: webdriver.Chrome) -> list[list[str]]:
+    found = browser.find_elements(By.CSS_SELECTOR, "#panel .legend")
+    return [legend.text.split() for legend in found]
+
+
+def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown) -> None:
+    browser, run = shown.browser, shown.run
+    assert [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")] == [
+        "wheel load (N)",
+        "wheel gap (mm)",
+    ]
+    assert len(browser.find_elements(By.CSS_SELECTOR, "#panel .curve")) == 12
+    (canvas, *_) = browser.find_elements(By.CSS_SELECTOR, "#root canvas[data-engine]")
+    panel = browser.find_element(By.ID, "panel")
+    assert panel.rect["x"] >= canvas.rect["x"] + canvas.rect["width"] - 1.0
+
+    positions = []
+    for row in (5, 15):
+        go_to(browser, float(run.time[row] - run.time[0]) + 0.01)
+        await_that(lambda row=row: f"{run.time[row] + 0.01:.2f} s of" in panel.text, "the panel's clock")
+        positions.append(cursors(browser))
+        names = run.model.wheel_names
+        loads = run.trajectory["wheel_forces"][row, :, 0]
+        expected = [word for name, load in zip(names, loads, strict=True) for word in (name, f"{load:.1f}")]
+        assert readings(browser)[0] == expected
+    assert len(positions[0]) == 2
+    # One impact does not flatten the other curves: the axis ends below it, and says so.
+    assert browser.find_element(By.CSS_SELECTOR, "#panel .peak").text == "cut off, peak 100000 N"
+    curves = browser.find_elements(By.CSS_SELECTOR, "#panel .curve")[:6]
+    heights = [float(y) for curve in curves for y in re.findall(r"[\d.]+ ([\d.]+)", curve.get_attribute("d") or "")]
+    assert min(heights) == pytest.approx(6.0, abs=0.1)  # the top
+    assert np.mean(np.array(heights) < 130.0) > 0.5  # the rest fills the chart
+    assert positions[1][0] - positions[0][0] == pytest.approx(0.5 * (330 - 42 - 6), abs=2.0)  # half of the axis
+
+
+def test_a_click_on_a_curve_goes_to_that_time(shown: Shown) -> None:
+    go_to(shown.browser, 0.2)
+    chart = shown.browser.find_element(By.CSS_SELECTOR, "#panel svg")
+    shown.browser.execute_script(
+        "const box = arguments[0].getBoundingClientRect();"
+        "const at = {bubbles: true, clientX: box.x + box.width / 2, clientY: box.y + box.height / 2};"
+        "arguments[0].dispatchEvent(new MouseEvent('click', at));",
+        chart,
+    )
+    middle = (165 - 42) / (330 - 42 - 6) * float(shown.run.time[-1] - shown.run.time[0])
+    await_that(lambda: slider(shown.browser) == pytest.approx(middle, abs=0.02), "the time that was clicked on")
+
+
+def test_it_plays(shown: Shown) -> None:
+    go_to(shown.browser, 0.2)
+    shown.browser.find_element(By.CSS_SELECTOR, "#root button").click()
+    await_that(lambda: (slider(shown.browser) or 0.0) > 0.25, "a later time")
+    go_to(shown.browser, 0.0)
+
+
+def test_a_missing_browser_is_named_and_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shutil, "which", lambda _: None)
+    with pytest.raises(pytest.fail.Exception, match="chromium and chromium-driver"):
+        programs()

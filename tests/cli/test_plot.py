@@ -1,0 +1,355 @@
+"""`rover plot`: figures of any saved run, their labels, their data and what they refuse."""
+
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
+from typer.testing import CliRunner, Result
+
+from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField, report, rug
+from rover_gym.cli import app
+from rover_gym.extras import MissingExtraError
+from rover_gym.figures import draw_run
+from rover_gym.figures.derived import contact_velocities, motor_work, slip_ratios, smooth
+from rover_gym.figures.path import footprints
+from rover_gym.figures.run import DRAWINGS, drawable
+from rover_gym.figures.style import COLOURS, STYLE, WHEELS
+from rover_gym.recording import Recorder, Sampler, describe
+from rover_gym.run import Run, read_run
+
+KINDS = ("flat", "rocks", "section_6_1", "rug")
+# "gap, left wheels (mm)"; a pure number has the unit 1.
+LABEL_WITH_UNIT = re.compile(r".+ \((s|m|mm|m/s|mm/s|N|N m|J|°|%|1)\)$", flags=re.DOTALL)
+
+KILLED = """
+import os, signal, sys
+from rover_gym import RoverModel, Simulation
+from rover_gym.recording import Recorder, Sampler, describe
+
+sim = Simulation(RoverModel())
+q = sim.q
+q[1] = 0.45
+sim.set_state(q)
+sampler = Sampler(sim.model)
+recorder = Recorder(sys.argv[1], sampler.channels, describe(sim, "a drop"), terrain=sim.terrain, rows_per_flush=10)
+for _ in range(57):
+    step = sim.step()
+    recorder.append(sampler.row(sim, residual=step.residual, iterations=step.iterations))
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def rover(*arguments: str) -> Result:
+    return CliRunner(env={"COLUMNS": "120", "NO_COLOR": "1"}).invoke(app, list(arguments))
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A short run of each kind."""
+    folder = tmp_path_factory.mktemp("runs")
+    common = ("--time-limit", "2", "--seed", "1", "--output")
+    assert rover("drive", *common, str(folder / "flat")).exit_code == 0
+    rocks = ("--terrain", "sphere_field", "--difficulty", "1")
+    assert rover("drive", *rocks, *common, str(folder / "rocks")).exit_code == 0
+    report.run(folder / "section_6_1.h5", duration=3.5)
+    rug.run(folder / "rug.h5", duration=4.0)
+    return {
+        "flat": folder / "flat" / "episode-1.h5",
+        "rocks": folder / "rocks" / "episode-1.h5",
+        "section_6_1": folder / "section_6_1.h5",
+        "rug": folder / "rug.h5",
+    }
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def run(request: pytest.FixtureRequest, recordings: dict[str, Path]) -> Run:
+    return read_run(recordings[request.param])
+
+
+@pytest.fixture(autouse=True)
+def style() -> Iterator[None]:
+    with mpl.rc_context(STYLE):
+        yield
+
+
+def drawn(name: str, run: Run) -> Figure:
+    figure = Figure()
+    DRAWINGS[name].draw(figure, run)
+    return figure
+
+
+def curves(axes: Axes) -> dict[str, np.ndarray]:
+    """The lines of an axes by label."""
+    return {str(line.get_label()): np.asarray(line.get_ydata()) for line in axes.get_lines()}
+
+
+def test_a_run_gives_a_file_per_figure(recordings: dict[str, Path], tmp_path: Path) -> None:
+    result = rover("plot", str(recordings["rocks"]), "--output", str(tmp_path))
+    assert result.exit_code == 0, result.output
+    for name in DRAWINGS:
+        assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert f"figure: {tmp_path / name}.png" in result.output
+    assert len(list(tmp_path.iterdir())) == len(DRAWINGS)
+
+
+def test_without_a_folder_the_figures_lie_beside_the_run(
+    recordings: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few = {name: DRAWINGS[name] for name in ("path", "wheel-loads", "energy")}  # drawing takes half a second each
+    monkeypatch.setattr("rover_gym.figures.run.DRAWINGS", few)
+    result = rover("plot", str(recordings["rug"]), "--format", "svg", "--overview")
+    assert result.exit_code == 0, result.output
+    files = sorted(recordings["rug"].with_name("rug-plots").iterdir())
+    assert [file.name for file in files] == sorted(f"{name}.svg" for name in (*few, "overview"))
+    assert all("<svg" in file.read_text(encoding="utf-8")[:1000] for file in files)
+
+
+@pytest.mark.parametrize("name", DRAWINGS)
+def test_every_axis_has_a_unit_and_every_line_is_named(name: str, run: Run) -> None:
+    figure = drawn(name, run)
+    titles = [axes.get_title() for axes in figure.axes]
+    assert run.title in figure.get_suptitle()
+    legends = [legend for legend in (*figure.legends, *(axes.get_legend() for axes in figure.axes)) if legend]
+    named = {text.get_text() for legend in legends for text in legend.get_texts()}
+    assert named
+    for axes, title in zip(figure.axes, titles, strict=True):
+        below_others = axes.get_subplotspec() is None or axes.get_subplotspec().is_last_row()
+        in_front = axes.get_subplotspec() is None or axes.get_subplotspec().is_first_col()
+        if in_front:
+            assert LABEL_WITH_UNIT.match(axes.get_ylabel()), (title, axes.get_ylabel())
+        if below_others and axes.get_lines():
+            assert LABEL_WITH_UNIT.match(axes.get_xlabel()), (title, axes.get_xlabel())
+        for line in axes.get_lines():
+            label = str(line.get_label())
+            assert label.startswith("_") or label in named, label  # "_": explained by a note or drawn for another
+
+
+def test_type_is_readable_where_a_figure_is_shown_800_pixels_wide(recordings: dict[str, Path]) -> None:
+    figure = drawn("wheel-loads", read_run(recordings["flat"]))
+    pixels_per_point = 800.0 / 9.0 / 72.0
+    texts = [text for legend in figure.legends for text in legend.get_texts()]
+    texts += [label for axes in figure.axes for label in (axes.yaxis.label, *axes.get_yticklabels())]
+    assert min(text.get_fontsize() for text in texts) * pixels_per_point >= 11.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_curves_are_the_files(kind: str, recordings: dict[str, Path]) -> None:
+    run, file = read_run(recordings[kind]), h5py.File(recordings[kind])
+    left, right = drawn("wheel-gaps", run).axes
+    names = ("front left", "front right", "middle left", "back left", "middle right", "back right")
+    for i, (wheel, name) in enumerate(zip(WHEELS, names, strict=True)):
+        axes = left if wheel.endswith("L") else right
+        assert curves(axes)[name] == pytest.approx(1e3 * file["wheel_gaps"][:, i])
+    loads = drawn("wheel-loads", run).axes
+    assert curves(loads[0])["_FL samples"] == pytest.approx(file["wheel_forces"][:, 0, 0])
+    torques = drawn("torques-and-steering", run).axes
+    assert curves(torques[1])["back right"] == pytest.approx(file["wheel_torques"][:, 5])
+    assert curves(torques[2])["_FL set-point"] == pytest.approx(np.degrees(file["steering_set_points"][:, 0]))
+    assert curves(torques[2])["front left"] == pytest.approx(np.degrees(file["q"][:, 7]))
+    energy = drawn("energy", run).axes[0]
+    assert curves(energy)["kinetic"] == pytest.approx(file["kinetic_energy"][:])
+    tilt = curves(drawn("attitude", run).axes[0])
+    assert tilt["pitch, nose up"] == pytest.approx(np.degrees(file["q"][:, 5]))
+    iterations = drawn("contact-solver", run).axes[1]
+    assert curves(iterations)["iterations since the last row"] == pytest.approx(file["solver_iterations"][:])
+    tracks = {line.get_label(): line for line in drawn("path", run).axes[0].get_lines()}
+    assert tracks["_MR track"].get_xdata() == pytest.approx(file["wheel_centres"][:, 4, 2])
+    assert tracks["_MR track"].get_ydata() == pytest.approx(file["wheel_centres"][:, 4, 0])
+    file.close()
+
+
+def test_a_wheel_has_one_colour_in_every_figure(recordings: dict[str, Path]) -> None:
+    run = read_run(recordings["rocks"])
+    for name in ("wheel-gaps", "wheel-loads", "slip", "torques-and-steering"):
+        for axes in drawn(name, run).axes:
+            for line in axes.get_lines():
+                if line.get_label() == "middle right":
+                    assert line.get_color() == COLOURS["MR"]
+    assert len(set(COLOURS.values())) == len(WHEELS)
+
+
+def test_the_map_shows_goal_and_the_spheres_in_sight(recordings: dict[str, Path]) -> None:
+    run = read_run(recordings["rocks"])
+    axes = drawn("path", run).axes[0]
+    (goal,) = (line for line in axes.get_lines() if line.get_label() == "_goal")
+    assert run.goal is not None
+    assert (goal.get_xdata()[0], goal.get_ydata()[0]) == pytest.approx((run.goal[1], run.goal[0]))
+    (spheres,) = (artist for artist in axes.collections if isinstance(artist, EllipseCollection))
+    prints = footprints(run.terrain)
+    for (z, x), height in zip(spheres.get_offsets(), spheres.get_array(), strict=True):
+        nearest = np.linalg.norm(prints.centres - (x, z), axis=1).argmin()
+        assert height == pytest.approx(prints.heights[nearest])
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    x, z = prints.centres.T
+    assert len(spheres.get_offsets()) >= ((left < z) & (z < right) & (bottom < x) & (x < top)).sum()
+    assert (right - left) / (top - bottom) == pytest.approx(1.5)
+    assert axes.get_aspect() == 1.0
+
+
+def test_a_half_buried_sphere_shows_its_equator_and_one_on_top_its_own_radius() -> None:
+    field = SphereField([(0.0, 0.0, 0.0), (3.0, 0.7, 1.0), (6.0, -0.3, 2.0)], [0.5, 0.7, 0.5], Plane())
+    prints = footprints(field)
+    assert prints.centres == pytest.approx(np.array([(0.0, 0.0), (3.0, 1.0), (6.0, 2.0)]))
+    assert prints.radii == pytest.approx([0.5, 0.7, 0.4])
+    assert prints.heights == pytest.approx([0.5, 1.4, 0.2])
+
+
+def test_the_motors_work_is_what_the_environment_counts(recordings: dict[str, Path]) -> None:
+    # The environment sums |work| of each wheel and control period; where no wheel brakes, both are equal.
+    for kind in ("flat", "rocks"):
+        run = read_run(recordings[kind])
+        spent = np.abs(np.diff(motor_work(run), axis=0)).sum(axis=1)
+        assert np.cumsum(spent) == pytest.approx(run.trajectory["motor_energy"][1:], rel=1e-9, abs=1e-9)
+
+
+def recorded(sim: Simulation, path: Path, steps: int) -> Run:
+    sampler = Sampler(sim.model)
+    with Recorder(path, sampler.channels, describe(sim, "a test"), terrain=sim.terrain) as recorder:
+        recorder.append(sampler.row(sim))
+        for _ in range(steps):
+            step = sim.step()
+            recorder.append(sampler.row(sim, residual=step.residual, iterations=step.iterations))
+    return read_run(path)
+
+
+def lifted(height: float, **options: object) -> Simulation:
+    sim = Simulation(RoverModel(), **options)
+    q = sim.q
+    q[1] = height
+    sim.set_state(q)
+    return sim
+
+
+def test_the_motors_work_is_the_energy_of_wheels_that_turn_in_the_air(tmp_path: Path) -> None:
+    # No gravity and nothing touched: what the motors put in is kinetic energy. The report's energy is even in the
+    # step, torques are constant, so a step of 0.1 ms leaves little.
+    sim = lifted(5.0, gravity=(0.0, 0.0, 0.0), time_step=1e-4)
+    sim.set_wheel_torques(np.full(6, 2.0))
+    run = recorded(sim, tmp_path / "run.h5", 500)
+    assert run.trajectory["kinetic_energy"][-1] > 0.1  # J
+    assert motor_work(run)[-1].sum() == pytest.approx(run.trajectory["kinetic_energy"][-1], rel=1e-3)
+
+
+def test_braked_wheels_slide_as_fast_as_the_rover_goes_and_slip_wholly(tmp_path: Path) -> None:
+    sim = lifted(0.0, friction=0.1)
+    q, qdot = sim.q, sim.v
+    q[1] -= sim.wheel_gaps.min()
+    qdot[0] = 2.0
+    sim.set_state(q, qdot)
+    sim.brake()
+    run = recorded(sim, tmp_path / "run.h5", 20)
+    sliding = np.hypot(*np.moveaxis(contact_velocities(run)[10:, :, 1:], -1, 0))
+    speed = run.trajectory["v"][10:, 0]
+    assert sliding == pytest.approx(np.tile(speed, (6, 1)).T, rel=0.05)
+    assert slip_ratios(run)[10:] == pytest.approx(np.ones((11, 6)), rel=0.05)
+
+
+def test_wheels_in_the_air_have_no_slip(tmp_path: Path) -> None:
+    run = recorded(lifted(3.0), tmp_path / "run.h5", 5)
+    assert np.isnan(contact_velocities(run)).all()
+    figure = drawn("slip", run)
+    assert curves(figure.axes[2])["mean slip ratio, computed from q and v"] == pytest.approx(np.zeros(6))
+
+
+def test_the_computed_slip_is_near_the_recorded_one(recordings: dict[str, Path]) -> None:
+    # Contacts are looked at where the step ends, the environment's where it forecast them.
+    run = read_run(recordings["rocks"])
+    ratios = slip_ratios(run)
+    known = np.isfinite(ratios)
+    computed = np.where(known, ratios, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    difference = np.abs(computed[1:] - run.trajectory["slip_ratio"][1:])
+    assert np.quantile(difference, 0.9) < 0.02
+    assert difference.max() < 0.2
+    assert run.trajectory["slip_ratio"].max() > 0.1
+
+
+def test_smoothing_keeps_a_constant_and_the_area_of_a_spike_and_leaves_gaps() -> None:
+    time = np.linspace(0.0, 2.0, 201)
+    assert smooth(time, np.full(201, 3.0), 0.5) == pytest.approx(np.full(201, 3.0))
+    spike = np.zeros((201, 2))
+    spike[100, 1] = 50.0
+    smoothed = smooth(time, spike, 0.5)
+    assert smoothed.sum(axis=0) == pytest.approx([0.0, 50.0])
+    assert not smoothed[np.abs(time - 1.0) > 0.25 + 0.01].any()
+    holes = np.where(np.arange(201) % 3 == 0, np.nan, 3.0)
+    assert smooth(time, holes, 0.5) == pytest.approx(holes, nan_ok=True)
+
+
+def test_a_killed_run_is_drawn_and_says_that_it_was_broken_off(tmp_path: Path) -> None:
+    path = tmp_path / "killed.h5"
+    result = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
+    assert result.returncode == -signal.SIGKILL
+    run = read_run(path)
+    assert run.n_frames == 50
+    assert "broken off" in drawn("attitude", run).get_suptitle()
+    assert list(drawable(run)) == list(DRAWINGS)
+    for name in DRAWINGS:
+        assert drawn(name, run).axes
+
+
+def test_a_run_of_one_row_is_drawn(tmp_path: Path) -> None:
+    run = recorded(lifted(0.5), tmp_path / "run.h5", 0)
+    assert run.n_frames == 1
+    for name in DRAWINGS:
+        drawn(name, run).draw_without_rendering()
+
+
+def test_what_was_not_recorded_is_left_out(tmp_path: Path) -> None:
+    sim = lifted(0.5)
+    sampler = Sampler(sim.model)
+    channels = [channel for channel in sampler.channels if channel.name in ("time", "q", "v", "wheel_gaps")]
+    with Recorder(tmp_path / "run.h5", channels, describe(sim, "a test"), terrain=sim.terrain) as recorder:
+        row = sampler.row(sim)
+        recorder.append({channel.name: row[channel.name] for channel in channels})
+    assert list(drawable(read_run(tmp_path / "run.h5"))) == ["wheel-gaps", "attitude"]
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"), [(b"no HDF5", "not HDF5"), (None, "No such file"), ("other", "is no rover-gym trajectory")]
+)
+def test_a_file_that_is_no_run_is_refused_by_name(content: bytes | str | None, reason: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.h5"
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif content is not None:
+        with h5py.File(path, "w") as file:
+            file["x"] = 1.0
+    result = rover("plot", str(path))
+    assert result.exit_code == 2
+    assert len(result.stderr.splitlines()) == 1
+    assert str(path) in result.stderr
+    assert reason in result.stderr
+    assert not (tmp_path / "bad-plots").exists()
+
+
+def test_an_unknown_format_is_refused_before_anything_is_written(recordings: dict[str, Path], tmp_path: Path) -> None:
+    result = rover("plot", str(recordings["flat"]), "--format", "bmp", "--output", str(tmp_path / "plots"))
+    assert result.exit_code == 2
+    assert result.stderr == "error: format: must be one of png, svg, pdf, got 'bmp'\n"
+    assert not (tmp_path / "plots").exists()
+    with pytest.raises(OptionError) as error:
+        draw_run(read_run(recordings["flat"]), tmp_path / "plots", file_format="bmp")
+    assert (error.value.field, error.value.value) == ("format", "bmp")
+
+
+def test_without_matplotlib_the_error_names_the_extra(
+    recordings: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(MissingExtraError, match=r"rover-gym\[demo\]"):
+        draw_run(read_run(recordings["flat"]), tmp_path / "plots")
+    result = rover("plot", str(recordings["flat"]), "--output", str(tmp_path / "plots"))
+    assert result.exit_code == 2
+    assert "pip install 'rover-gym[demo]'" in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+    assert not (tmp_path / "plots").exists()

@@ -1,0 +1,136 @@
+"""Saved runs, read back with rover and ground."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField, report, rug
+from rover_gym.cli import app
+from rover_gym.recording import Recorder, RecordingError, Sampler, describe
+from rover_gym.run import read_run
+
+KILLED = """
+import os, signal, sys
+from rover_gym import report
+from rover_gym.recording import Recorder, Sampler, describe
+
+sim = report.scene()
+sampler = Sampler(sim.model)
+recorder = Recorder(
+    sys.argv[1], sampler.channels, describe(sim, "to be killed"), terrain=sim.terrain, rows_per_flush=10
+)
+for _ in range(57):
+    sim.step()
+    recorder.append(sampler.row(sim))
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def record(sim: Simulation, path: Path, steps: int = 20) -> Path:
+    sampler = Sampler(sim.model)
+    with Recorder(path, sampler.channels, describe(sim, "a test"), terrain=sim.terrain) as recorder:
+        recorder.append(sampler.row(sim))
+        for _ in range(steps):
+            sim.step()
+            recorder.append(sampler.row(sim))
+    return path
+
+
+def test_poses_are_those_of_the_simulation(tmp_path: Path) -> None:
+    sim = report.scene()
+    run = read_run(record(sim, tmp_path / "run.h5"))
+    assert run.n_frames == 21
+    assert run.positions.shape == (21, 16, 3)
+    assert run.rotations.shape == (21, 16, 3, 3)
+    for i, (position, rotation) in enumerate(sim.poses().values()):
+        assert run.positions[-1, i] == pytest.approx(position, abs=1e-12)
+        assert run.rotations[-1, i] == pytest.approx(rotation, abs=1e-12)
+    assert list(sim.poses()) == run.model.solid_names
+    # Of contact 0.30 m in this scene, so the rover is the recorded one and not the built-in one.
+    assert run.model.wheel_radii == pytest.approx(np.full(6, 0.3))
+    assert run.model.to_dict() == sim.model.to_dict()
+    assert run.goal is None
+    assert run.title == "a test"
+
+
+def test_the_wheels_recorded_gaps_are_those_over_the_ground_that_is_read(tmp_path: Path) -> None:
+    for name, sim in (("plane", report.scene()), ("rug", rug.scene())):
+        run = read_run(record(sim, tmp_path / f"{name}.h5"))
+        for q, gaps in zip(run.trajectory["q"], run.trajectory["wheel_gaps"], strict=True):
+            assert run.model.wheel_gaps(q, run.terrain, "state") == pytest.approx(gaps, abs=1e-12)
+
+
+@pytest.mark.parametrize("terrain", ["plane", "sphere_field"])
+def test_an_episode_is_read_back_with_its_goal(terrain: str, tmp_path: Path) -> None:
+    arguments = ["drive", "--terrain", terrain, "--goal", "5", "1", "--time-limit", "1", "--output", str(tmp_path)]
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    run = read_run(tmp_path / "episode-0.h5")
+    assert run.goal == (5.0, 1.0)
+    assert isinstance(run.terrain, Plane if terrain == "plane" else SphereField)
+    assert run.n_frames == 21
+    for q, gaps in zip(run.trajectory["q"], run.trajectory["wheel_gaps"], strict=True):
+        assert run.model.wheel_gaps(q, run.terrain, "state") == pytest.approx(gaps, abs=1e-12)
+
+
+def test_both_sections_of_the_report_are_read_back(tmp_path: Path) -> None:
+    for scene in (report, rug):
+        result = scene.run(tmp_path / "run.h5", duration=0.1)
+        assert read_run(result.path).n_frames == 21
+
+
+def test_a_killed_run_is_read_back_as_far_as_it_came(tmp_path: Path) -> None:
+    path = tmp_path / "killed.h5"
+    done = subprocess.run([sys.executable, "-c", KILLED, str(path)], check=False)
+    assert done.returncode == -signal.SIGKILL
+    run = read_run(path)
+    assert run.n_frames == 50
+    assert not run.trajectory.attributes["complete"]
+    sim = report.scene()
+    sim.step(50)
+    trunk = run.model.solid_names.index("trunk")
+    assert run.positions[-1, trunk] == pytest.approx(sim.poses()["trunk"][0], abs=1e-12)
+    result = CliRunner().invoke(app, ["replay", str(path), "--vrml", str(tmp_path / "killed.wrl"), "--fps", "1000"])
+    assert result.exit_code == 0, result.output
+    place = (tmp_path / "killed.wrl").read_text(encoding="utf-8").partition("DEF trunk_place")[2].partition("\n")[0]
+    keys, _, values = place.partition("keyValue")
+    assert len(keys.partition("key [")[2].strip("] ").split()) == 50
+    last = [float(word) for word in values.strip("[] }").split(",")[-1].split()]
+    assert last == pytest.approx(sim.poses()["trunk"][0], abs=1e-6)
+
+
+def test_frames_are_the_samples_nearest_to_a_films_times(tmp_path: Path) -> None:
+    run = read_run(record(report.scene(), tmp_path / "run.h5", steps=100))  # 0.5 s at 200 samples a second
+    film = run.resample(30.0)
+    assert film.n_frames == 16
+    assert np.abs(film.time - np.arange(16) / 30.0).max() <= 0.0025 + 1e-12
+    assert np.array_equal(film.positions[-1], run.positions[np.searchsorted(run.time, film.time[-1] - 1e-9)])
+    assert np.array_equal(run.resample(1e6).time, run.time)
+    assert run.resample(1e-3).n_frames == 1
+    for fps in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(OptionError, match="fps"):
+            run.resample(fps)
+
+
+def test_a_run_without_rover_ground_or_samples_is_refused(tmp_path: Path) -> None:
+    sim = Simulation(RoverModel())
+    sampler = Sampler(sim.model)
+
+    def refusal(path: Path) -> str:
+        with pytest.raises(RecordingError) as caught:
+            read_run(path)
+        return str(caught.value)
+
+    with Recorder(tmp_path / "a.h5", sampler.channels, {"title": "no model"}, terrain=sim.terrain) as recorder:
+        recorder.append(sampler.row(sim))
+    assert "holds no rover" in refusal(tmp_path / "a.h5")
+    with Recorder(tmp_path / "b.h5", sampler.channels, describe(sim, "no ground")) as recorder:
+        recorder.append(sampler.row(sim))
+    assert "holds no ground" in refusal(tmp_path / "b.h5")
+    with Recorder(tmp_path / "c.h5", sampler.channels, describe(sim, "no samples"), terrain=sim.terrain):
+        pass
+    assert "holds no samples" in refusal(tmp_path / "c.h5")

@@ -1,0 +1,454 @@
+"""Frames show what the simulation does, headless, and the usual wrappers make videos of them."""
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import gymnasium as gym
+import imageio_ffmpeg
+import numpy as np
+import numpy.typing as npt
+import pytest
+from gymnasium.wrappers import RecordVideo
+
+import rover_gym
+from rover_gym import OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField
+from rover_gym import appearance as look
+from rover_gym.recording import MissingExtraError
+from rover_gym.rendering import FrameRenderer
+from rover_gym.rendering.frames import contact_forces
+from rover_gym.start import resting_pose, tilted_plane
+
+Frame = npt.NDArray[np.uint8]
+SIZE = {"width": 160, "height": 120}
+
+
+@pytest.fixture(scope="module")
+def model() -> RoverModel:
+    return RoverModel()
+
+
+@pytest.fixture
+def renderer(model: RoverModel) -> Iterator[Callable[..., FrameRenderer]]:
+    """Makes small renderers and frees them."""
+    made: list[FrameRenderer] = []
+
+    def make(terrain: Plane | SphereField, **options: Any) -> FrameRenderer:
+        made.append(FrameRenderer(model, terrain, **{**SIZE, **options}))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+
+
+def parked(model: RoverModel, terrain: Plane | SphereField, *, heading: float = 0.0) -> Simulation:
+    """A rover at rest on the terrain's plane, at the origin."""
+    plane = terrain if isinstance(terrain, Plane) else terrain.ground
+    assert plane is not None
+    simulation = Simulation(model, terrain)
+    simulation.set_state(resting_pose(model, plane, (0.0, 0.0), heading))
+    return simulation
+
+
+def moved(simulation: Simulation, **changes: float) -> Simulation:
+    """The simulation with coordinates changed by name."""
+    q = simulation.q
+    for name, change in changes.items():
+        q[simulation.model.dof_names.index(name)] += change
+    simulation.set_state(q)
+    return simulation
+
+
+def like(frame: Frame, colour: look.Colour, within: float = 0.06) -> npt.NDArray[np.bool_]:
+    """Which pixels have a colour's hue and saturation, whatever the light: (height, width)."""
+    pixels = frame.astype(np.float64) + 1.0
+    chroma = pixels / pixels.sum(axis=2, keepdims=True)
+    expected = np.array(colour) / sum(colour)
+    near: npt.NDArray[np.bool_] = np.abs(chroma - expected).max(axis=2) < within / 2.0
+    return near
+
+
+def changed(a: Frame, b: Frame) -> int:
+    """How many pixels clearly differ."""
+    return int((np.abs(a.astype(int) - b.astype(int)).max(axis=2) > 12).sum())
+
+
+def test_a_frame_is_an_image_of_the_size_asked_for(model: RoverModel, renderer: Callable[..., FrameRenderer]) -> None:
+    plane = Plane()
+    frame = renderer(plane, width=200, height=90).render(parked(model, plane))
+    assert frame.shape == (90, 200, 3)
+    assert frame.dtype == np.uint8
+    assert frame.flags.owndata
+    assert frame.flags.c_contiguous
+
+
+def test_sky_is_above_ground_and_the_rover_stands_on_it(
+    model: RoverModel, renderer: Callable[..., FrameRenderer]
+) -> None:
+    plane = Plane()
+    frame = renderer(plane).render(parked(model, plane))
+    ground, deck = like(frame, look.GROUND_COLOUR), like(frame, look.DECK_COLOUR)
+    assert ground[-20:].mean() > 0.8
+    assert ground[:8].mean() < 0.1
+    assert deck.sum() > 300
+    rows, columns = np.nonzero(deck)
+    assert abs(rows.mean() - 60) < 25
+    assert abs(columns.mean() - 80) < 25
+    assert like(frame, look.NOSE_COLOUR).sum() > 15
+    assert like(frame, look.BOGIE_COLOUR).sum() > 40
+
+
+def test_the_nose_is_in_front(model: RoverModel, renderer: Callable[..., FrameRenderer]) -> None:
+    plane = Plane()
+    # From above, x is up in the picture and z to its right.
+    frame = renderer(plane, camera="top").render(parked(model, plane))
+    nose, deck = (np.argwhere(like(frame, colour)).mean(axis=0) for colour in (look.NOSE_COLOUR, look.DECK_COLOUR))
+    assert nose[0] < deck[0] - 5
+    assert abs(nose[1] - deck[1]) < 2
+    frame = renderer(plane, camera="top").render(parked(model, plane, heading=-np.pi / 2))  # heading to +z
+    nose, deck = (np.argwhere(like(frame, colour)).mean(axis=0) for colour in (look.NOSE_COLOUR, look.DECK_COLOUR))
+    assert nose[1] > deck[1] + 5
+    assert abs(nose[0] - deck[0]) < 2
+
+
+def test_rocks_and_goal_are_seen_where_there_are_some(
+    model: RoverModel, renderer: Callable[..., FrameRenderer]
+) -> None:
+    field = SphereField([[1.6, 0.0, 1.2], [1.6, 0.0, -1.2]], [0.3, 0.3], Plane())
+    bare = renderer(Plane(), camera="top").render(parked(model, Plane()))
+    rocks = renderer(field, camera="top").render(parked(model, field))
+    flagged = renderer(Plane(), camera="top", goal=(1.8, 0.0), goal_tolerance=0.5).render(parked(model, Plane()))
+    assert not like(bare, look.GOAL_COLOUR).any()
+    assert like(flagged, look.GOAL_COLOUR).sum() > 20
+    # The ring's midpoint: 8 m above the trunk, 34 degrees over 120 rows.
+    rows, _ = np.nonzero(like(flagged, look.GOAL_COLOUR))
+    height = 8.0 + parked(model, Plane()).q[1]
+    row = 60.0 - 1.8 * 60.0 / (height * np.tan(np.radians(17.0)))
+    assert 0.5 * (rows.min() + rows.max()) == pytest.approx(row, abs=4.0)
+    # Two discs of 0.3 m, seen from 8 m less their own height.
+    grey = (np.abs(rocks.astype(int) - bare).max(axis=2) > 24)[:55]
+    pixels = 60.0 / (height * np.tan(np.radians(17.0)))
+    assert grey.sum() > 2 * np.pi * (0.3 * pixels) ** 2
+
+
+def test_spheres_without_a_plane_are_drawn(model: RoverModel, renderer: Callable[..., FrameRenderer]) -> None:
+    rug = SphereField.rug()
+    simulation = Simulation(model, rug)
+    q = np.zeros(model.nq)
+    q[1] = 2.0
+    simulation.set_state(q)
+    frame = renderer(rug, goal=(3.0, 0.0)).render(simulation)
+    assert like(frame, look.ROCK_COLOUR).mean() > 0.1
+    assert like(frame, look.GOAL_COLOUR).sum() > 10
+
+
+def test_ground_moves_past_when_the_rover_drives(model: RoverModel, renderer: Callable[..., FrameRenderer]) -> None:
+    plane = Plane()
+    simulation = parked(model, plane)
+    camera = renderer(plane)
+    before = camera.render(simulation)
+    assert changed(before, camera.render(moved(simulation, x=0.5))) > 1000  # the other tile under the rover
+    # After two tiles the checkers look the same again, under a sky that does.
+    again = camera.render(moved(simulation, x=0.5))
+    assert changed(before, again) < 40
+
+
+def test_a_turn_of_the_wheels_alone_shows_at_every_wheel(
+    model: RoverModel, renderer: Callable[..., FrameRenderer]
+) -> None:
+    plane = Plane()
+    camera = renderer(plane, width=640, height=480)
+    simulation = parked(model, plane)
+    before = camera.render(simulation)
+    wheels = [model.dof_names[index] for index in model.wheel_joint_indices]
+    visible = {"BR", "MR", "FR", "BL"}  # the view is from behind and from the right
+    for name, wheel in zip(model.wheel_names, wheels, strict=True):
+        after = camera.render(moved(simulation, **{wheel: np.pi}))
+        if name in visible:
+            # A half turn: treads and spokes look the same, the one marked arm does not.
+            assert changed(before, after) > 8, name
+        moved(simulation, **{wheel: -np.pi})
+    assert changed(before, camera.render(simulation)) == 0
+
+
+def test_steering_and_suspension_show(model: RoverModel, renderer: Callable[..., FrameRenderer]) -> None:
+    plane = Plane()
+    camera = renderer(plane, width=320, height=240)
+    simulation = parked(model, plane)
+    before = camera.render(simulation)
+    for index in (*model.steering_joint_indices[-2:], model.dof_names.index("right_bogie")):
+        name = model.dof_names[index]
+        assert changed(before, camera.render(moved(simulation, **{name: 0.4}))) > 20, name
+        moved(simulation, **{name: -0.4})
+
+
+def test_forces_are_drawn_on_request_and_grow_with_the_load(
+    model: RoverModel, renderer: Callable[..., FrameRenderer]
+) -> None:
+    plane = Plane()
+    seen = {}
+    for gravity in (9.81, 3.72):
+        simulation = Simulation(model, plane, gravity=(0.0, -gravity, 0.0))
+        simulation.set_state(resting_pose(model, plane, (0.0, 0.0), 0.0))
+        simulation.brake()
+        simulation.step(40)
+        for show in (False, True):
+            frame = renderer(plane, camera="side", show_forces=show, width=320, height=240).render(simulation)
+            seen[gravity, show] = like(frame, look.FORCE_COLOUR).sum()
+    assert seen[9.81, False] == seen[3.72, False] == 0
+    assert seen[9.81, True] > 60
+    # Arrows are as long as the force is in wheel loads, whatever the gravity.
+    assert seen[3.72, True] == pytest.approx(seen[9.81, True], rel=0.15)
+
+
+def test_the_arrows_of_a_parked_rover_carry_its_weight(model: RoverModel) -> None:
+    plane = tilted_plane(np.radians(10.0), 0.5)
+    simulation = parked(model, plane, heading=0.3)
+    assert [array.shape for array in contact_forces(simulation)] == [(0, 3), (0, 3)], "no step, no contact"
+    simulation.brake()
+    simulation.step(400)
+    points, forces = contact_forces(simulation)
+    # N, against 9418 N of weight; and the same about the mass centre, N m.
+    np.testing.assert_allclose(forces.sum(axis=0), -model.mass * simulation.gravity, atol=0.5)
+    arms = points - simulation.centre_of_mass()
+    np.testing.assert_allclose(np.cross(arms, forces).sum(axis=0), 0.0, atol=0.5)
+
+
+def test_the_camera_follows_and_the_rover_stays_in_the_middle(renderer: Callable[..., FrameRenderer]) -> None:
+    env = gym.make("Rover-v0", goal_distance=20.0, goal_bearing_deg=60.0).unwrapped
+    assert isinstance(env, RoverEnv)
+    env.reset(seed=1)
+    policy = rover_gym.PDPolicy(env)
+    camera = renderer(Plane())
+    action = np.zeros(12, np.float32)
+    centres = []
+    for _ in range(60):
+        observation, *_ = env.step(action)
+        action, _ = policy.predict(observation)
+        centres.append(np.argwhere(like(camera.render(env.simulation), look.DECK_COLOUR)).mean(axis=0))
+    assert np.hypot(*(env.simulation.q[[0, 2]])) > 1.5
+    assert np.all(np.abs(np.array(centres) - (60.0, 80.0)) < (25.0, 30.0))
+    steps = np.abs(np.diff(centres, axis=0))
+    assert steps.max() < 3.0, "no jump between frames"
+
+
+def test_a_slope_is_seen(model: RoverModel, renderer: Callable[..., FrameRenderer]) -> None:
+    """Facing across the slope the horizon of the ground leans as the ground does."""
+    slope = np.radians(15.0)
+    plane = tilted_plane(slope, np.pi / 2)  # uphill to the left of x
+    frame = renderer(plane, camera=((-4.0, 1.5, 0.0), (0.0, 1.2, 0.0)), width=320, height=240).render(
+        parked(model, plane)
+    )
+    ground = like(frame, look.GROUND_COLOUR, within=0.08)
+    first = np.argmax(ground, axis=0)
+    left, right = first[10:60].mean(), first[-60:-10].mean()
+    assert np.arctan2(right - left, 250.0) == pytest.approx(slope, abs=0.07)
+
+
+def test_equal_states_give_equal_frames(model: RoverModel, renderer: Callable[..., FrameRenderer]) -> None:
+    field = SphereField.rocks(0.1, (-5, -5, 5, 5), 0, clear=[[0.0, 0.0, 1.5]])
+    frames = []
+    for _ in range(2):
+        camera, simulation = renderer(field, goal=(4.0, 1.0), show_forces=True), parked(model, field)
+        simulation.set_wheel_torques(np.full(6, 30.0))
+        for _ in range(3):
+            simulation.step(10)
+            frames.append(camera.render(simulation))
+        assert np.array_equal(frames[-1], camera.render(simulation)), "looking twice changes nothing"
+    for a, b in zip(frames[:3], frames[3:], strict=True):
+        assert np.array_equal(a, b)
+
+
+def test_a_new_episode_brings_its_own_ground_and_goal(
+    model: RoverModel, renderer: Callable[..., FrameRenderer]
+) -> None:
+    camera = renderer(Plane(), camera="top")
+    field = SphereField([[1.6, 0.0, 1.2]], [0.3], Plane())
+    alone = camera.render(parked(model, Plane()))
+    camera.set_scene(field, goal=(1.8, 0.0))
+    assert changed(alone, camera.render(parked(model, field))) > 50
+    camera.set_scene(Plane())
+    assert np.array_equal(alone, camera.render(parked(model, Plane())))
+
+
+def test_a_model_of_another_shape_is_drawn_as_it_is() -> None:
+    description = RoverModel().to_dict()
+    description["solids"][0]["shape"]["size"] = [1.2, 0.1, 0.5]
+    thin = RoverModel.from_dict(description)
+    areas = []
+    for each in (RoverModel(), thin):
+        with FrameRenderer(each, Plane(), **SIZE) as camera:
+            areas.append(like(camera.render(parked(each, Plane())), look.DECK_COLOUR).sum())
+    assert areas[1] < 0.75 * areas[0]
+
+
+def test_a_frame_takes_well_under_a_second(model: RoverModel) -> None:
+    field = SphereField.rocks(0.1, (-10, -10, 10, 10), 0, min_diameter=0.1, clear=[[0.0, 0.0, 1.5]])
+    assert len(field) > 200
+    with FrameRenderer(model, field) as camera:
+        simulation = parked(model, field)
+        camera.render(simulation)
+        start = time.process_time()
+        for _ in range(5):
+            camera.render(simulation)
+        assert (time.process_time() - start) / 5 < 0.5
+
+
+def test_only_a_render_mode_that_exists_is_accepted() -> None:
+    for mode in ("human", "ansi", "depth_array"):
+        with pytest.raises(OptionError, match="render_mode") as caught:
+            RoverEnv(render_mode=mode)
+        assert (caught.value.field, caught.value.value) == ("render_mode", mode)
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        ({"breadth": 640}, "render_options"),
+        ({"width": 641}, "render_options.width"),
+        ({"width": 0}, "render_options.width"),
+        ({"height": 1e9}, "render_options.height"),
+        ({"height": "big"}, "render_options.height"),
+        ({"camera": "front"}, "render_options.camera"),
+        ({"camera": 3}, "render_options.camera"),
+        ({"camera": ((0, 0, 0), (0, 0))}, "render_options.camera[1]"),
+        ({"camera": ((0, 0, 0), (0, 0, 0))}, "render_options.camera"),
+        ({"camera": ((0, 0, np.nan), (0, 0, 0))}, "render_options.camera[0][2]"),
+        ({"show_forces": 1}, "render_options.show_forces"),
+        ({"antialiasing": "yes"}, "render_options.antialiasing"),
+    ],
+)
+def test_odd_options_are_refused_by_name(options: dict[str, Any], field: str) -> None:
+    with pytest.raises(OptionError) as caught:
+        RoverEnv(render_mode="rgb_array", render_options=options)
+    assert (caught.value.field or "").startswith(field)
+
+
+def test_a_missing_renderer_is_told_when_the_environment_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'rover-gym\[render\]'"):
+        RoverEnv(render_mode="rgb_array")
+    RoverEnv()
+
+
+def test_no_renderer_is_imported_before_the_first_frame() -> None:
+    code = """
+import sys, rover_gym
+env = rover_gym.RoverEnv(render_mode="rgb_array", render_options={"width": 64, "height": 48})
+env.reset(seed=0)
+assert not [name for name in sys.modules if name.startswith(("vtk", "pygame", "moviepy"))]
+assert env.render().shape == (48, 64, 3)
+env.close()
+"""
+    # Nothing of a desktop is left in the environment, and VTK keeps to itself what it tried.
+    done = subprocess.run([sys.executable, "-c", code], env={}, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+@pytest.mark.parametrize("name", ["Rover-v0", "RoverRocks-v0"])
+def test_the_environment_renders_each_episode(name: str) -> None:
+    with gym.make(name, render_mode="rgb_array", render_options=SIZE, control_frequency=10) as env:
+        assert env.metadata["render_fps"] == 10
+        env.reset(seed=0)
+        first: Any = env.render()
+        env.reset(seed=1)
+        second: Any = env.render()
+        env.step(env.action_space.sample())
+        third: Any = env.render()
+        assert changed(first, second) > 500
+        assert changed(second, third) > 0
+    assert RoverEnv.metadata["render_fps"] == 20
+
+
+def test_rendering_changes_nothing() -> None:
+    rewards = []
+    for mode in (None, "rgb_array"):
+        with gym.make("RoverRocks-v0", render_mode=mode, render_options=SIZE) as env:
+            observation, _ = env.reset(seed=4)
+            policy = rover_gym.PDPolicy(env)
+            for _ in range(10):
+                if mode:
+                    env.render()
+                observation, reward, *_ = env.step(policy.predict(observation)[0])
+            rewards.append((reward, *observation))
+    assert rewards[0] == rewards[1]
+
+
+def test_render_without_a_mode_warns_and_gives_none(env: RoverEnv) -> None:
+    with pytest.warns(UserWarning, match="render_mode"):
+        assert env.render() is None
+
+
+def frames_of(path: Path) -> tuple[float, list[Frame]]:
+    """Frames per second of a video, and its frames, decoded by ffmpeg."""
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    done = subprocess.run(command, capture_output=True, check=True)
+    said = re.search(rb"Video: h264.*?, (\d+)x(\d+).*?, ([\d.]+) fps", done.stderr)
+    assert said is not None, done.stderr
+    width, height = int(said[1]), int(said[2])
+    return float(said[3]), list(np.frombuffer(done.stdout, np.uint8).reshape(-1, height, width, 3))
+
+
+@pytest.mark.parametrize("name", ["Rover-v0", "RoverRocks-v0"])
+def test_gymnasium_records_a_video(name: str, tmp_path: Path) -> None:
+    env = gym.make(name, render_mode="rgb_array", render_options=SIZE, max_episode_steps=12)
+    with RecordVideo(env, str(tmp_path / "videos")) as recorded:
+        recorded.reset(seed=0)
+        first: Any = recorded.render()
+        truncated = False
+        while not truncated:
+            _, _, _, truncated, _ = recorded.step(np.ones(12, np.float32) * 0.5)
+        last: Any = env.render()
+    fps, frames = frames_of(tmp_path / "videos" / "rl-video-episode-0.mp4")
+    assert fps == 20.0
+    assert len(frames) == 13
+    for expected, decoded in ((first, frames[0]), (last, frames[-1])):
+        assert np.abs(expected.astype(float) - decoded).mean() < 12.0, "but for compression"
+
+
+@pytest.mark.parametrize("name", ["Rover-v0", "RoverRocks-v0"])
+def test_stable_baselines3_records_a_video(name: str, tmp_path: Path) -> None:
+    sb3 = pytest.importorskip("stable_baselines3.common.vec_env", reason="stable-baselines3 is an extra")
+    venv = sb3.DummyVecEnv([lambda: gym.make(name, render_mode="rgb_array", render_options=SIZE) for _ in range(2)])
+    recorder = sb3.VecVideoRecorder(venv, str(tmp_path), lambda step: step == 0, video_length=5)
+    recorder.seed(0)
+    recorder.reset()
+    for _ in range(6):
+        recorder.step([np.full(12, 0.5, np.float32)] * 2)
+    recorder.close()
+    (path,) = tmp_path.glob("*.mp4")
+    fps, frames = frames_of(path)
+    assert fps == 20.0
+    assert len(frames) == 6
+    assert frames[0].shape == (2 * SIZE["height"], SIZE["width"], 3)  # one rover over the other
+
+
+def test_a_window_shows_the_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # pygame's own deprecations, and Gymnasium's word that it adds the window
+        import pygame  # noqa: PLC0415 - after the driver is chosen
+
+        with gym.make("RoverRocks-v0", render_mode="human", render_options=SIZE) as env:
+            assert env.render_mode == "human"
+            env.reset(seed=0)
+            shown = pygame.surfarray.array3d(pygame.display.get_surface()).transpose(1, 0, 2)
+            bare: Any = env.unwrapped
+            assert np.array_equal(shown, bare.render())
+            env.step(np.ones(12, np.float32) * 0.5)
+            assert changed(shown, pygame.surfarray.array3d(pygame.display.get_surface()).transpose(1, 0, 2)) > 0
+
+
+def test_a_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rover_gym.rendering.frames._has_osmesa", lambda: False)
+    monkeypatch.setitem(os.environ, "VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
+    with pytest.raises(OSError, match="apt-get install libegl1"):
+        FrameRenderer(RoverModel(), Plane())
