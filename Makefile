@@ -13,7 +13,7 @@ UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
 
-.PHONY: help demo test check lint types format test-rust test-slow test-python docs bench pins clean
+.PHONY: help demo test check lint types format test-rust test-slow test-python docs bench orders pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -63,6 +63,10 @@ bench: ## time a step and tell where the time goes (informs, does not gate)
 	    | awk '/Collected/ { print $$NF }'; }; \
 	  awk -v a=$$(count 1) -v b=$$(count 1001) 'BEGIN { printf "\n%.0f instructions a step of the curve (callgrind)\n", (b - a) / 1000 }'; \
 	else echo "valgrind is not installed: no instruction counts"; fi
+
+orders: $(STAMPS)/demo ## measure every time-stepping scheme: order, drift, energy, cost; redraw docs/comparison/orders.png
+	cargo run --release --locked --quiet -p rover-comparison --bin orders -- runs/orders.json
+	$(BIN)/python tests/comparison/draw_orders.py runs/orders.json docs/comparison/orders.png
 
 pins: $(STAMPS)/venv ## resolve requirements/*.txt anew from pyproject.toml
 	$(call pin,demo) --extra demo --group build
