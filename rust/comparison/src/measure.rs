@@ -1,11 +1,14 @@
 //! Order, drift, energy and cost of a scheme.
 
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::Instant;
 
 use rover_core::integrator::{OptionsError, StepError};
 use rover_core::multibody::StateError;
-use rover_core::planar::{PlanarError, PlanarMachine, PlanarSimulation};
+use rover_core::planar::{
+    Ball, BallSimulation, ContactRule, Line, PlanarError, PlanarMachine, PlanarSimulation,
+};
 use rover_core::simulation::CommandError;
 use serde::Serialize;
 use thiserror::Error;
@@ -14,7 +17,7 @@ use crate::scenes::{
     G, MASS, WHEEL_LOAD, ball_above, ball_on_sine, bouncing_at, driving, flight, flight_at,
     options, rolling, sliding,
 };
-use crate::{EventDriven, SCHEMES, Scheme, Stepper};
+use crate::{EventDriven, Kind, SCHEMES, Scheme, Stepper};
 
 /// A measurement that could not be made.
 #[derive(Debug, Error, Clone, PartialEq)]
@@ -211,7 +214,7 @@ pub fn drift(scheme: &Scheme, coarsest: usize) -> Curve {
 /// What happens to the energy, relative to that of the drop or of the descent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct EnergyBehaviour {
-    /// Change over 60 s of bouncing with e = 1 at 5 ms.
+    /// Change over 60 s of bouncing with e = 1 at 5 ms (penalty: 1 ms, here and below).
     pub elastic: Option<f64>,
     /// Largest growth in a step of a ball that drops with e = 0 and stays.
     pub growth: Option<f64>,
@@ -221,59 +224,92 @@ pub struct EnergyBehaviour {
     pub rolling: Option<f64>,
 }
 
-/// See [`EnergyBehaviour`].
-#[must_use]
-pub fn energy(scheme: &Scheme) -> EnergyBehaviour {
-    let h = 5e-3;
-    let elastic = || -> Result<f64, MeasureError> {
-        let mut simulation = ball_above(scheme, &options(0.0, 1.0, h), 1.0)?;
-        let before = simulation.energy().total();
-        simulation.step_with(&scheme.stepper(MASS, 1.0), 12_000)?;
-        Ok((simulation.energy().total() - before) / (MASS * G))
-    };
-    let drop = || -> Result<(f64, f64), MeasureError> {
-        let mut simulation = ball_above(scheme, &options(0.5, 0.0, h), 1.0)?;
-        let stepper = scheme.stepper(MASS, 0.0);
-        let mut growth = 0.0_f64;
-        for _ in 0..1000 {
-            let before = simulation.energy().total();
-            simulation.step_with(&stepper, 1)?;
-            growth = growth.max(simulation.energy().total() - before);
-        }
-        Ok((growth / (MASS * G), simulation.v().norm()))
-    };
-    let rolling = || -> Result<f64, MeasureError> {
-        let mut simulation = ball_on_sine(scheme, &options(0.9, 0.0, h), -0.3, 0.0)?;
-        let before = simulation.energy().total();
-        simulation.step_with(&scheme.stepper(MASS, 0.0), 12_000)?;
-        let descent = MASS * G * 0.2; // to the valley's bottom
-        Ok((simulation.energy().total() - before) / descent)
-    };
-    let drop = drop().ok();
-    EnergyBehaviour {
-        elastic: elastic().ok(),
-        growth: drop.map(|d| d.0),
-        rest: drop.map(|d| d.1),
-        rolling: rolling().ok(),
+/// Step of the energy's runs, s: the penalty's stiffness allows no larger one.
+fn energy_step(scheme: &Scheme) -> f64 {
+    if matches!(scheme.kind, Kind::Penalty(..)) {
+        1e-3
+    } else {
+        5e-3
     }
 }
 
-/// Time of a step of the drive over the sine at 2.5 ms, µs: the least of several runs.
+/// Relative change of the energy of a ball that bounces from 1 m with e = 1 for so many steps.
 ///
 /// # Errors
 /// A step that cannot be taken.
-pub fn cost(scheme: &Scheme) -> Result<f64, MeasureError> {
+pub fn elastic_change(scheme: &Scheme, duration: f64) -> Result<f64, MeasureError> {
+    let h = energy_step(scheme);
+    let mut simulation = ball_above(scheme, &options(0.0, 1.0, h), 1.0)?;
+    let before = simulation.energy().total();
+    simulation.step_with(&scheme.stepper(MASS, 1.0), count(duration, h))?;
+    Ok((simulation.energy().total() - before) / (MASS * G))
+}
+
+/// Largest relative growth of the energy in a step of a ball that drops from 1 m with e = 0, and its speed after 5 s, m/s.
+///
+/// # Errors
+/// A step that cannot be taken.
+pub fn drop_and_rest(scheme: &Scheme) -> Result<(f64, f64), MeasureError> {
+    let h = energy_step(scheme);
+    let mut simulation = ball_above(scheme, &options(0.5, 0.0, h), 1.0)?;
+    let stepper = scheme.stepper(MASS, 0.0);
+    let mut growth = 0.0_f64;
+    for _ in 0..count(5.0, h) {
+        let before = simulation.energy().total();
+        simulation.step_with(&stepper, 1)?;
+        growth = growth.max(simulation.energy().total() - before);
+    }
+    Ok((growth / (MASS * G), simulation.v().norm()))
+}
+
+/// Change of the energy of a ball that rolls to and fro in a valley, relative to that of a descent by 0.2 m.
+///
+/// # Errors
+/// A step that cannot be taken.
+pub fn rolling_change(scheme: &Scheme, duration: f64) -> Result<f64, MeasureError> {
+    let h = energy_step(scheme);
+    let mut simulation = ball_on_sine(scheme, &options(0.9, 0.0, h), -0.3, 0.0)?;
+    let before = simulation.energy().total();
+    simulation.step_with(&scheme.stepper(MASS, 0.0), count(duration, h))?;
+    Ok((simulation.energy().total() - before) / (MASS * G * 0.2))
+}
+
+fn count(duration: f64, h: f64) -> usize {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand
+    let n = (duration / h).round() as usize;
+    n
+}
+
+/// See [`EnergyBehaviour`].
+#[must_use]
+pub fn energy(scheme: &Scheme) -> EnergyBehaviour {
+    let drop = drop_and_rest(scheme).ok();
+    EnergyBehaviour {
+        elastic: elastic_change(scheme, 60.0).ok(),
+        growth: drop.map(|d| d.0),
+        rest: drop.map(|d| d.1),
+        rolling: rolling_change(scheme, 60.0).ok(),
+    }
+}
+
+/// Time of a step of the drive over the sine at 2.5 ms, µs, the least of several runs; outer iterations in a step; whether all converged.
+///
+/// # Errors
+/// A step that cannot be taken.
+pub fn cost(scheme: &Scheme) -> Result<(f64, f64, bool), MeasureError> {
     let n = 256;
-    let mut least = f64::INFINITY;
+    let mut answer = (f64::INFINITY, 0.0, false);
     for _ in 0..20 {
         let mut simulation = driving(scheme, DURATION / n as f64)?;
         let stepper = scheme.stepper(WHEEL_LOAD, 0.0);
         let start = Instant::now();
-        simulation.step_with(&stepper, n)?;
+        let report = simulation.step_with(&stepper, n)?;
         black_box(simulation.q());
-        least = least.min(start.elapsed().as_secs_f64() * 1e6 / n as f64);
+        let time = start.elapsed().as_secs_f64() * 1e6 / n as f64;
+        let iterations = report.newton_iterations as f64 / n as f64;
+        answer = (answer.0.min(time), iterations, report.is_converged());
     }
-    Ok(least)
+    Ok(answer)
 }
 
 /// A ball at rest on a slope below the friction angle: speed downhill (m/s) after 2 s, where 0 is expected.
@@ -282,16 +318,12 @@ pub fn cost(scheme: &Scheme) -> Result<f64, MeasureError> {
 /// A step that cannot be taken.
 pub fn creep(scheme: &Scheme) -> Result<f64, MeasureError> {
     let (alpha, mu) = (0.3_f64, 0.5);
-    let ground = rover_core::planar::Line::new(-alpha.tan(), 0.0)?;
+    let ground = Line::new(-alpha.tan(), 0.0)?;
     // No friction turns it: a block.
-    let block = rover_core::planar::Ball::new(MASS, 0.3, 1e12)?;
+    let block = Ball::new(MASS, 0.3, 1e12)?;
     let options = scheme.options(&options(mu, 0.0, 1e-3));
-    let mut simulation = rover_core::planar::BallSimulation::new(
-        block,
-        std::sync::Arc::new(ground),
-        rover_core::planar::ContactRule::Nearest,
-        options,
-    )?;
+    let mut simulation =
+        BallSimulation::new(block, Arc::new(ground), ContactRule::Nearest, options)?;
     simulation.set_state(&[0.0, 0.3 / alpha.cos(), 0.0], &[0.0; 3])?;
     simulation.step_with(&scheme.stepper(MASS, 0.0), 2000)?;
     Ok(simulation.v()[0].hypot(simulation.v()[1]))
@@ -341,6 +373,10 @@ pub struct Measured {
     pub creep: Option<f64>,
     /// µs a step.
     pub cost: Option<f64>,
+    /// Outer iterations a step.
+    pub iterations: Option<f64>,
+    /// Whether every step of the drive at 2.5 ms converged.
+    pub is_converged: Option<bool>,
 }
 
 /// Measures a scheme; minutes for all in debug mode, seconds in release.
@@ -348,14 +384,22 @@ pub struct Measured {
 /// # Errors
 /// No reference.
 pub fn measure(scheme: &Scheme) -> Result<Measured, MeasureError> {
+    // The penalty's stiffness bounds its step.
+    let finer = if matches!(scheme.kind, Kind::Penalty(..)) {
+        16
+    } else {
+        1
+    };
+    let coarsest = 16 * finer;
     let [flight, rolling, sliding, driving] = [
         order_in(scheme, Motion::Flight, 16)?,
-        order_in(scheme, Motion::Rolling, 16)?,
-        order_in(scheme, Motion::Sliding, 16)?,
-        order_in(scheme, Motion::Driving, 16)?,
+        order_in(scheme, Motion::Rolling, coarsest)?,
+        order_in(scheme, Motion::Sliding, coarsest)?,
+        order_in(scheme, Motion::Driving, coarsest)?,
     ];
-    let impacts = order_across_impacts(scheme, 100);
-    let drift = drift(scheme, 16);
+    let impacts = order_across_impacts(scheme, 100 * finer);
+    let drift = drift(scheme, coarsest);
+    let cost = cost(scheme).ok();
     let orders = [&flight, &rolling, &sliding, &driving, &impacts, &drift].map(Curve::order);
     Ok(Measured {
         name: scheme.name,
@@ -368,6 +412,8 @@ pub fn measure(scheme: &Scheme) -> Result<Measured, MeasureError> {
         drift,
         energy: energy(scheme),
         creep: creep(scheme).ok(),
-        cost: cost(scheme).ok(),
+        cost: cost.map(|c| c.0),
+        iterations: cost.map(|c| c.1),
+        is_converged: cost.map(|c| c.2),
     })
 }

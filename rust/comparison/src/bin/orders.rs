@@ -26,12 +26,17 @@ fn print_row(m: &Measured) {
     for x in [e.elastic, e.growth, e.rest, e.rolling, m.creep] {
         print!("{:>10}", power(x));
     }
-    println!("{:>9}", number(m.cost));
+    let is_converged = m.is_converged.map_or("-", |x| if x { "yes" } else { "no" });
+    println!(
+        "{:>9}{:>7}{is_converged:>6}",
+        number(m.cost),
+        number(m.iterations)
+    );
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!(
-        "{:<40}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>10}{:>10}{:>10}{:>10}{:>10}{:>9}",
+        "{:<40}{:>9}{:>9}{:>9}{:>9}{:>9}{:>9}{:>10}{:>10}{:>10}{:>10}{:>10}{:>9}{:>7}{:>6}",
         "order in",
         "flight",
         "rolling",
@@ -44,7 +49,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         "rest",
         "valley",
         "creep",
-        "us/step"
+        "us/step",
+        "iter",
+        "conv"
     );
     let mut all = Vec::new();
     for scheme in &SCHEMES {
