@@ -206,7 +206,7 @@ def _sine_curves(figure: Figure, centre: Trajectory) -> None:
     _against(impulses, name, "Friction", centre["time"], tangential, FRICTION, "friction, ours", STEP)
     speed.set(title="speed of the centre", xlabel="time (s)", ylabel="speed (m/s)")
     impulses.set(
-        title="impulses of a step of 0.5 ms (the report's frame was up to 1.4 too short)",
+        title="impulses of a step of 0.5 ms\nthe report's frame was up to 1.4 times too short",
         xlabel="time (s)",
         ylabel="impulse (N s)",
     )
