@@ -287,7 +287,7 @@ class Simulation:
         variant: Literal["linearised", "newton"] = "linearised",
         theta: float = 0.5,
         forecast: float = 0.5,
-        solver: Literal["auto", "nsgs", "newton"] = "auto",
+        solver: Literal["auto", "nsgs", "newton", "proximal", "admm"] = "auto",
         tolerance: float = 1e-12,
         max_iterations: int = 1000,
         stabilisation: Literal["projection", "none"] = "projection",
@@ -378,17 +378,24 @@ class Simulation:
 @final
 class SolverReport:
     @property
-    def status(self) -> Literal["converged", "not_converged"]: ...
+    def status(self) -> Literal["converged", "relaxed", "not_converged"]:
+        """"relaxed": the convex relaxation is solved, not Coulomb's law."""
     @property
     def is_converged(self) -> bool: ...
     @property
     def iterations(self) -> int: ...
     @property
-    def residual(self) -> float: ...
+    def residual(self) -> float:
+        """Violation of Coulomb's law relative to the data, computed from the returned impulses."""
     @property
-    def velocity_error(self) -> float: ...
+    def velocity_error(self) -> float:
+        """Largest violation of Coulomb's law at one contact, m/s."""
     @property
-    def solver(self) -> str: ...
+    def solver(self) -> str:
+        """The method that answered; never "auto"."""
+    @property
+    def law(self) -> Literal["coulomb", "relaxed"]:
+        """The law that the answer obeys."""
 
 @final
 class FrictionContactSolution:
@@ -400,14 +407,31 @@ class FrictionContactSolution:
     def report(self) -> SolverReport: ...
 
 def solve_friction_contact(
-    W: npt.ArrayLike,
+    W: npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
     q: npt.ArrayLike,
     mu: npt.ArrayLike,
     tolerance: float = 1e-8,
     *,
     dimension: Literal[2, 3] = 3,
-    solver: Literal["auto", "nsgs", "newton"] = "auto",
+    solver: Literal["auto", "nsgs", "newton", "proximal", "admm", "relaxed"] = "auto",
     max_iterations: int = 1000,
     initial: npt.ArrayLike | None = None,
 ) -> FrictionContactSolution:
-    """Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K, for any W (n_c d, n_c d)."""
+    """Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K, for any W (n_c d, n_c d).
+
+    Args:
+        W: Delassus operator, 1/kg, used as it is (it need not be symmetric or regular). For many contacts its block rows
+            ``(indptr (n_c + 1,), indices (n_blocks,), data (n_blocks, d, d))``: each row ascending, with its diagonal block.
+        q: Free velocity (n_c d,), m/s, contact by contact: normal, tangent (, tangent).
+        mu: Friction coefficients (n_c,).
+        tolerance: Largest relative residual of a converged answer; its velocities are also right to max(tolerance, 1e-9) m/s.
+        dimension: Components of a contact, 2 or 3.
+        solver: "auto" escalates from what is cheap to what is robust; "nsgs", "newton", "proximal", "admm" are single methods of
+            Coulomb's law; "relaxed" solves its convex relaxation, another law, and so never counts as converged.
+        max_iterations: Most Newton steps, sweeps or ADMM iterations.
+        initial: Warm start (n_c d,), N s.
+
+    Raises:
+        ProblemError: Wrong shapes or entries.
+        OptionError: Unknown solver or dimension, tolerance or max_iterations out of range.
+    """

@@ -7,11 +7,12 @@ use rover_core::problem::{Dimension, FrictionContactProblem, evaluate};
 use rover_core::solver::{Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve};
 use solver_scenes::{Problem, ROVER_NV, Scene, falling, pile, rover, table};
 
-const METHODS: [Method; 4] = [
+const METHODS: [Method; 5] = [
     Method::Auto,
     Method::GaussSeidel,
     Method::Newton,
     Method::ProximalPoint,
+    Method::Admm,
 ];
 
 fn solve_with(

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Value};
-use crate::friction_contact::solver_options;
+use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::plane::Plane;
 use crate::snapshot::Snapshot;
@@ -214,7 +214,7 @@ impl Simulation {
             variant: choice("variant", variant, &VARIANTS)?,
             stabilisation: choice("stabilisation", stabilisation, &STABILISATIONS)?,
             warm_start,
-            solver: solver_options(solver, tolerance, max_iterations)?,
+            solver: solver_options(solver, tolerance, max_iterations, &SIMULATION_SOLVERS)?,
             ..StepOptions::default()
         };
         let inner =

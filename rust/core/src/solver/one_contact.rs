@@ -154,14 +154,22 @@ fn in_space<const D: usize>(
             return;
         }
     }
-    let (mut low, mut high) = (smallest, (smallest + scale).max(f64::MIN_POSITIVE));
-    while at(high).0 > 0.0 && high < f64::MAX / 16.0 {
-        low = high;
-        high *= 8.0;
-    }
-    let mut kappa = high;
+    let (mut low, mut high) = (smallest, f64::INFINITY);
+    // The answer of a block without preferred direction is a good first guess.
+    let size = (q_hat[0] * q_hat[0] + q_hat[1] * q_hat[1]).sqrt();
+    let along = W[0][1] * q_hat[0] + W[0][2] * q_hat[1];
+    let guess = (size * W_NN / mu - along / size) / -q[0] - 0.5 * trace;
+    let mut kappa = if guess > smallest && guess.is_finite() {
+        guess
+    } else {
+        (smallest + scale).max(f64::MIN_POSITIVE)
+    };
     // Without a sign change (an indefinite W only) the contact has no answer; a damped one keeps an iteration going.
-    let steps = if at(low).0 > 0.0 { MAX_STEPS } else { 0 };
+    let steps = if smallest <= 0.0 || at(smallest).0 > 0.0 {
+        MAX_STEPS
+    } else {
+        0
+    };
     for _ in 0..steps {
         let (g, slope, _, _) = at(kappa);
         if g > 0.0 {
@@ -172,8 +180,10 @@ fn in_space<const D: usize>(
         let newton = kappa - g / slope;
         let next = if newton >= low && newton <= high {
             newton
-        } else {
+        } else if high.is_finite() {
             0.5 * (low + high)
+        } else {
+            8.0 * low.max(scale).max(f64::MIN_POSITIVE)
         };
         let change = (next - kappa).abs();
         kappa = next;
