@@ -7,6 +7,7 @@ import typer
 from rover_gym._core import __version__
 from rover_gym.cli.baseline import baseline
 from rover_gym.cli.drive import drive
+from rover_gym.cli.planar import planar
 from rover_gym.cli.report import report
 
 app = typer.Typer(
@@ -18,6 +19,7 @@ app = typer.Typer(
 app.command()(drive)
 app.command()(baseline)
 app.command()(report)
+app.add_typer(planar, name="planar")
 
 
 def _print_version(wanted: bool) -> None:

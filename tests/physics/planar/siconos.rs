@@ -27,7 +27,7 @@ fn report_ball(
 ) -> BallSimulation {
     let options = StepOptions {
         variant,
-        ..unprojected(options(9.8, friction, 0.7, time_step))
+        ..unprojected(&options(9.8, friction, 0.7, time_step))
     };
     let ball = Ball::new(3.0, 1.5, 4.05).unwrap();
     let mut simulation =

@@ -57,7 +57,6 @@ impl TwoWheelRover {
         wheel_b: PlanarWheel,
     ) -> Result<Self, PlanarError> {
         positive("mass", mass)?;
-        positive("inertia", inertia)?;
         for (name, wheel) in [("a", &wheel_a), ("b", &wheel_b)] {
             positive(&format!("wheel_mass_{name}"), wheel.mass)?;
             positive(&format!("radius_{name}"), wheel.radius)?;
@@ -66,6 +65,7 @@ impl TwoWheelRover {
                 finite(&format!("axle_{name}[{k}]"), *value)?;
             }
         }
+        positive("inertia", inertia)?;
         let apart = (wheel_b.axle - wheel_a.axle).norm();
         let needed = wheel_a.radius + wheel_b.radius;
         if apart <= needed {
