@@ -65,8 +65,16 @@ fn measure(soil: &mut SoilSimulation, steps: usize) -> (f64, f64, usize, f64) {
 }
 
 fn main() {
-    println!("disks  tolerance  scene   disk-steps/s  sweeps/step  contacts  converged  penetration/r");
-    for count in std::env::args().filter_map(|a| a.parse().ok()).collect::<Vec<usize>>().into_iter().chain([200, 2000, 20_000]).take(3) {
+    println!(
+        "disks  tolerance  scene   disk-steps/s  sweeps/step  contacts  converged  penetration/r"
+    );
+    for count in std::env::args()
+        .filter_map(|a| a.parse().ok())
+        .collect::<Vec<usize>>()
+        .into_iter()
+        .chain([200, 2000, 20_000])
+        .take(3)
+    {
         for tolerance in [1e-4, 1e-8] {
             let mut soil = bed(count, 1e-4);
             soil.step(1500).expect("finite");
@@ -85,7 +93,8 @@ fn main() {
                         .expect("a soil");
                 run.set_state(&state.0, &state.1).expect("a state");
                 // Until impulses are known, and until it flows.
-                run.step(if scene == "flow" { 100 } else { 20 }).expect("finite");
+                run.step(if scene == "flow" { 100 } else { 20 })
+                    .expect("finite");
                 let (rate, sweeps, contacts, converged) = measure(&mut run, steps);
                 println!(
                     "{count:6} {tolerance:8.0e}   {scene}   {rate:12.3e}  {sweeps:11.1}  {contacts:8}  {converged:9.2}  {:.4}",

@@ -8,6 +8,7 @@ mod friction_contact;
 mod model;
 mod planar;
 mod planar_ground;
+mod planar_soil;
 mod plane;
 mod simulation;
 mod snapshot;
@@ -35,5 +36,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module
     )?)?;
     planar::register(module)?;
+    planar_soil::register(module)?;
     Ok(())
 }

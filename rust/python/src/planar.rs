@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::errors::{BorderError, Kind, Value};
-use crate::friction_contact::solver_options;
+use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
 use crate::planar_ground::{border, parse};
 use crate::simulation::{
     Energy, Problem, STABILISATIONS, StepReport, VARIANTS, choice, name_of, step_count,
@@ -257,7 +257,7 @@ fn options(given: Option<&Bound<'_, PyDict>>) -> PyResult<Options> {
             }
         }
     }
-    step.solver = solver_options(&solver, tolerance, max_iterations)?;
+    step.solver = solver_options(&solver, tolerance, max_iterations, &SIMULATION_SOLVERS)?;
     Ok(Options {
         step,
         rule,
@@ -267,7 +267,7 @@ fn options(given: Option<&Bound<'_, PyDict>>) -> PyResult<Options> {
 }
 
 /// Two numbers.
-fn pair(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vector2<f64>> {
+pub fn pair(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vector2<f64>> {
     let values = vector(value, kind, field)?;
     match values[..] {
         [x, y] => Ok(Vector2::new(x, y)),

@@ -23,7 +23,7 @@ use crate::solver::SolverOptions;
 
 /// Options that suit a soil of these disks.
 ///
-/// θ = 1 and γ = 1, which the contact's law needs; h = 1 ms; solver tolerance 1e-4 and at most 1000 sweeps; penetration is
+/// θ = 1 and γ = 1, which the contact's law needs; h = 1 ms; solver tolerance 1e-4 and at most 200 sweeps; penetration is
 /// projected away from 0.5% of the smallest radius on.
 #[must_use]
 pub fn soil_options(disks: &Disks) -> StepOptions {
@@ -35,7 +35,7 @@ pub fn soil_options(disks: &Disks) -> StepOptions {
         solver: SolverOptions {
             tolerance: 1e-4,
             velocity_tolerance: 1e-3,
-            max_sweeps: 1000,
+            max_sweeps: 200,
             ..SolverOptions::default()
         },
         ..StepOptions::default()
