@@ -608,7 +608,7 @@ class TwoWheelRoverSimulation(PlanarSimulation):
 class SolverReport:
     @property
     def status(self) -> Literal["converged", "relaxed", "not_converged"]:
-        """"relaxed": the convex relaxation is solved, not Coulomb's law."""
+        """ "relaxed": the convex relaxation is solved, not Coulomb's law."""
     @property
     def is_converged(self) -> bool: ...
     @property
@@ -649,14 +649,17 @@ def solve_friction_contact(
     """Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K, for any W (n_c d, n_c d).
 
     Args:
-        W: Delassus operator, 1/kg, used as it is (it need not be symmetric or regular). For many contacts its block rows
-            ``(indptr (n_c + 1,), indices (n_blocks,), data (n_blocks, d, d))``: each row ascending, with its diagonal block.
+        W: Delassus operator, 1/kg, used as it is (it need not be symmetric or regular). For many contacts its block
+            rows ``(indptr (n_c + 1,), indices (n_blocks,), data (n_blocks, d, d))``: each row ascending, with its
+            diagonal block.
         q: Free velocity (n_c d,), m/s, contact by contact: normal, tangent (, tangent).
         mu: Friction coefficients (n_c,).
-        tolerance: Largest relative residual of a converged answer; its velocities are also right to max(tolerance, 1e-9) m/s.
+        tolerance: Largest relative residual of a converged answer; its velocities are also right to
+            max(tolerance, 1e-9) m/s.
         dimension: Components of a contact, 2 or 3.
-        solver: "auto" escalates from what is cheap to what is robust; "nsgs", "newton", "proximal", "admm" are single methods of
-            Coulomb's law; "relaxed" solves its convex relaxation, another law, and so never counts as converged.
+        solver: "auto" escalates from what is cheap to what is robust; "nsgs", "newton", "proximal", "admm" are single
+            methods of Coulomb's law; "relaxed" solves its convex relaxation, another law, and so never counts as
+            converged.
         max_iterations: Most Newton steps, sweeps or ADMM iterations.
         initial: Warm start (n_c d,), N s.
 

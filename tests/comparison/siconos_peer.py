@@ -1,7 +1,8 @@
 """Solves friction-contact problems with Siconos; run by an interpreter that has it, fed by `solver_profiles.py`.
 
-Reads one job per line (JSON: the problem's .npz, solver, tolerance, repetitions) and answers with one line each. Needs nothing of this
-package: Debian's python3-siconos wants numpy < 2 and so an interpreter of its own.
+Says so when it is ready, then reads one job per line (JSON: the problem's .npz, solver, tolerance, repetitions) and
+answers with one line each. Needs nothing of this package: Debian's python3-siconos wants numpy < 2 and so an
+interpreter of its own.
 """
 
 import json
@@ -35,7 +36,7 @@ def solve(job: dict) -> dict:
         options = numerics.SolverOptions(getattr(numerics, "SICONOS_FRICTION_3D_" + job["solver"]))
         options.dparam[numerics.SICONOS_DPARAM_TOL] = job["tolerance"]
         if job["solver"] == "NSGS":
-            options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = 100_000
+            options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = 20_000
         p, u = np.zeros(3 * n_contacts), np.zeros(3 * n_contacts)
         begin = time.thread_time()
         numerics.fc3d_driver(problem, p, u, options)
@@ -43,10 +44,15 @@ def solve(job: dict) -> dict:
         best, spent = min(best, elapsed), spent + elapsed
         if spent > 0.3:
             break
-    return {"seconds": best, "iterations": int(options.iparam[numerics.SICONOS_IPARAM_ITER_DONE]), "impulses": p[planar].tolist()}
+    return {
+        "seconds": best,
+        "iterations": int(options.iparam[numerics.SICONOS_IPARAM_ITER_DONE]),
+        "impulses": p[planar].tolist(),
+    }
 
 
 answers = sys.stdout
 sys.stdout = sys.stderr  # Siconos' own words go elsewhere
+print("ready", file=answers, flush=True)
 for line in sys.stdin:
     print(json.dumps(solve(json.loads(line))), file=answers, flush=True)

@@ -2,13 +2,14 @@
 
     python tests/comparison/solver_profiles.py [--problems FOLDER] [--siconos PYTHON] [--output FOLDER]
 
-Each solver starts every problem from zero. Its answer is judged here and not by itself: the natural map of the returned impulses, relative to
-the data, must be 1e-8 or less, and the velocity right to 1e-6 m/s at every contact. Where it is not, the solver's own tolerance is tightened
-tenfold, up to four times; the time that counts is that of the run that sufficed. The profile at tau is the share of problems that a solver
-answers within tau times the best solver's time (or iterations). Source: Dolan and Moré 2002.
+Each solver starts every problem from zero. Its answer is judged here and not by itself: the natural map of the
+returned impulses, relative to the data, must be 1e-8 or less, and the velocity right to 1e-6 m/s at every contact.
+Where it is not, the solver's own tolerance is tightened tenfold, up to four times; the time that counts is that of the
+run that sufficed. The profile at tau is the share of problems that a solver answers within tau times the best solver's
+time (or iterations). Source: Dolan and Moré 2002.
 
-The recorded problems are no part of this repository (Siconos' public collection and synthetic ones as .npz with W, q, mu and dimension);
-without their folder the synthetic families alone are used.
+The recorded problems are no part of this repository (Siconos' public collection and synthetic ones as .npz with W, q,
+mu and dimension); without their folder the synthetic families alone are used.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ import numpy.typing as npt
 import rover_gym
 
 mpl.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
+import matplotlib.pyplot as plt
 
 Array = npt.NDArray[np.float64]
 ROOT = Path(__file__).parents[2]
@@ -41,6 +42,7 @@ VELOCITY = 1e-6  # m/s, largest violation at a contact
 OURS = ("auto", "nsgs", "newton", "proximal", "admm")
 PEERS = ("NSGS", "NSN_AC", "ADMM", "PROX")
 CAP = 20.0  # s of wall time per problem and solver of the peer
+HOPELESS = 0.3  # s of a failed run after which no tighter tolerance is tried
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,13 @@ def mechanism(seed: int, n_contacts: int, dimension: int) -> Problem:
     H = rng.uniform(-1, 1, (n, n + 2))
     inverse = 10 ** rng.uniform(-1, 1, n + 2)
     q = H @ rng.uniform(-1, 1, n + 2)
-    return Problem(f"mechanism_{dimension}d_{n_contacts}_{seed}", H * inverse @ H.T, q, rng.uniform(0.1, 0.8, n_contacts), dimension)
+    return Problem(
+        f"mechanism_{dimension}d_{n_contacts}_{seed}",
+        H * inverse @ H.T,
+        q,
+        rng.uniform(0.1, 0.8, n_contacts),
+        dimension,
+    )
 
 
 def synthetic() -> list[Problem]:
@@ -176,7 +184,10 @@ class Siconos:
     def is_installed(python: str) -> bool:
         """Whether the interpreter can import it."""
         try:
-            return subprocess.run([python, "-c", "import siconos.numerics"], capture_output=True, check=False).returncode == 0
+            return (
+                subprocess.run([python, "-c", "import siconos.numerics"], capture_output=True, check=False).returncode
+                == 0
+            )
         except OSError:
             return False
 
@@ -190,10 +201,12 @@ class Siconos:
             self.worker = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
             )
+            assert self.worker.stdout is not None
+            self.worker.stdout.readline()  # ready: its start does not count
         worker = self.worker
         assert worker.stdin is not None
         assert worker.stdout is not None
-        job = {"problem": str(path), "solver": solver, "tolerance": tolerance, "repetitions": 20}
+        job = {"problem": str(path), "solver": solver, "tolerance": tolerance, "repetitions": 5}
         worker.stdin.write(json.dumps(job) + "\n")
         worker.stdin.flush()
         line = worker.stdout.readline() if select.select([worker.stdout], [], [], CAP)[0] else ""
@@ -218,7 +231,7 @@ def run(problem: Problem, solve: Callable[[Problem, float], tuple[float, int, Ar
     for tolerance in (1e-8, 1e-9, 1e-10, 1e-11, 1e-12):
         seconds, iterations, impulses = solve(problem, tolerance)
         result = Run(seconds, iterations, *residual(problem, impulses))
-        if result.is_solved or seconds > CAP:
+        if result.is_solved or seconds > HOPELESS:
             break
     return result
 
@@ -237,7 +250,15 @@ def draw(profiles: dict[str, dict[str, list[float]]], taus: Array, n_problems: i
     for axis, (what, curves) in zip(axes, profiles.items(), strict=True):
         for index, (name, shares) in enumerate(curves.items()):
             peer = name.startswith("Siconos")
-            axis.step(taus, shares, where="post", label=name, color=f"C{index}", ls="--" if peer else "-", lw=2.5 if name == "auto" else 1.3)
+            axis.step(
+                taus,
+                shares,
+                where="post",
+                label=name,
+                color=f"C{index}",
+                ls="--" if peer else "-",
+                lw=2.5 if name == "auto" else 1.3,
+            )
         axis.set(xscale="log", xlim=(1, taus[-1]), ylim=(0, 1.02), xlabel=f"{what} / least {what} of any solver")
         axis.grid(alpha=0.3)
     axes[0].set_ylabel(f"share of {n_problems} problems solved")
@@ -261,12 +282,20 @@ def compare(problems: list[Problem], siconos: str | None) -> dict[str, dict[str,
         peer = Siconos(siconos, Path(folder)) if siconos and Siconos.is_installed(siconos) else None
         for name in PEERS if peer else ():
             assert peer is not None
-            solvers[f"Siconos {name}"] = lambda problem, tolerance, name=name, peer=peer: peer.solve(problem, name, tolerance)
+            solvers[f"Siconos {name}"] = lambda problem, tolerance, name=name, peer=peer: peer.solve(
+                problem, name, tolerance
+            )
         results: dict[str, dict[str, Run]] = {name: {} for name in solvers}
         for problem in problems:
             for name, solve in solvers.items():
                 results[name][problem.name] = run(problem, solve)
-            print(problem.name, *(f"{n}:{r[problem.name].seconds:.1e}{'' if r[problem.name].is_solved else '!'}" for n, r in results.items()))
+            print(
+                problem.name,
+                *(
+                    f"{n}:{r[problem.name].seconds:.1e}{'' if r[problem.name].is_solved else '!'}"
+                    for n, r in results.items()
+                ),
+            )
         if peer is not None:
             peer.close()
     return results
@@ -292,7 +321,10 @@ def main() -> None:
     taus = np.logspace(0, 4, 200)
     costs = {
         "time": {n: [r.seconds if r.is_solved else np.inf for r in row.values()] for n, row in results.items()},
-        "iterations": {n: [float(max(r.iterations, 1)) if r.is_solved else np.inf for r in row.values()] for n, row in results.items()},
+        "iterations": {
+            n: [float(max(r.iterations, 1)) if r.is_solved else np.inf for r in row.values()]
+            for n, row in results.items()
+        },
     }
     profiles = {what: profile(cost, taus) for what, cost in costs.items()}
     arguments.output.mkdir(parents=True, exist_ok=True)
@@ -318,7 +350,9 @@ def main() -> None:
         "n_problems": len(problems),
         "runs": rounded,
     }
-    (arguments.output / "solver_profiles.json").write_text(json.dumps(summary, indent=None, separators=(",", ":")) + "\n", encoding="utf-8")
+    (arguments.output / "solver_profiles.json").write_text(
+        json.dumps(summary, indent=None, separators=(",", ":")) + "\n", encoding="utf-8"
+    )
     print(json.dumps(summary["solved"]), "of", len(problems))
 
 

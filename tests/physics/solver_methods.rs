@@ -200,7 +200,7 @@ fn the_relaxed_law_lifts_what_slides() {
         );
         let (p, u, report) = solve_with(Method::Auto.solver(), &problem.view(), &options);
         assert!(report.is_converged() && u[0].abs() < 1e-12);
-        assert!((p[0] - m).abs() < 1e-12);
+        assert!((p[0] - m).abs() < 1e-11);
     }
 }
 
@@ -247,43 +247,51 @@ const RADIUS: f64 = 0.05;
 const MASS: f64 = 0.7;
 const STEP: f64 = 9.81e-3;
 
-/// Pyramids of disks side by side, `rows` disks at the foot of each: every disk stands on two, the lowest on the floor. Contacts, inverse masses
-/// and free velocities after a step of gravity.
-fn pyramids(n_pyramids: usize, rows: usize) -> (Vec<PairContact<2, 3>>, Vec<[f64; 3]>, Vec<f64>) {
-    let per = rows * (rows + 1) / 2;
+/// Columns of disks side by side, on the floor or on one plank that lies on the floor with both ends. Contacts, inverse masses and free velocities after
+/// a step of gravity. On the floor every column is an island; the plank makes one of all.
+fn columns(
+    n_columns: usize,
+    height: usize,
+    plank: bool,
+) -> (Vec<PairContact<2, 3>>, Vec<[f64; 3]>, Vec<f64>) {
     let mut contacts = Vec::new();
-    // Normal from the first body to the second, which stands on it.
-    let mut touch = |below: Option<usize>, above: usize, n: [f64; 2]| {
-        let t = [-n[1], n[0]];
-        let side = |sign: f64, arm: f64| {
-            [n, t].map(|e| {
-                let lever = arm * (n[0] * e[1] - n[1] * e[0]);
+    // `arms`: from each body's centre to the contact; the normal points up, from the first body to the second.
+    let mut touch = |bodies: [Option<usize>; 2], arms: [[f64; 2]; 2]| {
+        let side = |sign: f64, r: [f64; 2]| {
+            [[0.0, 1.0], [-1.0, 0.0]].map(|e| {
+                let lever = r[0] * e[1] - r[1] * e[0];
                 [sign * e[0], sign * e[1], sign * lever]
             })
         };
         contacts.push(PairContact {
-            bodies: [below, Some(above)],
-            jacobians: [side(-1.0, RADIUS), side(1.0, -RADIUS)],
+            bodies,
+            jacobians: [side(-1.0, arms[0]), side(1.0, arms[1])],
         });
     };
-    for pyramid in 0..n_pyramids {
-        let mut start = pyramid * per;
-        for level in 0..rows {
-            let width = rows - level;
-            for k in 0..width {
-                if level == 0 {
-                    touch(None, start + k, [0.0, 1.0]);
-                } else {
-                    let left = start - width - 1 + k;
-                    touch(Some(left), start + k, [0.5, 0.75_f64.sqrt()]);
-                    touch(Some(left + 1), start + k, [-0.5, 0.75_f64.sqrt()]);
-                }
-            }
-            start += width;
+    let n_disks = n_columns * height;
+    let half = 1.2 * RADIUS * n_columns as f64;
+    for column in 0..n_columns {
+        let x = 2.4 * RADIUS * (column as f64 + 0.5) - half;
+        for level in 0..height {
+            let disk = column * height + level;
+            let (below, arm) = match (level, plank) {
+                (0, false) => (None, [0.0, 0.0]),
+                (0, true) => (Some(n_disks), [x, 0.01]),
+                _ => (Some(disk - 1), [0.0, RADIUS]),
+            };
+            touch([below, Some(disk)], [arm, [0.0, -RADIUS]]);
+        }
+    }
+    if plank {
+        for x in [-half, half] {
+            touch([None, Some(n_disks)], [[0.0; 2], [x, -0.01]]);
         }
     }
     let inverse = [1.0 / MASS, 1.0 / MASS, 2.0 / (MASS * RADIUS * RADIUS)];
-    let n_bodies = n_pyramids * per;
+    let mut masses = vec![inverse; n_disks];
+    if plank {
+        masses.push([1.0 / MASS, 1.0 / MASS, 3.0 / (MASS * half * half)]);
+    }
     let mut q = Vec::new();
     for contact in &contacts {
         for r in 0..2 {
@@ -294,49 +302,49 @@ fn pyramids(n_pyramids: usize, rows: usize) -> (Vec<PairContact<2, 3>>, Vec<[f64
             q.push(fall(0) + fall(1));
         }
     }
-    (contacts, vec![inverse; n_bodies], q)
+    (contacts, masses, q)
 }
 
 #[test]
-fn pyramids_of_disks_rest_whatever_the_storage() {
-    let (n_pyramids, rows) = (5, 10);
-    let (contacts, masses, q) = pyramids(n_pyramids, rows);
-    let mut W = BlockSparseDelassus::new();
-    W.assemble(&contacts, &masses);
-    let mu = vec![0.5; contacts.len()];
-    let dense = W.to_dense();
-    let sparse = FrictionContactProblem::new_sparse(Dimension::Two, &W, &q, &mu).expect("sound");
-    let full = FrictionContactProblem::new(Dimension::Two, &dense, &q, &mu).expect("sound");
-    for solver in coulomb_solvers() {
-        let options = SolverOptions {
-            tolerance: 1e-9,
-            velocity_tolerance: 1e-8,
-            ..SolverOptions::default()
-        };
-        let (p, u, report) = solve_with(solver, &sparse, &options);
-        assert!(report.is_converged(), "{}: {report:?}", solver.name());
-        assert!(u.iter().all(|x| x.abs() < 3e-8), "{} moves", solver.name());
-        let carried: f64 = (0..contacts.len())
-            .filter(|&i| contacts[i].bodies[0].is_none())
-            .map(|i| p[2 * i])
-            .sum();
-        let weight = STEP * MASS * masses.len() as f64;
-        assert!((carried / weight - 1.0).abs() < 1e-6, "{}", solver.name());
-        let (_, u_full, report) = solve_with(solver, &full, &options);
-        assert!(
-            report.is_converged(),
-            "{}, dense: {report:?}",
-            solver.name()
-        );
-        assert!(distance(&u, &u_full) < 1e-6, "{}", solver.name());
+fn columns_of_disks_rest_whatever_the_storage() {
+    for plank in [false, true] {
+        let (contacts, masses, q) = columns(12, 4, plank);
+        let mut W = BlockSparseDelassus::new();
+        W.assemble(&contacts, &masses);
+        let mu = vec![0.5; contacts.len()];
+        let dense = W.to_dense();
+        let sparse =
+            FrictionContactProblem::new_sparse(Dimension::Two, &W, &q, &mu).expect("sound");
+        let full = FrictionContactProblem::new(Dimension::Two, &dense, &q, &mu).expect("sound");
+        for solver in coulomb_solvers() {
+            let options = SolverOptions {
+                tolerance: 1e-9,
+                ..SolverOptions::default()
+            };
+            for problem in [&sparse, &full] {
+                let (p, u, report) = solve_with(solver, problem, &options);
+                assert!(report.is_converged(), "{}: {report:?}", solver.name());
+                assert!(
+                    u.iter().all(|x| x.abs() < 3e-9),
+                    "{} moves, {report:?}",
+                    solver.name()
+                );
+                let carried: f64 = (0..contacts.len())
+                    .filter(|&i| contacts[i].bodies[0].is_none())
+                    .map(|i| p[2 * i])
+                    .sum();
+                let weight = STEP * MASS * masses.len() as f64;
+                assert!((carried / weight - 1.0).abs() < 1e-6, "{}", solver.name());
+            }
+        }
     }
 }
 
-/// Snapshot of the work: sweeps and linear solves of the default, cold, to 1e-12; one pyramid and many islands.
+/// Snapshot of the work: sweeps and linear solves of the default, cold, to 1e-12; one island and many.
 #[test]
 fn many_contacts_take_few_iterations() {
-    for (n_pyramids, rows, bound) in [(1, 20, 120), (40, 5, 900)] {
-        let (contacts, masses, q) = pyramids(n_pyramids, rows);
+    for (n_columns, plank, bound) in [(100, true, 80), (200, false, 700)] {
+        let (contacts, masses, q) = columns(n_columns, 4, plank);
         let mut W = BlockSparseDelassus::new();
         W.assemble(&contacts, &masses);
         let mu = vec![0.5; contacts.len()];
@@ -344,7 +352,7 @@ fn many_contacts_take_few_iterations() {
         let options = SolverOptions::default();
         let (_, u, report) = solve_with(Method::Auto.solver(), &problem, &options);
         assert!(report.is_converged(), "{report:?}");
-        assert!(report.iterations <= bound, "{n_pyramids}: {report:?}");
+        assert!(report.iterations <= bound, "{n_columns}: {report:?}");
         assert!(u.iter().all(|x| x.abs() < 1e-9));
     }
 }

@@ -158,11 +158,7 @@ enum Delassus {
 
 impl Delassus {
     /// A square array, or block rows `(indptr, indices, data)`.
-    fn read(
-        W: &Bound<'_, PyAny>,
-        dimension: Dimension,
-        flat: &impl Fn(&Bound<'_, PyAny>, &str) -> PyResult<Vec<f64>>,
-    ) -> PyResult<Self> {
+    fn read(W: &Bound<'_, PyAny>, dimension: Dimension) -> PyResult<Self> {
         if let Ok(rows) = W.cast::<PyTuple>()
             && rows.len() == 3
             && array(&rows.get_item(2)?, Kind::Problem, "W")?.shape().len() == 3
@@ -185,6 +181,12 @@ impl Delassus {
         }
         Ok(Self::Dense(dense.as_array().iter().copied().collect()))
     }
+}
+
+/// Any array-like as a list, whatever its shape.
+fn flat(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<f64>> {
+    let numbers = array(value, Kind::Problem, field)?;
+    Ok(numbers.as_array().iter().copied().collect())
 }
 
 fn as_index(number: f64) -> PyResult<usize> {
@@ -229,14 +231,7 @@ pub fn solve_friction_contact(
         }
     };
     let options = solver_options(solver, tolerance, max_iterations, &Method::ALL)?;
-    let flat = |value: &Bound<'_, PyAny>, field| -> PyResult<Vec<f64>> {
-        Ok(array(value, Kind::Problem, field)?
-            .as_array()
-            .iter()
-            .copied()
-            .collect())
-    };
-    let W = Delassus::read(W, kind, &flat)?;
+    let W = Delassus::read(W, kind)?;
     let q = flat(q, "q")?;
     let mu = vector(mu, Kind::Problem, "mu")?;
     let problem = match &W {

@@ -119,8 +119,8 @@ fn project<const D: usize>(
             changes[0] += r * (x[k] - next[k]).powi(2);
             changes[1] += r * (next[k] - z[k]).powi(2);
             y[k] += r * (relaxed[k] - next[k]);
-            z[k] = next[k];
         }
+        z.copy_from_slice(&next);
     }
     changes
 }
@@ -208,7 +208,7 @@ pub(super) fn solve<const D: usize>(
         step += 1;
         *iterations += 1;
         let ratio = (primal / dual).sqrt();
-        let is_unbalanced = ratio > IMBALANCE || ratio < 1.0 / IMBALANCE;
+        let is_unbalanced = ratio.is_finite() && !(1.0 / IMBALANCE..=IMBALANCE).contains(&ratio);
         if step % BALANCE == 0 && is_unbalanced && changes_of_sigma < MAX_CHANGES {
             let change = ratio.clamp(1.0 / LARGEST_CHANGE, LARGEST_CHANGE);
             let next = (sigma * change).clamp(1e-10, 1e6);

@@ -1,12 +1,13 @@
 //! The choice of method, and what all methods share: prepared scales, the acceptance test, the final report.
 
 use super::methods::{Algorithm, Outcome};
-use super::modes::Proximal;
+use super::modes::{Linearised, Proximal};
 use super::nsgs::Budget;
 use super::report::{SolveReport, SolveStatus};
 use super::workspace::SolverWorkspace;
 use super::{Method, SolverOptions, islands, newton, nsgs, pivoting, proximal};
-use crate::law::coulomb::natural_map;
+use crate::cone::tangential_norm;
+use crate::law::coulomb::{ContactMode, natural_map};
 use crate::problem::{FrictionContactProblem, Operator, Residual, evaluate_contact};
 
 /// The problem's slices and the scales derived from them.
@@ -214,6 +215,26 @@ fn judge<A: Algorithm, const D: usize>(
 const COLD_SWEEPS: usize = 4;
 const GUIDED_STEPS: usize = 6;
 
+/// Slip or parting, relative to the largest free velocity, that decides a mode.
+const DECIDED: f64 = 1e-8;
+
+/// Whether every sliding contact slips and every open one parts. Where one does not, its mode is a matter of choice, a sweep's choice depends on the
+/// order of the contacts, and so would the loads of a mechanism that is statically indeterminate.
+fn is_decided<const D: usize>(data: &Prepared<'_>, contacts: &[Linearised], u: &[f64]) -> bool {
+    let largest = data.q.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    contacts
+        .iter()
+        .zip(u.chunks_exact(D))
+        .all(|(contact, u)| match contact.mode {
+            ContactMode::Stick => true,
+            ContactMode::Open => u[0] > DECIDED * largest,
+            ContactMode::Slide => {
+                let slip: [f64; D] = std::array::from_fn(|k| u[k]);
+                tangential_norm(&slip) > DECIDED * largest
+            }
+        })
+}
+
 /// Most sweeps over many contacts before Newton. Dense, a Newton step costs about as much as `n` sweeps; block-sparse the fill grows with the problem.
 fn sweep_budget(data: &Prepared<'_>) -> usize {
     match data.W {
@@ -275,7 +296,7 @@ pub(super) fn escalate<const D: usize>(
         }
         // A warm start can mislead where zero does not.
         p.fill(0.0);
-    } else if data.mu.len() > 0 {
+    } else if data.q.chunks_exact(D).any(|q| q[0] < 0.0) {
         // Sweeps depend on the order of the contacts; the answer does not, since only the modes are taken from them.
         let prox = Proximal {
             alpha: 0.0,
@@ -291,7 +312,7 @@ pub(super) fn escalate<const D: usize>(
         };
         let (status, residual) =
             newton::full_steps::<D>(data, options, guided, p, u, workspace, iterations);
-        if status == SolveStatus::Converged {
+        if status == SolveStatus::Converged && is_decided::<D>(data, &workspace.contacts, u) {
             return (Method::Newton, status, residual);
         }
         p.fill(0.0);

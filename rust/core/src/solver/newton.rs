@@ -132,7 +132,7 @@ fn give_best(
 pub(super) struct Plan {
     /// Most steps.
     pub max_steps: usize,
-    /// Whether `p` only tells the modes, and the search starts from zero with them.
+    /// Whether `p` only tells the modes, and the search starts from zero with them; it ends when they turn out wrong.
     pub only_modes: bool,
 }
 
@@ -198,6 +198,10 @@ pub(super) fn full_steps<const D: usize>(
         } else {
             predict::<D>(data, &mut course, p, u, workspace)
         };
+        if plan.only_modes && course.exact {
+            // The guess was wrong, and the centre may have followed it.
+            return give_best(data, best, p, u, workspace);
+        }
         *iterations += 1;
         if prediction.changed && step > 0 && step % CYCLE == 0 {
             let prox = Proximal {
