@@ -196,12 +196,11 @@ impl BodyPairs {
         self.local(y, u);
         let (mut map, mut data, mut velocity) = (0.0, 0.0, 0.0_f64);
         for i in 0..self.len() {
-            let [normal, tangent] = match self.discs.get(i) {
-                Some(pair) => pair.block(),
-                None => {
-                    let block = self.wide[i - self.discs.len()].block();
-                    [block[0][0], block[1][1]]
-                }
+            let [normal, tangent] = if let Some(pair) = self.discs.get(i) {
+                pair.block()
+            } else {
+                let block = self.wide[i - self.discs.len()].block();
+                [block[0][0], block[1][1]]
             };
             let trace = normal + tangent;
             let rho = if trace > 0.0 { 2.0 / trace } else { 1.0 };
@@ -320,7 +319,7 @@ pub fn solve_body_pairs(
             .clamp(2, 10)
             .min(options.max_sweeps - report.iterations);
         for k in 0..batch {
-            if (report.iterations + k) % 2 == 0 {
+            if (report.iterations + k).is_multiple_of(2) {
                 for row in rows.iter_mut() {
                     sweep_disc(row, y);
                 }

@@ -48,7 +48,7 @@ impl Grid {
         #[allow(clippy::cast_possible_truncation)] // clamped
         let columns = columns.clamp(3.0, (size / 4) as f64) as i64;
         self.stride = columns;
-        self.mask = size as i64 - 1;
+        self.mask = i64::try_from(size).unwrap_or(i64::MAX) - 1;
         self.starts.clear();
         self.starts.resize(size + 1, 0);
         self.places.clear();

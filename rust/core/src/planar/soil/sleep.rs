@@ -183,7 +183,8 @@ impl Sleep {
     ) -> Vec<bool> {
         let n = scene.disks.len();
         // Cells of that side, folded into a table: a mover marks its cell and the eight around it.
-        let size = (4 * n).next_power_of_two().max(64) as i64;
+        let size = (4 * n).next_power_of_two().max(64);
+        let mask = i64::try_from(size).unwrap_or(i64::MAX) - 1;
         let cell = |x: f64| {
             #[allow(clippy::cast_possible_truncation)] // saturates, and folds
             let cell = (x / options.distance).floor() as i64;
@@ -191,9 +192,9 @@ impl Sleep {
         };
         let place = |column: i64, row: i64| {
             let mixed = row.wrapping_mul(0x9E37_79B1).wrapping_add(column);
-            usize::try_from(mixed & (size - 1)).unwrap_or(0)
+            usize::try_from(mixed & mask).unwrap_or(0)
         };
-        let mut marked = vec![false; usize::try_from(size).unwrap_or(0)];
+        let mut marked = vec![false; size];
         let mut mark = |x: f64, y: f64, cells: i64| {
             for row in -cells..=cells {
                 for column in -cells..=cells {

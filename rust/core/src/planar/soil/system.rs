@@ -17,6 +17,9 @@ use crate::solver::{Method, SolveReport, SolverOptions, SolverWorkspace, solve};
 /// Gap up to which a pair is taken as a contact though it is not forecast to close, as a share of the smallest radius: its neighbours may push it.
 const SKIN: f64 = 0.01;
 
+/// Largest such gap, as a share of the smallest radius: a blow that throws farther in one step is a step that is too long.
+const FARTHEST_SKIN: f64 = 0.2;
+
 /// A place that holds nothing that moves: c = s = 0 there.
 const NOWHERE: u32 = 0;
 
@@ -256,7 +259,6 @@ impl MechanicalSystem for SoilSystem<'_> {
         let mut grid = std::mem::take(&mut self.parts.grid);
         let scene = self.scene;
         let (radius, largest) = (scene.disks.radius(), scene.disks.largest());
-        let skin = activation.hover.max(SKIN * scene.disks.smallest());
         let lead = activation.lead.abs();
         let mut fastest = v[..3 * n]
             .chunks_exact(3)
@@ -277,6 +279,12 @@ impl MechanicalSystem for SoilSystem<'_> {
                 wheels.push((disc, velocity));
             }
         }
+        // What the fastest can be thrown at within the step is a contact too, though it comes no nearer yet.
+        let smallest = scene.disks.smallest();
+        let skin = (SKIN * smallest)
+            .max(lead * fastest)
+            .min(FARTHEST_SKIN * smallest);
+        let skin = skin.max(activation.hover);
         // Two bodies close by at most twice that; farther than a diameter nobody looks (a step that long is too long).
         let reach = (skin + 2.0 * lead * fastest).min(2.0 * largest);
         grid.fill(&q, radius, 2.0 * largest + reach);
