@@ -1,14 +1,15 @@
 """Scenes of granular soil: a settled bed, the two-wheel rover on it, one wheel of a test rig; recordings of them.
 
-    >>> from rover_gym.planar_soil import rover_on_soil
-    >>> sim = rover_on_soil(count=222, layers=3)
-    >>> sim.set_torques([50.0, 50.0])
-    >>> sim.step(100).steps
-    100
+>>> from rover_gym.planar_soil import rover_on_soil
+>>> sim = rover_on_soil(count=222, layers=3)
+>>> sim.set_torques([50.0, 50.0])
+>>> sim.step(100).steps
+100
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -208,7 +209,7 @@ def drawbar_pull(
 def _surface(bed: Bed) -> float:
     """Mean height of the bed's surface, m."""
     edges = np.linspace(0.0, bed.width, 1 + int(bed.width / (2.5 * bed.radius.max())))
-    return float(np.mean([bed.top(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]))
+    return float(np.mean([bed.top(a, b) for a, b in itertools.pairwise(edges)]))
 
 
 class SoilSampler:

@@ -1,4 +1,4 @@
-"""Pictures of a soil: disks, wheels and force chains; the crossing as a video; curves of slip, sinkage and drawbar pull."""
+"""Pictures of a soil: disks, wheels, force chains; the crossing as a video; slip, sinkage and drawbar pull."""
 
 from __future__ import annotations
 
@@ -87,7 +87,9 @@ def _paint(axes: Axes, frame: Frame, strongest: float) -> None:
     # A mark on each disk shows how it turns.
     x, y, angle = frame.position.T
     tips = np.stack((x + frame.radius * np.cos(angle), y + frame.radius * np.sin(angle)), axis=1)
-    axes.add_collection(LineCollection(np.stack((frame.position[:, :2], tips), axis=1), colors="#8a744a", linewidths=0.4))
+    axes.add_collection(
+        LineCollection(np.stack((frame.position[:, :2], tips), axis=1), colors="#8a744a", linewidths=0.4)
+    )
     widths = 5.0 * np.sqrt(frame.forces / strongest)
     axes.add_collection(LineCollection(frame.chains, colors=CHAIN, linewidths=widths, capstyle="round", zorder=4))
     for k, (cx, cy, r) in enumerate(frame.wheels):
@@ -150,9 +152,7 @@ def film_soil(frames: Sequence[Frame], path: str | Path, *, frames_per_second: i
     return Path(path)
 
 
-def draw_curves(
-    drives: Sequence[dict[str, float]], pulls: Sequence[dict[str, float]], path: str | Path
-) -> Path:
+def draw_curves(drives: Sequence[dict[str, float]], pulls: Sequence[dict[str, float]], path: str | Path) -> Path:
     """Draws slip and sinkage against torque, and the drawbar pull against slip.
 
     Args:

@@ -1,12 +1,11 @@
 """`rover_gym.planar.SoilSimulation`: arrays, bad input, snapshots, recording and pictures."""
 
-import pickle
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rover_gym.planar import Line, SoilSimulation, soil_packing
+from rover_gym.planar import Line, SoilSimulation, SoilSnapshot, soil_packing
 from rover_gym.planar_soil import record_soil, rover_on_soil, settled_bed
 from rover_gym.planar_soil_figures import Frame, draw_soil
 from rover_gym.recording import read_trajectory
@@ -96,7 +95,7 @@ def test_the_rover_crosses_and_a_snapshot_continues_bit_for_bit(tmp_path: Path) 
     sim.set_torques([50.0, 50.0])
     start = sim.machine
     sim.step(100)
-    snapshot = pickle.loads(pickle.dumps(sim.snapshot()))
+    snapshot = SoilSnapshot.from_bytes(sim.snapshot().to_bytes())
     frames: list[Frame] = []
     record_soil(sim, tmp_path / "soil.h5", "a test", duration=0.1, look=lambda now: frames.append(Frame(now)))
     end = sim.position

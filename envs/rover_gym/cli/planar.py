@@ -24,7 +24,9 @@ from rover_gym.planar import (
 )
 from rover_gym.recording import read_trajectory
 
-planar = typer.Typer(help="Planar systems of the report's chapter 3: a ball, a two-wheel rover, granular soil.", no_args_is_help=True)
+planar = typer.Typer(
+    help="Planar systems of the report's chapter 3: a ball, a two-wheel rover, granular soil.", no_args_is_help=True
+)
 
 
 class GroundKind(StrEnum):
