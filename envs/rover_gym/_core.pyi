@@ -772,8 +772,8 @@ def soil_packing(
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Radii (n,), masses (n,) and centres (n, 2) of disks in loose rows over a width, without overlap.
 
-    Radii are drawn evenly from the range; `mass` is a disk's of the mean radius, others go with the area. The defaults are
-    the original's soil: three layers of 74.
+    Radii are drawn evenly from the range; `mass` is a disk's of the mean radius, others go with the area. The
+    defaults are the original's soil: three layers of 74.
 
     Raises:
         ModelError: A number that is not finite or of the wrong sign, radii the wrong way round, no room for a disk.

@@ -134,8 +134,8 @@ def slip_on_soil(bed: Bed, torque: float, *, duration: float = 1.0, **options: A
     """Drives the rover with one torque at both wheels and tells what came of it.
 
     Returns:
-        torque (N m), distance (m), speed (m/s) at the end, slip `1 - distance / (r turned)` over the run, and sinkage: how far the wheels'
-        lowest points are below the bed's mean surface, m, mean over the run.
+        torque (N m), distance (m), speed (m/s) at the end, slip `1 - distance / (r turned)` over the run, and sinkage:
+        how far the wheels' lowest points are below the bed's mean surface, m, mean over the run.
     """
     sim = rover_on_soil(bed, **options)
     surface = _surface(bed)
@@ -175,8 +175,8 @@ def drawbar_pull(
         **options: Of `SoilSimulation`.
 
     Returns:
-        slip, pull: mean horizontal force of the soil on the wheel (N), its standard error from blocks of a tenth, weight: mean vertical force (N),
-        sinkage (m).
+        slip, pull: mean horizontal force of the soil on the wheel (N), its standard error from blocks of a tenth,
+        weight: mean vertical force (N), sinkage (m).
     """
     start = 0.3
     height = bed.clear_height(start, WHEEL_RADIUS)
