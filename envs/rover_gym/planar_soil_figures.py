@@ -88,10 +88,10 @@ def _paint(axes: Axes, frame: Frame, strongest: float) -> None:
     x, y, angle = frame.position.T
     tips = np.stack((x + frame.radius * np.cos(angle), y + frame.radius * np.sin(angle)), axis=1)
     axes.add_collection(
-        LineCollection(np.stack((frame.position[:, :2], tips), axis=1), colors="#8a744a", linewidths=0.4)
+        LineCollection(list(np.stack((frame.position[:, :2], tips), axis=1)), colors="#8a744a", linewidths=0.4)
     )
     widths = 5.0 * np.sqrt(frame.forces / strongest)
-    axes.add_collection(LineCollection(frame.chains, colors=CHAIN, linewidths=widths, capstyle="round", zorder=4))
+    axes.add_collection(LineCollection(list(frame.chains), colors=CHAIN, linewidths=widths, capstyle="round", zorder=4))
     for k, (cx, cy, r) in enumerate(frame.wheels):
         axes.add_patch(Circle((cx, cy), r, facecolor="#00000018", edgecolor=WHEEL, linewidth=2.0, zorder=3))
         turn = frame.machine[3 + k] if len(frame.machine) == 5 else 0.0
@@ -135,7 +135,7 @@ def film_soil(frames: Sequence[Frame], path: str | Path, *, frames_per_second: i
     """
     figure = _figure(12.0, 4.6)
     try:
-        import imageio_ffmpeg  # noqa: PLC0415 - an extra
+        import imageio_ffmpeg  # type: ignore[import-untyped]  # noqa: PLC0415 - an extra
     except ModuleNotFoundError as error:
         raise MissingExtraError("imageio-ffmpeg", "render") from error
     from matplotlib import rc_context  # noqa: PLC0415 - an extra

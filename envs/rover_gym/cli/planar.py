@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -143,7 +143,7 @@ def soil(
     from rover_gym.planar_soil import record_soil, rover_on_soil, settled_bed  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.planar_soil_figures import Frame, draw_soil, film_soil  # noqa: PLC0415 - matplotlib is slow to load
 
-    options = {"gravity": (0.0, -gravity), "friction": friction, "time_step": time_step}
+    options: dict[str, Any] = {"gravity": (0.0, -gravity), "friction": friction, "time_step": time_step}
     slowness = float(np.sqrt(9.81 / max(gravity, 1e-3)))
     bed = settled_bed(disks, layers, seed=seed, settle=0.5 * slowness, **options)
     sim = rover_on_soil(bed, wheel_friction=wheel_friction, **options)
