@@ -6,33 +6,43 @@ listed FL, FR, ML, BL, MR, BR.
 
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from typing import Any, Literal, TypeAlias, final
+from typing import Any, Literal, TypeAlias, final, overload
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import disjoint_base
 
 _Array: TypeAlias = npt.NDArray[np.float64]
 _Coordinates: TypeAlias = Literal["report", "state"]
 
 __all__ = [
+    "BallSimulation",
     "CommandError",
     "Contacts",
     "Energy",
     "FrictionContactSolution",
+    "Line",
     "ModelError",
     "OptionError",
+    "PlanarContacts",
+    "PlanarSimulation",
+    "PlanarSnapshot",
     "Plane",
+    "Polyline",
     "ProblemError",
     "RoverGymError",
     "RoverModel",
     "Simulation",
+    "Sine",
     "Snapshot",
     "SolverReport",
     "SphereField",
+    "Spline",
     "StateError",
     "StepError",
     "StepReport",
     "TerrainError",
+    "TwoWheelRoverSimulation",
     "__version__",
     "solve_friction_contact",
 ]
@@ -374,6 +384,225 @@ class Simulation:
     def profile(self, n: int = 1000) -> dict[str, float]:
         """Mean microseconds per step by part (kinematics, mass_matrix, factor, ...) over n steps of a copy."""
     def __reduce__(self) -> Any: ...
+
+@final
+class Line:
+    """The ground y = slope x + offset (m) of a planar scene; x forward, y up.
+
+    Raises:
+        TerrainError: A number is not finite.
+    """
+
+    def __new__(cls, slope: float = 0.0, offset: float = 0.0) -> Line: ...
+    @property
+    def slope(self) -> float: ...
+    @property
+    def offset(self) -> float: ...
+    @overload
+    def height(self, x: float) -> float: ...
+    @overload
+    def height(self, x: Sequence[float] | _Array) -> _Array: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class Sine:
+    """The ground y = amplitude sin(2 pi x / wavelength + phase) + offset, m.
+
+    Raises:
+        TerrainError: A number is not finite, or the wavelength is not positive.
+    """
+
+    def __new__(cls, amplitude: float, wavelength: float, phase: float = 0.0, offset: float = 0.0) -> Sine: ...
+    @property
+    def amplitude(self) -> float: ...
+    @property
+    def wavelength(self) -> float: ...
+    @property
+    def phase(self) -> float: ...
+    @property
+    def offset(self) -> float: ...
+    @overload
+    def height(self, x: float) -> float: ...
+    @overload
+    def height(self, x: Sequence[float] | _Array) -> _Array: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class Spline:
+    """The natural cubic spline through points (m), continued by its tangents: a ground with continuous curvature.
+
+    Raises:
+        TerrainError: Fewer than two points, lengths that differ, an entry that is not finite, x that does not
+            increase.
+    """
+
+    def __new__(cls, x: npt.ArrayLike, y: npt.ArrayLike) -> Spline: ...
+    @property
+    def x(self) -> _Array: ...
+    @property
+    def y(self) -> _Array: ...
+    @overload
+    def height(self, x: float) -> float: ...
+    @overload
+    def height(self, x: Sequence[float] | _Array) -> _Array: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class Polyline:
+    """Straight pieces between points (m), which may stand above each other: steps, ramps, kerbs, with corners.
+
+    Raises:
+        TerrainError: Fewer than two points, lengths that differ, an entry that is not finite, x that decreases, a
+            point twice.
+    """
+
+    def __new__(cls, x: npt.ArrayLike, y: npt.ArrayLike) -> Polyline: ...
+    @staticmethod
+    def step(x: float, height: float) -> Polyline:
+        """Level ground at height 0 with a step up (or down, if negative) at x, m."""
+    @property
+    def x(self) -> _Array: ...
+    @property
+    def y(self) -> _Array: ...
+    @overload
+    def height(self, x: float) -> float: ...
+    @overload
+    def height(self, x: Sequence[float] | _Array) -> _Array: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class PlanarContacts:
+    """The contacts of a planar simulation's last step, as fresh arrays with one row a contact."""
+
+    @property
+    def discs(self) -> npt.NDArray[np.int64]:
+        """(n,) which disc touches: 0 the ball or wheel A, 1 wheel B."""
+    @property
+    def points(self) -> _Array:
+        """(n, 2) points of the ground, world, m."""
+    @property
+    def normals(self) -> _Array:
+        """(n, 2) unit normals out of the ground; the tangent is (n_y, -n_x)."""
+    @property
+    def gaps(self) -> _Array:
+        """(n,) m."""
+    @property
+    def impulses(self) -> _Array:
+        """(n, 2) along normal and tangent, N s."""
+    @property
+    def velocities(self) -> _Array:
+        """(n, 2) of the rim against the ground after the step, along normal and tangent, m/s."""
+    def __len__(self) -> int: ...
+
+@final
+class PlanarSnapshot:
+    """Everything that a planar simulation needs to continue bit for bit; picklable."""
+
+    @staticmethod
+    def from_bytes(data: bytes) -> PlanarSnapshot: ...
+    def to_bytes(self) -> bytes: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __reduce__(self) -> Any: ...
+
+@disjoint_base
+class PlanarSimulation:
+    """A planar machine on a ground, stepped by the rover's own schemes: what the two kinds below share."""
+
+    @property
+    def ground(self) -> Line | Sine | Spline | Polyline: ...
+    @property
+    def time(self) -> float: ...
+    @property
+    def time_step(self) -> float: ...
+    @property
+    def q(self) -> _Array:
+        """(nv,) coordinates: m, m, then rad; angles turn to the left."""
+    @property
+    def v(self) -> _Array:
+        """(nv,) their rates."""
+    @property
+    def centres(self) -> _Array:
+        """(n_discs, 2) centres of the ball or of wheels A, B, world, m."""
+    @property
+    def gaps(self) -> _Array:
+        """(n_discs,) distance to the ground now, m; negative where they overlap."""
+    @property
+    def torques(self) -> _Array: ...
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The keyword arguments that describe the machine."""
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The keyword arguments that make a simulation with these options."""
+    def set_state(self, q: npt.ArrayLike, v: npt.ArrayLike | None = None) -> None:
+        """Sets coordinates and rates (default: at rest). Time goes to 0, warm start is dropped, torques stay."""
+    def set_torques(self, torques: npt.ArrayLike) -> None:
+        """(n_discs,) N m, positive drives forward; the rover's act between body and wheels."""
+    def step(self, n: int = 1) -> StepReport: ...
+    @property
+    def contacts(self) -> PlanarContacts: ...
+    def energy(self) -> Energy: ...
+    def mass_matrix(self) -> _Array:
+        """(nv, nv) at the current state."""
+    def last_problem(self) -> tuple[_Array, _Array, _Array]:
+        """W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem."""
+    def snapshot(self) -> PlanarSnapshot: ...
+    def restore(self, snapshot: PlanarSnapshot) -> None: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class BallSimulation(PlanarSimulation):
+    """A disc on a ground: coordinates x, y (centre, m) and theta (rad).
+
+    `inertia` (kg m2) is a homogeneous disc's if not given. Options as `Simulation`'s, but for gravity (x, y), and
+    `contact`: "nearest" (the disc touches where the ground is nearest to its centre) or "centre_height" (the
+    report's: the centre itself stops at the ground).
+
+    Raises:
+        ModelError: Mass, radius or inertia is not finite and positive.
+        TerrainError: `ground` is none.
+        OptionError: An option is out of its range.
+    """
+
+    def __new__(
+        cls,
+        ground: Line | Sine | Spline | Polyline,
+        *,
+        mass: float = 3.0,
+        radius: float = 1.5,
+        inertia: float | None = None,
+        **options: Any,
+    ) -> BallSimulation: ...
+
+@final
+class TwoWheelRoverSimulation(PlanarSimulation):
+    """Body and two driven wheels: coordinates x, y (body's mass centre, m), theta, theta_A, theta_B (rad).
+
+    A is the back wheel, B the front one; their angles are absolute. `wheel_*` take one number or one a wheel. `axle_a`,
+    `axle_b`: axles relative to the body's mass centre in its own axes, m; (-0.4, 0) and (0.4, 0) if not given.
+    `inertia` is a rod's from axle to axle and `wheel_inertia` a disc's if not given. Defaults are the scale of the
+    report's granular run. Options as `BallSimulation`'s.
+
+    Raises:
+        ModelError: A mass, radius or inertia is not finite and positive, or the wheels overlap.
+        TerrainError: `ground` is none.
+        OptionError: An option is out of its range.
+    """
+
+    def __new__(
+        cls,
+        ground: Line | Sine | Spline | Polyline,
+        *,
+        mass: float = 130.0,
+        inertia: float | None = None,
+        wheel_mass: float | npt.ArrayLike | None = None,
+        wheel_radius: float | npt.ArrayLike | None = None,
+        wheel_inertia: float | npt.ArrayLike | None = None,
+        axle_a: npt.ArrayLike | None = None,
+        axle_b: npt.ArrayLike | None = None,
+        **options: Any,
+    ) -> TwoWheelRoverSimulation: ...
 
 @final
 class SolverReport:

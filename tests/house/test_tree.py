@@ -44,8 +44,9 @@ def test_every_golden_file_has_its_provenance() -> None:
 
 
 def test_the_packages_copy_of_the_golden_curves_is_current() -> None:
-    packer = runpy.run_path(str(ROOT / "tests" / "golden" / "pack_section_6_1.py"))
-    assert packer["PACKED"].read_text(encoding="utf-8") == packer["pack"]()
+    for name in ("pack_section_6_1.py", "pack_chapter_3.py"):
+        packer = runpy.run_path(str(ROOT / "tests" / "golden" / name))
+        assert packer["PACKED"].read_text(encoding="utf-8") == packer["pack"]()
 
 
 def test_there_is_one_version() -> None:

@@ -7,6 +7,7 @@ import typer
 from rover_gym._core import __version__
 from rover_gym.cli.baseline import baseline
 from rover_gym.cli.drive import drive
+from rover_gym.cli.planar import planar
 from rover_gym.cli.plot import plot
 from rover_gym.cli.replay import replay
 from rover_gym.cli.report import report
@@ -22,6 +23,7 @@ app.command()(baseline)
 app.command()(report)
 app.command()(plot)
 app.command()(replay)
+app.add_typer(planar, name="planar")
 
 
 def _print_version(wanted: bool) -> None:

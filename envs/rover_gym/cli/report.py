@@ -1,4 +1,4 @@
-"""`rover report`: sections 6.1 and 6.2 of the report, run again."""
+"""`rover report`: sections 6.1 and 6.2 of the report, run again; with figures also chapter 3."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -55,6 +55,10 @@ def report(
         from rover_gym.figures import draw_all, draw_rug  # noqa: PLC0415 - matplotlib is slow to load
 
         for path in (*draw_all(result.path, output), *draw_rug(rug_result.path, output)):
+            say_path("figure", path)
+        from rover_gym.planar_figures import draw_chapter_3  # noqa: PLC0415
+
+        for path in draw_chapter_3(output):
             say_path("figure", path)
 
 

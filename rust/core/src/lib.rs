@@ -14,7 +14,8 @@
 //! - [`multibody`]: model, state, kinematics, mass matrix, bias, energy, momentum;
 //! - [`geometry`]: the ground; [`contact`]: points, frames, gaps, Delassus operator;
 //! - [`cone`], [`law`], [`problem`], [`solver`]: the friction-contact problem, which sees only (W, q, μ);
-//! - [`integrator`]: one step; [`simulation`]: many.
+//! - [`integrator`]: one step; [`simulation`]: many;
+//! - [`planar`]: a ball and a two-wheel rover on a curve, through the same step.
 #![forbid(unsafe_code)]
 
 pub use nalgebra;
@@ -25,6 +26,7 @@ pub mod geometry;
 pub mod integrator;
 pub mod law;
 pub mod multibody;
+pub mod planar;
 pub mod problem;
 pub mod simulation;
 pub mod solver;

@@ -6,6 +6,8 @@ mod contacts;
 mod errors;
 mod friction_contact;
 mod model;
+mod planar;
+mod planar_ground;
 mod plane;
 mod simulation;
 mod snapshot;
@@ -32,5 +34,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
         friction_contact::solve_friction_contact,
         module
     )?)?;
+    planar::register(module)?;
     Ok(())
 }

@@ -120,7 +120,7 @@ pub struct Simulation {
 }
 
 /// W, free velocity and friction coefficients.
-type Problem<'py> = (
+pub type Problem<'py> = (
     Bound<'py, PyArray2<f64>>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<f64>>,
@@ -133,7 +133,8 @@ fn names(joints: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
         .or_else(|_| joints.extract())
 }
 
-fn choice<T: Copy>(
+/// The value that a word stands for.
+pub fn choice<T: Copy>(
     field: &'static str,
     given: &str,
     choices: &[(&str, T)],
@@ -152,20 +153,43 @@ fn choice<T: Copy>(
     })
 }
 
-const VARIANTS: [(&str, Variant); 2] = [
+/// Schemes by name.
+pub const VARIANTS: [(&str, Variant); 2] = [
     ("linearised", Variant::Linearised),
     ("newton", Variant::Newton),
 ];
-const STABILISATIONS: [(&str, Stabilisation); 2] = [
+/// Stabilisations by name.
+pub const STABILISATIONS: [(&str, Stabilisation); 2] = [
     ("projection", Stabilisation::Projection),
     ("none", Stabilisation::None),
 ];
 
-fn name_of<T: PartialEq + Copy>(value: T, choices: &[(&'static str, T)]) -> &'static str {
+/// The word that stands for a value.
+pub fn name_of<T: PartialEq + Copy>(value: T, choices: &[(&'static str, T)]) -> &'static str {
     choices
         .iter()
         .find(|(_, v)| *v == value)
         .map_or("", |(name, _)| name)
+}
+
+/// A number of steps.
+pub fn step_count(n: i64) -> Result<usize, BorderError> {
+    usize::try_from(n).map_err(|_| {
+        let message = format!("n: must not be negative, is {n}");
+        BorderError::option("n", message, Value::Number(n as f64))
+    })
+}
+
+impl From<CoreReport> for StepReport {
+    fn from(inner: CoreReport) -> Self {
+        Self { inner }
+    }
+}
+
+impl From<CoreEnergy> for Energy {
+    fn from(inner: CoreEnergy) -> Self {
+        Self { inner }
+    }
 }
 
 impl Simulation {
@@ -405,13 +429,7 @@ impl Simulation {
 
     #[pyo3(signature = (n = 1))]
     fn step(&mut self, py: Python<'_>, n: i64) -> PyResult<StepReport> {
-        let steps = usize::try_from(n).map_err(|_| {
-            BorderError::option(
-                "n",
-                format!("n: must not be negative, is {n}"),
-                Value::Number(n as f64),
-            )
-        })?;
+        let steps = step_count(n)?;
         let inner = &mut self.inner;
         let report = py.detach(|| inner.step(steps)).map_err(BorderError::from)?;
         Ok(StepReport { inner: report })

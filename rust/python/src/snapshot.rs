@@ -18,7 +18,8 @@ impl Snapshot {
     }
 }
 
-fn damaged(e: &postcard::Error) -> BorderError {
+/// A snapshot whose bytes cannot be read.
+pub fn damaged(e: &postcard::Error) -> BorderError {
     let message = format!("snapshot: its bytes are damaged ({e})");
     BorderError {
         kind: Kind::State,

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::activation::Activation;
 use super::contact_frame::ContactFrame;
 use super::contact_point::{Contact, ContactKey, Part};
 use super::sweep::{DEEP, first_touch};
@@ -10,23 +11,6 @@ use super::wheel_sphere::{self, NearestPoint};
 use super::{box_plane, box_sphere};
 use crate::geometry::{Primitive, Sphere, Terrain};
 use crate::multibody::{Kinematics, Model, Wheel};
-
-/// When a candidate becomes a contact of the step: `gap + lead · u_N ≤ 0`, or nearly at rest within `hover`.
-///
-/// The first is the forecast of Moreau–Jean stepping; `lead` is what is left of γ h after the configuration that the
-/// gap was measured in. The second keeps a contact that rests a rounding error above the ground closed, instead of
-/// letting it fall for a step: within `hover` metres and slower than `slow` m/s.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Activation {
-    /// s.
-    pub lead: f64,
-    /// m.
-    pub hover: f64,
-    /// m/s.
-    pub slow: f64,
-    /// m: a bound of `|lead · u_N|` over the machine, so that the search knows how far to look.
-    pub margin: f64,
-}
 
 /// On a sphere: the nearest point of the pose.
 const NEAREST: u16 = 0;
@@ -53,7 +37,7 @@ pub fn detect(
         kinematics,
         v,
         activation,
-        reach: activation.hover.max(activation.margin),
+        reach: activation.reach(),
         can_be_passed: terrain.can_be_passed(),
         out,
     };
@@ -79,20 +63,14 @@ struct Gate<'a> {
 impl Gate<'_> {
     #[inline]
     fn offer(&mut self, contact: Contact) {
-        let activation = self.activation;
-        let is_touching = contact.gap <= 0.0;
-        if activation.lead.abs() > 0.0 || !is_touching {
-            let u_N = contact.frame.n.dot(&self.kinematics.point_velocity(
-                self.model,
-                contact.body,
-                &contact.point,
-                self.v,
-            ));
-            let forecast = contact.gap + activation.lead * u_N;
-            let is_hovering = contact.gap <= activation.hover && u_N.abs() <= activation.slow;
-            if forecast > 0.0 && !is_hovering {
-                return;
-            }
+        let u_N = || {
+            let velocity =
+                self.kinematics
+                    .point_velocity(self.model, contact.body, &contact.point, self.v);
+            contact.frame.n.dot(&velocity)
+        };
+        if !self.activation.admits(contact.gap, u_N) {
+            return;
         }
         self.out.push(contact);
     }

@@ -1,5 +1,6 @@
 //! From bodies near the ground to unilateral contacts: points, frames, gaps and their Jacobians.
 
+pub mod activation;
 pub mod box_plane;
 pub mod box_sphere;
 pub mod contact_frame;
@@ -10,7 +11,8 @@ mod sweep;
 pub mod wheel_plane;
 pub mod wheel_sphere;
 
+pub use activation::Activation;
 pub use contact_frame::ContactFrame;
 pub use contact_point::{Contact, ContactKey, Part};
 pub use delassus::{ContactSystem, generalized_impulse};
-pub use detection::{Activation, detect, relocate};
+pub use detection::{detect, relocate};

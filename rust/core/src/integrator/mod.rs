@@ -3,67 +3,94 @@
 //! | scheme | file | order in smooth phases | through impacts |
 //! |---|---|---|---|
 //! | Moreau–Jean, one linearised step | [`moreau_jean`] | 2 in the position, explicit in the gyroscopic terms | 1 |
-//! | Moreau–Jean, Newton on the end-of-step forces, in momentum form | [`moreau_jean_newton`] | 2 | 1 |
+//! | Moreau–Jean, Newton on the end-of-step forces | [`moreau_jean_newton`] | 2 | 1 |
 //!
 //! Both treat impacts and persistent contact by the same law at velocity level and search for no event.
 //! What the velocity law leaves of penetration, [`position_projection`] removes.
+//!
+//! A scheme is written once, over what a [`MechanicalSystem`] can do: the rover's tree of solids ([`tree_system`]) and the planar
+//! systems ([`crate::planar`]) step through the same code.
 
 pub mod command;
 pub mod error;
 pub mod fitted_theta;
+pub mod mechanical_system;
 pub mod moreau_jean;
 pub mod moreau_jean_newton;
 pub mod options;
 pub mod position_projection;
 pub mod probe;
 pub mod report;
+pub mod scratch;
+pub mod tree_system;
+pub mod warm_start;
 pub mod workspace;
 
 pub use command::{Command, HeldJoint};
 pub use error::{OptionsError, StepError};
+pub use mechanical_system::{MechanicalSystem, Start, UnilateralContact};
 pub use options::{Stabilisation, StepOptions, Variant};
 pub use probe::{NoProbe, Phase, Probe};
 pub use report::{StepReport, StepStatus};
-pub use workspace::{ActiveContact, WarmStart, Workspace};
+pub use scratch::Scratch;
+pub use tree_system::{TreeScratch, TreeSystem};
+pub use warm_start::WarmStart;
+pub use workspace::{ActiveContact, Workspace};
 
-use crate::geometry::Terrain;
-use crate::multibody::{Model, State};
+/// Key of a system's contacts.
+pub type KeyOf<S> = <<S as MechanicalSystem>::Contact as UnilateralContact>::Key;
 
-/// What a step works on, beside state and scratch.
-#[derive(Clone, Copy)]
-pub struct Scene<'a> {
-    /// The machine.
-    pub model: &'a Model,
-    /// The ground.
-    pub terrain: &'a dyn Terrain,
-    /// Step, scheme, laws, tolerances.
-    pub options: &'a StepOptions,
+/// Scratch of a system's steps.
+pub type ScratchOf<S> =
+    Scratch<<S as MechanicalSystem>::Configuration, <S as MechanicalSystem>::Contact>;
+
+/// The state that a step moves.
+#[derive(Debug)]
+pub struct StateMut<'a, Q> {
+    /// Configuration.
+    pub configuration: &'a mut Q,
+    /// Velocity (nv).
+    pub v: &'a mut [f64],
+    /// s.
+    pub time: &'a mut f64,
 }
 
-/// A time-stepping scheme.
-pub trait Integrator {
+/// A time-stepping scheme for systems `S`.
+pub trait Integrator<S: MechanicalSystem> {
     /// Takes one step, or leaves `state` and `warm_start` as they were.
     ///
     /// # Errors
     /// `NonFinite` or `SingularMassMatrix`. A solver that did not converge is no error: see the report.
     fn step(
         &self,
-        scene: &Scene<'_>,
-        command: &Command,
-        state: &mut State,
-        warm_start: &mut WarmStart,
-        workspace: &mut Workspace,
+        system: &mut S,
+        options: &StepOptions,
+        state: StateMut<'_, S::Configuration>,
+        warm_start: &mut WarmStart<KeyOf<S>>,
+        scratch: &mut ScratchOf<S>,
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError>;
 }
 
-impl Variant {
-    /// The scheme of a variant: the one place where it is chosen.
-    #[must_use]
-    pub fn integrator(self) -> &'static dyn Integrator {
+/// A variant steps as its scheme does: the one place where it is chosen.
+impl<S: MechanicalSystem> Integrator<S> for Variant {
+    #[inline]
+    fn step(
+        &self,
+        system: &mut S,
+        options: &StepOptions,
+        state: StateMut<'_, S::Configuration>,
+        warm_start: &mut WarmStart<KeyOf<S>>,
+        scratch: &mut ScratchOf<S>,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError> {
+        let (linearised, newton) = (
+            moreau_jean::MoreauJean,
+            moreau_jean_newton::MoreauJeanNewton,
+        );
         match self {
-            Self::Linearised => &moreau_jean::MoreauJean,
-            Self::Newton => &moreau_jean_newton::MoreauJeanNewton,
+            Self::Linearised => linearised.step(system, options, state, warm_start, scratch, probe),
+            Self::Newton => newton.step(system, options, state, warm_start, scratch, probe),
         }
     }
 }

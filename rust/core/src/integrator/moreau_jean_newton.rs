@@ -15,21 +15,16 @@
 //! Source: the discrete d'Alembert principle, as in Simo, Wong 1991 for one body; contacts and the
 //! correction r as in [`super::moreau_jean`].
 
-use nalgebra::Vector3;
-
-use super::command::Command;
 use super::error::StepError;
+use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
 use super::moreau_jean::{
-    MoreauJean, activation, add_command, add_correction, assemble_contacts, factorise, finish,
-    set_held_theta, solve_contacts,
+    MoreauJean, activation, add_correction, assemble_contacts, finish, solve_contacts,
 };
+use super::options::StepOptions;
 use super::probe::{Phase, Probe};
 use super::report::{StepReport, StepStatus};
-use super::workspace::{WarmStart, Workspace};
-use super::{Integrator, Scene};
-use crate::contact::{detect, relocate};
-use crate::multibody::momentum::body_momenta;
-use crate::multibody::{Model, State};
+use super::warm_start::WarmStart;
+use super::{Integrator, KeyOf, ScratchOf, StateMut};
 
 /// Relative change below which an iteration that no longer shrinks has met rounding.
 const ROUNDING: f64 = 1e-8;
@@ -38,29 +33,25 @@ const ROUNDING: f64 = 1e-8;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MoreauJeanNewton;
 
-impl Integrator for MoreauJeanNewton {
+impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
     fn step(
         &self,
-        scene: &Scene<'_>,
-        command: &Command,
-        state: &mut State,
-        warm_start: &mut WarmStart,
-        workspace: &mut Workspace,
+        system: &mut S,
+        options: &StepOptions,
+        state: StateMut<'_, S::Configuration>,
+        warm_start: &mut WarmStart<KeyOf<S>>,
+        scratch: &mut ScratchOf<S>,
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
-        let Scene { model, options, .. } = *scene;
         let (h, theta) = (options.time_step, options.theta);
-        let ws = workspace;
-        ws.kinematics.update_for_step(model, &state.configuration);
-        ws.c_start.copy_from_slice(&ws.kinematics.c);
-        body_momenta(
-            model,
-            &ws.kinematics,
-            &state.v,
-            &Vector3::zeros(),
-            &mut ws.momenta,
-        );
-        ws.v.copy_from_slice(&state.v);
+        let ws = scratch;
+        ws.fit(system.nv());
+        let start = Start {
+            configuration: &*state.configuration,
+            v: &*state.v,
+        };
+        system.begin_balance(start);
+        ws.v.copy_from_slice(start.v);
         let mut report = StepReport {
             steps: 1,
             status: StepStatus::NotConverged,
@@ -69,7 +60,10 @@ impl Integrator for MoreauJeanNewton {
         let mut is_settled = false;
         let mut last_change = f64::INFINITY;
         for iteration in 0..options.newton_max_iterations {
-            let solved = iterate(scene, command, state, warm_start, ws, iteration, probe)?;
+            let Some(solved) = iterate(system, options, start, warm_start, ws, iteration, probe)
+            else {
+                return Err(StepError::SingularMassMatrix { time: *state.time });
+            };
             report.iterations += solved.iterations;
             report.residual = solved.residual;
             report.n_contacts = solved.n_contacts;
@@ -92,141 +86,76 @@ impl Integrator for MoreauJeanNewton {
         }
         if !is_settled {
             // An iterate that has not settled obeys no law: take the step that needs no iteration, and say so.
-            let taken = MoreauJean.step(scene, command, state, warm_start, ws, probe)?;
+            let taken = MoreauJean.step(system, options, state, warm_start, ws, probe)?;
             return Ok(StepReport {
                 newton_iterations: report.newton_iterations,
                 status: StepStatus::NotConverged,
                 ..taken
             });
         }
-        for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(&state.v) {
+        for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(start.v) {
             *mean = theta * end + (1.0 - theta) * begin;
         }
-        ws.end.set_moved(&state.configuration, &ws.v_mean, h);
+        system.set_moved(start.configuration, &ws.v_mean, h, &mut ws.end);
         // The contacts were measured at the end of the last iterate, which is the end of the step.
         ws.gap_end.clear();
         ws.gap_end
-            .extend(ws.contacts.iter().map(|contact| contact.gap));
-        finish(scene, state, warm_start, ws, report, probe)
+            .extend(ws.contacts.iter().map(UnilateralContact::gap));
+        finish(system, options, state, warm_start, ws, report, probe)
     }
 }
 
-/// One iteration: `ws.v` moves by `ws.y`.
-fn iterate(
-    scene: &Scene<'_>,
-    command: &Command,
-    state: &State,
-    warm_start: &WarmStart,
-    ws: &mut Workspace,
+/// One iteration: `ws.v` moves by `ws.y`. None where the mass matrix cannot be factored.
+fn iterate<S: MechanicalSystem>(
+    system: &mut S,
+    options: &StepOptions,
+    start: Start<'_, S::Configuration>,
+    warm_start: &WarmStart<KeyOf<S>>,
+    ws: &mut ScratchOf<S>,
     iteration: usize,
     probe: &mut dyn Probe,
-) -> Result<StepReport, StepError> {
-    let Scene {
-        model,
-        terrain,
-        options,
-    } = *scene;
+) -> Option<StepReport> {
     let (h, theta) = (options.time_step, options.theta);
 
-    for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(&state.v) {
+    for ((mean, end), begin) in ws.v_mean.iter_mut().zip(&ws.v).zip(start.v) {
         *mean = theta * end + (1.0 - theta) * begin;
     }
-    ws.configuration
-        .set_moved(&state.configuration, &ws.v_mean, theta * h);
-    ws.end.set_moved(&state.configuration, &ws.v_mean, h);
-    ws.kinematics.update_for_step(model, &ws.configuration);
-    ws.kinematics_end.update_for_step(model, &ws.end);
+    system.set_moved(start.configuration, &ws.v_mean, theta * h, &mut ws.middle);
+    system.set_moved(start.configuration, &ws.v_mean, h, &mut ws.end);
+    system.place_middle(&ws.middle);
+    system.place_end(&ws.end);
     probe.end(Phase::Kinematics);
     if iteration == 0 {
         // The set of contacts of a step is decided once, by the forecast.
-        let activation = activation(model, options, &state.v, theta * h);
-        detect(
-            model,
-            &ws.kinematics,
-            &ws.kinematics_end,
-            terrain,
-            &state.v,
-            &activation,
-            &mut ws.contacts,
-        );
+        let activation = activation(options, theta * h);
+        system.detect(start.v, activation, &mut ws.contacts);
     }
-    for contact in &mut ws.contacts {
-        relocate(model, &ws.kinematics_end, terrain, contact);
-    }
+    system.relocate(&mut ws.contacts);
     probe.end(Phase::Detection);
-    ws.mass_matrix.update(model, &ws.kinematics);
+    system.update_mass_matrix(options);
     probe.end(Phase::MassMatrix);
-    momentum_residual(
-        model,
-        &options.gravity,
-        h,
-        theta,
-        &state.configuration.position,
-        ws,
-    );
-    set_held_theta(model, options, command, ws);
-    add_command(
+    system.balance(
         options,
-        command,
-        &state.configuration.joints,
-        &state.v,
+        start,
         &ws.v,
-        &ws.theta_held,
+        &ws.v_mean,
+        &mut ws.correction,
         &mut ws.y,
     );
     probe.end(Phase::Bias);
-    factorise(model, options, command, ws)
-        .ok_or(StepError::SingularMassMatrix { time: state.time })?;
-    ws.factor.half_solve(model, &mut ws.y);
+    if !system.factorise(options) {
+        return None;
+    }
+    system.half_solve(&mut ws.y);
     probe.end(Phase::Factor);
-    assemble_contacts(scene, &state.v, warm_start, ws);
-    add_correction(scene, warm_start, ws);
+    assemble_contacts(system, options, start.v, warm_start, ws);
+    add_correction(system, options, warm_start, ws);
     if iteration > 0 {
         ws.p.copy_from_slice(&ws.p_last);
     }
     probe.end(Phase::Delassus);
-    let solved = solve_contacts(scene, ws, iteration == 0, probe);
+    let solved = solve_contacts(system, options, ws, iteration == 0, probe);
     ws.p_last.clone_from(&ws.p);
     probe.end(Phase::Update);
-    Ok(solved)
-}
-
-/// `ws.y = −(left side)` of the principle above at the iterate `ws.v`, without commands and contacts.
-fn momentum_residual(
-    model: &Model,
-    gravity: &Vector3<f64>,
-    h: f64,
-    theta: f64,
-    start: &Vector3<f64>,
-    ws: &mut Workspace,
-) {
-    let end = ws.kinematics_end.base - start;
-    body_momenta(model, &ws.kinematics_end, &ws.v, &end, &mut ws.momenta_end);
-    let middle = ws.kinematics.base - start;
-    let bodies = model.bodies();
-    ws.sums.copy_from_slice(&ws.momenta_end);
-    for (b, (sum, begin)) in ws.sums.iter_mut().zip(&ws.momenta).enumerate() {
-        let weight = gravity * (bodies[b].mass * h);
-        // Both mass centres relative to the point of reference, the trunk origin at the start of the step.
-        let centre = (ws.kinematics_end.c[b] + end) * theta + ws.c_start[b] * (1.0 - theta);
-        sum.linear -= begin.linear + weight;
-        sum.angular -= begin.angular + centre.cross(&weight);
-    }
-    for b in (0..bodies.len()).rev() {
-        let (P, L) = (ws.sums[b].linear, ws.sums[b].angular);
-        // About the trunk origin at the midpoint, where the screws are taken.
-        let about_middle = L - middle.cross(&P);
-        if b == 0 {
-            for k in 0..3 {
-                ws.y[k] = -P[k];
-                ws.y[3 + k] = -about_middle[k];
-            }
-        } else {
-            let a = &ws.kinematics.axis[b];
-            ws.y[5 + b] = -a.dot(&(about_middle - ws.kinematics.r[b].cross(&P)));
-            let parent = bodies[b].parent;
-            ws.sums[parent].linear += P;
-            ws.sums[parent].angular += L;
-        }
-    }
+    Some(solved)
 }

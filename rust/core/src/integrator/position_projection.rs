@@ -8,23 +8,27 @@
 //! Source: Acary 2013, *Projected event-capturing time-stepping schemes for nonsmooth mechanical systems with unilateral
 //! contact and Coulomb's friction*, CMAME 256, 224–250.
 
-use super::Scene;
-use super::moreau_jean::note;
-use super::options::Stabilisation;
+use super::ScratchOf;
+use super::mechanical_system::MechanicalSystem;
+use super::moreau_jean::{note, set_friction};
+use super::options::{Stabilisation, StepOptions};
 use super::report::StepReport;
-use super::workspace::Workspace;
-use crate::problem::{Dimension, FrictionContactProblem};
 use crate::solver::{SolveReport, SolveStatus, solve};
 
 /// Corrects `ws.end`, where the contacts are predicted to have the gaps `ws.gap_end`.
-pub(super) fn project(scene: &Scene<'_>, ws: &mut Workspace, report: &mut StepReport) {
-    let options = scene.options;
+pub(super) fn project<S: MechanicalSystem>(
+    system: &S,
+    options: &StepOptions,
+    ws: &mut ScratchOf<S>,
+    report: &mut StepReport,
+) {
     if options.stabilisation == Stabilisation::None {
         return;
     }
+    let d = S::DIMENSION.components();
     let stays = |gap: f64, u_N: f64| gap + options.time_step * u_N < 0.0;
     let mut deepest = 0.0_f64;
-    for (gap, u) in ws.gap_end.iter_mut().zip(ws.u.chunks_exact(3)) {
+    for (gap, u) in ws.gap_end.iter_mut().zip(ws.u.chunks_exact(d)) {
         if *gap < 0.0 && !stays(*gap, u[0]) {
             *gap = 0.0;
         }
@@ -34,56 +38,53 @@ pub(super) fn project(scene: &Scene<'_>, ws: &mut Workspace, report: &mut StepRe
         return;
     }
     ws.q_free.fill(0.0);
-    for (q, gap) in ws.q_free.chunks_exact_mut(3).zip(&ws.gap_end) {
+    for (q, gap) in ws.q_free.chunks_exact_mut(d).zip(&ws.gap_end) {
         q[0] = *gap;
     }
     ws.p_position.resize(ws.p.len(), 0.0);
     ws.u_position.resize(ws.p.len(), 0.0);
     let limit = -FARTHEST * deepest;
-    let mut solved = displace(scene, ws);
+    let mut solved = displace(system, options, ws);
     let is_finite = solved.status != SolveStatus::NonFinite;
-    if is_finite && (!solved.is_converged() || size(ws) > limit) {
+    if is_finite && (!solved.is_converged() || size(system, ws) > limit) {
         // Friction locks a wedge, or fights itself over nanometres: the shortest way out needs none.
         ws.mu.fill(0.0);
-        solved = displace(scene, ws);
-        ws.mu.fill(options.friction_coefficient);
+        solved = displace(system, options, ws);
+        set_friction(system, options, &ws.contacts, &mut ws.mu);
     }
     note(report, &solved);
-    let share = (limit / size(ws)).min(1.0);
-    ws.end.advance(&ws.y, share);
+    let share = (limit / size(system, ws)).min(1.0);
+    system.advance(&mut ws.end, &ws.y, share);
 }
 
 /// Solves for the displacement `ws.y` with the coefficients in `ws.mu`.
-fn displace(scene: &Scene<'_>, ws: &mut Workspace) -> SolveReport {
+fn displace<S: MechanicalSystem>(
+    system: &S,
+    options: &StepOptions,
+    ws: &mut ScratchOf<S>,
+) -> SolveReport {
     ws.p_position.fill(0.0);
-    let problem =
-        FrictionContactProblem::from_assembled(Dimension::Three, &ws.system.W, &ws.q_free, &ws.mu);
+    let problem = system.problem(&ws.q_free, &ws.mu);
     let solved = solve(
         &problem,
-        &scene.options.solver,
+        &options.solver,
         &mut ws.p_position,
         &mut ws.u_position,
         &mut ws.solver,
     );
     ws.y.fill(0.0);
-    ws.system
-        .add_impulses(scene.model, &ws.p_position, &mut ws.y);
-    ws.factor.half_solve_back(scene.model, &mut ws.y);
+    system.add_impulses(&ws.p_position, &mut ws.y);
+    system.half_solve_back(&mut ws.y);
     solved
 }
 
-/// How far a displacement goes, m: the contacts' points, the trunk's origin, and what turns by so much at arm's length.
-fn size(ws: &Workspace) -> f64 {
+/// How far a displacement goes, m: the contacts' points, and what the system counts beside them.
+fn size<S: MechanicalSystem>(system: &S, ws: &ScratchOf<S>) -> f64 {
     // d = W λ is what the answer u = d + (gap, 0, 0) holds beside the gaps.
     let points = ws.u_position.iter().zip(&ws.q_free).map(|(u, q)| u - q);
-    let trunk = ws.y[..6].iter().copied();
-    let joints = ws.y[6..].iter().map(|angle| angle * JOINT_ARM);
-    let all = points.chain(trunk).chain(joints);
-    all.fold(0.0_f64, |m, d| m.max(d.abs()))
+    let elsewhere = system.displacement(&ws.y);
+    points.fold(elsewhere, |m, d| m.max(d.abs()))
 }
-
-/// Arm at which a joint's turn counts, m. A freely steered wheel that is freed of 2 cm turns by 0.4 rad.
-const JOINT_ARM: f64 = 0.05;
 
 /// How far a displacement may go, as a multiple of the deepest penetration; the rest is left to the next steps.
 ///

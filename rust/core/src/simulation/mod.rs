@@ -7,4 +7,5 @@ pub mod snapshot;
 
 pub use error::{CommandError, SnapshotError};
 pub use rover::Simulation;
+pub(crate) use rover::check as check_command;
 pub use snapshot::Snapshot;

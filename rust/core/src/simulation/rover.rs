@@ -10,8 +10,9 @@ use super::snapshot::Snapshot;
 use crate::contact::{Activation, Contact, ContactFrame, Part, detect, detection::wheel_contacts};
 use crate::geometry::Terrain;
 use crate::integrator::{
-    ActiveContact, Command, HeldJoint, NoProbe, OptionsError, Probe, Scene, StepError, StepOptions,
-    StepReport, WarmStart, Workspace,
+    ActiveContact, Command, HeldJoint, Integrator, NoProbe, OptionsError, Probe, StateMut,
+    StepError, StepOptions, StepReport, TreeSystem, WarmStart, Workspace,
+    workspace::contact_capacity,
 };
 use crate::multibody::{Configuration, Energy, Kinematics, Model, Momentum, State, momentum};
 
@@ -56,9 +57,9 @@ impl Simulation {
             state: State::zero(&model),
             wheel_torque: vec![0.0; model.wheels().len()],
             joint_torque: vec![0.0; model.n_joints()],
-            warm_start: WarmStart::with_capacity(&model),
+            warm_start: WarmStart::with_capacity(contact_capacity(&model), model.nv()),
             workspace: Workspace::new(&model),
-            active: Vec::with_capacity(3 * model.wheels().len() + 4 * model.boxes().len()),
+            active: Vec::with_capacity(contact_capacity(&model)),
             command,
             model,
             terrain,
@@ -128,8 +129,7 @@ impl Simulation {
             v,
             time: 0.0,
         };
-        self.warm_start.impulses.clear();
-        self.warm_start.persistent.clear();
+        self.warm_start.clear();
         self.active.clear();
     }
 
@@ -307,25 +307,29 @@ impl Simulation {
     }
 
     fn step_probed(&mut self, n: usize, probe: &mut dyn Probe) -> Result<StepReport, StepError> {
-        let integrator = self.options.variant.integrator();
-        let scene = Scene {
-            model: &self.model,
-            terrain: &*self.terrain,
-            options: &self.options,
-        };
         let mut total = StepReport::default();
         for _ in 0..n {
-            let report = integrator.step(
-                &scene,
-                &self.command,
-                &mut self.state,
+            let mut system = TreeSystem {
+                model: &self.model,
+                terrain: &*self.terrain,
+                command: &self.command,
+                parts: &mut self.workspace.tree,
+            };
+            let state = StateMut {
+                configuration: &mut self.state.configuration,
+                v: &mut self.state.v,
+                time: &mut self.state.time,
+            };
+            let report = self.options.variant.step(
+                &mut system,
+                &self.options,
+                state,
                 &mut self.warm_start,
-                &mut self.workspace,
+                &mut self.workspace.step,
                 probe,
             )?;
             total.merge(&report);
-            self.active.clear();
-            self.active.extend_from_slice(self.workspace.active());
+            self.workspace.list_active(&mut self.active);
         }
         Ok(total)
     }
@@ -496,7 +500,12 @@ impl Simulation {
     }
 }
 
-fn check(field: &'static str, values: &[f64], expected: usize) -> Result<(), CommandError> {
+/// A command of `expected` finite entries.
+pub(crate) fn check(
+    field: &'static str,
+    values: &[f64],
+    expected: usize,
+) -> Result<(), CommandError> {
     if values.len() != expected {
         return Err(CommandError::Length {
             field,

@@ -1,0 +1,275 @@
+"""Figures 3.2 to 3.5 of the report, and a plot of any planar run.
+
+The report's text states other parameters than its figures were made with. These are the figures' own, SI: a ball of
+3 kg, radius 1.5 m, inertia 4.05 kg m2, restitution 0.7, g = 9.8, step 0.5 ms; first y = -x/2 + 1/2 from (5, 10), then
+y = sin x from (-2.5, 1). In both the ball's *centre* stops at the ground ("centre_height"); beside it stands the same
+ball touching with its rim.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.planar import BallSimulation, Line, PlanarSimulation, Polyline, Sine, describe, record
+from rover_gym.recording import MissingExtraError, Trajectory, read_trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+BALL: dict[str, Any] = {
+    "mass": 3.0,
+    "radius": 1.5,
+    "inertia": 4.05,
+    "gravity": (0.0, -9.8),
+    "restitution": 0.7,
+    "time_step": 0.0005,
+}
+STEP = 0.0005  # s, of the report's runs
+OURS, RIM, PUBLISHED, GROUND, FRICTION = "#0072B2", "#009E73", "0.55", "#8c6d46", "#D55E00"
+STYLE = {
+    "axes.grid": True,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": "medium",
+    "figure.constrained_layout.use": True,
+    "figure.dpi": 150,
+    "grid.alpha": 0.3,
+    "legend.fontsize": "small",
+    "lines.linewidth": 1.2,
+}
+
+
+@cache
+def published() -> dict[str, Any]:
+    """The report's curves of figures 3.2 to 3.5, by figure and curve."""
+    text = resources.files("rover_gym").joinpath("data/chapter_3.json").read_text(encoding="utf-8")
+    data: dict[str, Any] = json.loads(text)
+    return data["published"]  # type: ignore[no-any-return]
+
+
+def incline(contact: str = "centre_height") -> tuple[BallSimulation, float]:
+    """The ball of figures 3.2 and 3.3 at its start, and how long it runs, s.
+
+    Args:
+        contact: "centre_height" as the report's, or "nearest".
+    """
+    sim = BallSimulation(Line(-0.5, 0.5), friction=0.6, contact=contact, stabilisation="none", **BALL)
+    sim.set_state([5.0, 10.0, 0.0])
+    return sim, 12.0
+
+
+def sine(contact: str = "centre_height") -> tuple[BallSimulation, float]:
+    """The ball of figures 3.4 and 3.5 at its start, and how long it runs, s.
+
+    Args:
+        contact: "centre_height" as the report's, or "nearest": then the ball starts higher by its radius.
+    """
+    ground = Sine(1.0, 2.0 * np.pi)
+    sim = BallSimulation(ground, friction=0.5, contact=contact, stabilisation="none", **BALL)
+    sim.set_state([-2.5, 1.0 if contact == "centre_height" else 2.5, 0.0])
+    return sim, 10.0
+
+
+def draw_chapter_3(folder: str | Path) -> list[Path]:
+    """Runs both examples, records them and draws figures 3.2 to 3.5 as PNG files; returns their paths.
+
+    Raises:
+        MissingExtraError: matplotlib or h5py is not installed.
+    """
+    folder = Path(folder)
+    runs: dict[str, tuple[Trajectory, Trajectory]] = {}
+    for name, scene in (("incline", incline), ("sine", sine)):
+        pair = []
+        for contact in ("centre_height", "nearest"):
+            sim, duration = scene(contact)
+            path = folder / f"ball-{name}-{contact.replace('_', '-')}.h5"
+            # The impulses are those of a row's last step, and drawn of the report's rule only.
+            steps_per_row = 1 if contact == "centre_height" else 10
+            title = f"chapter 3 of the report: ball, {name}"
+            record(sim, path, describe(sim, title), duration=duration, steps_per_row=steps_per_row)
+            pair.append(read_trajectory(path))
+        runs[name] = (pair[0], pair[1])
+    return _draw(
+        folder,
+        {
+            "figure-3.2-ball-on-a-line": lambda figure: _incline_path(figure, *runs["incline"]),
+            "figure-3.3-speed-and-impulses": lambda figure: _incline_curves(figure, runs["incline"][0]),
+            "figure-3.4-ball-on-a-sine": lambda figure: _sine_path(figure, *runs["sine"]),
+            "figure-3.5-speed-and-impulses": lambda figure: _sine_curves(figure, runs["sine"][0]),
+        },
+    )
+
+
+def draw_run(sim: PlanarSimulation, recording: str | Path, path: str | Path) -> Path:
+    """Draws a recorded planar run: the machine's way over its ground, and speed, gaps, loads and energy against time.
+
+    Args:
+        sim: A simulation on the same ground.
+        recording: What `record` wrote.
+        path: PNG file to write.
+
+    Raises:
+        MissingExtraError: matplotlib or h5py is not installed.
+    """
+    trajectory = read_trajectory(recording)
+    path = Path(path)
+    return _draw(path.parent, {path.stem: lambda figure: _run(figure, sim, trajectory)})[0]
+
+
+def _draw(folder: Path, figures: dict[str, Callable[[Figure], None]]) -> list[Path]:
+    try:
+        import matplotlib as mpl  # noqa: PLC0415 - only who draws needs it
+        from matplotlib.figure import Figure  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        raise MissingExtraError("matplotlib", "demo") from error
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        for name, draw in figures.items():
+            figure = Figure(figsize=(11.0, 5.0))
+            draw(figure)
+            paths.append(folder / f"{name}.png")
+            figure.savefig(paths[-1])
+    return paths
+
+
+def _curve(figure: str, curve: str) -> npt.NDArray[np.float64]:
+    """A published curve as (2, n)."""
+    return np.array(published()[figure]["curves"][curve]).T
+
+
+def _plot_published(axes: Axes, figure: str) -> None:
+    axes.plot(*_curve(figure, "Ball position"), color=PUBLISHED, linewidth=3.0, label="the report's")
+
+
+def _speed(trajectory: Trajectory) -> npt.NDArray[np.float64]:
+    return np.linalg.norm(trajectory["v"][:, :2], axis=1)  # type: ignore[no-any-return]
+
+
+def _incline_path(figure: Figure, centre: Trajectory, rim: Trajectory) -> None:
+    whole, begin = figure.subplots(1, 2)
+    x = np.array([0.0, 190.0])
+    for axes in (whole, begin):
+        axes.plot(x, -0.5 * x + 0.5, color=GROUND, label="ground, y = -x/2 + 1/2")
+        _plot_published(axes, "fig_3_2_ball_incline")
+        axes.plot(*centre["q"][:, :2].T, color=OURS, label="ours, centre stops at the ground")
+        axes.plot(*rim["q"][:, :2].T, color=RIM, linestyle="--", label="ours, rim touches")
+        axes.set(xlabel="x (m)", ylabel="y (m)")
+    whole.set(title="12 s")
+    begin.set(title="the first bounces", xlim=(4.0, 40.0), ylim=(-20.0, 11.0))
+    whole.legend(loc="upper right")
+    figure.suptitle("Figure 3.2: a ball on an inclined line, from (5, 10)")
+
+
+def _incline_curves(figure: Figure, centre: Trajectory) -> None:
+    speed, impulses = figure.subplots(1, 2)
+    name = "fig_3_3_ball_incline_velocity_forces"
+    _against(speed, name, "Ball Velocity", centre["time"], _speed(centre), OURS, "speed, ours")
+    normal, tangential = centre["impulses"][:, 0].T
+    _against(impulses, name, "reaction", centre["time"], normal, OURS, "reaction, ours")
+    _against(impulses, name, "friction", centre["time"], tangential, FRICTION, "friction, ours")
+    speed.set(title="speed of the centre", xlabel="time (s)", ylabel="speed (m/s)")
+    impulses.set(title="impulses of a step of 0.5 ms", xlabel="time (s)", ylabel="impulse (N s)")
+    for axes in (speed, impulses):
+        axes.legend()
+    figure.suptitle("Figure 3.3: speed, reaction and friction of the ball on the line")
+
+
+def _sine_path(figure: Figure, centre: Trajectory, rim: Trajectory) -> None:
+    axes = figure.subplots()
+    x = np.linspace(-5.0, 2.0, 400)
+    axes.plot(x, np.sin(x), color=GROUND, label="ground, y = sin x")
+    _plot_published(axes, "fig_3_4_ball_sine")
+    axes.plot(*centre["q"][:, :2].T, color=OURS, label="ours, centre stops at the ground")
+    axes.plot(*rim["q"][:, :2].T, color=RIM, linestyle="--", label="ours, rim touches, from 1.5 m higher")
+    axes.set(xlabel="x (m)", ylabel="y (m)", xlim=(-5.0, 2.0))
+    axes.set_aspect("equal", adjustable="box")
+    axes.legend(loc="upper right")
+    figure.suptitle("Figure 3.4: a ball on a sine over 10 s, from (-2.5, 1)")
+
+
+def _sine_curves(figure: Figure, centre: Trajectory) -> None:
+    speed, impulses = figure.subplots(1, 2)
+    name = "fig_3_5_ball_sine_velocity_forces"
+    _against(speed, name, "Velocity", centre["time"], _speed(centre), OURS, "speed, ours", STEP)
+    normal, tangential = centre["impulses"][:, 0].T
+    _against(impulses, name, "Reaction", centre["time"], normal, OURS, "reaction, ours", STEP)
+    _against(impulses, name, "Friction", centre["time"], tangential, FRICTION, "friction, ours", STEP)
+    speed.set(title="speed of the centre", xlabel="time (s)", ylabel="speed (m/s)")
+    impulses.set(
+        title="impulses of a step of 0.5 ms (the report's frame was up to 1.4 too short)",
+        xlabel="time (s)",
+        ylabel="impulse (N s)",
+    )
+    for axes in (speed, impulses):
+        axes.legend()
+    figure.suptitle("Figure 3.5: speed, reaction and friction of the ball on the sine")
+
+
+def _against(
+    axes: Axes,
+    figure: str,
+    curve: str,
+    time: npt.NDArray[np.float64],
+    ours: npt.NDArray[np.float64],
+    colour: str,
+    label: str,
+    scale: float = 1.0,
+) -> None:
+    """Ours over the report's; `scale` turns its abscissa into seconds."""
+    t, value = _curve(figure, curve)
+    is_first = not axes.lines
+    axes.plot(scale * t, value, color=PUBLISHED, linewidth=3.0, alpha=0.7, label="the report's" if is_first else "")
+    axes.plot(time, ours, color=colour, label=label)
+
+
+def _run(figure: Figure, sim: PlanarSimulation, trajectory: Trajectory) -> None:
+    from matplotlib.patches import Circle  # noqa: PLC0415 - only who draws needs it
+
+    grid = figure.add_gridspec(2, 3)
+    way = figure.add_subplot(grid[0, :])
+    speed, gaps, energy = (figure.add_subplot(grid[1, k]) for k in range(3))
+    centres, time = trajectory["centres"], trajectory["time"]
+    machine = sim.parameters
+    radii = np.atleast_1d(machine["radius"] if "radius" in machine else machine["wheel_radius"])
+    low, high = centres[:, :, 0].min() - 2.0 * radii.max(), centres[:, :, 0].max() + 2.0 * radii.max()
+    x = np.linspace(low, high, 2000)
+    if isinstance(sim.ground, Polyline):
+        x = np.sort(np.concatenate((x, sim.ground.x - 1e-9, sim.ground.x)))
+    way.plot(x, sim.ground.height(x), color=GROUND)
+    colours = (OURS, FRICTION)
+    names = ("ball",) if len(radii) == 1 else ("wheel A (back)", "wheel B (front)")
+    for i, (name, colour) in enumerate(zip(names, colours, strict=False)):
+        way.plot(*centres[:, i].T, color=colour, linewidth=0.8, label=f"centre of {name}")
+        gaps.plot(time, 1e3 * trajectory["gaps"][:, i], color=colour, label=name)
+    for row in np.linspace(0, len(time) - 1, 6).astype(int):
+        for i, radius in enumerate(radii):
+            way.add_patch(Circle(centres[row, i], radius, fill=False, color=colours[i], alpha=0.6))
+        if len(radii) > 1:
+            way.plot(*centres[row].T, color="0.3", linewidth=2.0)
+    way.set(xlabel="x (m)", ylabel="y (m)", title=f"{trajectory.attributes['title']}, {time[-1]:g} s")
+    way.set_aspect("equal", adjustable="datalim")
+    way.legend(loc="upper right")
+    speed.plot(time, _speed(trajectory), color=OURS)
+    speed.set(xlabel="time (s)", ylabel="speed (m/s)")
+    gaps.set(xlabel="time (s)", ylabel="gap (mm)")
+    gaps.legend()
+    kinetic, potential = trajectory["kinetic_energy"], trajectory["potential_energy"]
+    potential = potential - potential.min()
+    for values, label, colour in (
+        (kinetic, "kinetic", OURS),
+        (potential, "potential, from its lowest", FRICTION),
+        (kinetic + potential, "sum", "0.2"),
+    ):
+        energy.plot(time, values, color=colour, label=label)
+    energy.set(xlabel="time (s)", ylabel="energy (J)")
+    energy.legend()

@@ -1,0 +1,178 @@
+//! What time stepping needs of a mechanical system: `M(q) dv = F(q, v) dt + H(q) dp`, q moved along v by ⊕.
+//!
+//! Every scheme of this chapter is written once, over this trait. The rover's tree of solids implements it with its sparse factor,
+//! a planar ball or two-wheel rover with small dense matrices, a soil of disks with a diagonal one; nothing of a step is written twice.
+//!
+//! A system holds its description and the scratch of its matrices, never its state: the scheme hands in configurations and
+//! velocities and asks in the order
+//!
+//! ```text
+//! place_middle(q_m), place_end(q̃) → detect → relocate      the contacts, measured at q̃
+//! update_mass_matrix → factorise                           M̂(q_m) = Fᵀ F
+//! assemble                                                 H, Z = F⁻ᵀ H, W = Zᵀ Z at q̃
+//! load, half_solve, local, problem, add_impulses, half_solve_back
+//! ```
+//!
+//! Vectors between `half_solve` and `half_solve_back` are in *factor coordinates* `y = F v`: there an impulse y does
+//! `Zᵀ y` at the contacts, and contact impulses p change y by `Z p`, so W never needs a product with M̂⁻¹. Any factor will do (Cholesky's,
+//! the tree's `Lᵀ D L`, the square root of a diagonal).
+
+use super::options::StepOptions;
+use crate::contact::Activation;
+use crate::problem::{Dimension, FrictionContactProblem};
+
+/// A contact as time stepping sees it: a name and a gap.
+pub trait UnilateralContact {
+    /// Tells the same contact from one step to the next.
+    type Key: Copy + Ord;
+
+    /// Its name, unique within a step.
+    fn key(&self) -> Self::Key;
+
+    /// Signed distance, m, positive when apart, where the contact was last measured.
+    fn gap(&self) -> f64;
+}
+
+/// Where a step begins.
+#[derive(Debug)]
+pub struct Start<'a, Q> {
+    /// Configuration.
+    pub configuration: &'a Q,
+    /// Velocity (nv).
+    pub v: &'a [f64],
+}
+
+impl<Q> Clone for Start<'_, Q> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<Q> Copy for Start<'_, Q> {}
+
+/// A system with unilateral contacts, see the page above.
+///
+/// With d components a contact (2 or 3, `DIMENSION`), local vectors run contact by contact `normal, tangent, (tangent)`.
+pub trait MechanicalSystem {
+    /// A point of the configuration space; sizes may be anything, ⊕ is the system's.
+    type Configuration: Clone;
+    /// A contact: what the system needs to find its rows of Hᵀ again.
+    type Contact: UnilateralContact;
+
+    /// Whether contacts have one tangent or two.
+    const DIMENSION: Dimension;
+
+    /// Number of velocities now.
+    fn nv(&self) -> usize;
+
+    /// `to = from ⊕ h v`, without allocating.
+    fn set_moved(
+        &self,
+        from: &Self::Configuration,
+        v: &[f64],
+        h: f64,
+        to: &mut Self::Configuration,
+    );
+
+    /// `q ⊕= h v`.
+    fn advance(&self, q: &mut Self::Configuration, v: &[f64], h: f64);
+
+    /// Whether every entry of a configuration is finite.
+    fn is_finite(&self, q: &Self::Configuration) -> bool;
+
+    /// Takes rounding out of a configuration that is about to become the state (unit quaternions).
+    fn normalise(&self, _q: &mut Self::Configuration) {}
+
+    /// Kinematics where forces and mass matrix are evaluated.
+    fn place_middle(&mut self, q: &Self::Configuration);
+
+    /// Kinematics where contact frames and Jacobians are evaluated.
+    fn place_end(&mut self, q: &Self::Configuration);
+
+    /// Finds the contacts of the step, measured at the middle's pose, by the forecast at the velocity `v` (nv).
+    ///
+    /// `activation.margin` is 0 and the system's to fill. `out` is cleared first.
+    fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<Self::Contact>);
+
+    /// Measures point, frame and gap of each contact anew at the end's pose: the same features.
+    fn relocate(&mut self, contacts: &mut [Self::Contact]);
+
+    /// μ of one contact.
+    fn friction_coefficient(&self, options: &StepOptions, _contact: &Self::Contact) -> f64 {
+        options.friction_coefficient
+    }
+
+    /// M at the middle's pose, and how implicit its implicit forces are.
+    fn update_mass_matrix(&mut self, options: &StepOptions);
+
+    /// Factors `M̂ = M + (implicit forces) = Fᵀ F`; false where it is not positive definite in floating point.
+    #[must_use]
+    fn factorise(&mut self, options: &StepOptions) -> bool;
+
+    /// `out = M v` (nv), kg m/s and kg m²/s: asked for between `update_mass_matrix` and `factorise`, which may add implicit terms.
+    fn multiply_mass(&self, v: &[f64], out: &mut [f64]);
+
+    /// `y = h F(q_m, v_mean)` (nv), N s and N m s: the impulse of all forces but the contacts' over the step.
+    ///
+    /// Forces taken implicitly enter with their value extrapolated from the start's velocity.
+    fn load(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Self::Configuration>,
+        v_mean: &[f64],
+        y: &mut [f64],
+    );
+
+    /// Before the iterations of a Newton variant: what it must remember of the start. By default nothing.
+    fn begin_balance(&mut self, _start: Start<'_, Self::Configuration>) {}
+
+    /// `y = h F − Δ(M v)` (nv): what the iterate `v_end` leaves of the balance over the step without contacts.
+    ///
+    /// The default is the rule at the middle, `h F(q_m, v_mean) − M(q_m) (v_end − v)`, of order 2 for θ = ½.
+    /// `scratch` (nv) may be overwritten.
+    fn balance(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Self::Configuration>,
+        v_end: &[f64],
+        v_mean: &[f64],
+        scratch: &mut [f64],
+        y: &mut [f64],
+    ) {
+        for ((change, end), begin) in y.iter_mut().zip(v_end).zip(start.v) {
+            *change = end - begin;
+        }
+        self.multiply_mass(y, scratch);
+        self.load(options, start, v_mean, y);
+        for (y, momentum) in y.iter_mut().zip(&*scratch) {
+            *y -= momentum;
+        }
+    }
+
+    /// `y ← F⁻ᵀ y`: an impulse into factor coordinates.
+    fn half_solve(&self, y: &mut [f64]);
+
+    /// `y ← F⁻¹ y`: factor coordinates into a velocity.
+    fn half_solve_back(&self, y: &mut [f64]);
+
+    /// Builds H, Z and W of the contacts at the end's pose, and `u = Hᵀ v` (d n_c), m/s.
+    fn assemble(&mut self, contacts: &[Self::Contact], v: &[f64], u: &mut [f64]);
+
+    /// `out = Zᵀ y` (d n_c), m/s.
+    fn local(&self, y: &[f64], out: &mut [f64]);
+
+    /// `out += Hᵀ v` (d n_c), m/s, for another velocity than [`Self::assemble`]'s.
+    fn add_local_of_velocity(&self, contacts: &[Self::Contact], v: &[f64], out: &mut [f64]);
+
+    /// `y += Z p`, with p (d n_c) in N s.
+    fn add_impulses(&self, p: &[f64], y: &mut [f64]);
+
+    /// `out = H p` (nv): the generalized impulse, N s and N m s, of p (d n_c), N s.
+    fn generalized_impulse(&self, contacts: &[Self::Contact], p: &[f64], out: &mut [f64]);
+
+    /// The friction-contact problem of the assembled W, with the free velocity q (d n_c), m/s, and μ (n_c).
+    fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a>;
+
+    /// How far a displacement `y` (nv) moves what is not a contact point, m: the projection's guard.
+    fn displacement(&self, y: &[f64]) -> f64;
+}

@@ -1,0 +1,96 @@
+//! Scratch of a step that every system shares: vectors over velocities and over contacts.
+
+use crate::solver::SolverWorkspace;
+
+/// Scratch of a step of configurations `Q` and contacts `C`. Nothing in it is state: a fresh one gives the same bits.
+///
+/// After a step it tells what the step did: contacts, impulses, local velocities, all measured at the step's end.
+#[derive(Clone, Debug)]
+pub struct Scratch<Q, C> {
+    pub(super) middle: Q,
+    pub(super) end: Q,
+    pub(super) y: Vec<f64>,
+    pub(super) correction: Vec<f64>,
+    pub(super) v: Vec<f64>,
+    pub(super) v_mean: Vec<f64>,
+    pub(super) contacts: Vec<C>,
+    pub(super) q_free: Vec<f64>,
+    pub(super) mu: Vec<f64>,
+    pub(super) p: Vec<f64>,
+    pub(super) p_last: Vec<f64>,
+    pub(super) u: Vec<f64>,
+    pub(super) u_before: Vec<f64>,
+    pub(super) gap_end: Vec<f64>,
+    pub(super) p_position: Vec<f64>,
+    pub(super) u_position: Vec<f64>,
+    pub(super) solver: SolverWorkspace,
+}
+
+impl<Q: Clone, C> Scratch<Q, C> {
+    /// Room for nv velocities and n contacts of d components; `q` is any configuration of the right size.
+    #[must_use]
+    pub fn new(q: &Q, nv: usize, n: usize, d: usize) -> Self {
+        let room = || Vec::with_capacity(d * n);
+        Self {
+            middle: q.clone(),
+            end: q.clone(),
+            y: vec![0.0; nv],
+            correction: vec![0.0; nv],
+            v: vec![0.0; nv],
+            v_mean: vec![0.0; nv],
+            contacts: Vec::with_capacity(n),
+            q_free: room(),
+            mu: Vec::with_capacity(n),
+            p: room(),
+            p_last: room(),
+            u: room(),
+            u_before: room(),
+            gap_end: Vec::with_capacity(n),
+            p_position: room(),
+            u_position: room(),
+            solver: SolverWorkspace::default(),
+        }
+    }
+
+    /// Makes the velocities' vectors fit a system whose nv may have changed since the last step.
+    pub(super) fn fit(&mut self, nv: usize) {
+        for vector in [
+            &mut self.y,
+            &mut self.correction,
+            &mut self.v,
+            &mut self.v_mean,
+        ] {
+            vector.resize(nv, 0.0);
+        }
+    }
+
+    /// Contacts of the last step.
+    #[must_use]
+    pub fn contacts(&self) -> &[C] {
+        &self.contacts
+    }
+
+    /// Impulses of the last step (d n_c), N s.
+    #[must_use]
+    pub fn impulses(&self) -> &[f64] {
+        &self.p
+    }
+
+    /// Local velocities after the last step (d n_c), m/s.
+    #[must_use]
+    pub fn velocities(&self) -> &[f64] {
+        &self.u
+    }
+
+    /// Free velocity of the last step's friction-contact problem, with restitution (d n_c), m/s.
+    #[must_use]
+    pub fn free_velocity(&self) -> &[f64] {
+        &self.q_free
+    }
+
+    /// Friction coefficients of the last step's contacts (n_c).
+    #[must_use]
+    pub fn friction_coefficients(&self) -> &[f64] {
+        &self.mu
+    }
+}

@@ -1,0 +1,433 @@
+//! The tree of solids on a terrain as a mechanical system: the rover.
+//!
+//! `M̂ = M + h θ_j K_d + h² θ_j θ K_p` on held joints: the PD of a held joint is implicit with an exponentially fitted θ_j
+//! ([`super::fitted_theta`]), so no gain and no step make it unstable. `M̂ = Lᵀ D L` along the tree; the contact system keeps `Z` along
+//! each contact's path.
+
+use nalgebra::Vector3;
+
+use super::command::Command;
+use super::fitted_theta::fitted_theta;
+use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
+use super::options::StepOptions;
+use crate::contact::{
+    Activation, Contact, ContactKey, ContactSystem, detect, generalized_impulse, relocate,
+};
+use crate::geometry::Terrain;
+use crate::multibody::bias::{BiasScratch, bias};
+use crate::multibody::momentum::body_momenta;
+use crate::multibody::{
+    Configuration, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum,
+};
+use crate::problem::{Dimension, FrictionContactProblem};
+
+impl UnilateralContact for Contact {
+    type Key = ContactKey;
+
+    #[inline]
+    fn key(&self) -> ContactKey {
+        self.key
+    }
+
+    #[inline]
+    fn gap(&self) -> f64 {
+        self.gap
+    }
+}
+
+/// Poses, matrices and momenta of a tree: scratch, sized once.
+#[derive(Clone, Debug)]
+pub struct TreeScratch {
+    kinematics: Kinematics,
+    kinematics_end: Kinematics,
+    mass_matrix: MassMatrix,
+    factor: FactoredMassMatrix,
+    bias_scratch: BiasScratch,
+    momenta: Vec<Momentum>,
+    momenta_end: Vec<Momentum>,
+    sums: Vec<Momentum>,
+    c_start: Vec<Vector3<f64>>,
+    theta_held: Vec<f64>,
+    force: Vec<f64>,
+    system: ContactSystem,
+}
+
+impl TreeScratch {
+    /// Room for a model with n contacts.
+    #[must_use]
+    pub fn new(model: &Model, n: usize) -> Self {
+        let momenta = vec![Momentum::default(); model.bodies().len()];
+        Self {
+            kinematics: Kinematics::new(model),
+            kinematics_end: Kinematics::new(model),
+            mass_matrix: MassMatrix::new(model),
+            factor: FactoredMassMatrix::new(model),
+            bias_scratch: BiasScratch::new(model),
+            momenta: momenta.clone(),
+            momenta_end: momenta.clone(),
+            sums: momenta,
+            c_start: vec![Vector3::zeros(); model.bodies().len()],
+            theta_held: vec![0.0; model.n_joints()],
+            force: vec![0.0; model.nv()],
+            system: ContactSystem::with_capacity(model, n),
+        }
+    }
+
+    /// Delassus operator of the last step, row-major, 1/kg.
+    #[must_use]
+    pub fn operator(&self) -> &[f64] {
+        &self.system.W
+    }
+
+    /// World position of the trunk's origin at the pose where contacts were last measured, m.
+    #[must_use]
+    pub fn base_of_contacts(&self) -> &Vector3<f64> {
+        &self.kinematics_end.base
+    }
+}
+
+/// A model on a terrain under a command.
+pub struct TreeSystem<'a> {
+    /// The machine.
+    pub model: &'a Model,
+    /// The ground.
+    pub terrain: &'a dyn Terrain,
+    /// Torques and held joints.
+    pub command: &'a Command,
+    /// Its scratch.
+    pub parts: &'a mut TreeScratch,
+}
+
+impl MechanicalSystem for TreeSystem<'_> {
+    type Configuration = Configuration;
+    type Contact = Contact;
+
+    const DIMENSION: Dimension = Dimension::Three;
+
+    #[inline]
+    fn nv(&self) -> usize {
+        self.model.nv()
+    }
+
+    #[inline]
+    fn set_moved(&self, from: &Configuration, v: &[f64], h: f64, to: &mut Configuration) {
+        to.set_moved(from, v, h);
+    }
+
+    #[inline]
+    fn advance(&self, q: &mut Configuration, v: &[f64], h: f64) {
+        q.advance(v, h);
+    }
+
+    #[inline]
+    fn is_finite(&self, q: &Configuration) -> bool {
+        q.is_finite()
+    }
+
+    #[inline]
+    fn normalise(&self, q: &mut Configuration) {
+        q.attitude.renormalize_fast();
+    }
+
+    #[inline]
+    fn place_middle(&mut self, q: &Configuration) {
+        self.parts.kinematics.update_for_step(self.model, q);
+    }
+
+    #[inline]
+    fn place_end(&mut self, q: &Configuration) {
+        self.parts.kinematics_end.update_for_step(self.model, q);
+    }
+
+    #[inline]
+    fn detect(&mut self, v: &[f64], mut activation: Activation, out: &mut Vec<Contact>) {
+        let reach: f64 = self
+            .model
+            .bodies()
+            .iter()
+            .map(|b| b.position.norm())
+            .sum::<f64>()
+            + 1.0;
+        let linear = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+        let turning: f64 = v[3..].iter().map(|w| w.abs()).sum();
+        activation.margin = activation.lead.abs() * (linear + turning * reach);
+        detect(
+            self.model,
+            &self.parts.kinematics,
+            &self.parts.kinematics_end,
+            self.terrain,
+            v,
+            &activation,
+            out,
+        );
+    }
+
+    #[inline]
+    fn relocate(&mut self, contacts: &mut [Contact]) {
+        for contact in contacts {
+            relocate(
+                self.model,
+                &self.parts.kinematics_end,
+                self.terrain,
+                contact,
+            );
+        }
+    }
+
+    #[inline]
+    fn update_mass_matrix(&mut self, options: &StepOptions) {
+        self.parts
+            .mass_matrix
+            .update(self.model, &self.parts.kinematics);
+        set_held_theta(self.model, options, self.command, self.parts);
+    }
+
+    #[inline]
+    fn factorise(&mut self, options: &StepOptions) -> bool {
+        let (h, theta) = (options.time_step, options.theta);
+        let parts = &mut *self.parts;
+        for (j, held) in self.command.held.iter().enumerate() {
+            if let Some(held) = held {
+                let theta_j = parts.theta_held[j];
+                let implicit = h * theta_j * (held.damping + h * theta * held.stiffness);
+                parts
+                    .mass_matrix
+                    .add_to_diagonal(self.model, 6 + j, implicit);
+            }
+        }
+        parts.mass_matrix.factorise(self.model, &mut parts.factor)
+    }
+
+    fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
+        self.parts.mass_matrix.times(self.model, v, out);
+    }
+
+    #[inline]
+    fn load(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Configuration>,
+        v_mean: &[f64],
+        y: &mut [f64],
+    ) {
+        let parts = &mut *self.parts;
+        bias(
+            self.model,
+            &parts.kinematics,
+            v_mean,
+            &options.gravity,
+            &mut parts.bias_scratch,
+            &mut parts.force,
+        );
+        for (y, f) in y.iter_mut().zip(&parts.force) {
+            *y = -options.time_step * f;
+        }
+        let joints = &start.configuration.joints;
+        add_command(
+            options,
+            self.command,
+            joints,
+            start.v,
+            start.v,
+            &parts.theta_held,
+            y,
+        );
+    }
+
+    fn begin_balance(&mut self, start: Start<'_, Configuration>) {
+        let parts = &mut *self.parts;
+        parts
+            .kinematics
+            .update_for_step(self.model, start.configuration);
+        parts.c_start.copy_from_slice(&parts.kinematics.c);
+        body_momenta(
+            self.model,
+            &parts.kinematics,
+            start.v,
+            &Vector3::zeros(),
+            &mut parts.momenta,
+        );
+    }
+
+    /// In momentum form, exact at both ends: see [`super::moreau_jean_newton`].
+    fn balance(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Configuration>,
+        v_end: &[f64],
+        _v_mean: &[f64],
+        _scratch: &mut [f64],
+        y: &mut [f64],
+    ) {
+        momentum_residual(
+            self.model,
+            &options.gravity,
+            (options.time_step, options.theta),
+            &start.configuration.position,
+            v_end,
+            self.parts,
+            y,
+        );
+        let joints = &start.configuration.joints;
+        add_command(
+            options,
+            self.command,
+            joints,
+            start.v,
+            v_end,
+            &self.parts.theta_held,
+            y,
+        );
+    }
+
+    #[inline]
+    fn half_solve(&self, y: &mut [f64]) {
+        self.parts.factor.half_solve(self.model, y);
+    }
+
+    #[inline]
+    fn half_solve_back(&self, y: &mut [f64]) {
+        self.parts.factor.half_solve_back(self.model, y);
+    }
+
+    #[inline]
+    fn assemble(&mut self, contacts: &[Contact], v: &[f64], u: &mut [f64]) {
+        let parts = &mut *self.parts;
+        parts.system.assemble(
+            self.model,
+            &parts.kinematics_end,
+            &parts.factor,
+            contacts,
+            v,
+        );
+        u.copy_from_slice(&parts.system.u);
+    }
+
+    #[inline]
+    fn local(&self, y: &[f64], out: &mut [f64]) {
+        self.parts.system.local(self.model, y, out);
+    }
+
+    #[inline]
+    fn add_local_of_velocity(&self, contacts: &[Contact], v: &[f64], out: &mut [f64]) {
+        self.parts.system.add_local_of_velocity(
+            self.model,
+            &self.parts.kinematics_end,
+            contacts,
+            v,
+            out,
+        );
+    }
+
+    #[inline]
+    fn add_impulses(&self, p: &[f64], y: &mut [f64]) {
+        self.parts.system.add_impulses(self.model, p, y);
+    }
+
+    #[inline]
+    fn generalized_impulse(&self, contacts: &[Contact], p: &[f64], out: &mut [f64]) {
+        generalized_impulse(self.model, &self.parts.kinematics_end, contacts, p, out);
+    }
+
+    #[inline]
+    fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a> {
+        FrictionContactProblem::from_assembled(Dimension::Three, &self.parts.system.W, q, mu)
+    }
+
+    /// The trunk's origin, and what turns by so much at arm's length.
+    fn displacement(&self, y: &[f64]) -> f64 {
+        let trunk = y[..6].iter().copied();
+        let joints = y[6..].iter().map(|angle| angle * JOINT_ARM);
+        trunk.chain(joints).fold(0.0_f64, |m, d| m.max(d.abs()))
+    }
+}
+
+/// Arm at which a joint's turn counts, m. A freely steered wheel that is freed of 2 cm turns by 0.4 rad.
+const JOINT_ARM: f64 = 0.05;
+
+/// How implicit each held joint's PD is.
+fn set_held_theta(
+    model: &Model,
+    options: &StepOptions,
+    command: &Command,
+    parts: &mut TreeScratch,
+) {
+    let h = options.time_step;
+    for (j, held) in command.held.iter().enumerate() {
+        if let Some(held) = held {
+            let inertia = parts.mass_matrix.diagonal(model, 6 + j);
+            let z = h * (held.damping + 0.5 * h * held.stiffness) / inertia;
+            parts.theta_held[j] = fitted_theta(z).max(options.theta);
+        }
+    }
+}
+
+/// Adds `h τ` to `y`: torques, and the PD at the θ_j-weighted position and velocity of the iterate `v_end`.
+fn add_command(
+    options: &StepOptions,
+    command: &Command,
+    joints: &[f64],
+    v: &[f64],
+    v_end: &[f64],
+    theta_held: &[f64],
+    y: &mut [f64],
+) {
+    let (h, theta) = (options.time_step, options.theta);
+    for (j, (torque, held)) in command.torque.iter().zip(&command.held).enumerate() {
+        let mut tau = *torque;
+        if let Some(held) = held {
+            let (theta_j, rate, rate_end) = (theta_held[j], v[6 + j], v_end[6 + j]);
+            let mean = theta * rate_end + (1.0 - theta) * rate;
+            tau -= held.stiffness * (joints[j] + h * theta_j * mean - held.set_point);
+            tau -= held.damping * (rate + theta_j * (rate_end - rate));
+        }
+        y[6 + j] += h * tau;
+    }
+}
+
+/// `y = −(left side)` of the principle of [`super::moreau_jean_newton`] at the iterate `v_end`, without commands and contacts.
+fn momentum_residual(
+    model: &Model,
+    gravity: &Vector3<f64>,
+    (h, theta): (f64, f64),
+    start: &Vector3<f64>,
+    v_end: &[f64],
+    parts: &mut TreeScratch,
+    y: &mut [f64],
+) {
+    let end = parts.kinematics_end.base - start;
+    body_momenta(
+        model,
+        &parts.kinematics_end,
+        v_end,
+        &end,
+        &mut parts.momenta_end,
+    );
+    let middle = parts.kinematics.base - start;
+    let bodies = model.bodies();
+    parts.sums.copy_from_slice(&parts.momenta_end);
+    for (b, (sum, begin)) in parts.sums.iter_mut().zip(&parts.momenta).enumerate() {
+        let weight = gravity * (bodies[b].mass * h);
+        // Both mass centres relative to the point of reference, the trunk origin at the start of the step.
+        let centre = (parts.kinematics_end.c[b] + end) * theta + parts.c_start[b] * (1.0 - theta);
+        sum.linear -= begin.linear + weight;
+        sum.angular -= begin.angular + centre.cross(&weight);
+    }
+    for b in (0..bodies.len()).rev() {
+        let (P, L) = (parts.sums[b].linear, parts.sums[b].angular);
+        // About the trunk origin at the midpoint, where the screws are taken.
+        let about_middle = L - middle.cross(&P);
+        if b == 0 {
+            for k in 0..3 {
+                y[k] = -P[k];
+                y[3 + k] = -about_middle[k];
+            }
+        } else {
+            let a = &parts.kinematics.axis[b];
+            y[5 + b] = -a.dot(&(about_middle - parts.kinematics.r[b].cross(&P)));
+            let parent = bodies[b].parent;
+            parts.sums[parent].linear += P;
+            parts.sums[parent].angular += L;
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Planar scenes that cannot be.
+
+use thiserror::Error;
+
+/// A curve or a machine that cannot be built.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum PlanarError {
+    /// NaN or infinite.
+    #[error("{field}: must be finite, is {value}")]
+    NotFinite {
+        /// Name of the argument.
+        field: String,
+        /// What was given.
+        value: f64,
+    },
+    /// Zero or negative where that has no meaning.
+    #[error("{field}: must be positive, is {value}")]
+    NotPositive {
+        /// Name of the argument.
+        field: String,
+        /// What was given.
+        value: f64,
+    },
+    /// Negative.
+    #[error("{field}: must not be negative, is {value}")]
+    Negative {
+        /// Name of the argument.
+        field: String,
+        /// What was given.
+        value: f64,
+    },
+    /// Two wheels in one place.
+    #[error(
+        "axle_b: the wheels overlap: their axles are {value} m apart, their radii add up to {needed} m"
+    )]
+    WheelsOverlap {
+        /// Distance of the axles, m.
+        value: f64,
+        /// Sum of the radii, m.
+        needed: f64,
+    },
+    /// Too few points for a curve.
+    #[error("x: needs at least {needed} points, has {count}")]
+    TooFewPoints {
+        /// How many are needed.
+        needed: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// Another number of heights than of places.
+    #[error("y: needs one entry for each of the {expected} in x, has {count}")]
+    MismatchedLengths {
+        /// Length of x.
+        expected: usize,
+        /// Length of y.
+        count: usize,
+    },
+    /// The curve turns back: it is not a function of x.
+    #[error("x[{index}]: must be {demand} the entry before it, is {value}")]
+    NotAFunction {
+        /// Which point.
+        index: usize,
+        /// `greater than`, or `at least` where vertical faces are allowed.
+        demand: &'static str,
+        /// What was given.
+        value: f64,
+    },
+    /// The same point twice.
+    #[error("y[{index}]: repeats the point before it, {value}")]
+    RepeatedPoint {
+        /// Which point.
+        index: usize,
+        /// Its height.
+        value: f64,
+    },
+}
+
+impl PlanarError {
+    /// Name of the argument that is wrong.
+    #[must_use]
+    pub fn field(&self) -> String {
+        match self {
+            Self::NotFinite { field, .. }
+            | Self::NotPositive { field, .. }
+            | Self::Negative { field, .. } => field.clone(),
+            Self::WheelsOverlap { .. } => "axle_b".to_owned(),
+            Self::TooFewPoints { .. } => "x".to_owned(),
+            Self::MismatchedLengths { .. } => "y".to_owned(),
+            Self::NotAFunction { index, .. } => format!("x[{index}]"),
+            Self::RepeatedPoint { index, .. } => format!("y[{index}]"),
+        }
+    }
+}
+
+/// `value`, if it is finite.
+///
+/// # Errors
+/// [`PlanarError::NotFinite`].
+pub fn finite(field: &str, value: f64) -> Result<f64, PlanarError> {
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(PlanarError::NotFinite {
+            field: field.to_owned(),
+            value,
+        })
+    }
+}
+
+/// `value`, if it is finite and positive.
+///
+/// # Errors
+/// [`PlanarError::NotFinite`] or [`PlanarError::NotPositive`].
+pub fn positive(field: &str, value: f64) -> Result<f64, PlanarError> {
+    if finite(field, value)? > 0.0 {
+        Ok(value)
+    } else {
+        Err(PlanarError::NotPositive {
+            field: field.to_owned(),
+            value,
+        })
+    }
+}

@@ -1,0 +1,30 @@
+//! The planar systems of the report's chapter 3: a ball, a two-wheel rover, and the ground they run on.
+//!
+//! - [`ground`], [`curve`], [`polyline`]: what lies below a curve, and where a disc touches it;
+//! - [`machine`]: machines with few coordinates as mechanical systems with one tangent a contact;
+//! - [`ball`], [`two_wheel_rover`]: two of them; [`simulation`]: one on a ground, through time.
+//!
+//! Nothing of time stepping, contact law or solver is here: [`crate::integrator`] steps these systems as it steps the rover.
+//! x points forward, y up, angles turn to the left.
+
+pub mod ball;
+pub mod curve;
+pub mod error;
+pub mod ground;
+pub mod machine;
+pub mod polyline;
+pub mod simulation;
+pub mod two_wheel_rover;
+
+pub use ball::Ball;
+pub use curve::{Curve, Line, Sine, Spline};
+pub use error::PlanarError;
+pub use ground::{ContactRule, Facing, Ground};
+pub use machine::{
+    Disc, PlanarContact, PlanarKey, PlanarMachine, PlanarScratch, PlanarSystem, contact_rows,
+};
+pub use polyline::Polyline;
+pub use simulation::{
+    BallSimulation, PlanarActiveContact, PlanarSimulation, PlanarSnapshot, TwoWheelRoverSimulation,
+};
+pub use two_wheel_rover::{PlanarWheel, TwoWheelRover};

@@ -1,0 +1,564 @@
+//! `PlanarSimulation` and its two kinds, `BallSimulation` and `TwoWheelRoverSimulation`.
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict, PyTuple};
+use rover_core::integrator::{StepError, StepOptions, StepReport as CoreReport};
+use rover_core::multibody::{Energy as CoreEnergy, StateError};
+use rover_core::nalgebra::{DMatrix, Vector2};
+use rover_core::planar::{
+    Ball, ContactRule, Ground, PlanarActiveContact, PlanarMachine, PlanarSimulation as Core,
+    PlanarSnapshot as CoreSnapshot, PlanarWheel, TwoWheelRover,
+};
+use rover_core::simulation::{CommandError, SnapshotError};
+use std::sync::Arc;
+
+use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
+use crate::errors::{BorderError, Kind, Value};
+use crate::friction_contact::solver_options;
+use crate::planar_ground::{border, parse};
+use crate::simulation::{
+    Energy, Problem, STABILISATIONS, StepReport, VARIANTS, choice, name_of, step_count,
+};
+use crate::snapshot::damaged;
+
+const RULES: [(&str, ContactRule); 2] = [
+    ("nearest", ContactRule::Nearest),
+    ("centre_height", ContactRule::CentreHeight),
+];
+
+/// What the border needs of a simulation, whatever its machine.
+trait Run: Send + Sync {
+    fn q(&self) -> &[f64];
+    fn v(&self) -> &[f64];
+    fn time(&self) -> f64;
+    fn options(&self) -> &StepOptions;
+    fn rule(&self) -> ContactRule;
+    fn inputs(&self) -> &[f64];
+    fn contacts(&self) -> &[PlanarActiveContact];
+    fn centres(&self) -> Vec<[f64; 2]>;
+    fn gaps(&self) -> Vec<f64>;
+    fn energy(&self) -> CoreEnergy;
+    fn mass_matrix(&self) -> DMatrix<f64>;
+    fn last_problem(&self) -> (&[f64], &[f64], &[f64]);
+    fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), StateError>;
+    fn set_inputs(&mut self, inputs: &[f64]) -> Result<(), CommandError>;
+    fn step(&mut self, n: usize) -> Result<CoreReport, StepError>;
+    fn snapshot(&self) -> CoreSnapshot;
+    fn restore(&mut self, snapshot: &CoreSnapshot) -> Result<(), SnapshotError>;
+}
+
+impl<const NV: usize, M: PlanarMachine<NV>> Run for Core<NV, M> {
+    fn q(&self) -> &[f64] {
+        self.q().as_slice()
+    }
+    fn v(&self) -> &[f64] {
+        self.v().as_slice()
+    }
+    fn time(&self) -> f64 {
+        self.time()
+    }
+    fn options(&self) -> &StepOptions {
+        self.options()
+    }
+    fn rule(&self) -> ContactRule {
+        self.rule()
+    }
+    fn inputs(&self) -> &[f64] {
+        self.inputs()
+    }
+    fn contacts(&self) -> &[PlanarActiveContact] {
+        self.contacts()
+    }
+    fn centres(&self) -> Vec<[f64; 2]> {
+        let machine = self.machine();
+        let centre = |i| machine.disc(i, self.q()).centre.into();
+        (0..machine.n_discs()).map(centre).collect()
+    }
+    fn gaps(&self) -> Vec<f64> {
+        self.gaps()
+    }
+    fn energy(&self) -> CoreEnergy {
+        self.energy()
+    }
+    fn mass_matrix(&self) -> DMatrix<f64> {
+        let M = self.mass_matrix();
+        DMatrix::from_column_slice(NV, NV, M.as_slice())
+    }
+    fn last_problem(&self) -> (&[f64], &[f64], &[f64]) {
+        self.last_problem()
+    }
+    fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), StateError> {
+        self.set_state(q, v)
+    }
+    fn set_inputs(&mut self, inputs: &[f64]) -> Result<(), CommandError> {
+        self.set_inputs(inputs)
+    }
+    fn step(&mut self, n: usize) -> Result<CoreReport, StepError> {
+        self.step(n)
+    }
+    fn snapshot(&self) -> CoreSnapshot {
+        self.snapshot()
+    }
+    fn restore(&mut self, snapshot: &CoreSnapshot) -> Result<(), SnapshotError> {
+        self.restore(snapshot)
+    }
+}
+
+/// Everything that a planar simulation needs to continue bit for bit; picklable.
+#[pyclass(module = "rover_gym._core", frozen)]
+pub struct PlanarSnapshot {
+    inner: CoreSnapshot,
+}
+
+#[pymethods]
+impl PlanarSnapshot {
+    #[staticmethod]
+    fn from_bytes(data: &[u8]) -> PyResult<Self> {
+        Ok(Self {
+            inner: postcard::from_bytes(data).map_err(|e| damaged(&e))?,
+        })
+    }
+
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = postcard::to_stdvec(&self.inner).map_err(|e| damaged(&e))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+        other
+            .cast::<Self>()
+            .is_ok_and(|o| o.get().inner == self.inner)
+    }
+
+    fn __hash__(&self) -> PyResult<u64> {
+        use std::hash::{DefaultHasher, Hasher};
+        let mut hasher = DefaultHasher::new();
+        hasher.write(&postcard::to_stdvec(&self.inner).map_err(|e| damaged(&e))?);
+        Ok(hasher.finish())
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let bytes = slf.get().to_bytes(slf.py())?;
+        Ok((slf.get_type().getattr("from_bytes")?, (bytes,)))
+    }
+}
+
+/// The contacts of the last step, as fresh arrays with one row a contact.
+#[pyclass(module = "rover_gym._core", frozen)]
+pub struct PlanarContacts {
+    active: Vec<PlanarActiveContact>,
+}
+
+impl PlanarContacts {
+    fn rows<'py>(
+        &self,
+        py: Python<'py>,
+        f: impl Fn(&PlanarActiveContact) -> [f64; 2],
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        fresh_rows(py, &self.active.iter().map(f).collect::<Vec<_>>())
+    }
+}
+
+#[pymethods]
+impl PlanarContacts {
+    #[getter]
+    fn discs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_iter(
+            py,
+            self.active.iter().map(|a| i64::from(a.contact.key.disc)),
+        )
+    }
+
+    #[getter]
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.rows(py, |a| a.contact.foot.into())
+    }
+
+    #[getter]
+    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.rows(py, |a| a.contact.n.into())
+    }
+
+    #[getter]
+    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.active.iter().map(|a| a.contact.gap))
+    }
+
+    #[getter]
+    fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.rows(py, |a| a.impulse)
+    }
+
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.rows(py, |a| a.velocity)
+    }
+
+    fn __len__(&self) -> usize {
+        self.active.len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("PlanarContacts({})", self.active.len())
+    }
+}
+
+/// A planar machine on a ground, stepped through time by the rover's own schemes.
+#[pyclass(module = "rover_gym._core", subclass)]
+pub struct PlanarSimulation {
+    inner: Box<dyn Run>,
+    ground: Py<PyAny>,
+    parameters: Py<PyDict>,
+    solver: String,
+    max_iterations: usize,
+}
+
+/// The keyword arguments of a step, checked.
+struct Options {
+    step: StepOptions,
+    rule: ContactRule,
+    solver: String,
+    max_iterations: usize,
+}
+
+/// Reads the options that both kinds of simulation take.
+fn options(given: Option<&Bound<'_, PyDict>>) -> PyResult<Options> {
+    let mut step = StepOptions::default();
+    let mut rule = ContactRule::Nearest;
+    let (mut solver, mut tolerance, mut max_iterations) = ("auto".to_owned(), 1e-12, 1000_usize);
+    for (key, value) in given.into_iter().flatten() {
+        let key: String = key.extract()?;
+        match key.as_str() {
+            "gravity" => step.gravity = pair(&value, Kind::Option, "gravity")?.push(0.0),
+            "friction" => step.friction_coefficient = value.extract()?,
+            "restitution" => step.restitution = value.extract()?,
+            "time_step" => step.time_step = value.extract()?,
+            "variant" => step.variant = choice("variant", &value.extract::<String>()?, &VARIANTS)?,
+            "theta" => step.theta = value.extract()?,
+            "forecast" => step.forecast = value.extract()?,
+            "stabilisation" => {
+                step.stabilisation = choice(
+                    "stabilisation",
+                    &value.extract::<String>()?,
+                    &STABILISATIONS,
+                )?;
+            }
+            "warm_start" => step.warm_start = value.extract()?,
+            "contact" => rule = choice("contact", &value.extract::<String>()?, &RULES)?,
+            "solver" => solver = value.extract()?,
+            "tolerance" => tolerance = value.extract()?,
+            "max_iterations" => max_iterations = value.extract()?,
+            _ => {
+                let message = format!("{key}: is no option of a planar simulation");
+                return Err(pyo3::exceptions::PyTypeError::new_err(message));
+            }
+        }
+    }
+    step.solver = solver_options(&solver, tolerance, max_iterations)?;
+    Ok(Options {
+        step,
+        rule,
+        solver,
+        max_iterations,
+    })
+}
+
+/// Two numbers.
+fn pair(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vector2<f64>> {
+    let values = vector(value, kind, field)?;
+    match values[..] {
+        [x, y] => Ok(Vector2::new(x, y)),
+        _ => Err(BorderError {
+            kind,
+            message: format!("{field}: needs 2 entries, has {}", values.len()),
+            field: Some(field.to_owned()),
+            value: Value::Count(values.len()),
+        }
+        .into()),
+    }
+}
+
+impl PlanarSimulation {
+    fn build<const NV: usize, M: PlanarMachine<NV> + 'static>(
+        machine: M,
+        ground: &Bound<'_, PyAny>,
+        parameters: Bound<'_, PyDict>,
+        given: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let terrain: Arc<dyn Ground> = parse(ground)?;
+        let options = options(given)?;
+        let inner =
+            Core::new(machine, terrain, options.rule, options.step).map_err(BorderError::from)?;
+        Ok(Self {
+            inner: Box::new(inner),
+            ground: ground.clone().unbind(),
+            parameters: parameters.unbind(),
+            solver: options.solver,
+            max_iterations: options.max_iterations,
+        })
+    }
+}
+
+#[pymethods]
+impl PlanarSimulation {
+    #[getter]
+    fn ground(&self, py: Python<'_>) -> Py<PyAny> {
+        self.ground.clone_ref(py)
+    }
+
+    #[getter]
+    fn time(&self) -> f64 {
+        self.inner.time()
+    }
+
+    #[getter]
+    fn time_step(&self) -> f64 {
+        self.inner.options().time_step
+    }
+
+    #[getter]
+    fn q<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, self.inner.q())
+    }
+
+    #[getter]
+    fn v<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, self.inner.v())
+    }
+
+    /// Centres of the discs that touch the ground.
+    #[getter]
+    fn centres<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        fresh_rows(py, &self.inner.centres())
+    }
+
+    #[getter]
+    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, &self.inner.gaps())
+    }
+
+    #[getter]
+    fn torques<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, self.inner.inputs())
+    }
+
+    /// The keyword arguments that describe the machine.
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.parameters.bind(py).copy()
+    }
+
+    /// The keyword arguments that make a simulation with these options.
+    #[getter]
+    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let o = self.inner.options();
+        let settings = PyDict::new(py);
+        settings.set_item("gravity", (o.gravity.x, o.gravity.y))?;
+        settings.set_item("friction", o.friction_coefficient)?;
+        settings.set_item("restitution", o.restitution)?;
+        settings.set_item("time_step", o.time_step)?;
+        settings.set_item("variant", name_of(o.variant, &VARIANTS))?;
+        settings.set_item("theta", o.theta)?;
+        settings.set_item("forecast", o.forecast)?;
+        settings.set_item("solver", &self.solver)?;
+        settings.set_item("tolerance", o.solver.tolerance)?;
+        settings.set_item("max_iterations", self.max_iterations)?;
+        settings.set_item("stabilisation", name_of(o.stabilisation, &STABILISATIONS))?;
+        settings.set_item("warm_start", o.warm_start)?;
+        settings.set_item("contact", name_of(self.inner.rule(), &RULES))?;
+        Ok(settings)
+    }
+
+    #[pyo3(signature = (q, v = None))]
+    fn set_state(&mut self, q: &Bound<'_, PyAny>, v: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let q = vector(q, Kind::State, "q")?;
+        let rest = || Ok(vec![0.0; self.inner.v().len()]);
+        let v = v.map_or_else(rest, |v| vector(v, Kind::State, "v"))?;
+        Ok(self.inner.set_state(&q, &v).map_err(BorderError::from)?)
+    }
+
+    fn set_torques(&mut self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+        let torques = vector(torques, Kind::Command, "torques")?;
+        Ok(self.inner.set_inputs(&torques).map_err(BorderError::from)?)
+    }
+
+    #[pyo3(signature = (n = 1))]
+    fn step(&mut self, py: Python<'_>, n: i64) -> PyResult<StepReport> {
+        let steps = step_count(n)?;
+        let inner = &mut self.inner;
+        let report = py.detach(|| inner.step(steps)).map_err(BorderError::from)?;
+        Ok(report.into())
+    }
+
+    #[getter]
+    fn contacts(&self) -> PlanarContacts {
+        PlanarContacts {
+            active: self.inner.contacts().to_vec(),
+        }
+    }
+
+    fn energy(&self) -> Energy {
+        self.inner.energy().into()
+    }
+
+    fn mass_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        fresh_matrix(py, &self.inner.mass_matrix())
+    }
+
+    /// W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem.
+    fn last_problem<'py>(&self, py: Python<'py>) -> PyResult<Problem<'py>> {
+        let (W, q, mu) = self.inner.last_problem();
+        let size = 2 * mu.len();
+        let q = if size == 0 { &q[..0] } else { q };
+        let W = DMatrix::from_row_slice(size, size, &W[..size * size]);
+        Ok((fresh_matrix(py, &W)?, fresh(py, q), fresh(py, mu)))
+    }
+
+    fn snapshot(&self) -> PlanarSnapshot {
+        PlanarSnapshot {
+            inner: self.inner.snapshot(),
+        }
+    }
+
+    fn restore(&mut self, snapshot: &PlanarSnapshot) -> PyResult<()> {
+        Ok(self
+            .inner
+            .restore(&snapshot.inner)
+            .map_err(BorderError::from)?)
+    }
+
+    fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let own = slf.borrow();
+        let (kind, ground) = (slf.get_type().name()?, own.ground.bind(slf.py()).repr()?);
+        Ok(format!("{kind}({ground}, time={})", own.time()))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
+        let py = slf.py();
+        let own = slf.borrow();
+        let settings = own.settings(py)?;
+        settings.update(own.parameters.bind(py).as_mapping())?;
+        let rebuild = slf.get_type().getattr("_rebuild")?;
+        let arguments = (slf.get_type(), own.ground(py), settings, own.snapshot());
+        (rebuild, arguments).into_pyobject(py)
+    }
+
+    #[staticmethod]
+    fn _rebuild<'py>(
+        kind: &Bound<'py, PyAny>,
+        ground: &Bound<'py, PyAny>,
+        settings: &Bound<'py, PyDict>,
+        snapshot: &PlanarSnapshot,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let made = kind.call((ground,), Some(settings))?;
+        made.cast::<Self>()?.borrow_mut().restore(snapshot)?;
+        Ok(made)
+    }
+}
+
+/// The ball of the report's section 3.1: coordinates x, y, theta.
+#[pyclass(module = "rover_gym._core", extends = PlanarSimulation)]
+pub struct BallSimulation;
+
+#[pymethods]
+impl BallSimulation {
+    #[new]
+    #[pyo3(signature = (ground, *, mass = 3.0, radius = 1.5, inertia = None, **options))]
+    fn new(
+        ground: &Bound<'_, PyAny>,
+        mass: f64,
+        radius: f64,
+        inertia: Option<f64>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<PyClassInitializer<Self>> {
+        let inertia = inertia.unwrap_or(0.5 * mass * radius * radius);
+        let ball = Ball::new(mass, radius, inertia).map_err(|e| border(Kind::Model, &e))?;
+        let parameters = PyDict::new(ground.py());
+        parameters.set_item("mass", mass)?;
+        parameters.set_item("radius", radius)?;
+        parameters.set_item("inertia", inertia)?;
+        let base = PlanarSimulation::build(ball, ground, parameters, options)?;
+        Ok(PyClassInitializer::from(base).add_subclass(Self))
+    }
+}
+
+/// The two-wheel rover of the report's section 3.1: coordinates x, y, theta, theta_A, theta_B.
+#[pyclass(module = "rover_gym._core", extends = PlanarSimulation)]
+pub struct TwoWheelRoverSimulation;
+
+/// One number for both wheels, or one for each.
+fn both(value: Option<&Bound<'_, PyAny>>, field: &str, default: [f64; 2]) -> PyResult<[f64; 2]> {
+    let Some(value) = value else {
+        return Ok(default);
+    };
+    if let Ok(x) = value.extract::<f64>() {
+        return Ok([x, x]);
+    }
+    Ok(pair(value, Kind::Model, field)?.into())
+}
+
+#[pymethods]
+impl TwoWheelRoverSimulation {
+    #[new]
+    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
+    #[pyo3(signature = (ground, *, mass = 130.0, inertia = None, wheel_mass = None, wheel_radius = None, wheel_inertia = None,
+        axle_a = None, axle_b = None, **options))]
+    fn new(
+        ground: &Bound<'_, PyAny>,
+        mass: f64,
+        inertia: Option<f64>,
+        wheel_mass: Option<&Bound<'_, PyAny>>,
+        wheel_radius: Option<&Bound<'_, PyAny>>,
+        wheel_inertia: Option<&Bound<'_, PyAny>>,
+        axle_a: Option<&Bound<'_, PyAny>>,
+        axle_b: Option<&Bound<'_, PyAny>>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<PyClassInitializer<Self>> {
+        let masses = both(wheel_mass, "wheel_mass", [60.0; 2])?;
+        let radii = both(wheel_radius, "wheel_radius", [0.2; 2])?;
+        // Discs, unless told otherwise.
+        let of_disc = |i: usize| 0.5 * masses[i] * radii[i] * radii[i];
+        let inertias = both(wheel_inertia, "wheel_inertia", [of_disc(0), of_disc(1)])?;
+        let axle = |given: Option<&Bound<'_, PyAny>>, field: &str, x: f64| {
+            given.map_or(Ok(Vector2::new(x, 0.0)), |a| pair(a, Kind::Model, field))
+        };
+        let axles = [axle(axle_a, "axle_a", -0.4)?, axle(axle_b, "axle_b", 0.4)?];
+        // A rod from axle to axle, unless told otherwise.
+        let inertia = inertia.unwrap_or(mass * (axles[1] - axles[0]).norm_squared() / 12.0);
+        let wheel = |i: usize| PlanarWheel {
+            mass: masses[i],
+            radius: radii[i],
+            inertia: inertias[i],
+            axle: axles[i],
+        };
+        let rover = TwoWheelRover::new(mass, inertia, wheel(0), wheel(1))
+            .map_err(|e| border(Kind::Model, &e))?;
+        let parameters = PyDict::new(ground.py());
+        parameters.set_item("mass", mass)?;
+        parameters.set_item("inertia", inertia)?;
+        parameters.set_item("wheel_mass", (masses[0], masses[1]))?;
+        parameters.set_item("wheel_radius", (radii[0], radii[1]))?;
+        parameters.set_item("wheel_inertia", (inertias[0], inertias[1]))?;
+        parameters.set_item("axle_a", (axles[0].x, axles[0].y))?;
+        parameters.set_item("axle_b", (axles[1].x, axles[1].y))?;
+        let base = PlanarSimulation::build(rover, ground, parameters, options)?;
+        Ok(PyClassInitializer::from(base).add_subclass(Self))
+    }
+}
+
+/// Adds the planar classes to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<crate::planar_ground::Line>()?;
+    module.add_class::<crate::planar_ground::Sine>()?;
+    module.add_class::<crate::planar_ground::Spline>()?;
+    module.add_class::<crate::planar_ground::Polyline>()?;
+    module.add_class::<PlanarSnapshot>()?;
+    module.add_class::<PlanarContacts>()?;
+    module.add_class::<PlanarSimulation>()?;
+    module.add_class::<BallSimulation>()?;
+    module.add_class::<TwoWheelRoverSimulation>()?;
+    Ok(())
+}

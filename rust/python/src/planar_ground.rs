@@ -1,0 +1,273 @@
+//! `Line`, `Sine`, `Spline`, `Polyline`: the grounds of planar scenes.
+
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use rover_core::planar::{
+    Ground, Line as CoreLine, PlanarError, Polyline as CorePolyline, Sine as CoreSine,
+    Spline as CoreSpline,
+};
+use std::sync::Arc;
+
+use crate::arrays::{fresh, vector};
+use crate::errors::{BorderError, Kind, Value};
+
+/// A planar error on its way to Python, as a terrain's or a machine's.
+pub fn border(kind: Kind, e: &PlanarError) -> BorderError {
+    let value = match e {
+        PlanarError::NotFinite { value, .. }
+        | PlanarError::NotPositive { value, .. }
+        | PlanarError::Negative { value, .. }
+        | PlanarError::WheelsOverlap { value, .. }
+        | PlanarError::NotAFunction { value, .. }
+        | PlanarError::RepeatedPoint { value, .. } => Value::Number(*value),
+        PlanarError::TooFewPoints { count, .. } | PlanarError::MismatchedLengths { count, .. } => {
+            Value::Count(*count)
+        }
+        _ => Value::Nothing,
+    };
+    BorderError {
+        kind,
+        message: e.to_string(),
+        field: Some(e.field()),
+        value,
+    }
+}
+
+fn terrain<T>(made: Result<T, PlanarError>) -> Result<T, BorderError> {
+    made.map_err(|e| border(Kind::Terrain, &e))
+}
+
+/// Height at one place or at many.
+fn heights<'py>(ground: &dyn Ground, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let py = x.py();
+    if let Ok(x) = x.extract::<f64>() {
+        return Ok(ground.height(x).into_pyobject(py)?.into_any());
+    }
+    let places = vector(x, Kind::Option, "x")?;
+    let heights: Vec<f64> = places.iter().map(|x| ground.height(*x)).collect();
+    Ok(fresh(py, &heights).into_any())
+}
+
+/// The ground y = slope x + offset.
+#[pyclass(module = "rover_gym._core", frozen)]
+pub struct Line {
+    inner: CoreLine,
+}
+
+#[pymethods]
+impl Line {
+    #[new]
+    #[pyo3(signature = (slope = 0.0, offset = 0.0))]
+    fn new(slope: f64, offset: f64) -> PyResult<Self> {
+        Ok(Self {
+            inner: terrain(CoreLine::new(slope, offset))?,
+        })
+    }
+
+    #[getter]
+    fn slope(&self) -> f64 {
+        self.inner.slope()
+    }
+
+    #[getter]
+    fn offset(&self) -> f64 {
+        self.inner.offset()
+    }
+
+    fn height<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        heights(&self.inner, x)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Line(slope={}, offset={})", self.slope(), self.offset())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, (f64, f64)) {
+        let own = slf.get();
+        (slf.get_type().into_any(), (own.slope(), own.offset()))
+    }
+}
+
+/// The ground y = amplitude sin(2 pi x / wavelength + phase) + offset.
+#[pyclass(module = "rover_gym._core", frozen)]
+pub struct Sine {
+    inner: CoreSine,
+}
+
+#[pymethods]
+impl Sine {
+    #[new]
+    #[pyo3(signature = (amplitude, wavelength, phase = 0.0, offset = 0.0))]
+    fn new(amplitude: f64, wavelength: f64, phase: f64, offset: f64) -> PyResult<Self> {
+        Ok(Self {
+            inner: terrain(CoreSine::new(amplitude, wavelength, phase, offset))?,
+        })
+    }
+
+    #[getter]
+    fn amplitude(&self) -> f64 {
+        self.inner.parameters()[0]
+    }
+
+    #[getter]
+    fn wavelength(&self) -> f64 {
+        self.inner.parameters()[1]
+    }
+
+    #[getter]
+    fn phase(&self) -> f64 {
+        self.inner.parameters()[2]
+    }
+
+    #[getter]
+    fn offset(&self) -> f64 {
+        self.inner.parameters()[3]
+    }
+
+    fn height<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        heights(&self.inner, x)
+    }
+
+    fn __repr__(&self) -> String {
+        let [amplitude, wavelength, phase, offset] = self.inner.parameters();
+        format!(
+            "Sine(amplitude={amplitude}, wavelength={wavelength}, phase={phase}, offset={offset})"
+        )
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> (Bound<'py, PyAny>, (f64, f64, f64, f64)) {
+        (
+            slf.get_type().into_any(),
+            slf.get().inner.parameters().into(),
+        )
+    }
+}
+
+/// The natural cubic spline through points, continued by its tangents: a ground with continuous curvature.
+#[pyclass(module = "rover_gym._core", frozen)]
+pub struct Spline {
+    inner: CoreSpline,
+}
+
+#[pymethods]
+impl Spline {
+    #[new]
+    fn new(x: &Bound<'_, PyAny>, y: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let (x, y) = (
+            vector(x, Kind::Terrain, "x")?,
+            vector(y, Kind::Terrain, "y")?,
+        );
+        Ok(Self {
+            inner: terrain(CoreSpline::new(&x, &y))?,
+        })
+    }
+
+    #[getter]
+    fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        fresh(py, self.inner.x()).into_any()
+    }
+
+    #[getter]
+    fn y<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        fresh(py, self.inner.y()).into_any()
+    }
+
+    fn height<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        heights(&self.inner, x)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Spline({} points)", self.inner.x().len())
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (py, own) = (slf.py(), slf.get());
+        let points = PyTuple::new(py, [own.x(py), own.y(py)])?;
+        Ok((slf.get_type().into_any(), points))
+    }
+}
+
+/// Straight pieces between points, which may stand above each other: steps, ramps, kerbs.
+#[pyclass(module = "rover_gym._core", frozen)]
+pub struct Polyline {
+    inner: CorePolyline,
+}
+
+#[pymethods]
+impl Polyline {
+    #[new]
+    fn new(x: &Bound<'_, PyAny>, y: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let (x, y) = (
+            vector(x, Kind::Terrain, "x")?,
+            vector(y, Kind::Terrain, "y")?,
+        );
+        Ok(Self {
+            inner: terrain(CorePolyline::new(&x, &y))?,
+        })
+    }
+
+    /// Level ground with a step up (or down) at x.
+    #[staticmethod]
+    fn step(x: f64, height: f64) -> PyResult<Self> {
+        Ok(Self {
+            inner: terrain(CorePolyline::step(x, height))?,
+        })
+    }
+
+    #[getter]
+    fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        let x: Vec<f64> = self.inner.points().iter().map(|p| p.x).collect();
+        fresh(py, &x).into_any()
+    }
+
+    #[getter]
+    fn y<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
+        let y: Vec<f64> = self.inner.points().iter().map(|p| p.y).collect();
+        fresh(py, &y).into_any()
+    }
+
+    fn height<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        heights(&self.inner, x)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Polyline({} points)", self.inner.points().len())
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (py, own) = (slf.py(), slf.get());
+        let points = PyTuple::new(py, [own.x(py), own.y(py)])?;
+        Ok((slf.get_type().into_any(), points))
+    }
+}
+
+/// The ground in a Python object.
+pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<Arc<dyn Ground>> {
+    if let Ok(line) = given.cast::<Line>() {
+        return Ok(Arc::new(line.get().inner));
+    }
+    if let Ok(sine) = given.cast::<Sine>() {
+        return Ok(Arc::new(sine.get().inner));
+    }
+    if let Ok(spline) = given.cast::<Spline>() {
+        return Ok(Arc::new(spline.get().inner.clone()));
+    }
+    if let Ok(polyline) = given.cast::<Polyline>() {
+        return Ok(Arc::new(polyline.get().inner.clone()));
+    }
+    let shown = given
+        .repr()
+        .map_or_else(|_| String::new(), |r| r.to_string());
+    let message = format!("ground: must be a Line, Sine, Spline or Polyline, is {shown}");
+    Err(BorderError {
+        kind: Kind::Terrain,
+        message,
+        field: Some("ground".to_owned()),
+        value: Value::Text(shown),
+    }
+    .into())
+}

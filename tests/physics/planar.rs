@@ -1,0 +1,12 @@
+//! The planar systems: against references, closed forms and conservation laws.
+#![allow(clippy::unwrap_used)]
+
+#[path = "planar/scenes.rs"]
+mod scenes;
+
+#[path = "planar/ball.rs"]
+mod ball;
+#[path = "planar/siconos.rs"]
+mod siconos;
+#[path = "planar/two_wheel_rover.rs"]
+mod two_wheel_rover;

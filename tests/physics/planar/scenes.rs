@@ -1,0 +1,46 @@
+//! What the planar tests share.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use rover_core::integrator::{Stabilisation, StepOptions, Variant};
+use rover_core::planar::{Ball, BallSimulation, ContactRule, Ground, Line};
+
+pub const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
+pub const G: f64 = 9.81;
+
+/// Options with gravity straight down.
+pub fn options(g: f64, friction: f64, restitution: f64, time_step: f64) -> StepOptions {
+    StepOptions {
+        gravity: Vector3::new(0.0, -g, 0.0),
+        friction_coefficient: friction,
+        restitution,
+        time_step,
+        ..StepOptions::default()
+    }
+}
+
+/// The reference runs' own settings: no projection.
+pub fn unprojected(options: StepOptions) -> StepOptions {
+    StepOptions {
+        stabilisation: Stabilisation::None,
+        ..options
+    }
+}
+
+/// A ball on a ground with true contact.
+pub fn ball_on(ground: impl Ground + 'static, ball: Ball, options: StepOptions) -> BallSimulation {
+    BallSimulation::new(ball, Arc::new(ground), ContactRule::Nearest, options).unwrap()
+}
+
+/// Level ground at height 0.
+pub fn level() -> Line {
+    Line::new(0.0, 0.0).unwrap()
+}
+
+/// Number of steps in a time.
+pub fn count(duration: f64, time_step: f64) -> usize {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let n = (duration / time_step).round() as usize;
+    n
+}

@@ -1,0 +1,484 @@
+//! The two-wheel rover against closed forms and finite differences.
+
+use std::sync::Arc;
+
+use nalgebra::{SMatrix, SVector, Vector2};
+use rover_core::integrator::{StepOptions, Variant};
+use rover_core::planar::{
+    ContactRule, Ground, Line, PlanarMachine, PlanarWheel, Polyline, Sine, TwoWheelRover,
+    TwoWheelRoverSimulation, contact_rows,
+};
+
+use crate::scenes::{G, VARIANTS, count, level, options};
+
+type Q = SVector<f64, 5>;
+
+/// The original's scale: body 130 kg, wheels 60 kg of 20 cm, half length 40 cm.
+fn report_rover() -> TwoWheelRover {
+    rover(0.4, 0.0)
+}
+
+/// Axles at ±half length and `drop` below the body's mass centre.
+fn rover(half: f64, drop: f64) -> TwoWheelRover {
+    let wheel = |x: f64| PlanarWheel {
+        mass: 60.0,
+        radius: 0.2,
+        inertia: 1.2,
+        axle: Vector2::new(x, -drop),
+    };
+    TwoWheelRover::new(130.0, 130.0 * 0.64 / 12.0, wheel(-half), wheel(half)).unwrap()
+}
+
+/// Nothing about it is symmetric.
+fn lopsided() -> TwoWheelRover {
+    let a = PlanarWheel {
+        mass: 20.0,
+        radius: 0.15,
+        inertia: 0.3,
+        axle: Vector2::new(-0.5, -0.1),
+    };
+    let b = PlanarWheel {
+        mass: 45.0,
+        radius: 0.25,
+        inertia: 1.1,
+        axle: Vector2::new(0.35, -0.2),
+    };
+    TwoWheelRover::new(80.0, 6.0, a, b).unwrap()
+}
+
+fn on(
+    ground: impl Ground + 'static,
+    rover: TwoWheelRover,
+    options: StepOptions,
+) -> TwoWheelRoverSimulation {
+    TwoWheelRoverSimulation::new(rover, Arc::new(ground), ContactRule::Nearest, options).unwrap()
+}
+
+/// Standing on a slope (rise positive forward) with both wheels of `r` touching.
+fn on_slope(rover: &TwoWheelRover, angle: f64) -> [f64; 5] {
+    let [a, b] = rover.wheels();
+    assert!((a.radius - b.radius).abs() < 1e-12);
+    // Axles at height r over the slope along its normal; the body's centre `−axle.y` above them.
+    let up = Vector2::new(-angle.sin(), angle.cos()) * (a.radius - a.axle.y);
+    [up.x, up.y, angle, 0.0, 0.0]
+}
+
+fn states() -> impl Iterator<Item = (Q, Q)> {
+    (0..20).map(|i| {
+        let wave = |k: f64| (1.3 * f64::from(i) + 2.1 * k).sin();
+        (
+            Q::from_fn(|k, _| 2.0 * wave(k as f64)),
+            Q::from_fn(|k, _| 3.0 * wave(k as f64 + 7.0)),
+        )
+    })
+}
+
+/// Kinetic energy from the bodies' velocities, without M.
+fn kinetic(rover: &TwoWheelRover, q: &Q, v: &Q) -> f64 {
+    let mut sum = 0.5 * rover.mass() * v.xy().norm_squared() + 0.5 * rover.inertia() * v[2] * v[2];
+    let step = 1e-6;
+    for (i, wheel) in rover.wheels().iter().enumerate() {
+        let place = |s: f64| rover.disc(i, &(q + v * s)).centre;
+        let velocity = (place(step) - place(-step)) / (2.0 * step);
+        sum += 0.5 * wheel.mass * velocity.norm_squared();
+        sum += 0.5 * wheel.inertia * v[3 + i] * v[3 + i];
+    }
+    sum
+}
+
+#[test]
+fn the_mass_matrix_is_that_of_the_bodies_velocities() {
+    for rover in [report_rover(), lopsided()] {
+        for (q, v) in states() {
+            let expected = kinetic(&rover, &q, &v);
+            let energy = 0.5 * v.dot(&(rover.mass_matrix(&q) * v));
+            assert!(
+                (energy - expected).abs() < 1e-8 * expected,
+                "{energy} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn quadratic_terms_and_gravity_are_lagranges() {
+    // F = ∂K/∂q − Ṁ v − ∂V/∂q.
+    let gravity = Vector2::new(0.7, -9.81);
+    let rover = lopsided();
+    let step = 1e-5;
+    for (q, v) in states() {
+        let M_rate: SMatrix<f64, 5, 5> = (rover.mass_matrix(&(q + v * step))
+            - rover.mass_matrix(&(q - v * step)))
+            / (2.0 * step);
+        let mut expected = -(M_rate * v);
+        for k in 0..5 {
+            let mut shift = Q::zeros();
+            shift[k] = step;
+            let lagrangian =
+                |q: &Q| 0.5 * v.dot(&(rover.mass_matrix(q) * v)) - rover.potential(q, &gravity);
+            expected[k] += (lagrangian(&(q + shift)) - lagrangian(&(q - shift))) / (2.0 * step);
+        }
+        let force = rover.force(&q, &v, &gravity, &[0.0, 0.0]);
+        assert!(
+            (force - expected).norm() < 1e-6 * (1.0 + expected.norm()),
+            "{force} {expected}"
+        );
+    }
+}
+
+#[test]
+fn motors_do_work_between_body_and_wheel() {
+    let rover = lopsided();
+    for (q, v) in states() {
+        let (on, off) = (
+            rover.force(&q, &v, &Vector2::zeros(), &[3.0, -5.0]),
+            rover.force(&q, &v, &Vector2::zeros(), &[0.0, 0.0]),
+        );
+        let power = v.dot(&(on - off));
+        // A positive torque drives forward, that is to negative angles relative to the body.
+        let expected = 3.0 * (v[2] - v[3]) - 5.0 * (v[2] - v[4]);
+        assert!((power - expected).abs() < 1e-12, "{power} {expected}");
+    }
+}
+
+#[test]
+fn the_normal_row_is_the_gaps_gradient_and_the_tangential_one_the_rims_velocity() {
+    let sine = Sine::new(0.3, 3.0, 0.2, 0.0).unwrap();
+    let rover = lopsided();
+    for (mut q, v) in states() {
+        q[1] = 0.9 + 0.05 * q[1];
+        q[2] *= 0.1;
+        let o = StepOptions {
+            forecast: 1.0,
+            ..options(0.0, 0.5, 0.0, 1e-9)
+        };
+        let gaps = |q: &Q| {
+            let mut simulation = on(sine, rover, o.clone());
+            simulation.set_state(q.as_slice(), &[0.0; 5]).unwrap();
+            simulation.gaps()
+        };
+        let step = 1e-6;
+        let (before, after) = (gaps(&(q - v * step)), gaps(&(q + v * step)));
+        for i in 0..2 {
+            let disc = rover.disc(i, &q);
+            let mut facing = Vec::new();
+            sine.facing(&disc.centre, 5.0, &mut facing);
+            let near = facing
+                .iter()
+                .min_by(|a, b| a.distance.total_cmp(&b.distance))
+                .unwrap();
+            let contact = rover_core::planar::PlanarContact {
+                key: rover_core::planar::PlanarKey {
+                    disc: u32::try_from(i).unwrap(),
+                    feature: 0,
+                },
+                point: disc.centre - near.n * disc.radius,
+                foot: near.foot,
+                n: near.n,
+                gap: near.distance - disc.radius,
+            };
+            let [normal, tangential] = contact_rows(&rover, &q, &[contact])[0];
+            let rate = (after[i] - before[i]) / (2.0 * step);
+            assert!(
+                (normal.dot(&v) - rate).abs() < 1e-6,
+                "{} {rate}",
+                normal.dot(&v)
+            );
+            // The rim's material point: the centre's velocity and the wheel's own turn.
+            let place = |s: f64| rover.disc(i, &(q + v * s)).centre;
+            let centre = (place(step) - place(-step)) / (2.0 * step);
+            let rim = centre.dot(&contact.t()) + disc.radius * v[3 + i];
+            assert!((tangential.dot(&v) - rim).abs() < 1e-6);
+        }
+    }
+}
+
+#[test]
+fn loads_on_the_flat_are_those_of_statics() {
+    let wheel = |x: f64| PlanarWheel {
+        mass: 60.0,
+        radius: 0.2,
+        inertia: 1.2,
+        axle: Vector2::new(x, -0.1),
+    };
+    let rover = TwoWheelRover::new(130.0, 7.0, wheel(-0.5), wheel(0.3)).unwrap();
+    let mut simulation = on(level(), rover, options(G, 0.7, 0.0, 5e-3));
+    simulation
+        .set_state(&[0.0, 0.3, 0.0, 0.0, 0.0], &[0.0; 5])
+        .unwrap();
+    simulation.step(100).unwrap();
+    assert!(simulation.v().norm() < 1e-12);
+    let loads: Vec<f64> = simulation
+        .contacts()
+        .iter()
+        .map(|c| c.impulse[0] / 5e-3)
+        .collect();
+    // Body's weight split by 0.3 : 0.5, each wheel its own.
+    let expected = [
+        60.0 * G + 130.0 * G * 0.3 / 0.8,
+        60.0 * G + 130.0 * G * 0.5 / 0.8,
+    ];
+    for (load, expected) in loads.iter().zip(expected) {
+        assert!((load - expected).abs() < 1e-9 * expected, "{loads:?}");
+    }
+}
+
+/// Torque (N m, each wheel) that holds the rover on a slope: 2 τ = r m g sin α.
+fn holding(rover: &TwoWheelRover, angle: f64) -> f64 {
+    0.5 * rover.wheels()[0].radius * rover.total_mass() * G * angle.sin()
+}
+
+#[test]
+fn on_a_slope_torques_hold_it_and_the_loads_are_those_of_moments() {
+    let (angle, drop) = (0.3_f64, 0.15);
+    let rover = rover(0.4, drop);
+    let tau = holding(&rover, angle);
+    let mut simulation = on(
+        Line::new(angle.tan(), 0.0).unwrap(),
+        rover,
+        options(G, 0.7, 0.0, 5e-3),
+    );
+    simulation
+        .set_state(&on_slope(&rover, angle), &[0.0; 5])
+        .unwrap();
+    simulation.set_inputs(&[tau, tau]).unwrap();
+    simulation.step(400).unwrap();
+    assert!(simulation.v().norm() < 1e-9, "{}", simulation.v());
+    let loads: Vec<f64> = simulation
+        .contacts()
+        .iter()
+        .map(|c| c.impulse[0] / 5e-3)
+        .collect();
+    // Moments about the contact points: the mass centre at height z over the slope shifts m g sin α z / (2 l) to the back.
+    let z = 0.2 + 130.0 * drop / 250.0;
+    let (m, l) = (rover.total_mass(), 0.4);
+    let shift = m * G * angle.sin() * z / (2.0 * l);
+    let half = 0.5 * m * G * angle.cos();
+    assert!(
+        (loads[0] - half - shift).abs() < 1e-8 * half,
+        "{loads:?} {half} {shift}"
+    );
+    assert!((loads[1] - half + shift).abs() < 1e-8 * half, "{loads:?}");
+}
+
+#[test]
+fn it_tips_over_where_the_mass_centre_passes_the_lower_contact() {
+    // tan α = l/z, held by the back wheel's motor alone: at the limit it carries everything.
+    let drop = 0.5;
+    let rover = rover(0.4, drop);
+    let z = 0.2 + 130.0 * drop / 250.0;
+    let limit = (0.4_f64 / z).atan();
+    for (share, tips) in [(0.998, false), (1.002, true)] {
+        let angle = share * limit;
+        let tau = holding(&rover, angle);
+        let mut simulation = on(
+            Line::new(angle.tan(), 0.0).unwrap(),
+            rover,
+            options(G, 5.0, 0.0, 2e-3),
+        );
+        simulation
+            .set_state(&on_slope(&rover, angle), &[0.0; 5])
+            .unwrap();
+        simulation.set_inputs(&[2.0 * tau, 0.0]).unwrap();
+        simulation.step(1500).unwrap();
+        let lifted = simulation.gaps()[1];
+        assert_eq!(lifted > 0.01, tips, "{share}: {lifted}");
+    }
+}
+
+#[test]
+fn the_steepest_slope_it_climbs_is_the_friction_angle() {
+    // Both wheels driven at their friction limit carry m g sin α = μ m g cos α; above, it slides back whatever the torque.
+    let mu = 0.5;
+    let rover = report_rover();
+    for (share, climbs) in [(0.97, true), (1.03, false)] {
+        let angle = share * f64::atan(mu);
+        let mut best = f64::NEG_INFINITY;
+        for k in 1..=60 {
+            // Rear-loaded on a slope: torques in proportion to the loads, by moments.
+            let tau = holding(&rover, angle) * (0.7 + 0.02 * f64::from(k));
+            let shift = angle.tan() * 0.2 / 0.4;
+            let torques = [tau * (1.0 + shift), tau * (1.0 - shift)];
+            let mut simulation = on(
+                Line::new(angle.tan(), 0.0).unwrap(),
+                rover,
+                options(G, mu, 0.0, 5e-3),
+            );
+            simulation
+                .set_state(&on_slope(&rover, angle), &[0.0; 5])
+                .unwrap();
+            simulation.set_inputs(&torques).unwrap();
+            simulation.step(200).unwrap();
+            best = best.max(simulation.v()[0]);
+        }
+        assert_eq!(best > 0.0, climbs, "{share}: {best} m/s");
+    }
+}
+
+#[test]
+fn driving_on_the_flat_accelerates_at_the_closed_form() {
+    // (m + 2 J/r²) a = 2 τ/r while the wheels roll.
+    let rover = report_rover();
+    for variant in VARIANTS {
+        let mut simulation = on(
+            level(),
+            rover,
+            StepOptions {
+                variant,
+                ..options(G, 0.9, 0.0, 5e-3)
+            },
+        );
+        simulation
+            .set_state(&[0.0, 0.2, 0.0, 0.0, 0.0], &[0.0; 5])
+            .unwrap();
+        simulation.set_inputs(&[50.0, 50.0]).unwrap();
+        assert!(simulation.step(400).unwrap().is_converged());
+        let a = 2.0 * 50.0 / 0.2 / (rover.total_mass() + 2.0 * 1.2 / 0.04);
+        assert!(
+            (simulation.v()[0] - 2.0 * a).abs() < 1e-10,
+            "{} {}",
+            simulation.v()[0],
+            2.0 * a
+        );
+        // Load transfer: the torques' reaction on the body, and the body's inertia at the height of the axles: none beyond it.
+        let loads: Vec<f64> = simulation
+            .contacts()
+            .iter()
+            .map(|c| c.impulse[0] / 5e-3)
+            .collect();
+        let shift = 2.0 * 50.0 / 0.8;
+        assert!(
+            (loads[0] - loads[1] - 2.0 * shift).abs() < 1e-6,
+            "{loads:?}"
+        );
+    }
+}
+
+#[test]
+fn free_flight_is_a_parabola_and_keeps_its_energy() {
+    let far = Line::new(0.0, -1000.0).unwrap();
+    // With equal wheels beside the mass centre M is constant and a step exact.
+    let start = ([0.1, 2.0, 0.3, 0.0, 1.0], [1.0, 4.0, 2.0, -3.0, 0.5]);
+    for variant in VARIANTS {
+        let mut simulation = on(
+            far,
+            report_rover(),
+            StepOptions {
+                variant,
+                ..options(G, 0.5, 0.0, 5e-3)
+            },
+        );
+        simulation.set_state(&start.0, &start.1).unwrap();
+        let before = simulation.energy().total();
+        simulation.step(400).unwrap();
+        let after = simulation.energy().total();
+        assert!((after - before).abs() < 1e-9 * before, "{}", after - before);
+        let y = 2.0 + 4.0 * 2.0 - 0.5 * G * 4.0;
+        assert!(
+            (simulation.q()[1] - y).abs() < 1e-9,
+            "{}",
+            simulation.q()[1] - y
+        );
+    }
+    // Lopsided, its mass centre flies a parabola and the energy stays to second order with Newton.
+    let drift = |variant: Variant, h: f64| {
+        let mut simulation = on(
+            far,
+            lopsided(),
+            StepOptions {
+                variant,
+                ..options(G, 0.5, 0.0, h)
+            },
+        );
+        simulation.set_state(&start.0, &start.1).unwrap();
+        let before = simulation.energy().total();
+        simulation.step(count(2.0, h)).unwrap();
+        (simulation.energy().total() - before).abs() / before
+    };
+    for variant in VARIANTS {
+        let (coarse, fine) = (drift(variant, 8e-3), drift(variant, 1e-3));
+        let order = (coarse / fine).log2() / 3.0;
+        assert!(order > 1.8, "{variant:?}: {coarse} {fine}");
+        assert!(coarse < 1e-4, "{variant:?}: {coarse}");
+    }
+}
+
+#[test]
+fn it_drives_over_waves_and_up_a_step() {
+    let waves = Sine::new(0.08, 1.5, 0.0, 0.0).unwrap();
+    let step = Polyline::step(1.2, 0.05).unwrap();
+    for (ground, torque, way) in [
+        (Arc::new(waves) as Arc<dyn Ground>, 45.0, 3.0),
+        (Arc::new(step), 90.0, 3.0),
+    ] {
+        let mut simulation = TwoWheelRoverSimulation::new(
+            report_rover(),
+            ground,
+            ContactRule::Nearest,
+            options(G, 0.9, 0.0, 2e-3),
+        )
+        .unwrap();
+        simulation
+            .set_state(&[0.0, 0.35, 0.0, 0.0, 0.0], &[0.0; 5])
+            .unwrap();
+        simulation.step(500).unwrap();
+        simulation.set_inputs(&[torque, torque]).unwrap();
+        let mut deepest = 0.0_f64;
+        for _ in 0..10_000 {
+            assert!(simulation.step(1).unwrap().is_converged());
+            deepest = simulation.gaps().iter().fold(deepest, |m, g| m.min(*g));
+            if simulation.q()[0] > way {
+                break;
+            }
+        }
+        assert!(simulation.q()[0] > way, "{}", simulation.q());
+        assert!(
+            simulation.q()[2].abs() < 1.0,
+            "upright: {}",
+            simulation.q()[2]
+        );
+        assert!(deepest > -2e-3, "{deepest}");
+    }
+}
+
+#[test]
+fn without_friction_the_wheels_spin_on_the_spot() {
+    let mut simulation = TwoWheelRoverSimulation::new(
+        report_rover(),
+        Arc::new(Polyline::step(1.0, 0.05).unwrap()),
+        ContactRule::Nearest,
+        options(G, 0.0, 0.0, 2e-3),
+    )
+    .unwrap();
+    simulation
+        .set_state(&[0.0, 0.2, 0.0, 0.0, 0.0], &[0.0; 5])
+        .unwrap();
+    simulation.set_inputs(&[50.0, 50.0]).unwrap();
+    simulation.step(500).unwrap();
+    assert!(
+        simulation.q()[0].abs() < 1e-9,
+        "wheels spin: {}",
+        simulation.q()
+    );
+    assert!(simulation.v()[3] < -10.0);
+}
+
+#[test]
+fn rovers_that_cannot_be_are_refused() {
+    let wheel = |x: f64, radius: f64| PlanarWheel {
+        mass: 60.0,
+        radius,
+        inertia: 1.2,
+        axle: Vector2::new(x, 0.0),
+    };
+    let field = |mass: f64, a: PlanarWheel, b: PlanarWheel| {
+        TwoWheelRover::new(mass, 7.0, a, b).unwrap_err().field()
+    };
+    assert_eq!(field(130.0, wheel(-0.1, 0.2), wheel(0.2, 0.2)), "axle_b");
+    assert_eq!(field(130.0, wheel(-0.4, -0.2), wheel(0.4, 0.2)), "radius_a");
+    assert_eq!(
+        field(130.0, wheel(-0.4, 0.2), wheel(f64::NAN, 0.2)),
+        "axle_b[0]"
+    );
+    assert_eq!(field(f64::NAN, wheel(-0.4, 0.2), wheel(0.4, 0.2)), "mass");
+}
