@@ -13,7 +13,7 @@ UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
 
-.PHONY: help demo test check lint types format test-rust test-slow test-python docs bench pins clean
+.PHONY: help demo test check lint types format test-rust test-slow test-python docs bench chart stability pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -66,10 +66,20 @@ bench: ## time a step and tell where the time goes (informs, does not gate)
 	  awk -v a=$$(count 1) -v b=$$(count 1001) 'BEGIN { printf "\n%.0f instructions a step of the curve (callgrind)\n", (b - a) / 1000 }'; \
 	else echo "valgrind is not installed: no instruction counts"; fi
 
+# One thread for every engine, and the package of comparisons on the path.
+COMPARE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m comparison
+
+chart: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CPU time beside other engines: docs/comparison/ (15 minutes)
+	$(COMPARE).chart
+
+stability: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes where methods fail, ours and other engines': docs/stability.md (5 minutes)
+	$(COMPARE).stability
+
 pins: $(STAMPS)/venv ## resolve requirements/*.txt anew from pyproject.toml
 	$(call pin,demo) --extra demo --group build
 	$(call pin,test) --extra test --extra docs --group build --group lint --constraint requirements/demo.txt
 	$(call pin,train) --extra train --constraint requirements/test.txt
+	$(call pin,peers) --extra peers --constraint requirements/test.txt
 
 clean: ## remove everything that make made, but for runs/
 	rm -rf $(VENV) target docs/_build envs/rover_gym/_core*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis
@@ -97,6 +107,11 @@ $(STAMPS)/debian-%: requirements/debian/%.txt | $(STAMPS)/venv
 
 $(STAMPS)/demo $(STAMPS)/test $(STAMPS)/train: $(STAMPS)/%: requirements/%.txt $(STAMPS)/venv
 	$(UV) --requirement $<
+	@touch $@
+
+# An engine that cannot be installed is left out of the comparison, which says so.
+$(STAMPS)/peers: requirements/peers.txt $(STAMPS)/demo
+	$(UV) --requirement $< || for one in $$(grep -o '^[a-z-]*==[^ ;]*' $<); do $(UV) $$one || true; done
 	@touch $@
 
 # The compiled core, in release mode, and the package itself, editable.

@@ -15,6 +15,7 @@ from rover_gym._core import (
     StepError,
     TerrainError,
     __version__,
+    accuracy_options,
     solve_friction_contact,
 )
 from rover_gym.env import RoverEnv
@@ -40,5 +41,6 @@ __all__ = [
     "StepError",
     "TerrainError",
     "__version__",
+    "accuracy_options",
     "solve_friction_contact",
 ]

@@ -44,6 +44,7 @@ __all__ = [
     "TerrainError",
     "TwoWheelRoverSimulation",
     "__version__",
+    "accuracy_options",
     "solve_friction_contact",
 ]
 
@@ -293,16 +294,40 @@ class Simulation:
         gravity: npt.ArrayLike | None = None,
         friction: float = 0.7,
         restitution: float = 0.0,
-        time_step: float = 0.005,
-        variant: Literal["linearised", "newton"] = "linearised",
+        time_step: float | None = None,
+        variant: Literal["linearised", "newton"] | None = None,
         theta: float = 0.5,
         forecast: float = 0.5,
         solver: Literal["auto", "nsgs", "newton"] = "auto",
-        tolerance: float = 1e-12,
+        tolerance: float | None = None,
         max_iterations: int = 1000,
         stabilisation: Literal["projection", "none"] = "projection",
         warm_start: bool = True,
-    ) -> Simulation: ...
+        accuracy: Literal["fast", "balanced", "reference"] | float | None = None,
+    ) -> Simulation:
+        """A rover on a terrain.
+
+        Args:
+            model: The machine; the built-in rover by default.
+            terrain: Flat ground by default.
+            gravity: (3,) m/s2; (0, -9.81, 0) by default.
+            friction: Coulomb's coefficient of every contact.
+            restitution: Newton's, in [0, 1].
+            time_step: s; 0.005 by default.
+            variant: "linearised" by default; "newton" solves for the forces at the end of the step.
+            theta: Weight of the step's end, in [0.5, 1].
+            forecast: A contact takes part where gap + forecast h u_N <= 0.
+            solver: Of the contact problem.
+            tolerance: Relative, of the contact solver; 1e-12 by default.
+            max_iterations: Of the contact solver.
+            stabilisation: What is done about penetration.
+            warm_start: Whether the solver starts from the last step's impulses.
+            accuracy: Chooses time_step, variant and tolerance, which then cannot be given: by name, or by the error (m)
+                allowed on a path of 20 m on flat ground. docs/accuracy.md says what each costs and gives.
+
+        Raises:
+            OptionError: An option is out of its range, or is given beside `accuracy`.
+        """
     @property
     def model(self) -> RoverModel: ...
     @property
@@ -627,6 +652,9 @@ class FrictionContactSolution:
     def velocities(self) -> _Array: ...
     @property
     def report(self) -> SolverReport: ...
+
+def accuracy_options(accuracy: Literal["fast", "balanced", "reference"] | float) -> dict[str, Any]:
+    """The keyword arguments time_step, variant and tolerance of `Simulation` that an accuracy stands for."""
 
 def solve_friction_contact(
     W: npt.ArrayLike,

@@ -1,6 +1,7 @@
 //! The border between `rover-core` and Python: conversions, exceptions, array views. No mechanics.
 #![forbid(unsafe_code)]
 
+mod accuracy;
 mod arrays;
 mod contacts;
 mod errors;
@@ -30,6 +31,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<snapshot::Snapshot>()?;
     module.add_class::<friction_contact::SolverReport>()?;
     module.add_class::<friction_contact::FrictionContactSolution>()?;
+    module.add_function(wrap_pyfunction!(accuracy::accuracy_options, module)?)?;
     module.add_function(wrap_pyfunction!(
         friction_contact::solve_friction_contact,
         module

@@ -3,12 +3,15 @@
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use rover_core::integrator::{Stabilisation, StepOptions, StepReport as CoreReport, Variant};
+use rover_core::integrator::{
+    Accuracy, Stabilisation, StepOptions, StepReport as CoreReport, Variant,
+};
 use rover_core::multibody::{Energy as CoreEnergy, Model, coordinates};
 use rover_core::nalgebra::DMatrix;
 use rover_core::simulation::Simulation as CoreSimulation;
 use std::sync::Arc;
 
+use crate::accuracy;
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Value};
@@ -202,24 +205,25 @@ impl Simulation {
 impl Simulation {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (model = None, terrain = None, *, gravity = None, friction = 0.7, restitution = 0.0, time_step = 0.005,
-        variant = "linearised", theta = 0.5, forecast = 0.5, solver = "auto", tolerance = 1e-12, max_iterations = 1000,
-        stabilisation = "projection", warm_start = true))]
+    #[pyo3(signature = (model = None, terrain = None, *, gravity = None, friction = 0.7, restitution = 0.0, time_step = None,
+        variant = None, theta = 0.5, forecast = 0.5, solver = "auto", tolerance = None, max_iterations = 1000,
+        stabilisation = "projection", warm_start = true, accuracy = None))]
     fn new(
         model: Option<RoverModel>,
         terrain: Option<&Bound<'_, PyAny>>,
         gravity: Option<&Bound<'_, PyAny>>,
         friction: f64,
         restitution: f64,
-        time_step: f64,
-        variant: &str,
+        time_step: Option<f64>,
+        variant: Option<&str>,
         theta: f64,
         forecast: f64,
         solver: &str,
-        tolerance: f64,
+        tolerance: Option<f64>,
         max_iterations: usize,
         stabilisation: &str,
         warm_start: bool,
+        accuracy: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let model = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
         let terrain = match terrain {
@@ -228,14 +232,32 @@ impl Simulation {
             }),
             Some(given) => Ground::parse(given)?,
         };
+        let chosen = match accuracy {
+            None => Accuracy::BALANCED,
+            Some(given) => {
+                let chosen = accuracy::parse(given)?;
+                let clash = [
+                    ("time_step", time_step.is_some()),
+                    ("variant", variant.is_some()),
+                    ("tolerance", tolerance.is_some()),
+                ];
+                if let Some((field, _)) = clash.iter().find(|(_, given)| *given) {
+                    let message =
+                        format!("{field}: accuracy chooses it, so it cannot be given beside");
+                    return Err(BorderError::option(field, message, Value::Nothing).into());
+                }
+                chosen
+            }
+        };
+        let tolerance = tolerance.unwrap_or(chosen.tolerance);
         let options = StepOptions {
             gravity: checked_gravity(gravity)?,
             friction_coefficient: friction,
             restitution,
-            time_step,
+            time_step: time_step.unwrap_or(chosen.time_step),
             theta,
             forecast,
-            variant: choice("variant", variant, &VARIANTS)?,
+            variant: variant.map_or(Ok(chosen.variant), |v| choice("variant", v, &VARIANTS))?,
             stabilisation: choice("stabilisation", stabilisation, &STABILISATIONS)?,
             warm_start,
             solver: solver_options(solver, tolerance, max_iterations)?,

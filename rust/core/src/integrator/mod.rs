@@ -11,6 +11,7 @@
 //! A scheme is written once, over what a [`MechanicalSystem`] can do: the rover's tree of solids ([`tree_system`]) and the planar
 //! systems ([`crate::planar`]) step through the same code.
 
+pub mod accuracy;
 pub mod command;
 pub mod error;
 pub mod fitted_theta;
@@ -26,6 +27,7 @@ pub mod tree_system;
 pub mod warm_start;
 pub mod workspace;
 
+pub use accuracy::Accuracy;
 pub use command::{Command, HeldJoint};
 pub use error::{OptionsError, StepError};
 pub use mechanical_system::{MechanicalSystem, Start, UnilateralContact};

@@ -1,0 +1,191 @@
+"""Error against CPU time, every engine beside every other: `python -m comparison.chart [--quick]`.
+
+All engines of one scene and one step run one after the other, so that a busy machine is busy for all; a run that took
+less than a second is repeated and the least time kept. One thread. Writes `chart.json`, the pictures and the tables of
+`docs/comparison.md`.
+"""
+
+import argparse
+import json
+import platform
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from comparison.peers import Variant, load
+from comparison.peers.ours import OurRunner
+from comparison.references import load as load_reference
+from comparison.run import run
+from comparison.scene import STEPS, RoverScene, Trace
+from comparison.scenes import flat_drive, parked, rocks, rug
+from comparison.tables import fill
+from rover_gym import accuracy_options
+
+OUTPUT = Path(__file__).parents[2] / "docs" / "comparison"
+PACKAGES = ("rover-gym", "mujoco", "drake", "pybullet", "pin", "numpy")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A scene of the chart, with how its error is taken."""
+
+    scene: RoverScene
+    error: Callable[[Trace], float]
+    unit: str
+    what: str
+    finest: float  # s
+
+
+def scenes() -> list[Measured]:
+    """All of them."""
+    drive, field, parking, ground = flat_drive.scene(), rocks.scene(), parked.scene(), rug.scene()
+    paths = {scene.name: load_reference(scene.name) for scene in (drive, field, ground)}
+    return [
+        Measured(drive, lambda t: flat_drive.error(t, paths["flat_drive"]), "m", "RMS error of the path", 1e-4),
+        Measured(ground, lambda t: rug.error(t, paths["rug"]), "m", "RMS error of the path", 5e-4),
+        Measured(field, lambda t: rocks.error(t, paths["rocks"]), "m", "RMS error of the path", 5e-4),
+        Measured(parking, parked.error, "m/s", "creep", 5e-4),
+    ]
+
+
+def measure(
+    measured: Measured, variants: list[Variant], steps: tuple[float, ...], cap: float, console: Console
+) -> list[dict[str, Any]]:
+    """One row for every variant and step: error, CPU ms per simulated second, failure."""
+    rows: list[dict[str, Any]] = []
+    expected = dict.fromkeys((v.engine, v.name) for v in variants)
+    for step in sorted((s for s in steps if s >= measured.finest), reverse=True):
+        for variant in variants:
+            key = (variant.engine, variant.name)
+            row = {"scene": measured.scene.name, "engine": key[0], "variant": key[1], "step": step}
+            last = expected[key]
+            if last is not None and last[1] * last[0] / step > 1.5 * cap:
+                rows.append(row | {"failure": f"left out: would take more than {cap:g} s of CPU time"})
+                continue
+            try:
+                trace = run(variant, measured.scene, step, cap)
+            except NotImplementedError as reason:
+                rows.append(row | {"failure": f"left out: {reason}"})
+                continue
+            cost = trace.cpu / trace.simulated
+            for _ in range(2 if trace.cpu < 1.0 and not trace.failure else 0):
+                again = run(variant, measured.scene, step, cap)
+                cost = min(cost, again.cpu / again.simulated)
+            if trace.failure:
+                row["failure"] = trace.failure
+            else:
+                expected[key] = (step, trace.cpu)
+                row |= {"error": measured.error(trace), "cpu_ms_per_s": 1e3 * cost}
+            rows.append(row)
+            console.print(
+                f"{measured.scene.name:<11} {step * 1e3:>6g} ms  {variant.engine + ': ' + variant.name:<34}"
+                + (
+                    row["failure"]
+                    if trace.failure
+                    else f"{row['error']:>10.2e} {measured.unit} {cost * 1e3:>9.2f} ms/s"
+                )
+            )
+    return rows
+
+
+def presets(chosen: list[Measured], console: Console) -> list[dict[str, Any]]:
+    """Error and cost of every named accuracy in every scene."""
+    rows = []
+    for name in ("fast", "balanced", "reference"):
+        options = accuracy_options(name)
+        step = options.pop("time_step")
+        variant = Variant("rover-gym", name, partial(OurRunner, **options), "", "")
+        for measured in chosen:
+            traces = [run(variant, measured.scene, step, cap=1e3) for _ in range(1 if name == "reference" else 3)]
+            cost = min(t.cpu / t.simulated for t in traces)
+            row = {
+                "accuracy": name,
+                "scene": measured.scene.name,
+                "error": measured.error(traces[0]),
+                "cpu_ms_per_s": 1e3 * cost,
+            }
+            rows.append(row)
+            console.print(
+                f"{measured.scene.name:<11} {name:<10} {row['error']:.2e} {measured.unit} {1e3 * cost:.2f} ms/s"
+            )
+    return rows
+
+
+def main() -> None:
+    """Measures and draws."""
+    parser = argparse.ArgumentParser(description="Error against CPU time for this project and its peers.")
+    parser.add_argument("--quick", action="store_true", help="five steps and a cap of 2 s a run")
+    parser.add_argument("--draw", action="store_true", help="only draw what chart.json has")
+    parser.add_argument("--scenes", nargs="*", help="only these; the rest is kept as it is in chart.json")
+    parser.add_argument("--output", type=Path, default=OUTPUT)
+    arguments = parser.parse_args()
+    console = Console(width=140)
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    path = arguments.output / "chart.json"
+    if not arguments.draw:
+        variants, missing = load()
+        for engine, why in missing.items():
+            console.print(f"left out, not installed: {engine} ({why})")
+        steps = STEPS[3::2] if arguments.quick else STEPS
+        cap = 2.0 if arguments.quick else 8.0
+        chosen = [m for m in scenes() if not arguments.scenes or m.scene.name in arguments.scenes]
+        kept = []
+        if arguments.scenes and path.exists():
+            kept = [r for r in json.loads(path.read_text())["points"] if r["scene"] not in arguments.scenes]
+        by_name = presets(scenes(), console)
+        points = kept + [row for m in chosen for row in measure(m, variants, steps, cap, console)]
+        data = {
+            "meta": {
+                "command": "make chart",
+                "cost": "CPU time of one thread per simulated second, ms; the least of up to three runs",
+                "processor": processor(),
+                "python": platform.python_version(),
+                "packages": versions(),
+                "cap_s": cap,
+            },
+            "scenes": {m.scene.name: {"title": m.scene.title, "unit": m.unit, "error": m.what} for m in scenes()},
+            "engines": [
+                {"engine": v.engine, "variant": v.name, "settings": v.settings, "differs": v.differs, "best": v.best}
+                for v in variants
+            ],
+            "missing": missing,
+            "presets": by_name,
+            "points": points,
+        }
+        path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    from comparison.drawing import draw  # noqa: PLC0415 - Matplotlib would load before the engines
+
+    data = json.loads(path.read_text(encoding="utf-8"))
+    for picture in draw(data, arguments.output):
+        console.print(str(picture))
+    if arguments.output == OUTPUT:
+        fill(OUTPUT.with_suffix(".md"), data)
+
+
+def processor() -> str:
+    """What the machine calls its processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor()
+
+
+def versions() -> dict[str, str]:
+    """Of the packages that are installed."""
+    found = {}
+    for name in PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+if __name__ == "__main__":
+    main()

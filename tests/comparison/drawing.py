@@ -1,0 +1,236 @@
+"""Draws the chart: one large picture of the flat drive, one of the other scenes, one of our own variants."""
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+
+mpl.use("Agg")
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+
+Array = npt.NDArray[np.float64]
+Curve = tuple[dict[str, Any], Array, Array, Array]
+
+OURS = "rover-gym"
+COLOURS = {
+    OURS: "#d1361f",
+    "Drake": "#2f6db3",
+    "MuJoCo": "#3f8f4f",
+    "Bullet": "#8a5fb0",
+    "Pinocchio": "#b07a1e",
+    "Siconos": "#5b6770",
+}
+#: Of our variants in the picture of ours.
+OWN_COLOURS = ("#d1361f", "#e8a33d", "#7a4fa3", "#2b7a78")
+STYLES = {"SAP, stiff": (0, (4, 2)), "defaults": (0, (1, 1.5))}
+#: Errors below this are drawn here: they are rounding.
+FLOOR = {"parked": 1e-12}
+#: The goal for the flat drive: ms per simulated second, m.
+GOAL = (1.0, 0.01)
+
+
+def curves(data: dict[str, Any], scene: str) -> list[Curve]:
+    """Variant, steps, costs (ms per simulated second) and errors of every curve of a scene."""
+    out = []
+    for engine in data["engines"]:
+        key = (engine["engine"], engine["variant"])
+        rows = [
+            p for p in data["points"] if p["scene"] == scene and (p["engine"], p["variant"]) == key and "error" in p
+        ]
+        if rows:
+            rows.sort(key=lambda p: p["step"])
+            step, cost, error = (np.array([p[k] for p in rows]) for k in ("step", "cpu_ms_per_s", "error"))
+            out.append((engine, step, cost, np.maximum(error, FLOOR.get(scene, 0.0))))
+    return out
+
+
+def pareto(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """(cost, error) pairs that no other pair beats in both, by rising cost."""
+    front: list[tuple[float, float]] = []
+    for cost, error in sorted(points):
+        if np.isfinite(error) and (not front or error < front[-1][1]):
+            front.append((cost, error))
+    return front
+
+
+def _shade(axes: Axes, shown: list[Curve]) -> None:
+    """Below the Pareto front: what nothing here reaches."""
+    front = np.array(pareto([(c, e) for _, _, cost, error in shown for c, e in zip(cost, error, strict=True)]))
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    cost = np.concatenate([[left, front[0, 0]], front[:, 0], [right]])
+    error = np.concatenate([[high, high], front[:, 1], [front[-1, 1]]])
+    axes.fill_between(cost, low, error, color="#f3e3d3", alpha=0.6, linewidth=0, zorder=0)
+    axes.set_xlim(left, right)
+    axes.set_ylim(low, high)
+
+
+def _finish(axes: Axes) -> None:
+    axes.grid(which="major", color="#dddddd", linewidth=0.7)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+
+
+def _steps(axes: Axes, curve: Curve, wanted: tuple[float, ...], size: float) -> None:
+    """Writes step sizes beside points of our curve."""
+    _, step, cost, error = curve
+    for h, x, y in zip(step, cost, error, strict=True):
+        if np.isclose(h, wanted).any():
+            axes.annotate(
+                f"{h * 1e3:g} ms",
+                (x, y),
+                (-7, -5),
+                textcoords="offset points",
+                ha="right",
+                va="top",
+                fontsize=size,
+                color=COLOURS[OURS],
+            )
+
+
+def _plot(axes: Axes, shown: list[Curve]) -> None:
+    for engine, _, cost, error in shown:
+        own = engine["engine"] == OURS
+        axes.plot(
+            cost,
+            error,
+            color=COLOURS[engine["engine"]],
+            linestyle=STYLES.get(engine["variant"], "-"),
+            linewidth=2.6 if own else 1.5,
+            marker="o",
+            markersize=6 if own else 4,
+            zorder=4 if own else 3,
+        )
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+
+
+#: Text of a curve's label, the point that carries it (finest step first), offset in points, alignment.
+LABELS = {
+    (OURS, "linearised"): (OURS, 4, (8, 6), "left"),
+    ("Drake", "lagged, stiff"): ("Drake, lagged", -1, (-6, -14), "left"),
+    ("Drake", "SAP, stiff"): ("Drake, SAP", -1, (8, 0), "left"),
+    ("MuJoCo", "discrete, elliptic"): ("MuJoCo, best", 0, (6, -3), "left"),
+    ("MuJoCo", "defaults"): ("MuJoCo, defaults", 0, (6, 3), "left"),
+    ("Bullet", "50 iterations"): ("Bullet", -1, (-8, 5), "right"),
+    ("Pinocchio", "ADMM in a Python loop"): ("Pinocchio, ADMM\n(Python loop)", -1, (8, 0), "left"),
+    ("Siconos", "NSGS in a Python loop"): ("Siconos\n(Python loop)", 0, (8, -8), "left"),
+}
+
+
+def flat_drive(data: dict[str, Any], path: Path) -> Path:
+    """The picture of the README."""
+    figure, axes = plt.subplots(figsize=(8.0, 5.6), dpi=125)
+    shown = [c for c in curves(data, "flat_drive") if c[0]["best"]]
+    _plot(axes, shown)
+    left, right = axes.get_xlim()
+    axes.set_xlim(0.8 * left, 4.0 * right)  # room for labels
+    _shade(axes, shown)
+    for curve in shown:
+        engine, _, cost, error = curve
+        text, index, offset, side = LABELS[engine["engine"], engine["variant"]]
+        index = min(index, len(cost) - 1)
+        axes.annotate(
+            text,
+            (cost[index], error[index]),
+            offset,
+            textcoords="offset points",
+            ha=side,
+            fontsize=10.5,
+            color=COLOURS[engine["engine"]],
+            fontweight="bold" if engine["engine"] == OURS else "normal",
+            zorder=5,
+        )
+        if engine["engine"] == OURS:
+            _steps(axes, curve, (1e-1, 2e-2, 5e-3, 1e-3, 1e-4), 9)
+    axes.axhline(GOAL[1], color="#999999", linewidth=0.9, linestyle=(0, (2, 3)), zorder=1)
+    axes.annotate(
+        "1 cm",
+        (axes.get_xlim()[1], GOAL[1]),
+        (-2, 3),
+        textcoords="offset points",
+        ha="right",
+        fontsize=9,
+        color="#777777",
+    )
+    axes.text(
+        0.02, 0.03, "reached by nothing here", transform=axes.transAxes, fontsize=9, color="#a98d6d", style="italic"
+    )
+    axes.set_xlabel("CPU time of one thread, ms per simulated second", fontsize=10.5)
+    axes.set_ylabel("error of the path (RMS), m", fontsize=10.5)
+    axes.set_title("A drive of 22 m in a curve, one point per step size, 0.1 to 100 ms", fontsize=11.5, loc="left")
+    _finish(axes)
+    figure.tight_layout()
+    figure.savefig(path)
+    plt.close(figure)
+    return path
+
+
+def others(data: dict[str, Any], path: Path) -> Path:
+    """Rug, rocks and parking, with a common legend."""
+    names = [name for name in data["scenes"] if name != "flat_drive" and curves(data, name)]
+    figure, panels = plt.subplots(1, len(names), figsize=(4.4 * len(names), 4.7), dpi=100, squeeze=False)
+    for axes, name in zip(panels[0], names, strict=True):
+        scene = data["scenes"][name]
+        shown = [c for c in curves(data, name) if c[0]["best"]]
+        _plot(axes, shown)
+        _shade(axes, shown)
+        for curve in shown:
+            if curve[0]["engine"] == OURS:
+                _steps(axes, curve, (1e-1, 1e-2, 1e-3), 8.5)
+        axes.set_title(scene["title"], fontsize=11, loc="left")
+        axes.set_xlabel("CPU time, ms per simulated second")
+        axes.set_ylabel(f"{scene['error']}, {scene['unit']}")
+        _finish(axes)
+    lines = [
+        plt.Line2D(
+            [],
+            [],
+            color=COLOURS[e["engine"]],
+            linestyle=STYLES.get(e["variant"], "-"),
+            marker="o",
+            linewidth=2.6 if e["engine"] == OURS else 1.5,
+            label=OURS if e["engine"] == OURS else f"{e['engine']}: {e['variant']}",
+        )
+        for e in data["engines"]
+        if e["best"]
+    ]
+    figure.legend(handles=lines, loc="lower center", ncols=4, frameon=False, fontsize=9.5)
+    figure.tight_layout(rect=(0, 0.11, 1, 1))
+    figure.savefig(path)
+    plt.close(figure)
+    return path
+
+
+def variants(data: dict[str, Any], path: Path) -> Path:
+    """Our own variants and tolerances."""
+    names = [name for name in data["scenes"] if name != "parked" and curves(data, name)]
+    figure, panels = plt.subplots(1, len(names), figsize=(4.4 * len(names), 4.5), dpi=100, squeeze=False)
+    for axes, name in zip(panels[0], names, strict=True):
+        own = [c for c in curves(data, name) if c[0]["engine"] == OURS]
+        for (engine, _, cost, error), colour in zip(own, OWN_COLOURS, strict=True):
+            axes.plot(cost, error, color=colour, marker="o", markersize=4.5, linewidth=1.6, label=engine["variant"])
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_title(data["scenes"][name]["title"], fontsize=11, loc="left")
+        axes.set_xlabel("CPU time, ms per simulated second")
+        axes.set_ylabel("RMS error of the path, m")
+        _finish(axes)
+    figure.legend(*panels[0][0].get_legend_handles_labels(), loc="lower center", ncols=4, frameon=False, fontsize=9.5)
+    figure.tight_layout(rect=(0, 0.07, 1, 1))
+    figure.savefig(path)
+    plt.close(figure)
+    return path
+
+
+def draw(data: dict[str, Any], folder: Path) -> list[Path]:
+    """All pictures of the chart."""
+    mpl.rcParams.update({"font.family": "DejaVu Sans"})
+    return [
+        flat_drive(data, folder / "flat_drive.png"),
+        others(data, folder / "scenes.png"),
+        variants(data, folder / "variants.png"),
+    ]

@@ -1,0 +1,173 @@
+"""Free rigid bodies with given contacts, stepped by Moreau and Jean's scheme: a test bench for law and solver.
+
+The contact problem of a step is assembled here, densely, and handed to the solver under test. Bodies are few and turn
+little in these scenes, so inertia is taken about the axes of the world.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym import solve_friction_contact
+
+Array = npt.NDArray[np.float64]
+#: W, q, mu, last impulses -> impulses (n, d), whether it converged, iterations.
+Solver = Callable[[Array, Array, Array, Array | None], tuple[Array, bool, int]]
+G = 9.81  # m/s²; here z is up, as where these scenes come from
+
+
+def ours(name: str, tolerance: float = 1e-12, dimension: int = 3) -> Solver:
+    """This project's solver of a name."""
+
+    def solve(W: Array, q: Array, mu: Array, initial: Array | None) -> tuple[Array, bool, int]:
+        answer = solve_friction_contact(
+            W,
+            q,
+            mu,
+            tolerance,
+            dimension=3 if dimension == 3 else 2,
+            solver=name,
+            initial=initial,  # type: ignore[arg-type]
+        )
+        return answer.impulses, answer.report.is_converged, answer.report.iterations
+
+    return solve
+
+
+def relaxed(W: Array, q: Array, mu: Array, initial: Array | None) -> tuple[Array, bool, int]:  # noqa: ARG001
+    """The convex law (no mu |u_T| in the normal row), by projected gradient steps: what convex engines solve."""
+    n = len(mu)
+    p = np.zeros((n, 3))
+    step = 1.0 / np.linalg.eigvalsh(W).max()
+    for iteration in range(20_000):
+        new = p - step * (W @ p.ravel() + q).reshape(n, 3)
+        for k in range(n):
+            new[k] = onto_cone(new[k], mu[k])
+        change, p = np.abs(new - p).max(), new
+        if change <= 1e-13 * max(np.abs(p).max(), 1e-300):
+            return p, True, iteration
+    return p, False, 20_000
+
+
+def onto_cone(p: Array, mu: float) -> Array:
+    """Projection onto Coulomb's cone."""
+    size = float(np.hypot(p[1], p[2]))
+    if size <= mu * p[0]:
+        return p
+    if mu * size <= -p[0]:
+        return np.zeros(3)
+    normal = (p[0] + mu * size) / (1.0 + mu * mu)
+    return np.array([normal, *(p[1:] * (mu * normal / size))])
+
+
+@dataclass
+class Contact:
+    """Between body `a` (the normal points to it) and body `b`, or the ground where b is -1."""
+
+    a: int
+    b: int
+    point: Sequence[float]
+    normal: Sequence[float]
+    mu: float
+
+
+@dataclass
+class World:
+    """Bodies by mass, (3,) inertia, place and velocity (linear and angular)."""
+
+    masses: Array
+    inertias: Array
+    places: Array
+    contacts: Callable[["World"], list[Contact]]
+    h: float
+    restitution: float = 0.0
+    forces: Array | None = None
+    gravity: float = G
+    v: Array = field(default_factory=lambda: np.zeros(0))
+    impulses: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    converged: bool = True
+    iterations: int = 0
+
+    def __post_init__(self) -> None:
+        if self.v.size == 0:
+            self.v = np.zeros((len(self.masses), 6))
+
+    def inverse_masses(self) -> Array:
+        """(6 n,) of the diagonal mass matrix."""
+        return np.concatenate(
+            [np.concatenate([np.full(3, 1.0 / m), 1.0 / J]) for m, J in zip(self.masses, self.inertias, strict=True)]
+        )
+
+    def jacobian(self, contacts: list[Contact]) -> Array:
+        """(3 n_c, 6 n) local velocities from body velocities."""
+        H = np.zeros((3 * len(contacts), 6 * len(self.masses)))
+        for k, c in enumerate(contacts):
+            n = np.asarray(c.normal) / np.linalg.norm(c.normal)
+            t = np.cross(n, [0.0, 0.0, 1.0] if abs(n[2]) < 0.9 else [0.0, 1.0, 0.0])
+            t /= np.linalg.norm(t)
+            frame = np.array([n, t, np.cross(n, t)])
+            for body, sign in ((c.a, 1.0), (c.b, -1.0)):
+                if body >= 0:
+                    r = np.asarray(c.point) - self.places[body]
+                    H[3 * k : 3 * k + 3, 6 * body : 6 * body + 3] = sign * frame
+                    H[3 * k : 3 * k + 3, 6 * body + 3 : 6 * body + 6] = sign * np.cross(r, frame)
+        return H
+
+    def step(self, solver: Solver, *, warm: bool = True) -> None:
+        """One step, theta = 1/2."""
+        h = self.h
+        free = self.v.copy()
+        free[:, 2] -= h * self.gravity
+        if self.forces is not None:
+            free[:, :3] += h * self.forces / self.masses[:, None]
+        contacts = self.contacts(self)
+        if contacts:
+            H, inverse = self.jacobian(contacts), self.inverse_masses()
+            W = (H * inverse) @ H.T
+            before = (H @ self.v.ravel())[::3]
+            q = H @ free.ravel()
+            q[::3] += self.restitution * np.minimum(before, 0.0)
+            mu = np.array([c.mu for c in contacts])
+            initial = self.impulses.ravel() if warm and len(self.impulses) == len(contacts) else None
+            self.impulses, converged, iterations = solver(W, q, mu, initial)
+            self.converged &= converged
+            self.iterations += iterations
+            free = free + (inverse * (H.T @ self.impulses.ravel())).reshape(free.shape)
+        else:
+            self.impulses = np.zeros((0, 3))
+        self.places = self.places + 0.5 * h * (self.v + free)[:, :3]
+        self.v = free
+
+
+def box_inertia(mass: float, size: Sequence[float]) -> Array:
+    """(3,) about the centre."""
+    a, b, c = size
+    return mass / 12.0 * np.array([b * b + c * c, a * a + c * c, a * a + b * b])
+
+
+def corners(size: Sequence[float]) -> list[tuple[float, float]]:
+    """Of a box's face, around its centre."""
+    return [(sx * size[0] / 2.0, sy * size[1] / 2.0) for sx in (-1, 1) for sy in (-1, 1)]
+
+
+def stack(
+    masses: Sequence[float], h: float, friction: Sequence[float], size: Sequence[float] = (0.2, 0.2, 0.2)
+) -> World:
+    """Boxes on each other, four contacts between neighbours; `friction` from the ground up."""
+    n = len(masses)
+
+    def contacts(world: World) -> list[Contact]:
+        found = []
+        for level in range(n):
+            x, y, _ = world.places[level]
+            found += [
+                Contact(level, level - 1, (x + cx, y + cy, level * size[2]), (0.0, 0.0, 1.0), friction[level])
+                for cx, cy in corners(size)
+            ]
+        return found
+
+    places = np.array([(0.0, 0.0, (level + 0.5) * size[2]) for level in range(n)])
+    inertias = np.array([box_inertia(m, size) for m in masses])
+    return World(np.array(masses, dtype=float), inertias, places, contacts, h)

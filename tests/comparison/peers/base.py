@@ -1,0 +1,148 @@
+"""The interface that every engine is driven by, and what the builders share."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from comparison.scene import Array, Phase, RoverScene
+
+
+class Runner(Protocol):
+    """One engine with one scene, ready to step."""
+
+    def command(self, phase: Phase) -> None:
+        """Takes the commands of a phase."""
+
+    def advance(self, steps: int) -> None:
+        """Takes so many steps. This alone is timed."""
+
+    def position(self) -> Array:
+        """(3,) trunk origin, m."""
+
+    def rotation(self) -> Array:
+        """(3, 3) trunk attitude."""
+
+    def speed(self) -> float:
+        """Of the trunk's origin, m/s."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """An engine with its settings.
+
+    Attributes:
+        engine: Shared by the curves of one engine.
+        name: Of the curve.
+        build: Makes a runner from a scene and a time step.
+        settings: In words.
+        differs: What differs from rigid bodies with Coulomb friction.
+        best: Whether it is shown in the chart of the README.
+    """
+
+    engine: str
+    name: str
+    build: Callable[[RoverScene, float], Runner]
+    settings: str
+    differs: str
+    best: bool = True
+
+
+@dataclass(frozen=True)
+class Body:
+    """A solid of the machine, with what every engine wants to know."""
+
+    name: str
+    parent: int
+    position: Array
+    axis: Array
+    mass: float
+    centre: Array
+    inertia: Array  # (3,) principal, along the frame's axes
+    hold: tuple[float, float]  # N m/rad, N m s/rad
+    wheel: int  # index of the wheel that it carries, or -1
+    radius: float
+    drive_sign: float
+    steers: int  # index of the wheel that its joint steers, or -1
+
+
+def principal_inertia(solid: dict[str, Any]) -> Array:
+    """About the mass centre along the frame's axes, kg m²."""
+    if solid.get("inertia") is not None:
+        inertia = np.array(solid["inertia"], dtype=float)
+        if np.any(inertia[3:] != 0.0):
+            raise ValueError(f"{solid['name']}: products of inertia are not supported here")
+        return inertia[:3]
+    m, shape = solid["mass"], solid["shape"]
+    if shape["kind"] == "box":
+        a, b, c = shape["size"]
+        return m / 12.0 * np.array([b * b + c * c, a * a + c * c, a * a + b * b])
+    r = shape["radius"]
+    if shape["kind"] == "disc":
+        return m * r * r * np.array([0.25, 0.25, 0.5])
+    across = m / 12.0 * (3.0 * r * r + shape["height"] ** 2)
+    return np.array([across, m * r * r / 2.0, across])
+
+
+def bodies(machine: dict[str, Any]) -> list[Body]:
+    """The solids in the order of the coordinates: body i > 0 has joint coordinate 5 + i."""
+    names = [solid["name"] for solid in machine["solids"]]
+    wheels = {wheel["solid"]: i for i, wheel in enumerate(machine["wheels"])}
+    steered = {wheel.get("steering"): i for i, wheel in enumerate(machine["wheels"])}
+    out = []
+    for solid in machine["solids"]:
+        wheel = wheels.get(solid["name"], -1)
+        hold = solid.get("hold") or {"stiffness": 0.0, "damping": 0.0}
+        out.append(
+            Body(
+                name=solid["name"],
+                parent=names.index(solid["parent"]) if solid.get("parent") else -1,
+                position=np.array(solid.get("position") or (0.0, 0.0, 0.0)),
+                axis=np.array(solid.get("axis") or (0.0, 0.0, 1.0)),
+                mass=solid["mass"],
+                centre=np.array(solid.get("centre_of_mass") or (0.0, 0.0, 0.0)),
+                inertia=principal_inertia(solid),
+                hold=(hold["stiffness"], hold["damping"]),
+                wheel=wheel,
+                radius=machine["wheels"][wheel]["radius"] if wheel >= 0 else 0.0,
+                drive_sign=machine["wheels"][wheel]["drive_sign"] if wheel >= 0 else 0.0,
+                steers=steered.get(solid["name"], -1),
+            )
+        )
+    return out
+
+
+def held(scene: RoverScene, body: Body) -> bool:
+    """Whether the body's joint has a PD in this scene: steering always, wheels when braked."""
+    return body.steers >= 0 or (scene.brake and body.wheel >= 0)
+
+
+def rotation_of(q: Array) -> Array:
+    """(3, 3) attitude of public coordinates: Ry(q4) Rz(q5) Rx(q3)."""
+    (cx, cy, cz), (sx, sy, sz) = np.cos(q[3:6]), np.sin(q[3:6])
+    Rx = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    Ry = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    Rz = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    return np.asarray(Ry @ Rz @ Rx)
+
+
+def quaternion_of(R: Array) -> Array:
+    """(4,) w, x, y, z of a rotation matrix."""
+    w = np.sqrt(max(1.0 + R[0, 0] + R[1, 1] + R[2, 2], 0.0)) / 2.0
+    if w > 1e-6:
+        x, y, z = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+        return np.array([w, x / (4 * w), y / (4 * w), z / (4 * w)])
+    axis = np.sqrt(np.maximum((np.diag(R) + 1.0) / 2.0, 0.0))
+    i = int(np.argmax(axis))
+    axis = np.where(np.arange(3) == i, axis, (R[i] + R[:, i]) / (4.0 * axis[i]))
+    return np.array([w, *axis])
+
+
+def turn_z_to(normal: Array) -> Array:
+    """A rotation that takes the z axis to a unit vector: engines lay planes with their normal along z."""
+    n = normal / np.linalg.norm(normal)
+    helper = np.array([1.0, 0.0, 0.0]) if abs(n[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    x = np.cross(helper, n)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(n, x), n])

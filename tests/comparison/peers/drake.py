@@ -1,0 +1,159 @@
+"""Drake's discrete `MultibodyPlant`: compliant contact solved implicitly."""
+
+from functools import partial
+
+import numpy as np
+from pydrake.geometry import (
+    AddContactMaterial,
+    Box,
+    CollisionFilterDeclaration,
+    Cylinder,
+    GeometrySet,
+    ProximityProperties,
+    Sphere,
+)
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import (
+    AddMultibodyPlantSceneGraph,
+    ContactModel,
+    CoulombFriction,
+    DiscreteContactApproximation,
+)
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    PdControllerGains,
+    RevoluteJoint,
+    RotationalInertia,
+    SpatialInertia,
+)
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from comparison.peers.base import Variant, bodies, held, rotation_of, turn_z_to
+from comparison.scene import Array, Phase, RoverScene
+
+HALF_WIDTH = 0.002  # m, where a wheel must not be a sphere
+GROUND = 500.0  # m, edge of the box that is the plane: a half-space with many spheres beside it crashed
+
+
+class DrakeRunner:
+    """A discrete plant behind the common interface."""
+
+    def __init__(
+        self,
+        scene: RoverScene,
+        time_step: float,
+        *,
+        approximation: DiscreteContactApproximation,
+        stiffness: float | None,
+        dissipation: float = 50.0,
+    ) -> None:
+        self.h = time_step
+        builder = DiagramBuilder()
+        plant, graph = AddMultibodyPlantSceneGraph(builder, time_step)
+        plant.set_contact_model(ContactModel.kPoint)
+        plant.set_discrete_contact_approximation(approximation)
+        plant.mutable_gravity_field().set_gravity_vector(np.array(scene.gravity))
+        properties = ProximityProperties()
+        AddContactMaterial(
+            dissipation=dissipation,
+            point_stiffness=stiffness,
+            friction=CoulombFriction(scene.friction, scene.friction),
+            properties=properties,
+        )
+        world = plant.world_body()
+        if scene.normal is not None:
+            n = np.array(scene.normal) / np.linalg.norm(scene.normal)
+            pose = RigidTransform(RotationMatrix(turn_z_to(n)), -5.0 * n)
+            plant.RegisterCollisionGeometry(world, pose, Box(GROUND, GROUND, 10.0), "ground", properties)
+        for k, (x, y, z, r) in enumerate(scene.spheres):
+            plant.RegisterCollisionGeometry(world, RigidTransform([x, y, z]), Sphere(r), f"rock{k}", properties)
+        self.bodies = bodies(scene.machine)
+        solids, self.joints, self.actuators = [], {}, []
+        for i, body in enumerate(self.bodies):
+            inertia = SpatialInertia.MakeFromCentralInertia(
+                body.mass, body.centre, RotationalInertia(*(float(v) for v in body.inertia))
+            )
+            solid = plant.AddRigidBody(body.name, inertia)
+            solids.append(solid)
+            if body.parent >= 0:
+                parent = solids[body.parent]
+                frame = plant.AddFrame(
+                    FixedOffsetFrame(f"{body.name}_carrier", parent.body_frame(), RigidTransform(body.position))
+                )
+                joint = plant.AddJoint(RevoluteJoint(body.name, frame, solid.body_frame(), body.axis, 0.0))
+                self.joints[i] = joint
+            if body.wheel >= 0:
+                shape = Cylinder(body.radius, 2.0 * HALF_WIDTH) if scene.thin_wheels else Sphere(body.radius)
+                plant.RegisterCollisionGeometry(solid, RigidTransform(), shape, f"tyre_{body.name}", properties)
+            if held(scene, body) or body.wheel >= 0:
+                actuator = plant.AddJointActuator(body.name, self.joints[i])
+                if held(scene, body):
+                    actuator.set_controller_gains(PdControllerGains(p=body.hold[0], d=body.hold[1]))
+                self.actuators.append((i, actuator))
+        plant.Finalize()
+        manager = graph.collision_filter_manager()
+        own = GeometrySet([g for s in solids for g in plant.GetCollisionGeometriesForBody(s)])
+        manager.Apply(CollisionFilterDeclaration().ExcludeWithin(own))
+        diagram = builder.Build()
+        self.plant = plant
+        self.simulator = Simulator(diagram)
+        self.context = plant.GetMyMutableContextFromRoot(self.simulator.get_mutable_context())
+        self.trunk = solids[0]
+        pose = RigidTransform(RotationMatrix(rotation_of(scene.q)), scene.q[:3])
+        plant.SetFreeBodyPose(self.context, self.trunk, pose)
+        for i, joint in self.joints.items():
+            joint.set_angle(self.context, scene.q[5 + i])
+        self.instance = self.trunk.model_instance()
+        self.held = [(k, i) for k, (i, _) in enumerate(self.actuators) if held(scene, self.bodies[i])]
+        self.only_held = {i: k for k, (_, i) in enumerate(self.held)}
+        self.start = {i: scene.q[5 + i] for _, i in self.held}
+        self.command(Phase(0.0))
+        self.simulator.Initialize()
+        self.time = 0.0
+
+    def command(self, phase: Phase) -> None:
+        torques = np.zeros(len(self.actuators))
+        desired = np.zeros(self.plant.get_desired_state_input_port(self.instance).size())
+        place = {i: k for k, i in self.held} if len(desired) == 2 * len(self.actuators) else self.only_held
+        for k, (i, _) in enumerate(self.actuators):
+            body = self.bodies[i]
+            if body.wheel >= 0:
+                torques[k] = body.drive_sign * phase.torques[body.wheel]
+        for _, i in self.held:
+            body = self.bodies[i]
+            desired[place[i]] = phase.steering[body.steers] if body.steers >= 0 else self.start[i]
+        self.plant.get_actuation_input_port(self.instance).FixValue(self.context, torques)
+        self.plant.get_desired_state_input_port(self.instance).FixValue(self.context, desired)
+
+    def advance(self, steps: int) -> None:
+        self.time += steps * self.h
+        self.simulator.AdvanceTo(self.time)
+
+    def position(self) -> Array:
+        return np.array(self.plant.EvalBodyPoseInWorld(self.context, self.trunk).translation())
+
+    def rotation(self) -> Array:
+        return np.array(self.plant.EvalBodyPoseInWorld(self.context, self.trunk).rotation().matrix())
+
+    def speed(self) -> float:
+        velocity = self.plant.EvalBodySpatialVelocityInWorld(self.context, self.trunk)
+        return float(np.linalg.norm(velocity.translational()))
+
+
+VARIANTS = (
+    Variant(
+        "Drake",
+        "lagged, stiff",
+        partial(DrakeRunner, approximation=DiscreteContactApproximation.kLagged, stiffness=1e8),
+        "discrete plant, contact approximation lagged, point stiffness 1e8 N/m, dissipation 50 s/m",
+        "contacts are stiff springs; regularised friction creeps below 1e-4 m/s",
+    ),
+    Variant(
+        "Drake",
+        "SAP, stiff",
+        partial(DrakeRunner, approximation=DiscreteContactApproximation.kSap, stiffness=1e8),
+        "discrete plant, contact approximation SAP, point stiffness 1e8 N/m",
+        "convex friction: a sliding contact lifts off by h mu u_T",
+    ),
+)

@@ -1,0 +1,35 @@
+"""Runs one engine through one scene and times it."""
+
+import time
+
+import numpy as np
+
+from comparison.peers import Variant
+from comparison.scene import SAMPLE, RoverScene, Trace, steps_in
+
+
+def run(variant: Variant, scene: RoverScene, time_step: float, cap: float = 20.0) -> Trace:
+    """One run, stopped where it takes more CPU time than `cap` (s), turns infinite or fails."""
+    runner = variant.build(scene, time_step)
+    samples = [runner.position()]
+    cpu, simulated, failure = 0.0, 0.0, ""
+    chunk = steps_in(SAMPLE, time_step)
+    for phase in scene.phases:
+        runner.command(phase)
+        for _ in range(steps_in(phase.duration, SAMPLE)):
+            begin = time.process_time()
+            try:
+                runner.advance(chunk)
+            except (RuntimeError, ArithmeticError) as error:  # an engine's own word that it cannot go on
+                failure = f"{type(error).__name__}: {str(error).splitlines()[0][:120]}"
+            # an engine in a process of its own tells its time itself
+            cpu = runner.cpu if hasattr(runner, "cpu") else cpu + time.process_time() - begin
+            simulated += SAMPLE
+            samples.append(runner.position())
+            if not failure and not np.all(np.isfinite(samples[-1])):
+                failure = "the state is not finite"
+            if not failure and cpu > cap:
+                failure = f"stopped after {cap:g} s of CPU time"
+            if failure:
+                return Trace(np.array(samples), cpu, simulated, failure)
+    return Trace(np.array(samples), cpu, simulated)

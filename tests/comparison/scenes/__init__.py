@@ -1,0 +1,1 @@
+"""One file per scene, with its closed form or its reference."""

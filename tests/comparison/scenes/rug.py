@@ -1,0 +1,40 @@
+"""The report's rug: 1250 fixed spheres under the rover, gravity 0.0981 m/s², the first 10 s.
+
+The rover of the report's runs (wheels of radius 0.30 m, 880 kg) is dropped on the rug and driven with 0.4 N m a wheel.
+Restitution is 0, since no peer has Newton's; the rest is section 6.2 of the report. Reference: this project's Newton
+variant at a step of 0.05 ms.
+"""
+
+import numpy as np
+
+from comparison.scene import Array, Phase, RoverScene, Trace
+from rover_gym import SphereField
+from rover_gym.report import FRONT_STEERING, GRAVITY, report_model
+from rover_gym.rug import FRICTION, START, WHEEL_TORQUE
+
+
+def scene() -> RoverScene:
+    """The rug."""
+    model = report_model()
+    q = np.zeros(model.nq)
+    q[:3] = START
+    q[model.steering_joint_indices[:2]] = FRONT_STEERING
+    field = SphereField.rug()
+    steering = (FRONT_STEERING, FRONT_STEERING, 0.0, 0.0, 0.0, 0.0)
+    return RoverScene(
+        name="rug",
+        title="10 s on the report's rug of 1250 spheres",
+        machine=model.to_dict(),
+        q=q,
+        phases=(Phase(10.0, steering, (WHEEL_TORQUE,) * 6),),
+        normal=None,
+        spheres=np.column_stack([field.centres, field.radii]),
+        friction=FRICTION,
+        gravity=GRAVITY,
+        thin_wheels=True,
+    )
+
+
+def error(trace: Trace, reference: Array) -> float:
+    """Root mean square distance of the trunk's path from the reference, m."""
+    return float(np.sqrt(np.mean(np.sum((trace.positions - reference) ** 2, axis=1))))

@@ -1,0 +1,86 @@
+"""The tables of `docs/comparison.md`, made from `chart.json`."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+MARK = "<!-- tables: made by `make chart`, not by hand -->"
+TARGETS = (0.1, 0.03, 0.01, 0.003, 0.001)  # m
+
+
+def cost_of(points: list[tuple[float, float]], target: float) -> float | None:
+    """Least cost at which a curve of (cost, error) reaches an error; straight in the logarithms between its points."""
+    best = [cost for cost, error in points if error <= target]
+    for (c0, e0), (c1, e1) in pairwise(points):
+        if (e0 - target) * (e1 - target) < 0.0:
+            share = np.log(target / e0) / np.log(e1 / e0)
+            best.append(float(np.exp(np.log(c0) + share * np.log(c1 / c0))))
+    return min(best) if best else None
+
+
+def _number(value: float) -> str:
+    return f"{value:.2g}" if value < 100.0 else f"{value:.0f}"
+
+
+def reach(data: dict[str, Any], scene: str) -> str:
+    """Cost to reach errors, one line a curve."""
+    lines = [
+        "| engine | " + " | ".join(f"{100 * t:g} cm" for t in TARGETS) + " | smallest error, at a step of |",
+        "|---" * (len(TARGETS) + 2) + "|",
+    ]
+    for engine in data["engines"]:
+        rows = [
+            p
+            for p in data["points"]
+            if p["scene"] == scene
+            and (p["engine"], p["variant"]) == (engine["engine"], engine["variant"])
+            and "error" in p
+        ]
+        if not rows:
+            continue
+        rows.sort(key=lambda p: -p["step"])
+        points = [(p["cpu_ms_per_s"], p["error"]) for p in rows]
+        costs = [cost_of(points, target) for target in TARGETS]
+        least = min(rows, key=lambda p: p["error"])
+        lines.append(
+            f"| {engine['engine']}, {engine['variant']} | "
+            + " | ".join("-" if c is None else _number(c) for c in costs)
+            + f" | {100 * least['error']:.2g} cm, {least['step'] * 1e3:g} ms |"
+        )
+    return "\n".join(lines)
+
+
+def settings(data: dict[str, Any]) -> str:
+    """What each curve is."""
+    lines = ["| curve | settings | what differs from rigid bodies with Coulomb friction |", "|---|---|---|"]
+    lines += [f"| {e['engine']}, {e['variant']} | {e['settings']} | {e['differs']} |" for e in data["engines"]]
+    return "\n".join(lines)
+
+
+def presets(data: dict[str, Any]) -> str:
+    """Error and cost of each named accuracy, one line a scene."""
+    names = list(dict.fromkeys(row["accuracy"] for row in data["presets"]))
+    lines = ["| scene | " + " | ".join(f'`"{n}"`' for n in names) + " |", "|---" * (len(names) + 1) + "|"]
+    for scene, facts in data["scenes"].items():
+        rows = {row["accuracy"]: row for row in data["presets"] if row["scene"] == scene}
+        cells = [f"{rows[n]['error']:.1e} {facts['unit']}, {_number(rows[n]['cpu_ms_per_s'])} ms/s" for n in names]
+        lines.append(f"| {facts['title']} ({facts['error']}) | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def fill(page: Path, data: dict[str, Any]) -> None:
+    """Writes the tables into the page, after its mark."""
+    meta = data["meta"]
+    packages = ", ".join(f"{name} {version}" for name, version in meta["packages"].items())
+    parts = [
+        "## CPU milliseconds per simulated second to reach an error on the flat drive\n",
+        reach(data, "flat_drive"),
+        f"\nMeasured with `make chart` on {meta['processor']}, shared with other work;"
+        f" {packages}; Python {meta['python']}.",
+    ]
+    parts += [f"Left out, not installed: {engine}." for engine in data["missing"]]
+    parts += ["\n## Settings\n", settings(data), "\n## What the named accuracies give\n", presets(data)]
+    head = page.read_text(encoding="utf-8").split(MARK)[0]
+    page.write_text(head + MARK + "\n\n" + "\n".join(parts) + "\n", encoding="utf-8")
