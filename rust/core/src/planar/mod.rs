@@ -2,7 +2,8 @@
 //!
 //! - [`ground`], [`curve`], [`polyline`]: what lies below a curve, and where a disc touches it;
 //! - [`machine`]: machines with few coordinates as mechanical systems with one tangent a contact;
-//! - [`ball`], [`two_wheel_rover`]: two of them; [`simulation`]: one on a ground, through time.
+//! - [`ball`], [`two_wheel_rover`]: two of them; [`mirrored_rover`]: the six-wheel rover driven straight;
+//! - [`simulation`]: one on a ground, through time.
 //!
 //! Nothing of time stepping, contact law or solver is here: [`crate::integrator`] steps these systems as it steps the rover.
 //! x points forward, y up, angles turn to the left.
@@ -12,6 +13,7 @@ pub mod curve;
 pub mod error;
 pub mod ground;
 pub mod machine;
+pub mod mirrored_rover;
 pub mod polyline;
 pub mod simulation;
 pub mod two_wheel_rover;
@@ -23,8 +25,10 @@ pub use ground::{ContactRule, Facing, Ground};
 pub use machine::{
     Disc, PlanarContact, PlanarKey, PlanarMachine, PlanarScratch, PlanarSystem, contact_rows,
 };
+pub use mirrored_rover::MirroredRover;
 pub use polyline::Polyline;
 pub use simulation::{
-    BallSimulation, PlanarActiveContact, PlanarSimulation, PlanarSnapshot, TwoWheelRoverSimulation,
+    BallSimulation, MirroredRoverSimulation, PlanarActiveContact, PlanarSimulation, PlanarSnapshot,
+    TwoWheelRoverSimulation,
 };
 pub use two_wheel_rover::{PlanarWheel, TwoWheelRover};
