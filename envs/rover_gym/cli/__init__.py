@@ -11,6 +11,7 @@ from rover_gym.cli.planar import planar
 from rover_gym.cli.plot import plot
 from rover_gym.cli.replay import replay
 from rover_gym.cli.report import report
+from rover_gym.cli.scene import scene
 
 app = typer.Typer(
     help="Drive a six-wheel Mars rover in a nonsmooth simulator.",
@@ -23,6 +24,7 @@ app.command()(baseline)
 app.command()(report)
 app.command()(plot)
 app.command()(replay)
+app.command()(scene)
 app.add_typer(planar, name="planar")
 
 
