@@ -50,8 +50,8 @@ def measure_economies(
 ) -> list[Economy]:
     """Drives a plan's scene straight, with and without each economy that applies.
 
-    All drives are run in turn, `repeats` times, and the least CPU time of each is taken, so that a busy machine is busy for
-    all of them.
+    All drives are run in turn, `repeats` times, and the least CPU time of each is taken, so that a busy machine is
+    busy for all of them.
 
     Args:
         plan: What is built.

@@ -10,8 +10,8 @@
     >>> rover.step(200).is_converged
     True
 
-A scene says what will never happen in it; whatever it leaves open is built. What was left out is refused when it is asked for
-later. `docs/economy.md` has the error and the cost of each economy, and the command that measures them.
+A scene says what will never happen in it; whatever it leaves open is built. What was left out is refused when it is
+asked for later. `docs/economy.md` has the error and the cost of each economy, and the command that measures them.
 """
 
 import math
@@ -156,8 +156,7 @@ class ScenePlan:
 
     def _planar(self) -> MirroredRoverSimulation:
         plane = self.terrain
-        if not isinstance(plane, Plane):
-            raise AssertionError("a planar plan stands on a plane")
+        assert isinstance(plane, Plane)  # noqa: S101 - `plan` makes no planar plan without
         heading = self.start[4]
         n = plane.normal
         slope = -(n[0] * math.cos(heading) - n[2] * math.sin(heading)) / n[1]
