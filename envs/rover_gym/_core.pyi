@@ -634,9 +634,9 @@ class TwoWheelRoverSimulation(PlanarSimulation):
 class MirroredRoverSimulation(PlanarSimulation):
     """The six-wheel rover driven straight, in its plane of symmetry: x, y, theta, then a joint angle a pair.
 
-    `model` must be its own mirror image about the trunk's x-y plane; the built-in rover if not given. Its joints that do
-    not turn about z are locked at zero. Torques are one a pair of wheels, of each wheel of it, and saturate at the
-    model's limits. Only wheels touch the ground. Options as `BallSimulation`'s.
+    `model` must be its own mirror image about the trunk's x-y plane; the built-in rover if not given. Its joints that
+    do not turn about z are locked at zero. Torques: one a pair, of each of its wheels; they saturate at the model's
+    limits. Only wheels touch the ground. Options as `BallSimulation`'s.
 
     Raises:
         ModelError: The model has no planar image, or one that has not 7 coordinates.

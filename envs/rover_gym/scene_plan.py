@@ -180,16 +180,15 @@ class PlannedRover:
     def __init__(self, plan: ScenePlan) -> None:
         self.plan = plan
         self.simulation = plan.simulation()
-        names = plan.scene.model.dof_names
-        if isinstance(self.simulation, Simulation):
-            self._places = [[names.index(name)] for name in plan.model.dof_names]
-        else:
+        names, wheels = plan.scene.model.dof_names, plan.scene.model.wheel_names
+        self._pairs: list[list[int]] = []
+        if isinstance(self.simulation, MirroredRoverSimulation):
             # x runs along the heading, so it is put in its place by itself.
             joints = [[names.index(name) for name in pair] for pair in self.simulation.joints]
             self._places = [[], [1], [5], *joints]
-        wheels = plan.scene.model.wheel_names
-        planar = isinstance(self.simulation, MirroredRoverSimulation)
-        self._pairs = [[wheels.index(name) for name in pair] for pair in self.simulation.wheels] if planar else []
+            self._pairs = [[wheels.index(name) for name in pair] for pair in self.simulation.wheels]
+        else:
+            self._places = [[names.index(name)] for name in plan.model.dof_names]
 
     @property
     def time(self) -> float:

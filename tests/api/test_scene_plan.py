@@ -133,10 +133,9 @@ def test_a_planar_rover_that_tips_over_says_so() -> None:
     start = np.zeros(21)
     start[1], start[5] = 2.0, 0.15
     rover = plan(straight(start=start)).rover()
+    rover.set_wheel_torques(np.full(6, 150.0))  # in the air, the motors turn the trunk
     with pytest.raises(StepError, match="planar model does not know") as tilt:
-        for _ in range(40):
-            rover.set_wheel_torques(np.full(6, 150.0))  # in the air, the motors turn the trunk
-            rover.step(10)
+        tuple(rover.step(10) for _ in range(40))
     assert tilt.value.field == "pitch"
 
 
