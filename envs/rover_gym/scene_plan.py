@@ -44,19 +44,21 @@ Array: TypeAlias = npt.NDArray[np.float64]
 Accuracy: TypeAlias = Literal["fast", "balanced", "reference"] | float
 Kind: TypeAlias = Literal["full", "welded", "planar"]
 
-#: Largest distance of the trunk in 10 s from that of the full model with its steering held by the PD, m. Measured on
-#: flat ground and slopes of up to 10 degrees: at most a fifth of it.
-WELD_ERROR = 1e-4
-#: The same for the planar model against the welded one: rounding and the solver's tolerance, m.
-PLANAR_ERROR = 1e-7
-#: Linearised against Newton variant over step squared, m/s2, on the same drives.
-LINEARISED_ERROR = 1.0
-#: CPU time of a step on a plane, relative to the full model.
-COST: dict[Kind, float] = {"full": 1.0, "welded": 0.6, "planar": 0.3}
+#: Largest distance of the trunk in 10 s from that of the full model with its steering held by the PD, m. On a plane, from
+#: rest on it, a wheel touches on its steering axis and nothing turns it. Largest measured: 2.6e-7 (`docs/economy.md`).
+WELD_ERROR = 1e-6
+#: The same for the planar model against the welded one, m: rounding and the solver's tolerance. Largest measured: 1e-9.
+PLANAR_ERROR = 1e-8
+#: Linearised against Newton scheme over the step squared, m/s2, on the same drives. Largest measured: 3.3e-3.
+LINEARISED_ERROR = 1e-2
+#: CPU time of a step on a plane, relative to the full model, as measured.
+COST: dict[Kind, float] = {"full": 1.0, "welded": 0.75, "planar": 0.3}
+#: Gap of a wheel (m) up to which the start counts as resting on the plane.
+RESTING = 1e-6
 #: The planar model's trunk does not touch the ground; this far from parallel to it (rad) it might.
 LARGEST_TILT = 0.2
 
-_STRAIGHT = 1e-12  # sine of the angle up to which a slope counts as along the heading
+_STRAIGHT = 1e-12  # rad or m: what counts as symmetric, a few roundings away from it
 
 
 @dataclass(frozen=True)
@@ -286,7 +288,7 @@ def plan(scene: Scene, accuracy: Accuracy = "balanced", *, planar: bool = True) 
         )
     else:
         base = Decision("base", "free: 6 coordinates", f"no planar model: {obstacle}")
-    variant, variant_decision = _variant(scene, chosen)
+    variant, variant_decision = _variant(scene, chosen, calm=weld)
     options = {**scene.options, **chosen, "variant": variant}
     # Wrong options are refused here, not when the simulation is built.
     Simulation(model, terrain, **options)
@@ -383,8 +385,36 @@ def _steering(scene: Scene, terrain: Plane | SphereField, start: Array) -> tuple
     if isinstance(terrain, SphereField):
         why = "not commanded, but on spheres the PD gives way enough to change which sphere a wheel climbs"
         return False, Decision("steering", held, why)
-    why = "never commanded; what the PD would give way is within the error"
+    if not _rests(scene, terrain, start):
+        why = "not commanded, but in a landing wheels strike at an angle and turn"
+        return False, Decision("steering", held, why)
+    if _steering_offset(scene.model) > _STRAIGHT:
+        why = "not commanded, but the wheels touch beside their steering axes and turn"
+        return False, Decision("steering", held, why)
+    why = "never commanded, and every wheel touches on its steering axis, so nothing else turns it"
     return True, Decision("steering", f"{len(joints)} joints welded at zero", why, WELD_ERROR)
+
+
+def _rests(scene: Scene, terrain: Plane, start: Array) -> bool:
+    """Whether all wheels touch the plane at the start."""
+    gaps = scene.model.wheel_gaps(start, terrain, coordinates="state")
+    return float(np.abs(gaps).max()) <= RESTING
+
+
+def _steering_offset(model: RoverModel) -> float:
+    """Largest distance of a wheel's centre from its steering axis, straight ahead, m."""
+    description = model.to_dict()
+    axes = {solid["name"]: np.array(solid.get("axis", (0.0, 0.0, 0.0)), dtype=float) for solid in description["solids"]}
+    poses = model.poses(np.zeros(model.nq), coordinates="state")
+    offsets = [0.0]
+    for wheel in description["wheels"]:
+        if (name := wheel.get("steering")) in model.dof_names:
+            arm = poses[wheel["solid"]][0] - poses[name][0]
+            axis = poses[name][1] @ axes[name]
+            offsets.append(float(np.linalg.norm(np.cross(arm, axis)) / np.linalg.norm(axis)))
+            # On a plane it touches straight below its centre.
+            offsets.append(float(np.hypot(axis[0], axis[2])))
+    return max(offsets)
 
 
 def _obstacle(scene: Scene, terrain: Plane | SphereField, start: Array, *, welded: bool) -> str | None:
@@ -413,17 +443,15 @@ def _obstacle(scene: Scene, terrain: Plane | SphereField, start: Array, *, welde
     pairs = [[names.index(name) for name in pair] for pair in image.joints]
     free = {0, 1, 2, 4, 5, *(i for pair in pairs for i in pair)}
     still = [i for i in range(scene.model.nq) if i not in free]
-    if np.any(start[still]) or any(len({start[i] for i in pair}) > 1 for pair in pairs):
+    apart = [np.ptp(start[pair]) for pair in pairs]
+    if np.abs(start[still]).max(initial=0.0) > _STRAIGHT or max(apart) > _STRAIGHT:
         return "the start is not symmetric"
     return None
 
 
-def _variant(scene: Scene, chosen: dict[str, Any]) -> tuple[str, Decision]:
+def _variant(scene: Scene, chosen: dict[str, Any], *, calm: bool) -> tuple[str, Decision]:
     if scene.tumbles:
         return "newton", Decision("scheme", "Newton", "keeps angular momentum in free flight to rounding")
-    error = LINEARISED_ERROR * chosen["time_step"] ** 2
-    if chosen["variant"] == "newton":
-        why = "Newton pays in free flight only; on the ground it moves the path by less than the step's own error"
-    else:
-        why = "one linear solve a step: the motion on the ground is slow beside the step"
+    why = "Newton pays in free flight: on the ground it moves the path by less than the step's own error"
+    error = LINEARISED_ERROR * chosen["time_step"] ** 2 if calm else None
     return "linearised", Decision("scheme", "linearised", why, error)
