@@ -44,8 +44,9 @@ Array: TypeAlias = npt.NDArray[np.float64]
 Accuracy: TypeAlias = Literal["fast", "balanced", "reference"] | float
 Kind: TypeAlias = Literal["full", "welded", "planar"]
 
-#: Largest distance of the trunk in 10 s from that of the full model with its steering held by the PD, m. On a plane, from
-#: rest on it, a wheel touches on its steering axis and nothing turns it. Largest measured: 2.6e-7 (`docs/economy.md`).
+# The bounds are for 10 s from rest on a plane while the wheels do not slip; `docs/economy.md` has what was measured.
+#: Largest distance of the trunk from that of the full model with its steering held by the PD, m. On a plane a wheel
+#: touches on its steering axis and nothing turns it. Largest measured: 2.6e-7.
 WELD_ERROR = 1e-6
 #: The same for the planar model against the welded one, m: rounding and the solver's tolerance. Largest measured: 1e-9.
 PLANAR_ERROR = 1e-8
@@ -242,9 +243,15 @@ class PlannedRover:
         """Takes n steps.
 
         Raises:
-            StepError: A step could not be taken, or a planar rover has tilted so far that it may touch with its trunk.
+            StepError: A step could not be taken, a planar rover has tilted so far that it may touch with its trunk, or
+                the rover has left the scene's reach.
         """
         report = self.simulation.step(n)
+        reach = self.plan.scene.reach
+        if reach is not None:
+            way = self.q[[0, 2]] - self.plan.start[[0, 2]]
+            if (distance := float(np.hypot(*way))) > reach:
+                refuse(StepError, "reach", distance, f"the rover has left the reach of {reach:g} m it was planned with")
         if isinstance(self.simulation, MirroredRoverSimulation):
             ground = self.simulation.ground
             tilt = float(self.simulation.q[2]) - (math.atan(ground.slope) if isinstance(ground, Line) else 0.0)
@@ -362,7 +369,7 @@ def _ground(scene: Scene) -> tuple[Plane | SphereField, Decision]:
     if left == 0:
         refuse(OptionError, "reach", scene.reach, "leaves the rover without any ground")
     kept = SphereField(centres[shown], radii[shown], plane)
-    return kept, Decision("ground", f"{left} spheres in a ball tree", f"of {len(radii)} spheres {dropped}", 0.0)
+    return kept, Decision("ground", f"{left} spheres in a ball tree", f"of {len(radii)} spheres {dropped}")
 
 
 def _extent(model: RoverModel) -> Array:

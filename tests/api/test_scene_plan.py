@@ -162,6 +162,15 @@ def test_spheres_that_cannot_be_met_are_left_out() -> None:
     assert len(plan(Scene(everything)).terrain) == len(everything)  # type: ignore[arg-type]
 
 
+def test_a_rover_that_leaves_the_reach_it_was_planned_with_says_so() -> None:
+    rover = plan(straight(reach=0.5)).rover()
+    rover.set_wheel_torques(np.full(6, 30.0))
+    rover.step(100)
+    with pytest.raises(StepError, match="left the reach") as left:
+        rover.step(400)
+    assert left.value.field == "reach"
+
+
 def test_newton_is_built_where_it_pays() -> None:
     assert plan(straight(), "reference").options["variant"] == "linearised"
     assert plan(Scene(tumbles=True), "fast").options["variant"] == "newton"

@@ -43,7 +43,7 @@ def test_measure_compares_with_and_without() -> None:
     rows = json.loads(result.stdout)["measured"]
     assert {"steering welded, against the PD", "planar, against welded"} <= {row["name"] for row in rows}
     assert all(row["before"] > 0.0 and row["after"] > 0.0 for row in rows)
-    table = rover("--terrain", "rocks", "--reach", "0.5", "--measure", "--duration", "0.2")
+    table = rover("--terrain", "rocks", "--reach", "2.5", "--measure", "--duration", "0.2")
     assert "spheres left out" in table.output
 
 

@@ -21,6 +21,9 @@ from rover_gym.scene_plan import Accuracy, Scene, ScenePlan, plan
 from rover_gym.start import tilted_plane
 from rover_gym.validation import number, refuse
 
+#: Radius of the ground without rocks around the start, beyond the rover itself, m.
+CLEARING = 3.0
+
 
 class TerrainKind(StrEnum):
     """Grounds that can be chosen by name."""
@@ -118,7 +121,7 @@ def _scene(
     ground: Plane | SphereField = plane
     start = None
     if terrain is TerrainKind.rocks:
-        clear = ((0.0, 0.0, clear_radius(model)),)
+        clear = ((0.0, 0.0, CLEARING + clear_radius(model)),)
         ground = SphereField.rocks(
             0.1, (-4.0, -4.0, 26.0, 4.0), seed, max_diameter=0.2, ground=plane, clear=np.array(clear)
         )

@@ -83,7 +83,7 @@ fn point_jacobians_are_the_discs_rates() {
     }
 }
 
-/// Full (steering held as if welded) against planar: dropped from a hand's breadth, then driven.
+/// Six coordinates of the base and free pairs against the planar image: dropped from a hand's breadth, driven for ten seconds.
 fn largest_distance(slope: f64, options: StepOptions) -> f64 {
     let planar = planar();
     let P = injection(&planar);
@@ -96,7 +96,7 @@ fn largest_distance(slope: f64, options: StepOptions) -> f64 {
     let mut full = Simulation::new(
         model,
         Arc::new(Plane::new(normal.into(), 0.0).unwrap()),
-        options,
+        options.clone(),
     )
     .unwrap();
     let configuration = coordinates::from_public(full.model(), start.as_slice()).unwrap();
