@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from rover_gym.cli import app
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("README.md", "docs/recording.md", "docs/replay.md", "docs/seeing.md", "docs/planar.md")
+PAGES = ("README.md", "docs/economy.md", "docs/recording.md", "docs/replay.md", "docs/seeing.md", "docs/planar.md")
 
 
 def blocks() -> list[pytest.param]:

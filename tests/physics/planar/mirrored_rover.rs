@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, SVector, Vector2, Vector3};
 use rover_core::geometry::Plane;
-use rover_core::integrator::StepOptions;
+use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::bias::BiasScratch;
 use rover_core::multibody::{Kinematics, MassMatrix, Model, ModelDescription, bias, coordinates};
 use rover_core::planar::{
@@ -84,7 +84,7 @@ fn point_jacobians_are_the_discs_rates() {
 }
 
 /// Six coordinates of the base and free pairs against the planar image: dropped from a hand's breadth, driven for ten seconds.
-fn largest_distance(slope: f64, options: StepOptions) -> f64 {
+fn largest_distance(slope: f64, options: &StepOptions) -> f64 {
     let planar = planar();
     let P = injection(&planar);
     let model = Arc::new(planar.model().clone());
@@ -105,7 +105,7 @@ fn largest_distance(slope: f64, options: StepOptions) -> f64 {
     full.set_wheel_torques(&[15.0; 6]).unwrap();
     let line = Arc::new(Line::new(slope, 0.0).unwrap());
     let mut reduced =
-        MirroredRoverSimulation::new(planar, line, ContactRule::Nearest, options).unwrap();
+        MirroredRoverSimulation::new(planar, line, ContactRule::Nearest, options.clone()).unwrap();
     reduced.set_state(q.as_slice(), &[0.0; 7]).unwrap();
     reduced.set_inputs(&[15.0; 3]).unwrap();
     let mut largest = 0.0_f64;
@@ -122,13 +122,18 @@ fn largest_distance(slope: f64, options: StepOptions) -> f64 {
 #[test]
 fn ten_seconds_straight_ahead_are_those_of_the_full_rover() {
     for variant in VARIANTS {
+        // The Newton variant of the tree balances momenta of solids, the planar one forces: equal to second order only.
+        let bound = match variant {
+            Variant::Linearised => 1e-8,
+            Variant::Newton => 5e-4,
+        };
         for slope in [0.0, 0.05, -0.2] {
             let options = StepOptions {
                 variant,
                 ..options(G, 0.7, 0.0, 0.005)
             };
-            let distance = largest_distance(slope, options);
-            assert!(distance < 1e-8, "{variant:?}, slope {slope}: {distance:e}");
+            let distance = largest_distance(slope, &options);
+            assert!(distance < bound, "{variant:?}, slope {slope}: {distance:e}");
         }
     }
 }
