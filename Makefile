@@ -13,7 +13,7 @@ UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
 
-.PHONY: help demo test check lint types format test-rust test-slow test-python docs bench chart stability pins clean
+.PHONY: help demo test check lint types format test-rust test-slow test-python docs bench chart stability profiles train train-rllib pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -34,7 +34,7 @@ lint: $(STAMPS)/test ## formatting and lint, Rust and Python
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 
-types: $(STAMPS)/test $(STAMPS)/core ## mypy, and the stub against the compiled module
+types: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core ## mypy, and the stub against the compiled module
 	$(BIN)/mypy
 	MYPYPATH=envs $(BIN)/stubtest rover_gym._core
 
@@ -66,6 +66,17 @@ bench: ## time a step and tell where the time goes (informs, does not gate)
 	  awk -v a=$$(count 1) -v b=$$(count 1001) 'BEGIN { printf "\n%.0f instructions a step of the curve (callgrind)\n", (b - a) / 1000 }'; \
 	else echo "valgrind is not installed: no instruction counts"; fi
 
+train: $(STAMPS)/train $(STAMPS)/demo $(STAMPS)/core ## train a policy for the rocks (about half an hour of one core) and compare it with the baseline, under runs/
+	$(BIN)/python training/train_ppo.py --config training/configs/rocks.yaml --seed 1
+	$(BIN)/python training/evaluate.py runs/train/rocks-seed1 --difficulty 1
+
+train-rllib: ## train Rover-v0 on a local Ray with 1 and with 2 workers; Ray wants a virtual environment of its own
+	@$(MAKE) --no-print-directory VENV=$(VENV)-rllib $(VENV)-rllib/stamps/ray
+	$(VENV)-rllib/bin/python training/train_rllib.py --workers 1 --workers 2 --iterations 4
+
+profiles: $(STAMPS)/test $(STAMPS)/core ## performance profiles of the contact solvers, with Siconos' where it is installed
+	$(BIN)/python tests/comparison/solver_profiles.py
+
 # One thread for every engine, and the package of comparisons on the path.
 COMPARE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m comparison
 
@@ -79,10 +90,11 @@ pins: $(STAMPS)/venv ## resolve requirements/*.txt anew from pyproject.toml
 	$(call pin,demo) --extra demo --group build
 	$(call pin,test) --extra test --extra docs --group build --group lint --constraint requirements/demo.txt
 	$(call pin,train) --extra train --constraint requirements/test.txt
+	$(call pin,rllib) --extra rllib --group build
 	$(call pin,peers) --extra peers --constraint requirements/test.txt
 
 clean: ## remove everything that make made, but for runs/
-	rm -rf $(VENV) target docs/_build envs/rover_gym/_core*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) $(VENV)-rllib target docs/_build envs/rover_gym/_core*.so .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 # One list for every Python from 3.11 on, versions only.
 pin = $(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --no-annotate \
@@ -107,6 +119,12 @@ $(STAMPS)/debian-%: requirements/debian/%.txt | $(STAMPS)/venv
 
 $(STAMPS)/demo $(STAMPS)/test $(STAMPS)/train: $(STAMPS)/%: requirements/%.txt $(STAMPS)/venv
 	$(UV) --requirement $<
+	@touch $@
+
+# Ray pins its own Gymnasium, so these two go into an environment that has nothing else.
+$(STAMPS)/ray: requirements/rllib.txt pyproject.toml Cargo.lock $(shell find rust -type f) $(STAMPS)/venv
+	$(UV) --requirement $<
+	$(BIN)/python -m maturin develop --release --uv --quiet
 	@touch $@
 
 # An engine that cannot be installed is left out of the comparison, which says so.

@@ -34,6 +34,7 @@ __all__ = [
     "RoverGymError",
     "RoverModel",
     "Simulation",
+    "SimulationBatch",
     "Sine",
     "Snapshot",
     "SolverReport",
@@ -100,7 +101,9 @@ class RoverModel:
         steering_stiffness: float | None = None,
         steering_damping: float | None = None,
         wheel_torque_limit: float | None = None,
-    ) -> RoverModel: ...
+        mass_scale: float | None = None,
+    ) -> RoverModel:
+        """A model that differs in what is given. `mass_scale` multiplies masses and inertias."""
     def weld(self, joints: Mapping[str, float] | Sequence[str]) -> RoverModel: ...
     @property
     def name(self) -> str: ...
@@ -299,7 +302,7 @@ class Simulation:
         variant: Literal["linearised", "newton"] | None = None,
         theta: float = 0.5,
         forecast: float = 0.5,
-        solver: Literal["auto", "nsgs", "newton"] = "auto",
+        solver: Literal["auto", "nsgs", "newton", "proximal", "admm"] = "auto",
         tolerance: float | None = None,
         max_iterations: int = 1000,
         stabilisation: Literal["projection", "none"] = "projection",
@@ -397,6 +400,15 @@ class Simulation:
     @property
     def deepest_overlap(self) -> float:
         """Deepest gap of any wheel or box with the ground now, m: 0 where nothing overlaps, else negative."""
+    def reading(self, target: Sequence[float] | None = None, scan: npt.ArrayLike | None = None) -> _Array:
+        """All that a controller looks at as one fresh row; `reading_layout` names its parts.
+
+        `solver`, `work` and `positive_work` are those of the last call of `step`. `target`: a place on the map (x, z),
+        m; the origin by default. `scan` (n, 2): points ahead and to the right of the trunk's origin in the heading
+        frame, m, whose heights over the origin come last.
+        """
+    def reading_layout(self, n_scan: int = 0) -> dict[str, slice]:
+        """Names and places of the numbers in a reading."""
     def energy(self) -> Energy: ...
     def momentum(self) -> tuple[_Array, _Array]:
         """Linear (3,) kg m/s and angular momentum about the world origin (3,) kg m2/s."""
@@ -655,19 +667,60 @@ class MirroredRoverSimulation(PlanarSimulation):
         """Names of the wheels of each disc."""
 
 @final
+class SimulationBatch:
+    """Many rovers stepped side by side on several threads, bit for bit as each would be alone."""
+
+    def __new__(
+        cls, simulations: Sequence[Simulation], *, scan: npt.ArrayLike | None = None, threads: int | None = None
+    ) -> SimulationBatch:
+        """Copies the simulations, whose models must be of one size. `threads`: None for one a core."""
+    @property
+    def threads(self) -> int: ...
+    @property
+    def reading_layout(self) -> dict[str, slice]:
+        """Names and places of the numbers in a row of readings."""
+    def step(
+        self,
+        torques: npt.ArrayLike,
+        set_points: npt.ArrayLike,
+        n: int = 1,
+        *,
+        active: npt.NDArray[np.bool_] | None = None,
+    ) -> tuple[_Array, dict[int, str]]:
+        """Commands (n_rovers, 6) as `set_wheel_torques` and `set_steering` take them, then n steps.
+
+        Rovers that are not `active` keep still. Returns a fresh row of readings a rover, and why a rover could not
+        take a step, by its number; the others have gone on.
+        """
+    def readings(self) -> _Array:
+        """(n_rovers, size) as the rovers are now."""
+    def replace(self, index: int, simulation: Simulation, target: Sequence[float] | None = None) -> None:
+        """Puts a copy of a simulation, with its own terrain, in a place. `target` (x, z): what its readings look at."""
+    def simulation(self, index: int) -> Simulation:
+        """A copy of one rover, to look at."""
+    def __len__(self) -> int: ...
+
+@final
 class SolverReport:
     @property
-    def status(self) -> Literal["converged", "not_converged"]: ...
+    def status(self) -> Literal["converged", "relaxed", "not_converged"]:
+        """ "relaxed": the convex relaxation is solved, not Coulomb's law."""
     @property
     def is_converged(self) -> bool: ...
     @property
     def iterations(self) -> int: ...
     @property
-    def residual(self) -> float: ...
+    def residual(self) -> float:
+        """Violation of Coulomb's law relative to the data, computed from the returned impulses."""
     @property
-    def velocity_error(self) -> float: ...
+    def velocity_error(self) -> float:
+        """Largest violation of Coulomb's law at one contact, m/s."""
     @property
-    def solver(self) -> str: ...
+    def solver(self) -> str:
+        """The method that answered; never "auto"."""
+    @property
+    def law(self) -> Literal["coulomb", "relaxed"]:
+        """The law that the answer obeys."""
 
 @final
 class FrictionContactSolution:
@@ -682,14 +735,34 @@ def accuracy_options(accuracy: Literal["fast", "balanced", "reference"] | float)
     """The keyword arguments time_step, variant and tolerance of `Simulation` that an accuracy stands for."""
 
 def solve_friction_contact(
-    W: npt.ArrayLike,
+    W: npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
     q: npt.ArrayLike,
     mu: npt.ArrayLike,
     tolerance: float = 1e-8,
     *,
     dimension: Literal[2, 3] = 3,
-    solver: Literal["auto", "nsgs", "newton"] = "auto",
+    solver: Literal["auto", "nsgs", "newton", "proximal", "admm", "relaxed"] = "auto",
     max_iterations: int = 1000,
     initial: npt.ArrayLike | None = None,
 ) -> FrictionContactSolution:
-    """Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K, for any W (n_c d, n_c d)."""
+    """Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K, for any W (n_c d, n_c d).
+
+    Args:
+        W: Delassus operator, 1/kg, used as it is (it need not be symmetric or regular). For many contacts its block
+            rows ``(indptr (n_c + 1,), indices (n_blocks,), data (n_blocks, d, d))``: each row ascending, with its
+            diagonal block.
+        q: Free velocity (n_c d,), m/s, contact by contact: normal, tangent (, tangent).
+        mu: Friction coefficients (n_c,).
+        tolerance: Largest relative residual of a converged answer; its velocities are also right to
+            max(tolerance, 1e-9) m/s.
+        dimension: Components of a contact, 2 or 3.
+        solver: "auto" escalates from what is cheap to what is robust; "nsgs", "newton", "proximal", "admm" are single
+            methods of Coulomb's law; "relaxed" solves its convex relaxation, another law, and so never counts as
+            converged.
+        max_iterations: Most Newton steps, sweeps or ADMM iterations.
+        initial: Warm start (n_c d,), N s.
+
+    Raises:
+        ProblemError: Wrong shapes or entries.
+        OptionError: Unknown solver or dimension, tolerance or max_iterations out of range.
+    """

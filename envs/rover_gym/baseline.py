@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import gymnasium as gym
 
-from rover_gym.episodes import Episode, run_episode
+from rover_gym.episodes import Episode, Policy, run_episode
 from rover_gym.policy import PDPolicy
+from rover_gym.trained import TrainedPolicy, find_policy, policy_arguments
 
 DIFFICULTIES = (0.0, 0.25, 0.5, 0.75, 1.0)
 ENDS = ("goal", "time", "high_centred", "roll_over", "step_failed")
@@ -44,26 +45,29 @@ def measure_baseline(
     *,
     episodes: int = 200,
     seed: int = 0,
+    policy: str = "pd",
     progress: Callable[[float, int], None] = lambda _difficulty, _done: None,
 ) -> list[BaselineRow]:
-    """Drives `RoverRocks-v0` with the PD baseline, the same seeds at every difficulty.
+    """Drives `RoverRocks-v0` with the PD baseline, or another policy, the same seeds at every difficulty.
 
     Args:
         difficulties: Each in [0, 1].
         episodes: How many at each difficulty.
         seed: Seed of the first; the next ones count up.
+        policy: "pd", "trained" for the package's own, or the folder of a trained one.
         progress: Called with the difficulty and the number of episodes done, after each.
 
     Raises:
-        OptionError: A difficulty is out of its range.
+        OptionError: A difficulty is out of its range, or there is no such policy.
     """
-    env = gym.make("RoverRocks-v0")
-    policy = PDPolicy(env)
+    folder = find_policy(policy, "sphere_field")
+    env = gym.make("RoverRocks-v0", **({} if folder is None else policy_arguments(folder)))
+    driver: Policy = PDPolicy(env) if folder is None else TrainedPolicy.load(env, folder)
     rows = []
     for difficulty in difficulties:
         results = []
         for number in range(seed, seed + episodes):
-            results.append(run_episode(env, policy, number, options={"difficulty": difficulty}))
+            results.append(run_episode(env, driver, number, options={"difficulty": difficulty}))
             progress(difficulty, len(results))
         rows.append(_summarise(difficulty, results))
     return rows

@@ -1,9 +1,8 @@
 """`Rover-v0`: drive a six-wheel rover to a goal. The class docstring is the environment's card."""
 
 import copy
-import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
@@ -11,86 +10,22 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from rover_gym import rewards
-from rover_gym._core import (
-    CommandError,
-    ModelError,
-    OptionError,
-    Plane,
-    RoverModel,
-    Simulation,
-    Snapshot,
-    SphereField,
-    StateError,
-    StepError,
-    TerrainError,
-)
-from rover_gym.observation import (
-    CONTACT_GAP,
-    LARGEST,
-    N_ACTIONS,
-    N_WHEELS,
-    ObservationLayout,
-    build_layout,
-)
+from rover_gym._core import Plane, RoverModel, Simulation, Snapshot, SphereField, StateError, StepError
+from rover_gym.observation import N_ACTIONS, N_WHEELS, ObservationLayout
+from rover_gym.progress import Progress, advance, draw_noise, motor_commands, report
+from rover_gym.randomisation import Domain
 from rover_gym.render_options import RENDER_MODES, RenderOptions, check_render_mode, check_render_options
-from rover_gym.rocks import (
-    MAX_GOAL_DISTANCE,
-    RockDistribution,
-    Rocks,
-    check_rocks,
-    check_scan,
-    heights,
-    scan_points,
-)
-from rover_gym.start import Start, StartDistribution, resting_pose, sample_start, slope_of, tilted_plane
-from rover_gym.validation import Range, known_keys, number, refuse, span, vector
+from rover_gym.rocks import Rocks
+from rover_gym.scene import Scene, check_difficulty, check_reset_options, draw_scene
+from rover_gym.start import Start
+from rover_gym.task import Task, check_actions, check_task, mapping
+from rover_gym.validation import Range, refuse
 
 if TYPE_CHECKING:
     from rover_gym.rendering import FrameRenderer
 
-TERRAINS = ("plane", "sphere_field")
-SOLVER_OPTIONS = (
-    "variant",
-    "theta",
-    "forecast",
-    "solver",
-    "tolerance",
-    "max_iterations",
-    "stabilisation",
-    "warm_start",
-)
-RESET_OPTIONS = ("difficulty", "slope_deg", "uphill_deg", "position", "heading_deg", "goal", "q", "v")
-
-#: Steeper ground than this is a wall to a wheel.
-MAX_SLOPE_DEG = 60.0
-
-# High-centring: the trunk carries this share of the weight while the rover stays slower than this.
-TRUNK_LOAD = 0.1
-STUCK_SPEED = 0.05
-
-# A rover that stands deeper than this in the ground at its start, m, stands wrong.
-START_OVERLAP = 0.01
-
-# Below this speed, m/s, of wheel and rim alike a slip ratio says nothing.
+#: Below this speed, m/s, of wheel and rim alike a slip ratio says nothing: the core's `SLIP_SPEED`.
 SLIP_SPEED = 0.05
-
-
-@dataclass
-class _Episode:
-    """What an episode remembers beside the simulation's state; entries are replaced, never changed in place."""
-
-    start: Start
-    plane: Plane
-    terrain: Plane | SphereField
-    rocks: Rocks | None
-    q: npt.NDArray[np.float64]
-    distance: float
-    observation: npt.NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, np.float32))
-    previous_action: npt.NDArray[np.float64] = field(default_factory=lambda: np.zeros(N_ACTIONS))
-    energy: float = 0.0
-    energy_positive: float = 0.0
-    stuck_time: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -101,7 +36,9 @@ class EnvSnapshot:
     """
 
     simulation: Snapshot
-    episode: _Episode
+    scene: Scene
+    progress: Progress
+    difficulty: Range | None
     random_state: Mapping[str, Any]
 
 
@@ -178,6 +115,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | success         | w on the step that reaches the goal                            | 10       |
     | failure         | w on a step that ends in failure                               | -10      |
 
+    On a step that the physics could not take, only `failure` counts.
+
     ## Start
 
     The ground is a plane through the origin with slope and direction of steepest ascent drawn
@@ -215,13 +154,21 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     `truncated`: after 1200 steps (60 s), by Gymnasium's time limit; change it with
     `gymnasium.make(..., max_episode_steps=...)`. The environment itself never truncates.
 
+    ## Randomisation
+
+    `friction`, `mass_scale`, `actuator_gain` and `gravity_scale` are drawn uniformly at each reset where they are
+    ranges, and fixed where they are numbers. `observation_noise` is Gaussian, drawn anew each step for every
+    entry that has no bounds; flags, fractions, unit vectors, the distance and the action stay exact.
+    `set_difficulty` changes the rocks' difficulty, or its range, from the next reset on.
+
     ## Info
 
     `time` (s), `success` and `is_success` (the name stable-baselines3 looks for), `termination` ("" while
     the episode runs), `distance_to_goal` (m), `energy` (J, wheel motors, braking counted) and
     `energy_positive` (J, driving only) since reset, `slip_ratio` (mean over wheels in contact of
-    rim slip over the faster of rim and ground, 0 to 2), `tilt` (rad), `reward_terms`, and `solver`
-    (`status`, `iterations`, `residual`, `n_contacts`, `message`): the worst of the physics steps.
+    rim slip over the faster of rim and ground, 0 to 2), `tilt` (rad), `difficulty` (of the rocks, 0 where none
+    are drawn), `domain` (the randomised properties, by argument), `reward_terms`, and `solver` (`status`,
+    `iterations`, `residual`, `n_contacts`, `message`): the worst of the physics steps.
 
     ## Arguments
 
@@ -241,9 +188,13 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | max_steering_deg  | None           | set-point of a steering action of 1; None: the model's limit    |
     | max_tilt_deg      | 60             | roll-over beyond                                                |
     | stuck_time        | 2              | s until a high-centred rover ends the episode                   |
-    | friction          | 0.7            | Coulomb's coefficient                                           |
+    | friction          | 0.7            | Coulomb's coefficient, or range                                 |
     | restitution       | 0              | Newton's coefficient                                            |
     | gravity           | (0, -9.81, 0)  | m/s2; Mars is (0, -3.72, 0)                                     |
+    | mass_scale        | 1              | masses and inertias over the model's, or range                  |
+    | actuator_gain     | 1              | torque given over torque asked, up to the limit, or range       |
+    | gravity_scale     | 1              | gravity over `gravity`, or range                                |
+    | observation_noise | 0              | standard deviation, in the observation's units                  |
     | control_frequency | 20             | Hz; a whole number of physics steps a period                    |
     | time_step         | 0.005          | s, of the physics                                               |
     | model             | None           | a `RoverModel` with six driven, steered wheels; None: the rover |
@@ -284,9 +235,13 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         max_steering_deg: float | None = None,
         max_tilt_deg: float = 60.0,
         stuck_time: float = 2.0,
-        friction: float = 0.7,
+        friction: float | Range = 0.7,
         restitution: float = 0.0,
         gravity: tuple[float, float, float] = (0.0, -9.81, 0.0),
+        mass_scale: float | Range = 1.0,
+        actuator_gain: float | Range = 1.0,
+        gravity_scale: float | Range = 1.0,
+        observation_noise: float = 0.0,
         control_frequency: float = 20.0,
         time_step: float = 0.005,
         model: RoverModel | None = None,
@@ -295,104 +250,55 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         render_mode: str | None = None,
         render_options: Mapping[str, Any] | None = None,
     ) -> None:
-        self._field = terrain if isinstance(terrain, SphereField) else None
-        if self._field is None and terrain not in TERRAINS:
-            refuse(TerrainError, "terrain", terrain, f"unknown; known are {', '.join(TERRAINS)} and a SphereField")
-        self._rock_distribution: RockDistribution | None = None
-        if terrain == "sphere_field":
-            self._rock_distribution = check_rocks(difficulty, rock_abundance, max_rock_radius)
-        else:
-            for name, value in (
-                ("difficulty", difficulty),
-                ("rock_abundance", rock_abundance),
-                ("max_rock_radius", max_rock_radius),
-            ):
-                if value is not None:
-                    refuse(OptionError, name, value, "needs terrain 'sphere_field'")
-        self._slope_by_difficulty = slope_deg is None and self._rock_distribution is not None
-        scan = check_scan(height_scan)
-        self._scan_offsets = None if scan is None else scan.offsets
-        farthest = None if self._rock_distribution is None else MAX_GOAL_DISTANCE
-        self._start_distribution = StartDistribution(
-            slope=_radians(
-                span("slope_deg", 0.0 if slope_deg is None else slope_deg, at_least=0.0, at_most=MAX_SLOPE_DEG)
-            ),
-            uphill=_radians(span("uphill_deg", uphill_deg)),
-            heading=_radians(span("heading_deg", heading_deg)),
-            goal_distance=span("goal_distance", goal_distance, above=0.0, at_most=farthest),
-            goal_bearing=_radians(span("goal_bearing_deg", goal_bearing_deg)),
+        self.task: Task = check_task(
+            terrain=terrain,
+            difficulty=difficulty,
+            rock_abundance=rock_abundance,
+            max_rock_radius=max_rock_radius,
+            height_scan=height_scan,
+            slope_deg=slope_deg,
+            uphill_deg=uphill_deg,
+            heading_deg=heading_deg,
+            goal_distance=goal_distance,
+            goal_bearing_deg=goal_bearing_deg,
+            goal_tolerance=goal_tolerance,
+            max_steering_deg=max_steering_deg,
+            max_tilt_deg=max_tilt_deg,
+            stuck_time=stuck_time,
+            friction=friction,
+            restitution=restitution,
+            gravity=gravity,
+            mass_scale=mass_scale,
+            actuator_gain=actuator_gain,
+            gravity_scale=gravity_scale,
+            observation_noise=observation_noise,
+            control_frequency=control_frequency,
+            time_step=time_step,
+            model=model,
+            solver_options=solver_options,
+            reward_weights=reward_weights,
         )
-        if self._field is not None:
-            if slope_deg is not None:
-                refuse(OptionError, "slope_deg", slope_deg, "is the given field's own")
-            slope, uphill = slope_of(self._field)
-            self._start_distribution = replace(self._start_distribution, slope=(slope, slope), uphill=(uphill, uphill))
-        self.goal_tolerance = number("goal_tolerance", goal_tolerance, above=0.0)
-        self._cos_max_tilt = math.cos(math.radians(number("max_tilt_deg", max_tilt_deg, above=0.0, at_most=180.0)))
-        self._stuck_limit = number("stuck_time", stuck_time, above=0.0)
-        self.gravity = vector("gravity", gravity, 3)
-        magnitude = math.hypot(*self.gravity)
-        if not magnitude > 0.0:
-            refuse(OptionError, "gravity", gravity, "must not vanish: it says where up is")
-        self._up = -np.array(self.gravity) / magnitude
-
-        frequency = number("control_frequency", control_frequency, above=0.0)
-        step = number("time_step", time_step, above=0.0)
-        substeps = round(1.0 / (frequency * step))
-        if substeps < 1 or not math.isclose(substeps * frequency * step, 1.0, rel_tol=1e-9):
-            reason = f"must give a whole number of physics steps of {step:g} s a period"
-            refuse(OptionError, "control_frequency", control_frequency, reason)
-        self._substeps = substeps
-        self.dt = substeps * step
-
-        self._reward_weights = dict(rewards.WEIGHTS)
-        for name, weight in _mapping("reward_weights", reward_weights).items():
-            known_keys("reward_weights", (name,), rewards.WEIGHTS)
-            self._reward_weights[name] = number(f"reward_weights.{name}", weight)
-
-        self.model = _six_wheels(RoverModel() if model is None else model)
-        self._simulation_options: dict[str, Any] = {
-            "gravity": self.gravity,
-            "friction": friction,
-            "restitution": restitution,
-            "time_step": step,
-        }
-        further = _mapping("solver_options", solver_options)
-        known_keys("solver_options", further, SOLVER_OPTIONS)
-        self._simulation_options.update(further)
-        # The core validates what it takes; the simulation itself is built anew at each reset.
-        self._simulation = self._simulate(Plane())
-
-        limit = self.model.steering_limit
-        if max_steering_deg is not None:
-            asked = number("max_steering_deg", max_steering_deg, above=0.0)
-            if math.radians(asked) > limit * (1.0 + 1e-12):
-                reason = f"must be at most the model's limit, {math.degrees(limit):g}"
-                refuse(OptionError, "max_steering_deg", max_steering_deg, reason)
-            limit = min(limit, math.radians(asked))
-        self.max_steering = limit
-        self._torque_limits = self.model.wheel_torque_limits
-        self._wheel_index = np.array(self.model.wheel_joint_indices)
-        self._drive_signs = drive_signs(self.model)
-        self._rim_per_rate: list[float] = (self.model.wheel_radii * self._drive_signs).tolist()
-        self._trunk_load_limit = TRUNK_LOAD * self.model.mass * magnitude
-
-        self.observation_layout: ObservationLayout = build_layout(
-            self.model, magnitude, 0 if self._scan_offsets is None else len(self._scan_offsets)
-        )
-        self._inverse_scale = 1.0 / self.observation_layout.scale
+        self.model = self.task.model
+        self.gravity = self.task.gravity
+        self.dt = self.task.dt
+        self.goal_tolerance = self.task.goal_tolerance
+        self.max_steering = self.task.max_steering
+        self.observation_layout: ObservationLayout = self.task.layout
         self.observation_space = gym.spaces.Box(
             self.observation_layout.low, self.observation_layout.high, dtype=np.float32
         )
         self.action_space = gym.spaces.Box(-1.0, 1.0, (N_ACTIONS,), np.float32)
-        self._episode: _Episode | None = None
+        self._simulation = Simulation(self.model, Plane(), **self.task.simulation_options)
+        self._scene: Scene | None = None
+        self._progress: Progress
+        self._difficulty: Range | None = None
 
         check_render_mode(render_mode)
         self.render_mode = render_mode
         self.render_options: RenderOptions = check_render_options(
-            "render_options", _mapping("render_options", render_options)
+            "render_options", mapping("render_options", render_options)
         )
-        fps = round(frequency, 9)
+        fps = round(1.0 / self.dt, 9)
         self.metadata = {**type(self).metadata, "render_fps": int(fps) if fps.is_integer() else fps}
         self._renderer: FrameRenderer | None = None
 
@@ -417,6 +323,11 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         return self._running().rocks
 
     @property
+    def domain(self) -> Domain:
+        """The episode's properties of rover and world as they were drawn."""
+        return self._running().domain
+
+    @property
     def difficulty(self) -> float | None:
         """The episode's difficulty; None on the plane."""
         rocks = self.rocks
@@ -432,48 +343,16 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             StateError: `q` or `v` has a wrong shape or an entry that is not finite.
             TerrainError: The rover would stand in the ground or in a sphere; the running episode goes on.
         """
-        fixed, difficulty, q, v = self._check_reset_options(options)
+        checked = check_reset_options(self.task, options)
         super().reset(seed=seed)
-
-        distribution, rocks = self._start_distribution, None
-        if self._rock_distribution is not None:
-            rocks = self._rock_distribution.sample(self.np_random, difficulty)
-            if self._slope_by_difficulty:
-                distribution = replace(distribution, slope=rocks.slope)
-        start = sample_start(self.np_random, distribution, **fixed)
-        plane = tilted_plane(start.slope, start.uphill)
-        terrain: Plane | SphereField = plane
-        if self._field is not None and self._field.ground is not None:
-            plane, terrain = self._field.ground, self._field
-        elif rocks is not None:
-            terrain = rocks.lay_out(self.model, start, plane, self.goal_tolerance)
-        simulation = self._simulate(terrain)
-        if q is None:
-            q = resting_pose(self.model, plane, start.position, start.heading)
-        simulation.set_state(q, v)
-        if simulation.deepest_overlap < -START_OVERLAP:
-            reason = "is how deep (m) the rover stands in the ground or in a sphere at its start"
-            refuse(TerrainError, "terrain", simulation.deepest_overlap, reason)
-        self._simulation = simulation
-        distance = math.hypot(start.goal[0] - q[0], start.goal[1] - q[2])
-        self._episode = _Episode(
-            start=start, plane=plane, terrain=terrain, rocks=rocks, q=simulation.q, distance=distance
-        )
-
-        rotation = simulation.rotation
-        observation = self._observe(self._episode, simulation.v, rotation)
-        if observation is None:
-            refuse(StateError, "q", q, "must be observable in float32")
-        self._episode.observation = observation.copy()
-        info = self._info(
-            self._episode,
-            float(self._up @ rotation[:, 1]),
-            0.0,
-            termination="",
-            terms=dict.fromkeys(self._reward_weights, 0.0),
-            solver=_solver_info("converged"),
-        )
-        return observation, info
+        scene, simulation = draw_scene(self.task, self.np_random, self._difficulty, checked)
+        reading = simulation.reading(scene.start.goal, self.task.scan)
+        progress = Progress.begin(self.task, scene, reading, self._draw_noise())
+        if progress is None:
+            refuse(StateError, "q", checked.q, "must be observable in float32")
+        self._simulation, self._scene, self._progress = simulation, scene, progress
+        outcome = report(self.task, progress, reading)
+        return outcome.observation, outcome.info()
 
     def step(
         self, action: npt.NDArray[np.float32]
@@ -485,57 +364,32 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
                 [-1, 1]; nothing has changed.
             ResetNeeded: The environment has not been reset.
         """
-        episode = self._running()
+        goal = self._running().start.goal
         simulation = self._simulation
-        command = _check_action(action)
-        torques = command[:N_WHEELS] * self._torque_limits
-        solver = self._drive(torques, command[N_WHEELS:] * self.max_steering)
+        command = check_actions(action, (N_ACTIONS,))
+        torques, set_points = motor_commands(self.task, self._progress, command)
+        simulation.set_wheel_torques(torques)
+        simulation.set_steering(set_points)
+        messages: dict[int, str] = {}
+        try:
+            simulation.step(self.task.substeps)
+        except StepError as error:
+            messages[0] = str(error)
+        reading = simulation.reading(goal, self.task.scan)
+        outcome = advance(self.task, self._progress, command, reading, messages, self._draw_noise())
+        return outcome.observation, float(outcome.reward), bool(outcome.termination), False, outcome.info()
 
-        # The torque is constant over the period: its work is exactly torque times angle turned.
-        q, v, rotation = simulation.q, simulation.v, simulation.rotation
-        work: list[float] = (torques * self._drive_signs * (q - episode.q)[self._wheel_index]).tolist()
-        spent = sum(map(abs, work))
-        change = command - episode.previous_action
-        changes: list[float] = (change * change).tolist()
-        previous_distance = episode.distance
-        goal = episode.start.goal
-        cos_tilt = float(self._up @ rotation[:, 1])
+    def _draw_noise(self) -> npt.NDArray[np.float64] | None:
+        noise = draw_noise(self.task, (self.np_random,))
+        return None if noise is None else noise[0]
 
-        episode.q = q
-        episode.previous_action = command
-        episode.distance = math.hypot(goal[0] - q[0], goal[1] - q[2])
-        episode.energy += spent
-        episode.energy_positive += sum(joules for joules in work if joules > 0.0)
-        if simulation.trunk_force <= self._trunk_load_limit or math.hypot(v[0], v[2]) > STUCK_SPEED:
-            episode.stuck_time = 0.0
-        else:
-            episode.stuck_time += self.dt
+    def set_difficulty(self, difficulty: float | Range) -> None:
+        """Sets the rocks' difficulty, or the range it is drawn from, from the next reset on.
 
-        observation = self._observe(episode, v, rotation)
-        slip_ratio = self._slip_ratio(v)
-        if observation is None or solver["status"] == "failed":
-            termination = "step_failed"
-        else:
-            termination = self._termination(episode, cos_tilt)
-        if observation is None:
-            observation = episode.observation.copy()
-        else:
-            episode.observation = observation.copy()
-
-        w = self._reward_weights
-        terms = {
-            "progress": rewards.progress(w["progress"], previous_distance, episode.distance),
-            "time": rewards.time(w["time"], self.dt),
-            "energy": rewards.energy(w["energy"], spent),
-            "slip": rewards.slip(w["slip"], slip_ratio, self.dt),
-            "tilt": rewards.tilt(w["tilt"], cos_tilt, self.dt),
-            "torque_change": rewards.torque_change(w["torque_change"], sum(changes[:N_WHEELS])),
-            "steering_change": rewards.steering_change(w["steering_change"], sum(changes[N_WHEELS:])),
-            "success": rewards.success(w["success"], termination == "goal"),
-            "failure": rewards.failure(w["failure"], termination not in {"", "goal"}),
-        }
-        info = self._info(episode, cos_tilt, slip_ratio, termination=termination, terms=terms, solver=solver)
-        return observation, sum(terms.values()), termination != "", False, info
+        Raises:
+            OptionError: It is not within 0 to 1, or there are no rocks; nothing has changed.
+        """
+        self._difficulty = check_difficulty(self.task, difficulty)
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """The present state as a frame, (height, width, 3) uint8; None, with a warning, without a render mode.
@@ -547,12 +401,12 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         if self.render_mode is None:
             gym.logger.warn('RoverEnv: render() needs render_mode="rgb_array" when the environment is made')
             return None
-        episode = self._running()
+        scene = self._running()
         if self._renderer is None:
             from rover_gym.rendering import FrameRenderer  # noqa: PLC0415 - only who looks needs a renderer
 
-            self._renderer = FrameRenderer(self.model, episode.terrain, **asdict(self.render_options))
-        self._renderer.set_scene(episode.terrain, goal=episode.start.goal, goal_tolerance=self.goal_tolerance)
+            self._renderer = FrameRenderer(self.model, scene.terrain, **asdict(self.render_options))
+        self._renderer.set_scene(scene.terrain, goal=scene.start.goal, goal_tolerance=self.goal_tolerance)
         return self._renderer.render(self._simulation)
 
     def close(self) -> None:
@@ -564,8 +418,10 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     def snapshot(self) -> EnvSnapshot:
         """The state of the environment and of its random generator, to `restore` later."""
         return EnvSnapshot(
+            scene=self._running(),
             simulation=self._simulation.snapshot(),
-            episode=copy.copy(self._running()),
+            progress=self._progress.copy(),
+            difficulty=self._difficulty,
             random_state=copy.deepcopy(self.np_random.bit_generator.state),
         )
 
@@ -577,226 +433,18 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         """
         if not isinstance(snapshot, EnvSnapshot):
             refuse(StateError, "snapshot", snapshot, "must come from RoverEnv.snapshot()")
-        simulation = self._simulate(snapshot.episode.terrain)
+        simulation = self.task.simulate(snapshot.scene.terrain, snapshot.scene.domain)
         simulation.restore(snapshot.simulation)
-        self._simulation = simulation
-        self._episode = copy.copy(snapshot.episode)
+        self._simulation, self._scene = simulation, snapshot.scene
+        self._progress, self._difficulty = snapshot.progress.copy(), snapshot.difficulty
         self.np_random.bit_generator.state = copy.deepcopy(dict(snapshot.random_state))
 
-    def _simulate(self, terrain: Plane | SphereField) -> Simulation:
-        return Simulation(self.model, terrain, **self._simulation_options)
-
-    def _drive(self, torques: npt.NDArray[np.float64], set_points: npt.NDArray[np.float64]) -> dict[str, Any]:
-        """One control period of physics; returns what the solver says of it."""
-        simulation = self._simulation
-        simulation.set_wheel_torques(torques)
-        simulation.set_steering(set_points)
-        try:
-            report = simulation.step(self._substeps)
-        except StepError as error:
-            return _solver_info("failed", residual=math.inf, message=str(error))
-        return _solver_info(report.status, report.iterations, report.residual, report.n_contacts)
-
-    def _termination(self, episode: _Episode, cos_tilt: float) -> str:
-        """Why the episode ends here, or "" if it goes on."""
-        if episode.distance <= self.goal_tolerance:
-            return "goal"
-        if cos_tilt < self._cos_max_tilt:
-            return "roll_over"
-        if episode.stuck_time >= self._stuck_limit:
-            return "high_centred"
-        return ""
-
-    def _running(self) -> _Episode:
-        if self._episode is None:
+    def _running(self) -> Scene:
+        if self._scene is None:
             raise ResetNeeded("RoverEnv: call reset() first")
-        return self._episode
-
-    def _check_reset_options(
-        self, options: Mapping[str, Any] | None
-    ) -> tuple[dict[str, Any], float | None, npt.NDArray[np.float64] | None, npt.NDArray[np.float64] | None]:
-        """The arguments of `sample_start`, the difficulty, and the whole state where it is given."""
-        given = _mapping("options", options)
-        known_keys("options", given, RESET_OPTIONS)
-        fixed: dict[str, Any] = {}
-        difficulty = None
-        if "difficulty" in given:
-            difficulty = number("options.difficulty", given["difficulty"], at_least=0.0, at_most=1.0)
-            if self._rock_distribution is None:
-                refuse(OptionError, "options.difficulty", difficulty, "needs terrain 'sphere_field'")
-        if "slope_deg" in given:
-            fixed["slope"] = math.radians(
-                number("options.slope_deg", given["slope_deg"], at_least=0.0, at_most=MAX_SLOPE_DEG)
-            )
-        if "uphill_deg" in given:
-            fixed["uphill"] = math.radians(number("options.uphill_deg", given["uphill_deg"]))
-        if "heading_deg" in given:
-            fixed["heading"] = math.radians(number("options.heading_deg", given["heading_deg"]))
-        for name in ("position", "goal"):
-            if name in given:
-                fixed[name] = vector(f"options.{name}", given[name], 2)
-
-        q = v = None
-        if "v" in given and "q" not in given:
-            refuse(OptionError, "options.v", given["v"], "must come with q")
-        if "q" in given:
-            for name in ("position", "heading_deg"):
-                if name in given:
-                    refuse(OptionError, f"options.{name}", given[name], "must not come with q, which holds it")
-            q = np.array(vector("options.q", given["q"], self.model.nq, error=StateError))
-            fixed["position"], fixed["heading"] = (float(q[0]), float(q[2])), float(q[4])
-            if "v" in given:
-                v = np.array(vector("options.v", given["v"], self.model.nv, error=StateError))
-        if self._rock_distribution is not None and "goal" in fixed:
-            distance = math.dist(fixed["goal"], fixed.get("position", (0.0, 0.0)))
-            if not distance <= MAX_GOAL_DISTANCE:
-                reason = f"must be within {MAX_GOAL_DISTANCE:g} m of the start"
-                refuse(OptionError, "options.goal", given["goal"], reason)
-        return fixed, difficulty, q, v
-
-    def _observe(
-        self,
-        episode: _Episode,
-        v: npt.NDArray[np.float64],
-        rotation: npt.NDArray[np.float64],
-    ) -> npt.NDArray[np.float32] | None:
-        """The observation as a fresh array, or None where float32 cannot hold it."""
-        simulation = self._simulation
-        q = episode.q
-        forces = simulation.wheel_forces
-        gaps = simulation.wheel_gaps
-        wheels = self._wheel_index
-
-        joints = q.copy()
-        joints[wheels] -= math.tau * np.round(joints[wheels] / math.tau)
-        ahead, right = episode.start.goal[0] - q[0], episode.start.goal[1] - q[2]
-        c, s = math.cos(q[4]), math.sin(q[4])
-        scan: tuple[npt.NDArray[np.float64], ...] = ()
-        if self._scan_offsets is not None:
-            points = scan_points(self._scan_offsets, (q[0], q[2]), q[4])
-            scan = (heights(episode.terrain, points) - q[1],)
-        values = np.concatenate(
-            (
-                joints,
-                v[:3] @ rotation,
-                v[3:6] @ rotation,
-                v[6:],
-                gaps,
-                gaps <= CONTACT_GAP,
-                forces[:, 0],
-                forces[:, 1:].ravel(),
-                episode.plane.normal @ rotation,
-                (
-                    ahead * c - right * s,
-                    ahead * s + right * c,
-                    episode.distance,
-                ),
-                episode.previous_action,
-                (min(episode.stuck_time / self._stuck_limit, 1.0),),
-                *scan,
-            )
-        )
-        values *= self._inverse_scale
-        # Numbers beyond float32 are found here; a NaN fails the comparison too.
-        if not np.abs(values).max() <= LARGEST:
-            return None
-        return values.astype(np.float32)
-
-    def _slip_ratio(self, v: npt.NDArray[np.float64]) -> float:
-        """Mean over the wheels in contact of |u_T| / max(|rim speed|, |ground speed|)."""
-        contacts = self._simulation.contacts
-        rates = v[self._wheel_index].tolist()
-        rim_per_rate = self._rim_per_rate
-        total, n = 0.0, 0
-        for wheel, (_, u_t, u_b) in zip(contacts.wheels.tolist(), contacts.velocities.tolist(), strict=True):
-            if wheel >= 0:
-                rim = rim_per_rate[wheel] * rates[wheel]
-                total += math.hypot(u_t, u_b) / max(abs(rim), math.hypot(rim + u_t, u_b), SLIP_SPEED)
-                n += 1
-        return total / n if n else 0.0
-
-    def _info(
-        self,
-        episode: _Episode,
-        cos_tilt: float,
-        slip_ratio: float,
-        *,
-        termination: str,
-        terms: dict[str, float],
-        solver: dict[str, Any],
-    ) -> dict[str, Any]:
-        success = termination == "goal"
-        return {
-            "time": self._simulation.time,
-            "success": success,
-            "is_success": success,
-            "termination": termination,
-            "distance_to_goal": episode.distance,
-            "energy": episode.energy,
-            "energy_positive": episode.energy_positive,
-            "slip_ratio": slip_ratio,
-            "tilt": math.acos(min(1.0, max(-1.0, cos_tilt))),
-            "reward_terms": terms,
-            "solver": solver,
-        }
-
-
-def _solver_info(
-    status: str, iterations: int = 0, residual: float = 0.0, n_contacts: int = 0, *, message: str = ""
-) -> dict[str, Any]:
-    return {
-        "status": status,
-        "iterations": iterations,
-        "residual": residual,
-        "n_contacts": n_contacts,
-        "message": message,
-    }
-
-
-def _radians(degrees: Range) -> Range:
-    return (math.radians(degrees[0]), math.radians(degrees[1]))
-
-
-def _mapping(name: str, value: Mapping[str, Any] | None) -> Mapping[str, Any]:
-    if value is None:
-        return {}
-    if not isinstance(value, Mapping):
-        refuse(OptionError, name, value, "must be a mapping or None")
-    return value
-
-
-def _six_wheels(model: object) -> RoverModel:
-    """The model, if it has what the action drives."""
-    if not isinstance(model, RoverModel):
-        refuse(ModelError, "model", model, "must be a RoverModel")
-    for name, indices in (
-        ("wheel_joint_indices", model.wheel_joint_indices),
-        ("steering_joint_indices", model.steering_joint_indices),
-    ):
-        if len(indices) != N_WHEELS or min(indices) < 0:
-            refuse(ModelError, f"model.{name}", indices, f"must be {N_WHEELS} joints that move")
-    return model
+        return self._scene
 
 
 def drive_signs(model: RoverModel) -> npt.NDArray[np.float64]:
     """`(6,)` rate of a wheel's joint when the wheel rolls forward: 1, or -1 where the axis points right."""
     return model.actuation_matrix()[model.wheel_joint_indices, range(N_WHEELS)]
-
-
-def _check_action(action: object) -> npt.NDArray[np.float64]:
-    """The action as twelve floats of its own, within [-1, 1]."""
-    try:
-        given = np.asarray(action)
-    except ValueError:  # a ragged sequence
-        refuse(CommandError, "action", action, f"must be {N_ACTIONS} numbers")
-    if given.dtype.kind not in "fiu":
-        refuse(CommandError, "action", action, f"must be {N_ACTIONS} numbers")
-    if given.shape != (N_ACTIONS,):
-        refuse(CommandError, "action", given.shape, f"must have shape ({N_ACTIONS},)")
-    command = given.astype(np.float64)
-    # Written so that a NaN fails too.
-    if not np.abs(command).max() <= 1.0:
-        for i, entry in enumerate(command.tolist()):
-            if not abs(entry) <= 1.0:
-                refuse(CommandError, f"action[{i}]", entry, "must be within [-1, 1]")
-    return command

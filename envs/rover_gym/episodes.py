@@ -15,8 +15,10 @@ from rover_gym.env import RoverEnv
 class Policy(Protocol):
     """Anything with stable-baselines3's `predict`."""
 
-    def predict(self, observation: npt.NDArray[np.float32]) -> tuple[npt.NDArray[np.float32], Any]:
-        """The action for an observation, and a state."""
+    def predict(
+        self, observation: npt.NDArray[np.float32], state: Any = None, episode_start: Any = None
+    ) -> tuple[npt.NDArray[np.float32], Any]:
+        """The action for an observation, and a state to hand in next time."""
 
 
 @dataclass(frozen=True)
@@ -73,10 +75,11 @@ def run_episode(
     position = rover.simulation.q[:3]
     distance = slip = reward = wall_time = 0.0
     steps = 0
+    state = None
     terminated = truncated = False
     while not (terminated or truncated):
         start = time.perf_counter()
-        action, _ = policy.predict(observation)
+        action, state = policy.predict(observation, state)
         observation, step_reward, terminated, truncated, info = env.step(action)
         wall_time += time.perf_counter() - start
         on_step(rover, info)

@@ -18,9 +18,6 @@ from rover_gym.validation import refuse
 N_WHEELS = 6
 N_ACTIONS = 12
 
-#: A wheel touches when its gap is at most this, m. Resting wheels show gaps below a micrometre.
-CONTACT_GAP = 1e-3
-
 # Scales of one entry each; the forces are measured in mean wheel loads, m g / 6.
 GAP_SCALE = 0.1
 WHEEL_RATE_SCALE = 10.0
@@ -96,6 +93,11 @@ class ObservationLayout(Mapping[str, slice]):
     def high(self) -> npt.NDArray[np.float32]:
         """(size,) upper bounds of the observation space."""
         return np.repeat([f.high for f in self.fields], [f.size for f in self.fields]).astype(np.float32)
+
+    @property
+    def unbounded(self) -> npt.NDArray[np.float64]:
+        """(size,) 1 for entries without bounds, 0 for flags, fractions, unit vectors, distances and actions."""
+        return ((self.low <= -LARGEST) & (self.high >= LARGEST)).astype(np.float64)
 
     def split(self, observation: npt.ArrayLike) -> dict[str, npt.NDArray[np.float64]]:
         """The fields' values in SI units, as fresh arrays `(..., field size)`.

@@ -59,7 +59,7 @@ class PDPolicy:
     """
 
     def __init__(self, env: Any, gains: PDGains | None = None) -> None:
-        rover = _rover_env(env)
+        rover = rover_env(env)
         self.gains = PDGains() if gains is None else gains
         layout, model = rover.observation_layout, rover.model
         self._size = layout.size
@@ -191,11 +191,12 @@ def _clip(value: float) -> float:
     return min(1.0, max(-1.0, value))
 
 
-def _rover_env(env: Any) -> RoverEnv:
+def rover_env(env: Any) -> RoverEnv:
     """The `RoverEnv` inside wrappers, or the first one inside a vector environment."""
     inner = getattr(env, "unwrapped", env)
     if not isinstance(inner, RoverEnv) and getattr(inner, "envs", None):
         inner = getattr(inner.envs[0], "unwrapped", inner.envs[0])
+    inner = getattr(inner, "prototype", inner)  # what the rovers of a native batch are made like
     if not isinstance(inner, RoverEnv):
         raise TypeError(f"PDPolicy drives Rover-v0, not {inner!r}")
     return inner

@@ -18,6 +18,7 @@ def register_environments() -> None:
             gym.register(
                 id=name,
                 entry_point="rover_gym.env:RoverEnv",
+                vector_entry_point="rover_gym.vector:RoverVectorEnv",
                 max_episode_steps=MAX_EPISODE_STEPS,
                 kwargs=dict(arguments),
             )

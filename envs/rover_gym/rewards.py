@@ -1,11 +1,17 @@
 """The terms of the reward of `Rover-v0`, one function a term.
 
 The reward of a step is the sum of the terms; each term is its weight times a quantity of that step,
-with the weight's sign telling reward from cost. `dt` is the control period in seconds.
+with the weight's sign telling reward from cost. `dt` is the control period in seconds. Quantities
+are numbers, or arrays with one entry a rover.
 """
 
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import Any, TypeAlias
+
+#: A float for one rover, an array `(n,)` for n; a truth value likewise.
+Quantity: TypeAlias = Any
+Flag: TypeAlias = Any
 
 #: Default weights. With them a 7 m drive on flat ground earns about 15: 7 for the way, 10 at the goal.
 WEIGHTS: Mapping[str, float] = MappingProxyType(
@@ -23,7 +29,7 @@ WEIGHTS: Mapping[str, float] = MappingProxyType(
 )
 
 
-def progress(weight: float, previous_distance: float, distance: float) -> float:
+def progress(weight: float, previous_distance: Quantity, distance: Quantity) -> Quantity:
     """`w (d_before - d_after)`: metres gained on the goal."""
     return weight * (previous_distance - distance)
 
@@ -33,36 +39,36 @@ def time(weight: float, dt: float) -> float:
     return weight * dt
 
 
-def energy(weight: float, work: float) -> float:
+def energy(weight: float, work: Quantity) -> Quantity:
     """`w sum_i |tau_i dphi_i|`: joules through the six wheel motors, driving or braking."""
     return weight * work
 
 
-def slip(weight: float, slip_ratio: float, dt: float) -> float:
+def slip(weight: float, slip_ratio: Quantity, dt: float) -> Quantity:
     """`w s dt`: mean slip ratio of the wheels in contact, for as long as it lasts."""
     return weight * slip_ratio * dt
 
 
-def tilt(weight: float, cos_tilt: float, dt: float) -> float:
+def tilt(weight: float, cos_tilt: Quantity, dt: float) -> Quantity:
     """`w (1 - cos tilt) dt`: the trunk's lean from the vertical."""
     return weight * (1.0 - cos_tilt) * dt
 
 
-def torque_change(weight: float, squared_change: float) -> float:
+def torque_change(weight: float, squared_change: Quantity) -> Quantity:
     """`w sum_i (a_i - a_i,before)^2 / 6` over the six wheel torques."""
     return weight * squared_change / 6.0
 
 
-def steering_change(weight: float, squared_change: float) -> float:
+def steering_change(weight: float, squared_change: Quantity) -> Quantity:
     """`w sum_i (a_i - a_i,before)^2 / 6` over the six steering set-points."""
     return weight * squared_change / 6.0
 
 
-def success(weight: float, reached: bool) -> float:
+def success(weight: float, reached: Flag) -> Quantity:
     """`w` on the step that reaches the goal."""
-    return weight if reached else 0.0
+    return weight * reached + 0.0  # no negative zero
 
 
-def failure(weight: float, failed: bool) -> float:
-    """`w` on the step that ends in a roll-over, a high-centring or a step that could not be taken."""
-    return weight if failed else 0.0
+def failure(weight: float, failed: Flag) -> Quantity:
+    """`w` on a step that ends in a roll-over, a high-centring or a step that could not be taken."""
+    return weight * failed + 0.0

@@ -58,13 +58,45 @@ def test_answers_obey_coulombs_law(seed, n, rank, mu, dimension):
     assert np.abs(work + mu * p[:, 0] * slip).max() <= 1e-6 * impulse * scale
 
 
-@pytest.mark.parametrize("solver", ["auto", "nsgs", "newton"])
+SOLVERS = ["auto", "nsgs", "newton", "proximal", "admm"]
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
 def test_every_solver_gives_the_rovers_loads(sim, solver):
     sim.step()
     answer = rover_gym.solve_friction_contact(*sim.last_problem(), tolerance=1e-10, solver=solver, max_iterations=20000)
     assert answer.report.is_converged
     assert answer.impulses[:, 0].sum() == pytest.approx(960.0 * 9.81 * sim.time_step, rel=1e-6)
     assert np.abs(answer.velocities).max() < 1e-9
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_block_rows_and_an_unsymmetric_operator_are_taken_as_they_are(solver, dimension):
+    # Two contacts that stick, made from their impulses: q = -W p.
+    d = dimension
+    blocks = np.stack([2 * np.eye(d), 0.3 * np.ones((d, d)), -0.2 * np.ones((d, d)), 3 * np.eye(d)])
+    W = np.block([[blocks[0], blocks[1]], [blocks[2], blocks[3]]])
+    impulses = np.tile([1.0, 0.2, -0.1][:d], 2)
+    sparse = ([0, 2, 4], [0, 1, 0, 1], blocks)
+    for operator in (W, sparse):
+        answer = rover_gym.solve_friction_contact(
+            operator, -W @ impulses, [0.5, 0.5], 1e-10, dimension=d, solver=solver
+        )
+        assert answer.report.is_converged
+        assert answer.report.law == "coulomb"
+        np.testing.assert_allclose(answer.impulses.ravel(), impulses, atol=1e-8)
+
+
+def test_the_relaxed_law_says_that_it_is_another_law():
+    answer = rover_gym.solve_friction_contact(np.eye(3), [-1.0, 2.0, 0.0], [0.5], solver="relaxed")
+    assert (answer.report.status, answer.report.law, answer.report.is_converged) == ("relaxed", "relaxed", False)
+    # It parts with mu |u_T|: p = 1.6 (1, -0.5), u = (0.6, 1.2).
+    np.testing.assert_allclose(answer.velocities, [[0.6, 1.2, 0.0]], atol=1e-7)
+    assert answer.report.velocity_error > 0.1
+    with pytest.raises(rover_gym.OptionError) as caught:
+        rover_gym.Simulation(solver="relaxed")
+    assert caught.value.field == "solver"
 
 
 def test_a_warm_start_is_taken(sim):
@@ -87,6 +119,10 @@ def test_a_warm_start_is_taken(sim):
         (np.full((3, 3), np.inf), np.zeros(3), [0.5]),
         (np.diag([0.0, 1.0, 1.0]), np.zeros(3), [0.5]),
         ([["a", "b"]], np.zeros(3), [0.5]),
+        (([0, 1], [1], np.eye(3)[None]), np.zeros(3), [0.5]),
+        (([0, 1], [0.5], np.eye(3)[None]), np.zeros(3), [0.5]),
+        (([0, 1], [0], np.eye(2)[None]), np.zeros(3), [0.5]),
+        (([0, 1], [0], np.full((1, 3, 3), np.nan)), np.zeros(3), [0.5]),
     ],
 )
 def test_a_bad_problem_is_refused(arguments):

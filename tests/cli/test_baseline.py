@@ -36,3 +36,9 @@ def test_a_difficulty_out_of_range_is_one_line() -> None:
     assert result.stderr.startswith("error: ")
     assert len(result.stderr.splitlines()) == 1
     assert "difficulty" in result.stderr
+
+
+def test_a_trained_policy_can_be_measured_too() -> None:
+    result = rover("baseline", "--episodes", "1", "--difficulty", "0.25", "--policy", "trained")
+    assert result.exit_code == 0, result.output
+    assert "with a trained policy" in result.output

@@ -8,8 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 from rover_gym.cli import app
+from rover_gym.figures.chapter_3 import draw_chapter_3, incline, published
 from rover_gym.planar import describe, record
-from rover_gym.planar_figures import draw_chapter_3, incline, published
 from rover_gym.recording import read_trajectory
 
 

@@ -93,71 +93,69 @@ def measure(
     return rows
 
 
-def presets(chosen: list[Measured], console: Console) -> list[dict[str, Any]]:
-    """Error and cost of every named accuracy in every scene."""
+def presets(measured: Measured, console: Console) -> list[dict[str, Any]]:
+    """Error and cost of every named accuracy in a scene."""
     rows = []
     for name in ("fast", "balanced", "reference"):
         options = accuracy_options(name)
         step = options.pop("time_step")
         variant = Variant("rover-gym", name, partial(OurRunner, **options), "", "")
-        for measured in chosen:
-            traces = [run(variant, measured.scene, step, cap=1e3) for _ in range(1 if name == "reference" else 3)]
-            cost = min(t.cpu / t.simulated for t in traces)
-            row = {
-                "accuracy": name,
-                "scene": measured.scene.name,
-                "error": measured.error(traces[0]),
-                "cpu_ms_per_s": 1e3 * cost,
-            }
-            rows.append(row)
-            console.print(
-                f"{measured.scene.name:<11} {name:<10} {row['error']:.2e} {measured.unit} {1e3 * cost:.2f} ms/s"
-            )
+        traces = [run(variant, measured.scene, step, cap=1e3) for _ in range(1 if name == "reference" else 3)]
+        cost = 1e3 * min(t.cpu / t.simulated for t in traces)
+        error = measured.error(traces[0])
+        rows.append({"accuracy": name, "scene": measured.scene.name, "error": error, "cpu_ms_per_s": cost})
+        console.print(f"{measured.scene.name:<11} {name:<10} {error:.2e} {measured.unit} {cost:.2f} ms/s")
     return rows
+
+
+def measure_all(path: Path, wanted: list[str] | None, steps: tuple[float, ...], cap: float, console: Console) -> None:
+    """Measures scenes and writes the file after each, keeping what it has of the others."""
+    variants, missing = load()
+    for engine, why in missing.items():
+        console.print(f"left out, not installed: {engine} ({why})")
+    every = scenes()
+    data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    data |= {
+        "meta": {
+            "command": "make chart",
+            "cost": "CPU time of one thread per simulated second, ms; the least of up to three runs",
+            "processor": processor(),
+            "python": platform.python_version(),
+            "packages": versions(),
+            "cap_s": cap,
+        },
+        "scenes": {m.scene.name: {"title": m.scene.title, "unit": m.unit, "error": m.what} for m in every},
+        "engines": [
+            {"engine": v.engine, "variant": v.name, "settings": v.settings, "differs": v.differs, "best": v.best}
+            for v in variants
+        ],
+        "missing": missing,
+    }
+    for measured in every:
+        name = measured.scene.name
+        if wanted and name not in wanted:
+            continue
+        fresh = {"points": measure(measured, variants, steps, cap, console), "presets": presets(measured, console)}
+        for key, rows in fresh.items():
+            data[key] = [row for row in data.get(key, []) if row["scene"] != name] + rows
+        path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
 
 
 def main() -> None:
     """Measures and draws."""
     parser = argparse.ArgumentParser(description="Error against CPU time for this project and its peers.")
-    parser.add_argument("--quick", action="store_true", help="five steps and a cap of 2 s a run")
+    parser.add_argument("--quick", action="store_true", help="four steps and a cap of 2 s a run")
     parser.add_argument("--draw", action="store_true", help="only draw what chart.json has")
     parser.add_argument("--scenes", nargs="*", help="only these; the rest is kept as it is in chart.json")
+    parser.add_argument("--cap", type=float, default=8.0, help="CPU time that a run may take, s")
     parser.add_argument("--output", type=Path, default=OUTPUT)
     arguments = parser.parse_args()
     console = Console(width=140)
     arguments.output.mkdir(parents=True, exist_ok=True)
     path = arguments.output / "chart.json"
     if not arguments.draw:
-        variants, missing = load()
-        for engine, why in missing.items():
-            console.print(f"left out, not installed: {engine} ({why})")
-        steps = STEPS[3::2] if arguments.quick else STEPS
-        cap = 2.0 if arguments.quick else 8.0
-        chosen = [m for m in scenes() if not arguments.scenes or m.scene.name in arguments.scenes]
-        kept = []
-        if arguments.scenes and path.exists():
-            kept = [r for r in json.loads(path.read_text())["points"] if r["scene"] not in arguments.scenes]
-        by_name = presets(scenes(), console)
-        points = kept + [row for m in chosen for row in measure(m, variants, steps, cap, console)]
-        data = {
-            "meta": {
-                "command": "make chart",
-                "cost": "CPU time of one thread per simulated second, ms; the least of up to three runs",
-                "processor": processor(),
-                "python": platform.python_version(),
-                "packages": versions(),
-                "cap_s": cap,
-            },
-            "scenes": {m.scene.name: {"title": m.scene.title, "unit": m.unit, "error": m.what} for m in scenes()},
-            "engines": [
-                {"engine": v.engine, "variant": v.name, "settings": v.settings, "differs": v.differs, "best": v.best}
-                for v in variants
-            ],
-            "missing": missing,
-            "presets": by_name,
-            "points": points,
-        }
-        path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+        steps, cap = (STEPS[3::2], 2.0) if arguments.quick else (STEPS, arguments.cap)
+        measure_all(path, arguments.scenes, steps, cap, console)
     from comparison.drawing import draw  # noqa: PLC0415 - Matplotlib would load before the engines
 
     data = json.loads(path.read_text(encoding="utf-8"))

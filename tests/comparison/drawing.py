@@ -10,6 +10,7 @@ import numpy.typing as npt
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.ticker import NullFormatter
 
 Array = npt.NDArray[np.float64]
 Curve = tuple[dict[str, Any], Array, Array, Array]
@@ -68,6 +69,8 @@ def _shade(axes: Axes, shown: list[Curve]) -> None:
 
 
 def _finish(axes: Axes) -> None:
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_minor_formatter(NullFormatter())
     axes.grid(which="major", color="#dddddd", linewidth=0.7)
     axes.set_axisbelow(True)
     for side in ("top", "right"):
@@ -92,6 +95,7 @@ def _steps(axes: Axes, curve: Curve, wanted: tuple[float, ...], size: float) -> 
 
 
 def _plot(axes: Axes, shown: list[Curve]) -> None:
+    axes.margins(0.1)
     for engine, _, cost, error in shown:
         own = engine["engine"] == OURS
         axes.plot(
@@ -110,14 +114,14 @@ def _plot(axes: Axes, shown: list[Curve]) -> None:
 
 #: Text of a curve's label, the point that carries it (finest step first), offset in points, alignment.
 LABELS = {
-    (OURS, "linearised"): (OURS, 4, (8, 6), "left"),
-    ("Drake", "lagged, stiff"): ("Drake, lagged", -1, (-6, -14), "left"),
+    (OURS, "linearised"): (OURS, 4, (9, 5), "left"),
+    ("Drake", "lagged, stiff"): ("Drake, lagged", 0, (8, -8), "left"),
     ("Drake", "SAP, stiff"): ("Drake, SAP", -1, (8, 0), "left"),
     ("MuJoCo", "discrete, elliptic"): ("MuJoCo, best", 0, (6, -3), "left"),
     ("MuJoCo", "defaults"): ("MuJoCo, defaults", 0, (6, 3), "left"),
-    ("Bullet", "50 iterations"): ("Bullet", -1, (-8, 5), "right"),
-    ("Pinocchio", "ADMM in a Python loop"): ("Pinocchio, ADMM\n(Python loop)", -1, (8, 0), "left"),
-    ("Siconos", "NSGS in a Python loop"): ("Siconos\n(Python loop)", 0, (8, -8), "left"),
+    ("Bullet", "50 iterations"): ("Bullet", 0, (8, -3), "left"),
+    ("Pinocchio", "ADMM in a Python loop"): ("Pinocchio, ADMM (Python loop)", 0, (8, 5), "left"),
+    ("Siconos", "NSGS in a Python loop"): ("Siconos (Python loop)", 0, (8, 0), "left"),
 }
 
 
@@ -127,7 +131,7 @@ def flat_drive(data: dict[str, Any], path: Path) -> Path:
     shown = [c for c in curves(data, "flat_drive") if c[0]["best"]]
     _plot(axes, shown)
     left, right = axes.get_xlim()
-    axes.set_xlim(0.8 * left, 4.0 * right)  # room for labels
+    axes.set_xlim(0.5 * left, 30.0 * right)  # room for labels
     _shade(axes, shown)
     for curve in shown:
         engine, _, cost, error = curve
@@ -149,10 +153,10 @@ def flat_drive(data: dict[str, Any], path: Path) -> Path:
     axes.axhline(GOAL[1], color="#999999", linewidth=0.9, linestyle=(0, (2, 3)), zorder=1)
     axes.annotate(
         "1 cm",
-        (axes.get_xlim()[1], GOAL[1]),
-        (-2, 3),
+        (3.0 * GOAL[0], GOAL[1]),
+        (0, 3),
         textcoords="offset points",
-        ha="right",
+        ha="left",
         fontsize=9,
         color="#777777",
     )
@@ -180,7 +184,7 @@ def others(data: dict[str, Any], path: Path) -> Path:
         _shade(axes, shown)
         for curve in shown:
             if curve[0]["engine"] == OURS:
-                _steps(axes, curve, (1e-1, 1e-2, 1e-3), 8.5)
+                _steps(axes, curve, (2e-2, 5e-3, 1e-3), 8.5)
         axes.set_title(scene["title"], fontsize=11, loc="left")
         axes.set_xlabel("CPU time, ms per simulated second")
         axes.set_ylabel(f"{scene['error']}, {scene['unit']}")

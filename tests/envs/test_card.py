@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rover_gym import RoverEnv, rewards
-from rover_gym.env import RESET_OPTIONS
 from rover_gym.observation import build_layout
+from rover_gym.scene import RESET_OPTIONS
 
 
 @cache

@@ -306,7 +306,14 @@ def test_failed_step_terminates_openly(env: RoverEnv) -> None:
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e300])
 def test_observation_that_is_not_finite_terminates_openly(env: RoverEnv, value: float) -> None:
     last, *_ = env.step(action_of(0.1))
-    env._simulation = Faulty(env.simulation, wheel_gaps=np.full(6, value))  # type: ignore[assignment]
+    simulation = env.simulation
+
+    def reading(*arguments: Any) -> np.ndarray[Any, Any]:
+        row = simulation.reading(*arguments)
+        row[simulation.reading_layout()["wheel_gaps"]] = value
+        return row
+
+    env._simulation = Faulty(simulation, reading=reading)  # type: ignore[assignment]
     observation, _, terminated, _, info = env.step(action_of(0.1))
     assert terminated
     assert info["termination"] == "step_failed"

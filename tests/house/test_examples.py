@@ -9,7 +9,15 @@ from typer.testing import CliRunner
 from rover_gym.cli import app
 
 ROOT = Path(__file__).parents[2]
-PAGES = ("README.md", "docs/economy.md", "docs/recording.md", "docs/replay.md", "docs/seeing.md", "docs/planar.md")
+PAGES = (
+    "README.md",
+    "docs/economy.md",
+    "docs/planar.md",
+    "docs/recording.md",
+    "docs/replay.md",
+    "docs/seeing.md",
+    "docs/vector.md",
+)
 
 
 def blocks() -> list[pytest.param]:

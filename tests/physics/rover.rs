@@ -4,6 +4,8 @@
 #[path = "rover/scenes.rs"]
 mod scenes;
 
+#[path = "rover/batch.rs"]
+mod batch;
 #[path = "rover/driving.rs"]
 mod driving;
 #[path = "rover/free_flight.rs"]

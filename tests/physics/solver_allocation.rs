@@ -38,6 +38,8 @@ fn no_method_allocates_in_a_sized_workspace() {
         Method::GaussSeidel,
         Method::Newton,
         Method::ProximalPoint,
+        Method::Admm,
+        Method::Relaxed,
     ] {
         let options = SolverOptions {
             method,

@@ -12,6 +12,7 @@ from rover_gym.cli.plot import plot
 from rover_gym.cli.replay import replay
 from rover_gym.cli.report import report
 from rover_gym.cli.scene import scene
+from rover_gym.cli.speed import speed
 
 app = typer.Typer(
     help="Drive a six-wheel Mars rover in a nonsmooth simulator.",
@@ -26,6 +27,7 @@ app.command()(plot)
 app.command()(replay)
 app.command()(scene)
 app.add_typer(planar, name="planar")
+app.command()(speed)
 
 
 def _print_version(wanted: bool) -> None:

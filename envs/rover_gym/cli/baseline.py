@@ -24,9 +24,13 @@ def baseline(
     ] = None,
     episodes: Annotated[int, typer.Option(min=1, help="How many episodes at each difficulty.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode; the next ones count up.")] = 0,
+    policy: Annotated[
+        str,
+        typer.Option(help="'pd' for the baseline, 'trained' for the package's trained one, or such a one's folder."),
+    ] = "pd",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
 ) -> None:
-    """Drive RoverRocks-v0 with the PD baseline at several difficulties and print how often it reached the goal.
+    """Drive RoverRocks-v0 with the PD baseline or a trained policy and print how often it reached the goal.
 
     The interval is Wilson's, 95%. Time is the mean of the episodes that reached the goal; energy the work through
     the wheel motors over the way driven.
@@ -38,6 +42,7 @@ def baseline(
             difficulties,
             episodes=episodes,
             seed=seed,
+            policy=policy,
             progress=lambda level, done: bar.update(
                 task, advance=1, state=f"difficulty {level:g}, {done} of {episodes}"
             ),
@@ -51,14 +56,17 @@ def baseline(
             }
             for row in rows
         ]
-        typer.echo(json.dumps({"environment": "RoverRocks-v0", "seed": seed, "rows": plain}, indent=2))
+        typer.echo(
+            json.dumps({"environment": "RoverRocks-v0", "policy": policy, "seed": seed, "rows": plain}, indent=2)
+        )
     else:
-        console().print(_table(rows, seed))
+        console().print(_table(rows, seed, policy))
 
 
-def _table(rows: Sequence[BaselineRow], seed: int) -> Table:
+def _table(rows: Sequence[BaselineRow], seed: int, policy: str) -> Table:
     last = seed + rows[0].episodes - 1
-    title = f"RoverRocks-v0 with the PD baseline, {rows[0].episodes} episodes a row, seeds {seed} to {last}"
+    name = "the PD baseline" if policy == "pd" else "a trained policy"
+    title = f"RoverRocks-v0 with {name}, {rows[0].episodes} episodes a row, seeds {seed} to {last}"
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     for heading in ("difficulty", "success", "95% interval", "time to goal", "energy"):
         table.add_column(heading, justify="right")

@@ -1,4 +1,4 @@
-"""`rover drive`: episodes of `Rover-v0` with the PD baseline."""
+"""`rover drive`: episodes of `Rover-v0` with the PD baseline or a trained policy."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -15,10 +15,11 @@ from rich.table import Table
 
 from rover_gym.cli.console import console, plain_errors, progress_bar, say_path
 from rover_gym.env import RoverEnv
-from rover_gym.episodes import Episode, run_episode
+from rover_gym.episodes import Episode, Policy, run_episode
 from rover_gym.policy import PDPolicy
 from rover_gym.recording import Channel, Recorder, Sampler, describe
 from rover_gym.rewards import WEIGHTS
+from rover_gym.trained import TrainedPolicy, find_policy, policy_arguments
 from rover_gym.video import VideoWriter
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
@@ -41,6 +42,10 @@ def drive(
     goal: Annotated[
         tuple[float, float] | None, typer.Option(metavar="X Z", help="Goal on the map, m; drawn if not given.")
     ] = None,
+    policy: Annotated[
+        str,
+        typer.Option(help="'pd' for the baseline, 'trained' for the package's trained one, or such a one's folder."),
+    ] = "pd",
     friction: Annotated[float, typer.Option(help="Coulomb's coefficient.")] = 0.7,
     time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
     time_limit: Annotated[float, typer.Option(min=CONTROL_PERIOD, help="Time limit of an episode, s.")] = 60.0,
@@ -56,7 +61,7 @@ def drive(
         Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes, one after the other.")
     ] = None,
 ) -> None:
-    """Drive Rover-v0 to its goal with the PD baseline and print what the episodes came to."""
+    """Drive Rover-v0 to its goal with the PD baseline or a trained policy and print what the episodes came to."""
     arguments: dict[str, Any] = {
         "terrain": terrain,
         "friction": friction,
@@ -67,11 +72,14 @@ def drive(
     arguments |= {} if uphill is None else {"uphill_deg": uphill}
     arguments |= {} if heading is None else {"heading_deg": heading}
     options = {} if goal is None else {"goal": goal}
+    folder = find_policy(policy, terrain)
+    arguments |= {} if folder is None else policy_arguments(folder)
     filming: dict[str, Any] = {}
     if video is not None:
         filming = {"render_mode": "rgb_array", "render_options": {"antialiasing": True}}
     env = gym.make("Rover-v0", max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments, **filming)
-    policy = PDPolicy(env)
+    driver: Policy = PDPolicy(env) if folder is None else TrainedPolicy.load(env, folder)
+    name = "the PD baseline" if folder is None else "a trained policy"
 
     results, paths = [], []
     with progress_bar() as bar, ExitStack() as stack:
@@ -79,12 +87,16 @@ def drive(
         film = None if video is None else stack.enter_context(VideoWriter(video, env.metadata["render_fps"]))
         for number in range(seed, seed + episodes):
             path = None if output is None else output / f"episode-{number}.h5"
-            results.append(_drive_one(env, policy, number, arguments, options, path, bar, film))
+            results.append(_drive_one(env, driver, name, number, arguments, options, path, bar, film))
             paths += [path] if path else []
 
-    console().print(_table(results))
+    console().print(_table(results, name))
     if output is not None:
-        summary = {"arguments": arguments | options, "episodes": [asdict(episode) for episode in results]}
+        summary = {
+            "policy": policy,
+            "arguments": arguments | options,
+            "episodes": [asdict(episode) for episode in results],
+        }
         paths.append(output / "summary.json")
         paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     paths += [] if video is None else [video]
@@ -94,7 +106,8 @@ def drive(
 
 def _drive_one(
     env: gym.Env[Any, Any],
-    policy: PDPolicy,
+    policy: Policy,
+    name: str,
     seed: int,
     arguments: Mapping[str, Any],
     options: Mapping[str, Any],
@@ -112,7 +125,7 @@ def _drive_one(
             bar.update(task, state=f"{info['time']:.1f} s, {info['distance_to_goal']:.1f} m to go")
             if path is not None:
                 if tape is None:  # after the reset, when the start is known
-                    tape = _Tape(path, rover, seed, arguments)
+                    tape = _Tape(path, rover, name, seed, arguments)
                     stack.enter_context(tape.recorder)
                 tape.append(rover, info)
             if film is not None and (frame := rover.render()) is not None:
@@ -126,7 +139,7 @@ def _drive_one(
 class _Tape:
     """Records an episode: the simulation, and what the environment makes of it."""
 
-    def __init__(self, path: Path, rover: RoverEnv, seed: int, arguments: Mapping[str, Any]) -> None:
+    def __init__(self, path: Path, rover: RoverEnv, policy: str, seed: int, arguments: Mapping[str, Any]) -> None:
         self._sampler = Sampler(rover.model)
         channels = (
             *self._sampler.channels,
@@ -136,7 +149,7 @@ class _Tape:
             Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
         )
         scene = {**arguments, **asdict(rover.start), **_rocks(rover), "control_period": rover.dt}
-        title = "an episode of Rover-v0 with the PD baseline"
+        title = f"an episode of Rover-v0 with {policy}"
         attributes = describe(rover.simulation, title, scene, seed=seed)
         self.recorder = Recorder(path, channels, attributes, terrain=rover.simulation.terrain)
 
@@ -159,8 +172,8 @@ def _rocks(rover: RoverEnv) -> dict[str, Any]:
     return {} if rover.rocks is None else {"rocks": asdict(rover.rocks)}
 
 
-def _table(results: Sequence[Episode]) -> Table:
-    table = Table(title="Rover-v0 with the PD baseline", title_justify="left")
+def _table(results: Sequence[Episode], name: str) -> Table:
+    table = Table(title=f"Rover-v0 with {name}", title_justify="left")
     for heading in ("seed", "success", "distance", "time", "energy", "slip", "real-time factor"):
         table.add_column(heading, justify="right")
     for episode in results:

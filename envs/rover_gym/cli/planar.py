@@ -184,6 +184,6 @@ def _run(sim: PlanarSimulation, who: str, duration: float, path: Path) -> None:
     table.add_row("steps not converged", str(rows))
     console().print(table)
     say_path("trajectory", path)
-    from rover_gym.planar_figures import draw_run  # noqa: PLC0415 - matplotlib is slow to load
+    from rover_gym.figures.planar_run import draw_planar_run  # noqa: PLC0415 - matplotlib is slow to load
 
-    say_path("figure", draw_run(sim, path, path.with_suffix(".png")))
+    say_path("figure", draw_planar_run(sim, path, path.with_suffix(".png")))

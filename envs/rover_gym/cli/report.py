@@ -56,7 +56,7 @@ def report(
 
         for path in (*draw_all(result.path, output), *draw_rug(rug_result.path, output)):
             say_path("figure", path)
-        from rover_gym.planar_figures import draw_chapter_3  # noqa: PLC0415
+        from rover_gym.figures.chapter_3 import draw_chapter_3  # noqa: PLC0415
 
         for path in draw_chapter_3(output):
             say_path("figure", path)

@@ -8,7 +8,7 @@ use rover_core::geometry::TerrainError;
 use rover_core::integrator::{OptionsError, StepError};
 use rover_core::multibody::{ModelError, StateError};
 use rover_core::problem::ProblemError;
-use rover_core::simulation::{CommandError, SnapshotError};
+use rover_core::simulation::{BatchError, CommandError, SnapshotError};
 
 /// Which exception.
 #[derive(Clone, Copy, Debug)]
@@ -276,6 +276,33 @@ impl From<CommandError> for BorderError {
             field: Some(field),
             value,
         }
+    }
+}
+
+impl From<BatchError> for BorderError {
+    fn from(e: BatchError) -> Self {
+        let message = e.to_string();
+        let (field, value) = match e {
+            BatchError::Command { index, error } => {
+                let inner = Self::from(error);
+                let field = inner.field.map(|field| match field.split_once('[') {
+                    Some((name, entry)) => format!("{name}[{index}, {entry}"),
+                    None => format!("{field}[{index}]"),
+                });
+                return Self {
+                    message,
+                    field,
+                    ..inner
+                };
+            }
+            BatchError::Empty => ("simulations".to_owned(), Value::Count(0)),
+            BatchError::Differs { index, actual, .. } => {
+                (format!("simulations[{index}]"), Value::Count(actual))
+            }
+            BatchError::NoSuchRover { index, .. } => ("index".to_owned(), Value::Count(index)),
+            BatchError::Threads { count, .. } => ("threads".to_owned(), Value::Count(count)),
+        };
+        Self::option(&field, message, value)
     }
 }
 

@@ -2,8 +2,11 @@
 
 use numpy::{PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use rover_core::problem::{Dimension, FrictionContactProblem};
-use rover_core::solver::{Method, SolveReport, SolverOptions, SolverWorkspace, solve};
+use pyo3::types::PyTuple;
+use rover_core::problem::{BlockSparseDelassus, Dimension, FrictionContactProblem};
+use rover_core::solver::{
+    ContactLaw, Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve,
+};
 
 use crate::arrays::{array, fresh, vector};
 use crate::errors::{BorderError, Kind, Value};
@@ -19,10 +22,10 @@ pub struct SolverReport {
 impl SolverReport {
     #[getter]
     fn status(&self) -> &'static str {
-        if self.inner.is_converged() {
-            "converged"
-        } else {
-            "not_converged"
+        match self.inner.status {
+            SolveStatus::Converged => "converged",
+            SolveStatus::SolvedRelaxed => "relaxed",
+            _ => "not_converged",
         }
     }
 
@@ -47,8 +50,16 @@ impl SolverReport {
     }
 
     #[getter]
-    fn solver(&self) -> String {
-        format!("{:?}", self.inner.method)
+    fn solver(&self) -> &'static str {
+        self.inner.method.name()
+    }
+
+    #[getter]
+    fn law(&self) -> &'static str {
+        match self.inner.method.law() {
+            ContactLaw::Coulomb => "coulomb",
+            ContactLaw::Relaxed => "relaxed",
+        }
     }
 
     fn __repr__(&self) -> String {
@@ -87,25 +98,31 @@ impl FrictionContactSolution {
     }
 }
 
-/// A solver by its public name.
-pub fn method(name: &str) -> Result<Method, BorderError> {
-    match name {
-        "auto" => Ok(Method::Auto),
-        "nsgs" => Ok(Method::GaussSeidel),
-        "newton" => Ok(Method::Newton),
-        _ => Err(BorderError::option(
-            "solver",
-            format!("solver: must be \"auto\", \"nsgs\" or \"newton\", is {name:?}"),
-            Value::Text(name.to_owned()),
-        )),
-    }
+/// A solver by its public name, one of `known`.
+fn method(name: &str, known: &[Method]) -> Result<Method, BorderError> {
+    let found = known.iter().find(|method| method.name() == name);
+    found.copied().ok_or_else(|| {
+        let names: Vec<String> = known.iter().map(|m| format!("{:?}", m.name())).collect();
+        let message = format!("solver: must be one of {}, is {name:?}", names.join(", "));
+        BorderError::option("solver", message, Value::Text(name.to_owned()))
+    })
 }
+
+/// What a simulation may step with: the solvers of Coulomb's law.
+pub const SIMULATION_SOLVERS: [Method; 5] = [
+    Method::Auto,
+    Method::GaussSeidel,
+    Method::Newton,
+    Method::ProximalPoint,
+    Method::Admm,
+];
 
 /// Solver options of the public arguments.
 pub fn solver_options(
     name: &str,
     tolerance: f64,
     max_iterations: usize,
+    known: &[Method],
 ) -> Result<SolverOptions, BorderError> {
     if !(tolerance.is_finite() && tolerance > 0.0) {
         let message = format!("tolerance: must be finite and positive, is {tolerance}");
@@ -124,13 +141,70 @@ pub fn solver_options(
         ));
     }
     Ok(SolverOptions {
-        method: method(name)?,
+        method: method(name, known)?,
         tolerance,
         velocity_tolerance: tolerance.max(1e-9),
         max_newton_steps: max_iterations,
         max_sweeps: max_iterations,
         ..SolverOptions::default()
     })
+}
+
+/// `W` as it was given.
+enum Delassus {
+    Dense(Vec<f64>),
+    BlockSparse(BlockSparseDelassus),
+}
+
+impl Delassus {
+    /// A square array, or block rows `(indptr, indices, data)`.
+    fn read(W: &Bound<'_, PyAny>, dimension: Dimension) -> PyResult<Self> {
+        if let Ok(rows) = W.cast::<PyTuple>()
+            && rows.len() == 3
+            && array(&rows.get_item(2)?, Kind::Problem, "W")?.shape().len() == 3
+        {
+            let index = |at: usize| -> PyResult<Vec<usize>> {
+                let numbers = flat(&rows.get_item(at)?, "W")?;
+                numbers.into_iter().map(as_index).collect()
+            };
+            let (starts, columns) = (index(0)?, index(1)?);
+            let blocks = flat(&rows.get_item(2)?, "W")?;
+            let sparse = BlockSparseDelassus::from_rows(dimension, starts, columns, blocks);
+            return Ok(Self::BlockSparse(sparse.map_err(BorderError::from)?));
+        }
+        let dense = array(W, Kind::Problem, "W")?;
+        let shape = dense.shape().to_vec();
+        if shape.len() != 2 || shape[0] != shape[1] {
+            let message = format!("W: must be square, has shape {shape:?}");
+            let value = Value::Numbers(shape.iter().map(|&s| s as f64).collect());
+            return Err(problem_error("W", message, value).into());
+        }
+        Ok(Self::Dense(dense.as_array().iter().copied().collect()))
+    }
+}
+
+/// Any array-like as a list, whatever its shape.
+fn flat(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<f64>> {
+    let numbers = array(value, Kind::Problem, field)?;
+    Ok(numbers.as_array().iter().copied().collect())
+}
+
+fn as_index(number: f64) -> PyResult<usize> {
+    if number >= 0.0 && number.fract() == 0.0 && number < 1e15 {
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked above
+        return Ok(number as usize);
+    }
+    let message = format!("W: indices must be whole numbers >= 0, one is {number}");
+    Err(problem_error("W", message, Value::Number(number)).into())
+}
+
+fn problem_error(field: &str, message: String, value: Value) -> BorderError {
+    BorderError {
+        kind: Kind::Problem,
+        message,
+        field: Some(field.to_owned()),
+        value,
+    }
 }
 
 /// Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K.
@@ -156,31 +230,15 @@ pub fn solve_friction_contact(
             return Err(BorderError::option("dimension", message, Value::Count(dimension)).into());
         }
     };
-    let options = solver_options(solver, tolerance, max_iterations)?;
-    let W = array(W, Kind::Problem, "W")?;
-    let shape = W.shape().to_vec();
-    if shape.len() != 2 || shape[0] != shape[1] {
-        let message = format!("W: must be square, has shape {shape:?}");
-        let value = Value::Numbers(shape.iter().map(|&s| s as f64).collect());
-        return Err(BorderError {
-            kind: Kind::Problem,
-            message,
-            field: Some("W".to_owned()),
-            value,
-        }
-        .into());
-    }
-    let flat = |value: &Bound<'_, PyAny>, field| -> PyResult<Vec<f64>> {
-        Ok(array(value, Kind::Problem, field)?
-            .as_array()
-            .iter()
-            .copied()
-            .collect())
-    };
-    let W: Vec<f64> = W.as_array().iter().copied().collect();
+    let options = solver_options(solver, tolerance, max_iterations, &Method::ALL)?;
+    let W = Delassus::read(W, kind)?;
     let q = flat(q, "q")?;
     let mu = vector(mu, Kind::Problem, "mu")?;
-    let problem = FrictionContactProblem::new(kind, &W, &q, &mu).map_err(BorderError::from)?;
+    let problem = match &W {
+        Delassus::Dense(W) => FrictionContactProblem::new(kind, W, &q, &mu),
+        Delassus::BlockSparse(W) => FrictionContactProblem::new_sparse(kind, W, &q, &mu),
+    }
+    .map_err(BorderError::from)?;
     let mut p = vec![0.0; q.len()];
     if let Some(initial) = initial {
         let start = flat(initial, "initial")?;

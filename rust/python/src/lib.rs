@@ -3,6 +3,7 @@
 
 mod accuracy;
 mod arrays;
+mod batch;
 mod contacts;
 mod errors;
 mod friction_contact;
@@ -10,6 +11,7 @@ mod model;
 mod planar;
 mod planar_ground;
 mod plane;
+mod reading;
 mod simulation;
 mod snapshot;
 mod sphere_field;
@@ -26,6 +28,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<sphere_field::SphereField>()?;
     module.add_class::<contacts::Contacts>()?;
     module.add_class::<simulation::Simulation>()?;
+    module.add_class::<batch::SimulationBatch>()?;
     module.add_class::<simulation::StepReport>()?;
     module.add_class::<simulation::Energy>()?;
     module.add_class::<snapshot::Snapshot>()?;

@@ -240,7 +240,8 @@ impl RoverModel {
     }
 
     /// The same machine with some of its data changed.
-    #[pyo3(signature = (*, wheel_radius = None, masses = None, steering_stiffness = None, steering_damping = None, wheel_torque_limit = None))]
+    #[pyo3(signature = (*, wheel_radius = None, masses = None, steering_stiffness = None, steering_damping = None, wheel_torque_limit = None, mass_scale = None))]
+    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python method
     fn replace(
         &self,
         wheel_radius: Option<f64>,
@@ -248,6 +249,7 @@ impl RoverModel {
         steering_stiffness: Option<f64>,
         steering_damping: Option<f64>,
         wheel_torque_limit: Option<f64>,
+        mass_scale: Option<f64>,
     ) -> PyResult<Self> {
         let mut description = self.inner.description().clone();
         for wheel in &mut description.wheels {
@@ -285,6 +287,14 @@ impl RoverModel {
                 }
                 for (solid, mass) in description.solids.iter_mut().zip(masses) {
                     solid.mass = mass;
+                }
+            }
+        }
+        if let Some(scale) = mass_scale {
+            for solid in &mut description.solids {
+                solid.mass *= scale;
+                for entry in solid.inertia.iter_mut().flatten() {
+                    *entry *= scale;
                 }
             }
         }

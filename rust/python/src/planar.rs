@@ -15,7 +15,7 @@ use std::sync::Arc;
 
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::errors::{BorderError, Kind, Value};
-use crate::friction_contact::solver_options;
+use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
 use crate::model::RoverModel;
 use crate::planar_ground::{border, parse};
 use crate::simulation::{
@@ -258,7 +258,7 @@ fn options(given: Option<&Bound<'_, PyDict>>) -> PyResult<Options> {
             }
         }
     }
-    step.solver = solver_options(&solver, tolerance, max_iterations)?;
+    step.solver = solver_options(&solver, tolerance, max_iterations, &SIMULATION_SOLVERS)?;
     Ok(Options {
         step,
         rule,

@@ -8,16 +8,17 @@ use rover_core::integrator::{
 };
 use rover_core::multibody::{Energy as CoreEnergy, Model, coordinates};
 use rover_core::nalgebra::DMatrix;
-use rover_core::simulation::Simulation as CoreSimulation;
+use rover_core::simulation::{Look, ReadingLayout, Simulation as CoreSimulation};
 use std::sync::Arc;
 
 use crate::accuracy;
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Value};
-use crate::friction_contact::solver_options;
+use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::plane::Plane;
+use crate::reading::{place, scan_points, slices};
 use crate::snapshot::Snapshot;
 use crate::sphere_field::Ground;
 
@@ -115,9 +116,14 @@ impl Energy {
 /// A rover on a terrain, stepped through time.
 #[pyclass(module = "rover_gym._core")]
 pub struct Simulation {
-    inner: CoreSimulation,
+    pub inner: CoreSimulation,
+    pub origin: Origin,
+}
+
+/// What a simulation was made with and the core does not keep, for pickling.
+#[derive(Clone)]
+pub struct Origin {
     terrain: Ground,
-    /// Keyword arguments that it was made with, for pickling.
     solver: String,
     max_iterations: usize,
 }
@@ -260,17 +266,17 @@ impl Simulation {
             variant: variant.map_or(Ok(chosen.variant), |v| choice("variant", v, &VARIANTS))?,
             stabilisation: choice("stabilisation", stabilisation, &STABILISATIONS)?,
             warm_start,
-            solver: solver_options(solver, tolerance, max_iterations)?,
+            solver: solver_options(solver, tolerance, max_iterations, &SIMULATION_SOLVERS)?,
             ..StepOptions::default()
         };
         let inner =
             CoreSimulation::new(model, terrain.terrain(), options).map_err(BorderError::from)?;
-        Ok(Self {
-            inner,
+        let origin = Origin {
             terrain,
             solver: solver.to_owned(),
             max_iterations,
-        })
+        };
+        Ok(Self { inner, origin })
     }
 
     #[getter]
@@ -282,7 +288,7 @@ impl Simulation {
 
     #[getter]
     fn terrain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.terrain.to_object(py)
+        self.origin.terrain.to_object(py)
     }
 
     #[getter]
@@ -322,9 +328,9 @@ impl Simulation {
         settings.set_item("variant", name_of(o.variant, &VARIANTS))?;
         settings.set_item("theta", o.theta)?;
         settings.set_item("forecast", o.forecast)?;
-        settings.set_item("solver", &self.solver)?;
+        settings.set_item("solver", &self.origin.solver)?;
         settings.set_item("tolerance", o.solver.tolerance)?;
-        settings.set_item("max_iterations", self.max_iterations)?;
+        settings.set_item("max_iterations", self.origin.max_iterations)?;
         settings.set_item("stabilisation", name_of(o.stabilisation, &STABILISATIONS))?;
         settings.set_item("warm_start", o.warm_start)?;
         Ok(settings)
@@ -480,6 +486,28 @@ impl Simulation {
     #[getter]
     fn deepest_overlap(&self) -> f64 {
         self.inner.deepest_overlap()
+    }
+
+    #[pyo3(signature = (target = None, scan = None))]
+    fn reading<'py>(
+        &self,
+        py: Python<'py>,
+        target: Option<[f64; 2]>,
+        scan: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let scan = scan_points(scan)?;
+        let look = Look {
+            target: place(target)?,
+            scan: &scan,
+        };
+        let mut row = vec![0.0; ReadingLayout::new(self.model_ref(), scan.len()).size()];
+        self.inner.read(&look, &mut row);
+        Ok(PyArray1::from_vec(py, row))
+    }
+
+    #[pyo3(signature = (n_scan = 0))]
+    fn reading_layout<'py>(&self, py: Python<'py>, n_scan: usize) -> PyResult<Bound<'py, PyDict>> {
+        slices(py, &ReadingLayout::new(self.model_ref(), n_scan))
     }
 
     fn energy(&self) -> Energy {

@@ -80,7 +80,7 @@ def mass_ratios(variant: Variant) -> Iterator[Finding]:
         off = float(abs(runner.position()[1] - 0.35))
         how = (
             ""
-            if off <= 1e-3
+            if max(off, runner.speed()) <= 1e-3
             else f"stands {1e3 * (0.35 - runner.position()[1]):.0f} mm too low, moves at {runner.speed():.1e} m/s"
         )
         yield Finding(

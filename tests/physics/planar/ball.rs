@@ -258,9 +258,9 @@ fn a_ball_stays_before_a_step_or_rolls_over_it() {
     for _ in 0..60 {
         let mid = 0.5 * (low + high);
         if over(mid) > 0.0 {
-            high = mid
+            high = mid;
         } else {
-            low = mid
+            low = mid;
         }
     }
     for (share, gets_over) in [(0.96, false), (1.04, true)] {

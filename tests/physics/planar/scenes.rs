@@ -21,10 +21,10 @@ pub fn options(g: f64, friction: f64, restitution: f64, time_step: f64) -> StepO
 }
 
 /// The reference runs' own settings: no projection.
-pub fn unprojected(options: StepOptions) -> StepOptions {
+pub fn unprojected(options: &StepOptions) -> StepOptions {
     StepOptions {
         stabilisation: Stabilisation::None,
-        ..options
+        ..options.clone()
     }
 }
 

@@ -87,6 +87,15 @@ impl Terrain for Plane {
     fn primitive(&self, _id: u32) -> Primitive {
         Primitive::Plane(*self)
     }
+
+    fn height(&self, x: f64, z: f64) -> Option<f64> {
+        let n = &self.normal;
+        (n.y.abs() > 1e-12).then(|| -(n.x * x + n.z * z + self.offset) / n.y)
+    }
+
+    fn ground(&self) -> Option<&Plane> {
+        Some(self)
+    }
 }
 
 #[cfg(test)]

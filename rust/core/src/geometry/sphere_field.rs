@@ -103,32 +103,10 @@ impl SphereField {
         })
     }
 
-    /// Height y (m) of the visible surface at (x, z): the highest of ground and spheres; `None` where there is neither.
-    #[must_use]
-    pub fn height(&self, x: f64, z: f64) -> Option<f64> {
-        let of_plane = |plane: &Plane| {
-            let n = plane.normal();
-            (n.y.abs() > 1e-12).then(|| -(n.x * x + n.z * z + plane.offset()) / n.y)
-        };
-        let mut highest = self.ground.as_ref().and_then(of_plane);
-        self.tree.visit_column(x, z, |sphere| {
-            let across = (sphere.centre.x - x).hypot(sphere.centre.z - z);
-            let top = sphere.centre.y + (sphere.radius.powi(2) - across.powi(2)).max(0.0).sqrt();
-            highest = Some(highest.map_or(top, |y| y.max(top)));
-        });
-        highest
-    }
-
     /// The spheres in the order they were given.
     #[must_use]
     pub fn spheres(&self) -> &[Sphere] {
         &self.spheres
-    }
-
-    /// The plane under them.
-    #[must_use]
-    pub fn ground(&self) -> Option<&Plane> {
-        self.ground.as_ref()
     }
 }
 
@@ -186,6 +164,21 @@ impl Terrain for SphereField {
             (0, Some(plane)) => Primitive::Plane(plane),
             (id, _) => Primitive::Sphere(self.spheres[id as usize - 1]),
         }
+    }
+
+    /// The highest of ground and spheres.
+    fn height(&self, x: f64, z: f64) -> Option<f64> {
+        let mut highest = self.ground.as_ref().and_then(|plane| plane.height(x, z));
+        self.tree.visit_column(x, z, |sphere| {
+            let across = (sphere.centre.x - x).hypot(sphere.centre.z - z);
+            let top = sphere.centre.y + (sphere.radius.powi(2) - across.powi(2)).max(0.0).sqrt();
+            highest = Some(highest.map_or(top, |y| y.max(top)));
+        });
+        highest
+    }
+
+    fn ground(&self) -> Option<&Plane> {
+        self.ground.as_ref()
     }
 }
 

@@ -28,4 +28,10 @@ pub trait Terrain: Send + Sync {
 
     /// The primitive of a number that [`Self::visit_near`] gave.
     fn primitive(&self, id: u32) -> Primitive;
+
+    /// Height y (m) of the visible surface at (x, z); `None` where there is none.
+    fn height(&self, x: f64, z: f64) -> Option<f64>;
+
+    /// The plane that everything else lies on, if there is one.
+    fn ground(&self) -> Option<&Plane>;
 }

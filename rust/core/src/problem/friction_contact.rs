@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use super::{BlockSparseDelassus, Operator};
+
 /// Whether contacts have one tangent (planar scenes) or two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Dimension {
@@ -43,6 +45,22 @@ pub enum ProblemError {
         /// Number of rows needed.
         n: usize,
         /// Number of entries given.
+        found: usize,
+    },
+    /// A block row whose columns do not ascend, leave the matrix or lack the diagonal block.
+    #[error(
+        "block row {row} of W must have ascending columns within the matrix and its diagonal block"
+    )]
+    OperatorPattern {
+        /// Contact of the row.
+        row: usize,
+    },
+    /// `W` has another number of components per contact than the problem.
+    #[error("W has blocks of {found} components, but {expected} are needed")]
+    OperatorComponents {
+        /// Components of the problem.
+        expected: usize,
+        /// Components of the blocks.
         found: usize,
     },
     /// An entry of `W` is infinite or not a number.
@@ -98,7 +116,7 @@ pub enum ProblemError {
 #[derive(Clone, Copy, Debug)]
 pub struct FrictionContactProblem<'a> {
     dimension: Dimension,
-    W: &'a [f64],
+    W: Operator<'a>,
     q: &'a [f64],
     mu: &'a [f64],
 }
@@ -129,12 +147,52 @@ impl<'a> FrictionContactProblem<'a> {
         if W.len() != n * n {
             return Err(ProblemError::OperatorShape { n, found: W.len() });
         }
-        if let Some(index) = W.iter().position(|x| !x.is_finite()) {
-            return Err(ProblemError::NonFiniteOperator {
-                row: index / n,
-                column: index % n,
-                value: W[index],
+        Self::checked(dimension, Operator::Dense(W), q, mu)
+    }
+
+    /// The same for many contacts, with the blocks of `W` that are not zero.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), and where the components of `W` are not the dimension's.
+    pub fn new_sparse(
+        dimension: Dimension,
+        W: &'a BlockSparseDelassus,
+        q: &'a [f64],
+        mu: &'a [f64],
+    ) -> Result<Self, ProblemError> {
+        let d = dimension.components();
+        if W.components() != d {
+            return Err(ProblemError::OperatorComponents {
+                expected: d,
+                found: W.components(),
             });
+        }
+        if q.len() != d * mu.len() {
+            return Err(ProblemError::VelocityShape {
+                n_contacts: mu.len(),
+                components: d,
+                found: q.len(),
+            });
+        }
+        if W.n_contacts() != mu.len() {
+            return Err(ProblemError::OperatorShape {
+                n: q.len(),
+                found: d * d * W.n_blocks(),
+            });
+        }
+        Self::checked(dimension, Operator::BlockSparse(W), q, mu)
+    }
+
+    /// Checks the entries of data whose shapes fit.
+    fn checked(
+        dimension: Dimension,
+        W: Operator<'a>,
+        q: &'a [f64],
+        mu: &'a [f64],
+    ) -> Result<Self, ProblemError> {
+        let (d, n) = (dimension.components(), q.len());
+        if let Some((row, column, value)) = W.first_non_finite(n) {
+            return Err(ProblemError::NonFiniteOperator { row, column, value });
         }
         if let Some(index) = q.iter().position(|x| !x.is_finite()) {
             return Err(ProblemError::NonFiniteVelocity {
@@ -147,7 +205,7 @@ impl<'a> FrictionContactProblem<'a> {
                 return Err(ProblemError::InvalidFrictionCoefficient { contact, value });
             }
             for k in 0..d {
-                let value = W[(d * contact + k) * (n + 1)];
+                let value = W.diagonal(dimension, n, contact, k);
                 if k == 0 && value <= 0.0 {
                     return Err(ProblemError::NonPositiveNormal { contact, value });
                 }
@@ -164,6 +222,30 @@ impl<'a> FrictionContactProblem<'a> {
         })
     }
 
+    /// States a sparse problem from data that the caller assembled itself; only the shapes are checked, see
+    /// [`from_assembled`](Self::from_assembled).
+    ///
+    /// # Panics
+    /// If the lengths of `W`, `q` and `mu` do not fit together.
+    #[must_use]
+    pub fn from_assembled_sparse(W: &'a BlockSparseDelassus, q: &'a [f64], mu: &'a [f64]) -> Self {
+        let dimension = if W.components() == 2 {
+            Dimension::Two
+        } else {
+            Dimension::Three
+        };
+        assert!(
+            W.n_contacts() == mu.len() && q.len() == dimension.components() * mu.len(),
+            "W, q and mu must be of the same contacts"
+        );
+        Self {
+            dimension,
+            W: Operator::BlockSparse(W),
+            q,
+            mu,
+        }
+    }
+
     /// States the problem from data that the caller assembled itself; only the shapes are checked.
     ///
     /// Meant for the time stepper. Entries that are not finite make a solve end with
@@ -178,7 +260,7 @@ impl<'a> FrictionContactProblem<'a> {
         assert!(W.len() == n * n, "W must have n * n entries");
         Self {
             dimension,
-            W,
+            W: Operator::Dense(W),
             q,
             mu,
         }
@@ -191,10 +273,10 @@ impl<'a> FrictionContactProblem<'a> {
         self.dimension
     }
 
-    /// Delassus operator `W`, row-major `n × n`, 1/kg.
+    /// Delassus operator `W`, 1/kg.
     #[inline]
     #[must_use]
-    pub const fn operator(&self) -> &'a [f64] {
+    pub const fn operator(&self) -> Operator<'a> {
         self.W
     }
 

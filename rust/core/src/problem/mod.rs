@@ -7,12 +7,16 @@
 //! u = W p + q,    ũ = u + μ|u_T| n,    K_μ* ∋ ũ ⊥ p ∈ K_μ    at every contact.
 //! ```
 //!
-//! [`FrictionContactProblem`] states it, [`Residual`] judges an answer. Nothing here knows a body, so a problem read
+//! [`FrictionContactProblem`] states it, with `W` dense or, for many contacts, as [`BlockSparseDelassus`]; [`Residual`] judges an answer. Nothing here knows a body, so a problem read
 //! from a file is as good as one from a rover.
 
+mod block_sparse;
 mod friction_contact;
+mod operator;
 mod residual;
 
+pub use block_sparse::{BlockSparseDelassus, PairContact};
 pub use friction_contact::{Dimension, FrictionContactProblem, ProblemError};
+pub use operator::Operator;
 pub use residual::{Residual, contact_scale, evaluate, evaluate_into, local_velocity};
-pub(crate) use residual::{dot, evaluate_contact, multiply_add};
+pub(crate) use residual::{dot, evaluate_contact};

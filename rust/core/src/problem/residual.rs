@@ -78,19 +78,22 @@ pub fn local_velocity(problem: &FrictionContactProblem<'_>, p: &[f64], u: &mut [
         u.len() == problem.n_unknowns(),
         "u must have one entry per unknown"
     );
-    multiply_add(problem.operator(), p, problem.free_velocity(), u);
+    problem
+        .operator()
+        .multiply_add(p, problem.free_velocity(), u);
 }
 
 /// The scale `ρ_i = d / tr W_ii` of one contact, kg; 1 where the block has no positive trace.
 #[inline]
 #[must_use]
 pub fn contact_scale(problem: &FrictionContactProblem<'_>, contact: usize) -> f64 {
-    let d = problem.dimension().components();
-    let n = problem.n_unknowns();
-    let W = problem.operator();
-    let trace: f64 = (d * contact..d * (contact + 1))
-        .map(|k| W[k * (n + 1)])
-        .sum();
+    let (dimension, n, W) = (
+        problem.dimension(),
+        problem.n_unknowns(),
+        problem.operator(),
+    );
+    let d = dimension.components();
+    let trace: f64 = (0..d).map(|k| W.diagonal(dimension, n, contact, k)).sum();
     if trace > 0.0 { d as f64 / trace } else { 1.0 }
 }
 

@@ -55,6 +55,48 @@ pub enum CommandError {
     },
 }
 
+/// A batch that cannot be made, or a command that it cannot take.
+#[derive(Debug, Error, Clone, PartialEq)]
+pub enum BatchError {
+    /// No rovers.
+    #[error("simulations: a batch needs at least one")]
+    Empty,
+    /// Rovers whose readings have different lengths.
+    #[error("simulations[{index}]: has {actual} coordinates, the first has {expected}")]
+    Differs {
+        /// Which rover.
+        index: usize,
+        /// Coordinates of the first.
+        expected: usize,
+        /// Its own.
+        actual: usize,
+    },
+    /// No rover of this number.
+    #[error("index: must be below {len}, is {index}")]
+    NoSuchRover {
+        /// What was given.
+        index: usize,
+        /// Rovers in the batch.
+        len: usize,
+    },
+    /// Threads that the system would not start.
+    #[error("threads: {count} could not be started ({reason})")]
+    Threads {
+        /// What was asked for; 0 stands for one a core.
+        count: usize,
+        /// What the system says.
+        reason: String,
+    },
+    /// A command of one rover.
+    #[error("rover {index}: {error}")]
+    Command {
+        /// Which rover.
+        index: usize,
+        /// What is wrong with it.
+        error: CommandError,
+    },
+}
+
 /// A snapshot that does not fit the simulation.
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum SnapshotError {

@@ -29,6 +29,19 @@ pub struct Simulation {
     warm_start: WarmStart,
     workspace: Workspace,
     active: Vec<ActiveContact>,
+    last_call: LastCall,
+    angles_before: Vec<f64>,
+}
+
+/// What the last call of [`Simulation::step`] came to; not part of the state.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LastCall {
+    /// Report of its steps; empty where one could not be taken.
+    pub report: StepReport,
+    /// Work through the wheel motors, Σ |τ_i Δφ_i|, driving or braking, J.
+    pub work: f64,
+    /// Its driving part, Σ max(τ_i Δφ_i, 0), J.
+    pub positive_work: f64,
 }
 
 impl Simulation {
@@ -60,6 +73,8 @@ impl Simulation {
             warm_start: WarmStart::with_capacity(contact_capacity(&model), model.nv()),
             workspace: Workspace::new(&model),
             active: Vec::with_capacity(contact_capacity(&model)),
+            last_call: LastCall::default(),
+            angles_before: Vec::with_capacity(model.wheels().len()),
             command,
             model,
             terrain,
@@ -131,6 +146,7 @@ impl Simulation {
         };
         self.warm_start.clear();
         self.active.clear();
+        self.last_call = LastCall::default();
     }
 
     /// Driving torque of each wheel, positive forward, as it acts (N m).
@@ -193,6 +209,24 @@ impl Simulation {
     /// # Errors
     /// Wrong length, not finite, beyond the wheel's limit, or nonzero where there is no free steering joint.
     pub fn set_steering(&mut self, set_points: &[f64]) -> Result<(), CommandError> {
+        self.check_steering(set_points)?;
+        for (&set_point, wheel) in set_points.iter().zip(self.model.wheels()) {
+            if let Some(k) = wheel.steering {
+                let hold = self.model.bodies()[k - 5].hold;
+                let held = self.command.held[k - 6];
+                let (stiffness, damping) =
+                    held.map_or((hold.stiffness, hold.damping), |h| (h.stiffness, h.damping));
+                self.command.held[k - 6] = Some(HeldJoint {
+                    set_point,
+                    stiffness,
+                    damping,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_steering(&self, set_points: &[f64]) -> Result<(), CommandError> {
         check("set_points", set_points, self.model.wheels().len())?;
         for (index, (&value, wheel)) in set_points.iter().zip(self.model.wheels()).enumerate() {
             let limit = if wheel.steering.is_some() {
@@ -209,20 +243,16 @@ impl Simulation {
                 });
             }
         }
-        for (&set_point, wheel) in set_points.iter().zip(self.model.wheels()) {
-            if let Some(k) = wheel.steering {
-                let hold = self.model.bodies()[k - 5].hold;
-                let held = self.command.held[k - 6];
-                let (stiffness, damping) =
-                    held.map_or((hold.stiffness, hold.damping), |h| (h.stiffness, h.damping));
-                self.command.held[k - 6] = Some(HeldJoint {
-                    set_point,
-                    stiffness,
-                    damping,
-                });
-            }
-        }
         Ok(())
+    }
+
+    /// Whether [`Self::set_wheel_torques`] and [`Self::set_steering`] would take these.
+    ///
+    /// # Errors
+    /// As these two.
+    pub fn check_commands(&self, torques: &[f64], set_points: &[f64]) -> Result<(), CommandError> {
+        check("torques", torques, self.model.wheels().len())?;
+        self.check_steering(set_points)
     }
 
     /// Holds joints by name; set-points default to where they are, gains to the model's.
@@ -303,7 +333,41 @@ impl Simulation {
     /// # Errors
     /// See [`StepError`]. A solver that did not converge is no error: see the report.
     pub fn step(&mut self, n: usize) -> Result<StepReport, StepError> {
-        self.step_probed(n, &mut NoProbe)
+        self.angles_before.clear();
+        let joints = &self.state.configuration.joints;
+        let angle = |joint: Option<usize>| joint.map_or(0.0, |k| joints[k - 6]);
+        let wheels = self.model.wheels();
+        self.angles_before
+            .extend(wheels.iter().map(|wheel| angle(wheel.joint)));
+        let result = self.step_probed(n, &mut NoProbe);
+
+        // The torque is constant over the call: its work is exactly torque times angle turned.
+        let (mut work, mut positive_work) = (0.0, 0.0);
+        let joints = &self.state.configuration.joints;
+        for ((wheel, torque), before) in self
+            .model
+            .wheels()
+            .iter()
+            .zip(&self.wheel_torque)
+            .zip(&self.angles_before)
+        {
+            let turned = wheel.joint.map_or(0.0, |k| joints[k - 6] - before);
+            let joules: f64 = torque * wheel.drive_sign * turned;
+            work += joules.abs();
+            positive_work += joules.max(0.0);
+        }
+        self.last_call = LastCall {
+            report: result.clone().unwrap_or_default(),
+            work,
+            positive_work,
+        };
+        result
+    }
+
+    /// What the last call of [`Self::step`] came to.
+    #[must_use]
+    pub fn last_call(&self) -> &LastCall {
+        &self.last_call
     }
 
     fn step_probed(&mut self, n: usize, probe: &mut dyn Probe) -> Result<StepReport, StepError> {
@@ -496,6 +560,7 @@ impl Simulation {
         self.joint_torque.clone_from(&snapshot.joint_torque);
         self.warm_start.clone_from(&snapshot.warm_start);
         self.active.clone_from(&snapshot.active);
+        self.last_call = LastCall::default();
         Ok(())
     }
 }

@@ -1,16 +1,23 @@
-//! Solvers of the friction-contact problem. One entry point, [`solve`]; a solver sees only `(W, q, μ)`.
+//! Solvers of the friction-contact problem. The usual entry point is [`solve`]; a solver sees only `(W, q, μ)`.
 //!
 //! - [`one_contact`]: the exact solution of a single contact, the brick of Gauss–Seidel;
 //! - `nsgs`: nonsmooth Gauss–Seidel, cheap sweeps, good with many contacts;
 //! - `newton`: semismooth Newton on the contact modes, quadratic near the answer;
 //! - `pivoting`: one contact changes its mode at a time, from a warm start that full Newton steps do not profit from;
-//! - `proximal`: the proximal-point method around Newton, for whatever resists (redundant contacts, jammed stacks).
+//! - `proximal`: the proximal-point method around Newton, for whatever resists (redundant contacts, jammed stacks);
+//! - `admm`: alternating directions, and with them the convex relaxation of Coulomb's law, both for comparison;
+//! - `block_lu`: the sparse factors of a Newton step of many contacts.
 //!
+//! All stand behind the trait [`Solver`]; [`Method`] names them.
 //! [`Method::Auto`] takes few contacts to Newton at once and many to Gauss–Seidel first, and escalates when progress stops.
 //! Every report is computed from the returned impulse, never from inside an iteration.
 
+mod admm;
 mod auto;
+mod block_lu;
 mod dense;
+mod islands;
+mod methods;
 mod modes;
 mod newton;
 mod nsgs;
@@ -20,13 +27,17 @@ mod pivoting;
 mod proximal;
 mod reduced_system;
 mod report;
+mod storage;
 mod workspace;
 
+pub use methods::{
+    Admm, Automatic, ContactLaw, GaussSeidel, Newton, ProximalPoint, Relaxed, Solver,
+};
 pub use options::{Method, SolverOptions};
 pub use report::{SolveReport, SolveStatus};
 pub use workspace::SolverWorkspace;
 
-use crate::problem::{Dimension, FrictionContactProblem};
+use crate::problem::FrictionContactProblem;
 
 /// Solves `K_μ* ∋ ũ ⊥ p ∈ K_μ`, `u = W p + q`.
 ///
@@ -50,16 +61,9 @@ pub fn solve(
     u: &mut [f64],
     workspace: &mut SolverWorkspace,
 ) -> SolveReport {
-    assert!(
-        p.len() == problem.n_unknowns(),
-        "p must have one entry per unknown"
-    );
-    assert!(
-        u.len() == problem.n_unknowns(),
-        "u must have one entry per unknown"
-    );
-    match problem.dimension() {
-        Dimension::Two => auto::solve_in::<2>(problem, options, p, u, workspace),
-        Dimension::Three => auto::solve_in::<3>(problem, options, p, u, workspace),
+    match options.method {
+        // The time stepper's choice, without the detour of a virtual call.
+        Method::Auto => methods::solve_by::<Automatic>(problem, options, p, u, workspace),
+        method => method.solver().solve(problem, options, p, u, workspace),
     }
 }

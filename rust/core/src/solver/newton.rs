@@ -10,7 +10,7 @@ use super::reduced_system::{self, Factors, System};
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
 use super::{SolverOptions, auto::Prepared, nsgs};
-use crate::problem::{Residual, multiply_add};
+use crate::problem::Residual;
 
 /// Most full steps before the safeguarded method takes over. Measured on the recorded problems: modes that full steps find at
 /// all are found within about ten.
@@ -123,8 +123,17 @@ fn give_best(
     workspace: &SolverWorkspace,
 ) -> (SolveStatus, Residual) {
     p.copy_from_slice(&workspace.best);
-    multiply_add(data.W, p, data.q, u);
+    data.W.multiply_add(p, data.q, u);
     (SolveStatus::Stalled, best)
+}
+
+/// How [`full_steps`] begins and how long it goes on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plan {
+    /// Most steps.
+    pub max_steps: usize,
+    /// Whether `p` only tells the modes, and the search starts from zero with them; it ends when they turn out wrong.
+    pub only_modes: bool,
 }
 
 /// Full Newton steps from `p`; in steady motion two or three of them solve the step.
@@ -134,7 +143,7 @@ fn give_best(
 pub(super) fn full_steps<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
-    max_steps: usize,
+    plan: Plan,
     p: &mut [f64],
     u: &mut [f64],
     workspace: &mut SolverWorkspace,
@@ -148,10 +157,14 @@ pub(super) fn full_steps<const D: usize>(
         settled: 0,
         last: f64::INFINITY,
     };
-    workspace.centre.copy_from_slice(p);
-    multiply_add(data.W, p, data.q, u);
+    data.W.multiply_add(p, data.q, u);
     let recalled = modes::recall::<D>(data.mu, p, u, &mut workspace.contacts);
     let is_warm = p.iter().any(|x| x.abs() > 0.0);
+    if plan.only_modes {
+        p.fill(0.0);
+        u.copy_from_slice(data.q);
+    }
+    workspace.centre.copy_from_slice(p);
     let mut step = 0;
     let mut best = Residual::UNSOLVED;
     loop {
@@ -176,7 +189,7 @@ pub(super) fn full_steps<const D: usize>(
         {
             return (SolveStatus::Converged, residual);
         }
-        if step == max_steps {
+        if step == plan.max_steps {
             return give_best(data, best, p, u, workspace);
         }
         course.last = residual.relative;
@@ -185,6 +198,10 @@ pub(super) fn full_steps<const D: usize>(
         } else {
             predict::<D>(data, &mut course, p, u, workspace)
         };
+        if plan.only_modes && course.exact {
+            // The guess was wrong, and the centre may have followed it.
+            return give_best(data, best, p, u, workspace);
+        }
         *iterations += 1;
         if prediction.changed && step > 0 && step % CYCLE == 0 {
             let prox = Proximal {
@@ -219,7 +236,7 @@ pub(super) fn full_steps<const D: usize>(
             reduced_system::newton_point::<D>(data, system, p, u, workspace);
             p.copy_from_slice(&workspace.trial);
         }
-        multiply_add(data.W, p, data.q, u);
+        data.W.multiply_add(p, data.q, u);
         step += 1;
     }
 }

@@ -8,38 +8,64 @@ use super::one_contact::solve_one_contact;
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
 use super::{SolverOptions, auto::Prepared};
-use crate::problem::{Residual, dot, multiply_add};
+use crate::problem::{BlockSparseDelassus, Operator, Residual, dot};
 
 /// One sweep over all contacts of the problem with `W + α I` and `q − α c`.
 pub(super) fn sweep<const D: usize>(data: &Prepared<'_>, prox: Proximal<'_>, p: &mut [f64]) {
+    match data.W {
+        Operator::Dense(W) => sweep_rows::<D>(data, W, prox, p),
+        Operator::BlockSparse(W) => sweep_blocks::<D>(data, W, prox, p),
+    }
+}
+
+/// Replaces the impulse of contact `i` by the exact answer to the velocity `u` that it sees now.
+#[inline]
+fn update<const D: usize>(
+    mut block: [[f64; D]; D],
+    u: [f64; D],
+    prox: Proximal<'_>,
+    offset: usize,
+    mu: f64,
+    p: &mut [f64],
+) {
+    let mut q = u;
+    for r in 0..D {
+        q[r] -= prox.alpha * prox.centre[offset + r];
+        for c in 0..D {
+            q[r] -= block[r][c] * p[offset + c];
+        }
+        block[r][r] += prox.alpha;
+    }
+    let solved = solve_one_contact(&block, &q, mu).impulse;
+    if solved.iter().all(|x| x.is_finite()) {
+        p[offset..offset + D].copy_from_slice(&solved);
+    }
+}
+
+fn sweep_rows<const D: usize>(data: &Prepared<'_>, W: &[f64], prox: Proximal<'_>, p: &mut [f64]) {
     let n = data.n;
     for (i, &mu) in data.mu.iter().enumerate() {
         let offset = D * i;
-        let rows = &data.W[offset * n..(offset + D) * n];
-        let mut block = [[0.0; D]; D];
-        let mut own = [0.0; D];
-        own.copy_from_slice(&p[offset..offset + D]);
+        let u: [f64; D] = std::array::from_fn(|r| {
+            dot(&W[(offset + r) * n..(offset + r + 1) * n], p) + data.q[offset + r]
+        });
+        update::<D>(data.block(i), u, prox, offset, mu, p);
+    }
+}
+
+fn sweep_blocks<const D: usize>(
+    data: &Prepared<'_>,
+    W: &BlockSparseDelassus,
+    prox: Proximal<'_>,
+    p: &mut [f64],
+) {
+    for (i, &mu) in data.mu.iter().enumerate() {
+        let offset = D * i;
+        let mut u = W.row_times::<D>(i, p);
         for r in 0..D {
-            block[r].copy_from_slice(&rows[r * n + offset..r * n + offset + D]);
+            u[r] += data.q[offset + r];
         }
-        let mut q = [0.0; D];
-        for r in 0..D {
-            q[r] = dot(&rows[r * n..(r + 1) * n], p) + data.q[offset + r]
-                - prox.alpha * prox.centre[offset + r];
-            for c in 0..D {
-                q[r] -= block[r][c] * own[c];
-            }
-            if r == 0 && q[0] >= 0.0 {
-                break;
-            }
-        }
-        for r in 0..D {
-            block[r][r] += prox.alpha;
-        }
-        let solved = solve_one_contact(&block, &q, mu).impulse;
-        if solved.iter().all(|x| x.is_finite()) {
-            p[offset..offset + D].copy_from_slice(&solved);
-        }
+        update::<D>(data.block(i), u, prox, offset, mu, p);
     }
 }
 
@@ -69,7 +95,7 @@ pub(super) fn sweeps<const D: usize>(
     let mut done = 0;
     let mut last = f64::INFINITY;
     loop {
-        multiply_add(data.W, p, data.q, u);
+        data.W.multiply_add(p, data.q, u);
         let residual = data.measure::<D>(&workspace.rho, p, u);
         if Prepared::accepts(options, residual) {
             return (SolveStatus::Converged, residual);

@@ -154,33 +154,30 @@ fn in_space<const D: usize>(
             return;
         }
     }
-    let (mut low, mut high) = (smallest, (smallest + scale).max(f64::MIN_POSITIVE));
-    while at(high).0 > 0.0 && high < f64::MAX / 16.0 {
-        low = high;
-        high *= 8.0;
-    }
-    let mut kappa = high;
+    // The answer of a block without preferred direction is a good first guess.
+    let size = (q_hat[0] * q_hat[0] + q_hat[1] * q_hat[1]).sqrt();
+    let along = W[0][1] * q_hat[0] + W[0][2] * q_hat[1];
+    let guess = (size * W_NN / mu - along / size) / -q[0] - 0.5 * trace;
+    let beside = (smallest + scale).max(f64::MIN_POSITIVE);
+    let start = if guess > smallest && guess.is_finite() {
+        guess
+    } else {
+        beside
+    };
     // Without a sign change (an indefinite W only) the contact has no answer; a damped one keeps an iteration going.
-    let steps = if at(low).0 > 0.0 { MAX_STEPS } else { 0 };
-    for _ in 0..steps {
-        let (g, slope, _, _) = at(kappa);
-        if g > 0.0 {
-            low = kappa;
-        } else {
-            high = kappa;
-        }
-        let newton = kappa - g / slope;
-        let next = if newton >= low && newton <= high {
-            newton
-        } else {
-            0.5 * (low + high)
-        };
-        let change = (next - kappa).abs();
-        kappa = next;
-        if change <= 4.0 * f64::EPSILON * kappa {
-            break;
-        }
-    }
+    let kappa = if smallest <= 0.0 || at(smallest).0 > 0.0 {
+        falling_root(
+            |kappa| {
+                let (g, slope, _, _) = at(kappa);
+                (g, slope)
+            },
+            smallest,
+            start,
+            beside,
+        )
+    } else {
+        start
+    };
     let (_, _, b, det) = at(kappa);
     solution.mode = ContactMode::Slide;
     solution.kappa = kappa;
@@ -197,6 +194,36 @@ fn in_space<const D: usize>(
             p[2] *= scale;
         }
     }
+}
+
+/// Root of a function that is positive at `low` and negative far beyond: Newton inside a bracket, whose upper end is looked for in steps of `reach`.
+///
+/// `at` gives value and slope.
+fn falling_root(at: impl Fn(f64) -> (f64, f64), mut low: f64, start: f64, reach: f64) -> f64 {
+    let mut high = f64::INFINITY;
+    let mut x = start;
+    for _ in 0..MAX_STEPS {
+        let (value, slope) = at(x);
+        if value > 0.0 {
+            low = x;
+        } else {
+            high = x;
+        }
+        let newton = x - value / slope;
+        let next = if newton >= low && newton <= high {
+            newton
+        } else if high.is_finite() {
+            0.5 * (low + high)
+        } else {
+            8.0 * low.max(reach)
+        };
+        let change = (next - x).abs();
+        x = next;
+        if change <= 4.0 * f64::EPSILON * x {
+            break;
+        }
+    }
+    x
 }
 
 #[cfg(test)]

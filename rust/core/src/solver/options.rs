@@ -1,5 +1,7 @@
 //! What the caller may choose about a solve.
 
+use super::methods::{self, ContactLaw, Solver};
+
 /// Which algorithm solves the problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
@@ -13,6 +15,63 @@ pub enum Method {
     Newton,
     /// Proximal point outside, damped Newton inside.
     ProximalPoint,
+    /// Alternating directions with De Saxcé's shift renewed at every iteration; for comparison, `Auto` never takes it.
+    Admm,
+    /// The convex relaxation of Coulomb's law, for comparison: its answer obeys another law and never counts as converged.
+    Relaxed,
+}
+
+impl Method {
+    /// All methods, the default first.
+    pub const ALL: [Self; 6] = [
+        Self::Auto,
+        Self::GaussSeidel,
+        Self::Newton,
+        Self::ProximalPoint,
+        Self::Admm,
+        Self::Relaxed,
+    ];
+
+    /// Public name: what Python and reports call it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::GaussSeidel => "nsgs",
+            Self::Newton => "newton",
+            Self::ProximalPoint => "proximal",
+            Self::Admm => "admm",
+            Self::Relaxed => "relaxed",
+        }
+    }
+
+    /// The method of a public name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|method| method.name() == name)
+    }
+
+    /// The law that its answers obey.
+    #[must_use]
+    pub const fn law(self) -> ContactLaw {
+        match self {
+            Self::Relaxed => ContactLaw::Relaxed,
+            _ => ContactLaw::Coulomb,
+        }
+    }
+
+    /// The solver behind the trait.
+    #[must_use]
+    pub const fn solver(self) -> &'static dyn Solver {
+        match self {
+            Self::Auto => &methods::Automatic,
+            Self::GaussSeidel => &methods::GaussSeidel,
+            Self::Newton => &methods::Newton,
+            Self::ProximalPoint => &methods::ProximalPoint,
+            Self::Admm => &methods::Admm,
+            Self::Relaxed => &methods::Relaxed,
+        }
+    }
 }
 
 /// Options of [`solve`](crate::solver::solve).
@@ -28,7 +87,7 @@ pub struct SolverOptions {
     pub velocity_tolerance: f64,
     /// Most Newton steps, counting every linear solve; default 500.
     pub max_newton_steps: usize,
-    /// Most Gauss–Seidel sweeps when that is the method asked for; default 10 000. `Auto` stops earlier by itself.
+    /// Most Gauss–Seidel sweeps, or iterations of ADMM, when that is the method asked for; default 10 000. `Auto` stops earlier by itself.
     pub max_sweeps: usize,
     /// Proximal regularisation `α` relative to the mean diagonal of `W`; default 1e-6.
     ///

@@ -17,7 +17,7 @@ use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
 use crate::cone::tangential_norm;
 use crate::law::coulomb::ContactMode;
-use crate::problem::{Residual, multiply_add};
+use crate::problem::Residual;
 
 /// Most systems to solve.
 const MAX_PIVOTS: usize = 80;
@@ -195,7 +195,7 @@ pub(super) fn pivots<const D: usize>(
     workspace: &mut SolverWorkspace,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
-    multiply_add(data.W, p, data.q, u);
+    data.W.multiply_add(p, data.q, u);
     modes::recall::<D>(data.mu, p, u, &mut workspace.contacts);
     let alpha = ALPHA * data.mean_diagonal;
     let mut residual = data.measure::<D>(&workspace.rho, p, u);
@@ -235,11 +235,11 @@ pub(super) fn pivots<const D: usize>(
                 &mut workspace.contacts[i],
                 &mut p[D * i..][..D],
             );
-            multiply_add(data.W, p, data.q, u);
+            data.W.multiply_add(p, data.q, u);
             continue;
         }
         p.copy_from_slice(&workspace.trial);
-        multiply_add(data.W, p, data.q, u);
+        data.W.multiply_add(p, data.q, u);
         residual = data.measure::<D>(&workspace.rho, p, u);
         if Prepared::accepts(options, residual) {
             return (SolveStatus::Converged, residual);
@@ -254,7 +254,7 @@ pub(super) fn pivots<const D: usize>(
                 &mut workspace.contacts[i],
                 &mut p[D * i..][..D],
             );
-            multiply_add(data.W, p, data.q, u);
+            data.W.multiply_add(p, data.q, u);
         }
     }
     (SolveStatus::Stalled, residual)

@@ -13,7 +13,7 @@ use super::reduced_system::{self, Factors, System};
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
 use super::{SolverOptions, auto::Prepared, nsgs};
-use crate::problem::{Residual, multiply_add};
+use crate::problem::Residual;
 
 /// Most Newton steps for one value of `α`.
 const INNER_STEPS: usize = 30;
@@ -164,7 +164,7 @@ fn backtrack<const D: usize>(
         *d = t - x;
     }
     trial_velocity.fill(0.0);
-    multiply_add(data.W, direction, trial_velocity, image);
+    data.W.multiply_add(direction, trial_velocity, image);
     let prox = Proximal { alpha, centre };
     let mut t = 1.0;
     for _ in 0..HALVINGS {
@@ -198,7 +198,7 @@ fn descend<const D: usize>(
         mut exact,
         steps,
     } = task;
-    multiply_add(data.W, p, data.q, u);
+    data.W.multiply_add(p, data.q, u);
     let threshold = (tolerance / data.inverse_data).powi(2);
     let mut stuck = 0;
     for step in 0..=steps {
@@ -248,9 +248,9 @@ fn descend<const D: usize>(
         for _ in 0..SWEEPS {
             nsgs::sweep::<D>(data, prox, p);
         }
-        multiply_add(data.W, p, data.q, u);
+        data.W.multiply_add(p, data.q, u);
     }
-    multiply_add(data.W, p, data.q, u);
+    data.W.multiply_add(p, data.q, u);
     true
 }
 
@@ -263,7 +263,7 @@ pub(super) fn solve<const D: usize>(
     workspace: &mut SolverWorkspace,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
-    multiply_add(data.W, p, data.q, u);
+    data.W.multiply_add(p, data.q, u);
     let mut best = data.measure::<D>(&workspace.rho, p, u);
     if Prepared::accepts(options, best) {
         return (SolveStatus::Converged, best);
@@ -353,6 +353,6 @@ pub(super) fn solve<const D: usize>(
         }
     }
     p.copy_from_slice(&workspace.best);
-    multiply_add(data.W, p, data.q, u);
+    data.W.multiply_add(p, data.q, u);
     (status, data.measure::<D>(&workspace.rho, p, u))
 }

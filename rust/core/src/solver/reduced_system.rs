@@ -11,7 +11,7 @@ use super::dense;
 use super::modes::{Linearised, Prediction, Proximal, n_unknowns};
 use super::workspace::SolverWorkspace;
 use crate::law::coulomb::ContactMode;
-use crate::problem::multiply_add;
+use crate::problem::Operator;
 
 /// Kept factors of the reduced system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,6 +22,8 @@ pub(super) enum Factors {
     Symmetric,
     /// LU.
     General,
+    /// Block-sparse LU.
+    Sparse,
 }
 
 /// A factored reduced system, ready to be solved.
@@ -78,6 +80,7 @@ fn snap<const D: usize>(mu: &[f64], contacts: &[Linearised], p: &mut [f64]) -> b
 #[inline]
 fn assemble<const D: usize>(
     data: &Prepared<'_>,
+    W: &[f64],
     alpha: f64,
     contacts: &[Linearised],
     m: usize,
@@ -86,14 +89,14 @@ fn assemble<const D: usize>(
 ) {
     let n = data.n;
     if m == n {
-        A[..n * n].copy_from_slice(data.W);
+        A[..n * n].copy_from_slice(W);
         for k in 0..n {
             A[k * (n + 1)] += alpha;
         }
         return;
     }
     for (i, contact) in contacts.iter().enumerate() {
-        let first = &data.W[i * D * n..];
+        let first = &W[i * D * n..];
         let size = n_unknowns::<D>(contact.mode, data.mu[i]);
         for k in 0..size {
             let index = contact.start + k;
@@ -241,8 +244,27 @@ pub(super) fn factorise<const D: usize>(
     workspace: &mut SolverWorkspace,
 ) -> Factors {
     let m = prediction.m;
+    let W = match data.W {
+        Operator::Dense(W) => W,
+        Operator::BlockSparse(W) => {
+            if !workspace.is_analysed {
+                workspace.block_lu.analyse(W);
+                workspace.is_analysed = true;
+            }
+            let contacts = &workspace.contacts;
+            let is_regular = workspace
+                .block_lu
+                .factorise::<D>(W, data.mu, alpha, None, contacts);
+            return if is_regular {
+                Factors::Sparse
+            } else {
+                Factors::None
+            };
+        }
+    };
     assemble::<D>(
         data,
+        W,
         alpha,
         &workspace.contacts,
         m,
@@ -255,6 +277,7 @@ pub(super) fn factorise<const D: usize>(
         }
         assemble::<D>(
             data,
+            W,
             alpha,
             &workspace.contacts,
             m,
@@ -271,10 +294,19 @@ pub(super) fn factorise<const D: usize>(
 
 /// Solves the factored reduced system for the workspace's right-hand side, in place.
 #[inline]
-fn back_substitute(factors: Factors, m: usize, workspace: &mut SolverWorkspace) {
+fn back_substitute<const D: usize>(
+    data: &Prepared<'_>,
+    factors: Factors,
+    m: usize,
+    workspace: &mut SolverWorkspace,
+) {
+    if let (Factors::Sparse, Operator::BlockSparse(W)) = (factors, data.W) {
+        workspace.block_lu.solve::<D>(W, &mut workspace.rhs);
+        return;
+    }
     let rhs = &mut workspace.rhs[..m];
     match factors {
-        Factors::None => rhs.fill(0.0),
+        Factors::None | Factors::Sparse => rhs.fill(0.0),
         Factors::Symmetric => dense::cholesky_solve(&workspace.matrix[..m * m], m, rhs),
         Factors::General => dense::lu_solve(&workspace.matrix[..m * m], m, &workspace.pivots, rhs),
     }
@@ -297,9 +329,16 @@ pub(super) fn newton_point<const D: usize>(
         ..
     } = workspace;
     trial.copy_from_slice(p);
+    if system.factors == Factors::Sparse {
+        // Every contact keeps its place there, and unknowns that its mode takes away are zero.
+        for (i, contact) in contacts.iter_mut().enumerate() {
+            contact.start = D * i;
+        }
+        rhs.fill(0.0);
+    }
     let mut u = u;
     if snap::<D>(data.mu, contacts, trial) {
-        multiply_add(data.W, trial, data.q, trial_velocity);
+        data.W.multiply_add(trial, data.q, trial_velocity);
         u = trial_velocity;
     }
     let prox = Proximal {
@@ -307,7 +346,7 @@ pub(super) fn newton_point<const D: usize>(
         centre,
     };
     right_hand_side::<D>(data, prox, contacts, trial, u, rhs);
-    back_substitute(system.factors, system.m, workspace);
+    back_substitute::<D>(data, system.factors, system.m, workspace);
     apply::<D>(
         data.mu,
         &workspace.contacts,

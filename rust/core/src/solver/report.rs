@@ -8,6 +8,8 @@ use super::Method;
 pub enum SolveStatus {
     /// Both tolerances hold, or the violation is within the rounding of the data.
     Converged,
+    /// The tolerances hold for the convex relaxation, which is not the law that was asked for; the report's numbers are Coulomb's.
+    SolvedRelaxed,
     /// The allowed iterations were used up.
     MaxIterations,
     /// Progress stopped before the tolerance.

@@ -1,13 +1,21 @@
 //! Scratch memory of a solve, kept between solves so that none of them allocates.
 
+use super::block_lu::BlockLu;
+use super::islands::Islands;
 use super::modes::Linearised;
-use crate::problem::FrictionContactProblem;
+use super::storage::Storage;
+use crate::problem::Operator;
 
 /// Scratch of [`solve`](crate::solver::solve): grows to the largest problem met, carries nothing from one solve to the next.
+///
+/// Up to [`direct_contacts`](crate::solver::SolverOptions::direct_contacts) a solve in a sized workspace allocates nothing; above, the pattern of the sparse
+/// factors is made anew where Gauss–Seidel does not answer.
 #[derive(Clone, Debug, Default)]
 pub struct SolverWorkspace {
     /// Scale of each contact in the residual, kg.
     pub(super) rho: Vec<f64>,
+    /// Inverse of the scales, 1/kg: ADMM's penalty at `σ = 1`.
+    pub(super) weights: Vec<f64>,
     /// Scales of the mode prediction, normal and tangential, kg.
     pub(super) rho_modes: Vec<[f64; 2]>,
     /// Mode and frame of each contact in the current linearisation.
@@ -34,6 +42,13 @@ pub struct SolverWorkspace {
     pub(super) matrix: Vec<f64>,
     /// Row exchanges of the factorisation.
     pub(super) pivots: Vec<usize>,
+    /// Factors of the block-sparse system, and whether its pattern is that of the present problem.
+    pub(super) block_lu: BlockLu,
+    pub(super) is_analysed: bool,
+    /// `W` in the storage that suits its size.
+    pub(super) storage: Storage,
+    /// Problems of the islands.
+    pub(super) islands: Option<Box<Islands>>,
 }
 
 impl SolverWorkspace {
@@ -47,19 +62,32 @@ impl SolverWorkspace {
     #[must_use]
     pub fn with_capacity(n_contacts: usize, components: usize) -> Self {
         let mut workspace = Self::default();
-        workspace.resize(n_contacts, n_contacts * components);
+        let n = n_contacts * components;
+        workspace.resize(n_contacts, n);
+        workspace.matrix.resize(n * n, 0.0);
+        workspace.pivots.resize(n, 0);
         workspace
     }
 
     /// Makes every buffer fit; the contents are unspecified.
-    pub(super) fn fit(&mut self, problem: &FrictionContactProblem<'_>) {
-        if self.rhs.len() != problem.n_unknowns() || self.rho.len() != problem.n_contacts() {
-            self.resize(problem.n_contacts(), problem.n_unknowns());
+    pub(super) fn fit(&mut self, n_contacts: usize, n: usize, W: Operator<'_>) {
+        if self.rhs.len() != n || self.rho.len() != n_contacts {
+            self.resize(n_contacts, n);
+        }
+        match W {
+            Operator::Dense(_) => {
+                if self.pivots.len() != n {
+                    self.matrix.resize(n * n, 0.0);
+                    self.pivots.resize(n, 0);
+                }
+            }
+            Operator::BlockSparse(_) => self.is_analysed = false,
         }
     }
 
     fn resize(&mut self, n_contacts: usize, n: usize) {
         self.rho.resize(n_contacts, 0.0);
+        self.weights.resize(n_contacts, 0.0);
         self.rho_modes.resize(n_contacts, [0.0; 2]);
         self.contacts.resize(n_contacts, Linearised::default());
         for buffer in [
@@ -76,7 +104,5 @@ impl SolverWorkspace {
         ] {
             buffer.resize(n, 0.0);
         }
-        self.matrix.resize(n * n, 0.0);
-        self.pivots.resize(n, 0);
     }
 }

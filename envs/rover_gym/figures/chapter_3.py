@@ -1,4 +1,4 @@
-"""Figures 3.2 to 3.5 of the report, and a plot of any planar run.
+"""Figures 3.2 to 3.5 of the report: the ball on a line and on a sine.
 
 The report's text states other parameters than its figures were made with. These are the figures' own, SI: a ball of
 3 kg, radius 1.5 m, inertia 4.05 kg m2, restitution 0.7, g = 9.8, step 0.5 ms; first y = -x/2 + 1/2 from (5, 10), then
@@ -9,7 +9,6 @@ ball touching with its rim.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -18,8 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.planar import BallSimulation, Line, PlanarSimulation, Polyline, Sine, describe, record
-from rover_gym.recording import MissingExtraError, Trajectory, read_trajectory
+from rover_gym.figures.planar_run import FRICTION, GROUND, OURS, speed_of
+from rover_gym.figures.saving import save_figures
+from rover_gym.planar import BallSimulation, Line, Sine, describe, record
+from rover_gym.recording import Trajectory, read_trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,18 +35,7 @@ BALL: dict[str, Any] = {
     "time_step": 0.0005,
 }
 STEP = 0.0005  # s, of the report's runs
-OURS, RIM, PUBLISHED, GROUND, FRICTION = "#0072B2", "#009E73", "0.55", "#8c6d46", "#D55E00"
-STYLE = {
-    "axes.grid": True,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlesize": "medium",
-    "figure.constrained_layout.use": True,
-    "figure.dpi": 150,
-    "grid.alpha": 0.3,
-    "legend.fontsize": "small",
-    "lines.linewidth": 1.2,
-}
+RIM, PUBLISHED = "#009E73", "0.55"
 
 
 @cache
@@ -98,48 +88,15 @@ def draw_chapter_3(folder: str | Path) -> list[Path]:
             record(sim, path, describe(sim, title), duration=duration, steps_per_row=steps_per_row)
             pair.append(read_trajectory(path))
         runs[name] = (pair[0], pair[1])
-    return _draw(
-        folder,
+    return save_figures(
         {
             "figure-3.2-ball-on-a-line": lambda figure: _incline_path(figure, *runs["incline"]),
             "figure-3.3-speed-and-impulses": lambda figure: _incline_curves(figure, runs["incline"][0]),
             "figure-3.4-ball-on-a-sine": lambda figure: _sine_path(figure, *runs["sine"]),
             "figure-3.5-speed-and-impulses": lambda figure: _sine_curves(figure, runs["sine"][0]),
         },
+        folder,
     )
-
-
-def draw_run(sim: PlanarSimulation, recording: str | Path, path: str | Path) -> Path:
-    """Draws a recorded planar run: the machine's way over its ground, and speed, gaps, loads and energy against time.
-
-    Args:
-        sim: A simulation on the same ground.
-        recording: What `record` wrote.
-        path: PNG file to write.
-
-    Raises:
-        MissingExtraError: matplotlib or h5py is not installed.
-    """
-    trajectory = read_trajectory(recording)
-    path = Path(path)
-    return _draw(path.parent, {path.stem: lambda figure: _run(figure, sim, trajectory)})[0]
-
-
-def _draw(folder: Path, figures: dict[str, Callable[[Figure], None]]) -> list[Path]:
-    try:
-        import matplotlib as mpl  # noqa: PLC0415 - only who draws needs it
-        from matplotlib.figure import Figure  # noqa: PLC0415
-    except ModuleNotFoundError as error:
-        raise MissingExtraError("matplotlib", "demo") from error
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = []
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
-        for name, draw in figures.items():
-            figure = Figure(figsize=(11.0, 5.0))
-            draw(figure)
-            paths.append(folder / f"{name}.png")
-            figure.savefig(paths[-1])
-    return paths
 
 
 def _curve(figure: str, curve: str) -> npt.NDArray[np.float64]:
@@ -149,10 +106,6 @@ def _curve(figure: str, curve: str) -> npt.NDArray[np.float64]:
 
 def _plot_published(axes: Axes, figure: str) -> None:
     axes.plot(*_curve(figure, "Ball position"), color=PUBLISHED, linewidth=3.0, label="the report's")
-
-
-def _speed(trajectory: Trajectory) -> npt.NDArray[np.float64]:
-    return np.linalg.norm(trajectory["v"][:, :2], axis=1)  # type: ignore[no-any-return]
 
 
 def _incline_path(figure: Figure, centre: Trajectory, rim: Trajectory) -> None:
@@ -173,7 +126,7 @@ def _incline_path(figure: Figure, centre: Trajectory, rim: Trajectory) -> None:
 def _incline_curves(figure: Figure, centre: Trajectory) -> None:
     speed, impulses = figure.subplots(1, 2)
     name = "fig_3_3_ball_incline_velocity_forces"
-    _against(speed, name, "Ball Velocity", centre["time"], _speed(centre), OURS, "speed, ours")
+    _against(speed, name, "Ball Velocity", centre["time"], speed_of(centre), OURS, "speed, ours")
     normal, tangential = centre["impulses"][:, 0].T
     _against(impulses, name, "reaction", centre["time"], normal, OURS, "reaction, ours")
     _against(impulses, name, "friction", centre["time"], tangential, FRICTION, "friction, ours")
@@ -200,13 +153,13 @@ def _sine_path(figure: Figure, centre: Trajectory, rim: Trajectory) -> None:
 def _sine_curves(figure: Figure, centre: Trajectory) -> None:
     speed, impulses = figure.subplots(1, 2)
     name = "fig_3_5_ball_sine_velocity_forces"
-    _against(speed, name, "Velocity", centre["time"], _speed(centre), OURS, "speed, ours", STEP)
+    _against(speed, name, "Velocity", centre["time"], speed_of(centre), OURS, "speed, ours", STEP)
     normal, tangential = centre["impulses"][:, 0].T
     _against(impulses, name, "Reaction", centre["time"], normal, OURS, "reaction, ours", STEP)
     _against(impulses, name, "Friction", centre["time"], tangential, FRICTION, "friction, ours", STEP)
     speed.set(title="speed of the centre", xlabel="time (s)", ylabel="speed (m/s)")
     impulses.set(
-        title="impulses of a step of 0.5 ms (the report's frame was up to 1.4 too short)",
+        title="impulses of a step of 0.5 ms\nthe report's frame was up to 1.4 times too short",
         xlabel="time (s)",
         ylabel="impulse (N s)",
     )
@@ -230,46 +183,3 @@ def _against(
     is_first = not axes.lines
     axes.plot(scale * t, value, color=PUBLISHED, linewidth=3.0, alpha=0.7, label="the report's" if is_first else "")
     axes.plot(time, ours, color=colour, label=label)
-
-
-def _run(figure: Figure, sim: PlanarSimulation, trajectory: Trajectory) -> None:
-    from matplotlib.patches import Circle  # noqa: PLC0415 - only who draws needs it
-
-    grid = figure.add_gridspec(2, 3)
-    way = figure.add_subplot(grid[0, :])
-    speed, gaps, energy = (figure.add_subplot(grid[1, k]) for k in range(3))
-    centres, time = trajectory["centres"], trajectory["time"]
-    machine = sim.parameters
-    radii = np.atleast_1d(machine["radius"] if "radius" in machine else machine["wheel_radius"])
-    low, high = centres[:, :, 0].min() - 2.0 * radii.max(), centres[:, :, 0].max() + 2.0 * radii.max()
-    x = np.linspace(low, high, 2000)
-    if isinstance(sim.ground, Polyline):
-        x = np.sort(np.concatenate((x, sim.ground.x - 1e-9, sim.ground.x)))
-    way.plot(x, sim.ground.height(x), color=GROUND)
-    colours = (OURS, FRICTION)
-    names = ("ball",) if len(radii) == 1 else ("wheel A (back)", "wheel B (front)")
-    for i, (name, colour) in enumerate(zip(names, colours, strict=False)):
-        way.plot(*centres[:, i].T, color=colour, linewidth=0.8, label=f"centre of {name}")
-        gaps.plot(time, 1e3 * trajectory["gaps"][:, i], color=colour, label=name)
-    for row in np.linspace(0, len(time) - 1, 6).astype(int):
-        for i, radius in enumerate(radii):
-            way.add_patch(Circle(centres[row, i], radius, fill=False, color=colours[i], alpha=0.6))
-        if len(radii) > 1:
-            way.plot(*centres[row].T, color="0.3", linewidth=2.0)
-    way.set(xlabel="x (m)", ylabel="y (m)", title=f"{trajectory.attributes['title']}, {time[-1]:g} s")
-    way.set_aspect("equal", adjustable="datalim")
-    way.legend(loc="upper right")
-    speed.plot(time, _speed(trajectory), color=OURS)
-    speed.set(xlabel="time (s)", ylabel="speed (m/s)")
-    gaps.set(xlabel="time (s)", ylabel="gap (mm)")
-    gaps.legend()
-    kinetic, potential = trajectory["kinetic_energy"], trajectory["potential_energy"]
-    potential = potential - potential.min()
-    for values, label, colour in (
-        (kinetic, "kinetic", OURS),
-        (potential, "potential, from its lowest", FRICTION),
-        (kinetic + potential, "sum", "0.2"),
-    ):
-        energy.plot(time, values, color=colour, label=label)
-    energy.set(xlabel="time (s)", ylabel="energy (J)")
-    energy.legend()

@@ -1,0 +1,50 @@
+"""The vector environment of a configuration."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
+
+from rover_gym.command import CommandController
+from rover_gym.features import Features
+from rover_gym.learning.config import TrainingConfig, environment_arguments
+from rover_gym.learning.vec_env import CommandVecEnv
+from rover_gym.sb3 import RoverVecEnv
+
+
+def build_env(
+    config: TrainingConfig,
+    *,
+    num_envs: int | None = None,
+    environment: Mapping[str, Any] | None = None,
+    seed: int = 0,
+    monitor: Path | None = None,
+) -> VecEnv:
+    """Rovers that are driven by commands and show features, not yet normalised.
+
+    Args:
+        config: The configuration.
+        num_envs: How many, where it is not the configuration's number.
+        environment: Arguments that differ from the configuration's.
+        seed: Of the environments' fields.
+        monitor: File of the raw curve: reward, length (control periods) and success of every episode.
+    """
+    arguments = {**config.environment, **(environment or {})}
+    rovers = RoverVecEnv(
+        num_envs or config.num_envs,
+        threads=config.threads,
+        max_episode_steps=config.max_episode_steps,
+        **environment_arguments(arguments),
+    )
+    rovers.seed(seed)
+    one = rovers.prototype
+    venv = VecMonitor(rovers, None if monitor is None else str(monitor), info_keywords=("is_success", "termination"))
+    return CommandVecEnv(
+        venv, Features(one, config.pool), CommandController(one, config.command, guided=config.guided), config.repeat
+    )
+
+
+def normalised(venv: VecEnv, config: TrainingConfig, *, training: bool = True) -> VecNormalize:
+    """With running normalisation of features and, in training, of returns."""
+    return VecNormalize(venv, training=training, norm_reward=training, clip_obs=5.0, gamma=config.ppo.gamma)

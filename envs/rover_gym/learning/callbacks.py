@@ -1,0 +1,103 @@
+"""What happens while a policy learns: curriculum and checkpoints."""
+
+import json
+from collections import deque
+from pathlib import Path
+
+import numpy as np
+from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
+from stable_baselines3.common.vec_env import VecNormalize
+
+from rover_gym.learning.config import Curriculum
+
+
+class CurriculumCallback(BaseCallback):
+    """Raises the difficulty of the fields to come when enough episodes succeed.
+
+    Args:
+        curriculum: When, and by how much.
+        hardest: Hardest difficulty to begin with, where it is not the curriculum's start.
+    """
+
+    def __init__(self, curriculum: Curriculum, hardest: float | None = None) -> None:
+        super().__init__()
+        self.curriculum = curriculum
+        self.hardest = curriculum.start if hardest is None else hardest
+        self._recent: deque[bool] = deque()
+
+    def _on_training_start(self) -> None:
+        self._apply()
+
+    def _on_step(self) -> bool:
+        self._recent.extend(bool(info["is_success"]) for info in self.locals["infos"] if "episode" in info)
+        return True
+
+    def _on_rollout_end(self) -> None:
+        enough = len(self._recent) >= self.curriculum.episodes
+        if enough and np.mean(self._recent) >= self.curriculum.success and self.hardest < self.curriculum.end:
+            self.hardest = min(self.curriculum.end, self.hardest + self.curriculum.step)
+            self._apply()
+        if enough:
+            self._recent.clear()
+        self.logger.record("curriculum/hardest", self.hardest)
+
+    def _apply(self) -> None:
+        easiest = max(0.0, self.hardest - self.curriculum.width)
+        self.training_env.env_method("set_difficulty", (easiest, self.hardest))
+
+
+class SameFieldsEvalCallback(EvalCallback):
+    """Evaluates on the same fields every time, so that the curve shows the policy and not the fields.
+
+    Args:
+        seed: Of the fields.
+        arguments: Of stable-baselines3's `EvalCallback`.
+    """
+
+    def __init__(self, *args: object, seed: int, **arguments: object) -> None:
+        super().__init__(*args, **arguments)  # type: ignore[arg-type]
+        self._seed = seed
+
+    def _on_step(self) -> bool:
+        if self.n_calls % self.eval_freq == 0:
+            self.eval_env.seed(self._seed)
+        return super()._on_step()
+
+
+class CheckpointCallback(BaseCallback):
+    """Writes everything that a training needs to go on.
+
+    Args:
+        every: Steps of all environments between two checkpoints.
+        folder: Where `latest` and one file a checkpoint go.
+        curriculum: Its state is part of a checkpoint.
+    """
+
+    def __init__(self, every: int, folder: Path, curriculum: CurriculumCallback | None = None) -> None:
+        super().__init__()
+        self._every = every
+        self._folder = folder
+        self._curriculum = curriculum
+        self._next = every
+
+    def _on_training_start(self) -> None:
+        self._next = self.num_timesteps + self._every
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        if self.num_timesteps >= self._next:
+            self._next += self._every
+            self.write()
+
+    def write(self) -> None:
+        """Writes a checkpoint now; `latest.json`, written last, names it."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        name = f"{self.num_timesteps:09d}"
+        self.model.save(self._folder / f"{name}.zip")
+        normalisation = self.model.get_vec_normalize_env()
+        if isinstance(normalisation, VecNormalize):
+            normalisation.save(str(self._folder / f"{name}.pkl"))
+        state = {"name": name, "hardest": None if self._curriculum is None else self._curriculum.hardest}
+        (self._folder / "latest.json").write_text(json.dumps(state) + "\n", encoding="utf-8")

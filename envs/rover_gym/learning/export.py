@@ -1,0 +1,52 @@
+"""From a model of stable-baselines3 to a policy that NumPy runs."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.vec_env import VecNormalize
+
+from rover_gym.learning.config import TrainingConfig, rover
+from rover_gym.trained import Network, PolicyCard
+
+
+def network_of(model: OnPolicyAlgorithm, normalisation: VecNormalize) -> Network:
+    """The actor of a model, and the normalisation of what it sees."""
+    policy = model.policy
+    if not isinstance(policy, ActorCriticPolicy):
+        raise TypeError(f"an actor-critic policy is needed, not {policy!r}")
+    layers = [layer for layer in policy.mlp_extractor.policy_net if isinstance(layer, torch.nn.Linear)]
+    layers.append(policy.action_net)  # type: ignore[arg-type]
+    statistics: Any = normalisation.obs_rms  # of one array, not of a dictionary
+    return Network(
+        mean=statistics.mean.astype(np.float32),
+        deviation=np.sqrt(statistics.var + normalisation.epsilon).astype(np.float32),
+        weights=tuple(layer.weight.detach().numpy().copy() for layer in layers),
+        biases=tuple(layer.bias.detach().numpy().copy() for layer in layers),
+    )
+
+
+def export(
+    model: OnPolicyAlgorithm,
+    normalisation: VecNormalize,
+    config: TrainingConfig,
+    folder: Path,
+    source: Mapping[str, Any],
+) -> None:
+    """Writes the policy that `rover_gym.trained` reads."""
+    folder.mkdir(parents=True, exist_ok=True)
+    network_of(model, normalisation).save(folder / "policy.npz")
+    seen = {name: value for name, value in config.environment.items() if name == "height_scan"}
+    card = PolicyCard(
+        environment=seen,
+        pool=config.pool,
+        hold=config.repeat * rover(config.environment).dt,
+        command=config.command,
+        guided=config.guided,
+        source=source,
+    )
+    card.save(folder / "policy.json")

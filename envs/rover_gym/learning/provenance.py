@@ -1,0 +1,39 @@
+"""What a run leaves beside its model: versions, revision, times."""
+
+import platform
+import subprocess
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+PACKAGES = ("rover-gym", "numpy", "gymnasium", "stable-baselines3", "torch", "ray")
+
+
+def provenance() -> dict[str, Any]:
+    """Versions of what a training depends on, the revision of the sources, and the command."""
+    return {
+        "command": [Path(sys.argv[0]).name, *sys.argv[1:]],
+        "python": platform.python_version(),
+        "machine": platform.machine(),
+        "versions": {name: found for name in PACKAGES if (found := _version(name)) is not None},
+        "revision": revision(),
+    }
+
+
+def revision() -> str | None:
+    """The git revision of the sources, with "-dirty" where they differ from it; None outside a repository."""
+    git = ["git", "-C", str(Path(__file__).parent)]
+    try:
+        head = subprocess.run([*git, "rev-parse", "HEAD"], check=True, capture_output=True, text=True)  # noqa: S603
+        changed = subprocess.run([*git, "status", "--porcelain"], check=True, capture_output=True, text=True)  # noqa: S603
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return head.stdout.strip() + ("-dirty" if changed.stdout.strip() else "")
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None

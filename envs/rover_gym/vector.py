@@ -1,0 +1,145 @@
+"""`RoverVectorEnv`: many rovers as one vector environment of Gymnasium, what `gymnasium.make_vec` makes."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from rover_gym._core import OptionError
+from rover_gym.batch import RoverBatch, spread_seeds
+from rover_gym.progress import Array, Mask, Observations
+from rover_gym.registration import MAX_EPISODE_STEPS
+from rover_gym.validation import refuse
+
+_Info = dict[str, Any]
+
+
+class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
+    """Rovers that are stepped by the compiled core, many at a time, on several threads.
+
+    Each goes bit for bit as a `RoverEnv` of the same arguments and seed would, inside a `TimeLimit` and a
+    `SyncVectorEnv`, which gives the same arrays and infos, only slower.
+
+    Args:
+        num_envs: How many rovers.
+        threads: That step them; None for one a core.
+        max_episode_steps: Steps until truncation; None for never.
+        autoreset_mode: `"NextStep"`, `"SameStep"` or `"Disabled"`, as Gymnasium defines them.
+        **arguments: Those of `RoverEnv`.
+    """
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        threads: int | None = None,
+        max_episode_steps: int | None = MAX_EPISODE_STEPS,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        **arguments: Any,
+    ) -> None:
+        super().__init__()
+        try:
+            self.autoreset_mode = AutoresetMode(autoreset_mode)
+        except ValueError:
+            names = ", ".join(mode.value for mode in AutoresetMode)
+            refuse(OptionError, "autoreset_mode", autoreset_mode, f"must be one of {names}")
+        self.batch = RoverBatch(num_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments)
+        self.prototype = self.batch.prototype
+        self.num_envs = self.batch.n
+        self.metadata = {**self.prototype.metadata, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = None
+        self.single_observation_space = self.prototype.observation_space
+        self.single_action_space = self.prototype.action_space
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._ended: Mask = np.zeros(self.num_envs, np.bool_)
+
+    @property  # type: ignore[override] # as SyncVectorEnv's
+    def np_random(self) -> tuple[np.random.Generator, ...]:
+        """The rovers' random generators."""
+        return self.get_attr("np_random")
+
+    @np_random.setter
+    def np_random(self, value: object) -> None:  # noqa: ARG002 - a setter must take it
+        raise AttributeError("the rovers have random generators of their own: reset(seed=...) makes them anew")
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The seeds that they were made from."""
+        return self.get_attr("np_random_seed")
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: _Info | None = None
+    ) -> tuple[Observations, _Info]:
+        """Starts episodes.
+
+        Args:
+            seed: Of the first rover, then one more from rover to rover; or one a rover.
+            options: Those of `RoverEnv.reset`, for every rover, and `reset_mask`, `(num_envs,)` bool: the rovers to
+                reset, where it is not all; the others go on.
+
+        Raises:
+            OptionError: An option is unknown or out of its range; nothing has changed.
+        """
+        seeds = spread_seeds(seed, self.num_envs)
+        given = dict(options or {})
+        chosen = self._check_mask(given.pop("reset_mask")) if "reset_mask" in given else range(self.num_envs)
+        fixed = self.batch.check_options(given)
+        infos: _Info = {}
+        for i in chosen:
+            infos = self._add_info(infos, self.batch.reset(i, seeds[i], fixed), i)
+            self._ended[i] = False
+        return self.batch.observation, infos
+
+    def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observations, Array, Mask, Mask, _Info]:
+        """Applies actions `(num_envs, 12)` for one control period.
+
+        Raises:
+            CommandError: The actions have a wrong shape or an entry that is not finite or outside [-1, 1]; nothing
+                has changed.
+            ResetNeeded: A rover has not been reset, or, where autoreset is disabled, its episode has ended.
+        """
+        if not self._ended.any():
+            outcome, terminated, timed_out = self.batch.step(actions)
+            starting: list[int] = []
+        elif self.autoreset_mode == AutoresetMode.DISABLED:
+            raise ResetNeeded(f"rovers {np.flatnonzero(self._ended).tolist()}: call reset() with reset_mask first")
+        else:
+            # These do not move: their episode starts in this step.
+            starting = np.flatnonzero(self._ended).tolist()
+            outcome, terminated, timed_out = self.batch.step(actions, ~self._ended)
+        observation, reward, infos = outcome.observation, outcome.reward, outcome.vector_info()
+        truncated = timed_out
+        for i in starting:
+            reward[i], terminated[i], truncated[i] = 0.0, False, False
+        ended = terminated | truncated
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and ended.any():
+            starting = np.flatnonzero(ended).tolist()
+            last = [outcome.info(i) for i in starting]
+            for i, info in zip(starting, last, strict=True):
+                self._add_info(infos, {"final_obs": observation[i].copy(), "final_info": info}, i)
+            ended = np.zeros(self.num_envs, np.bool_)
+        for i in starting:
+            self._add_info(infos, self.batch.reset(i), i)
+        if starting:
+            observation[starting] = self.batch.observation[starting]
+        self._ended = ended
+        return observation, reward, terminated, truncated, infos
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Calls a method of every rover, such as `set_difficulty`, or gets an attribute."""
+        found = [getattr(rover, name) for rover in self.batch.rovers]
+        return tuple(each(*args, **kwargs) if callable(each) else each for each in found)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute of every rover, by the names that `RoverEnv` has."""
+        return tuple(getattr(rover, name) for rover in self.batch.rovers)
+
+    def _check_mask(self, mask: object) -> list[int]:
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
+            refuse(OptionError, "options.reset_mask", mask, f"must be an array of {self.num_envs} bool")
+        return [int(i) for i in np.flatnonzero(mask)]

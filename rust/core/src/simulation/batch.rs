@@ -1,0 +1,237 @@
+//! Many rovers stepped side by side.
+//!
+//! Models and terrains are shared, everything else is each rover's own, so rovers never wait for each other and their
+//! motion does not depend on how many there are nor on how many threads move them.
+
+use rayon::iter::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
+use rayon::slice::ParallelSliceMut;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use super::error::BatchError;
+use super::reading::{Look, ReadingLayout};
+use super::rover::Simulation;
+use crate::integrator::StepError;
+
+/// One rover with the places for its error and its reading.
+type Place<'a> = (
+    (
+        (&'a mut Simulation, &'a mut Option<StepError>),
+        &'a [f64; 2],
+    ),
+    &'a mut [f64],
+);
+
+/// Rovers with the threads that step them.
+pub struct Batch {
+    rovers: Vec<Simulation>,
+    targets: Vec<[f64; 2]>,
+    scan: Vec<[f64; 2]>,
+    layout: ReadingLayout,
+    errors: Vec<Option<StepError>>,
+    /// None: the caller's thread does it all.
+    pool: Option<ThreadPool>,
+    threads: usize,
+}
+
+impl Batch {
+    /// From rovers of models of one size.
+    ///
+    /// `scan`: points of the height scan, see [`Simulation::read`]. `threads`: None for one a core.
+    ///
+    /// # Errors
+    /// `Empty`, `Differs`, `Threads`.
+    pub fn new(
+        rovers: Vec<Simulation>,
+        scan: Vec<[f64; 2]>,
+        threads: Option<usize>,
+    ) -> Result<Self, BatchError> {
+        let Some(first) = rovers.first() else {
+            return Err(BatchError::Empty);
+        };
+        let layout = ReadingLayout::new(first.model(), scan.len());
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        // More threads than rovers would have nothing to do.
+        let threads = threads.unwrap_or_else(cores).clamp(1, rovers.len());
+        let start = |count| {
+            let built = ThreadPoolBuilder::new().num_threads(count).build();
+            built.map_err(|error| BatchError::Threads {
+                count,
+                reason: error.to_string(),
+            })
+        };
+        let batch = Self {
+            errors: vec![None; rovers.len()],
+            targets: vec![[0.0; 2]; rovers.len()],
+            pool: (threads > 1).then(|| start(threads)).transpose()?,
+            rovers,
+            scan,
+            layout,
+            threads,
+        };
+        for (index, rover) in batch.rovers.iter().enumerate() {
+            batch.check(index, rover)?;
+        }
+        Ok(batch)
+    }
+
+    fn check(&self, index: usize, rover: &Simulation) -> Result<(), BatchError> {
+        let own = ReadingLayout::new(rover.model(), self.scan.len());
+        if own == self.layout {
+            return Ok(());
+        }
+        Err(BatchError::Differs {
+            index,
+            expected: self.rovers[0].model().nv(),
+            actual: rover.model().nv(),
+        })
+    }
+
+    /// The rovers.
+    #[must_use]
+    pub fn rovers(&self) -> &[Simulation] {
+        &self.rovers
+    }
+
+    /// Threads that step them.
+    #[must_use]
+    pub fn threads(&self) -> usize {
+        self.threads
+    }
+
+    /// What the rows of readings hold.
+    #[must_use]
+    pub fn layout(&self) -> &ReadingLayout {
+        &self.layout
+    }
+
+    /// Puts another rover, with its own terrain, in a place; `target` (x, z, m) is what its readings look at.
+    ///
+    /// # Errors
+    /// `NoSuchRover`, `Differs`; nothing is changed then.
+    pub fn replace(
+        &mut self,
+        index: usize,
+        rover: Simulation,
+        target: [f64; 2],
+    ) -> Result<(), BatchError> {
+        let len = self.rovers.len();
+        if index >= len {
+            return Err(BatchError::NoSuchRover { index, len });
+        }
+        self.check(index, &rover)?;
+        self.rovers[index] = rover;
+        self.targets[index] = target;
+        Ok(())
+    }
+
+    /// Gives every rover its commands, takes `n` steps and writes the readings (n_rovers × layout's size, row-major).
+    ///
+    /// `torques` and `set_points`: n_rovers × n_wheels, row-major, as [`Simulation::set_wheel_torques`] and
+    /// [`Simulation::set_steering`] take them. `active`: rovers that are to move; the others keep still, commands too.
+    /// A step that a rover cannot take is that rover's own: see [`Self::errors`].
+    ///
+    /// # Errors
+    /// `Command`: the first command that a rover refuses; no rover has moved then.
+    ///
+    /// # Panics
+    /// If a slice has a wrong length.
+    pub fn step(
+        &mut self,
+        torques: &[f64],
+        set_points: &[f64],
+        n: usize,
+        active: Option<&[bool]>,
+        rows: &mut [f64],
+    ) -> Result<(), BatchError> {
+        let n_rovers = self.rovers.len();
+        let n_wheels = self.rovers[0].model().wheels().len();
+        let width = self.layout.size();
+        assert_eq!(torques.len(), n_rovers * n_wheels, "one torque a wheel");
+        assert_eq!(
+            set_points.len(),
+            n_rovers * n_wheels,
+            "one set-point a wheel"
+        );
+        assert_eq!(rows.len(), n_rovers * width, "one row a rover");
+        let is_active = |index: usize| active.is_none_or(|active| active[index]);
+
+        // All commands are looked at before any is given.
+        let own = |index: usize| index * n_wheels..(index + 1) * n_wheels;
+        let refused = |index| move |error| BatchError::Command { index, error };
+        for (index, rover) in self.rovers.iter().enumerate() {
+            if is_active(index) {
+                rover
+                    .check_commands(&torques[own(index)], &set_points[own(index)])
+                    .map_err(refused(index))?;
+            }
+        }
+        for (index, rover) in self.rovers.iter_mut().enumerate() {
+            if is_active(index) {
+                rover
+                    .set_wheel_torques(&torques[own(index)])
+                    .map_err(refused(index))?;
+                rover
+                    .set_steering(&set_points[own(index)])
+                    .map_err(refused(index))?;
+            }
+        }
+
+        let scan = &self.scan;
+        let move_one = |(index, (((rover, error), target), row)): (usize, Place<'_>)| {
+            *error = if is_active(index) {
+                rover.step(n).err()
+            } else {
+                None
+            };
+            let look = Look {
+                target: *target,
+                scan,
+            };
+            rover.read(&look, row);
+        };
+        let (rovers, errors, targets) = (&mut self.rovers, &mut self.errors, &self.targets);
+        match &self.pool {
+            None => rovers
+                .iter_mut()
+                .zip(errors)
+                .zip(targets)
+                .zip(rows.chunks_exact_mut(width))
+                .enumerate()
+                .for_each(move_one),
+            Some(pool) => pool.install(|| {
+                rovers
+                    .par_iter_mut()
+                    .zip(errors)
+                    .zip(targets)
+                    .zip(rows.par_chunks_exact_mut(width))
+                    .enumerate()
+                    .with_max_len(1) // rovers differ in cost, and a task costs little beside one
+                    .for_each(move_one);
+            }),
+        }
+        Ok(())
+    }
+
+    /// Writes the readings as they are now, without a step.
+    ///
+    /// # Panics
+    /// If `rows` has a wrong length.
+    pub fn read(&self, rows: &mut [f64]) {
+        let width = self.layout.size();
+        assert_eq!(rows.len(), self.rovers.len() * width, "one row a rover");
+        let rovers = self.rovers.iter().zip(&self.targets);
+        for ((rover, target), row) in rovers.zip(rows.chunks_exact_mut(width)) {
+            let look = Look {
+                target: *target,
+                scan: &self.scan,
+            };
+            rover.read(&look, row);
+        }
+    }
+
+    /// Why a rover's last step could not be taken, rover by rover.
+    #[must_use]
+    pub fn errors(&self) -> &[Option<StepError>] {
+        &self.errors
+    }
+}

@@ -1,0 +1,208 @@
+//! A reading: all that a controller looks at, as one row of numbers.
+
+use std::ops::Range;
+
+use nalgebra::Vector3;
+
+use super::rover::Simulation;
+use crate::contact::Part;
+use crate::integrator::StepStatus;
+use crate::multibody::{Model, coordinates};
+
+/// Below this speed of rim and ground alike a slip ratio says nothing, m/s.
+pub const SLIP_SPEED: f64 = 0.05;
+
+/// A wheel touches when its gap is at most this, m. Resting wheels show gaps below a micrometre.
+pub const CONTACT_GAP: f64 = 1e-3;
+
+/// What a reading is asked for.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Look<'a> {
+    /// A place on the map, x and z, m.
+    pub target: [f64; 2],
+    /// Points ahead and to the right of the trunk's origin in the heading frame, m, whose heights are wanted.
+    pub scan: &'a [[f64; 2]],
+}
+
+/// Names and places of the numbers in a reading, in order. SI units.
+///
+/// | name | size | meaning |
+/// |---|---|---|
+/// | `pose` | nq | public q with the wheels' angles wrapped to one turn |
+/// | `body_velocity` | 6 | trunk, linear then angular, in the trunk's frame |
+/// | `joint_rates` | nv − 6 | |
+/// | `wheel_gaps` | n | distance to the ground, one a wheel |
+/// | `wheel_contacts` | n | 1 where the gap is at most [`CONTACT_GAP`], else 0 |
+/// | `normal_forces` | n | mean of the last step, N |
+/// | `tangential_forces` | 2 n | rolling, lateral, wheel by wheel, N |
+/// | `ground_normal` | 3 | in the trunk's frame; zero where there is no ground plane |
+/// | `target` | 3 | a place on the map: ahead and to the right of the trunk's origin, and how far; horizontal |
+/// | `cos_tilt` | 1 | between the trunk's y axis and up, against gravity |
+/// | `speed` | 1 | of the trunk's origin, horizontal |
+/// | `trunk_force` | 1 | mean normal force of the last step on all that is no wheel, N |
+/// | `slip_ratio` | 1 | mean over the wheels' contacts of the last step of rim slip over the faster of rim and ground |
+/// | `work` | 1 | through the wheel motors in the last call of `step`, driving or braking, J |
+/// | `positive_work` | 1 | its driving part, J |
+/// | `time` | 1 | s |
+/// | `solver` | 4 | of the last call of `step`: 1 where it did not converge, iterations, residual, most contacts |
+/// | `heights` | scan | of the visible ground over the trunk's origin; not a number where there is none |
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReadingLayout {
+    fields: Vec<(&'static str, Range<usize>)>,
+    size: usize,
+}
+
+impl ReadingLayout {
+    /// Of a model, with a height scan of so many points.
+    #[must_use]
+    pub fn new(model: &Model, n_scan: usize) -> Self {
+        let n = model.wheels().len();
+        let sizes = [
+            ("pose", model.nv()),
+            ("body_velocity", 6),
+            ("joint_rates", model.n_joints()),
+            ("wheel_gaps", n),
+            ("wheel_contacts", n),
+            ("normal_forces", n),
+            ("tangential_forces", 2 * n),
+            ("ground_normal", 3),
+            ("target", 3),
+            ("cos_tilt", 1),
+            ("speed", 1),
+            ("trunk_force", 1),
+            ("slip_ratio", 1),
+            ("work", 1),
+            ("positive_work", 1),
+            ("time", 1),
+            ("solver", 4),
+            ("heights", n_scan),
+        ];
+        let mut size = 0;
+        let mut place = |(name, width)| {
+            size += width;
+            (name, size - width..size)
+        };
+        let fields = sizes.into_iter().map(&mut place).collect();
+        Self { fields, size }
+    }
+
+    /// Names with their places.
+    #[must_use]
+    pub fn fields(&self) -> &[(&'static str, Range<usize>)] {
+        &self.fields
+    }
+
+    /// Numbers of a reading.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.size
+    }
+}
+
+/// Fills a slice from its front.
+struct Row<'a> {
+    out: &'a mut [f64],
+    filled: usize,
+}
+
+impl Row<'_> {
+    fn put(&mut self, values: impl IntoIterator<Item = f64>) {
+        for value in values {
+            self.out[self.filled] = value;
+            self.filled += 1;
+        }
+    }
+}
+
+impl Simulation {
+    /// Writes a reading in the order of [`ReadingLayout`].
+    ///
+    /// # Panics
+    /// If `out` has not the size of the layout of this model and scan.
+    pub fn read(&self, look: &Look<'_>, out: &mut [f64]) {
+        let model = self.model();
+        let mut row = Row { out, filled: 0 };
+        let state = self.state();
+        let R_WB = state.configuration.attitude.to_rotation_matrix();
+
+        let mut pose = coordinates::to_public(&state.configuration);
+        for k in model.wheels().iter().filter_map(|wheel| wheel.joint) {
+            let turn = std::f64::consts::TAU;
+            pose[k] -= turn * (pose[k] / turn).round_ties_even();
+        }
+        let (x, y, z, heading) = (pose[0], pose[1], pose[2], pose[4]);
+        row.put(pose);
+
+        let v = &state.v;
+        let linear = R_WB.inverse() * Vector3::new(v[0], v[1], v[2]);
+        let angular = R_WB.inverse() * Vector3::new(v[3], v[4], v[5]);
+        row.put(linear.iter().copied());
+        row.put(angular.iter().copied());
+        row.put(v[6..].iter().copied());
+
+        let wheels = self.wheel_contacts();
+        row.put(wheels.iter().map(|wheel| wheel.gap));
+        let touches = |gap: f64| f64::from(u8::from(gap <= CONTACT_GAP));
+        row.put(wheels.iter().map(|wheel| touches(wheel.gap)));
+        let forces = self.wheel_forces();
+        row.put(forces.iter().map(|force| force[0]));
+        row.put(forces.iter().flat_map(|force| [force[1], force[2]]));
+        let normal = self.terrain().ground().map(|plane| *plane.normal());
+        let normal = R_WB.inverse() * normal.unwrap_or_default();
+        row.put(normal.iter().copied());
+
+        let (sine, cosine) = heading.sin_cos();
+        let (dx, dz) = (look.target[0] - x, look.target[1] - z);
+        row.put([
+            dx * cosine - dz * sine,
+            dx * sine + dz * cosine,
+            dx.hypot(dz),
+        ]);
+        let gravity = &self.options().gravity;
+        let up = gravity.try_normalize(0.0).map_or(Vector3::y(), |g| -g);
+        row.put([
+            up.dot(&R_WB.matrix().column(1)),
+            v[0].hypot(v[2]),
+            self.body_force(),
+            self.slip_ratio(),
+        ]);
+
+        let last = self.last_call();
+        let report = &last.report;
+        row.put([
+            last.work,
+            last.positive_work,
+            state.time,
+            f64::from(u8::from(report.status == StepStatus::NotConverged)),
+            report.iterations as f64,
+            report.residual,
+            report.n_contacts as f64,
+        ]);
+
+        for [ahead, right] in look.scan {
+            let at_x = x + (ahead * cosine + right * sine);
+            let at_z = z + (right * cosine - ahead * sine);
+            let height = self.terrain().height(at_x, at_z);
+            row.put([height.map_or(f64::NAN, |height| height - y)]);
+        }
+        assert_eq!(row.filled, row.out.len(), "a row as long as its layout");
+    }
+
+    /// Mean over the wheels' contacts of the last step of |u_T| / max(|rim speed|, |ground speed|); 0 without contacts.
+    #[must_use]
+    pub fn slip_ratio(&self) -> f64 {
+        let (mut total, mut n) = (0.0, 0_u32);
+        for active in self.contacts() {
+            if let Part::Wheel(i) = active.contact.part {
+                let wheel = &self.model().wheels()[i];
+                let rate = wheel.joint.map_or(0.0, |k| self.state().v[k]);
+                let rim = wheel.radius * wheel.drive_sign * rate;
+                let [_, u_t, u_b] = active.velocity;
+                let ground = (rim + u_t).hypot(u_b);
+                total += u_t.hypot(u_b) / rim.abs().max(ground).max(SLIP_SPEED);
+                n += 1;
+            }
+        }
+        if n == 0 { 0.0 } else { total / f64::from(n) }
+    }
+}

@@ -1,0 +1,49 @@
+//! Readings: what a controller looks at, as one row of numbers with named places.
+
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PySlice};
+use rover_core::simulation::ReadingLayout;
+
+use crate::arrays::array;
+use crate::errors::{BorderError, Kind, Value};
+
+/// Names with their slices.
+pub fn slices<'py>(py: Python<'py>, layout: &ReadingLayout) -> PyResult<Bound<'py, PyDict>> {
+    let names = PyDict::new(py);
+    for (name, place) in layout.fields() {
+        let (start, stop) = (place.start.cast_signed(), place.end.cast_signed());
+        names.set_item(name, PySlice::new(py, start, stop, 1))?;
+    }
+    Ok(names)
+}
+
+/// Points (n, 2) of a height scan; none where nothing is given.
+pub fn scan_points(given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<[f64; 2]>> {
+    let Some(given) = given else {
+        return Ok(Vec::new());
+    };
+    let points = array(given, Kind::Option, "scan")?;
+    let view = points.as_array();
+    let is_finite = view.iter().all(|x| x.is_finite());
+    if view.ndim() != 2 || view.shape()[1] != 2 || !is_finite {
+        let shape = view.shape();
+        let message = format!("scan: needs finite numbers of shape (n, 2), has {shape:?}");
+        return Err(BorderError::option("scan", message, Value::Count(view.ndim())).into());
+    }
+    let flat: Vec<f64> = view.iter().copied().collect();
+    Ok(flat.chunks_exact(2).map(|p| [p[0], p[1]]).collect())
+}
+
+/// A finite place on the map; the origin where nothing is given.
+pub fn place(target: Option<[f64; 2]>) -> PyResult<[f64; 2]> {
+    let target = target.unwrap_or_default();
+    match target.iter().position(|x| !x.is_finite()) {
+        None => Ok(target),
+        Some(index) => {
+            let value = target[index];
+            let field = format!("target[{index}]");
+            let message = format!("{field}: must be finite, is {value}");
+            Err(BorderError::option(&field, message, Value::Number(value)).into())
+        }
+    }
+}

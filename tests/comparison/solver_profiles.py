@@ -1,0 +1,363 @@
+"""Dolan–Moré performance profiles of the contact solvers: ours, and Siconos' where an interpreter has it.
+
+    python tests/comparison/solver_profiles.py [--problems FOLDER] [--siconos PYTHON] [--output FOLDER]
+
+Each solver starts every problem from zero. Its answer is judged here and not by itself: the natural map of the
+returned impulses, relative to the data, must be 1e-8 or less, and the velocity right to 1e-6 m/s at every contact.
+Where it is not, the solver's own tolerance is tightened a hundredfold, twice; the time that counts is that of the
+run that sufficed. The profile at tau is the share of problems that a solver answers within tau times the best solver's
+time (or iterations). Source: Dolan and Moré 2002.
+
+The recorded problems are no part of this repository (Siconos' public collection and synthetic ones as .npz with W, q,
+mu and dimension); without their folder the synthetic families alone are used.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import select
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+
+import rover_gym
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+
+Array = npt.NDArray[np.float64]
+ROOT = Path(__file__).parents[2]
+RESIDUAL = 1e-8  # relative natural map of an answer that counts
+VELOCITY = 1e-6  # m/s, largest violation at a contact
+OURS = ("auto", "nsgs", "newton", "proximal", "admm")
+PEERS = ("NSGS", "NSN_AC", "ADMM", "PROX")
+CAP = 5.0  # s of CPU time per run of the peer
+STUCK = 600.0  # s of wall time after which the peer is given up
+HOPELESS = 0.3  # s of a failed run after which no tighter tolerance is tried
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One friction-contact problem: W (n, n) 1/kg, q (n,) m/s, mu (n_c,)."""
+
+    name: str
+    W: Array
+    q: Array
+    mu: Array
+    dimension: int
+
+
+def residual(problem: Problem, impulses: Array) -> tuple[float, float]:
+    """Relative natural map and largest violation in m/s of impulses (n,), written out anew here."""
+    d = problem.dimension
+    p = impulses.reshape(-1, d)
+    if not np.isfinite(p).all():
+        return np.inf, np.inf
+    u = (problem.W @ impulses + problem.q).reshape(-1, d)
+    rho = d / np.diag(problem.W).reshape(-1, d).sum(1)
+    shifted = u.copy()
+    shifted[:, 0] += problem.mu * np.linalg.norm(u[:, 1:], axis=1)
+    z = p - rho[:, None] * shifted
+    normal, tangential = z[:, 0], np.linalg.norm(z[:, 1:], axis=1)
+    on_cone = np.maximum((normal + problem.mu * tangential) / (1 + problem.mu**2), 0.0)
+    scale = np.divide(problem.mu * on_cone, tangential, out=np.zeros_like(tangential), where=tangential > 0)
+    outside = np.column_stack([on_cone, scale[:, None] * z[:, 1:]])
+    inside = (tangential <= problem.mu * normal)[:, None]
+    polar = (normal <= -problem.mu * tangential)[:, None]
+    projected = np.where(polar, 0.0, np.where(inside, z, outside))
+    violation = np.linalg.norm(p - projected, axis=1)
+    data = float(np.linalg.norm(rho.repeat(d) * problem.q)) or 1.0
+    return float(np.linalg.norm(violation) / data), float((violation / rho).max(initial=0.0))
+
+
+def recorded(folder: Path | None) -> list[Problem]:
+    """The recorded problems of a folder, smallest first."""
+    found = []
+    for path in sorted(folder.glob("*.npz")) if folder else []:
+        with np.load(path) as data:
+            found.append(Problem(path.stem, data["W"], data["q"], data["mu"], int(data["dimension"])))
+    return sorted(found, key=lambda problem: len(problem.q))
+
+
+def pile(masses: list[float], mu: float) -> Problem:
+    """Cubes of side 1 m on one another, four contacts at each face, one millisecond of gravity from rest."""
+    rows = []
+    for level in range(len(masses)):
+        for x, z in ((-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5)):
+            block = np.zeros((3, 6 * len(masses)))
+            for body, y, sign in ((level, -0.5, 1.0), (level - 1, 0.5, -1.0)):
+                if body >= 0:
+                    jacobian = [[0, 1, 0, -z, 0, x], [1, 0, 0, 0, z, -y], [0, 0, 1, y, -x, 0]]
+                    block[:, 6 * body : 6 * body + 6] = sign * np.array(jacobian)
+            rows.append(block)
+    H = np.vstack(rows)
+    inverse = np.concatenate([[1 / m] * 3 + [6 / m] * 3 for m in masses])
+    v = np.tile([0.0, -9.81e-3, 0.0, 0.0, 0.0, 0.0], len(masses))
+    label = f"pile_{len(masses)}_ratio{max(masses) / min(masses):.0e}"
+    return Problem(label, H * inverse @ H.T, H @ v, np.full(len(H) // 3, mu), 3)
+
+
+def table(legs: int) -> Problem:
+    """A rigid table on a circle of legs, pushed along: W of rank 6."""
+    rows = []
+    for angle in 2 * np.pi * np.arange(legs) / legs:
+        x, y, z = np.cos(angle), -0.8, np.sin(angle)
+        rows.append([[0, 1, 0, -z, 0, x], [1, 0, 0, 0, z, -y], [0, 0, 1, y, -x, 0]])
+    H = np.vstack(rows).astype(float)
+    inverse = np.array([1 / 6, 1 / 6, 1 / 6, 0.5, 0.8, 0.5])
+    v = np.array([0.002, -0.0196, 0.001, 0.0, 0.003, 0.0])
+    return Problem(f"table_{legs}", H * inverse @ H.T, H @ v, np.full(legs, 0.5), 3)
+
+
+def mechanism(seed: int, n_contacts: int, dimension: int) -> Problem:
+    """Contacts of a random mechanism with about as many velocities as unknowns, masses over two decades."""
+    rng = np.random.default_rng(seed)
+    n = dimension * n_contacts
+    H = rng.uniform(-1, 1, (n, n + 2))
+    inverse = 10 ** rng.uniform(-1, 1, n + 2)
+    q = H @ rng.uniform(-1, 1, n + 2)
+    return Problem(
+        f"mechanism_{dimension}d_{n_contacts}_{seed}",
+        H * inverse @ H.T,
+        q,
+        rng.uniform(0.1, 0.8, n_contacts),
+        dimension,
+    )
+
+
+def synthetic() -> list[Problem]:
+    """The families that need no file."""
+    piles = [[1.0] * 3, [1.0] * 10, [1.0, 1e2], [1.0, 1e4], [1.0, 1e6], [1e4, 1.0], [2.0**k for k in range(8)]]
+    problems = [pile(masses, 0.9) for masses in piles]
+    problems += [table(legs) for legs in (4, 20, 60)]
+    problems += [mechanism(seed, n, d) for d in (2, 3) for n in (2, 6, 16) for seed in (1, 2)]
+    return problems
+
+
+@dataclass
+class Run:
+    """What a solver needed for a problem: the run that sufficed, or the last."""
+
+    seconds: float
+    iterations: int
+    relative: float
+    velocity: float
+
+    @property
+    def is_solved(self) -> bool:
+        """Whether the judge accepts the answer."""
+        return self.relative <= RESIDUAL and self.velocity <= VELOCITY
+
+
+def solve_ours(problem: Problem, solver: str, tolerance: float) -> tuple[float, int, Array]:
+    """Best CPU time of a few cold starts."""
+    options: dict[str, Any] = {"dimension": problem.dimension, "solver": solver, "tolerance": tolerance}
+    options["max_iterations"] = 10_000 if solver in ("nsgs", "admm") else 1000
+    best, spent = np.inf, 0.0
+    while True:
+        begin = time.thread_time()
+        answer = rover_gym.solve_friction_contact(problem.W, problem.q, problem.mu, **options)
+        elapsed = time.thread_time() - begin
+        best, spent = min(best, elapsed), spent + elapsed
+        if spent > 0.02:
+            return best, answer.report.iterations, answer.impulses.ravel()
+
+
+class Siconos:
+    """A worker in an interpreter that has Siconos; replaced when a job takes too long."""
+
+    def __init__(self, python: str, folder: Path) -> None:
+        """`folder` holds the problems while they are passed on."""
+        self.python, self.folder = python, folder
+        self.worker: subprocess.Popen[str] | None = None
+
+    @staticmethod
+    def is_installed(python: str) -> bool:
+        """Whether the interpreter can import it."""
+        try:
+            return (
+                subprocess.run([python, "-c", "import siconos.numerics"], capture_output=True, check=False).returncode
+                == 0
+            )
+        except OSError:
+            return False
+
+    def solve(self, problem: Problem, solver: str, tolerance: float) -> tuple[float, int, Array]:
+        """One job; an answer of zeros where it takes longer than the cap or the worker dies."""
+        path = self.folder / f"{problem.name}.npz"
+        if not path.exists():
+            np.savez(path, W=problem.W, q=problem.q, mu=problem.mu, dimension=problem.dimension)
+        if self.worker is None:
+            command = [self.python, str(Path(__file__).with_name("siconos_peer.py"))]
+            self.worker = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+            )
+            assert self.worker.stdout is not None
+            self.worker.stdout.readline()  # ready: its start does not count
+        worker = self.worker
+        assert worker.stdin is not None
+        assert worker.stdout is not None
+        job = {"problem": str(path), "solver": solver, "tolerance": tolerance, "repetitions": 5, "cap": CAP}
+        worker.stdin.write(json.dumps(job) + "\n")
+        worker.stdin.flush()
+        line = worker.stdout.readline() if select.select([worker.stdout], [], [], STUCK)[0] else ""
+        if not line:
+            worker.kill()
+            worker.wait()
+            self.worker = None
+            return np.inf, 0, np.zeros(len(problem.q))
+        answer = json.loads(line)
+        return answer["seconds"], answer["iterations"], np.array(answer["impulses"])
+
+    def close(self) -> None:
+        """Ends the worker."""
+        if self.worker is not None:
+            self.worker.kill()
+            self.worker.wait()
+
+
+def run(problem: Problem, solve: Callable[[Problem, float], tuple[float, int, Array]]) -> Run:
+    """Tightens the solver's own tolerance until the judge is content."""
+    result = Run(np.inf, 0, np.inf, np.inf)
+    for tolerance in (1e-8, 1e-10, 1e-12):
+        seconds, iterations, impulses = solve(problem, tolerance)
+        again = Run(seconds, iterations, *residual(problem, impulses))
+        if again.is_solved or not np.isfinite(result.relative):
+            result = again
+        if result.is_solved or seconds > HOPELESS:
+            break
+    return result
+
+
+def profile(costs: dict[str, list[float]], taus: Array) -> dict[str, list[float]]:
+    """Share of problems within tau times the best; a cost of infinity is a failure."""
+    table = np.array(list(costs.values()))
+    best = table.min(axis=0)
+    ratios = np.where(np.isfinite(table), table / np.where(np.isfinite(best) & (best > 0), best, 1.0), np.inf)
+    return {name: [float((row <= tau).mean()) for tau in taus] for name, row in zip(costs, ratios, strict=True)}
+
+
+def draw(profiles: dict[str, dict[str, list[float]]], taus: Array, n_problems: int, path: Path) -> None:
+    """Two panels: time and iterations."""
+    figure, axes = plt.subplots(1, 2, figsize=(11, 4.2), sharey=True, constrained_layout=True)
+    for axis, (what, curves) in zip(axes, profiles.items(), strict=True):
+        for index, (name, shares) in enumerate(curves.items()):
+            peer = name.startswith("Siconos")
+            axis.step(
+                taus,
+                shares,
+                where="post",
+                label=name,
+                color=f"C{index}",
+                ls="--" if peer else "-",
+                lw=2.5 if name == "auto" else 1.3,
+            )
+        axis.set(xscale="log", xlim=(1, taus[-1]), ylim=(0, 1.02), xlabel=f"{what} / least {what} of any solver")
+        axis.grid(alpha=0.3)
+    axes[0].set_ylabel(f"share of {n_problems} problems solved")
+    axes[1].legend(fontsize=8, loc="lower right")
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def problem_folder() -> Path | None:
+    """`shared/reference/contact_problems` beside the repository or above it."""
+    places = [ancestor / "shared" / "reference" / "contact_problems" for ancestor in Path(__file__).resolve().parents]
+    return next((place for place in places if place.is_dir()), None)
+
+
+def compare(problems: list[Problem], siconos: str | None) -> dict[str, dict[str, Run]]:
+    """Every solver on every problem: solver, then problem."""
+    solvers: dict[str, Callable[[Problem, float], tuple[float, int, Array]]] = {
+        name: lambda problem, tolerance, name=name: solve_ours(problem, name, tolerance) for name in OURS
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        peer = Siconos(siconos, Path(folder)) if siconos and Siconos.is_installed(siconos) else None
+        for name in PEERS if peer else ():
+            assert peer is not None
+            solvers[f"Siconos {name}"] = lambda problem, tolerance, name=name, peer=peer: peer.solve(
+                problem, name, tolerance
+            )
+        results: dict[str, dict[str, Run]] = {name: {} for name in solvers}
+        for problem in problems:
+            for name, solve in solvers.items():
+                results[name][problem.name] = run(problem, solve)
+            print(
+                problem.name,
+                *(
+                    f"{n}:{r[problem.name].seconds:.1e}{'' if r[problem.name].is_solved else '!'}"
+                    for n, r in results.items()
+                ),
+            )
+        if peer is not None:
+            peer.close()
+    return results
+
+
+def short(value: float, digits: int) -> float | None:
+    """A number of so many digits; None for infinity, which JSON has not."""
+    return float(f"{value:.{digits}g}") if np.isfinite(value) else None
+
+
+def main() -> None:
+    """Compares, writes the JSON and the figure."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--problems", type=Path, default=problem_folder(), help="folder of recorded problems (.npz)")
+    parser.add_argument("--siconos", default="/usr/bin/python3", help="interpreter that can import siconos")
+    parser.add_argument("--output", type=Path, default=ROOT / "docs" / "comparison")
+    parser.add_argument("--only", default="", help="part of the names of the problems to run")
+    arguments = parser.parse_args()
+    if arguments.problems is None:
+        print("no folder of recorded problems: the synthetic families only")
+    problems = [p for p in recorded(arguments.problems) + synthetic() if arguments.only in p.name]
+    results = compare(problems, arguments.siconos)
+    taus = np.logspace(0, 4, 200)
+    costs = {
+        "time": {n: [r.seconds if r.is_solved else np.inf for r in row.values()] for n, row in results.items()},
+        "iterations": {
+            n: [float(max(r.iterations, 1)) if r.is_solved else np.inf for r in row.values()]
+            for n, row in results.items()
+        },
+    }
+    profiles = {what: profile(cost, taus) for what, cost in costs.items()}
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    draw(profiles, taus, len(problems), arguments.output / "solver_profiles.png")
+    rounded = {
+        name: {
+            key: [short(r.seconds, 3), r.iterations, short(r.relative, 2), short(r.velocity, 2)]
+            for key, r in row.items()
+        }
+        for name, row in results.items()
+    }
+    summary = {
+        "meta": {
+            "command": "make profiles",
+            "machine": platform.processor() or platform.machine(),
+            "residual": RESIDUAL,
+            "velocity": VELOCITY,
+            "columns": ["CPU seconds", "iterations", "relative residual", "largest violation, m/s"],
+            "peer": "planar problems embedded in space; dense W, a cap of 5 s of CPU time a run",
+            "recorded": arguments.problems is not None,
+        },
+        "solved": {name: sum(r.is_solved for r in row.values()) for name, row in results.items()},
+        "n_problems": len(problems),
+        "runs": rounded,
+    }
+    (arguments.output / "solver_profiles.json").write_text(
+        json.dumps(summary, indent=None, separators=(",", ":")) + "\n", encoding="utf-8"
+    )
+    print(json.dumps(summary["solved"]), "of", len(problems))
+
+
+if __name__ == "__main__":
+    main()

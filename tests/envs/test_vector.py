@@ -1,0 +1,264 @@
+"""The native vector environment: each rover goes as it would alone, resets by the rules, threads do not show."""
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.error import ResetNeeded
+from gymnasium.utils.env_checker import data_equivalence
+from gymnasium.vector import AutoresetMode
+
+from rover_gym import CommandError, OptionError, RoverEnv
+from rover_gym.vector import RoverVectorEnv
+
+# A time limit so short that each test passes several.
+LIMIT = 12
+RANDOMISED: dict[str, Any] = {
+    "mass_scale": (0.8, 1.2),
+    "friction": (0.4, 0.9),
+    "actuator_gain": (0.7, 1.3),
+    "gravity_scale": (0.4, 1.2),
+    "observation_noise": 0.01,
+}
+SCENES = [
+    pytest.param("Rover-v0", {}, id="plane"),
+    pytest.param("Rover-v0", {"slope_deg": (0.0, 10.0), "goal_distance": (0.6, 1.0), **RANDOMISED}, id="randomised"),
+    pytest.param("RoverRocks-v0", {"height_scan": (5, 3, 0.4), "difficulty": (0.0, 1.0)}, id="rocks"),
+]
+
+
+def native(name: str, n: int, **arguments: Any) -> RoverVectorEnv:
+    arguments = {"max_episode_steps": LIMIT, **arguments}
+    made: Any = gym.make_vec(name, num_envs=n, **arguments)
+    assert type(made) is RoverVectorEnv
+    return made
+
+
+def actions(n: int, steps: int = 30, seed: int = 0) -> Any:
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, (steps, n, 12)).astype(np.float32)
+
+
+def assert_same(ours: tuple[Any, ...], theirs: tuple[Any, ...]) -> None:
+    for one, other in zip(ours[:-1], theirs[:-1], strict=True):
+        assert (one.dtype, one.shape) == (other.dtype, other.shape)
+        assert one.tobytes() == other.tobytes()
+    assert data_equivalence(ours[-1], theirs[-1], exact=True)
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+@pytest.mark.parametrize(("name", "arguments"), SCENES)
+def test_vector_is_sync_vector_bit_for_bit(name: str, arguments: dict[str, Any], mode: AutoresetMode) -> None:
+    ours = native(name, 3, autoreset_mode=mode, threads=2, **arguments)
+    kwargs = {"autoreset_mode": mode}
+    theirs = gym.make_vec(
+        name, num_envs=3, vectorization_mode="sync", vector_kwargs=kwargs, max_episode_steps=LIMIT, **arguments
+    )
+    assert ours.metadata["autoreset_mode"] == theirs.metadata["autoreset_mode"]
+    assert ours.single_observation_space == theirs.single_observation_space
+    assert (ours.observation_space, ours.action_space) == (theirs.observation_space, theirs.action_space)
+    assert_same(ours.reset(seed=5), theirs.reset(seed=5))
+    assert ours.np_random_seed == theirs.np_random_seed
+    ended = 0
+    for action in actions(3):
+        result = ours.step(action)
+        assert_same(result, theirs.step(action))
+        ended += int((result[2] | result[3]).sum())
+    assert ended > 3
+    assert_same(ours.reset(), theirs.reset())
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+@pytest.mark.parametrize("n", [1, 4, 9])
+def test_neither_threads_nor_neighbours_show(n: int, threads: int) -> None:
+    arguments: dict[str, Any] = {"terrain": "sphere_field", "difficulty": 0.5}
+    batch = native("Rover-v0", n, threads=threads, **arguments)
+    batch.reset(seed=0)
+    alone = gym.wrappers.TimeLimit(RoverEnv(**arguments), LIMIT)
+    alone.reset(seed=n - 1)
+    over = False
+    for action in actions(9, steps=20):
+        result = batch.step(action[:n])
+        if over:
+            observation, info = alone.reset()
+            reward, terminated, truncated = 0.0, False, False
+        else:
+            observation, reward, terminated, truncated, info = alone.step(action[n - 1])
+        assert result[0][-1].tobytes() == observation.tobytes()
+        assert (result[1][-1], result[2][-1], result[3][-1]) == (reward, terminated, truncated)
+        assert result[4]["distance_to_goal"][-1] == info["distance_to_goal"]
+        over = terminated or truncated
+    assert batch.batch.simulations.threads == min(threads, n)
+
+
+def test_the_time_limit_is_the_registered_one() -> None:
+    made: Any = gym.make_vec("Rover-v0", num_envs=2)
+    assert made.batch.max_episode_steps == gym.spec("Rover-v0").max_episode_steps == 1200
+    assert RoverVectorEnv(2, max_episode_steps=None).batch.max_episode_steps is None
+
+
+def test_without_a_limit_nothing_is_truncated() -> None:
+    env = RoverVectorEnv(1, max_episode_steps=None)
+    env.reset(seed=0)
+    for action in actions(1, steps=2 * LIMIT):
+        assert not env.step(0.1 * action)[3].any()
+
+
+def test_disabled_autoreset_waits_for_the_mask() -> None:
+    env = native("Rover-v0", 3, autoreset_mode="Disabled")
+    env.reset(seed=0)
+    env.reset(options={"reset_mask": np.array([False, True, False]), "heading_deg": 0.0})
+    for action in actions(3, steps=LIMIT):
+        observation, _, _, truncated, infos = env.step(action)
+    assert truncated.all()
+    with pytest.raises(ResetNeeded):
+        env.step(actions(3)[0])
+    mask = np.array([True, False, True])
+    again, infos = env.reset(options={"reset_mask": mask})
+    assert again[1].tobytes() == observation[1].tobytes(), "the others stay as they are"
+    np.testing.assert_array_equal(infos["_time"], mask)
+    with pytest.raises(ResetNeeded):
+        env.step(actions(3)[0])
+    env.reset(options={"reset_mask": ~mask})
+    assert not env.step(actions(3)[0])[3].any()
+
+
+def test_seeds_count_up_or_are_given() -> None:
+    env = native("Rover-v0", 3)
+    counted, _ = env.reset(seed=7)
+    listed, _ = env.reset(seed=[7, 8, 9])
+    assert counted.tobytes() == listed.tobytes()
+    assert env.np_random_seed == (7, 8, 9)
+    with pytest.raises(OptionError):
+        env.reset(seed=[1, 2])
+
+
+def test_options_are_every_rovers() -> None:
+    env = native("RoverRocks-v0", 3)
+    _, infos = env.reset(seed=0, options={"difficulty": 0.25, "goal": (3.0, 1.0)})
+    np.testing.assert_array_equal(infos["difficulty"], 0.25)
+    assert env.get_attr("goal") == ((3.0, 1.0),) * 3
+
+
+def test_difficulty_is_set_from_the_next_reset_on() -> None:
+    env = native("RoverRocks-v0", 3, autoreset_mode="SameStep")
+    env.reset(seed=0)
+    assert env.call("set_difficulty", (0.8, 0.9)) == (None,) * 3
+    assert env.get_attr("difficulty") == (0.5,) * 3
+    for action in actions(3, steps=LIMIT):
+        infos = env.step(action)[4]
+    assert all(0.8 <= d <= 0.9 for d in infos["difficulty"])
+    np.testing.assert_array_equal(infos["final_info"]["difficulty"], 0.5)
+    assert len(set(env.get_attr("difficulty"))) == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field"),
+    [
+        ({"num_envs": 0}, "num_envs"),
+        ({"threads": 0}, "threads"),
+        ({"threads": 1.5}, "threads"),
+        ({"max_episode_steps": 0}, "max_episode_steps"),
+        ({"autoreset_mode": "sometimes"}, "autoreset_mode"),
+        ({"friction": -1.0}, "friction"),
+    ],
+)
+def test_bad_arguments_are_refused(arguments: dict[str, Any], field: str) -> None:
+    with pytest.raises(OptionError) as caught:
+        RoverVectorEnv(**{"num_envs": 2, **arguments})
+    assert caught.value.field == field
+
+
+@pytest.mark.parametrize("mask", [[True, False], np.ones(3, np.bool_), np.ones(2)])
+def test_bad_masks_are_refused(mask: Any) -> None:
+    env = native("Rover-v0", 2)
+    with pytest.raises(OptionError) as caught:
+        env.reset(options={"reset_mask": mask})
+    assert caught.value.field == "options.reset_mask"
+
+
+def test_step_before_reset_is_refused() -> None:
+    with pytest.raises(ResetNeeded):
+        native("Rover-v0", 2).step(actions(2)[0])
+
+
+@pytest.mark.parametrize("value", [np.nan, 1.5])
+def test_a_bad_action_moves_nobody(value: float) -> None:
+    env, twin = native("Rover-v0", 3), native("Rover-v0", 3)
+    env.reset(seed=0)
+    twin.reset(seed=0)
+    bad = actions(3)[0]
+    bad[1, 4] = value
+    with pytest.raises(CommandError) as caught:
+        env.step(bad)
+    assert caught.value.field == "action[1, 4]"
+    with pytest.raises(CommandError):
+        env.step(actions(2)[0])
+    for action in actions(3, steps=3):
+        assert_same(env.step(action), twin.step(action))
+
+
+def spinning() -> dict[str, Any]:
+    """A start from which no step can be taken: the trunk turns at 1e30 rad/s."""
+    q, v = np.zeros(21), np.zeros(21)
+    q[1], v[3] = 0.5, 1e30
+    return {"q": q, "v": v}
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_a_rover_that_fails_fails_alone(threads: int) -> None:
+    env, twin = native("Rover-v0", 3, threads=threads), native("Rover-v0", 3, threads=threads)
+    env.reset(seed=0)
+    twin.reset(seed=0)
+    before, _ = env.reset(options={"reset_mask": np.array([False, True, False]), **spinning()})
+    action = actions(3)[0]
+    ours, theirs = env.step(action), twin.step(action)
+    for one, other in zip(ours[:4], theirs[:4], strict=True):
+        assert one[[0, 2]].tobytes() == other[[0, 2]].tobytes()
+        assert np.isfinite(one).all()
+    assert ours[2].tolist() == [False, True, False]
+    infos = ours[4]
+    assert infos["termination"].tolist() == ["", "step_failed", ""]
+    assert infos["solver"]["status"].tolist() == ["converged", "failed", "converged"]
+    assert "not finite" in infos["solver"]["message"][1]
+    assert ours[1][1] == infos["reward_terms"]["failure"][1] == -10.0
+    np.testing.assert_array_equal(ours[0][1], before[1], "the last finite observation")
+    following = env.step(action)
+    assert following[4]["termination"].tolist() == ["", "", ""]
+    assert np.isfinite(following[0]).all()
+
+
+def test_a_rover_can_be_looked_at() -> None:
+    env = native("RoverRocks-v0", 2)
+    env.reset(seed=3)
+    alone = RoverEnv(terrain="sphere_field")
+    alone.reset(seed=4)
+    action = actions(2)[0]
+    env.step(action)
+    alone.step(action[1])
+    (simulation,) = env.get_attr("simulation")[1:]
+    assert simulation.snapshot() == alone.simulation.snapshot()
+    assert len(simulation.terrain) == len(alone.simulation.terrain)
+    assert env.get_attr("start")[1] == alone.start
+    assert env.get_attr("rocks")[1] == alone.rocks
+
+
+def test_arrays_are_fresh() -> None:
+    env = native("Rover-v0", 2)
+    env.reset(seed=0)
+    first = env.step(actions(2)[0])
+    kept = [array.copy() for array in first[:4]]
+    distance = first[4]["distance_to_goal"].copy()
+    second = env.step(actions(2)[1])
+    for array, copied, later in zip(first[:4], kept, second[:4], strict=True):
+        assert array.tobytes() == copied.tobytes()
+        assert not np.shares_memory(array, later)
+    np.testing.assert_array_equal(first[4]["distance_to_goal"], distance)
+    for array in second[:4]:
+        array[:] = 1
+    third = env.step(actions(2)[2])
+    twin = native("Rover-v0", 2)
+    twin.reset(seed=0)
+    for action in actions(2)[:2]:
+        twin.step(action)
+    assert_same(third, twin.step(actions(2)[2]))

@@ -1,0 +1,250 @@
+//! Rovers in a batch go bit for bit as each would alone, whatever the number of threads.
+
+use std::sync::Arc;
+
+use rover_core::geometry::{Plane, Rocks, SphereField, Terrain};
+use rover_core::integrator::StepOptions;
+use rover_core::multibody::{Configuration, Model};
+use rover_core::simulation::{Batch, BatchError, CommandError, Look, ReadingLayout, Simulation};
+
+const SCAN: [[f64; 2]; 3] = [[1.0, -0.5], [0.0, 0.0], [-0.3, 0.8]];
+const TARGET: [f64; 2] = [3.0, -4.0];
+
+/// A rover at rest on its own ground, a field of rocks for odd numbers.
+fn rover(model: &Arc<Model>, i: usize) -> Simulation {
+    let field = Rocks {
+        abundance: 0.1,
+        area: [20.0, 20.0],
+        seed: i as u64,
+        ..Rocks::default()
+    };
+    let terrain: Arc<dyn Terrain> = if i % 2 == 1 {
+        Arc::new(SphereField::rocks(&field).unwrap())
+    } else {
+        Arc::new(Plane::ground())
+    };
+    let options = StepOptions {
+        friction_coefficient: 0.5 + 0.05 * i as f64,
+        ..StepOptions::default()
+    };
+    let mut simulation = Simulation::new(model.clone(), terrain, options).unwrap();
+    let mut start = Configuration::zero(model);
+    start.position.y = 0.8;
+    simulation.set_state(start, vec![0.0; model.nv()]);
+    simulation
+}
+
+fn rovers(n: usize) -> Vec<Simulation> {
+    let model = Arc::new(Model::rover());
+    (0..n).map(|i| rover(&model, i)).collect()
+}
+
+fn torques(i: usize, period: usize) -> [f64; 6] {
+    std::array::from_fn(|k| 30.0 * ((i + 3 * period + 5 * k) as f64).sin())
+}
+
+fn set_points(i: usize, period: usize) -> [f64; 6] {
+    std::array::from_fn(|k| 0.3 * ((2 * i + period + k) as f64).cos())
+}
+
+fn batch(n: usize, threads: usize) -> Batch {
+    let mut batch = Batch::new(rovers(n), SCAN.to_vec(), Some(threads)).unwrap();
+    for (i, rover) in rovers(n).into_iter().enumerate() {
+        batch.replace(i, rover, TARGET).unwrap();
+    }
+    batch
+}
+
+fn drive(batch: &mut Batch, periods: std::ops::Range<usize>, active: Option<&[bool]>) -> Vec<f64> {
+    let n = batch.rovers().len();
+    let mut rows = vec![0.0; n * batch.layout().size()];
+    for period in periods {
+        let tau: Vec<f64> = (0..n).flat_map(|i| torques(i, period)).collect();
+        let delta: Vec<f64> = (0..n).flat_map(|i| set_points(i, period)).collect();
+        batch.step(&tau, &delta, 5, active, &mut rows).unwrap();
+    }
+    rows
+}
+
+fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|x| x.to_bits()).collect()
+}
+
+#[test]
+fn a_batch_is_its_rovers_alone_for_any_number_of_threads() {
+    let n = 7;
+    let mut alone = Vec::new();
+    for (i, mut rover) in rovers(n).into_iter().enumerate() {
+        for period in 0..12 {
+            rover.set_wheel_torques(&torques(i, period)).unwrap();
+            rover.set_steering(&set_points(i, period)).unwrap();
+            rover.step(5).unwrap();
+        }
+        let look = Look {
+            target: TARGET,
+            scan: &SCAN,
+        };
+        let mut row = vec![0.0; ReadingLayout::new(rover.model(), SCAN.len()).size()];
+        rover.read(&look, &mut row);
+        alone.extend(row);
+    }
+    assert!(alone.iter().all(|x| x.is_finite()));
+    for threads in [1, 2, 4, 16] {
+        let mut batch = batch(n, threads);
+        assert_eq!(batch.threads(), threads.min(n));
+        let rows = drive(&mut batch, 0..12, None);
+        assert_eq!(bits(&rows), bits(&alone), "{threads} threads");
+        let mut read = vec![0.0; rows.len()];
+        batch.read(&mut read);
+        assert_eq!(bits(&read), bits(&rows));
+    }
+}
+
+#[test]
+fn a_rover_that_fails_fails_alone() {
+    let n = 3;
+    for threads in [1, 3] {
+        let mut sound = batch(n, threads);
+        let mut broken = batch(n, threads);
+        let mut mad = rovers(n).remove(1);
+        let mut v = vec![0.0; mad.model().nv()];
+        v[3] = 1e30;
+        let start = mad.state().configuration.clone();
+        mad.set_state(start, v);
+        broken.replace(1, mad, TARGET).unwrap();
+        let width = sound.layout().size();
+        let (a, b) = (
+            drive(&mut sound, 0..3, None),
+            drive(&mut broken, 0..3, None),
+        );
+        for i in [0, 2] {
+            let own = i * width..(i + 1) * width;
+            assert_eq!(bits(&a[own.clone()]), bits(&b[own]));
+        }
+        assert!(b.iter().all(|x| !x.is_nan()));
+        let failed: Vec<bool> = broken.errors().iter().map(Option::is_some).collect();
+        assert_eq!(failed, [false, true, false]);
+        assert!(sound.errors().iter().all(Option::is_none));
+    }
+}
+
+#[test]
+fn rovers_that_are_not_active_keep_still() {
+    let mut batch = batch(3, 2);
+    drive(&mut batch, 0..2, None);
+    let before = batch.rovers()[1].snapshot();
+    let moving = batch.rovers()[2].state().time;
+    drive(&mut batch, 2..4, Some(&[true, false, true]));
+    assert_eq!(batch.rovers()[1].snapshot(), before);
+    assert!(batch.rovers()[2].state().time > moving);
+}
+
+#[test]
+fn a_bad_command_moves_nobody() {
+    let mut batch = batch(2, 2);
+    let before: Vec<_> = batch.rovers().iter().map(Simulation::snapshot).collect();
+    let mut tau = vec![0.0; 12];
+    tau[9] = f64::NAN;
+    let mut rows = vec![0.0; 2 * batch.layout().size()];
+    let error = batch
+        .step(&tau, &[0.0; 12], 1, None, &mut rows)
+        .unwrap_err();
+    let BatchError::Command { index, error } = error else {
+        panic!("{error}")
+    };
+    assert_eq!(index, 1);
+    assert!(matches!(error, CommandError::NotFinite { index: 3, .. }));
+    let after: Vec<_> = batch.rovers().iter().map(Simulation::snapshot).collect();
+    assert_eq!(before, after);
+}
+
+#[test]
+fn batches_that_make_no_sense_are_refused() {
+    assert!(matches!(
+        Batch::new(vec![], vec![], None),
+        Err(BatchError::Empty)
+    ));
+    let mut batch = batch(2, 1);
+    let extra = rovers(1).remove(0);
+    assert!(matches!(
+        batch.replace(2, extra, TARGET),
+        Err(BatchError::NoSuchRover { index: 2, len: 2 })
+    ));
+    let locked = [("front_axle".to_owned(), 0.0)];
+    let welded = Arc::new(Model::rover().with_locked_joints(&locked).unwrap());
+    assert!(matches!(
+        batch.replace(0, rover(&welded, 0), TARGET),
+        Err(BatchError::Differs {
+            index: 0,
+            expected: 21,
+            actual: 20
+        })
+    ));
+}
+
+#[test]
+fn a_reading_says_what_the_simulation_says() {
+    let mut sim = rovers(2).remove(1);
+    for period in 0..20 {
+        sim.set_wheel_torques(&torques(0, period)).unwrap();
+        sim.step(10).unwrap();
+    }
+    let layout = ReadingLayout::new(sim.model(), SCAN.len());
+    let mut row = vec![0.0; layout.size()];
+    sim.read(
+        &Look {
+            target: TARGET,
+            scan: &SCAN,
+        },
+        &mut row,
+    );
+    let of = |name: &str| {
+        let (_, place) = layout.fields().iter().find(|(n, _)| *n == name).unwrap();
+        &row[place.clone()]
+    };
+    let state = sim.state();
+    let p = state.configuration.position;
+    let R = state.configuration.attitude.to_rotation_matrix();
+    assert!((of("pose")[0] - p.x).abs() < 1e-15);
+    let ahead = R * nalgebra::Vector3::x();
+    let heading = (-ahead.z).atan2(ahead.x);
+    assert!((of("pose")[4] - heading).abs() < 1e-12);
+    let to = nalgebra::Vector2::new(TARGET[0] - p.x, TARGET[1] - p.z);
+    assert!((of("target")[2] - to.norm()).abs() < 1e-12);
+    let along = to.x * heading.cos() - to.y * heading.sin();
+    assert!((of("target")[0] - along).abs() < 1e-12);
+    let lean = R.matrix()[(1, 1)];
+    assert!((of("cos_tilt")[0] - lean).abs() < 1e-12);
+    let body = R.inverse() * nalgebra::Vector3::new(state.v[0], state.v[1], state.v[2]);
+    assert!((of("body_velocity")[0] - body.x).abs() < 1e-12);
+    let under = sim.terrain().height(p.x, p.z).unwrap() - p.y;
+    assert!((of("heights")[1] - under).abs() < 1e-12);
+    assert!((of("slip_ratio")[0] - sim.slip_ratio()).abs() < 1e-15);
+    for (gap, touches) in of("wheel_gaps").iter().zip(of("wheel_contacts")) {
+        assert!((touches - f64::from(u8::from(*gap <= 1e-3))).abs() < 1e-15);
+    }
+}
+
+#[test]
+fn the_work_of_the_motors_is_the_energy_gained() {
+    // Free flight without gravity: nothing but the motors does work.
+    let model = Arc::new(Model::rover());
+    let options = StepOptions {
+        gravity: nalgebra::Vector3::zeros(),
+        time_step: 1e-4,
+        ..StepOptions::default()
+    };
+    let mut sim = Simulation::new(model.clone(), Arc::new(Plane::ground()), options).unwrap();
+    let mut start = Configuration::zero(&model);
+    start.position.y = 100.0;
+    sim.set_state(start, vec![0.0; model.nv()]);
+    sim.set_wheel_torques(&[20.0; 6]).unwrap();
+    let before = sim.energy().kinetic;
+    sim.step(500).unwrap();
+    let gained = sim.energy().kinetic - before;
+    let last = sim.last_call();
+    assert!(gained > 10.0, "{gained}");
+    // The steering joints' PD takes what it takes: under a hundredth.
+    assert!((last.positive_work / gained - 1.0).abs() < 0.01);
+    assert!((last.work - last.positive_work).abs() <= 1e-12 * last.work);
+}

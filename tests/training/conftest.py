@@ -1,0 +1,44 @@
+"""The scripts as functions."""
+
+import runpy
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from typer.testing import CliRunner, Result
+
+TRAINING = Path(__file__).parents[2] / "training"
+
+Script = Callable[..., Result]
+
+
+def script(name: str, function: str) -> Script:
+    """A command of `training/`, run in this process."""
+    app = typer.Typer()
+    app.command()(runpy.run_path(str(TRAINING / f"{name}.py"))[function])
+
+    def run(*arguments: Any) -> Result:
+        return CliRunner(env={"COLUMNS": "200", "NO_COLOR": "1"}).invoke(app, [str(entry) for entry in arguments])
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def train() -> Script:
+    """`train_ppo.py`."""
+    pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
+    return script("train_ppo", "train")
+
+
+@pytest.fixture(scope="session")
+def evaluate() -> Script:
+    """`evaluate.py`."""
+    return script("evaluate", "evaluate")
+
+
+@pytest.fixture(scope="session")
+def enjoy() -> Script:
+    """`enjoy.py`."""
+    return script("enjoy", "enjoy")

@@ -1,0 +1,164 @@
+"""Training runs, leaves what it promises, goes on after a stop, and gives a policy that NumPy runs alike."""
+
+import csv
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
+
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import VecNormalize
+
+from rover_gym.learning.build import build_env
+from rover_gym.learning.config import read_config
+from rover_gym.trained import Network, TrainedPolicy
+
+Script = Callable[..., Any]
+
+ENVIRONMENTS: Mapping[str, dict[str, Any]] = {
+    "plane": {"terrain": "plane", "goal_distance": 2.0, "friction": [0.5, 0.8]},
+    "rocks": {"terrain": "sphere_field", "goal_distance": 3.0, "height_scan": [12, 8, 0.2]},
+}
+
+
+def a_config(folder: Path, name: str) -> Path:
+    """A training of 2048 decisions, two control periods each."""
+    config: dict[str, Any] = {
+        "environment": {**ENVIRONMENTS[name], "control_frequency": 10, "time_step": 0.02},
+        "total_steps": 2048,
+        "num_envs": 8,
+        "max_episode_steps": 60,
+        "pool": 2 if name == "rocks" else 1,
+        "guided": name == "rocks",
+        "ppo": {"n_steps": 64, "batch_size": 128, "n_epochs": 2, "net_arch": [16, 16]},
+        "evaluation": {"every": 1024, "episodes": 4},
+        "checkpoint_every": 1024,
+    }
+    if name == "rocks":
+        config["curriculum"] = {"start": 0.1, "step": 0.2, "success": 0.1, "episodes": 10}
+    path = folder / f"{name}.yaml"
+    path.write_text(yaml.safe_dump(config), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module", params=["plane", "rocks"])
+def run(request: pytest.FixtureRequest, train: Script, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp(request.param)
+    result = train(
+        "--config", a_config(folder, request.param), "--output", folder / "run", "--seed", 3, "--no-progress"
+    )
+    assert result.exit_code == 0, result.output
+    return folder / "run"
+
+
+def test_the_run_leaves_what_it_was(run: Path) -> None:
+    report = json.loads((run / "run.json").read_text(encoding="utf-8"))
+    assert report["seed"] == 3
+    assert report["decisions"] == 2048
+    assert {"rover-gym", "stable-baselines3", "torch"} <= report["versions"].keys()
+    assert "revision" in report
+    assert read_config(run / "config.yaml").total_steps == 2048
+    assert list((run / "log").glob("events.out.tfevents.*"))
+
+
+def test_returns_are_finite_and_the_curve_has_every_episode(run: Path) -> None:
+    lines = (run / "curve.monitor.csv").read_text(encoding="utf-8").splitlines()[1:]
+    rows = list(csv.DictReader(lines))
+    # 2048 decisions of 2 periods, episodes of at most 60.
+    assert len(rows) >= 2048 * 2 // 60 - 8
+    assert np.isfinite([float(row["r"]) for row in rows]).all()
+    evaluations = np.load(run / "evaluations.npz")
+    assert evaluations["timesteps"].tolist() == [1024, 2048]
+    assert np.isfinite(evaluations["results"]).all()
+
+
+def test_the_parameters_have_changed(run: Path) -> None:
+    first, last = (PPO.load(run / "checkpoints" / f"{n:09d}.zip", device="cpu") for n in (1024, 2048))
+    for (name, before), after in zip(first.policy.named_parameters(), last.policy.parameters(), strict=True):
+        assert torch.isfinite(after).all()
+        assert not torch.equal(before, after), name
+
+
+def test_the_saved_policy_acts_like_the_model(run: Path) -> None:
+    config = read_config(run / "config.yaml")
+    venv = build_env(config, num_envs=5, seed=7)
+    normalisation = VecNormalize.load(str(run / "checkpoints" / "000002048.pkl"), venv)
+    normalisation.training = False
+    model = PPO.load(run / "checkpoints" / "000002048.zip", device="cpu")
+    network = Network.read(run / "policy" / "policy.npz")
+    features = venv.reset()
+    assert isinstance(features, np.ndarray)
+    for _ in range(10):
+        actions, _ = model.predict(normalisation.normalize_obs(features), deterministic=True)
+        np.testing.assert_allclose(network(features), actions, atol=1e-5)
+        features, *_ = venv.step(actions)
+
+    rover = venv.unwrapped.prototype
+    seen = rover.reset(seed=1)[0]
+    one, two = (TrainedPolicy.load(rover, run / "policy").predict(seen)[0] for _ in range(2))
+    np.testing.assert_array_equal(one, two)
+    assert one in rover.action_space
+
+
+def test_a_stopped_training_goes_on(run: Path, train: Script, tmp_path: Path) -> None:
+    config = a_config(tmp_path, run.parent.name.rstrip("0123456789"))
+    arguments = ("--config", config, "--output", tmp_path / "run", "--no-progress")
+    assert train(*arguments, "--steps", 1024).exit_code == 0
+    before = PPO.load(tmp_path / "run" / "checkpoints" / "000001024.zip", device="cpu")
+    result = train(*arguments, "--resume")
+    assert result.exit_code == 0, result.output
+    after = PPO.load(tmp_path / "run" / "checkpoints" / "000002048.zip", device="cpu")
+    assert after.num_timesteps == 2048
+    assert after._n_updates == 2 * before._n_updates
+    report = json.loads((tmp_path / "run" / "run.json").read_text(encoding="utf-8"))
+    assert report["resumed_from"] == 1024
+    assert (tmp_path / "run" / "curve-1024.monitor.csv").exists()
+
+
+def test_the_curriculum_rises_with_success(run: Path) -> None:
+    with (run / "log" / "progress.csv").open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row.get("curriculum/hardest")]
+    levels = [float(row["curriculum/hardest"]) for row in rows]
+    if "rocks" not in run.parent.name:
+        assert not levels
+        return
+    assert levels == sorted(levels)
+    assert levels[0] >= 0.1
+    assert levels[-1] > 0.1
+
+
+def test_an_evaluation_names_policies_and_baseline(run: Path, evaluate: Script, tmp_path: Path) -> None:
+    terrain = "sphere_field" if "rocks" in run.parent.name else "plane"
+    result = evaluate(run, "--terrain", terrain, "--episodes", 2, "--output", tmp_path)
+    assert result.exit_code == 0, result.output
+    report = json.loads((tmp_path / "evaluation.json").read_text(encoding="utf-8"))
+    expected = ["PD baseline", "guide alone", "run"] if terrain == "sphere_field" else ["PD baseline", "run"]
+    assert [row["policy"] for row in report["rows"]] == expected
+    for row in report["rows"]:
+        assert sum(row["ends"].values()) == row["episodes"] == 2
+        assert f"| {row['policy']} |" in (tmp_path / "evaluation.md").read_text(encoding="utf-8")
+    assert (tmp_path / "evaluation.png").stat().st_size > 1000
+
+
+def test_enjoy_drives(run: Path, enjoy: Script) -> None:
+    terrain = "sphere_field" if "rocks" in run.parent.name else "plane"
+    result = enjoy(run, "--terrain", terrain, "--seed", 5)
+    assert result.exit_code == 0, result.output
+    assert "seed 5: " in result.output
+
+
+def test_a_wrong_configuration_is_one_line(train: Script, tmp_path: Path) -> None:
+    path = tmp_path / "wrong.yaml"
+    path.write_text("environment: {terrain: plane}\ntotal_steps: 1\nsteps_total: 2\n", encoding="utf-8")
+    result = train("--config", path, "--output", tmp_path / "run")
+    assert result.exit_code == 2
+    assert result.stderr.startswith("error: steps_total: unknown")
+    assert len(result.stderr.splitlines()) == 1
+    assert not (tmp_path / "run").exists()
