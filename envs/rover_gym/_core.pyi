@@ -22,6 +22,7 @@ __all__ = [
     "Energy",
     "FrictionContactSolution",
     "Line",
+    "MirroredRoverSimulation",
     "ModelError",
     "OptionError",
     "PlanarContacts",
@@ -640,6 +641,30 @@ class TwoWheelRoverSimulation(PlanarSimulation):
         axle_b: npt.ArrayLike | None = None,
         **options: Any,
     ) -> TwoWheelRoverSimulation: ...
+
+@final
+class MirroredRoverSimulation(PlanarSimulation):
+    """The six-wheel rover driven straight, in its plane of symmetry: x, y, theta, then a joint angle a pair.
+
+    `model` must be its own mirror image about the trunk's x-y plane; the built-in rover if not given. Its joints that
+    do not turn about z are locked at zero. Torques: one a pair, of each of its wheels; they saturate at the model's
+    limits. Only wheels touch the ground. Options as `BallSimulation`'s.
+
+    Raises:
+        ModelError: The model has no planar image, or one that has not 7 coordinates.
+        TerrainError: `ground` is none.
+        OptionError: An option is out of its range.
+    """
+
+    def __new__(
+        cls, ground: Line | Sine | Spline | Polyline, *, model: RoverModel | None = None, **options: Any
+    ) -> MirroredRoverSimulation: ...
+    @property
+    def joints(self) -> list[list[str]]:
+        """Names of the joints that share each coordinate from the fourth on."""
+    @property
+    def wheels(self) -> list[list[str]]:
+        """Names of the wheels of each disc."""
 
 @final
 class SimulationBatch:

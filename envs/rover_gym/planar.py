@@ -22,10 +22,12 @@ import numpy.typing as npt
 from rover_gym._core import (
     BallSimulation,
     Line,
+    MirroredRoverSimulation,
     PlanarContacts,
     PlanarSimulation,
     PlanarSnapshot,
     Polyline,
+    RoverModel,
     Sine,
     SoilContacts,
     SoilSimulation,
@@ -39,6 +41,7 @@ from rover_gym.recording import Channel, Recorder
 __all__ = [
     "BallSimulation",
     "Line",
+    "MirroredRoverSimulation",
     "PlanarContacts",
     "PlanarSampler",
     "PlanarSimulation",
@@ -57,8 +60,12 @@ __all__ = [
 
 Ground = Line | Sine | Spline | Polyline
 
-COORDINATES = {3: ("x", "y", "theta"), 5: ("x", "y", "theta", "theta_a", "theta_b")}
-DISCS = {1: ("ball",), 2: ("wheel A", "wheel B")}
+COORDINATES = {
+    3: ("x", "y", "theta"),
+    5: ("x", "y", "theta", "theta_a", "theta_b"),
+    7: ("x", "y", "theta", "front_wheels", "bogies", "middle_wheels", "back_wheels"),
+}
+DISCS = {1: ("ball",), 2: ("wheel A", "wheel B"), 3: ("front wheels", "middle wheels", "back wheels")}
 
 
 class PlanarSampler:
@@ -130,7 +137,10 @@ def describe(sim: PlanarSimulation, title: str) -> dict[str, Any]:
         "scene": {
             "kind": type(sim).__name__,
             "ground": {"kind": type(ground).__name__.lower(), **shape},
-            "machine": sim.parameters,
+            "machine": {
+                name: value.to_dict() if isinstance(value, RoverModel) else value
+                for name, value in sim.parameters.items()
+            },
             "q": sim.q,
             "v": sim.v,
             "torques": sim.torques,

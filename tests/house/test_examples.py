@@ -11,6 +11,7 @@ from rover_gym.cli import app
 ROOT = Path(__file__).parents[2]
 PAGES = (
     "README.md",
+    "docs/economy.md",
     "docs/planar.md",
     "docs/recording.md",
     "docs/replay.md",

@@ -6,6 +6,8 @@ mod scenes;
 
 #[path = "planar/ball.rs"]
 mod ball;
+#[path = "planar/mirrored_rover.rs"]
+mod mirrored_rover;
 #[path = "planar/siconos.rs"]
 mod siconos;
 #[path = "planar/soil.rs"]

@@ -11,6 +11,7 @@ from rover_gym.cli.planar import planar
 from rover_gym.cli.plot import plot
 from rover_gym.cli.replay import replay
 from rover_gym.cli.report import report
+from rover_gym.cli.scene import scene
 from rover_gym.cli.speed import speed
 
 app = typer.Typer(
@@ -24,6 +25,7 @@ app.command()(baseline)
 app.command()(report)
 app.command()(plot)
 app.command()(replay)
+app.command()(scene)
 app.add_typer(planar, name="planar")
 app.command()(speed)
 

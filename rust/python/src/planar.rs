@@ -4,11 +4,11 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 use rover_core::integrator::{StepError, StepOptions, StepReport as CoreReport};
-use rover_core::multibody::{Energy as CoreEnergy, StateError};
+use rover_core::multibody::{Energy as CoreEnergy, Model, StateError};
 use rover_core::nalgebra::{DMatrix, Vector2};
 use rover_core::planar::{
-    Ball, ContactRule, Ground, PlanarActiveContact, PlanarMachine, PlanarSimulation as Core,
-    PlanarSnapshot as CoreSnapshot, PlanarWheel, TwoWheelRover,
+    Ball, ContactRule, Ground, MirroredRover, PlanarActiveContact, PlanarMachine,
+    PlanarSimulation as Core, PlanarSnapshot as CoreSnapshot, PlanarWheel, TwoWheelRover,
 };
 use rover_core::simulation::{CommandError, SnapshotError};
 use std::sync::Arc;
@@ -16,6 +16,7 @@ use std::sync::Arc;
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
+use crate::model::RoverModel;
 use crate::planar_ground::{border, parse};
 use crate::simulation::{
     Energy, Problem, STABILISATIONS, StepReport, VARIANTS, choice, name_of, step_count,
@@ -549,6 +550,45 @@ impl TwoWheelRoverSimulation {
     }
 }
 
+/// The six-wheel rover driven straight: coordinates x, y, theta and one angle a pair of joints.
+#[pyclass(module = "rover_gym._core", extends = PlanarSimulation)]
+pub struct MirroredRoverSimulation {
+    joints: Vec<Vec<String>>,
+    wheels: Vec<Vec<String>>,
+}
+
+#[pymethods]
+impl MirroredRoverSimulation {
+    #[new]
+    #[pyo3(signature = (ground, *, model = None, **options))]
+    fn new(
+        ground: &Bound<'_, PyAny>,
+        model: Option<RoverModel>,
+        options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<PyClassInitializer<Self>> {
+        let inner = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
+        let rover = MirroredRover::<7>::new(&inner).map_err(|e| border(Kind::Model, &e))?;
+        let own = Self {
+            joints: rover.joints(),
+            wheels: rover.wheel_names(),
+        };
+        let parameters = PyDict::new(ground.py());
+        parameters.set_item("model", RoverModel { inner })?;
+        let base = PlanarSimulation::build(rover, ground, parameters, options)?;
+        Ok(PyClassInitializer::from(base).add_subclass(own))
+    }
+
+    #[getter]
+    fn joints(&self) -> Vec<Vec<String>> {
+        self.joints.clone()
+    }
+
+    #[getter]
+    fn wheels(&self) -> Vec<Vec<String>> {
+        self.wheels.clone()
+    }
+}
+
 /// Adds the planar classes to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<crate::planar_ground::Line>()?;
@@ -560,5 +600,6 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PlanarSimulation>()?;
     module.add_class::<BallSimulation>()?;
     module.add_class::<TwoWheelRoverSimulation>()?;
+    module.add_class::<MirroredRoverSimulation>()?;
     Ok(())
 }

@@ -20,9 +20,10 @@ pub fn border(kind: Kind, e: &PlanarError) -> BorderError {
         | PlanarError::WheelsOverlap { value, .. }
         | PlanarError::NotAFunction { value, .. }
         | PlanarError::RepeatedPoint { value, .. } => Value::Number(*value),
-        PlanarError::TooFewPoints { count, .. } | PlanarError::MismatchedLengths { count, .. } => {
-            Value::Count(*count)
-        }
+        PlanarError::TooFewPoints { count, .. }
+        | PlanarError::MismatchedLengths { count, .. }
+        | PlanarError::CoordinateCount { count, .. } => Value::Count(*count),
+        PlanarError::NotMirrored { body } => Value::Text(body.clone()),
         _ => Value::Nothing,
     };
     BorderError {

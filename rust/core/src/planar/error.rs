@@ -74,6 +74,22 @@ pub enum PlanarError {
         /// Its height.
         value: f64,
     },
+    /// A solid of a rover that has no mirror image, or turns out of the plane.
+    #[error(
+        "model: {body} has no mirror image on the other side, or is turned out of the plane: no planar model"
+    )]
+    NotMirrored {
+        /// Its name.
+        body: String,
+    },
+    /// A rover with another number of planar coordinates than there is a simulation for.
+    #[error("model: needs {expected} coordinates in the plane, has {count}")]
+    CoordinateCount {
+        /// How many are needed.
+        expected: usize,
+        /// How many there are.
+        count: usize,
+    },
 }
 
 impl PlanarError {
@@ -85,6 +101,7 @@ impl PlanarError {
             | Self::NotPositive { field, .. }
             | Self::Negative { field, .. } => field.clone(),
             Self::WheelsOverlap { .. } => "axle_b".to_owned(),
+            Self::NotMirrored { .. } | Self::CoordinateCount { .. } => "model".to_owned(),
             Self::TooFewPoints { .. } => "x".to_owned(),
             Self::MismatchedLengths { .. } => "y".to_owned(),
             Self::NotAFunction { index, .. } => format!("x[{index}]"),

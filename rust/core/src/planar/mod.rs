@@ -2,8 +2,9 @@
 //!
 //! - [`ground`], [`curve`], [`polyline`]: what lies below a curve, and where a disc touches it;
 //! - [`machine`]: machines with few coordinates as mechanical systems with one tangent a contact;
-//! - [`ball`], [`two_wheel_rover`]: two of them; [`simulation`]: one on a ground, through time.
-//! - [`soil`]: thousands of free disks, and a machine that drives over them.
+//! - [`ball`], [`two_wheel_rover`]: two of them; [`mirrored_rover`]: the six-wheel rover driven straight;
+//! - [`soil`]: thousands of free disks, and a machine that drives over them;
+//! - [`simulation`]: one of the machines on a ground, through time.
 //!
 //! Nothing of time stepping, contact law or solver is here: [`crate::integrator`] steps these systems as it steps the rover.
 //! x points forward, y up, angles turn to the left.
@@ -13,6 +14,7 @@ pub mod curve;
 pub mod error;
 pub mod ground;
 pub mod machine;
+pub mod mirrored_rover;
 pub mod polyline;
 pub mod simulation;
 pub mod soil;
@@ -25,8 +27,10 @@ pub use ground::{ContactRule, Facing, Ground};
 pub use machine::{
     Disc, PlanarContact, PlanarKey, PlanarMachine, PlanarScratch, PlanarSystem, contact_rows,
 };
+pub use mirrored_rover::MirroredRover;
 pub use polyline::Polyline;
 pub use simulation::{
-    BallSimulation, PlanarActiveContact, PlanarSimulation, PlanarSnapshot, TwoWheelRoverSimulation,
+    BallSimulation, MirroredRoverSimulation, PlanarActiveContact, PlanarSimulation, PlanarSnapshot,
+    TwoWheelRoverSimulation,
 };
 pub use two_wheel_rover::{PlanarWheel, TwoWheelRover};

@@ -325,3 +325,6 @@ pub type BallSimulation = PlanarSimulation<3, super::ball::Ball>;
 
 /// The two-wheel rover on a ground.
 pub type TwoWheelRoverSimulation = PlanarSimulation<5, super::two_wheel_rover::TwoWheelRover>;
+
+/// The six-wheel rover, driven straight on a ground.
+pub type MirroredRoverSimulation = PlanarSimulation<7, super::mirrored_rover::MirroredRover<7>>;

@@ -1,0 +1,229 @@
+"""Plans: what a scene excludes is left out, within the stated error, and refused when it is asked for."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from rover_gym import (
+    CommandError,
+    OptionError,
+    Plane,
+    RoverModel,
+    Simulation,
+    SphereField,
+    StateError,
+    StepError,
+    TerrainError,
+)
+from rover_gym.economy import measure_economies
+from rover_gym.planar import MirroredRoverSimulation
+from rover_gym.scene_plan import WELD_ERROR, Scene, ScenePlan, plan
+from rover_gym.start import resting_pose, tilted_plane
+
+PARTS = ["ground", "steering", "base", "scheme", "contact solver", "step"]
+
+
+def straight(terrain: Plane | SphereField | None = None, **facts: object) -> Scene:
+    return Scene(terrain or Plane(), steered=False, equal_torques=True, **facts)  # type: ignore[arg-type]
+
+
+def path(made: ScenePlan, *, torque: float = 15.0, duration: float = 10.0) -> npt.NDArray[np.float64]:
+    """(n, 21) coordinates every 0.1 s of a drive straight ahead."""
+    rover = made.rover()
+    rover.set_wheel_torques(np.full(6, torque))
+    rows = []
+    for _ in range(round(duration / 0.1)):
+        assert rover.step(round(0.1 / rover.simulation.time_step)).is_converged
+        rows.append(rover.q)
+    return np.array(rows)
+
+
+def full(made: ScenePlan) -> ScenePlan:
+    return replace(made, kind="full", model=made.scene.model)
+
+
+def test_a_scene_that_excludes_nothing_gets_the_whole_model() -> None:
+    made = plan(Scene())
+    assert made.kind == "full"
+    assert made.model.nv == 21
+    assert [row["part"] for row in made.explain()] == PARTS
+    assert all(row["built"] and row["reason"] for row in made.explain())
+
+
+@pytest.mark.parametrize(
+    ("facts", "kind"),
+    [
+        ({"steered": False}, "welded"),
+        ({"steered": False, "equal_torques": True}, "planar"),
+        ({"steered": True, "equal_torques": True}, "full"),
+        ({"steered": False, "equal_torques": True, "held": True}, "welded"),
+        ({"steered": False, "equal_torques": True, "tumbles": True}, "welded"),
+        ({"steered": False, "equal_torques": True, "terrain": tilted_plane(0.1, 0.5)}, "welded"),
+        ({"steered": False, "equal_torques": True, "terrain": tilted_plane(0.1, 0.5), "heading": 0.5}, "planar"),
+        ({"steered": False, "equal_torques": True, "terrain": SphereField.rocks(0.1, (-3, -3, 3, 3), 1)}, "full"),
+    ],
+)
+def test_only_what_is_excluded_is_left_out(facts: dict[str, object], kind: str) -> None:
+    made = plan(Scene(**facts))  # type: ignore[arg-type]
+    assert made.kind == kind
+    assert [row["part"] for row in made.explain()] == PARTS
+    simulation = made.simulation()
+    assert isinstance(simulation, MirroredRoverSimulation) == (kind == "planar")
+    assert len(simulation.v) == {"full": 21, "welded": 15, "planar": 7}[kind]
+
+
+def test_nothing_is_welded_where_wheels_may_turn_by_themselves() -> None:
+    start = resting_pose(RoverModel(), Plane(), (2.0, 1.0), 0.3)
+    assert plan(straight(start=start)).kind == "planar"
+    dropped = start.copy()
+    dropped[1] += 0.01
+    assert plan(straight(start=dropped)).kind == "full"
+    lopsided = start.copy()
+    lopsided[11] = 0.1  # the left bogie alone
+    assert plan(straight(start=lopsided)).kind == "full"
+    description = RoverModel().to_dict()
+    wheel = next(solid for solid in description["solids"] if solid["name"] == "wheel_ML")
+    wheel["position"] = [0.02, -0.15, 0.0]
+    trailing = plan(straight(model=RoverModel.from_dict(description)))
+    assert trailing.kind == "full"
+    assert "beside their steering axes" in trailing.decisions[1].reason
+
+
+@pytest.mark.parametrize("slope", [0.0, 5.0, -10.0])
+@pytest.mark.parametrize("planar", [False, True])
+def test_a_straight_drive_is_the_full_models_within_the_stated_error(slope: float, planar: bool) -> None:
+    made = plan(straight(tilted_plane(math.radians(slope), 0.0)), planar=planar)
+    assert made.kind == ("planar" if planar else "welded")
+    ours, whole = path(made), path(full(made))
+    assert np.linalg.norm(whole[-1, :3] - whole[0, :3]) > 1.0
+    distance = np.linalg.norm(ours[:, :3] - whole[:, :3], axis=1).max()
+    assert distance < made.error < 2.0 * WELD_ERROR
+
+
+def test_the_planar_image_is_put_where_the_full_rover_is_on_a_diagonal() -> None:
+    scene = straight(tilted_plane(0.1, -0.7), heading=-0.7)
+    planar, welded = plan(scene), plan(scene, planar=False)
+    assert (planar.kind, welded.kind) == ("planar", "welded")
+    ours, whole = path(planar, duration=5.0, torque=25.0), path(welded, duration=5.0, torque=25.0)
+    assert whole[-1, 2] > 1.0
+    assert np.abs(ours - whole).max() < 1e-6
+
+
+def test_what_was_left_out_is_refused() -> None:
+    rover = plan(straight()).rover()
+    rover.set_steering(np.zeros(6))
+    with pytest.raises(CommandError, match="without steering") as steering:
+        rover.set_steering([0.1, 0.1, 0.0, 0.0, 0.0, 0.0])
+    assert steering.value.field == "steering"
+    with pytest.raises(CommandError, match="equal torques") as torques:
+        rover.set_wheel_torques([10.0, 11.0, 10.0, 10.0, 10.0, 10.0])
+    assert torques.value.field == "torques"
+    with pytest.raises(CommandError, match="6 numbers"):
+        rover.set_wheel_torques([10.0] * 3)
+    welded = plan(straight(), planar=False).rover()
+    welded.set_wheel_torques([10.0, 11.0, 10.0, 10.0, 10.0, 10.0])
+    with pytest.raises(CommandError, match="without steering"):
+        welded.set_steering(np.full(6, 0.1))
+    whole = plan(Scene()).rover()
+    whole.set_steering(np.full(6, 0.1))
+    assert isinstance(whole.simulation, Simulation)
+    assert whole.simulation.steering == pytest.approx(0.1)
+
+
+def test_a_planar_rover_that_tips_over_says_so() -> None:
+    made = plan(straight())
+    start = made.start.copy()
+    start[1] += 2.0
+    rover = replace(made, start=start).rover()
+    rover.set_wheel_torques(np.full(6, 150.0))  # in the air, the motors turn the trunk
+    with pytest.raises(StepError, match="planar model does not know") as tilt:
+        tuple(rover.step(10) for _ in range(40))
+    assert tilt.value.field == "pitch"
+
+
+def test_spheres_that_cannot_be_met_are_left_out() -> None:
+    centres = np.array([[0.5, -0.3, 0.0], [2.0, 0.0, 0.0], [30.0, 0.0, 0.0]])
+    field = SphereField(centres, [0.2, 0.1, 0.3], Plane())
+    assert isinstance(plan(Scene(field)).terrain, SphereField)
+    assert len(plan(Scene(field)).terrain) == 2  # type: ignore[arg-type]
+    near = plan(Scene(field, reach=5.0)).terrain
+    assert isinstance(near, SphereField)
+    assert len(near) == 1
+    flat = plan(Scene(field, reach=0.2))
+    assert isinstance(flat.terrain, Plane)
+    assert "1 are under the plane, 2 out of reach" in flat.decisions[0].reason
+    # Nothing was met, so nothing changes: bit for bit.
+    ours, whole = (path(replace(flat, terrain=terrain), duration=0.5) for terrain in (flat.terrain, flat.scene.terrain))
+    assert np.array_equal(ours, whole)
+    everything = SphereField.rocks(0.1, (-3, -3, 3, 3), 1)
+    assert len(plan(Scene(everything)).terrain) == len(everything)  # type: ignore[arg-type]
+
+
+def test_a_rover_that_leaves_the_reach_it_was_planned_with_says_so() -> None:
+    rover = plan(straight(reach=0.5)).rover()
+    rover.set_wheel_torques(np.full(6, 30.0))
+    rover.step(100)
+    with pytest.raises(StepError, match="left the reach") as left:
+        rover.step(400)
+    assert left.value.field == "reach"
+
+
+def test_newton_is_built_where_it_pays() -> None:
+    assert plan(straight(), "reference").options["variant"] == "linearised"
+    assert plan(Scene(tumbles=True), "fast").options["variant"] == "newton"
+    assert plan(Scene(), "fast").options["time_step"] == 0.02
+
+
+@pytest.mark.parametrize(
+    ("scene", "accuracy", "error", "field"),
+    [
+        (Scene(reach=-1.0), "balanced", OptionError, "reach"),
+        (Scene(heading=math.nan), "balanced", OptionError, "heading"),
+        (Scene(options={"friction": -1.0}), "balanced", OptionError, "friction"),
+        (Scene(), "best", OptionError, "accuracy"),
+        (Scene(start=np.zeros(20)), "balanced", StateError, "start"),
+        (Scene(start=np.full(21, np.nan)), "balanced", StateError, "start[0]"),
+        (Scene(SphereField.rug()), "balanced", TerrainError, "terrain"),
+        (Scene(SphereField.rug(), start=np.zeros(21), reach=0.1), "balanced", None, None),
+        (Scene(SphereField.rug(), start=np.full(21, 50.0), reach=0.1), "balanced", OptionError, "reach"),
+        (Scene(Plane((1.0, 0.0, 0.0))), "balanced", TerrainError, "terrain"),
+    ],
+)
+def test_a_scene_that_cannot_be_is_refused(
+    scene: Scene, accuracy: str, error: type[Exception] | None, field: str | None
+) -> None:
+    if error is None:
+        assert plan(scene, accuracy).kind == "full"  # type: ignore[arg-type]
+        return
+    with pytest.raises(error) as refused:
+        plan(scene, accuracy)  # type: ignore[arg-type]
+    assert refused.value.field == field  # type: ignore[attr-defined]
+
+
+def test_turned_wheels_at_the_start_contradict_a_scene_without_steering() -> None:
+    start = np.zeros(21)
+    start[7] = 0.1
+    with pytest.raises(OptionError, match="turned wheels") as refused:
+        plan(straight(start=start))
+    assert refused.value.field == "steered"
+
+
+def test_a_rover_that_is_not_its_mirror_image_is_no_planar_one() -> None:
+    model = RoverModel().replace(masses={"left_bogie": 60.0})
+    made = plan(straight(model=model))
+    assert made.kind == "welded"
+    assert "left_bogie" in next(d.reason for d in made.decisions if d.part == "base")
+
+
+def test_every_economy_is_measured_against_its_bound() -> None:
+    economies = {e.name: e for e in measure_economies(plan(straight()), duration=2.0, repeats=1)}
+    for name in ("steering welded, against the PD", "planar, against welded", "all of the model's"):
+        economy = economies[name]
+        assert economy.bound is not None
+        assert economy.error < economy.bound
+        assert economy.before > 0.0
+        assert economy.ratio == economy.after / economy.before
+    assert economies["all of the model's"].ratio < 1.0
