@@ -107,6 +107,10 @@ def test_the_rover_crosses_and_a_snapshot_continues_bit_for_bit(tmp_path: Path) 
     np.testing.assert_array_equal(run["position"][-1], end)
     assert run["penetration"].max() < 0.01 * sim.radius.min()
     assert len(frames) == len(run["time"]) == 6
+    impulses = []
+    for _ in range(100):
+        sim.step(1)
+        impulses.append(sim.impulse_on_wheels()[1])
     weight = 250.0 * 9.81 * sim.time_step
-    assert run["impulse_on_wheels"][-1][1] == pytest.approx(weight, rel=0.5)
+    assert np.mean(impulses) == pytest.approx(weight, rel=0.25)  # single steps carry knocks
     assert draw_soil(frames[-1], tmp_path / "soil.png").read_bytes().startswith(b"\x89PNG")

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from comparison.peers import ours, pinocchio_admm
+from comparison.peers import ours
 from comparison.run import run
 from comparison.scene import Array, RoverScene
 from comparison.scenes import flat_drive, rocks, rug
@@ -45,6 +45,8 @@ def _save(name: str, path: Array, meta: dict[str, Any]) -> None:
 def make_flat_drive() -> None:
     """The flat drive's path in x and z since the end of the rest."""
     scene = flat_drive.scene()
+    from comparison.peers import pinocchio_admm  # noqa: PLC0415 - only who makes references needs the peer
+
     coarse, fine = (flat_drive.driven(run(pinocchio_admm.VARIANTS[0], scene, step, NO_CAP)) for step in (1e-3, 5e-4))
     path = 2.0 * fine - coarse
     own = _ours(scene)[:, [0, 2]]
@@ -63,6 +65,8 @@ def make_flat_drive() -> None:
 
 def make_path(scene: RoverScene, peer_step: float = 1e-3) -> None:
     """The trunk's path of a scene, from this project at the finest step."""
+    from comparison.peers import pinocchio_admm  # noqa: PLC0415 - as above
+
     path = _ours(scene)
     other = run(pinocchio_admm.VARIANTS[0], scene, peer_step, NO_CAP).positions
     _save(

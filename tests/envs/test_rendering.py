@@ -452,3 +452,18 @@ def test_a_machine_without_opengl_is_told_what_to_install(monkeypatch: pytest.Mo
     monkeypatch.setitem(os.environ, "VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
     with pytest.raises(OSError, match="apt-get install libegl1"):
         FrameRenderer(RoverModel(), Plane())
+
+
+def test_an_optimizer_can_be_made_after_a_frame() -> None:
+    """A training that starts after a rendering ended in a segmentation fault: two LLVMs in one process."""
+    code = (
+        "import gymnasium, rover_gym, torch\n"
+        "env = gymnasium.make('Rover-v0', render_mode='rgb_array')\n"
+        "env.reset(seed=0)\n"
+        "print(env.render().shape)\n"
+        "torch.optim.Adam([torch.nn.Parameter(torch.zeros(1))])\n"
+        "print('made')\n"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=200)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.split() == ["(480,", "640,", "3)", "made"]

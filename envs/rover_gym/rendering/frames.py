@@ -1,7 +1,10 @@
 """The frame: the rover, what stands around it, contact forces and the camera."""
 
+import contextlib
 import ctypes
+import importlib.util
 import math
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -244,6 +247,7 @@ class _Quiet:
 
 
 def _open_window(width: int, height: int) -> vtkRenderWindow:
+    _load_triton()
     with _Quiet():
         window = vtkRenderWindow()
         # The last kind that VTK tries; without its library it would end the process at the first frame.
@@ -255,6 +259,19 @@ def _open_window(width: int, height: int) -> vtkRenderWindow:
         window.SetMultiSamples(0)  # in software, multisampling costs several times the rest of a frame
         window.SetSize(width, height)
     return window
+
+
+def _load_triton() -> None:
+    """Loads the library of triton, which PyTorch brings on Linux, before Mesa's drivers where it is installed.
+
+    Mesa makes the symbols of its LLVM global, and triton's library, loaded later, would take them for those of its own
+    LLVM: PyTorch then ends the process when it makes an optimizer (Mesa 22.3 with LLVM 15, triton 3.9).
+    """
+    package = importlib.util.find_spec("triton")
+    if package is not None and package.origin is not None:
+        library = Path(package.origin).parent / "_C" / "libtriton.so"
+        with contextlib.suppress(OSError):  # then nobody can import it later either
+            ctypes.CDLL(str(library))
 
 
 def _has_osmesa() -> bool:
