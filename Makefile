@@ -13,7 +13,7 @@ UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
 
-.PHONY: help demo test check lint types format test-rust test-slow test-python docs bench chart stability profiles train train-rllib pins clean
+.PHONY: help demo test check lint types format test-rust test-slow test-python docs bench chart stability orders profiles train train-rllib pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -85,6 +85,10 @@ chart: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CP
 
 stability: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes where methods fail, ours and other engines': docs/stability.md (5 minutes)
 	$(COMPARE).stability
+
+orders: $(STAMPS)/demo ## measure every time-stepping scheme: order, drift, energy, cost; redraw docs/comparison/orders.png
+	cargo run --release --locked --quiet -p rover-comparison --bin orders -- runs/orders.json
+	$(BIN)/python tests/comparison/draw_orders.py runs/orders.json docs/comparison/orders.png
 
 pins: $(STAMPS)/venv ## resolve requirements/*.txt anew from pyproject.toml
 	$(call pin,demo) --extra demo --group build

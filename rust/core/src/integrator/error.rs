@@ -36,4 +36,14 @@ pub enum StepError {
         /// Time before the step, s.
         time: f64,
     },
+    /// Events without end: a scheme that stops at each of them cannot pass the point where they accumulate.
+    #[error(
+        "{events} events before t = {time} s in one step: they accumulate, and an event-driven scheme cannot pass; the state before the step was kept"
+    )]
+    Accumulation {
+        /// Time of the last event, s.
+        time: f64,
+        /// Events in the step.
+        events: usize,
+    },
 }

@@ -1,0 +1,26 @@
+//! Time-stepping schemes that the rover does not use, over the systems that it does, and what each costs and reaches.
+//!
+//! Every scheme implements [`rover_core::integrator::Integrator`] over [`rover_core::integrator::MechanicalSystem`], as the rover's own do, with the same
+//! contacts, laws and solver, so that what differs between two curves is the scheme alone. They are written to be read and
+//! compared, and allocate in a step.
+//!
+//! - [`generalised_alpha`], [`schatzman_paoli`], [`event_driven`], [`penalty`]: one scheme each; [`scheme`]: the list;
+//! - [`scenes`]: motions with closed forms or a converged reference; [`measure`]: orders, drift, energy, cost.
+//!
+//! `make orders` writes the figures of `docs/integrators.md`.
+#![forbid(unsafe_code)]
+
+mod acceleration;
+pub mod event_driven;
+pub mod generalised_alpha;
+pub mod measure;
+pub mod penalty;
+pub mod scenes;
+pub mod schatzman_paoli;
+pub mod scheme;
+
+pub use event_driven::EventDriven;
+pub use generalised_alpha::GeneralisedAlpha;
+pub use penalty::Penalty;
+pub use schatzman_paoli::SchatzmanPaoli;
+pub use scheme::{Kind, SCHEMES, Scheme, Stepper};
