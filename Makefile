@@ -52,7 +52,7 @@ test-slow: ## the Rust tests that take minutes: recorded contact problems of any
 test-python: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core $(STAMPS)/debian-demo $(STAMPS)/debian-test ## the Python tests only
 	$(BIN)/pytest --numprocesses auto
 
-docs: $(STAMPS)/test $(STAMPS)/core ## build the documentation, Rust and Python, warnings denied
+docs: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core ## build the documentation, Rust and Python, warnings denied
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --locked --quiet
 	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going docs docs/_build/html
 	@echo "docs/_build/html/index.html"

@@ -676,6 +676,181 @@ class SimulationBatch:
     def __len__(self) -> int: ...
 
 @final
+class SoilContacts:
+    """Contacts of a soil's last step, one row each; those between disks that sleep are not in it."""
+
+    @property
+    def bodies(self) -> npt.NDArray[np.int64]:
+        """(n, 2) numbers of both bodies: disks from 0, then the wheels; -1 for a wall or the ground."""
+    @property
+    def points(self) -> npt.NDArray[np.float64]:
+        """(n, 2) where the first body's rim touches, m."""
+    @property
+    def normals(self) -> npt.NDArray[np.float64]:
+        """(n, 2) unit normals, from the second body into the first."""
+    @property
+    def gaps(self) -> npt.NDArray[np.float64]:
+        """(n,) at the start of the step, m; negative where bodies overlap."""
+    @property
+    def impulses(self) -> npt.NDArray[np.float64]:
+        """(n, 2) on the first body along the normal and the tangent (n_y, -n_x), N s."""
+    @property
+    def velocities(self) -> npt.NDArray[np.float64]:
+        """(n, 2) of the first body against the second after the step, along normal and tangent, m/s."""
+    @property
+    def world_impulses(self) -> npt.NDArray[np.float64]:
+        """(n, 2) on the first body along x and y, N s."""
+    def __len__(self) -> int: ...
+
+@final
+class SoilSnapshot:
+    """Everything that a soil needs to continue bit for bit; picklable."""
+
+    @staticmethod
+    def from_bytes(data: bytes) -> SoilSnapshot: ...
+    def to_bytes(self) -> bytes: ...
+
+@final
+class SoilSimulation:
+    """Free disks with friction, between walls or on a ground, and perhaps a machine that drives over them.
+
+    Args:
+        radius: (n,) m.
+        mass: (n,) kg; the disks are solid.
+        position: (n, 2) centres or (n, 3) with angles, m and rad.
+        walls: (n, 4) a point of each wall and the normal to its free side.
+        ground: A ground of any shape.
+        rover: Keyword arguments of `TwoWheelRoverSimulation` that describe a rover, such as its `parameters`.
+        rig: Mass (kg) and radius (m) of one wheel whose forward speed and turning rate nothing changes.
+        machine: (5,) coordinates of the rover (x, y, theta, theta_A, theta_B) or the rig (x, y, -, theta, -).
+        friction: Coulomb's coefficient between disks.
+        wall_friction: Of disks against walls and ground.
+        wheel_friction: Of wheels.
+        restitution: Newton's coefficient of all contacts.
+        gravity: (2,) m/s^2; (0, -9.81) if not given.
+        time_step: s.
+        tolerance: Of the contact solver, relative.
+        max_iterations: Most sweeps of the contact solver in a step.
+        stabilisation: "projection" or "none".
+        penetration_tolerance: Penetration that is projected away, m; 0.5% of the smallest radius if not given.
+        sleep: Whether disks sleep that rest far from anything that moves.
+        sleep_speed: m/s below which a disk is still; 5e-4 if not given.
+        sleep_distance: m within which nothing may move; 0.2 if not given.
+
+    Raises:
+        ModelError: A radius or mass is not finite and positive.
+        StateError: Positions of a wrong shape or not finite; disks, walls, wheels that overlap.
+        TerrainError: A wall without direction, or a ground that is none.
+        OptionError: An option is out of its range.
+    """
+
+    def __new__(
+        cls,
+        radius: npt.ArrayLike,
+        mass: npt.ArrayLike,
+        position: npt.ArrayLike,
+        *,
+        walls: npt.ArrayLike | None = None,
+        ground: Line | Sine | Spline | Polyline | None = None,
+        rover: dict[str, Any] | None = None,
+        rig: npt.ArrayLike | None = None,
+        machine: npt.ArrayLike | None = None,
+        friction: float = 0.5,
+        wall_friction: float = 0.5,
+        wheel_friction: float = 0.9,
+        restitution: float = 0.0,
+        gravity: npt.ArrayLike | None = None,
+        time_step: float = 0.001,
+        tolerance: float = 0.0001,
+        max_iterations: int = 200,
+        stabilisation: Literal["projection", "none"] = "projection",
+        penetration_tolerance: float | None = None,
+        sleep: bool = False,
+        sleep_speed: float | None = None,
+        sleep_distance: float | None = None,
+    ) -> SoilSimulation: ...
+    @property
+    def time(self) -> float: ...
+    @property
+    def time_step(self) -> float: ...
+    @property
+    def radius(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def mass(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def position(self) -> npt.NDArray[np.float64]:
+        """(n, 3) x, y (m) and angle (rad) of each disk."""
+    @property
+    def velocity(self) -> npt.NDArray[np.float64]:
+        """(n, 3) their rates, m/s and rad/s."""
+    @property
+    def asleep(self) -> npt.NDArray[np.bool_]:
+        """(n,) which disks sleep."""
+    @property
+    def machine(self) -> npt.NDArray[np.float64]:
+        """(5,) the machine's coordinates; empty without one."""
+    @property
+    def machine_rate(self) -> npt.NDArray[np.float64]:
+        """(5,) their rates; empty without a machine."""
+    @property
+    def wheels(self) -> npt.NDArray[np.float64]:
+        """(n, 3) centre and radius of each wheel, m."""
+    @property
+    def torques(self) -> npt.NDArray[np.float64]: ...
+    @property
+    def pull(self) -> tuple[float, float]:
+        """Force at the machine's centre, N."""
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The options, by the names of the arguments."""
+    def set_state(
+        self,
+        position: npt.ArrayLike,
+        velocity: npt.ArrayLike | None = None,
+        machine: npt.ArrayLike | None = None,
+        machine_rate: npt.ArrayLike | None = None,
+    ) -> None:
+        """Sets the state at time 0; rates are 0 and the machine stays where it is if not given."""
+    def set_torques(self, torques: npt.ArrayLike) -> None:
+        """(2,) N m of the rover's wheels, positive forward."""
+    def set_pull(self, pull: npt.ArrayLike) -> None:
+        """(2,) N at the machine's centre: a drawbar."""
+    def step(self, n: int = 1) -> StepReport: ...
+    @property
+    def contacts(self) -> SoilContacts: ...
+    def energy(self) -> Energy: ...
+    def momentum(self) -> npt.NDArray[np.float64]:
+        """(3,) momentum of the disks (kg m/s) and their moment of momentum about the origin (kg m^2/s)."""
+    def impulse_on_wheels(self) -> npt.NDArray[np.float64]:
+        """(2,) of the last step's contacts, N s."""
+    def penetration(self) -> float:
+        """Deepest overlap now, m."""
+    def wake(self) -> None:
+        """Wakes all disks."""
+    def snapshot(self) -> SoilSnapshot: ...
+    def restore(self, snapshot: SoilSnapshot) -> None: ...
+
+def soil_packing(
+    count: int = 222,
+    *,
+    radius_min: float = 0.016,
+    radius_max: float = 0.0165,
+    mass: float = 0.7,
+    left: float = 0.0,
+    width: float = 2.4494,
+    bottom: float = 0.0,
+    seed: int = 0,
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Radii (n,), masses (n,) and centres (n, 2) of disks in loose rows over a width, without overlap.
+
+    Radii are drawn evenly from the range; `mass` is a disk's of the mean radius, others go with the area. The
+    defaults are the original's soil: three layers of 74.
+
+    Raises:
+        ModelError: A number that is not finite or of the wrong sign, radii the wrong way round, no room for a disk.
+    """
+
+@final
 class SolverReport:
     @property
     def status(self) -> Literal["converged", "relaxed", "not_converged"]:

@@ -27,8 +27,12 @@ from rover_gym._core import (
     PlanarSnapshot,
     Polyline,
     Sine,
+    SoilContacts,
+    SoilSimulation,
+    SoilSnapshot,
     Spline,
     TwoWheelRoverSimulation,
+    soil_packing,
 )
 from rover_gym.recording import Channel, Recorder
 
@@ -41,10 +45,14 @@ __all__ = [
     "PlanarSnapshot",
     "Polyline",
     "Sine",
+    "SoilContacts",
+    "SoilSimulation",
+    "SoilSnapshot",
     "Spline",
     "TwoWheelRoverSimulation",
     "describe",
     "record",
+    "soil_packing",
 ]
 
 Ground = Line | Sine | Spline | Polyline

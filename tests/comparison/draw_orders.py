@@ -37,28 +37,34 @@ def draw(measured: dict[str, Any], target: Path) -> None:
         steps: list[float] = []
         for i, scheme in enumerate(measured["schemes"]):
             curve = scheme[key]
-            points = [(h * 1e3, max(e, FLOOR)) for h, e in zip(curve["h"], curve["error"], strict=True) if e is not None]
-            steps = [h * 1e3 for h in curve["h"]]
+            points = [
+                (h * 1e3, max(e, FLOOR)) for h, e in zip(curve["h"], curve["error"], strict=True) if e is not None
+            ]
+            steps += [h * 1e3 for h in curve["h"]]
             if points:
                 axis.loglog(
                     *zip(*points, strict=True),
                     marker=markers[i],
                     markersize=4.5,
                     linewidth=1.2,
+                    linestyle="-" if i % 2 == 0 else "--",  # some lie on each other
                     color=f"C{i}",
                     label=scheme["name"],
                 )
-        low, high = min(steps), max(steps)
+        # Slopes to compare with, in the middle of the panel where the reference leaves room.
+        high = max(steps)
+        low = high / 8
         bottom, top = axis.get_ylim()
+        level = (bottom**0.45) * (top**0.55)
         for order in (1, 2):
-            start = (top / 3) * (low / high) ** order
-            if start > bottom:
-                axis.loglog([low, high], [start, top / 3], color="0.6", linewidth=0.8, linestyle=":")
-                axis.annotate(f"{order}", (low, start), color="0.4", fontsize=8, ha="right", va="center")
+            start = level * (low / high) ** order
+            axis.loglog([low, high], [start, level], color="0.5", linewidth=0.9, linestyle=":")
+            axis.annotate(f"{order}", (low, start), color="0.4", fontsize=8, ha="right", va="center")
         axis.set_title(title, fontsize=10)
         axis.set_xlabel("step (ms)")
         axis.set_ylabel(unit)
-        axis.set_xticks(steps, [f"{h:g}" for h in steps])
+        ticks = [t for t in (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 40) if min(steps) * 0.9 <= t <= high * 1.1]
+        axis.set_xticks(ticks, [f"{t:g}" for t in ticks])
         axis.minorticks_off()
         axis.grid(visible=True, which="major", color="0.9")
     handles, labels = axes.flat[0].get_legend_handles_labels()

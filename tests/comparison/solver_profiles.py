@@ -103,7 +103,7 @@ def pile(masses: list[float], mu: float) -> Problem:
     H = np.vstack(rows)
     inverse = np.concatenate([[1 / m] * 3 + [6 / m] * 3 for m in masses])
     v = np.tile([0.0, -9.81e-3, 0.0, 0.0, 0.0, 0.0], len(masses))
-    label = f"pile_{len(masses)}_ratio{max(masses) / min(masses):.0e}"
+    label = f"pile_{len(masses)}_top{masses[-1] / masses[0]:.0e}"
     return Problem(label, H * inverse @ H.T, H @ v, np.full(len(H) // 3, mu), 3)
 
 
@@ -321,24 +321,6 @@ def main() -> None:
         print("no folder of recorded problems: the synthetic families only")
     problems = [p for p in recorded(arguments.problems) + synthetic() if arguments.only in p.name]
     results = compare(problems, arguments.siconos)
-    taus = np.logspace(0, 4, 200)
-    costs = {
-        "time": {n: [r.seconds if r.is_solved else np.inf for r in row.values()] for n, row in results.items()},
-        "iterations": {
-            n: [float(max(r.iterations, 1)) if r.is_solved else np.inf for r in row.values()]
-            for n, row in results.items()
-        },
-    }
-    profiles = {what: profile(cost, taus) for what, cost in costs.items()}
-    arguments.output.mkdir(parents=True, exist_ok=True)
-    draw(profiles, taus, len(problems), arguments.output / "solver_profiles.png")
-    rounded = {
-        name: {
-            key: [short(r.seconds, 3), r.iterations, short(r.relative, 2), short(r.velocity, 2)]
-            for key, r in row.items()
-        }
-        for name, row in results.items()
-    }
     summary = {
         "meta": {
             "command": "make profiles",
@@ -346,17 +328,41 @@ def main() -> None:
             "residual": RESIDUAL,
             "velocity": VELOCITY,
             "columns": ["CPU seconds", "iterations", "relative residual", "largest violation, m/s"],
-            "peer": "planar problems embedded in space; dense W, a cap of 5 s of CPU time a run",
+            "peer": f"planar problems embedded in space; dense W; a cap of {CAP:g} s of CPU time a run",
             "recorded": arguments.problems is not None,
         },
-        "solved": {name: sum(r.is_solved for r in row.values()) for name, row in results.items()},
-        "n_problems": len(problems),
-        "runs": rounded,
+        "runs": {
+            name: {
+                key: [short(r.seconds, 3), r.iterations, short(r.relative, 2), short(r.velocity, 2)]
+                for key, r in row.items()
+            }
+            for name, row in results.items()
+        },
     }
-    (arguments.output / "solver_profiles.json").write_text(
-        json.dumps(summary, indent=None, separators=(",", ":")) + "\n", encoding="utf-8"
-    )
-    print(json.dumps(summary["solved"]), "of", len(problems))
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(summary, separators=(",", ":"))
+    (arguments.output / "solver_profiles.json").write_text(text + "\n", encoding="utf-8")
+    print_and_draw(summary, arguments.output / "solver_profiles.png")
+
+
+def print_and_draw(summary: dict[str, Any], path: Path) -> None:
+    """Counts what each solver solved and draws the profiles of a summary as it is in the JSON."""
+    runs: dict[str, dict[str, list[float | None]]] = summary["runs"]
+
+    def cost(run: list[float | None], column: int) -> float:
+        value, relative, velocity = run[column], run[2], run[3]
+        solved = relative is not None and relative <= RESIDUAL and velocity is not None and velocity <= VELOCITY
+        return max(value, 1e-9) if solved and value is not None else np.inf
+
+    taus = np.logspace(0, 4, 200)
+    profiles = {}
+    for column, what in enumerate(("time", "iterations")):
+        costs = {name: [cost(run, column) for run in row.values()] for name, row in runs.items()}
+        profiles[what] = profile(costs, taus)
+    n_problems = len(next(iter(runs.values())))
+    draw(profiles, taus, n_problems, path)
+    for name, row in runs.items():
+        print(f"{name:16} {sum(np.isfinite(cost(run, 0)) for run in row.values())} of {n_problems}")
 
 
 if __name__ == "__main__":

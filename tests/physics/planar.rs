@@ -8,5 +8,7 @@ mod scenes;
 mod ball;
 #[path = "planar/siconos.rs"]
 mod siconos;
+#[path = "planar/soil.rs"]
+mod soil;
 #[path = "planar/two_wheel_rover.rs"]
 mod two_wheel_rover;

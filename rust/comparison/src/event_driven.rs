@@ -23,7 +23,7 @@ use rover_core::integrator::{
 };
 use rover_core::law::newton_impact::rebound;
 use rover_core::nalgebra::{DMatrix, DVector};
-use rover_core::problem::Dimension;
+use rover_core::problem::{Dimension, Operator};
 use rover_core::solver::SolverWorkspace;
 
 use crate::acceleration::{
@@ -214,7 +214,7 @@ impl<S: MechanicalSystem> Run<'_, S> {
         self.system
             .add_local_of_velocity(&motion.contacts, &a, &mut b);
         let W = self.system.problem(&b, &motion.mu).operator();
-        let mut A = DMatrix::from_row_slice(n, n, W);
+        let mut A = dense(W, n);
         let mut rhs = DVector::from_iterator(n, b.iter().map(|b| -b));
         for (i, (mode, mu)) in motion.modes.iter().zip(&motion.mu).enumerate() {
             if let Mode::Slide(sign) = mode {
@@ -300,7 +300,7 @@ impl<S: MechanicalSystem> Run<'_, S> {
             self.system.assemble(&motion.contacts, v, &mut u);
             let is_last = iteration == 3;
             let W = self.system.problem(&u, &motion.mu).operator();
-            let mut A = DMatrix::from_row_slice(n, n, W);
+            let mut A = dense(W, n);
             let mut rhs = DVector::zeros(n);
             for (i, (contact, mode)) in motion.contacts.iter().zip(&motion.modes).enumerate() {
                 rhs[2 * i] = if is_last { -u[2 * i] } else { -contact.gap() };
@@ -532,4 +532,16 @@ fn stop_slip<S: MechanicalSystem>(
         };
     }
     run.project(motion, q, v)
+}
+
+/// The operator as a matrix, column by column.
+fn dense(W: Operator<'_>, n: usize) -> DMatrix<f64> {
+    let zero = vec![0.0; n];
+    let mut A = DMatrix::zeros(n, n);
+    for (j, mut column) in A.column_iter_mut().enumerate() {
+        let mut unit = zero.clone();
+        unit[j] = 1.0;
+        W.multiply_add(&unit, &zero, column.as_mut_slice());
+    }
+    A
 }

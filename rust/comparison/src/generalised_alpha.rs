@@ -63,6 +63,7 @@ impl GeneralisedAlpha {
 }
 
 impl<S: MechanicalSystem> Integrator<S> for GeneralisedAlpha {
+    #[allow(clippy::too_many_lines)] // the page's equations, line by line in their order
     fn step(
         &self,
         system: &mut S,

@@ -45,6 +45,7 @@ struct Memory {
 }
 
 impl<S: MechanicalSystem> Integrator<S> for SchatzmanPaoli {
+    #[allow(clippy::too_many_lines)] // the page's equations, line by line in their order
     fn step(
         &self,
         system: &mut S,

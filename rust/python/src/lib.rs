@@ -10,6 +10,7 @@ mod friction_contact;
 mod model;
 mod planar;
 mod planar_ground;
+mod planar_soil;
 mod plane;
 mod reading;
 mod simulation;
@@ -40,5 +41,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module
     )?)?;
     planar::register(module)?;
+    planar_soil::register(module)?;
     Ok(())
 }

@@ -267,7 +267,7 @@ fn options(given: Option<&Bound<'_, PyDict>>) -> PyResult<Options> {
 }
 
 /// Two numbers.
-fn pair(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vector2<f64>> {
+pub fn pair(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vector2<f64>> {
     let values = vector(value, kind, field)?;
     match values[..] {
         [x, y] => Ok(Vector2::new(x, y)),

@@ -19,7 +19,9 @@
 
 use super::options::StepOptions;
 use crate::contact::Activation;
+use crate::law::newton_impact::rebound;
 use crate::problem::{Dimension, FrictionContactProblem};
+use crate::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
 
 /// A contact as time stepping sees it: a name and a gap.
 pub trait UnilateralContact {
@@ -172,6 +174,33 @@ pub trait MechanicalSystem {
 
     /// The friction-contact problem of the assembled W, with the free velocity q (d n_c), m/s, and μ (n_c).
     fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a>;
+
+    /// What is added to the normal free velocity, m/s, so that the problem's `0 ≤ u_N ⊥ p_N ≥ 0` is the contact's law.
+    ///
+    /// The default is Newton's impact law, `e u_N⁻`.
+    fn normal_shift(
+        &self,
+        options: &StepOptions,
+        _contact: &Self::Contact,
+        u_N_before: f64,
+    ) -> f64 {
+        rebound(options.restitution, u_N_before)
+    }
+
+    /// Solves [`Self::problem`]: p (d n_c), N s, in and out, and u (d n_c), m/s, out, as [`solve`] takes them.
+    ///
+    /// A system of very many bodies has its own way, which needs no W.
+    fn solve(
+        &self,
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        p: &mut [f64],
+        u: &mut [f64],
+        workspace: &mut SolverWorkspace,
+    ) -> SolveReport {
+        solve(&self.problem(q, mu), options, p, u, workspace)
+    }
 
     /// How far a displacement `y` (nv) moves what is not a contact point, m: the projection's guard.
     fn displacement(&self, y: &[f64]) -> f64;

@@ -28,8 +28,7 @@ use super::scratch::Scratch;
 use super::warm_start::WarmStart;
 use super::{Integrator, KeyOf, ScratchOf, StateMut};
 use crate::contact::Activation;
-use crate::law::newton_impact::rebound;
-use crate::solver::{SolveReport, solve};
+use crate::solver::SolveReport;
 
 /// The linearised variant.
 #[derive(Clone, Copy, Debug, Default)]
@@ -219,25 +218,30 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
         } else {
             system.add_local_of_velocity(&ws.contacts, &ws.v, &mut ws.q_free);
         }
-        for (q, u) in ws
-            .q_free
-            .chunks_exact_mut(d)
-            .zip(ws.u_before.chunks_exact(d))
-        {
-            q[0] += rebound(options.restitution, u[0]);
+        let shift = |(contact, before): (&S::Contact, &[f64])| {
+            system.normal_shift(options, contact, before[0])
+        };
+        let shifts = || {
+            ws.contacts
+                .iter()
+                .zip(ws.u_before.chunks_exact(d))
+                .map(shift)
+        };
+        for (q, shift) in ws.q_free.chunks_exact_mut(d).zip(shifts()) {
+            q[0] += shift;
         }
-        let problem = system.problem(&ws.q_free, &ws.mu);
-        let solved = solve(
-            &problem,
+        let solved = system.solve(
+            &ws.q_free,
+            &ws.mu,
             &options.solver,
             &mut ws.p,
             &mut ws.u,
             &mut ws.solver,
         );
         note(&mut report, &solved);
-        // u came with the restitution term inside: take it out again.
-        for (u, before) in ws.u.chunks_exact_mut(d).zip(ws.u_before.chunks_exact(d)) {
-            u[0] -= rebound(options.restitution, before[0]);
+        // u came with the shift inside: take it out again.
+        for (u, shift) in ws.u.chunks_exact_mut(d).zip(shifts()) {
+            u[0] -= shift;
         }
         system.add_impulses(&ws.p, &mut ws.y);
         probe.end(Phase::Solve);

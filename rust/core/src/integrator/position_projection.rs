@@ -13,7 +13,7 @@ use super::mechanical_system::MechanicalSystem;
 use super::moreau_jean::{note, set_friction};
 use super::options::{Stabilisation, StepOptions};
 use super::report::StepReport;
-use crate::solver::{SolveReport, SolveStatus, solve};
+use crate::solver::{SolveReport, SolveStatus};
 
 /// Corrects `ws.end`, where the contacts are predicted to have the gaps `ws.gap_end`.
 pub(super) fn project<S: MechanicalSystem>(
@@ -64,9 +64,9 @@ fn displace<S: MechanicalSystem>(
     ws: &mut ScratchOf<S>,
 ) -> SolveReport {
     ws.p_position.fill(0.0);
-    let problem = system.problem(&ws.q_free, &ws.mu);
-    let solved = solve(
-        &problem,
+    let solved = system.solve(
+        &ws.q_free,
+        &ws.mu,
         &options.solver,
         &mut ws.p_position,
         &mut ws.u_position,

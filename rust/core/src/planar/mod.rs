@@ -3,6 +3,7 @@
 //! - [`ground`], [`curve`], [`polyline`]: what lies below a curve, and where a disc touches it;
 //! - [`machine`]: machines with few coordinates as mechanical systems with one tangent a contact;
 //! - [`ball`], [`two_wheel_rover`]: two of them; [`simulation`]: one on a ground, through time.
+//! - [`soil`]: thousands of free disks, and a machine that drives over them.
 //!
 //! Nothing of time stepping, contact law or solver is here: [`crate::integrator`] steps these systems as it steps the rover.
 //! x points forward, y up, angles turn to the left.
@@ -14,6 +15,7 @@ pub mod ground;
 pub mod machine;
 pub mod polyline;
 pub mod simulation;
+pub mod soil;
 pub mod two_wheel_rover;
 
 pub use ball::Ball;

@@ -1,7 +1,7 @@
 //! Dense or block-sparse: the storage of `W` that the solve works on.
 //!
-//! Few contacts are dense whatever the caller has; many contacts whose blocks are mostly zero are block-sparse. Measured on the recorded
-//! problems of 50 to 667 contacts: with 2% of the blocks a Newton step costs a fiftieth, a sweep a tenth; at 24% they are even.
+//! Few contacts are dense whatever the caller has; many contacts whose blocks are mostly zero are block-sparse. Measured on 296
+//! contacts with 1.6% of the blocks: the same 580 Newton steps cost a twentieth.
 
 use crate::problem::{BlockSparseDelassus, FrictionContactProblem, Operator};
 

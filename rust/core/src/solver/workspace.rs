@@ -1,6 +1,7 @@
 //! Scratch memory of a solve, kept between solves so that none of them allocates.
 
 use super::block_lu::BlockLu;
+use super::body_pairs::BodyPairsWorkspace;
 use super::islands::Islands;
 use super::modes::Linearised;
 use super::storage::Storage;
@@ -47,6 +48,8 @@ pub struct SolverWorkspace {
     pub(super) is_analysed: bool,
     /// `W` in the storage that suits its size.
     pub(super) storage: Storage,
+    /// Of the sweeps over pairs of bodies.
+    pub(crate) body_pairs: BodyPairsWorkspace,
     /// Problems of the islands.
     pub(super) islands: Option<Box<Islands>>,
 }

@@ -1,0 +1,97 @@
+//! The disks: radii and masses, and the factors of their diagonal mass matrix.
+
+use super::super::error::positive;
+use super::error::SoilError;
+
+/// Solid disks, immutable: `J = m r²/2`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Disks {
+    radius: Vec<f64>,
+    mass: Vec<f64>,
+    /// `1/√m`.
+    pub(super) linear: Vec<f64>,
+    /// `r/√J = √(2/m)`.
+    pub(super) angular: Vec<f64>,
+    /// `√m`, `√J`.
+    pub(super) roots: Vec<[f64; 2]>,
+    largest: f64,
+    smallest: f64,
+}
+
+impl Disks {
+    /// `radius` (n) in m, `mass` (n) in kg.
+    ///
+    /// # Errors
+    /// None at all, another number of masses, an entry that is not finite and positive.
+    pub fn new(radius: Vec<f64>, mass: Vec<f64>) -> Result<Self, SoilError> {
+        if radius.is_empty() {
+            return Err(SoilError::Empty);
+        }
+        if mass.len() != radius.len() {
+            return Err(SoilError::Length {
+                field: "mass",
+                expected: radius.len(),
+                count: mass.len(),
+            });
+        }
+        for (name, values) in [("radius", &radius), ("mass", &mass)] {
+            for (i, value) in values.iter().enumerate() {
+                positive(&format!("{name}[{i}]"), *value)?;
+            }
+        }
+        let roots = radius.iter().zip(&mass);
+        Ok(Self {
+            linear: mass.iter().map(|m| 1.0 / m.sqrt()).collect(),
+            angular: mass.iter().map(|m| (2.0 / m).sqrt()).collect(),
+            roots: roots
+                .map(|(r, m)| [m.sqrt(), r * (0.5 * m).sqrt()])
+                .collect(),
+            largest: radius.iter().copied().fold(0.0, f64::max),
+            smallest: radius.iter().copied().fold(f64::INFINITY, f64::min),
+            radius,
+            mass,
+        })
+    }
+
+    /// Number of disks.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.radius.len()
+    }
+
+    /// Never: a soil has at least one disk.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.radius.is_empty()
+    }
+
+    /// Radii, m.
+    #[must_use]
+    pub fn radius(&self) -> &[f64] {
+        &self.radius
+    }
+
+    /// Masses, kg.
+    #[must_use]
+    pub fn mass(&self) -> &[f64] {
+        &self.mass
+    }
+
+    /// `J = m r²/2` of disk i, kg m².
+    #[must_use]
+    pub fn inertia(&self, i: usize) -> f64 {
+        0.5 * self.mass[i] * self.radius[i] * self.radius[i]
+    }
+
+    /// Largest radius, m.
+    #[must_use]
+    pub fn largest(&self) -> f64 {
+        self.largest
+    }
+
+    /// Smallest radius, m.
+    #[must_use]
+    pub fn smallest(&self) -> f64 {
+        self.smallest
+    }
+}

@@ -1,0 +1,485 @@
+//! A soil through time.
+
+use std::sync::Arc;
+
+use nalgebra::{SVector, Vector2};
+use serde::{Deserialize, Serialize};
+
+use super::super::error::finite;
+use super::contact::{SoilContact, SoilKey};
+use super::disks::Disks;
+use super::error::SoilError;
+use super::grid::Grid;
+use super::scene::SoilScene;
+use super::sleep::{Sleep, SleepOptions, StepTaken};
+use super::system::{SoilParts, SoilSystem};
+use crate::integrator::{
+    Integrator, NoProbe, OptionsError, Probe, Scratch, StateMut, StepError, StepOptions,
+    StepReport, WarmStart,
+};
+use crate::multibody::Energy;
+use crate::simulation::SnapshotError;
+use crate::solver::SolverOptions;
+
+/// Options that suit a soil of these disks.
+///
+/// θ = 1 and γ = 1, which the contact's law needs; h = 1 ms; solver tolerance 1e-4 and at most 200 sweeps; penetration is
+/// projected away from 0.5% of the smallest radius on.
+#[must_use]
+pub fn soil_options(disks: &Disks) -> StepOptions {
+    StepOptions {
+        theta: 1.0,
+        forecast: 1.0,
+        time_step: 1e-3,
+        penetration_tolerance: 5e-3 * disks.smallest(),
+        solver: SolverOptions {
+            tolerance: 1e-4,
+            velocity_tolerance: 1e-3,
+            max_sweeps: 200,
+            ..SolverOptions::default()
+        },
+        ..StepOptions::default()
+    }
+}
+
+/// A contact of the last step with what it did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SoilActiveContact {
+    /// Bodies, point, normal, gaps.
+    pub contact: SoilContact,
+    /// Impulse along n, t, N s, on the first body.
+    pub impulse: [f64; 2],
+    /// Local velocity after the step along n, t, m/s.
+    pub velocity: [f64; 2],
+}
+
+/// All that a soil needs to continue bit for bit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SoilSnapshot {
+    /// (x, y, θ) of each disk, then the machine's coordinates, m and rad.
+    pub q: Vec<f64>,
+    /// Their rates.
+    pub v: Vec<f64>,
+    /// s.
+    pub time: f64,
+    /// Steps taken.
+    pub count: usize,
+    /// Torques, N m.
+    pub inputs: Vec<f64>,
+    /// Force at the machine, N.
+    pub pull: [f64; 2],
+    /// Where the next solve starts.
+    pub warm_start: WarmStart<SoilKey>,
+    /// Who sleeps.
+    pub sleep: Sleep,
+}
+
+/// A soil, its state and its scratch. The description is shared.
+#[derive(Clone, Debug)]
+pub struct SoilSimulation {
+    scene: Arc<SoilScene>,
+    options: StepOptions,
+    sleep_options: Option<SleepOptions>,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    time: f64,
+    count: usize,
+    inputs: Vec<f64>,
+    pull: Vector2<f64>,
+    warm_start: WarmStart<SoilKey>,
+    sleep: Sleep,
+    parts: SoilParts,
+    scratch: Scratch<Vec<f64>, SoilContact>,
+    has_contacts: bool,
+}
+
+impl SoilSimulation {
+    /// At rest in the configuration `q` (nv): (x, y, θ) of each disk, then the machine's coordinates.
+    ///
+    /// # Errors
+    /// A description or configuration that cannot be: see [`SoilScene::check_configuration`].
+    pub fn new(
+        scene: Arc<SoilScene>,
+        options: StepOptions,
+        sleep_options: Option<SleepOptions>,
+        q: Vec<f64>,
+    ) -> Result<Self, SoilSetupError> {
+        options.check()?;
+        for (field, value) in [("theta", options.theta), ("forecast", options.forecast)] {
+            if value < 1.0 {
+                return Err(SoilSetupError::Options(OptionsError::OutOfRange {
+                    field,
+                    range: "1 in a soil",
+                    value,
+                }));
+            }
+        }
+        scene.check()?;
+        scene.check_configuration(&q)?;
+        let (n, nv) = (scene.disks.len(), scene.nv());
+        let n_inputs = scene.machine.as_ref().map_or(0, |m| m.n_inputs());
+        Ok(Self {
+            scratch: Scratch::new(&q, nv, 3 * n, 2),
+            v: vec![0.0; nv],
+            q,
+            time: 0.0,
+            count: 0,
+            inputs: vec![0.0; n_inputs],
+            pull: Vector2::zeros(),
+            warm_start: WarmStart::default(),
+            sleep: Sleep::new(n),
+            parts: SoilParts::default(),
+            has_contacts: false,
+            scene,
+            options,
+            sleep_options,
+        })
+    }
+
+    /// The description.
+    #[must_use]
+    pub fn scene(&self) -> &Arc<SoilScene> {
+        &self.scene
+    }
+
+    /// Options of every step.
+    #[must_use]
+    pub fn options(&self) -> &StepOptions {
+        &self.options
+    }
+
+    /// (x, y, θ) of each disk, then the machine's coordinates, m and rad.
+    #[must_use]
+    pub fn q(&self) -> &[f64] {
+        &self.q
+    }
+
+    /// Their rates.
+    #[must_use]
+    pub fn v(&self) -> &[f64] {
+        &self.v
+    }
+
+    /// s.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// Torques of the machine, N m, positive forward.
+    #[must_use]
+    pub fn inputs(&self) -> &[f64] {
+        &self.inputs
+    }
+
+    /// Force at the machine's first two coordinates, N.
+    #[must_use]
+    pub fn pull(&self) -> Vector2<f64> {
+        self.pull
+    }
+
+    /// Which disks sleep (n).
+    #[must_use]
+    pub fn asleep(&self) -> &[bool] {
+        self.sleep.asleep()
+    }
+
+    /// Contacts of the last step; none before the first and after a restore. Contacts among sleeping disks are not in it.
+    pub fn contacts(&self) -> impl Iterator<Item = SoilActiveContact> + '_ {
+        let count = if self.has_contacts {
+            self.scratch.contacts().len()
+        } else {
+            0
+        };
+        let local = self.scratch.impulses().chunks_exact(2);
+        let local = local.zip(self.scratch.velocities().chunks_exact(2));
+        let contacts = self.scratch.contacts().iter().zip(local).take(count);
+        contacts.map(|(contact, (p, u))| SoilActiveContact {
+            contact: *contact,
+            impulse: [p[0], p[1]],
+            velocity: [u[0], u[1]],
+        })
+    }
+
+    /// Sets configuration and rates (nv); time 0, all awake, warm start forgotten, torques kept.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; nothing is changed then.
+    pub fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), SoilError> {
+        self.scene.check_configuration(q)?;
+        if v.len() != q.len() {
+            return Err(SoilError::Length {
+                field: "velocity",
+                expected: q.len(),
+                count: v.len(),
+            });
+        }
+        let n = self.scene.disks.len();
+        for (k, value) in v.iter().enumerate() {
+            let field = if k < 3 * n {
+                format!("velocity[{}]", k / 3)
+            } else {
+                format!("machine_rate[{}]", k - 3 * n)
+            };
+            finite(&field, *value)?;
+        }
+        self.q.copy_from_slice(q);
+        self.v.copy_from_slice(v);
+        self.time = 0.0;
+        self.count = 0;
+        self.warm_start.clear();
+        self.sleep = Sleep::new(n);
+        self.has_contacts = false;
+        Ok(())
+    }
+
+    /// Sets the torques, N m, positive forward. Wakes nothing: what turns does.
+    ///
+    /// # Errors
+    /// Wrong length or an entry that is not finite; nothing is changed then.
+    pub fn set_inputs(&mut self, inputs: &[f64]) -> Result<(), SoilError> {
+        if inputs.len() != self.inputs.len() {
+            return Err(SoilError::Length {
+                field: "torques",
+                expected: self.inputs.len(),
+                count: inputs.len(),
+            });
+        }
+        for (k, value) in inputs.iter().enumerate() {
+            finite(&format!("torques[{k}]"), *value)?;
+        }
+        self.inputs.copy_from_slice(inputs);
+        Ok(())
+    }
+
+    /// Sets a force at the machine's first two coordinates, N: a drawbar.
+    ///
+    /// # Errors
+    /// No machine, or an entry that is not finite; nothing is changed then.
+    pub fn set_pull(&mut self, pull: [f64; 2]) -> Result<(), SoilError> {
+        if self.scene.machine.is_none() {
+            return Err(SoilError::NoMachine);
+        }
+        for (k, value) in pull.iter().enumerate() {
+            finite(&format!("pull[{k}]"), *value)?;
+        }
+        self.pull = pull.into();
+        Ok(())
+    }
+
+    /// Takes `n` steps, or stops at the first that fails, keeping the state before it.
+    ///
+    /// # Errors
+    /// See [`StepError`]. A solver that did not converge is no error: see the report.
+    pub fn step(&mut self, n: usize) -> Result<StepReport, StepError> {
+        self.step_probed(n, &mut NoProbe)
+    }
+
+    /// The same, telling `probe` of the phases.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_probed(
+        &mut self,
+        n: usize,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError> {
+        let variant = self.options.variant;
+        let mut total = StepReport::default();
+        for _ in 0..n {
+            let mut system = SoilSystem {
+                scene: &self.scene,
+                asleep: self.sleep.asleep(),
+                inputs: &self.inputs,
+                pull: self.pull,
+                parts: &mut self.parts,
+            };
+            let state = StateMut {
+                configuration: &mut self.q,
+                v: &mut self.v,
+                time: &mut self.time,
+            };
+            let report = variant.step(
+                &mut system,
+                &self.options,
+                state,
+                &mut self.warm_start,
+                &mut self.scratch,
+                probe,
+            )?;
+            total.merge(&report);
+            self.count += 1;
+            self.has_contacts = true;
+            if let Some(options) = &self.sleep_options {
+                let taken = StepTaken {
+                    scene: &self.scene,
+                    weight_impulse: self.options.gravity.norm() * self.options.time_step,
+                    q: &self.q,
+                    v: &mut self.v,
+                    contacts: self.scratch.contacts(),
+                    impulses: self.scratch.impulses(),
+                    count: self.count,
+                };
+                self.sleep.update(options, taken, &mut self.warm_start);
+            }
+        }
+        Ok(total)
+    }
+
+    /// Kinetic and potential energy now, J.
+    #[must_use]
+    pub fn energy(&self) -> Energy {
+        let disks = &self.scene.disks;
+        let gravity = self.options.gravity.xy();
+        let mut energy = Energy::default();
+        for (i, m) in disks.mass().iter().enumerate() {
+            let (q, v) = (&self.q[3 * i..3 * i + 3], &self.v[3 * i..3 * i + 3]);
+            energy.kinetic += 0.5 * m * (v[0] * v[0] + v[1] * v[1]);
+            energy.kinetic += 0.5 * disks.inertia(i) * v[2] * v[2];
+            energy.potential -= m * (gravity.x * q[0] + gravity.y * q[1]);
+        }
+        if let Some(machine) = &self.scene.machine {
+            let (pose, rate) = self.own();
+            energy.kinetic += 0.5 * rate.dot(&(machine.mass_matrix(&pose) * rate));
+            energy.potential += machine.potential(&pose, &gravity);
+        }
+        energy
+    }
+
+    fn own(&self) -> (SVector<f64, 5>, SVector<f64, 5>) {
+        let at = 3 * self.scene.disks.len();
+        (
+            SVector::from_column_slice(&self.q[at..]),
+            SVector::from_column_slice(&self.v[at..]),
+        )
+    }
+
+    /// Momentum (x, y) of the disks, kg m/s, and their moment of momentum about the origin, kg m²/s.
+    #[must_use]
+    pub fn momentum(&self) -> [f64; 3] {
+        let disks = &self.scene.disks;
+        let mut sum = [0.0; 3];
+        for (i, m) in disks.mass().iter().enumerate() {
+            let (q, v) = (&self.q[3 * i..3 * i + 3], &self.v[3 * i..3 * i + 3]);
+            sum[0] += m * v[0];
+            sum[1] += m * v[1];
+            sum[2] += m * (q[0] * v[1] - q[1] * v[0]) + disks.inertia(i) * v[2];
+        }
+        sum
+    }
+
+    /// Impulse (x, y) of the last step's contacts on the machine's wheels, N s.
+    #[must_use]
+    pub fn impulse_on_wheels(&self) -> [f64; 2] {
+        let n = self.scene.disks.len();
+        let mut sum = Vector2::zeros();
+        for active in self.contacts().filter(|c| c.contact.key.a as usize >= n) {
+            let [p_N, p_T] = active.impulse;
+            sum += active.contact.n * p_N + active.contact.t() * p_T;
+        }
+        sum.into()
+    }
+
+    /// Deepest overlap now, m: 0 where nothing overlaps.
+    #[must_use]
+    pub fn penetration(&self) -> f64 {
+        let disks = &self.scene.disks;
+        let (n, radius) = (disks.len(), disks.radius());
+        let mut grid = Grid::default();
+        grid.fill(&self.q, radius, 2.0 * disks.largest());
+        let mut facing = Vec::new();
+        let mut least = 0.0_f64;
+        let mut meet = |i: usize, x: f64, y: f64, r: f64| {
+            grid.near(x, y, r + disks.largest(), |item| {
+                if item.index as usize != i {
+                    least = least.min((item.x - x).hypot(item.y - y) - r - item.radius);
+                }
+            });
+            for wall in &self.scene.walls {
+                least = least.min(wall.distance(x, y) - r);
+            }
+            if let Some(ground) = &self.scene.ground {
+                facing.clear();
+                ground.facing(&Vector2::new(x, y), r, &mut facing);
+                least = facing.iter().fold(least, |l, f| l.min(f.distance - r));
+            }
+        };
+        for (i, r) in radius.iter().enumerate() {
+            meet(i, self.q[3 * i], self.q[3 * i + 1], *r);
+        }
+        if let Some(machine) = &self.scene.machine {
+            let (pose, _) = self.own();
+            for k in 0..machine.n_discs() {
+                let disc = machine.disc(k, &pose);
+                meet(n + k, disc.centre.x, disc.centre.y, disc.radius);
+            }
+        }
+        -least
+    }
+
+    /// Wakes all disks.
+    pub fn wake(&mut self) {
+        self.sleep.wake_all(&mut self.warm_start);
+    }
+
+    /// Everything that is needed to continue bit for bit.
+    #[must_use]
+    pub fn snapshot(&self) -> SoilSnapshot {
+        SoilSnapshot {
+            q: self.q.clone(),
+            v: self.v.clone(),
+            time: self.time,
+            count: self.count,
+            inputs: self.inputs.clone(),
+            pull: self.pull.into(),
+            warm_start: self.warm_start.clone(),
+            sleep: self.sleep.clone(),
+        }
+    }
+
+    /// Goes back to a snapshot.
+    ///
+    /// # Errors
+    /// A snapshot of another scene or with damaged contents; nothing is changed then.
+    pub fn restore(&mut self, snapshot: &SoilSnapshot) -> Result<(), SnapshotError> {
+        let nv = self.scene.nv();
+        if snapshot.q.len() != nv || snapshot.inputs.len() != self.inputs.len() {
+            return Err(SnapshotError::OtherModel);
+        }
+        let warm = &snapshot.warm_start;
+        let mut numbers = [&snapshot.q, &snapshot.v, &snapshot.inputs, &warm.persistent]
+            .into_iter()
+            .flatten()
+            .chain(&snapshot.pull)
+            .chain(warm.impulses.iter().flat_map(|(_, p)| p));
+        let is_sound = snapshot.v.len() == nv
+            && [0, nv].contains(&warm.persistent.len())
+            && snapshot.time.is_finite()
+            && snapshot.sleep.is_of(self.scene.disks.len())
+            && numbers.all(|x| x.is_finite());
+        if !is_sound {
+            return Err(SnapshotError::Damaged);
+        }
+        self.q.copy_from_slice(&snapshot.q);
+        self.v.copy_from_slice(&snapshot.v);
+        self.time = snapshot.time;
+        self.count = snapshot.count;
+        self.inputs.clone_from(&snapshot.inputs);
+        self.pull = snapshot.pull.into();
+        self.warm_start.clone_from(&snapshot.warm_start);
+        self.sleep.clone_from(&snapshot.sleep);
+        self.has_contacts = false;
+        Ok(())
+    }
+}
+
+/// What a soil's simulation cannot be built from.
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
+pub enum SoilSetupError {
+    /// An option.
+    #[error(transparent)]
+    Options(#[from] OptionsError),
+    /// The scene or its configuration.
+    #[error(transparent)]
+    Soil(#[from] SoilError),
+}

@@ -1,0 +1,611 @@
+//! `SoilSimulation` and `soil_packing`: granular soil of disks.
+
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use rover_core::integrator::Stabilisation;
+use rover_core::nalgebra::Vector2;
+use rover_core::planar::soil::{
+    Disks, Machine, Packing, SleepOptions, SoilActiveContact, SoilError, SoilFriction, SoilScene,
+    SoilSetupError, SoilSimulation as Core, SoilSnapshot as CoreSnapshot, Wall, WheelRig,
+    soil_options,
+};
+use rover_core::planar::{Ground, PlanarWheel, TwoWheelRover};
+use std::sync::Arc;
+
+use crate::arrays::{array, fresh, fresh_rows, vector};
+use crate::errors::{BorderError, Kind, Value};
+use crate::planar::pair;
+use crate::planar_ground::{border, parse};
+use crate::simulation::{Energy, STABILISATIONS, StepReport, choice, name_of, step_count};
+use crate::snapshot::damaged;
+
+/// Radii, masses and centres of a packing.
+type Packed<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<f64>>,
+);
+
+fn soil_error(e: &SoilError) -> BorderError {
+    let field = e.field();
+    let kind = match field.split('[').next().unwrap_or_default() {
+        "position" | "velocity" | "machine" | "machine_rate" => Kind::State,
+        "torques" | "pull" => Kind::Command,
+        "friction" | "wall_friction" | "wheel_friction" => Kind::Option,
+        _ => Kind::Model,
+    };
+    let value = match e {
+        SoilError::Number(number) => return border(kind, number),
+        SoilError::Length { count, .. } => Value::Count(*count),
+        SoilError::Overlap { value, .. }
+        | SoilError::InWall { value, .. }
+        | SoilError::WheelIn { value, .. }
+        | SoilError::TooNarrow { value, .. }
+        | SoilError::Range { value } => Value::Number(*value),
+        SoilError::Empty => Value::Count(0),
+        _ => Value::Nothing,
+    };
+    BorderError {
+        kind,
+        message: e.to_string(),
+        field: Some(field),
+        value,
+    }
+}
+
+fn setup_error(e: SoilSetupError) -> BorderError {
+    match e {
+        SoilSetupError::Options(e) => e.into(),
+        SoilSetupError::Soil(e) => soil_error(&e),
+    }
+}
+
+/// An (n, m) array as rows, flattened.
+fn rows(value: &Bound<'_, PyAny>, kind: Kind, field: &str, width: usize) -> PyResult<Vec<f64>> {
+    let any = array(value, kind, field)?;
+    let view = any.as_array();
+    if view.ndim() != 2 || view.shape()[1] != width {
+        let message = format!("{field}: needs shape (n, {width}), has {:?}", view.shape());
+        return Err(BorderError {
+            kind,
+            message,
+            field: Some(field.to_owned()),
+            value: Value::Count(view.len()),
+        }
+        .into());
+    }
+    Ok(view.iter().copied().collect())
+}
+
+/// Two numbers out of a mapping, or one for both.
+fn both(given: &Bound<'_, PyDict>, field: &str, default: [f64; 2]) -> PyResult<[f64; 2]> {
+    match given.get_item(field)? {
+        None => Ok(default),
+        Some(value) => value
+            .extract::<f64>()
+            .map(|x| [x, x])
+            .or_else(|_| Ok(pair(&value, Kind::Model, field)?.into())),
+    }
+}
+
+/// The two-wheel rover of the keyword arguments that `TwoWheelRoverSimulation` takes.
+fn rover(given: &Bound<'_, PyDict>) -> PyResult<TwoWheelRover> {
+    let number = |field: &str| -> PyResult<Option<f64>> {
+        given
+            .get_item(field)?
+            .map(|x| x.extract::<f64>())
+            .transpose()
+    };
+    let masses = both(given, "wheel_mass", [60.0; 2])?;
+    let radii = both(given, "wheel_radius", [0.2; 2])?;
+    let of_disc = |i: usize| 0.5 * masses[i] * radii[i] * radii[i];
+    let inertias = both(given, "wheel_inertia", [of_disc(0), of_disc(1)])?;
+    let axles = [
+        both(given, "axle_a", [-0.4, 0.0])?,
+        both(given, "axle_b", [0.4, 0.0])?,
+    ]
+    .map(Vector2::from);
+    let mass = number("mass")?.unwrap_or(130.0);
+    let rod = mass * (axles[1] - axles[0]).norm_squared() / 12.0;
+    let wheel = |i: usize| PlanarWheel {
+        mass: masses[i],
+        radius: radii[i],
+        inertia: inertias[i],
+        axle: axles[i],
+    };
+    let inertia = number("inertia")?.unwrap_or(rod);
+    let made = TwoWheelRover::new(mass, inertia, wheel(0), wheel(1));
+    Ok(made.map_err(|e| border(Kind::Model, &e))?)
+}
+
+/// The contacts of the last step of a soil, as fresh arrays with one row a contact.
+#[pyclass(module = "rover_gym._core", frozen)]
+pub struct SoilContacts {
+    active: Vec<SoilActiveContact>,
+    /// Number of disks and of disks with wheels.
+    counts: [usize; 2],
+}
+
+impl SoilContacts {
+    fn rows<'py>(
+        &self,
+        py: Python<'py>,
+        f: impl Fn(&SoilActiveContact) -> [f64; 2],
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        fresh_rows(py, &self.active.iter().map(f).collect::<Vec<_>>())
+    }
+}
+
+#[pymethods]
+impl SoilContacts {
+    /// Numbers of both bodies: disks from 0, then wheels; -1 for a wall or the ground.
+    #[getter]
+    fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let name = |body: u32| {
+            let is_fixed = body as usize >= self.counts[1];
+            if is_fixed { -1 } else { i64::from(body) }
+        };
+        let keys = self.active.iter().map(|a| a.contact.key);
+        let flat = PyArray1::from_iter(py, keys.flat_map(|k| [name(k.a), name(k.b)]));
+        flat.call_method1("reshape", (self.active.len(), 2))
+    }
+
+    #[getter]
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.rows(py, |a| a.contact.point.into())
+    }
+
+    #[getter]
+    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.rows(py, |a| a.contact.n.into())
+    }
+
+    #[getter]
+    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.active.iter().map(|a| a.contact.gap_start))
+    }
+
+    #[getter]
+    fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.rows(py, |a| a.impulse)
+    }
+
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.rows(py, |a| a.velocity)
+    }
+
+    /// Impulses on the first body in the world's axes.
+    #[getter]
+    fn world_impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.rows(py, |a| {
+            (a.contact.n * a.impulse[0] + a.contact.t() * a.impulse[1]).into()
+        })
+    }
+
+    fn __len__(&self) -> usize {
+        self.active.len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("SoilContacts({})", self.active.len())
+    }
+}
+
+/// Everything that a soil needs to continue bit for bit; picklable.
+#[pyclass(module = "rover_gym._core", frozen)]
+pub struct SoilSnapshot {
+    inner: CoreSnapshot,
+}
+
+#[pymethods]
+impl SoilSnapshot {
+    #[staticmethod]
+    fn from_bytes(data: &[u8]) -> PyResult<Self> {
+        Ok(Self {
+            inner: postcard::from_bytes(data).map_err(|e| damaged(&e))?,
+        })
+    }
+
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = postcard::to_stdvec(&self.inner).map_err(|e| damaged(&e))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let bytes = slf.get().to_bytes(slf.py())?;
+        Ok((slf.get_type().getattr("from_bytes")?, (bytes,)))
+    }
+}
+
+/// A soil of free disks, with walls, a ground and perhaps a machine on it.
+#[pyclass(module = "rover_gym._core")]
+pub struct SoilSimulation {
+    inner: Core,
+}
+
+impl SoilSimulation {
+    fn n(&self) -> usize {
+        self.inner.scene().disks.len()
+    }
+
+    fn disks(values: &[f64], n: usize) -> Vec<[f64; 3]> {
+        let rows = values.chunks_exact(3).take(n);
+        rows.map(|row| [row[0], row[1], row[2]]).collect()
+    }
+}
+
+/// Positions with an angle where none was given.
+fn with_angles(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<f64>> {
+    let width = array(value, Kind::State, field)?
+        .as_array()
+        .shape()
+        .get(1)
+        .copied();
+    if width == Some(2) {
+        let flat = rows(value, Kind::State, field, 2)?;
+        return Ok(flat
+            .chunks_exact(2)
+            .flat_map(|r| [r[0], r[1], 0.0])
+            .collect());
+    }
+    rows(value, Kind::State, field, 3)
+}
+
+#[pymethods]
+impl SoilSimulation {
+    #[new]
+    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
+    #[pyo3(signature = (radius, mass, position, *, walls = None, ground = None, rover = None, rig = None, machine = None,
+        friction = 0.5, wall_friction = 0.5, wheel_friction = 0.9, restitution = 0.0, gravity = None, time_step = 1e-3,
+        tolerance = 1e-4, max_iterations = 200, stabilisation = "projection", penetration_tolerance = None,
+        sleep = false, sleep_speed = None, sleep_distance = None))]
+    fn new(
+        radius: &Bound<'_, PyAny>,
+        mass: &Bound<'_, PyAny>,
+        position: &Bound<'_, PyAny>,
+        walls: Option<&Bound<'_, PyAny>>,
+        ground: Option<&Bound<'_, PyAny>>,
+        rover: Option<&Bound<'_, PyDict>>,
+        rig: Option<&Bound<'_, PyAny>>,
+        machine: Option<&Bound<'_, PyAny>>,
+        friction: f64,
+        wall_friction: f64,
+        wheel_friction: f64,
+        restitution: f64,
+        gravity: Option<&Bound<'_, PyAny>>,
+        time_step: f64,
+        tolerance: f64,
+        max_iterations: usize,
+        stabilisation: &str,
+        penetration_tolerance: Option<f64>,
+        sleep: bool,
+        sleep_speed: Option<f64>,
+        sleep_distance: Option<f64>,
+    ) -> PyResult<Self> {
+        let radius = vector(radius, Kind::Model, "radius")?;
+        let mass = vector(mass, Kind::Model, "mass")?;
+        let disks = Disks::new(radius, mass).map_err(|e| soil_error(&e))?;
+        let mut q = with_angles(position, "position")?;
+        if q.len() != 3 * disks.len() {
+            let message = format!(
+                "position: needs one row for each of the {} disks, has {}",
+                disks.len(),
+                q.len() / 3
+            );
+            return Err(BorderError {
+                kind: Kind::State,
+                message,
+                field: Some("position".to_owned()),
+                value: Value::Count(q.len() / 3),
+            }
+            .into());
+        }
+        let mut options = soil_options(&disks);
+        if let Some(gravity) = gravity {
+            options.gravity = pair(gravity, Kind::Option, "gravity")?.push(0.0);
+        }
+        (options.time_step, options.restitution) = (time_step, restitution);
+        (options.solver.tolerance, options.solver.max_sweeps) = (tolerance, max_iterations);
+        options.stabilisation =
+            choice::<Stabilisation>("stabilisation", stabilisation, &STABILISATIONS)?;
+        options.solver.velocity_tolerance = 10.0 * tolerance;
+        if let Some(depth) = penetration_tolerance {
+            options.penetration_tolerance = depth;
+        }
+        let mut lines = Vec::new();
+        if let Some(walls) = walls {
+            for row in rows(walls, Kind::Terrain, "walls", 4)?.chunks_exact(4) {
+                let wall = Wall::new(Vector2::new(row[0], row[1]), Vector2::new(row[2], row[3]));
+                lines.push(wall.map_err(|e| border(Kind::Terrain, &e))?);
+            }
+        }
+        let ground: Option<Arc<dyn Ground>> = ground.map(parse).transpose()?;
+        let who: Option<Arc<Machine>> = match (rover, rig) {
+            (Some(given), None) => Some(Arc::new(self::rover(given)?)),
+            (None, Some(given)) => {
+                let given = pair(given, Kind::Model, "rig")?;
+                let rig = WheelRig::new(given.x, given.y);
+                Some(Arc::new(rig.map_err(|e| border(Kind::Model, &e))?))
+            }
+            (None, None) => None,
+            _ => {
+                let message = "rig: a soil has a rover or a rig, not both".to_owned();
+                return Err(BorderError::option("rig", message, Value::Nothing).into());
+            }
+        };
+        if let Some(machine) = machine {
+            q.extend(vector(machine, Kind::State, "machine")?);
+        }
+        let scene = SoilScene {
+            disks,
+            walls: lines,
+            ground,
+            machine: who,
+            friction: SoilFriction {
+                disks: friction,
+                walls: wall_friction,
+                wheels: wheel_friction,
+            },
+        };
+        let mut rest = SleepOptions::default();
+        if let Some(speed) = sleep_speed {
+            rest.speed = speed;
+        }
+        if let Some(distance) = sleep_distance {
+            rest.distance = distance;
+        }
+        for (field, value) in [
+            ("sleep_speed", rest.speed),
+            ("sleep_distance", rest.distance),
+        ] {
+            if !(value.is_finite() && value > 0.0) {
+                let message = format!("{field}: must be finite and positive, is {value}");
+                return Err(BorderError::option(field, message, Value::Number(value)).into());
+            }
+        }
+        let inner =
+            Core::new(Arc::new(scene), options, sleep.then_some(rest), q).map_err(setup_error)?;
+        Ok(Self { inner })
+    }
+
+    #[getter]
+    fn time(&self) -> f64 {
+        self.inner.time()
+    }
+
+    #[getter]
+    fn time_step(&self) -> f64 {
+        self.inner.options().time_step
+    }
+
+    #[getter]
+    fn radius<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, self.inner.scene().disks.radius())
+    }
+
+    #[getter]
+    fn mass<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, self.inner.scene().disks.mass())
+    }
+
+    #[getter]
+    fn position<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        fresh_rows(py, &Self::disks(self.inner.q(), self.n()))
+    }
+
+    #[getter]
+    fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        fresh_rows(py, &Self::disks(self.inner.v(), self.n()))
+    }
+
+    #[getter]
+    fn asleep<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+        PyArray1::from_slice(py, self.inner.asleep())
+    }
+
+    #[getter]
+    fn machine<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, &self.inner.q()[3 * self.n()..])
+    }
+
+    #[getter]
+    fn machine_rate<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, &self.inner.v()[3 * self.n()..])
+    }
+
+    /// Centre (x, y) and radius of each wheel.
+    #[getter]
+    fn wheels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let Some(machine) = &self.inner.scene().machine else {
+            return fresh_rows::<3>(py, &[]);
+        };
+        let own = &self.inner.q()[3 * self.n()..];
+        let pose = rover_core::nalgebra::SVector::<f64, 5>::from_column_slice(own);
+        let row = |k| {
+            let disc = machine.disc(k, &pose);
+            [disc.centre.x, disc.centre.y, disc.radius]
+        };
+        fresh_rows(py, &(0..machine.n_discs()).map(row).collect::<Vec<_>>())
+    }
+
+    #[getter]
+    fn torques<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, self.inner.inputs())
+    }
+
+    #[getter]
+    fn pull(&self) -> (f64, f64) {
+        let pull = self.inner.pull();
+        (pull.x, pull.y)
+    }
+
+    /// Numbers and names of the options.
+    #[getter]
+    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (o, friction) = (self.inner.options(), &self.inner.scene().friction);
+        let settings = PyDict::new(py);
+        settings.set_item("friction", friction.disks)?;
+        settings.set_item("wall_friction", friction.walls)?;
+        settings.set_item("wheel_friction", friction.wheels)?;
+        settings.set_item("restitution", o.restitution)?;
+        settings.set_item("gravity", (o.gravity.x, o.gravity.y))?;
+        settings.set_item("time_step", o.time_step)?;
+        settings.set_item("tolerance", o.solver.tolerance)?;
+        settings.set_item("max_iterations", o.solver.max_sweeps)?;
+        settings.set_item("stabilisation", name_of(o.stabilisation, &STABILISATIONS))?;
+        settings.set_item("penetration_tolerance", o.penetration_tolerance)?;
+        Ok(settings)
+    }
+
+    #[pyo3(signature = (position, velocity = None, machine = None, machine_rate = None))]
+    fn set_state(
+        &mut self,
+        position: &Bound<'_, PyAny>,
+        velocity: Option<&Bound<'_, PyAny>>,
+        machine: Option<&Bound<'_, PyAny>>,
+        machine_rate: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let n = self.n();
+        let mut q = with_angles(position, "position")?;
+        let mut v = match velocity {
+            Some(velocity) => with_angles(velocity, "velocity")?,
+            None => vec![0.0; q.len()],
+        };
+        match machine {
+            Some(machine) => q.extend(vector(machine, Kind::State, "machine")?),
+            None => q.extend(&self.inner.q()[3 * n..]),
+        }
+        match machine_rate {
+            Some(rate) => v.extend(vector(rate, Kind::State, "machine_rate")?),
+            None => v.resize(v.len() + self.inner.v().len() - 3 * n, 0.0),
+        }
+        Ok(self.inner.set_state(&q, &v).map_err(|e| soil_error(&e))?)
+    }
+
+    fn set_torques(&mut self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+        let torques = vector(torques, Kind::Command, "torques")?;
+        Ok(self
+            .inner
+            .set_inputs(&torques)
+            .map_err(|e| soil_error(&e))?)
+    }
+
+    fn set_pull(&mut self, pull: &Bound<'_, PyAny>) -> PyResult<()> {
+        let pull = pair(pull, Kind::Command, "pull")?;
+        Ok(self
+            .inner
+            .set_pull(pull.into())
+            .map_err(|e| soil_error(&e))?)
+    }
+
+    #[pyo3(signature = (n = 1))]
+    fn step(&mut self, py: Python<'_>, n: i64) -> PyResult<StepReport> {
+        let steps = step_count(n)?;
+        let inner = &mut self.inner;
+        let report = py.detach(|| inner.step(steps)).map_err(BorderError::from)?;
+        Ok(report.into())
+    }
+
+    #[getter]
+    fn contacts(&self) -> SoilContacts {
+        let n = self.n();
+        let wheels = self
+            .inner
+            .scene()
+            .machine
+            .as_ref()
+            .map_or(0, |m| m.n_discs());
+        SoilContacts {
+            active: self.inner.contacts().collect(),
+            counts: [n, n + wheels],
+        }
+    }
+
+    fn energy(&self) -> Energy {
+        self.inner.energy().into()
+    }
+
+    /// Momentum of the disks (x, y) and their moment of momentum about the origin.
+    fn momentum<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, &self.inner.momentum())
+    }
+
+    /// Impulse of the last step's contacts on the wheels.
+    fn impulse_on_wheels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        fresh(py, &self.inner.impulse_on_wheels())
+    }
+
+    /// Deepest overlap now.
+    fn penetration(&self) -> f64 {
+        self.inner.penetration()
+    }
+
+    fn wake(&mut self) {
+        self.inner.wake();
+    }
+
+    fn snapshot(&self) -> SoilSnapshot {
+        SoilSnapshot {
+            inner: self.inner.snapshot(),
+        }
+    }
+
+    fn restore(&mut self, snapshot: &SoilSnapshot) -> PyResult<()> {
+        Ok(self
+            .inner
+            .restore(&snapshot.inner)
+            .map_err(BorderError::from)?)
+    }
+
+    fn __repr__(&self) -> String {
+        let (n, time) = (self.n(), self.inner.time());
+        format!("SoilSimulation({n} disks, time={time} s)")
+    }
+}
+
+/// Radii, masses and centres of disks in rows, without overlap.
+#[pyfunction]
+#[pyo3(signature = (count = 222, *, radius_min = 0.016, radius_max = 0.0165, mass = 0.7, left = 0.0, width = 2.4494, bottom = 0.0, seed = 0))]
+#[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
+pub fn soil_packing(
+    py: Python<'_>,
+    count: usize,
+    radius_min: f64,
+    radius_max: f64,
+    mass: f64,
+    left: f64,
+    width: f64,
+    bottom: f64,
+    seed: u64,
+) -> PyResult<Packed<'_>> {
+    let packing = Packing {
+        count,
+        radius_min,
+        radius_max,
+        mass,
+        left,
+        width,
+        bottom,
+        seed,
+    };
+    let (disks, q) = packing.build().map_err(|e| soil_error(&e))?;
+    let centres: Vec<[f64; 2]> = q.chunks_exact(3).map(|c| [c[0], c[1]]).collect();
+    Ok((
+        fresh(py, disks.radius()),
+        fresh(py, disks.mass()),
+        fresh_rows(py, &centres)?,
+    ))
+}
+
+/// Adds the soil's classes to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<SoilSimulation>()?;
+    module.add_class::<SoilContacts>()?;
+    module.add_class::<SoilSnapshot>()?;
+    module.add_function(wrap_pyfunction!(soil_packing, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,112 @@
+"""`rover_gym.planar.SoilSimulation`: arrays, bad input, snapshots, recording and pictures."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rover_gym.planar import Line, SoilSimulation, SoilSnapshot, soil_packing
+from rover_gym.planar_soil import record_soil, rover_on_soil, settled_bed
+from rover_gym.planar_soil_figures import Frame, draw_soil
+from rover_gym.recording import read_trajectory
+
+
+def pair(**options: object) -> SoilSimulation:
+    """Two disks side by side on a line, at rest."""
+    return SoilSimulation([0.1, 0.1], [1.0, 2.0], [[0.0, 0.1], [0.3, 0.1]], ground=Line(), **options)  # type: ignore[arg-type]
+
+
+def test_disks_at_rest_stay_and_press_on_the_ground() -> None:
+    sim = pair()
+    report = sim.step(50)
+    assert report.is_converged
+    assert report.steps == 50
+    np.testing.assert_allclose(sim.position, [[0.0, 0.1, 0.0], [0.3, 0.1, 0.0]], atol=1e-12)
+    contacts = sim.contacts
+    np.testing.assert_array_equal(contacts.bodies, [[0, -1], [1, -1]])
+    np.testing.assert_allclose(contacts.world_impulses, [[0.0, 9.81e-3], [0.0, 2 * 9.81e-3]], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(contacts.points, [[0.0, 0.0], [0.3, 0.0]], atol=1e-12)
+    assert sim.time == pytest.approx(0.05)
+    assert sim.energy().potential == pytest.approx(3.0 * 9.81 * 0.1)
+    assert sim.penetration() < 1e-12
+
+
+def test_two_disks_collide_as_the_closed_form_says() -> None:
+    # Head on, e = 0.5, no gravity: u+ = -e u-, momentum kept: v1 = 0, v2 = 0.5 for m = 1, 2 and v1- = 1.
+    sim = SoilSimulation(
+        [0.1, 0.1], [1.0, 2.0], [[0.0, 0.0], [0.3, 0.0]], gravity=(0.0, 0.0), restitution=0.5, tolerance=1e-12
+    )
+    sim.set_state(sim.position, [[1.0, 0.0], [0.0, 0.0]])
+    sim.step(200)
+    np.testing.assert_allclose(sim.velocity, [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(sim.momentum()[:2], [1.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ({"radius": [0.1, -0.1]}, "radius[1]"),
+        ({"radius": [0.1, np.nan]}, "radius[1]"),
+        ({"mass": [1.0]}, "mass"),
+        ({"position": [[0.0, 0.1], [0.15, 0.1]]}, "position[1]"),
+        ({"position": [[0.0, 0.05], [0.3, 0.1]]}, "position[0]"),
+        ({"position": [[0.0, np.inf], [0.3, 0.1]]}, "position[0]"),
+        ({"position": [[0.0, 0.1]]}, "position"),
+        ({"friction": -1.0}, "friction"),
+        ({"time_step": 0.0}, "time_step"),
+        ({"tolerance": 0.0}, "tolerance"),
+        ({"walls": [[0.0, 0.0, 0.0, 0.0]]}, "normal"),
+        ({"sleep": True, "sleep_speed": -1.0}, "sleep_speed"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name(change: dict[str, object], field: str) -> None:
+    good: dict[str, object] = {"radius": [0.1, 0.1], "mass": [1.0, 2.0], "position": [[0.0, 0.1], [0.3, 0.1]]}
+    with pytest.raises(ValueError, match=r".+") as caught:
+        SoilSimulation(**{**good, "ground": Line(), **change})  # type: ignore[arg-type]
+    assert getattr(caught.value, "field", None) == field
+
+
+def test_a_refused_state_changes_nothing() -> None:
+    sim = pair()
+    before = sim.position
+    for state in ([[0.0, 0.1], [0.1, 0.1]], [[0.0, 0.1], [np.nan, 0.1]]):
+        with pytest.raises(ValueError, match="position"):
+            sim.set_state(state)
+    with pytest.raises(ValueError, match="machine"):
+        sim.set_pull([1.0, 0.0])
+    np.testing.assert_array_equal(sim.position, before)
+
+
+def test_packings_repeat_and_do_not_overlap() -> None:
+    radius, mass, centres = soil_packing(100, width=0.7, seed=3)
+    again = soil_packing(100, width=0.7, seed=3)
+    np.testing.assert_array_equal(centres, again[2])
+    assert not np.array_equal(centres, soil_packing(100, width=0.7, seed=4)[2])
+    apart = np.linalg.norm(centres[:, None] - centres[None], axis=2) - radius[:, None] - radius[None]
+    assert apart[np.triu_indices(100, 1)].min() >= 0.0
+    np.testing.assert_allclose(mass / radius**2, mass[0] / radius[0] ** 2)
+    with pytest.raises(ValueError, match="width"):
+        soil_packing(10, width=0.01)
+
+
+def test_the_rover_crosses_and_a_snapshot_continues_bit_for_bit(tmp_path: Path) -> None:
+    bed = settled_bed(150, 3, settle=0.2)
+    sim = rover_on_soil(bed)
+    sim.set_torques([50.0, 50.0])
+    start = sim.machine
+    sim.step(100)
+    snapshot = SoilSnapshot.from_bytes(sim.snapshot().to_bytes())
+    frames: list[Frame] = []
+    record_soil(sim, tmp_path / "soil.h5", "a test", duration=0.1, look=lambda now: frames.append(Frame(now)))
+    end = sim.position
+    assert sim.machine[0] > start[0]
+    sim.restore(snapshot)
+    sim.step(100)
+    np.testing.assert_array_equal(sim.position, end)
+    run = read_trajectory(tmp_path / "soil.h5")
+    np.testing.assert_array_equal(run["position"][-1], end)
+    assert run["penetration"].max() < 0.01 * sim.radius.min()
+    assert len(frames) == len(run["time"]) == 6
+    weight = 250.0 * 9.81 * sim.time_step
+    assert run["impulse_on_wheels"][-1][1] == pytest.approx(weight, rel=0.5)
+    assert draw_soil(frames[-1], tmp_path / "soil.png").read_bytes().startswith(b"\x89PNG")

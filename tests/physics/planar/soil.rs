@@ -1,0 +1,434 @@
+//! Granular soil: conservation, energy, penetration, sleep, the sweeps against a dense solver.
+
+use std::sync::Arc;
+
+use rover_core::integrator::{Stabilisation, StepOptions};
+use rover_core::nalgebra::{Vector2, Vector3};
+use rover_core::planar::soil::{
+    Disks, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, SoilSetupError,
+    SoilSimulation, Wall, soil_options,
+};
+use rover_core::planar::{Line, PlanarWheel, TwoWheelRover};
+use rover_core::solver::Method;
+
+fn box_of(width: f64) -> Vec<Wall> {
+    vec![Wall::floor(0.0), Wall::left(0.0), Wall::right(width)]
+}
+
+fn packing(count: usize, columns: usize, seed: u64) -> Packing {
+    Packing {
+        count,
+        width: 0.0335 * columns as f64,
+        radius_min: 0.013,
+        seed,
+        ..Packing::default()
+    }
+}
+
+/// Disks in a box, not yet settled.
+fn soil(
+    packing: &Packing,
+    change: impl FnOnce(&mut StepOptions, &mut SoilScene),
+) -> SoilSimulation {
+    let (disks, q) = packing.build().expect("a packing");
+    let mut options = soil_options(&disks);
+    let mut scene = SoilScene {
+        disks,
+        walls: box_of(packing.width),
+        ground: None,
+        machine: None,
+        friction: SoilFriction::default(),
+    };
+    change(&mut options, &mut scene);
+    SoilSimulation::new(Arc::new(scene), options, None, q).expect("a soil")
+}
+
+/// Velocities drawn from a recurrence, in [−speed, speed].
+fn shake(soil: &mut SoilSimulation, speed: f64) {
+    let mut x = 0.37_f64;
+    let n = 3 * soil.scene().disks.len();
+    let v: Vec<f64> = (0..n)
+        .map(|k| {
+            x = 3.99 * x * (1.0 - x);
+            let arm = if k % 3 == 2 { 30.0 } else { 1.0 };
+            arm * speed * (2.0 * x - 1.0)
+        })
+        .collect();
+    let q = soil.q().to_vec();
+    soil.set_state(&q, &v).expect("a state");
+}
+
+#[test]
+fn equal_seeds_give_equal_packings_and_none_overlaps() {
+    for seed in 0..4 {
+        let packing = packing(300, 20, seed);
+        let (disks, q) = packing.build().expect("a packing");
+        assert_eq!(packing.build().expect("a packing").1, q);
+        let r = disks.radius();
+        for i in 0..300 {
+            for j in 0..i {
+                let apart = (q[3 * i] - q[3 * j]).hypot(q[3 * i + 1] - q[3 * j + 1]);
+                assert!(apart >= r[i] + r[j], "{i} {j}");
+            }
+            assert!(q[3 * i] >= r[i] && q[3 * i] + r[i] <= packing.width && q[3 * i + 1] >= r[i]);
+        }
+    }
+}
+
+#[test]
+fn collisions_in_free_space_keep_momentum_to_rounding() {
+    let mut soil = soil(&packing(120, 11, 1), |options, scene| {
+        options.gravity = Vector3::zeros();
+        options.restitution = 0.4;
+        scene.walls.clear();
+    });
+    shake(&mut soil, 1.0);
+    let before = soil.momentum();
+    let mut contacts = 0;
+    for _ in 0..200 {
+        contacts += soil.step(1).expect("finite").n_contacts;
+    }
+    assert!(contacts > 1000, "they did meet: {contacts}");
+    let after = soil.momentum();
+    // 84 kg at 1 m/s: rounding of a few thousand sums of order 1.
+    for k in 0..2 {
+        assert!((after[k] - before[k]).abs() < 1e-11, "{before:?} {after:?}");
+    }
+    // The impulses act at one point of two circles that touch up to the gap that a contact may close: the moment is kept but for that.
+    assert!((after[2] - before[2]).abs() < 1e-3 * 84.0 * 0.3);
+}
+
+#[test]
+fn energy_never_grows_without_restitution() {
+    // Solved well and without projection, so that nothing but the scheme is seen.
+    let mut soil = soil(&packing(50, 8, 2), |options, _| {
+        options.solver.tolerance = 1e-9;
+        options.solver.velocity_tolerance = 1e-8;
+        options.solver.max_sweeps = 20_000;
+        options.stabilisation = Stabilisation::None;
+    });
+    shake(&mut soil, 0.5);
+    let mut energy = soil.energy().total();
+    let scale = energy;
+    for step in 0..300 {
+        soil.step(1).expect("finite");
+        let now = soil.energy().total();
+        assert!(
+            now <= energy + 1e-8 * scale,
+            "step {step}: {}",
+            now - energy
+        );
+        energy = now;
+    }
+    assert!(energy < 0.95 * scale);
+}
+
+#[test]
+fn disks_that_are_shaken_and_fall_stay_out_of_one_another() {
+    let mut soil = soil(&packing(150, 12, 2), |_, _| {});
+    shake(&mut soil, 0.5);
+    for step in 0..300 {
+        soil.step(1).expect("finite");
+        let share = soil.penetration() / soil.scene().disks.smallest();
+        assert!(share < 0.01, "step {step}: {share}");
+    }
+}
+
+#[test]
+fn energy_never_grows_with_restitution_without_friction() {
+    for e in [0.5, 0.9] {
+        let mut soil = soil(&packing(60, 10, 3), |options, scene| {
+            options.restitution = e;
+            options.solver.tolerance = 1e-8;
+            options.solver.max_sweeps = 20_000;
+            options.gravity = Vector3::zeros();
+            scene
+                .walls
+                .push(Wall::new(Vector2::new(0.0, 0.6), -Vector2::y()).expect("a wall"));
+            scene.friction = SoilFriction {
+                disks: 0.0,
+                walls: 0.0,
+                wheels: 0.0,
+            };
+        });
+        shake(&mut soil, 1.0);
+        let mut energy = soil.energy().kinetic;
+        let scale = energy;
+        for step in 0..300 {
+            soil.step(1).expect("finite");
+            let now = soil.energy().kinetic;
+            assert!(
+                now <= energy + 1e-7 * scale,
+                "e {e}, step {step}: {}",
+                now - energy
+            );
+            energy = now;
+        }
+        assert!(energy < 0.99 * scale, "they did meet");
+    }
+}
+
+#[test]
+fn a_disk_falls_and_rests_within_a_rounding_of_the_floor() {
+    let disks = Disks::new(vec![0.02], vec![0.5]).expect("a disk");
+    let options = soil_options(&disks);
+    let scene = SoilScene {
+        disks,
+        walls: vec![],
+        ground: Some(Arc::new(Line::new(0.0, 0.1).expect("a line"))),
+        machine: None,
+        friction: SoilFriction::default(),
+    };
+    let q = vec![0.0, 0.5, 0.0];
+    let mut soil = SoilSimulation::new(Arc::new(scene), options, None, q).expect("a soil");
+    // 0.38 m of free fall take √(2 · 0.38/9.81) = 0.2783 s; an implicit step is late by h/2.
+    soil.step(276).expect("finite");
+    assert!(soil.v()[1] < -2.7, "still falls");
+    soil.step(6).expect("finite");
+    assert!(soil.v()[1].abs() < 1e-12);
+    assert!((soil.q()[1] - 0.12).abs() < 1e-12, "{}", soil.q()[1]);
+}
+
+#[test]
+fn a_disk_on_a_slope_rolls_below_and_slides_above_three_times_the_friction() {
+    // Solid disk on a slope α: rolls with 2/3 g sin α iff tan α ≤ 3 μ, else slides with g (sin α − μ cos α).
+    for (mu, slope) in [(0.3, 0.5_f64), (0.1, 0.5)] {
+        let disks = Disks::new(vec![0.02], vec![0.5]).expect("a disk");
+        let options = soil_options(&disks);
+        let alpha = slope.atan();
+        let scene = SoilScene {
+            disks,
+            walls: vec![],
+            ground: Some(Arc::new(Line::new(-slope, 0.0).expect("a line"))),
+            machine: None,
+            friction: SoilFriction {
+                walls: mu,
+                ..SoilFriction::default()
+            },
+        };
+        let q = vec![0.02 * alpha.sin(), 0.02 * alpha.cos(), 0.0];
+        let mut soil = SoilSimulation::new(Arc::new(scene), options, None, q).expect("a soil");
+        soil.step(500).expect("finite");
+        let speed = soil.v()[0].hypot(soil.v()[1]);
+        let expected = if slope <= 3.0 * mu {
+            2.0 / 3.0 * alpha.sin()
+        } else {
+            alpha.sin() - mu * alpha.cos()
+        };
+        assert!(
+            (speed - 0.5 * 9.81 * expected).abs() < 1e-3 * speed,
+            "{mu}: {speed}"
+        );
+    }
+}
+
+#[test]
+fn the_floor_carries_the_weight() {
+    let mut soil = soil(&packing(200, 12, 4), |_, _| {});
+    soil.step(800).expect("finite");
+    let weight: f64 = 9.81 * soil.scene().disks.mass().iter().sum::<f64>();
+    let force: f64 = soil
+        .contacts()
+        .filter(|c| !c.contact.is_with_disk())
+        .map(|c| (c.contact.n * c.impulse[0] + c.contact.t() * c.impulse[1]).y * 1e3)
+        .sum();
+    assert!((force - weight).abs() < 2e-3 * weight, "{force} {weight}");
+}
+
+#[test]
+fn sweeps_and_the_dense_newton_give_the_same_velocities() {
+    let packing = packing(40, 8, 5);
+    let mut speeds = Vec::new();
+    for method in [Method::Auto, Method::ProximalPoint] {
+        let mut soil = soil(&packing, |options, _| {
+            options.solver.method = method;
+            options.solver.tolerance = 1e-10;
+            options.solver.velocity_tolerance = 1e-9;
+            options.solver.max_sweeps = 100_000;
+        });
+        shake(&mut soil, 0.3);
+        let report = soil.step(3).expect("finite");
+        assert!(report.is_converged(), "{method:?} {report:?}");
+        speeds.push(soil.v().to_vec());
+    }
+    let worst = speeds[0]
+        .chunks(3)
+        .zip(speeds[1].chunks(3))
+        .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
+        .fold(0.0, f64::max);
+    assert!(worst < 1e-6, "{worst} m/s");
+}
+
+/// A bed, and one disk that falls on its left end: with or without sleep.
+fn dropped(sleep: Option<SleepOptions>) -> (SoilSimulation, usize) {
+    let packing = packing(240, 60, 6);
+    let mut bed = soil(&packing, |options, _| options.solver.tolerance = 1e-6);
+    bed.step(700).expect("finite");
+    let (mut radius, mut mass) = (
+        bed.scene().disks.radius().to_vec(),
+        bed.scene().disks.mass().to_vec(),
+    );
+    radius.push(0.03);
+    mass.push(3.0);
+    let mut q = bed.q().to_vec();
+    q.extend([0.2, 0.6, 0.0]);
+    let scene = SoilScene {
+        disks: Disks::new(radius, mass).expect("disks"),
+        ..(**bed.scene()).clone()
+    };
+    let options = bed.options().clone();
+    let mut soil = SoilSimulation::new(Arc::new(scene), options, sleep, q).expect("a soil");
+    let mut most = 0;
+    for _ in 0..60 {
+        soil.step(10).expect("finite");
+        most = most.max(soil.asleep().iter().filter(|a| **a).count());
+    }
+    (soil, most)
+}
+
+#[test]
+fn sleep_leaves_the_motion_as_it_is_and_wakes_what_is_struck() {
+    let (awake, none) = dropped(None);
+    let (slept, most) = dropped(Some(SleepOptions::default()));
+    assert!(none == 0 && most > 120, "{most} of 241 slept");
+    let worst = awake
+        .q()
+        .chunks(3)
+        .zip(slept.q().chunks(3))
+        .map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]))
+        .fold(0.0, f64::max);
+    // A tenth of a radius after an impact that moves disks by several.
+    assert!(worst < 0.0015, "{worst} m");
+}
+
+#[test]
+fn sleeping_costs_less() {
+    let packing = packing(240, 60, 6);
+    let mut soil = soil(&packing, |_, _| {});
+    soil.step(700).expect("finite");
+    let mut sleeping = SoilSimulation::new(
+        soil.scene().clone(),
+        soil.options().clone(),
+        Some(SleepOptions::default()),
+        soil.q().to_vec(),
+    )
+    .expect("a soil");
+    sleeping.step(400).expect("finite");
+    // A disk that rolls on goes on rolling: there is no rolling friction.
+    assert!(sleeping.asleep().iter().filter(|a| **a).count() > 120);
+    let contacts = sleeping.step(1).expect("finite").n_contacts;
+    assert!(
+        contacts < 250,
+        "{contacts} of more than 400 contacts are left"
+    );
+    let before = sleeping.q().to_vec();
+    sleeping.wake();
+    assert!(sleeping.asleep().iter().all(|a| !a));
+    sleeping.step(5).expect("finite");
+    let moved = before.chunks(3).zip(sleeping.q().chunks(3));
+    let most = moved
+        .filter(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]) > 2e-5)
+        .count();
+    assert!(
+        most < 5,
+        "they wake with the load that they had, {most} moved"
+    );
+}
+
+fn rover() -> TwoWheelRover {
+    let wheel = |x: f64| PlanarWheel {
+        mass: 60.0,
+        radius: 0.2,
+        inertia: 1.2,
+        axle: Vector2::new(x, 0.0),
+    };
+    TwoWheelRover::new(130.0, 130.0 * 0.64 / 12.0, wheel(-0.4), wheel(0.4)).expect("a rover")
+}
+
+#[test]
+fn the_rover_drives_over_the_original_soil() {
+    let (disks, q) = Packing::default().build().expect("a packing");
+    let options = soil_options(&disks);
+    let scene = SoilScene {
+        disks,
+        walls: box_of(Packing::default().width),
+        ground: None,
+        machine: None,
+        friction: SoilFriction::default(),
+    };
+    let mut bed = SoilSimulation::new(Arc::new(scene), options.clone(), None, q).expect("a soil");
+    bed.step(300).expect("finite");
+    let mut q = bed.q().to_vec();
+    q.extend([0.7, 0.31, 0.0, 0.0, 0.0]);
+    let scene = SoilScene {
+        machine: Some(Arc::new(rover())),
+        ..(**bed.scene()).clone()
+    };
+    let mut soil = SoilSimulation::new(Arc::new(scene), options, None, q).expect("a soil");
+    soil.step(300).expect("finite");
+    // The bed still gives way now and then, so the mean over 0.2 s.
+    let mut weight = 0.0;
+    for _ in 0..200 {
+        soil.step(1).expect("finite");
+        weight += soil.impulse_on_wheels()[1] / 0.2;
+    }
+    assert!(
+        (weight - 250.0 * 9.81).abs() < 0.1 * 250.0 * 9.81,
+        "{weight} N"
+    );
+    soil.set_inputs(&[50.0, 50.0]).expect("torques");
+    let n = 3 * soil.scene().disks.len();
+    let from = soil.q()[n];
+    let snapshot = soil.snapshot();
+    soil.step(500).expect("finite");
+    assert!(soil.q()[n] > from + 0.05, "it goes forward");
+    assert!(soil.penetration() < 0.01 * 0.016);
+    let end = soil.q().to_vec();
+    soil.restore(&snapshot).expect("its own");
+    soil.step(500).expect("finite");
+    assert_eq!(soil.q(), end, "a snapshot continues bit for bit");
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    let made = |radius: &[f64], mass: &[f64]| Disks::new(radius.to_vec(), mass.to_vec());
+    assert_eq!(made(&[], &[]), Err(SoilError::Empty));
+    assert_eq!(
+        made(&[1.0, -1.0], &[1.0, 1.0])
+            .expect_err("negative")
+            .field(),
+        "radius[1]"
+    );
+    assert_eq!(
+        made(&[1.0], &[f64::NAN]).expect_err("NaN").field(),
+        "mass[0]"
+    );
+    assert_eq!(
+        made(&[1.0], &[1.0, 2.0]).expect_err("length").field(),
+        "mass"
+    );
+    let scene = Arc::new(SoilScene {
+        disks: made(&[0.1, 0.1], &[1.0, 1.0]).expect("disks"),
+        walls: vec![Wall::floor(0.0)],
+        ground: None,
+        machine: None,
+        friction: SoilFriction::default(),
+    });
+    let build = |q: &[f64]| {
+        SoilSimulation::new(scene.clone(), soil_options(&scene.disks), None, q.to_vec())
+    };
+    for (q, field) in [
+        ([0.0, 0.1, 0.0, 0.15, 0.1, 0.0], "position[1]"),
+        ([0.0, 0.05, 0.0, 0.5, 0.1, 0.0], "position[0]"),
+        ([0.0, 0.1, 0.0, f64::INFINITY, 0.1, 0.0], "position[1]"),
+    ] {
+        match build(&q) {
+            Err(SoilSetupError::Soil(error)) => assert_eq!(error.field(), field, "{error}"),
+            other => panic!("{field}: {other:?}"),
+        }
+    }
+    let mut soil = build(&[0.0, 0.1, 0.0, 0.5, 0.1, 0.0]).expect("a soil");
+    assert!(soil.set_state(&[0.0; 6], &[0.0; 6]).is_err());
+    assert!((soil.q()[3] - 0.5).abs() < 1e-15, "nothing has changed");
+    assert_eq!(soil.set_pull([1.0, 0.0]), Err(SoilError::NoMachine));
+}
