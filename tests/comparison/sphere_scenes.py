@@ -1,7 +1,8 @@
 """SimBenchmark's scenes of free spheres, ours beside MuJoCo and Bullet: `python -m comparison.sphere_scenes [--quick]`.
 
-Ours is the program `free_spheres` of `rust/comparison`, which also hands out the centres at the start, so that all begin alike.
-Positions and velocities are read every 10 ms (outside the timing), and errors are taken from them in the same way for all.
+Ours is the program `free_spheres` of `rust/comparison`, which also hands out the centres at the start, so that all
+begin alike. Positions and velocities are read every 10 ms (outside the timing), and errors are taken from them in the
+same way for all.
 Writes `docs/comparison/spheres.json`, `spheres.png` and the tables of `docs/comparison.md` between their marks.
 """
 
@@ -44,8 +45,8 @@ PUBLISHED: dict[str, dict[str, tuple[float, float | None]]] = {
 #: What is measured, and its unit.
 ERROR = {
     "666": ("penetration", "sum of penetration², m²"),
-    "elastic 666": ("energy_error", "(E − E0)², J²"),
-    "bouncing": ("energy_error", "(E − E0)², J²"),
+    "elastic 666": ("energy_error", "(E - E0)², J²"),
+    "bouncing": ("energy_error", "(E - E0)², J²"),
 }
 
 
@@ -189,8 +190,9 @@ def run_peer(
 
 def ours(*arguments: str) -> list[dict[str, Any]]:
     """What the program `free_spheres` prints."""
-    command = ["cargo", "run", "--release", "--locked", "--quiet", "-p", "rover-comparison", "--bin", "free_spheres", "--"]
-    done = subprocess.run([*command, *arguments], cwd=ROOT, check=True, capture_output=True, text=True)
+    program = "cargo run --release --locked --quiet -p rover-comparison --bin free_spheres --"
+    command = [*program.split(), *arguments]
+    done = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
     parsed: list[dict[str, Any]] = json.loads(done.stdout)
     return parsed
 
@@ -258,7 +260,9 @@ def draw(data: dict[str, Any], path: Path) -> None:
         axes.set_xlabel("CPU time, ms per simulated second")
         axes.set_ylabel(label)
         axes.grid(which="major", color="#dddddd", linewidth=0.7)
-        axes.legend(fontsize=8.5, frameon=False)
+        low, high = axes.get_ylim()
+        axes.set_ylim(low, high * (high / low) ** 0.3)  # room for the legend
+        axes.legend(fontsize=8.5, frameon=False, loc="upper right")
         for side in ("top", "right"):
             axes.spines[side].set_visible(False)
     figure.tight_layout()

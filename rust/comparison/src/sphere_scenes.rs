@@ -178,8 +178,9 @@ pub fn run(
 ) -> Result<SphereRun, SphereRunError> {
     let mut simulation = scene.start(time_step, projects)?;
     let energy = simulation.energy();
-    // Rounded, so that a step that divides the interval does so.
-    let count = |x: f64| (0..).take_while(|k| f64::from(*k) + 0.5 < x).count();
+    // Rounded, so that a step that divides the interval does so; non-negative and far below 2^32.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let count = |x: f64| x.round() as usize;
     let per_sample = count(SAMPLE / time_step).max(1);
     let n_samples = count(duration / (time_step * per_sample as f64)).max(1);
     let mut out = SphereRun {
