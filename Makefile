@@ -80,8 +80,9 @@ profiles: $(STAMPS)/test $(STAMPS)/core ## performance profiles of the contact s
 # One thread for every engine, and the package of comparisons on the path.
 COMPARE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m comparison
 
-chart: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CPU time beside other engines: docs/comparison/ (15 minutes)
-	$(COMPARE).chart
+chart: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CPU time beside other engines: docs/comparison/ (20 minutes; CHART=--quick is shorter)
+	$(COMPARE).chart $(CHART)
+	$(COMPARE).sphere_scenes $(filter --quick,$(CHART))
 
 stability: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes where methods fail, ours and other engines': docs/stability.md (5 minutes)
 	$(COMPARE).stability

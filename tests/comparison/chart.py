@@ -11,12 +11,12 @@ import platform
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
+from comparison.machine import processor, versions
 from comparison.peers import Variant, load
 from comparison.peers.ours import OurRunner
 from comparison.references import load as load_reference
@@ -27,7 +27,6 @@ from comparison.tables import fill
 from rover_gym import accuracy_options
 
 OUTPUT = Path(__file__).parents[2] / "docs" / "comparison"
-PACKAGES = ("rover-gym", "mujoco", "drake", "pybullet", "pin", "numpy")
 
 
 @dataclass(frozen=True)
@@ -163,26 +162,6 @@ def main() -> None:
         console.print(str(picture))
     if arguments.output == OUTPUT:
         fill(OUTPUT.with_suffix(".md"), data)
-
-
-def processor() -> str:
-    """What the machine calls its processor."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        return platform.processor()
-
-
-def versions() -> dict[str, str]:
-    """Of the packages that are installed."""
-    found = {}
-    for name in PACKAGES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
-    return found
 
 
 if __name__ == "__main__":

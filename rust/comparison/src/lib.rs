@@ -6,18 +6,22 @@
 //!
 //! - [`generalised_alpha`], [`schatzman_paoli`], [`event_driven`], [`penalty`]: one scheme each; [`scheme`]: the list;
 //! - [`scenes`]: motions with closed forms or a converged reference; [`measure`]: orders, drift, energy, cost.
+//! - [`free_spheres`] in space with a block-sparse W, found by a [`cell_grid`]; [`sphere_scenes`]: heaps and bounces of them.
 //!
 //! `make orders` writes the figures of `docs/integrators.md`.
 #![forbid(unsafe_code)]
 
 mod acceleration;
+pub mod cell_grid;
 pub mod event_driven;
+pub mod free_spheres;
 pub mod generalised_alpha;
 pub mod measure;
 pub mod penalty;
 pub mod scenes;
 pub mod schatzman_paoli;
 pub mod scheme;
+pub mod sphere_scenes;
 
 pub use event_driven::EventDriven;
 pub use generalised_alpha::GeneralisedAlpha;

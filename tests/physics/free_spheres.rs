@@ -1,0 +1,138 @@
+//! Free spheres in space: energy, momentum, penetration, symmetry, and a single sphere's closed forms.
+
+#![allow(clippy::unwrap_used)] // a test stops where a scene is impossible
+
+use rover_comparison::free_spheres::{SphereKind, SphereSimulation};
+use rover_comparison::scenes::{G, options};
+use rover_comparison::sphere_scenes::{KIND, Scene, run};
+use rover_core::integrator::StepOptions;
+use rover_core::nalgebra::Vector3;
+
+/// No CPU time is wanted here.
+fn no_clock() -> f64 {
+    0.0
+}
+
+fn weightless(friction: f64, restitution: f64, time_step: f64) -> StepOptions {
+    StepOptions {
+        gravity: Vector3::zeros(),
+        ..options(friction, restitution, time_step)
+    }
+}
+
+#[test]
+fn bouncing_keeps_its_energy_at_any_step() {
+    for step in [0.02, 0.01, 0.003, 0.001] {
+        let shown = run(Scene::Bouncing, step, false, 4.0, no_clock).unwrap();
+        assert!((shown.energy - 24034.5).abs() < 1e-8);
+        assert!(shown.n_contacts == 49, "the balls did strike");
+        assert!(shown.energy_change < 1e-13, "{shown:?}");
+    }
+}
+
+#[test]
+fn elastic_impacts_of_the_block_keep_its_energy() {
+    for step in [0.01, 0.005] {
+        let shown = run(Scene::ElasticBlock, step, false, 1.0, no_clock).unwrap();
+        assert!(shown.n_contacts > 100, "many at once: {shown:?}");
+        assert!(shown.energy_change < 1e-12, "{shown:?}");
+    }
+}
+
+#[test]
+fn projection_keeps_the_block_apart() {
+    let projected = run(Scene::Block, 1e-3, true, 0.6, no_clock).unwrap();
+    assert!(projected.n_contacts > 200 && projected.converged > 0.99);
+    assert!(projected.penetration < 1e-5, "{projected:?}");
+    assert!(projected.deepest < 5e-3, "{projected:?}");
+    // The velocity law alone lets penetration stay.
+    let left = run(Scene::Block, 1e-3, false, 0.6, no_clock).unwrap();
+    assert!(left.penetration > projected.penetration, "{left:?}");
+    assert!(left.penetration < 1e-4, "{left:?}");
+}
+
+#[test]
+fn impacts_in_flight_keep_the_momentum() {
+    // A weightless crowd that implodes, with friction, above the plane.
+    for (friction, restitution) in [(0.0, 1.0), (0.6, 0.0), (0.6, 0.5)] {
+        let mut centres = Scene::ElasticBlock.centres();
+        centres.retain(|x| x.x.abs() < 0.4 && x.z.abs() < 0.4 && x.y < 1.8);
+        for x in &mut centres {
+            x.y += 5.0;
+        }
+        let middle = Vector3::new(0.0, 6.4, 0.0);
+        let options = weightless(friction, restitution, 2e-3);
+        let mut simulation = SphereSimulation::new(KIND, centres.clone(), options).unwrap();
+        for (v, x) in simulation.v_mut().chunks_exact_mut(6).zip(&centres) {
+            let inwards = (middle - x) * 2.0 + Vector3::new(0.1, -0.2, 0.3).cross(x);
+            v[..3].copy_from_slice(inwards.as_slice());
+            v[3..].copy_from_slice(&[1.0, -2.0, 0.5]);
+        }
+        let start = (simulation.momentum(), simulation.angular_momentum());
+        let before = simulation.energy();
+        let mut struck = 0;
+        for _ in 0..150 {
+            struck += simulation.step(1).unwrap().n_contacts;
+        }
+        assert!(struck > 100, "{struck} contacts");
+        let change = (simulation.momentum() - start.0).norm();
+        assert!(change < 1e-10, "linear: {change}");
+        // Directions are taken at the predicted end of the step and arms as the radius: angular momentum is kept to O(h).
+        let spin = (simulation.angular_momentum() - start.1).norm();
+        assert!(
+            spin < 0.02 * start.1.norm(),
+            "angular: {spin} of {}",
+            start.1.norm()
+        );
+        assert!(simulation.energy() <= before * (1.0 + 1e-12));
+    }
+}
+
+#[test]
+fn a_symmetric_heap_stays_symmetric() {
+    // A sphere falls on four in a square: a quarter turn about y changes nothing.
+    let side = 0.11;
+    let mut centres: Vec<_> = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]
+        .map(|(x, z)| Vector3::new(side * x, 0.1, side * z))
+        .to_vec();
+    centres.push(Vector3::new(0.0, 0.5, 0.0));
+    let mut simulation = SphereSimulation::new(KIND, centres, options(0.0, 0.0, 2e-3)).unwrap();
+    simulation.step(400).unwrap();
+    let x = simulation.centres();
+    assert!(x[0].x > side + 0.01, "pushed apart");
+    assert!(x[4].x.abs() < 1e-9 && x[4].z.abs() < 1e-9);
+    for k in 1..4 {
+        let before = x[k - 1];
+        let turned = Vector3::new(-before.z, before.y, before.x);
+        assert!((x[k] - turned).norm() < 1e-9, "{k}: {} {turned}", x[k]);
+    }
+    let W = simulation.operator().to_dense();
+    let n = 3 * simulation.contacts().len();
+    for r in 0..n {
+        for s in 0..r {
+            assert!((W[r * n + s] - W[s * n + r]).abs() < 1e-14);
+        }
+    }
+}
+
+#[test]
+fn a_sliding_sphere_comes_to_roll_at_five_sevenths() {
+    let kind = SphereKind {
+        mass: 3.0,
+        radius: 0.2,
+    };
+    let start = vec![Vector3::new(0.0, 0.2, 0.0)];
+    let mut simulation = SphereSimulation::new(kind, start, options(0.3, 0.0, 1e-3)).unwrap();
+    simulation.v_mut()[0] = 1.0;
+    simulation.step(200).unwrap();
+    assert!((simulation.v()[0] - 5.0 / 7.0).abs() < 1e-9);
+    assert!(
+        (simulation.v()[5] + 5.0 / 7.0 / 0.2).abs() < 1e-8,
+        "rolls forward"
+    );
+    // Until it rolls it slips for 2 v/(7 mu g) over 12 v²/(49 mu g).
+    let slips = 2.0 / (7.0 * 0.3 * G);
+    let expected = 12.0 / (49.0 * 0.3 * G) + 5.0 / 7.0 * (0.2 - slips);
+    assert!((simulation.centres()[0].x - expected).abs() < 2e-4);
+    assert!((simulation.centres()[0].y - 0.2).abs() < 1e-12);
+}
