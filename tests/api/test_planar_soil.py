@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rover_gym.figures.soil import Frame, draw_soil
 from rover_gym.planar import Line, SoilSimulation, SoilSnapshot, soil_packing
 from rover_gym.planar_soil import record_soil, rover_on_soil, settled_bed
-from rover_gym.planar_soil_figures import Frame, draw_soil
 from rover_gym.recording import read_trajectory
 
 

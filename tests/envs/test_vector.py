@@ -43,10 +43,9 @@ def assert_same(ours: tuple[Any, ...], theirs: tuple[Any, ...]) -> None:
     for one, other in zip(ours[:-1], theirs[:-1], strict=True):
         assert (one.dtype, one.shape) == (other.dtype, other.shape)
         assert one.tobytes() == other.tobytes()
-    differing = [key for key in theirs[-1] if not data_equivalence(ours[-1].get(key), theirs[-1][key], exact=True)]
-    assert data_equivalence(ours[-1], theirs[-1], exact=True), {
-        key: (ours[-1].get(key), theirs[-1][key]) for key in differing
-    }
+    for key, value in theirs[-1].items():
+        assert data_equivalence(ours[-1].get(key), value, exact=True), key
+    assert data_equivalence(ours[-1], theirs[-1], exact=True)
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])

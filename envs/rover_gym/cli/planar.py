@@ -140,8 +140,8 @@ def soil(
     output: Output = Path("runs/planar"),
 ) -> None:
     """Drive the two-wheel rover over granular soil of disks; record, draw and film it."""
+    from rover_gym.figures.soil import Frame, draw_soil, film_soil  # noqa: PLC0415 - matplotlib is slow to load
     from rover_gym.planar_soil import record_soil, rover_on_soil, settled_bed  # noqa: PLC0415 - h5py is slow to load
-    from rover_gym.planar_soil_figures import Frame, draw_soil, film_soil  # noqa: PLC0415 - matplotlib is slow to load
 
     options: dict[str, Any] = {"gravity": (0.0, -gravity), "friction": friction, "time_step": time_step}
     slowness = float(np.sqrt(9.81 / max(gravity, 1e-3)))
@@ -180,8 +180,8 @@ def soil(
     if video:
         say_path("video", film_soil(frames, output / "soil.mp4"))
     if sweep:
+        from rover_gym.figures.soil import draw_curves  # noqa: PLC0415 - as above
         from rover_gym.planar_soil import drawbar_pull, slip_on_soil  # noqa: PLC0415 - as above
-        from rover_gym.planar_soil_figures import draw_curves  # noqa: PLC0415 - as above
 
         scale = gravity / 9.81
         drives = [slip_on_soil(bed, scale * t, **options) for t in (5.0, 10.0, 20.0, 35.0, 50.0, 75.0, 100.0)]

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym._core import SoilSimulation
-from rover_gym.recording import MissingExtraError
+from rover_gym.extras import MissingExtraError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -135,7 +135,7 @@ def film_soil(frames: Sequence[Frame], path: str | Path, *, frames_per_second: i
     """
     figure = _figure(12.0, 4.6)
     try:
-        import imageio_ffmpeg  # type: ignore[import-untyped]  # noqa: PLC0415 - an extra
+        import imageio_ffmpeg  # noqa: PLC0415 - an extra
     except ModuleNotFoundError as error:
         raise MissingExtraError("imageio-ffmpeg", "render") from error
     from matplotlib import rc_context  # noqa: PLC0415 - an extra
