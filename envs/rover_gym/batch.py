@@ -6,9 +6,10 @@ the functions that `RoverEnv` calls, over arrays.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
 
@@ -22,6 +23,9 @@ from rover_gym.scene import ResetOptions, Scene, check_difficulty, check_reset_o
 from rover_gym.start import Start
 from rover_gym.task import Task, check_actions
 from rover_gym.validation import Range, refuse
+
+if TYPE_CHECKING:
+    from rover_gym.rendering import FrameRenderer
 
 
 class RoverBatch:
@@ -137,11 +141,32 @@ class RoverBatch:
 class Rover:
     """One rover of a batch, by the names that `RoverEnv` has: to look at, and to set its difficulty."""
 
-    render_mode: str | None = None
     spec = None
 
     def __init__(self, batch: RoverBatch, i: int) -> None:
         self._batch, self._i = batch, i
+        self._renderer: FrameRenderer | None = None
+
+    @property
+    def render_mode(self) -> str | None:
+        """That of the arguments, for all rovers."""
+        return self._batch.prototype.render_mode
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """The present state as a frame, as `RoverEnv.render`; None without a render mode."""
+        if self.render_mode is None:
+            return None
+        scene, prototype = self._scene, self._batch.prototype
+        if self._renderer is None:
+            self._renderer = prototype.make_renderer(scene)
+        self._renderer.set_scene(scene.terrain, goal=scene.start.goal, goal_tolerance=prototype.goal_tolerance)
+        return self._renderer.render(self.simulation)
+
+    def close(self) -> None:
+        """Frees the renderer, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
 
     @property
     def simulation(self) -> Simulation:

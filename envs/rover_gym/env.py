@@ -403,11 +403,15 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             return None
         scene = self._running()
         if self._renderer is None:
-            from rover_gym.rendering import FrameRenderer  # noqa: PLC0415 - only who looks needs a renderer
-
-            self._renderer = FrameRenderer(self.model, scene.terrain, **asdict(self.render_options))
+            self._renderer = self.make_renderer(scene)
         self._renderer.set_scene(scene.terrain, goal=scene.start.goal, goal_tolerance=self.goal_tolerance)
         return self._renderer.render(self._simulation)
+
+    def make_renderer(self, scene: Scene) -> "FrameRenderer":
+        """A renderer with this environment's `render_options`, which whoever asked for it closes."""
+        from rover_gym.rendering import FrameRenderer  # noqa: PLC0415 - only who looks needs a renderer
+
+        return FrameRenderer(self.model, scene.terrain, **asdict(self.render_options))
 
     def close(self) -> None:
         """Frees the renderer, if there is one."""

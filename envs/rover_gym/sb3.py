@@ -101,7 +101,9 @@ class RoverVecEnv(VecEnv):
         return observation, reward, dones, infos
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """Frees the renderers, if there are any."""
+        for rover in self.batch.rovers:
+            rover.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """An attribute of the rovers, or of the environment that they are made like."""
@@ -129,8 +131,8 @@ class RoverVecEnv(VecEnv):
         return [False for _ in self._chosen(indices)]
 
     def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
-        """No pictures: draw a `RoverEnv` instead."""
-        return [None] * self.num_envs
+        """A frame of every rover, with `render_mode="rgb_array"`; `render()` puts them side by side."""
+        return [rover.render() for rover in self.batch.rovers]
 
     def _chosen(self, indices: VecEnvIndices) -> list[Rover]:
         return [self.batch.rovers[i] for i in self._get_indices(indices)]

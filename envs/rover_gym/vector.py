@@ -51,7 +51,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         self.prototype = self.batch.prototype
         self.num_envs = self.batch.n
         self.metadata = {**self.prototype.metadata, "autoreset_mode": self.autoreset_mode}
-        self.render_mode = None
+        self.render_mode = self.prototype.render_mode
         self.single_observation_space = self.prototype.observation_space
         self.single_action_space = self.prototype.action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -129,6 +129,16 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
             observation[starting] = self.batch.observation[starting]
         self._ended = ended
         return observation, reward, terminated, truncated, infos
+
+    def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
+        """A frame of every rover, with `render_mode="rgb_array"`; None without."""
+        frames = tuple(frame for rover in self.batch.rovers if (frame := rover.render()) is not None)
+        return frames or None
+
+    def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - Gymnasium's signature
+        """Frees the renderers, if there are any."""
+        for rover in self.batch.rovers:
+            rover.close()
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """Calls a method of every rover, such as `set_difficulty`, or gets an attribute."""

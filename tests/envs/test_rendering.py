@@ -467,3 +467,32 @@ def test_an_optimizer_can_be_made_after_a_frame() -> None:
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=200)
     assert result.returncode == 0, result.stderr
     assert result.stdout.split() == ["(480,", "640,", "3)", "made"]
+
+
+def test_every_rover_of_a_batch_is_drawn_as_it_would_be_alone() -> None:
+    from rover_gym.sb3 import RoverVecEnv  # noqa: PLC0415 - after the warning filters of this file
+
+    options = {"render_mode": "rgb_array", "render_options": {"width": 160, "height": 120}}
+    alone = gym.make("Rover-v0", **options)
+    alone.reset(seed=4)
+    many = gym.make_vec("Rover-v0", num_envs=2, **options)
+    many.reset(seed=4)
+    venv = RoverVecEnv(2, **options)
+    venv.seed(4)
+    venv.reset()
+    action = np.full(12, 0.3, np.float32)
+    for _ in range(3):
+        alone.step(action)
+        many.step(np.tile(action, (2, 1)))
+        venv.step(np.tile(action, (2, 1)))
+    frame = alone.render()
+    frames = many.render()
+    assert frames is not None
+    assert len(frames) == 2
+    np.testing.assert_array_equal(frames[0], frame)
+    assert not np.array_equal(frames[1], frame)
+    tiled = venv.render()
+    assert tiled is not None
+    np.testing.assert_array_equal(tiled[:120, :160], frame)
+    for env in (alone, many, venv):
+        env.close()
