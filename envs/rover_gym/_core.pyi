@@ -37,6 +37,9 @@ __all__ = [
     "SimulationBatch",
     "Sine",
     "Snapshot",
+    "SoilContacts",
+    "SoilSimulation",
+    "SoilSnapshot",
     "SolverReport",
     "SphereField",
     "Spline",
@@ -47,6 +50,7 @@ __all__ = [
     "TwoWheelRoverSimulation",
     "__version__",
     "accuracy_options",
+    "soil_packing",
     "solve_friction_contact",
 ]
 
