@@ -12,6 +12,7 @@ STAMPS := $(VENV)/stamps# in the environment, so that both go together
 UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
+export VIRTUAL_ENV := $(abspath $(VENV))# where maturin installs
 
 .PHONY: help demo test check lint types format test-rust test-slow test-python docs bench chart stability orders profiles train train-rllib pins clean
 
