@@ -846,6 +846,12 @@ class SoilSimulation:
         machine_rate: npt.ArrayLike | None = None,
     ) -> None:
         """Sets the state at time 0; rates are 0 and the machine stays where it is if not given."""
+    def remove(self, which: npt.ArrayLike) -> None:
+        """Takes the disks that `which` (n,) marks out of the soil; the others go on under new numbers in the same order.
+
+        Raises:
+            ModelError: Another number of marks, or no disk would be left.
+        """
     def set_torques(self, torques: npt.ArrayLike) -> None:
         """(2,) N m of the rover's wheels, positive forward."""
     def set_pull(self, pull: npt.ArrayLike) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from validation.samples import DIAMETER, GRAVITY, RADIUS, Array, Sample, box, glued_row, loose, settle
-from validation.watch import Ledger, Watched
+from validation.samples import DIAMETER, RADIUS, Array, Sample, box, glued_row, loose, settle
+from validation.watch import GRAVITY, Ledger
 
 FRICTION = 1.0
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym._core import SoilSimulation, soil_packing
-from validation.watch import Watched
+from validation.watch import GRAVITY, Watched
 
 Array = npt.NDArray[np.float64]
 
@@ -21,7 +21,6 @@ SPREAD = 0.2
 MASS = 0.1
 #: s: a free disk falls a hundredth of its diameter from rest in 13 steps.
 TIME_STEP = 5e-4
-GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
@@ -69,14 +68,16 @@ class Sample:
         """The same disks where a simulation left them."""
         return replace(self, position=sim.position, velocity=sim.velocity)
 
-    def watched(self, *, walls: object = None, friction: float, **options: object) -> Watched:
+    def watched(
+        self, *, walls: object = None, friction: float, has_energy: bool = True, **options: object
+    ) -> Watched:
         """A simulation of these disks; their friction with walls is the same as among them unless given."""
         given = {"wall_friction": friction, "time_step": TIME_STEP} | options
         sim = SoilSimulation(
             self.radius, self.mass, self.position, kinematic=self.kinematic, walls=walls, friction=friction, **given
-        )  # type: ignore[arg-type]
+        )
         sim.set_state(self.position, self.velocity)
-        return Watched(sim)
+        return Watched(sim, has_energy=has_energy)
 
 
 def loose(count: int, width: float, seed: int, *, left: float = 0.0, bottom: float = 0.0) -> Sample:
@@ -119,22 +120,17 @@ def sides(left: float, right: float) -> list[list[float]]:
     return [[left, 0.0, 1.0, 0.0], [right, 0.0, -1.0, 0.0]]
 
 
-def settle(watched: Watched, *, least: float = 0.2, most: float = 5.0, speed: float = 0.01) -> None:
-    """Steps until the root mean square speed is below `speed` times sqrt(g d), or for `most` seconds.
-
-    Args:
-        watched: The soil.
-        least: Time that it runs at least, s.
-        most: Time that it runs at most, s.
-        speed: In units of sqrt(9.81 DIAMETER).
-    """
+def slow(watched: Watched, speed: float) -> bool:
+    """Whether the free disks' root mean square speed is below `speed` times sqrt(9.81 DIAMETER)."""
     sim = watched.sim
-    limit = speed * np.sqrt(GRAVITY * DIAMETER)
     mass = float(sim.mass[~sim.kinematic].sum())
-    every = round(0.05 / sim.time_step)
+    return bool(np.sqrt(2.0 * sim.energy().kinetic / mass) < speed * np.sqrt(GRAVITY * DIAMETER))
+
+
+def settle(watched: Watched, *, least: float = 0.2, most: float = 5.0, speed: float = 0.01) -> None:
+    """Steps until the disks are `slow`, for `least` seconds at least and `most` at most."""
+    every = 0.05
     elapsed = 0.0
-    while elapsed < most:
-        watched.step(every)
-        elapsed += every * sim.time_step
-        if elapsed >= least and np.sqrt(2.0 * sim.energy().kinetic / mass) < limit:
-            return
+    while elapsed < least or (elapsed < most and not slow(watched, speed)):
+        watched.step(round(every / watched.sim.time_step))
+        elapsed += every

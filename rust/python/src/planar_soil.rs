@@ -497,6 +497,11 @@ impl SoilSimulation {
         Ok(self.inner.set_state(&q, &v).map_err(|e| soil_error(&e))?)
     }
 
+    #[allow(clippy::needless_pass_by_value)] // made for this call
+    fn remove(&mut self, which: Vec<bool>) -> PyResult<()> {
+        Ok(self.inner.remove(&which).map_err(|e| soil_error(&e))?)
+    }
+
     fn set_torques(&mut self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
         let torques = vector(torques, Kind::Command, "torques")?;
         Ok(self

@@ -2,6 +2,7 @@
 
 use super::super::error::positive;
 use super::error::SoilError;
+use super::removal::Renumbering;
 
 /// Solid disks, immutable: `J = m r²/2`. Some may be kinematic: nothing changes their velocity, as grains
 /// glued to a rough floor or a piston.
@@ -69,6 +70,12 @@ impl Disks {
             });
         }
         Ok(Self { kinematic, ..self })
+    }
+
+    /// Those that stay.
+    pub(super) fn without(&self, renumbering: &Renumbering) -> Result<Self, SoilError> {
+        let [radius, mass] = [&self.radius, &self.mass].map(|all| renumbering.keep(all, 1));
+        Self::new(radius, mass)?.with_kinematic(renumbering.keep(&self.kinematic, 1))
     }
 
     /// Number of disks.

@@ -10,6 +10,7 @@ use super::contact::{SoilContact, SoilKey};
 use super::disks::Disks;
 use super::error::SoilError;
 use super::grid::Grid;
+use super::removal::Renumbering;
 use super::scene::SoilScene;
 use super::sleep::{Sleep, SleepOptions, StepTaken};
 use super::system::{SoilParts, SoilSystem};
@@ -229,6 +230,40 @@ impl SoilSimulation {
         self.count = 0;
         self.warm_start.clear();
         self.sleep = Sleep::new(self.scene.disks.kinematic());
+        self.has_contacts = false;
+        Ok(())
+    }
+
+    /// Takes the disks that are marked (n) out of the soil; the others go on as they are, under new numbers in the same order.
+    ///
+    /// Snapshots of before belong to another soil.
+    ///
+    /// # Errors
+    /// Another number of marks; none would be left. Nothing is changed then.
+    pub fn remove(&mut self, marked: &[bool]) -> Result<(), SoilError> {
+        let n = self.scene.disks.len();
+        if marked.len() != n {
+            return Err(SoilError::Length {
+                field: "which",
+                expected: n,
+                count: marked.len(),
+            });
+        }
+        let renumbering = Renumbering::without(marked);
+        let disks = self.scene.disks.without(&renumbering)?;
+        self.scene = Arc::new(SoilScene {
+            disks,
+            ..(*self.scene).clone()
+        });
+        self.q = renumbering.keep(&self.q, 3);
+        self.v = renumbering.keep(&self.v, 3);
+        self.sleep = self.sleep.without(&renumbering);
+        self.warm_start.persistent.clear();
+        let impulses = self.warm_start.impulses.iter();
+        self.warm_start.impulses = impulses
+            .filter_map(|(key, p)| Some((renumbering.key(*key)?, *p)))
+            .collect();
+        self.scratch = Scratch::new(&self.q, self.scene.nv(), 3 * renumbering.left(), 2);
         self.has_contacts = false;
         Ok(())
     }

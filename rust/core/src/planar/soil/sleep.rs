@@ -8,6 +8,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::contact::{SoilContact, SoilKey};
+use super::removal::Renumbering;
 use super::scene::SoilScene;
 use crate::integrator::WarmStart;
 
@@ -67,6 +68,18 @@ impl Sleep {
             still: vec![0; kinematic.len()],
             asleep: kinematic.to_vec(),
             dormant: Vec::new(),
+        }
+    }
+
+    /// Of the disks that stay.
+    pub(super) fn without(&self, renumbering: &Renumbering) -> Self {
+        let dormant = self.dormant.iter();
+        Self {
+            still: renumbering.keep(&self.still, 1),
+            asleep: renumbering.keep(&self.asleep, 1),
+            dormant: dormant
+                .filter_map(|(key, p)| Some((renumbering.key(*key)?, *p)))
+                .collect(),
         }
     }
 

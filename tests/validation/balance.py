@@ -1,0 +1,59 @@
+"""Runs made for momentum and energy alone: a cloud that collides in empty space, a box of disks that bounce."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from validation.samples import DIAMETER, RADIUS, loose, settle
+from validation.watch import Ledger, Watched
+
+
+def _shaken(watched: Watched, speed: float, seed: int) -> None:
+    sim = watched.sim
+    random = np.random.default_rng(seed)
+    velocity = speed * random.standard_normal((len(sim.radius), 3))
+    velocity[:, 2] /= RADIUS
+    sim.set_state(sim.position, velocity)
+
+
+def cloud(count: int, friction: float, restitution: float, seed: int, *, steps: int = 400) -> dict[str, float]:
+    """A square of disks that fly at random in a box without gravity.
+
+    Friction and restitution as given, also at the walls; every step is watched.
+    """
+    side = 1.6 * RADIUS * np.sqrt(np.pi * count)
+    walls = [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [side, 0.0, -1.0, 0.0], [0.0, side, 0.0, -1.0]]
+    sample = loose(count, side, seed)
+    watched = sample.watched(
+        walls=walls, friction=friction, restitution=restitution, gravity=(0.0, 0.0), max_iterations=2000
+    )
+    _shaken(watched, 0.5, seed)
+    watched = Watched(watched.sim)
+    start = watched.sim.energy().kinetic
+    watched.step(steps)
+    return {
+        "friction": friction,
+        "restitution": restitution,
+        "lost": 1.0 - watched.sim.energy().kinetic / start,
+        "grown": watched.ledger.growth / start,
+    } | watched.ledger.as_dict()
+
+
+def free_cloud(count: int, friction: float, seed: int) -> dict[str, float]:
+    """Two clouds that fly through one another in empty space: nothing outside changes momentum or moment of momentum."""
+    side = 1.2 * RADIUS * np.sqrt(np.pi * count / 2.0)
+    left = loose(count // 2, side, seed)
+    right = loose(count // 2, side, seed + 1, left=side + 2.0 * DIAMETER, bottom=0.3 * side)
+    left.velocity[:, 0], right.velocity[:, 0] = 1.0, -1.0
+    watched = (left + right).watched(friction=friction, gravity=(0.0, 0.0), max_iterations=2000)
+    sim = watched.sim
+    before = sim.momentum()
+    moved = float((sim.mass * np.linalg.norm(sim.velocity[:, :2], axis=1)).sum())
+    turned = float((sim.mass * np.abs(sim.position[:, 0] * sim.velocity[:, 1] - sim.position[:, 1] * sim.velocity[:, 0])).sum())
+    watched.step(round(side / sim.time_step))
+    error = np.abs(sim.momentum() - before)
+    return {
+        "momentum_error": float(error[:2].max() / moved),
+        "moment_error": float(error[2] / turned),
+        "energy_left": float(sim.energy().kinetic / (0.5 * float(sim.mass.sum()))),
+    } | watched.ledger.as_dict()
