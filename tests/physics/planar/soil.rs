@@ -127,10 +127,9 @@ fn energy_never_grows_without_restitution() {
             energy = now;
         }
         assert!(energy < 0.95 * scale);
-        assert!(
-            (converged >= 290) == (case != 1),
-            "{converged} in case {case}"
-        );
+        // Solved well, some steps want more sweeps than are allowed; cut short, most do.
+        let expected = [295..=300, 0..=150, 200..=300][case].clone();
+        assert!(expected.contains(&converged), "{converged} in case {case}");
     }
 }
 
