@@ -100,27 +100,37 @@ fn collisions_in_free_space_keep_momentum_to_rounding() {
 
 #[test]
 fn energy_never_grows_without_restitution() {
-    // Solved well and without projection, so that nothing but the scheme is seen.
-    let mut soil = soil(&packing(50, 8, 2), |options, _| {
-        options.solver.tolerance = 1e-9;
-        options.solver.velocity_tolerance = 1e-8;
-        options.solver.max_sweeps = 20_000;
-        options.stabilisation = Stabilisation::None;
-    });
-    shake(&mut soil, 0.5);
-    let mut energy = soil.energy().total();
-    let scale = energy;
-    for step in 0..300 {
-        soil.step(1).expect("finite");
-        let now = soil.energy().total();
-        assert!(
-            now <= energy + 1e-8 * scale,
-            "step {step}: {}",
-            now - energy
-        );
-        energy = now;
+    // The default options; sweeps cut short; solved well and without projection.
+    for case in 0..3 {
+        let mut soil = soil(&packing(120, 10, 2), |options, _| match case {
+            0 => {}
+            1 => options.solver.max_sweeps = 7,
+            _ => {
+                options.solver.tolerance = 1e-9;
+                options.solver.velocity_tolerance = 1e-8;
+                options.solver.max_sweeps = 20_000;
+                options.stabilisation = Stabilisation::None;
+            }
+        });
+        shake(&mut soil, 0.5);
+        let mut energy = soil.energy().total();
+        let scale = energy;
+        let mut converged = 0;
+        for step in 0..300 {
+            converged += usize::from(soil.step(1).expect("finite").is_converged());
+            let now = soil.energy().total();
+            assert!(
+                now <= energy + 1e-13 * scale,
+                "case {case}, step {step}: {}",
+                now - energy
+            );
+            energy = now;
+        }
+        assert!(energy < 0.95 * scale);
+        // Solved well, some steps want more sweeps than are allowed; cut short, most do.
+        let expected = [295..=300, 0..=150, 200..=300][case].clone();
+        assert!(expected.contains(&converged), "{converged} in case {case}");
     }
-    assert!(energy < 0.95 * scale);
 }
 
 #[test]
