@@ -7,11 +7,14 @@ from typing import Any
 import numpy as np
 
 from validation.samples import DIAMETER, Array, box, loose, settle
-from validation.watch import Ledger
+from validation.watch import GRAVITY, Ledger
 
 FRICTIONS = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
 #: From walls and floor, and below the highest disk, in diameters: what is nearer is not counted.
 MARGIN = 5.0
+COUNT = 800
+#: Knocks that a bed is given after it has settled, and the speed of each, in sqrt(9.81 DIAMETER).
+KNOCKS, KNOCK = 8, 1.5
 
 
 def covered(position: Array, radius: Array, window: tuple[float, float, float, float], points: int = 1500) -> float:
@@ -53,14 +56,27 @@ def coordination(bodies: Array, impulse: Array, within: Array, least: int) -> tu
     return float(count[:n][counted].mean()), float(1.0 - counted.sum() / within.sum())
 
 
-def bed(count: int, friction: float, seed: int, ledger: Ledger, **options: Any) -> dict[str, float]:
-    """Lets disks fall into a box that is about as wide as the bed is high and looks at its inside."""
+def bed(count: int, friction: float, seed: int, ledger: Ledger, *, knocks: int = 0, **options: Any) -> dict[str, float]:
+    """Lets disks fall into a box that is about as wide as the bed is high and looks at its inside.
+
+    Args:
+        count: Disks.
+        friction: Between all.
+        seed: Of the disks.
+        ledger: What the steps are entered into.
+        knocks: How often the settled bed is thrown up before it is looked at.
+        **options: Of `SoilSimulation`.
+    """
     width = DIAMETER * np.sqrt(count * np.pi / 4.0 / 0.82)
     sample = loose(count, width, seed)
     watched = sample.watched(walls=box(0.0, width), friction=friction, **options)
-    settle(watched, speed=1e-3, most=4.0)
-    ledger.merge(watched.ledger)
     sim = watched.sim
+    for _ in range(knocks):
+        settle(watched)
+        sim.set_state(sim.position, [0.0, KNOCK * np.sqrt(GRAVITY * DIAMETER), 0.0] * np.ones((count, 1)))
+        watched.restart()
+    settle(watched, speed=1e-3, most=3.0)
+    ledger.merge(watched.ledger)
     position, radius = sim.position, sim.radius
     margin = MARGIN * DIAMETER
     window = (margin, width - margin, margin, float(np.quantile(position[:, 1], 0.99)) - margin)
@@ -72,9 +88,17 @@ def bed(count: int, friction: float, seed: int, ledger: Ledger, **options: Any) 
     return {
         "friction": friction,
         "seed": seed,
+        "knocks": knocks,
         "fraction": covered(position, radius, window),
         "coordination": mean,
         "rattlers": rattlers,
         "disks": int(within.sum()),
         "speed": speed,
     }
+
+
+def measure(ledger: Ledger) -> dict[str, object]:
+    """Beds of several frictions, poured; and knocked."""
+    poured = [bed(COUNT, mu, seed, ledger) for mu in FRICTIONS for seed in (0, 1)]
+    knocked = [bed(COUNT, mu, 0, ledger, knocks=KNOCKS) for mu in (0.3, 0.5, 1.0)]
+    return {"poured": poured, "knocked": knocked}

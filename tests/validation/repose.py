@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from validation.samples import DIAMETER, Array, box, glued_row, loose, settle, slow
 from validation.watch import Ledger
 
 FRICTIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7)
+LENGTH, COUNT = 40.0, 720
 
 
 def surface(position: Array, radius: Array, left: float, right: float) -> tuple[Array, Array]:
@@ -15,7 +18,7 @@ def surface(position: Array, radius: Array, left: float, right: float) -> tuple[
     edges = np.arange(left, right + 1e-9, 2.0 * DIAMETER)
     x, top = position[:, 0], position[:, 1] + radius
     places, heights = [], []
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in itertools.pairwise(edges):
         near = (x >= a) & (x < b)
         if near.any():
             k = np.flatnonzero(near)[top[near].argmax()]
@@ -24,7 +27,7 @@ def surface(position: Array, radius: Array, left: float, right: float) -> tuple[
     return np.array(places), np.array(heights)
 
 
-def slope(count: int, friction: float, seed: int, ledger: Ledger, *, length: float = 50.0) -> dict[str, object]:
+def slope(count: int, friction: float, seed: int, ledger: Ledger, *, length: float = LENGTH) -> dict[str, object]:
     """Angle of repose of one bed.
 
     Args:
@@ -62,3 +65,17 @@ def slope(count: int, friction: float, seed: int, ledger: Ledger, *, length: flo
         "seconds": float(sim.time),
         "surface": [(x / DIAMETER).round(3).tolist(), (y / DIAMETER).round(3).tolist()],
     }
+
+
+def measure(ledger: Ledger) -> dict[str, object]:
+    """Slopes of several frictions."""
+    runs = [slope(COUNT, mu, seed, ledger) for mu in FRICTIONS for seed in (0, 1)]
+    means = [
+        {
+            "friction": mu,
+            "angle": float(np.mean([r["angle"] for r in runs if r["friction"] == mu])),
+            "spread": float(np.ptp([r["angle"] for r in runs if r["friction"] == mu])),
+        }
+        for mu in FRICTIONS
+    ]
+    return {"runs": runs, "means": means}

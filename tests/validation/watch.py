@@ -84,6 +84,10 @@ class Watched:
         energy = self.sim.energy()
         return float(energy.kinetic + energy.potential)
 
+    def restart(self) -> None:
+        """After the state was set from outside: what that did to the energy is not counted."""
+        self._look()
+
     def remove(self, which: np.ndarray) -> None:
         """Takes disks (n,) out; their energy is no longer counted."""
         if which.any():
