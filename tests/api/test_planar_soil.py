@@ -140,14 +140,13 @@ def test_kinematic_disks_bear_and_move_as_they_are_told() -> None:
 def test_removed_disks_leave_the_others_as_they_are() -> None:
     radius, mass, centres = soil_packing(40, width=0.4, seed=1)
     walls = [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [0.4, 0.0, -1.0, 0.0]]
-    # one more, far off on the floor: without it all go on bit for bit
-    far = SoilSimulation(
-        np.insert(radius, 7, 0.01), np.insert(mass, 7, 0.1), np.insert(centres, 7, [0.2, 9.0], axis=0), walls=walls
-    )
+    # One more, held far off: with it or without it all go on bit for bit.
+    marks = np.arange(41) == 7
+    more = (np.insert(radius, 7, radius[0]), np.insert(mass, 7, 0.1), np.insert(centres, 7, [0.2, 9.0], axis=0))
+    far = SoilSimulation(*more, walls=walls, kinematic=marks)
     alone = SoilSimulation(radius, mass, centres, walls=walls)
     for sim in (far, alone):
         sim.step(150)
-    marks = np.arange(41) == 7
     far.remove(marks)
     np.testing.assert_array_equal(far.radius, radius)
     np.testing.assert_array_equal(far.position, alone.position)

@@ -7,6 +7,8 @@ import numpy as np
 from validation.samples import DIAMETER, RADIUS, loose
 from validation.watch import Ledger, Watched
 
+STEPS = (1e-3, 5e-4, 1e-4, 2e-5)
+
 
 def _shaken(watched: Watched, speed: float, seed: int) -> None:
     sim = watched.sim
@@ -14,6 +16,12 @@ def _shaken(watched: Watched, speed: float, seed: int) -> None:
     velocity = speed * random.standard_normal((len(sim.radius), 3))
     velocity[:, 2] /= RADIUS
     sim.set_state(sim.position, velocity)
+
+
+def _walls(count: int) -> tuple[float, list[list[float]]]:
+    """A square box that disks fill to two fifths."""
+    side = 1.6 * RADIUS * np.sqrt(np.pi * count)
+    return side, [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [side, 0.0, -1.0, 0.0], [0.0, side, 0.0, -1.0]]
 
 
 def cloud(
@@ -24,8 +32,7 @@ def cloud(
     Friction and restitution as given, also at the walls. Newton's restitution with friction may add energy: such a
     run is not entered into the ledger.
     """
-    side = 1.6 * RADIUS * np.sqrt(np.pi * count)
-    walls = [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [side, 0.0, -1.0, 0.0], [0.0, side, 0.0, -1.0]]
+    side, walls = _walls(count)
     sample = loose(count, side, seed)
     watched = sample.watched(
         walls=walls, friction=friction, restitution=restitution, gravity=(0.0, 0.0), max_iterations=2000
@@ -42,6 +49,19 @@ def cloud(
         "lost": 1.0 - watched.sim.energy().kinetic / start,
         "grown": watched.ledger.growth / start,
     } | watched.ledger.as_dict()
+
+
+def cooling(count: int, restitution: float, step: float, seed: int, *, duration: float = 0.2) -> dict[str, float]:
+    """How much of its energy a dense box without friction and gravity keeps, by the step."""
+    side, walls = _walls(count)
+    sample = loose(count, side, seed)
+    watched = sample.watched(
+        walls=walls, friction=0.0, restitution=restitution, gravity=(0.0, 0.0), time_step=step, max_iterations=2000
+    )
+    _shaken(watched, 0.5, seed)
+    start = watched.sim.energy().kinetic
+    watched.sim.step(round(duration / step))
+    return {"restitution": restitution, "step": step, "kept": watched.sim.energy().kinetic / start}
 
 
 def free_cloud(count: int, friction: float, seed: int, ledger: Ledger) -> dict[str, float]:
@@ -74,5 +94,6 @@ def measure(ledger: Ledger) -> dict[str, object]:
             for friction, restitution in ((0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (0.0, 0.5), (0.0, 0.9), (0.5, 0.5))
             for seed in (0, 1)
         ],
+        "cooling": [cooling(300, restitution, step, 0) for restitution in (0.9, 1.0) for step in STEPS],
         "clouds": [free_cloud(400, friction, 0, ledger) for friction in (0.0, 0.5)],
     }

@@ -17,9 +17,9 @@ FRICTION = 1.0
 PAPER = ((2.5, 1.0), (3.25, 0.7))
 ASPECT = 2.0
 #: How long a column is watched, in units of the time that its height takes to fall.
-FALLS = 5.0
-COUNT = 1000
-ASPECTS = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
+FALLS = 4.0
+COUNT = 700
+ASPECTS = (0.5, 0.8, 1.25, 2.0, 3.2, 5.0, 8.0)
 
 
 def column(count: int, aspect: float, seed: int, ledger: Ledger) -> tuple[Sample, float, float]:
@@ -123,8 +123,8 @@ def measure(ledger: Ledger) -> dict[str, object]:
     """All columns, and the power laws that they follow."""
     flat = [run_out(COUNT, aspect, seed, ledger) for seed in (0, 1) for aspect in ASPECTS]
     rough = [run_out(COUNT, aspect, 0, ledger, rough=True) for aspect in ASPECTS[1::2]]
-    bouncing = [run_out(COUNT, aspect, 0, ledger, restitution=0.5) for aspect in (1.0, 4.0)]
-    sizes = [run_out(count, 2.0, 0, ledger) for count in (300, 4000)]
+    bouncing = [run_out(COUNT, aspect, 0, ledger, restitution=0.5) for aspect in (0.8,)]
+    sizes = [run_out(count, 2.0, 0, ledger) for count in (200, 2500)]
     return {"flat": flat, "rough": rough, "bouncing": bouncing, "sizes": sizes, "fits": fits(flat)}
 
 

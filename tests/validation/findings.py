@@ -155,6 +155,9 @@ def balance(data: dict[str, Any]) -> Iterator[Finding]:
         1e-12,
         digits=".1e",
     )
+    kept = [r["kept"] for r in data["cooling"] if r["restitution"] == 0.9]
+    error = abs(kept[0] / kept[-1] - 1.0)
+    yield Finding("energy kept at e = 0.9, step 1 against 0.02 ms", "the same, 5%", "", error, 0.0, 0.05, digits=".3f")
 
 
 def everywhere(ledgers: dict[str, dict[str, float]]) -> Iterator[Finding]:

@@ -10,8 +10,8 @@ from validation.watch import GRAVITY, Ledger
 FRICTION = 0.5
 WALL_FRICTION = 0.5
 #: Width of the silo in diameters, and heights of the filling in widths.
-WIDTH = 15.0
-HEIGHTS = (0.5, 1.0, 1.5, 2.0, 3.0, 4.5, 6.0)
+WIDTH = 12.0
+HEIGHTS = (0.5, 1.0, 1.5, 2.5, 4.0, 6.0)
 #: The bottom is lowered at this speed (diameters a second), so that the walls' friction is all turned upward, this far.
 SPEED = 2.0
 TRAVEL = 1.0

@@ -10,7 +10,7 @@ from validation.samples import DIAMETER, Array, box, glued_row, loose, settle, s
 from validation.watch import Ledger
 
 FRICTIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7)
-LENGTH, COUNT = 40.0, 720
+LENGTH, COUNT = 32.0, 500
 
 
 def surface(position: Array, radius: Array, left: float, right: float) -> tuple[Array, Array]:
