@@ -88,7 +88,7 @@ chart: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CP
 stability: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes where methods fail, ours and other engines': docs/stability.md (5 minutes)
 	$(COMPARE).stability
 
-validate: $(STAMPS)/core ## the soil beside papers and closed forms: docs/validation.md (VALIDATE_TIME; VALIDATE="packing repose" measures some)
+validate: $(STAMPS)/core ## the soil beside papers and closed forms: docs/validation.md (some 12 minutes of one core; VALIDATE="packing repose" measures some)
 	PYTHONPATH=tests $(BIN)/python -m validation $(VALIDATE)
 
 orders: $(STAMPS)/demo ## measure every time-stepping scheme: order, drift, energy, cost; redraw docs/comparison/orders.png
