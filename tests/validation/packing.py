@@ -97,8 +97,18 @@ def bed(count: int, friction: float, seed: int, ledger: Ledger, *, knocks: int =
     }
 
 
+def lifting() -> list[dict[str, object]]:
+    """A knocked bed with and without the projection of positions: what that does to energy and overlap."""
+    found = []
+    for stabilisation in ("projection", "none"):
+        own = Ledger()
+        bed(150, 0.5, 0, own, knocks=5, stabilisation=stabilisation)
+        found.append({"stabilisation": stabilisation} | own.as_dict())
+    return found
+
+
 def measure(ledger: Ledger) -> dict[str, object]:
     """Beds of several frictions, poured; and knocked."""
     poured = [bed(COUNT, mu, seed, ledger) for mu in FRICTIONS for seed in (0, 1)]
     knocked = [bed(COUNT, mu, 0, ledger, knocks=KNOCKS) for mu in (0.2, 0.5)]
-    return {"poured": poured, "knocked": knocked}
+    return {"poured": poured, "knocked": knocked, "lifting": lifting()}
