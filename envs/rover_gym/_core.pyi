@@ -747,8 +747,8 @@ class SoilSimulation:
         radius: (n,) m.
         mass: (n,) kg; the disks are solid.
         position: (n, 2) centres or (n, 3) with angles, m and rad.
-        kinematic: (n,) disks whose velocity nothing changes, as grains glued to a rough floor, or a piston with the velocity
-            that `set_state` gives it; none if not given. They may overlap one another and walls.
+        kinematic: (n,) disks whose velocity nothing changes, as grains glued to a rough floor, or a piston with the
+            velocity that `set_state` gives it; none if not given. They may overlap one another and walls.
         walls: (n, 4) a point of each wall and the normal to its free side.
         ground: A ground of any shape.
         rover: Keyword arguments of `TwoWheelRoverSimulation` that describe a rover, such as its `parameters`.
@@ -847,7 +847,7 @@ class SoilSimulation:
     ) -> None:
         """Sets the state at time 0; rates are 0 and the machine stays where it is if not given."""
     def remove(self, which: npt.ArrayLike) -> None:
-        """Takes the disks that `which` (n,) marks out of the soil; the others go on under new numbers in the same order.
+        """Takes the disks that `which` (n,) marks out; the others go on under new numbers in the same order.
 
         Raises:
             ModelError: Another number of marks, or no disk would be left.
@@ -861,7 +861,7 @@ class SoilSimulation:
     def contacts(self) -> SoilContacts: ...
     def energy(self) -> Energy: ...
     def momentum(self) -> npt.NDArray[np.float64]:
-        """(3,) momentum of the disks that are not kinematic (kg m/s) and their moment of momentum about the origin (kg m^2/s)."""
+        """(3,) momentum of the disks but kinematic ones (kg m/s), and its moment about the origin (kg m^2/s)."""
     def impulse_on_wheels(self) -> npt.NDArray[np.float64]:
         """(2,) of the last step's contacts, N s."""
     def penetration(self) -> float:
