@@ -17,7 +17,7 @@ from typing import Any
 from rich.console import Console
 
 from comparison.machine import processor, versions
-from comparison.peers import Variant, load
+from comparison.peers import LeftOut, Variant, load
 from comparison.peers.ours import OurRunner
 from comparison.references import load as load_reference
 from comparison.run import run
@@ -68,8 +68,8 @@ def measure(
                 continue
             try:
                 trace = run(variant, measured.scene, step, cap)
-            except NotImplementedError as reason:
-                rows.append(row | {"failure": f"left out: {reason}"})
+            except LeftOut as left_out:
+                rows.append(row | {"failure": f"left out: {left_out.reason}"})
                 continue
             cost = trace.cpu / trace.simulated
             for _ in range(2 if trace.cpu < 1.0 and not trace.failure else 0):
