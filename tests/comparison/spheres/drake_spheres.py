@@ -1,15 +1,22 @@
 """Drake. Contacts are springs: solved implicitly in a discrete plant, integrated in a continuous one.
 
-A discrete plant has no restitution, so the elastic scenes run in a continuous one without dissipation, whose springs give
-back what they take as far as the step resolves them. The ground is a box: a half-space with 300 spheres or more crashes
-Drake 1.51. Two boxes have one point of contact, so a slab stands on four small spheres at its corners.
+A discrete plant has no restitution, so the elastic scenes run in a continuous one without dissipation, whose springs
+give back what they take as far as the step resolves them. The ground is a box: a half-space with 300 spheres or more
+crashes Drake 1.51. Two boxes have one point of contact, so a slab stands on four small spheres at its corners.
 """
 
 from functools import partial
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.geometry import AddContactMaterial, Box, CollisionFilterDeclaration, GeometrySet, ProximityProperties, Sphere
+from pydrake.geometry import (
+    AddContactMaterial,
+    Box,
+    CollisionFilterDeclaration,
+    GeometrySet,
+    ProximityProperties,
+    Sphere,
+)
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import (
@@ -28,6 +35,11 @@ from comparison.spheres.scene import Array, FreeScene, G
 
 GROUND = 500.0  # m, edge of the box that is the plane
 FOOT = 0.05  # m, radius of a slab's feet
+#: Point stiffness, N/m. Under a slab stiffer is better; in the block 1e8 left more penetration and cost thrice as much.
+STIFFNESS_OF_SLAB, STIFFNESS = 1e8, 1e6
+DISSIPATION = 50.0  # s/m
+#: A continuous plant's springs are as stiff as a step resolves (angular frequency times step), but no softer than this.
+RESOLVED, SOFTEST = 0.3, 1e5
 
 
 def _material(friction: float, stiffness: float, dissipation: float) -> ProximityProperties:
@@ -41,6 +53,11 @@ def _material(friction: float, stiffness: float, dissipation: float) -> Proximit
     return properties
 
 
+def _inertia(mass: float, own: Array) -> SpatialInertia:
+    """About the centre of mass from its (3,) principal moments."""
+    return SpatialInertia.MakeFromCentralInertia(mass, np.zeros(3), RotationalInertia(*own.tolist()))
+
+
 class DrakeSpheres:
     """A `MultibodyPlant` of free bodies: discrete with an approximation, else continuous with Runge-Kutta 3."""
 
@@ -50,14 +67,16 @@ class DrakeSpheres:
         time_step: float,
         *,
         approximation: DiscreteContactApproximation | None,
-        stiffness: float,
-        dissipation: float,
     ) -> None:
         is_elastic, is_discrete = scene.restitution > 0.0, approximation is not None
         if is_elastic and is_discrete:
             raise LeftOut("a discrete plant has no restitution")
         if not is_elastic and not is_discrete:
             raise LeftOut("the continuous plant is for elastic scenes")
+        slab = scene.slab
+        stiffness, dissipation = STIFFNESS_OF_SLAB if slab else STIFFNESS, DISSIPATION
+        if not is_discrete:
+            stiffness, dissipation = max(scene.mass * (RESOLVED / time_step) ** 2, SOFTEST), 0.0
         builder = DiagramBuilder()
         plant, graph = AddMultibodyPlantSceneGraph(builder, time_step if is_discrete else 0.0)
         plant.set_contact_model(ContactModel.kPoint)
@@ -68,23 +87,22 @@ class DrakeSpheres:
         ground = _material(scene.friction, stiffness, dissipation)
         below = RigidTransform(np.array([0.0, -5.0, 0.0]))
         plant.RegisterCollisionGeometry(plant.world_body(), below, Box(GROUND, 10.0, GROUND), "ground", ground)
-        slab = scene.slab
         material = _material(slab.friction if slab else scene.friction, stiffness, dissipation)
-        inertia = 0.4 * scene.mass * scene.radius**2
+        inertia = np.full(3, 0.4 * scene.mass * scene.radius**2)
         self.bodies = []
         for k in range(len(scene.centres)):
-            own = SpatialInertia.MakeFromCentralInertia(scene.mass, np.zeros(3), RotationalInertia(inertia, inertia, inertia))
-            body = plant.AddRigidBody(f"sphere{k}", own)
+            body = plant.AddRigidBody(f"sphere{k}", _inertia(scene.mass, inertia))
             plant.RegisterCollisionGeometry(body, RigidTransform(), Sphere(scene.radius), f"sphere{k}", material)
             self.bodies.append(body)
         if slab is not None:
-            own = SpatialInertia.MakeFromCentralInertia(slab.mass, np.zeros(3), RotationalInertia(*slab.inertia.tolist()))
-            body = plant.AddRigidBody("slab", own)
+            body = plant.AddRigidBody("slab", _inertia(slab.mass, slab.inertia))
             plant.RegisterCollisionGeometry(body, RigidTransform(), Box(*(2.0 * slab.half)), "slab", material)
             feet = []
             for k, (sx, sz) in enumerate([(-1, -1), (-1, 1), (1, -1), (1, 1)]):
                 corner = np.array([sx * (slab.half[0] - FOOT), FOOT - slab.half[1], sz * (slab.half[2] - FOOT)])
-                feet.append(plant.RegisterCollisionGeometry(body, RigidTransform(corner), Sphere(FOOT), f"foot{k}", ground))
+                feet.append(
+                    plant.RegisterCollisionGeometry(body, RigidTransform(corner), Sphere(FOOT), f"foot{k}", ground)
+                )
             self.bodies.append(body)
         plant.Finalize()
         if slab is not None:
@@ -127,11 +145,7 @@ class DrakeSpheres:
 
 
 VARIANTS = {
-    ("Drake", "lagged, 1e8 N/m"): partial(
-        DrakeSpheres, approximation=DiscreteContactApproximation.kLagged, stiffness=1e8, dissipation=50.0
-    ),
-    ("Drake", "SAP, 1e8 N/m"): partial(
-        DrakeSpheres, approximation=DiscreteContactApproximation.kSap, stiffness=1e8, dissipation=50.0
-    ),
-    ("Drake", "continuous, 1e6 N/m"): partial(DrakeSpheres, approximation=None, stiffness=1e6, dissipation=0.0),
+    ("Drake", "lagged"): partial(DrakeSpheres, approximation=DiscreteContactApproximation.kLagged),
+    ("Drake", "SAP"): partial(DrakeSpheres, approximation=DiscreteContactApproximation.kSap),
+    ("Drake", "continuous, Runge-Kutta 3"): partial(DrakeSpheres, approximation=None),
 }

@@ -8,10 +8,16 @@ import matplotlib as mpl
 from comparison.spheres.tables import ERRORS
 
 mpl.use("Agg")
-from matplotlib import pyplot as plt  # noqa: E402 - after the choice of how to draw
+from matplotlib import pyplot as plt
 
 COLOURS = {"rover-gym": "#d1361f", "Drake": "#2f6db3", "MuJoCo": "#3f8f4f", "Bullet": "#8a5fb0"}
-STYLES = {"projection to convergence": "-", "projection": "--", "velocity level": ":", "defaults": "--", "SAP, 1e8 N/m": "--"}
+STYLES = {
+    "projection to convergence": "-",
+    "projection": "--",
+    "velocity level": ":",
+    "defaults": "--",
+    "SAP": "--",
+}
 #: Of rolling one direction stands for three.
 PANELS = ("666", "elastic 666", "bouncing", "rolling, diagonal")
 
