@@ -10,14 +10,22 @@ CHART = ROOT / "docs" / "comparison"
 QUICK = ROOT / "runs" / "comparison"
 
 
-def between(page: Path, begin: str, end: str, text: str) -> None:
-    """Puts text between two marks of a page; a quick run's page is first copied from the documentation.
+def page_of(output: Path) -> Path:
+    """The page whose tables a run fills: the documentation's, or a fresh copy of it for a quick run."""
+    page = output.with_suffix(".md")
+    if output == QUICK:
+        page.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(CHART.with_suffix(".md"), page)
+    return page
+
+
+def between(output: Path, begin: str, end: str, text: str) -> None:
+    """Puts text between two marks of a run's page.
 
     Raises:
-        ValueError: The page lacks a mark.
+        ValueError: The page does not have each mark once.
     """
-    if not page.exists():
-        shutil.copyfile(CHART.with_suffix(".md"), page)
+    page = page_of(output)
     whole = page.read_text(encoding="utf-8")
     for mark in (begin, end):
         if whole.count(mark) != 1:

@@ -158,7 +158,7 @@ def main() -> None:
     from comparison.spheres.drawing import draw  # noqa: PLC0415 - Matplotlib would load before the engines
 
     draw(data, path.with_suffix(".png"))
-    fill(output.with_suffix(".md"), data)
+    fill(output, data)
 
 
 if __name__ == "__main__":

@@ -129,7 +129,7 @@ def slope(solvers: Mapping[str, Method]) -> Iterator[Finding]:
         )
         how = _rest(world, solve, 20)
         if isinstance(solve, Spring):
-            how = f"creeps at {1e3 * float(world.v[0, :3] @ along):.2g} mm/s"
+            how = f"creeps at {1e3 * abs(float(world.v[0, :3] @ along)):.2g} mm/s"
         yield Finding("cube on a slope, tan 0.5 of mu 0.7", "rest", name, _fast(world), 1e-9, "m/s", how)
 
 

@@ -80,6 +80,6 @@ def tables(data: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def fill(page: Path, data: dict[str, Any]) -> None:
+def fill(output: Path, data: dict[str, Any]) -> None:
     """Puts the tables between their marks."""
-    between(page, BEGIN, END, tables(data))
+    between(output, BEGIN, END, tables(data))
