@@ -19,7 +19,7 @@ G = 9.81  # m/s²; here z is up, as where these scenes come from
 
 
 def ours(name: str, tolerance: float = 1e-12, dimension: int = 3, max_iterations: int = 1000) -> Solver:
-    """This project's solver of a name."""
+    """This project's solver of a name; `max_iterations` are sweeps of "nsgs" and steps of "newton"."""
 
     def solve(W: Array, q: Array, mu: Array, initial: Array | None) -> tuple[Array, bool, int]:
         answer = solve_friction_contact(
