@@ -95,15 +95,6 @@ def landing(console: Console) -> None:
     console.print(f"landing on one side from 0.45 m: steering welded: {_apart(*paths):.2g} m")
 
 
-def slipping(console: Console) -> None:
-    """The planar image where wheels slip: 120 N m down 20 degrees at 20 ms."""
-    plane = tilted_plane(math.radians(-20.0), 0.0)
-    made = plan(Scene(plane, steered=False, equal_torques=True), "fast")
-    for economy in measure_economies(made, torque=120.0, repeats=1):
-        if economy.name.startswith("planar"):
-            console.print(f"120 N m down 20 degrees, 20 ms: {economy.name}: {economy.error:.2g} m")
-
-
 def main() -> None:
     """Prints all of them."""
     console = Console(width=160, highlight=False)
@@ -112,7 +103,6 @@ def main() -> None:
             console.print(f"planes, {accuracy}: {name}: {error:.1e} m")
     rocks(console)
     landing(console)
-    slipping(console)
 
 
 if __name__ == "__main__":
