@@ -1,8 +1,8 @@
 """What the named accuracies give over ensembles of drives: `python -m comparison.presets [--quick] [--newton]`.
 
 For every scene the median and the quartiles of the members' errors and the median of their costs. Writes
-`docs/comparison/presets.json` and its table in `docs/comparison.md`. `--newton` adds "reference" with the Newton
-variant instead, which takes three times as long.
+`docs/comparison/presets.json` and its table in `docs/comparison.md`. `--newton` instead sets "reference" beside the
+same with the Newton variant, under `runs/`.
 """
 
 import argparse
@@ -97,13 +97,15 @@ def main() -> None:
     """Measures and fills the table."""
     parser = argparse.ArgumentParser(description="The named accuracies over ensembles of drives.")
     parser.add_argument("--quick", action="store_true", help=f'two members, no "reference", under {QUICK}')
-    parser.add_argument("--newton", action="store_true", help='also "reference" with the Newton variant')
+    parser.add_argument(
+        "--newton", action="store_true", help=f'"reference" and the same with the Newton variant, under {QUICK}'
+    )
     parser.add_argument("--scenes", nargs="*", help="only these; the rest is kept as it is in presets.json")
     arguments = parser.parse_args()
     console = Console(width=160)
     size = 2 if arguments.quick else SIZE
-    names = NAMES[:2] if arguments.quick else NAMES + (("reference, Newton",) if arguments.newton else ())
-    output: Path = QUICK if arguments.quick else CHART
+    names = NAMES[:2] if arguments.quick else ("reference", "reference, Newton") if arguments.newton else NAMES
+    output: Path = CHART if names == NAMES else QUICK
     output.mkdir(parents=True, exist_ok=True)
     path = output / "presets.json"
     data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"rows": []}
@@ -114,7 +116,7 @@ def main() -> None:
         rows = measure(ensemble, names, size, console)
         data["rows"] = [row for row in data["rows"] if row["scene"] != ensemble.name] + rows
         path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-        for window in ensemble.windows if not arguments.quick else ():
+        for window in ensemble.windows if names == NAMES else ():
             if not is_ordered([row for row in rows if row["window"] == window]):
                 console.print(f"not in order: {ensemble.title}, {window}")
     between(output, BEGIN, END, table(data))
