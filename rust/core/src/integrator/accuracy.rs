@@ -38,7 +38,7 @@ impl Accuracy {
     };
     /// 0.2 ms to 1e-12: to compare others with.
     ///
-    /// Linearised: the Newton variant is as far from either variant's finest paths, over rocks too, at two to five times the cost.
+    /// Linearised: the Newton variant is as far from the finest paths, over rocks too, at two to three times the cost.
     pub const REFERENCE: Self = Self {
         time_step: 2e-4,
         variant: Variant::Linearised,
