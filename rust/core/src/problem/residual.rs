@@ -53,14 +53,39 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + tail
 }
 
-/// `out = A x + b` for a row-major square matrix `A`.
+/// `out = A x + b` for a row-major square matrix `A`: four rows at a time, so that `x` is loaded once for them.
 #[inline]
 pub(crate) fn multiply_add(A: &[f64], x: &[f64], b: &[f64], out: &mut [f64]) {
     let n = x.len();
     if n == 0 {
         return;
     }
-    for ((row, offset), value) in A.chunks_exact(n).zip(b).zip(out) {
+    let (pairs, last) = x.as_chunks::<2>();
+    let (groups, rest) = A.split_at(A.len() - A.len() % (4 * n));
+    let done = groups.len() / n;
+    let results = out.chunks_exact_mut(4).zip(b.chunks_exact(4));
+    for (group, (out, b)) in groups.chunks_exact(4 * n).zip(results) {
+        let rows: [&[f64]; 4] = std::array::from_fn(|r| &group[r * n..(r + 1) * n]);
+        let [r0, r1, r2, r3] = rows.map(|row| &row.as_chunks::<2>().0[..pairs.len()]);
+        let mut sums = [[0.0; 2]; 4];
+        for (i, x) in pairs.iter().enumerate() {
+            for k in 0..2 {
+                sums[0][k] += r0[i][k] * x[k];
+                sums[1][k] += r1[i][k] * x[k];
+                sums[2][k] += r2[i][k] * x[k];
+                sums[3][k] += r3[i][k] * x[k];
+            }
+        }
+        if let [x] = last {
+            for (sum, row) in sums.iter_mut().zip(rows) {
+                sum[0] += row[n - 1] * x;
+            }
+        }
+        for r in 0..4 {
+            out[r] = (sums[r][0] + sums[r][1]) + b[r];
+        }
+    }
+    for ((row, offset), value) in rest.chunks_exact(n).zip(&b[done..]).zip(&mut out[done..]) {
         *value = dot(row, x) + offset;
     }
 }
