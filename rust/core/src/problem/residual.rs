@@ -33,6 +33,9 @@ impl Residual {
     }
 }
 
+/// Rows of a product that are computed together.
+const ROWS: usize = 3;
+
 /// Scalar product with four partial sums, so that it runs in vector registers.
 #[inline]
 #[must_use]
@@ -53,27 +56,35 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + tail
 }
 
-/// `out = A x + b` for a row-major square matrix `A`: four rows at a time, so that `x` is loaded once for them.
+/// `out = A x + b` for a row-major square matrix `A`; of up to six contacts the size is known to the compiler.
 #[inline]
 pub(crate) fn multiply_add(A: &[f64], x: &[f64], b: &[f64], out: &mut [f64]) {
-    let n = x.len();
-    if n == 0 {
-        return;
+    match x.len() {
+        0 => {}
+        3 => multiply_add_of(3, A, x, b, out),
+        6 => multiply_add_of(6, A, x, b, out),
+        9 => multiply_add_of(9, A, x, b, out),
+        12 => multiply_add_of(12, A, x, b, out),
+        15 => multiply_add_of(15, A, x, b, out),
+        18 => multiply_add_of(18, A, x, b, out),
+        n => multiply_add_of(n, A, x, b, out),
     }
+}
+
+/// Three rows at a time, so that `x` is loaded once for them.
+#[inline(always)]
+fn multiply_add_of(n: usize, A: &[f64], x: &[f64], b: &[f64], out: &mut [f64]) {
+    let (x, b, out) = (&x[..n], &b[..n], &mut out[..n]);
     let (pairs, last) = x.as_chunks::<2>();
-    let (groups, rest) = A.split_at(A.len() - A.len() % (4 * n));
-    let done = groups.len() / n;
-    let results = out.chunks_exact_mut(4).zip(b.chunks_exact(4));
-    for (group, (out, b)) in groups.chunks_exact(4 * n).zip(results) {
-        let rows: [&[f64]; 4] = std::array::from_fn(|r| &group[r * n..(r + 1) * n]);
-        let [r0, r1, r2, r3] = rows.map(|row| &row.as_chunks::<2>().0[..pairs.len()]);
-        let mut sums = [[0.0; 2]; 4];
+    let results = out.chunks_exact_mut(ROWS).zip(b.chunks_exact(ROWS));
+    for (group, (out, b)) in A.chunks_exact(ROWS * n).zip(results) {
+        let rows: [&[f64]; ROWS] = std::array::from_fn(|r| &group[r * n..(r + 1) * n]);
+        let chunks = rows.map(|row| &row.as_chunks::<2>().0[..pairs.len()]);
+        let mut sums = [[0.0; 2]; ROWS];
         for (i, x) in pairs.iter().enumerate() {
-            for k in 0..2 {
-                sums[0][k] += r0[i][k] * x[k];
-                sums[1][k] += r1[i][k] * x[k];
-                sums[2][k] += r2[i][k] * x[k];
-                sums[3][k] += r3[i][k] * x[k];
+            for (sum, row) in sums.iter_mut().zip(chunks) {
+                sum[0] += row[i][0] * x[0];
+                sum[1] += row[i][1] * x[1];
             }
         }
         if let [x] = last {
@@ -81,12 +92,12 @@ pub(crate) fn multiply_add(A: &[f64], x: &[f64], b: &[f64], out: &mut [f64]) {
                 sum[0] += row[n - 1] * x;
             }
         }
-        for r in 0..4 {
+        for r in 0..ROWS {
             out[r] = (sums[r][0] + sums[r][1]) + b[r];
         }
     }
-    for ((row, offset), value) in rest.chunks_exact(n).zip(&b[done..]).zip(&mut out[done..]) {
-        *value = dot(row, x) + offset;
+    for r in n - n % ROWS..n {
+        out[r] = dot(&A[r * n..(r + 1) * n], x) + b[r];
     }
 }
 

@@ -12,11 +12,11 @@
 //! linearly, so it is for moderate tolerances. Source: Boyd et al. 2011; for frictional contact Acary, Brémond and Huber 2018, Carpentier et al. 2024.
 
 use super::auto::Prepared;
+use super::dense::{self, LANES};
 use super::methods::ContactLaw;
 use super::modes::Linearised;
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
-use super::dense::{self, LANES};
 use super::{SolverOptions, reduced_system};
 use crate::cone::{SecondOrderCone, tangential_norm};
 use crate::law::coulomb::ContactMode;

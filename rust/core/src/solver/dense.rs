@@ -16,14 +16,43 @@ pub(super) const fn chunks(m: usize) -> usize {
     m.div_ceil(LANES)
 }
 
+/// Calls `body` with `size`, as a constant where it is that of a few contacts: then all its loops have known bounds.
+macro_rules! with_known_size {
+    ($size:expr, |$known:ident| $body:expr) => {{
+        match $size {
+            1 => {
+                let $known = 1;
+                $body
+            }
+            2 => {
+                let $known = 2;
+                $body
+            }
+            3 => {
+                let $known = 3;
+                $body
+            }
+            4 => {
+                let $known = 4;
+                $body
+            }
+            5 => {
+                let $known = 5;
+                $body
+            }
+            $known => $body,
+        }
+    }};
+}
+
 /// The first columns of a panel, each of `size` chunks.
-#[inline]
+#[inline(always)]
 fn panel_columns(panel: &[Chunk], size: usize) -> [&[Chunk]; LANES] {
     std::array::from_fn(|k| &panel[k * size..(k + 1) * size])
 }
 
 /// `x[c] -= Σ_k factors[k] columns[k][c]` for the chunks `c` of a range.
-#[inline]
+#[inline(always)]
 fn subtract_columns(
     x: &mut [Chunk],
     columns: [&[Chunk]; LANES],
@@ -33,9 +62,14 @@ fn subtract_columns(
     let x = &mut x[range.clone()];
     let [a, b, c, d] = columns.map(|column| &column[range.clone()]);
     for ((((x, a), b), c), d) in x.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-        for l in 0..LANES {
-            x[l] -= (factors[0] * a[l] + factors[1] * b[l]) + (factors[2] * c[l] + factors[3] * d[l]);
-        }
+        // Read whole before it is written: then the compiler needs no proof that the columns are others.
+        let (a, b, c, d) = (*a, *b, *c, *d);
+        let old = *x;
+        *x = std::array::from_fn(|l| {
+            old[l]
+                - ((factors[0] * a[l] + factors[1] * b[l])
+                    + (factors[2] * c[l] + factors[3] * d[l]))
+        });
     }
 }
 
@@ -44,6 +78,12 @@ fn subtract_columns(
 /// `L` replaces the lower triangle, with reciprocal diagonal. Returns `false` when a pivot is not positive; then `A` is spoilt.
 #[must_use]
 pub(super) fn cholesky(A: &mut [Chunk], size: usize) -> bool {
+    with_known_size!(size, |size| cholesky_of(A, size))
+}
+
+#[inline(always)]
+fn cholesky_of(A: &mut [Chunk], size: usize) -> bool {
+    let A = &mut A[..LANES * size * size];
     for block in 0..size {
         for k in 0..LANES {
             let (own, right) = A[(LANES * block + k) * size..].split_at_mut(size);
@@ -72,17 +112,23 @@ pub(super) fn cholesky(A: &mut [Chunk], size: usize) -> bool {
 }
 
 /// `x -= factor other` from chunk `first` on.
-#[inline]
+#[inline(always)]
 fn subtract(x: &mut [Chunk], other: &[Chunk], factor: f64, first: usize) {
     for (x, y) in x[first..].iter_mut().zip(&other[first..]) {
-        for l in 0..LANES {
-            x[l] -= factor * y[l];
-        }
+        let (old, y) = (*x, *y);
+        *x = std::array::from_fn(|l| old[l] - factor * y[l]);
     }
 }
 
 /// Solves `L Lᵀ x = b` in place of `b`, with the factor of [`cholesky`].
 pub(super) fn cholesky_solve(L: &[Chunk], size: usize, b: &mut [Chunk]) {
+    with_known_size!(size, |size| cholesky_solve_of(L, size, b))
+}
+
+#[inline(always)]
+fn cholesky_solve_of(L: &[Chunk], size: usize, b: &mut [Chunk]) {
+    let L = &L[..LANES * size * size];
+    let b = &mut b[..size];
     let columns = |block: usize| panel_columns(&L[LANES * block * size..], size);
     for block in 0..size {
         let panel = columns(block);
@@ -124,6 +170,13 @@ pub(super) fn cholesky_solve(L: &[Chunk], size: usize, b: &mut [Chunk]) {
 /// Returns `false` at a zero or non-finite pivot.
 #[must_use]
 pub(super) fn lu(A: &mut [Chunk], size: usize, pivots: &mut [usize]) -> bool {
+    with_known_size!(size, |size| lu_of(A, size, pivots))
+}
+
+#[inline(always)]
+fn lu_of(A: &mut [Chunk], size: usize, pivots: &mut [usize]) -> bool {
+    let A = &mut A[..LANES * size * size];
+    let pivots = &mut pivots[..LANES * size];
     for block in 0..size {
         for k in 0..LANES {
             let column = LANES * block + k;
@@ -158,7 +211,7 @@ pub(super) fn lu(A: &mut [Chunk], size: usize, pivots: &mut [usize]) -> bool {
 }
 
 /// Solves with the unit lower triangle of a diagonal block, in place.
-#[inline]
+#[inline(always)]
 fn eliminate(x: &mut Chunk, panel: [&[Chunk]; LANES], block: usize) -> Chunk {
     for k in 0..LANES - 1 {
         for l in k + 1..LANES {
@@ -169,7 +222,7 @@ fn eliminate(x: &mut Chunk, panel: [&[Chunk]; LANES], block: usize) -> Chunk {
 }
 
 /// Brings the largest entry of column `k` at or below the diagonal onto it; `false` if it is zero or not finite.
-#[inline]
+#[inline(always)]
 fn exchange(A: &mut [Chunk], size: usize, k: usize, pivots: &mut [usize]) -> bool {
     let column = &A[k * size..(k + 1) * size];
     let (block, lane) = (k / LANES, k % LANES);
@@ -202,6 +255,13 @@ fn exchange(A: &mut [Chunk], size: usize, k: usize, pivots: &mut [usize]) -> boo
 
 /// Solves `A x = b` in place of `b`, with the factors of [`lu`].
 pub(super) fn lu_solve(A: &[Chunk], size: usize, pivots: &[usize], b: &mut [Chunk]) {
+    with_known_size!(size, |size| lu_solve_of(A, size, pivots, b))
+}
+
+#[inline(always)]
+fn lu_solve_of(A: &[Chunk], size: usize, pivots: &[usize], b: &mut [Chunk]) {
+    let A = &A[..LANES * size * size];
+    let b = &mut b[..size];
     let columns = |block: usize| panel_columns(&A[LANES * block * size..], size);
     let flat = b.as_flattened_mut();
     for (k, &pivot) in pivots.iter().take(LANES * size).enumerate() {

@@ -3,13 +3,12 @@
 //! Sweeps depend on the order of the contacts; the answer does not, since only modes and sliding directions are taken from them. Where a mode is a
 //! matter of choice, or the guess was wrong, there is no answer here and the caller goes on.
 
+use super::SolverOptions;
 use super::auto::Prepared;
 use super::modes::{self, Linearised};
 use super::one_contact::estimate_one_contact;
 use super::reduced_system::{self, Factors, System};
-use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
-use super::SolverOptions;
 use crate::cone::tangential_norm;
 use crate::law::coulomb::ContactMode;
 use crate::problem::{Operator, Residual};
@@ -110,7 +109,7 @@ pub(super) fn solve<const D: usize>(
     }
     *iterations += SWEEPS;
     data.W.multiply_add(p, data.q, u);
-    let mut prediction = modes::recall::<D>(data.mu, p, u, &mut workspace.contacts);
+    let prediction = modes::recall::<D>(data.mu, p, u, &mut workspace.contacts);
     p.fill(0.0);
     u.copy_from_slice(data.q);
     let alpha = ALPHA * options.regularisation * data.mean_diagonal;
@@ -135,7 +134,6 @@ pub(super) fn solve<const D: usize>(
         p.copy_from_slice(&workspace.trial);
         data.W.multiply_add(p, data.q, u);
         let residual = data.measure::<D>(&workspace.rho, p, u);
-        if std::env::var("TR").is_ok() { eprintln!("step {step} rel {:e} {:?}", residual.relative, factors); }
         let progress = residual.relative / last;
         let is_solved = Prepared::accepts(options, residual)
             || (progress > LEAST_GAIN

@@ -228,7 +228,12 @@ fn in_space<const D: usize, const STEPS: usize>(
 /// Root of a function that is positive at `low` and negative far beyond: Newton inside a bracket, whose upper end is looked for in steps of `reach`.
 ///
 /// `at` gives value and slope.
-fn falling_root<const STEPS: usize>(at: impl Fn(f64) -> (f64, f64), mut low: f64, start: f64, reach: f64) -> f64 {
+fn falling_root<const STEPS: usize>(
+    at: impl Fn(f64) -> (f64, f64),
+    mut low: f64,
+    start: f64,
+    reach: f64,
+) -> f64 {
     let mut high = f64::INFINITY;
     let mut x = start;
     for _ in 0..STEPS {

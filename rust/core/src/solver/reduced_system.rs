@@ -119,43 +119,59 @@ pub(super) fn assemble<const D: usize>(
     let n = D * contacts.len();
     let height = LANES * dense::chunks(m);
     let A = A.as_flattened_mut();
-    for (i, contact) in contacts.iter().enumerate() {
-        let n_rows = n_unknowns::<D>(contact.mode, mu[i]);
-        if n_rows == 0 {
-            continue;
-        }
-        let rows: [&[f64]; D] = std::array::from_fn(|r| &W[(D * i + r) * n..][..n]);
-        for (j, (other, &mu)) in contacts.iter().zip(mu).enumerate() {
-            let mut block: [[f64; D]; D] =
-                std::array::from_fn(|r| std::array::from_fn(|c| rows[r][D * j + c]));
-            if contact.mode == ContactMode::Slide && D == 3 {
-                let [e0, e1] = contact.e;
-                for c in 0..D {
-                    block[1][c] = e0 * block[D - 1][c] - e1 * block[1][c];
-                }
-            }
-            let n_columns = n_unknowns::<D>(other.mode, mu);
-            if other.mode == ContactMode::Slide {
-                let [e0, e1] = other.e;
-                for row in &mut block {
-                    let (x, y) = (row[1], row[D - 1]);
-                    let along = if D == 2 { x * e0 } else { x * e0 + y * e1 };
-                    row[0] += mu * along;
-                    row[1] = e0 * y - e1 * x;
-                }
-            }
-            for c in 0..n_columns.min(D) {
-                let column = &mut A[(other.start + c) * height + contact.start..][..n_rows];
-                for (out, row) in column.iter_mut().zip(&block) {
-                    *out = row[c];
-                }
-            }
-        }
-        for k in 0..n_rows {
-            let diagonal = &mut A[(contact.start + k) * (height + 1)];
-            *diagonal += alpha;
+    for ((contact, &mu_i), rows) in contacts.iter().zip(mu).zip(W.chunks_exact(D * n)) {
+        let rows: [&[[f64; D]]; D] =
+            std::array::from_fn(|r| rows[r * n..(r + 1) * n].as_chunks::<D>().0);
+        for k in 0..n_unknowns::<D>(contact.mode, mu_i) {
+            let column = &mut A[contact.start + k..];
+            let diagonal = (contact.start + k) * height;
             if contact.mode == ContactMode::Slide && k == 1 {
-                *diagonal += contact.gamma;
+                let [e0, e1] = contact.e;
+                let turned = rows[1].iter().zip(rows[D - 1]);
+                let across = turned.map(|(x, y)| std::array::from_fn(|c| e0 * y[c] - e1 * x[c]));
+                combine_columns::<D>(across, mu, contacts, height, column);
+                column[diagonal] += contact.gamma;
+            } else {
+                combine_columns::<D>(rows[k].iter().copied(), mu, contacts, height, column);
+            }
+            column[diagonal] += alpha;
+        }
+    }
+}
+
+/// One row of `W C`, the columns that the unknowns of every contact act through, into every `height`-th entry of `target`.
+#[inline]
+fn combine_columns<const D: usize>(
+    row: impl Iterator<Item = [f64; D]>,
+    mu: &[f64],
+    contacts: &[Linearised],
+    height: usize,
+    target: &mut [f64],
+) {
+    let mut at = 0;
+    let mut push = |x: f64| {
+        target[at] = x;
+        at += height;
+    };
+    for ((w, contact), &mu) in row.zip(contacts).zip(mu) {
+        match contact.mode {
+            ContactMode::Open => {}
+            ContactMode::Stick => {
+                for x in w {
+                    push(x);
+                }
+            }
+            ContactMode::Slide => {
+                let [e0, e1] = contact.e;
+                let along = if D == 2 {
+                    w[1] * e0
+                } else {
+                    w[1] * e0 + w[2] * e1
+                };
+                push(w[0] + mu * along);
+                if D == 3 && mu > 0.0 {
+                    push(e0 * w[2] - e1 * w[1]);
+                }
             }
         }
     }

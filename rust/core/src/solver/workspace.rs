@@ -1,8 +1,8 @@
 //! Scratch memory of a solve, kept between solves so that none of them allocates.
 
 use super::block_lu::BlockLu;
-use super::dense::{self, Chunk, LANES};
 use super::body_pairs::BodyPairsWorkspace;
+use super::dense::{self, Chunk, LANES};
 use super::islands::Islands;
 use super::modes::Linearised;
 use super::storage::Storage;
