@@ -1,7 +1,7 @@
 """Steps of 1 ms over rocks took hundreds of solver iterations, and some missed the tolerance.
 
-Six wheels squeezed the ground against each other to the limit of friction and slipped at 1e-11 m/s: one step in nine took
-more than 100 iterations, the worst 1134, and 8 steps in 7000 missed 1e-12.
+Six wheels squeezed the ground against each other to the limit of friction and slipped at 1e-11 m/s: one step in nine
+took more than 100 iterations, the worst 1134, and 8 steps in 7000 missed 1e-12.
 """
 
 import numpy as np
