@@ -19,10 +19,13 @@ const STEPS: usize = 6;
 
 /// `α` relative to the regularisation asked for. The modes are fixed, so that `α` only has to keep the system regular: a larger one costs
 /// steps that take its effect out again, a smaller one lets rounding into the impulses that `W` cannot see.
-const ALPHA: f64 = 1e-2;
+const ALPHA: f64 = 0.1;
 
 /// A residual falling at least this much per step lets the old factors serve once more.
 const REUSE_CONTRACTION: f64 = 0.02;
+
+/// Steps after which the sliding directions are known.
+const SETTLED: usize = 2;
 
 /// Least gain of a step; with less, the modes are taken to be wrong.
 const LEAST_GAIN: f64 = 0.5;
@@ -115,6 +118,7 @@ pub(super) fn solve<const D: usize>(
     let alpha = ALPHA * options.regularisation * data.mean_diagonal;
     let mut factors = Factors::None;
     let mut last = f64::INFINITY;
+    workspace.centre.fill(0.0);
     for step in 0..STEPS.min(options.max_newton_steps) {
         if factors == Factors::None {
             factors = reduced_system::factorise::<D>(data, alpha, prediction, true, workspace);
@@ -122,7 +126,10 @@ pub(super) fn solve<const D: usize>(
         if factors == Factors::None && prediction.m > 0 {
             return None;
         }
-        workspace.centre.copy_from_slice(p);
+        // Until the sliding directions are known, which the guess is not, the centre stays at zero, or the guess would stay in what W cannot see.
+        if step >= SETTLED {
+            workspace.centre.copy_from_slice(p);
+        }
         let system = System {
             alpha,
             m: prediction.m,
@@ -142,10 +149,12 @@ pub(super) fn solve<const D: usize>(
         if is_solved {
             return is_decided::<D>(data, &workspace.contacts, u).then_some(residual);
         }
-        if step > 0 && (progress > LEAST_GAIN || progress.is_nan()) {
+        if step >= SETTLED && (progress > LEAST_GAIN || progress.is_nan()) {
             return None;
         }
-        if progress > REUSE_CONTRACTION {
+        // What is left below that is the regularisation, which new factors do not take away.
+        if progress > REUSE_CONTRACTION && residual.relative > 10.0 * ALPHA * options.regularisation
+        {
             factors = Factors::None;
         }
         last = residual.relative;

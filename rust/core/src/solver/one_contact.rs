@@ -20,7 +20,7 @@ use crate::law::coulomb::ContactMode;
 const MAX_STEPS: usize = 100;
 
 /// Steps of an estimate. Measured on the recorded impacts of a rover.
-const ESTIMATE_STEPS: usize = 1;
+const ESTIMATE_STEPS: usize = 2;
 
 /// The solved contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
