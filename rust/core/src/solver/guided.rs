@@ -17,15 +17,11 @@ use crate::problem::{Operator, Residual};
 const SWEEPS: usize = 4;
 const STEPS: usize = 6;
 
-/// `α` relative to the regularisation asked for. The modes are fixed, so that `α` only has to keep the system regular: a larger one costs
-/// steps that take its effect out again, a smaller one lets rounding into the impulses that `W` cannot see.
-const ALPHA: f64 = 0.1;
-
 /// A residual falling at least this much per step lets the old factors serve once more.
 const REUSE_CONTRACTION: f64 = 0.02;
 
 /// Steps after which the sliding directions are known.
-const SETTLED: usize = 2;
+const SETTLED: usize = 1;
 
 /// Least gain of a step; with less, the modes are taken to be wrong.
 const LEAST_GAIN: f64 = 0.5;
@@ -115,7 +111,7 @@ pub(super) fn solve<const D: usize>(
     let prediction = modes::recall::<D>(data.mu, p, u, &mut workspace.contacts);
     p.fill(0.0);
     u.copy_from_slice(data.q);
-    let alpha = ALPHA * options.regularisation * data.mean_diagonal;
+    let alpha = options.regularisation * data.mean_diagonal;
     let mut factors = Factors::None;
     let mut last = f64::INFINITY;
     workspace.centre.fill(0.0);
@@ -152,9 +148,7 @@ pub(super) fn solve<const D: usize>(
         if step >= SETTLED && (progress > LEAST_GAIN || progress.is_nan()) {
             return None;
         }
-        // What is left below that is the regularisation, which new factors do not take away.
-        if progress > REUSE_CONTRACTION && residual.relative > 10.0 * ALPHA * options.regularisation
-        {
+        if progress > REUSE_CONTRACTION {
             factors = Factors::None;
         }
         last = residual.relative;

@@ -19,7 +19,7 @@ use crate::law::coulomb::ContactMode;
 /// Most steps of the safeguarded Newton on `g(κ)`; bisection alone needs about 60 for all digits.
 const MAX_STEPS: usize = 100;
 
-/// Steps of an estimate. Measured on the recorded impacts of a rover.
+/// Steps of an estimate: with one, a sweep's directions are too rough for loads that do not depend on the order of the contacts.
 const ESTIMATE_STEPS: usize = 2;
 
 /// The solved contact.
