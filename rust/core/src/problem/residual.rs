@@ -72,6 +72,7 @@ pub(crate) fn multiply_add(A: &[f64], x: &[f64], b: &[f64], out: &mut [f64]) {
 }
 
 /// Three rows at a time, so that `x` is loaded once for them.
+#[allow(clippy::inline_always)] // the known size has to reach the loops
 #[inline(always)]
 fn multiply_add_of(n: usize, A: &[f64], x: &[f64], b: &[f64], out: &mut [f64]) {
     let (x, b, out) = (&x[..n], &b[..n], &mut out[..n]);

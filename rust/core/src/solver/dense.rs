@@ -3,6 +3,7 @@
 //! Matrices are column-major, of a size that is a multiple of [`LANES`] (the caller pads with the unit matrix), in chunks of that many entries. So every
 //! loop runs over whole chunks, and what is left of a matrix is loaded and stored once for [`LANES`] eliminated columns. That serves six
 //! contacts, where everything stays in the first cache, as well as hundreds.
+#![allow(clippy::inline_always)] // the known size has to reach every loop, or its bounds stay unknown
 
 /// Entries of a chunk, and columns that are eliminated together.
 pub(super) const LANES: usize = 4;
