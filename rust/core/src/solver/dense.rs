@@ -123,7 +123,7 @@ fn subtract(x: &mut [Chunk], other: &[Chunk], factor: f64, first: usize) {
 
 /// Solves `L Lᵀ x = b` in place of `b`, with the factor of [`cholesky`].
 pub(super) fn cholesky_solve(L: &[Chunk], size: usize, b: &mut [Chunk]) {
-    with_known_size!(size, |size| cholesky_solve_of(L, size, b))
+    with_known_size!(size, |size| cholesky_solve_of(L, size, b));
 }
 
 #[inline(always)]
@@ -256,7 +256,7 @@ fn exchange(A: &mut [Chunk], size: usize, k: usize, pivots: &mut [usize]) -> boo
 
 /// Solves `A x = b` in place of `b`, with the factors of [`lu`].
 pub(super) fn lu_solve(A: &[Chunk], size: usize, pivots: &[usize], b: &mut [Chunk]) {
-    with_known_size!(size, |size| lu_solve_of(A, size, pivots, b))
+    with_known_size!(size, |size| lu_solve_of(A, size, pivots, b));
 }
 
 #[inline(always)]
