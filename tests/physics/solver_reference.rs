@@ -13,10 +13,10 @@ use solver_npz::{Recorded, recorded};
 const ITERATIONS: [(&str, usize); 11] = [
     ("Rover11035", 7),
     ("Rover4396", 7),
-    ("Rover1039", 8),
-    ("Rover4144", 8),
-    ("Rover4516", 8),
-    ("Rover1040", 8),
+    ("Rover1039", 9),
+    ("Rover4144", 9),
+    ("Rover4516", 9),
+    ("Rover1040", 9),
     ("Rover9770", 8),
     ("synthetic_2cubes_ratio1e0", 8),
     ("synthetic_2cubes_ratio1e6", 20),
@@ -85,7 +85,8 @@ fn dragged_cubes_move_together_at_any_mass_ratio() {
             let speed = u[1].hypot(u[2]);
             let expected = if i < 4 { DRAGGED } else { 0.0 };
             assert!(
-                (speed - expected).abs() < 1e-6 * DRAGGED,
+                // the solver's own tolerance in m/s
+                (speed - expected).abs() < 1e-9,
                 "{}, contact {i}: {speed:e} m/s",
                 problem.name
             );

@@ -62,12 +62,16 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         for iteration in 0..options.newton_max_iterations {
             let Some(solved) = iterate(system, options, start, warm_start, ws, iteration, probe)
             else {
-                return Err(StepError::SingularMassMatrix { time: *state.time });
+                break;
             };
             report.iterations += solved.iterations;
             report.residual = solved.residual;
             report.n_contacts = solved.n_contacts;
             report.newton_iterations = iteration + 1;
+            // A maximum passes over what is no number, so that has to be looked for.
+            if !ws.v.iter().all(|x| x.is_finite()) {
+                break;
+            }
             // ws.y is now the change of v in this iteration.
             let change = ws.y.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let size = ws.v.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
@@ -78,9 +82,6 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
             if is_small || is_rounding {
                 is_settled = true;
                 report.status = solved.status;
-                break;
-            }
-            if change.is_nan() {
                 break;
             }
         }
@@ -105,7 +106,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
     }
 }
 
-/// One iteration: `ws.v` moves by `ws.y`. None where the mass matrix cannot be factored.
+/// One iteration: `ws.v` moves by `ws.y`. None where the mass matrix cannot be factored: the iterate has run away.
 fn iterate<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,

@@ -12,11 +12,12 @@
 //! linearly, so it is for moderate tolerances. Source: Boyd et al. 2011; for frictional contact Acary, Brémond and Huber 2018, Carpentier et al. 2024.
 
 use super::auto::Prepared;
+use super::dense::{self, LANES};
 use super::methods::ContactLaw;
 use super::modes::Linearised;
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
-use super::{SolverOptions, dense};
+use super::{SolverOptions, reduced_system};
 use crate::cone::{SecondOrderCone, tangential_norm};
 use crate::law::coulomb::ContactMode;
 use crate::problem::{Operator, Residual};
@@ -45,13 +46,20 @@ fn factorise<const D: usize>(
     }
     match data.W {
         Operator::Dense(W) => {
-            let n = data.n;
-            let matrix = &mut workspace.matrix[..n * n];
-            matrix.copy_from_slice(W);
-            for k in 0..n {
-                matrix[k * (n + 1)] += sigma * workspace.weights[k / D];
+            let (n, size) = (data.n, dense::chunks(data.n));
+            for (i, contact) in workspace.contacts.iter_mut().enumerate() {
+                *contact = Linearised {
+                    mode: ContactMode::Stick,
+                    start: D * i,
+                    ..Linearised::default()
+                };
             }
-            dense::lu(matrix, n, &mut workspace.pivots)
+            let matrix = &mut workspace.matrix;
+            reduced_system::assemble::<D>(data.mu, W, 0.0, &workspace.contacts, n, matrix);
+            for k in 0..n {
+                matrix[k * size + k / LANES][k % LANES] += sigma * workspace.weights[k / D];
+            }
+            dense::lu(matrix, size, &mut workspace.pivots)
         }
         Operator::BlockSparse(W) => {
             if !workspace.is_analysed {
@@ -105,7 +113,7 @@ fn project<const D: usize>(
     z: &mut [f64],
     workspace: &mut SolverWorkspace,
 ) -> [f64; 2] {
-    let (x, y) = (&workspace.rhs, &mut workspace.direction);
+    let (x, y) = (workspace.rhs.as_flattened(), &mut workspace.direction);
     let mut changes = [0.0; 2];
     for (i, (&mu, weight)) in data.mu.iter().zip(&workspace.weights).enumerate() {
         let r = sigma * weight;
@@ -185,24 +193,26 @@ pub(super) fn solve<const D: usize>(
                 return (status, data.measure::<D>(&workspace.rho, p, u));
             }
         }
+        let rhs = workspace.rhs.as_flattened_mut();
         for (i, (&mu, weight)) in data.mu.iter().zip(&workspace.weights).enumerate() {
             let y: [f64; D] = std::array::from_fn(|k| workspace.direction[D * i + k]);
             for k in 0..D {
                 let at = D * i + k;
-                workspace.rhs[at] = sigma * weight * p[at] - y[k] - data.q[at];
+                rhs[at] = sigma * weight * p[at] - y[k] - data.q[at];
             }
             if shifts {
-                workspace.rhs[D * i] -= mu * tangential_norm(&y);
+                rhs[D * i] -= mu * tangential_norm(&y);
             }
         }
+        rhs[data.n..].fill(0.0);
         match data.W {
             Operator::Dense(_) => dense::lu_solve(
-                &workspace.matrix[..data.n * data.n],
-                data.n,
+                &workspace.matrix,
+                dense::chunks(data.n),
                 &workspace.pivots,
                 &mut workspace.rhs,
             ),
-            Operator::BlockSparse(W) => workspace.block_lu.solve::<D>(W, &mut workspace.rhs),
+            Operator::BlockSparse(W) => workspace.block_lu.solve::<D>(W, &mut rhs[..data.n]),
         }
         let [primal, dual] = project::<D>(data, sigma, p, workspace);
         step += 1;

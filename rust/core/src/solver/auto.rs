@@ -1,13 +1,12 @@
 //! The choice of method, and what all methods share: prepared scales, the acceptance test, the final report.
 
 use super::methods::{Algorithm, Outcome};
-use super::modes::{Linearised, Proximal};
+use super::modes::Proximal;
 use super::nsgs::Budget;
 use super::report::{SolveReport, SolveStatus};
 use super::workspace::SolverWorkspace;
-use super::{Method, SolverOptions, islands, newton, nsgs, pivoting, proximal};
-use crate::cone::tangential_norm;
-use crate::law::coulomb::{ContactMode, natural_map};
+use super::{Method, SolverOptions, guided, islands, newton, nsgs, pivoting, proximal};
+use crate::law::coulomb::natural_map;
 use crate::problem::{FrictionContactProblem, Operator, Residual, evaluate_contact};
 
 /// The problem's slices and the scales derived from them.
@@ -210,31 +209,6 @@ fn judge<A: Algorithm, const D: usize>(
     }
 }
 
-/// Sweeps over few contacts from rest, only to find the modes, and the Newton steps that try them. Measured on the recorded impacts of a rover with 2, 4
-/// and 6 sweeps and 3, 6 and 24 steps: four and six are the least work, less than half of predicting the modes contact by contact.
-const COLD_SWEEPS: usize = 4;
-const GUIDED_STEPS: usize = 6;
-
-/// Slip or parting, relative to the largest free velocity, that decides a mode.
-const DECIDED: f64 = 1e-8;
-
-/// Whether every sliding contact slips and every open one parts. Where one does not, its mode is a matter of choice, a sweep's choice depends on the
-/// order of the contacts, and so would the loads of a mechanism that is statically indeterminate.
-fn is_decided<const D: usize>(data: &Prepared<'_>, contacts: &[Linearised], u: &[f64]) -> bool {
-    let largest = data.q.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    contacts
-        .iter()
-        .zip(u.chunks_exact(D))
-        .all(|(contact, u)| match contact.mode {
-            ContactMode::Stick => true,
-            ContactMode::Open => u[0] > DECIDED * largest,
-            ContactMode::Slide => {
-                let slip: [f64; D] = std::array::from_fn(|k| u[k]);
-                tangential_norm(&slip) > DECIDED * largest
-            }
-        })
-}
-
 /// Most sweeps over many contacts before Newton. Dense, a Newton step costs about as much as `n` sweeps; block-sparse the fill grows with the problem; 20, 50 and 200 were
 /// tried on the recorded ones.
 fn sweep_budget(data: &Prepared<'_>) -> usize {
@@ -255,10 +229,6 @@ pub(super) fn escalate<const D: usize>(
 ) -> Outcome {
     workspace.start.copy_from_slice(p);
     let steps = newton::FULL_STEPS.min(options.max_newton_steps);
-    let full = newton::Plan {
-        max_steps: steps,
-        only_modes: false,
-    };
     let is_few = data.mu.len() <= options.direct_contacts;
     let is_warm = p.iter().any(|x| x.abs() > 0.0);
     if !is_few {
@@ -281,10 +251,7 @@ pub(super) fn escalate<const D: usize>(
         workspace.start.copy_from_slice(p);
     } else if is_warm {
         // Where the modes of the last step serve, this is the end; where they do not, more full steps seldom help.
-        let few = newton::Plan {
-            max_steps: newton::WARM_STEPS.min(steps),
-            ..full
-        };
+        let few = newton::WARM_STEPS.min(steps);
         let (status, residual) =
             newton::full_steps::<D>(data, options, few, p, u, workspace, iterations);
         if status == SolveStatus::Converged {
@@ -298,28 +265,13 @@ pub(super) fn escalate<const D: usize>(
         // A warm start can mislead where zero does not.
         p.fill(0.0);
     } else if data.q.chunks_exact(D).any(|q| q[0] < 0.0) {
-        // Sweeps depend on the order of the contacts; the answer does not, since only the modes are taken from them.
-        let prox = Proximal {
-            alpha: 0.0,
-            centre: &workspace.start,
-        };
-        for _ in 0..COLD_SWEEPS {
-            nsgs::sweep::<D>(data, prox, p);
-        }
-        *iterations += COLD_SWEEPS;
-        let guided = newton::Plan {
-            max_steps: GUIDED_STEPS.min(steps),
-            only_modes: true,
-        };
-        let (status, residual) =
-            newton::full_steps::<D>(data, options, guided, p, u, workspace, iterations);
-        if status == SolveStatus::Converged && is_decided::<D>(data, &workspace.contacts, u) {
-            return (Method::Newton, status, residual);
+        if let Some(residual) = guided::solve::<D>(data, options, p, u, workspace, iterations) {
+            return (Method::Newton, SolveStatus::Converged, residual);
         }
         p.fill(0.0);
     }
     let (status, residual) =
-        newton::full_steps::<D>(data, options, full, p, u, workspace, iterations);
+        newton::full_steps::<D>(data, options, steps, p, u, workspace, iterations);
     if status == SolveStatus::Converged {
         return (Method::Newton, status, residual);
     }

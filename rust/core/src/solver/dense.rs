@@ -1,163 +1,289 @@
 //! Factorisations of the dense systems of a Newton step, in place and without allocation.
 //!
-//! Both go by panels of [`PANEL`] rows: what is left of the matrix is loaded and stored once per panel, which serves six contacts
-//! (everything in registers and the first cache) as well as hundreds.
+//! Matrices are column-major, of a size that is a multiple of [`LANES`] (the caller pads with the unit matrix), in chunks of that many entries. So every
+//! loop runs over whole chunks, and what is left of a matrix is loaded and stored once for [`LANES`] eliminated columns. That serves six
+//! contacts, where everything stays in the first cache, as well as hundreds.
+#![allow(clippy::inline_always)] // the known size has to reach every loop, or its bounds stay unknown
 
-use crate::problem::dot;
+/// Entries of a chunk, and columns that are eliminated together.
+pub(super) const LANES: usize = 4;
 
-/// Rows that are eliminated together.
-const PANEL: usize = 4;
+/// Entries that the loops work on together.
+pub(super) type Chunk = [f64; LANES];
 
-/// `row -= Σ_k factors[k] panel[k]`, on equal ranges.
+/// Size of the padded system of `m` unknowns, in chunks.
 #[inline]
-fn subtract_panel(row: &mut [f64], factors: [f64; PANEL], panel: [&[f64]; PANEL]) {
-    let n = row.len();
-    let [a, b, c, d] = panel.map(|x| &x[..n]);
-    for ((((x, a), b), c), d) in row.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-        *x -= (factors[0] * a + factors[1] * b) + (factors[2] * c + factors[3] * d);
-    }
+pub(super) const fn chunks(m: usize) -> usize {
+    m.div_ceil(LANES)
 }
 
-/// `row -= factor other`, on equal ranges.
-#[inline]
-fn subtract(row: &mut [f64], factor: f64, other: &[f64]) {
-    for (x, y) in row.iter_mut().zip(other) {
-        *x -= factor * y;
-    }
-}
-
-/// The four rows of a panel that begins at row `first`, each from column `from`.
-#[inline]
-fn panel_rows(above: &[f64], m: usize, first: usize, from: usize) -> [&[f64]; PANEL] {
-    std::array::from_fn(|k| &above[(first + k) * m + from..(first + k + 1) * m])
-}
-
-/// Cholesky factor `A = Uᵀ U` of a symmetric matrix, row-major `m × m`, of which only the upper triangle is read.
-///
-/// `U` replaces the upper triangle, with reciprocal diagonal. Returns `false` when a pivot is not positive; then `A` is spoilt.
-#[must_use]
-pub(super) fn cholesky(A: &mut [f64], m: usize) -> bool {
-    for first in (0..m).step_by(PANEL) {
-        let last = (first + PANEL).min(m);
-        for k in first..last {
-            let (above, rest) = A.split_at_mut(k * m);
-            let row = &mut rest[k..m];
-            for j in first..k {
-                let other = &above[j * m + k..(j + 1) * m];
-                subtract(row, other[0], other);
+/// Calls `body` with `size`, as a constant where it is that of a few contacts: then all its loops have known bounds.
+macro_rules! with_known_size {
+    ($size:expr, |$known:ident| $body:expr) => {{
+        match $size {
+            1 => {
+                let $known = 1;
+                $body
             }
-            let pivot = row[0];
+            2 => {
+                let $known = 2;
+                $body
+            }
+            3 => {
+                let $known = 3;
+                $body
+            }
+            4 => {
+                let $known = 4;
+                $body
+            }
+            5 => {
+                let $known = 5;
+                $body
+            }
+            $known => $body,
+        }
+    }};
+}
+
+/// The first columns of a panel, each of `size` chunks.
+#[inline(always)]
+fn panel_columns(panel: &[Chunk], size: usize) -> [&[Chunk]; LANES] {
+    std::array::from_fn(|k| &panel[k * size..(k + 1) * size])
+}
+
+/// `x[c] -= Σ_k factors[k] columns[k][c]` for the chunks `c` of a range.
+#[inline(always)]
+fn subtract_columns(
+    x: &mut [Chunk],
+    columns: [&[Chunk]; LANES],
+    factors: Chunk,
+    range: std::ops::Range<usize>,
+) {
+    let x = &mut x[range.clone()];
+    let [a, b, c, d] = columns.map(|column| &column[range.clone()]);
+    for ((((x, a), b), c), d) in x.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+        // Read whole before it is written: then the compiler needs no proof that the columns are others.
+        let (a, b, c, d) = (*a, *b, *c, *d);
+        let old = *x;
+        *x = std::array::from_fn(|l| {
+            old[l]
+                - ((factors[0] * a[l] + factors[1] * b[l])
+                    + (factors[2] * c[l] + factors[3] * d[l]))
+        });
+    }
+}
+
+/// Cholesky factor `A = L Lᵀ` of a symmetric matrix of `size` chunks a side, of which only the lower triangle is read.
+///
+/// `L` replaces the lower triangle, with reciprocal diagonal. Returns `false` when a pivot is not positive; then `A` is spoilt.
+#[must_use]
+pub(super) fn cholesky(A: &mut [Chunk], size: usize) -> bool {
+    with_known_size!(size, |size| cholesky_of(A, size))
+}
+
+#[inline(always)]
+fn cholesky_of(A: &mut [Chunk], size: usize) -> bool {
+    let A = &mut A[..LANES * size * size];
+    for block in 0..size {
+        for k in 0..LANES {
+            let (own, right) = A[(LANES * block + k) * size..].split_at_mut(size);
+            let pivot = own[block][k];
             if pivot.is_nan() || pivot <= 0.0 {
                 return false;
             }
             let reciprocal = 1.0 / pivot.sqrt();
-            for x in &mut *row {
-                *x *= reciprocal;
+            for chunk in &mut own[block..] {
+                *chunk = chunk.map(|x| x * reciprocal);
             }
-            row[0] = reciprocal;
+            own[block][k] = reciprocal;
+            for (j, other) in right.chunks_exact_mut(size).take(LANES - 1 - k).enumerate() {
+                subtract(other, own, own[block][k + 1 + j], block);
+            }
         }
-        if last < first + PANEL {
-            break;
-        }
-        let (above, rest) = A.split_at_mut(last * m);
-        for (i, row) in rest.chunks_exact_mut(m).enumerate() {
-            let panel = panel_rows(above, m, first, last + i);
-            subtract_panel(&mut row[last + i..], panel.map(|u| u[0]), panel);
+        let (left, right) = A.split_at_mut(LANES * (block + 1) * size);
+        let panel = panel_columns(&left[LANES * block * size..], size);
+        for (j, column) in right.chunks_exact_mut(size).enumerate() {
+            let at = block + 1 + j / LANES;
+            let factors = panel.map(|own| own[at][j % LANES]);
+            subtract_columns(column, panel, factors, at..size);
         }
     }
     true
 }
 
-/// Solves `Uᵀ U x = b` in place of `b`, with the factor of [`cholesky`].
-pub(super) fn cholesky_solve(U: &[f64], m: usize, b: &mut [f64]) {
-    if m == 0 {
-        return;
-    }
-    for (i, row) in U.chunks_exact(m).enumerate() {
-        let x = b[i] * row[i];
-        b[i] = x;
-        subtract(&mut b[i + 1..m], x, &row[i + 1..]);
-    }
-    for (i, row) in U.chunks_exact(m).enumerate().rev() {
-        b[i] = (b[i] - dot(&row[i + 1..], &b[i + 1..m])) * row[i];
+/// `x -= factor other` from chunk `first` on.
+#[inline(always)]
+fn subtract(x: &mut [Chunk], other: &[Chunk], factor: f64, first: usize) {
+    for (x, y) in x[first..].iter_mut().zip(&other[first..]) {
+        let (old, y) = (*x, *y);
+        *x = std::array::from_fn(|l| old[l] - factor * y[l]);
     }
 }
 
-/// LU factors with row exchanges of a row-major `m × m` matrix, in place; the diagonal of `U` is stored reciprocal.
+/// Solves `L Lᵀ x = b` in place of `b`, with the factor of [`cholesky`].
+pub(super) fn cholesky_solve(L: &[Chunk], size: usize, b: &mut [Chunk]) {
+    with_known_size!(size, |size| cholesky_solve_of(L, size, b));
+}
+
+#[inline(always)]
+fn cholesky_solve_of(L: &[Chunk], size: usize, b: &mut [Chunk]) {
+    let L = &L[..LANES * size * size];
+    let b = &mut b[..size];
+    let columns = |block: usize| panel_columns(&L[LANES * block * size..], size);
+    for block in 0..size {
+        let panel = columns(block);
+        let x = &mut b[block];
+        for k in 0..LANES {
+            x[k] *= panel[k][block][k];
+            for l in k + 1..LANES {
+                x[l] -= panel[k][block][l] * x[k];
+            }
+        }
+        let x = *x;
+        subtract_columns(b, panel, x, block + 1..size);
+    }
+    for block in (0..size).rev() {
+        let panel = columns(block);
+        let (above, below) = b.split_at_mut(block + 1);
+        let x = &mut above[block];
+        let products = panel.map(|column| {
+            let mut sums = [0.0; LANES];
+            for (y, z) in column[block + 1..].iter().zip(&*below) {
+                for l in 0..LANES {
+                    sums[l] += y[l] * z[l];
+                }
+            }
+            (sums[0] + sums[1]) + (sums[2] + sums[3])
+        });
+        for k in (0..LANES).rev() {
+            let mut rest = x[k] - products[k];
+            for l in k + 1..LANES {
+                rest -= panel[k][block][l] * x[l];
+            }
+            x[k] = rest * panel[k][block][k];
+        }
+    }
+}
+
+/// LU factors with row exchanges of a matrix of `size` chunks a side, in place; the diagonal of `U` is stored reciprocal.
 ///
 /// Returns `false` at a zero or non-finite pivot.
 #[must_use]
-pub(super) fn lu(A: &mut [f64], m: usize, pivots: &mut [usize]) -> bool {
-    for first in (0..m).step_by(PANEL) {
-        let last = (first + PANEL).min(m);
-        for k in first..last {
-            if !exchange(A, m, k, pivots) {
+pub(super) fn lu(A: &mut [Chunk], size: usize, pivots: &mut [usize]) -> bool {
+    with_known_size!(size, |size| lu_of(A, size, pivots))
+}
+
+#[inline(always)]
+fn lu_of(A: &mut [Chunk], size: usize, pivots: &mut [usize]) -> bool {
+    let A = &mut A[..LANES * size * size];
+    let pivots = &mut pivots[..LANES * size];
+    for block in 0..size {
+        for k in 0..LANES {
+            let column = LANES * block + k;
+            if !exchange(A, size, column, pivots) {
                 return false;
             }
-            let (above, below) = A.split_at_mut((k + 1) * m);
-            let pivot_row = &mut above[k * m..];
-            let reciprocal = 1.0 / pivot_row[k];
-            pivot_row[k] = reciprocal;
-            let tail = &pivot_row[k + 1..last];
-            for row in below.chunks_exact_mut(m) {
-                let factor = row[k] * reciprocal;
-                row[k] = factor;
-                subtract(&mut row[k + 1..last], factor, tail);
+            let (own, right) = A[column * size..].split_at_mut(size);
+            let reciprocal = 1.0 / own[block][k];
+            for l in k + 1..LANES {
+                own[block][l] *= reciprocal;
+            }
+            for chunk in &mut own[block + 1..] {
+                *chunk = chunk.map(|x| x * reciprocal);
+            }
+            own[block][k] = reciprocal;
+            for other in right.chunks_exact_mut(size).take(LANES - 1 - k) {
+                let factor = other[block][k];
+                for l in k + 1..LANES {
+                    other[block][l] -= factor * own[block][l];
+                }
+                subtract(other, own, factor, block + 1);
             }
         }
-        if last == m {
-            break;
-        }
-        for k in first + 1..last {
-            let (above, rest) = A.split_at_mut(k * m);
-            let (factors, row) = rest[..m].split_at_mut(last);
-            for j in first..k {
-                subtract(row, factors[j], &above[j * m + last..(j + 1) * m]);
-            }
-        }
-        let (above, below) = A.split_at_mut(last * m);
-        let panel = panel_rows(above, m, first, last);
-        for row in below.chunks_exact_mut(m) {
-            let (factors, row) = row.split_at_mut(last);
-            subtract_panel(row, std::array::from_fn(|k| factors[first + k]), panel);
+        let (left, right) = A.split_at_mut(LANES * (block + 1) * size);
+        let panel = panel_columns(&left[LANES * block * size..], size);
+        for column in right.chunks_exact_mut(size) {
+            let factors = eliminate(&mut column[block], panel, block);
+            subtract_columns(column, panel, factors, block + 1..size);
         }
     }
     true
 }
 
+/// Solves with the unit lower triangle of a diagonal block, in place.
+#[inline(always)]
+fn eliminate(x: &mut Chunk, panel: [&[Chunk]; LANES], block: usize) -> Chunk {
+    for k in 0..LANES - 1 {
+        for l in k + 1..LANES {
+            x[l] -= panel[k][block][l] * x[k];
+        }
+    }
+    *x
+}
+
 /// Brings the largest entry of column `k` at or below the diagonal onto it; `false` if it is zero or not finite.
-#[inline]
-fn exchange(A: &mut [f64], m: usize, k: usize, pivots: &mut [usize]) -> bool {
+#[inline(always)]
+fn exchange(A: &mut [Chunk], size: usize, k: usize, pivots: &mut [usize]) -> bool {
+    let column = &A[k * size..(k + 1) * size];
+    let (block, lane) = (k / LANES, k % LANES);
     let mut best = k;
-    let mut size = A[k * m + k].abs();
-    for (i, row) in A.chunks_exact(m).enumerate().skip(k + 1) {
-        let candidate = row[k].abs();
-        if candidate > size {
-            size = candidate;
-            best = i;
+    let mut largest = column[block][lane].abs();
+    let mut offer = |row: usize, x: f64| {
+        if x.abs() > largest {
+            largest = x.abs();
+            best = row;
+        }
+    };
+    for l in lane + 1..LANES {
+        offer(LANES * block + l, column[block][l]);
+    }
+    for (c, chunk) in column.iter().enumerate().skip(block + 1) {
+        for (l, &x) in chunk.iter().enumerate() {
+            offer(LANES * c + l, x);
         }
     }
     pivots[k] = best;
     if best != k {
-        let (above, below) = A.split_at_mut(best * m);
-        above[k * m..(k + 1) * m].swap_with_slice(&mut below[..m]);
+        for column in A.chunks_exact_mut(size) {
+            let x = column[block][lane];
+            column[block][lane] = column[best / LANES][best % LANES];
+            column[best / LANES][best % LANES] = x;
+        }
     }
-    size > 0.0 && size.is_finite()
+    largest > 0.0 && largest.is_finite()
 }
 
 /// Solves `A x = b` in place of `b`, with the factors of [`lu`].
-pub(super) fn lu_solve(A: &[f64], m: usize, pivots: &[usize], b: &mut [f64]) {
-    if m == 0 {
-        return;
+pub(super) fn lu_solve(A: &[Chunk], size: usize, pivots: &[usize], b: &mut [Chunk]) {
+    with_known_size!(size, |size| lu_solve_of(A, size, pivots, b));
+}
+
+#[inline(always)]
+fn lu_solve_of(A: &[Chunk], size: usize, pivots: &[usize], b: &mut [Chunk]) {
+    let A = &A[..LANES * size * size];
+    let b = &mut b[..size];
+    let columns = |block: usize| panel_columns(&A[LANES * block * size..], size);
+    let flat = b.as_flattened_mut();
+    for (k, &pivot) in pivots.iter().take(LANES * size).enumerate() {
+        flat.swap(k, pivot);
     }
-    for k in 0..m {
-        b.swap(k, pivots[k]);
+    for block in 0..size {
+        let panel = columns(block);
+        let x = eliminate(&mut b[block], panel, block);
+        subtract_columns(b, panel, x, block + 1..size);
     }
-    for (i, row) in A.chunks_exact(m).enumerate() {
-        b[i] -= dot(&row[..i], &b[..i]);
-    }
-    for (i, row) in A.chunks_exact(m).enumerate().rev() {
-        b[i] = (b[i] - dot(&row[i + 1..], &b[i + 1..m])) * row[i];
+    for block in (0..size).rev() {
+        let panel = columns(block);
+        let x = &mut b[block];
+        for k in (0..LANES).rev() {
+            x[k] *= panel[k][block][k];
+            for l in 0..k {
+                x[l] -= panel[k][block][l] * x[k];
+            }
+        }
+        let x = *x;
+        subtract_columns(b, panel, x, 0..block);
     }
 }
 
@@ -166,48 +292,64 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn product(A: &[f64], x: &[f64]) -> Vec<f64> {
-        A.chunks_exact(x.len())
-            .map(|row| crate::problem::dot(row, x))
-            .collect()
+    /// Padded with the unit matrix; `entry(i, j)` is row `i`, column `j`.
+    fn padded(m: usize, entry: impl Fn(usize, usize) -> f64) -> Vec<Chunk> {
+        let size = chunks(m);
+        let mut A = vec![[0.0; LANES]; LANES * size * size];
+        for j in 0..LANES * size {
+            for i in 0..LANES * size {
+                A[j * size + i / LANES][i % LANES] = if i < m && j < m {
+                    entry(i, j)
+                } else {
+                    f64::from(u8::from(i == j))
+                };
+            }
+        }
+        A
+    }
+
+    fn vector(m: usize, entry: impl Fn(usize) -> f64) -> Vec<Chunk> {
+        let mut x = vec![[0.0; LANES]; chunks(m)];
+        for i in 0..m {
+            x[i / LANES][i % LANES] = entry(i);
+        }
+        x
     }
 
     #[test]
     fn singular_matrices_are_refused() {
-        assert!(!lu(&mut [0.0; 9], 3, &mut [0; 3]));
-        assert!(!cholesky(&mut [1.0, 0.0, 0.0, -1.0], 2));
-        assert!(!cholesky(&mut [f64::NAN], 1));
+        let zero = |_, _| 0.0;
+        assert!(!lu(&mut padded(3, zero), 1, &mut [0; 4]));
+        let indefinite = |i: usize, j: usize| if i == j { 1.0 - 2.0 * i as f64 } else { 0.0 };
+        assert!(!cholesky(&mut padded(2, indefinite), 1));
+        assert!(!cholesky(&mut padded(1, |_, _| f64::NAN), 1));
     }
 
     proptest! {
         #[test]
         fn factors_solve(entries in prop::collection::vec(-1.0..1.0f64, 400), m in 1usize..20) {
-            let x: Vec<f64> = entries[..m].to_vec();
-            let mut general = entries[..m * m].to_vec();
-            for k in 0..m {
-                // Off the diagonal, so that rows have to be exchanged.
-                general[k * m + (k + 1) % m] += 3.0 * (m as f64).sqrt();
-            }
-            let mut b = product(&general, &x);
-            let mut pivots = vec![0; m];
-            let mut factors = general.clone();
-            prop_assert!(lu(&mut factors, m, &mut pivots));
-            lu_solve(&factors, m, &pivots, &mut b);
-            for k in 0..m {
-                prop_assert!((b[k] - x[k]).abs() < 1e-11);
-            }
+            let size = chunks(m);
+            // Off the diagonal, so that rows have to be exchanged.
+            let general = |i: usize, j: usize| {
+                let large = if j == (i + 1) % m { 3.0 * (m as f64).sqrt() } else { 0.0 };
+                entries[i * m + j] + large
+            };
             // AᵀA is symmetric positive definite.
-            let mut gram = vec![0.0; m * m];
-            for i in 0..m {
-                for j in 0..m {
-                    gram[i * m + j] = (0..m).map(|k| general[k * m + i] * general[k * m + j]).sum();
-                }
-            }
-            let mut b = product(&gram, &x);
-            prop_assert!(cholesky(&mut gram, m));
-            cholesky_solve(&gram, m, &mut b);
+            let gram = |i: usize, j: usize| (0..m).map(|k| general(k, i) * general(k, j)).sum::<f64>();
+            let mut factors = padded(m, general);
+            let mut pivots = vec![0; LANES * size];
+            let mut b = vector(m, |i| (0..m).map(|j| general(i, j) * entries[j]).sum());
+            prop_assert!(lu(&mut factors, size, &mut pivots));
+            lu_solve(&factors, size, &pivots, &mut b);
             for k in 0..m {
-                prop_assert!((b[k] - x[k]).abs() < 1e-9);
+                prop_assert!((b[k / LANES][k % LANES] - entries[k]).abs() < 1e-11);
+            }
+            let mut factors = padded(m, gram);
+            let mut b = vector(m, |i| (0..m).map(|j| gram(i, j) * entries[j]).sum());
+            prop_assert!(cholesky(&mut factors, size));
+            cholesky_solve(&factors, size, &mut b);
+            for k in 0..m {
+                prop_assert!((b[k / LANES][k % LANES] - entries[k]).abs() < 1e-9);
             }
         }
     }

@@ -165,12 +165,9 @@ impl Algorithm for Newton {
         workspace: &mut SolverWorkspace,
         iterations: &mut usize,
     ) -> Outcome {
-        let plan = newton::Plan {
-            max_steps: options.max_newton_steps,
-            only_modes: false,
-        };
+        let steps = options.max_newton_steps;
         let (status, residual) =
-            newton::full_steps::<D>(data, options, plan, p, u, workspace, iterations);
+            newton::full_steps::<D>(data, options, steps, p, u, workspace, iterations);
         (Self::METHOD, status, residual)
     }
 }

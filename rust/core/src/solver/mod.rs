@@ -3,6 +3,7 @@
 //! - [`one_contact`]: the exact solution of a single contact, the brick of Gauss–Seidel;
 //! - `nsgs`: nonsmooth Gauss–Seidel, cheap sweeps, good with many contacts;
 //! - `newton`: semismooth Newton on the contact modes, quadratic near the answer;
+//! - `guided`: few contacts from rest, a few sweeps for the modes and Newton with them;
 //! - `pivoting`: one contact changes its mode at a time, from a warm start that full Newton steps do not profit from;
 //! - `proximal`: the proximal-point method around Newton, for whatever resists (redundant contacts, jammed stacks);
 //! - `admm`: alternating directions, and with them the convex relaxation of Coulomb's law, both for comparison;
@@ -19,6 +20,7 @@ mod block_lu;
 pub mod body_pairs;
 pub mod body_sweeps;
 mod dense;
+mod guided;
 mod islands;
 mod methods;
 mod modes;

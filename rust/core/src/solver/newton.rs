@@ -127,15 +127,6 @@ fn give_best(
     (SolveStatus::Stalled, best)
 }
 
-/// How [`full_steps`] begins and how long it goes on.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Plan {
-    /// Most steps.
-    pub max_steps: usize,
-    /// Whether `p` only tells the modes, and the search starts from zero with them; it ends when they turn out wrong.
-    pub only_modes: bool,
-}
-
 /// Full Newton steps from `p`; in steady motion two or three of them solve the step.
 ///
 /// The proximal centre stays at the start until the modes settle and follows the iterate then, so that the last steps refine what the
@@ -143,7 +134,7 @@ pub(super) struct Plan {
 pub(super) fn full_steps<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
-    plan: Plan,
+    max_steps: usize,
     p: &mut [f64],
     u: &mut [f64],
     workspace: &mut SolverWorkspace,
@@ -160,10 +151,6 @@ pub(super) fn full_steps<const D: usize>(
     data.W.multiply_add(p, data.q, u);
     let recalled = modes::recall::<D>(data.mu, p, u, &mut workspace.contacts);
     let is_warm = p.iter().any(|x| x.abs() > 0.0);
-    if plan.only_modes {
-        p.fill(0.0);
-        u.copy_from_slice(data.q);
-    }
     workspace.centre.copy_from_slice(p);
     let mut step = 0;
     let mut best = Residual::UNSOLVED;
@@ -189,7 +176,7 @@ pub(super) fn full_steps<const D: usize>(
         {
             return (SolveStatus::Converged, residual);
         }
-        if step == plan.max_steps {
+        if step == max_steps {
             return give_best(data, best, p, u, workspace);
         }
         course.last = residual.relative;
@@ -198,10 +185,6 @@ pub(super) fn full_steps<const D: usize>(
         } else {
             predict::<D>(data, &mut course, p, u, workspace)
         };
-        if plan.only_modes && course.exact {
-            // The guess was wrong, and the centre may have followed it.
-            return give_best(data, best, p, u, workspace);
-        }
         *iterations += 1;
         if prediction.changed && step > 0 && step % CYCLE == 0 {
             let prox = Proximal {

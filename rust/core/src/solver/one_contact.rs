@@ -19,6 +19,9 @@ use crate::law::coulomb::ContactMode;
 /// Most steps of the safeguarded Newton on `g(κ)`; bisection alone needs about 60 for all digits.
 const MAX_STEPS: usize = 100;
 
+/// Steps of an estimate: with one, a sweep's directions are too rough for loads that do not depend on the order of the contacts.
+const ESTIMATE_STEPS: usize = 2;
+
 /// The solved contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OneContactSolution<const D: usize> {
@@ -41,6 +44,27 @@ pub fn solve_one_contact<const D: usize>(
     q: &[f64; D],
     mu: f64,
 ) -> OneContactSolution<D> {
+    solve_within::<D, MAX_STEPS>(W, q, mu, 0.0)
+}
+
+/// As [`solve_one_contact`], but the direction of a slide is good to a few digits only. `kappa`: that of the last estimate, or zero.
+#[inline]
+pub(super) fn estimate_one_contact<const D: usize>(
+    W: &[[f64; D]; D],
+    q: &[f64; D],
+    mu: f64,
+    kappa: f64,
+) -> OneContactSolution<D> {
+    solve_within::<D, ESTIMATE_STEPS>(W, q, mu, kappa)
+}
+
+#[inline]
+fn solve_within<const D: usize, const STEPS: usize>(
+    W: &[[f64; D]; D],
+    q: &[f64; D],
+    mu: f64,
+    kappa: f64,
+) -> OneContactSolution<D> {
     let mut solution = OneContactSolution {
         impulse: [0.0; D],
         mode: ContactMode::Open,
@@ -56,7 +80,7 @@ pub fn solve_one_contact<const D: usize>(
     } else if D == 2 {
         in_the_plane(W, q, mu, &mut solution);
     } else {
-        in_space(W, q, mu, &mut solution);
+        in_space::<D, STEPS>(W, q, mu, kappa, &mut solution);
     }
     solution
 }
@@ -88,10 +112,11 @@ fn in_the_plane<const D: usize>(
     }
 }
 
-fn in_space<const D: usize>(
+fn in_space<const D: usize, const STEPS: usize>(
     W: &[[f64; D]; D],
     q: &[f64; D],
     mu: f64,
+    last: f64,
     solution: &mut OneContactSolution<D>,
 ) {
     let p = &mut solution.impulse;
@@ -154,19 +179,23 @@ fn in_space<const D: usize>(
             return;
         }
     }
-    // The answer of a block without preferred direction is a good first guess.
-    let size = (q_hat[0] * q_hat[0] + q_hat[1] * q_hat[1]).sqrt();
-    let along = W[0][1] * q_hat[0] + W[0][2] * q_hat[1];
-    let guess = (size * W_NN / mu - along / size) / -q[0] - 0.5 * trace;
     let beside = (smallest + scale).max(f64::MIN_POSITIVE);
-    let start = if guess > smallest && guess.is_finite() {
-        guess
+    let start = if last > smallest {
+        last
     } else {
-        beside
+        // The answer of a block without preferred direction is a good first guess.
+        let size = (q_hat[0] * q_hat[0] + q_hat[1] * q_hat[1]).sqrt();
+        let along = W[0][1] * q_hat[0] + W[0][2] * q_hat[1];
+        let guess = (size * W_NN / mu - along / size) / -q[0] - 0.5 * trace;
+        if guess > smallest && guess.is_finite() {
+            guess
+        } else {
+            beside
+        }
     };
     // Without a sign change (an indefinite W only) the contact has no answer; a damped one keeps an iteration going.
     let kappa = if smallest <= 0.0 || at(smallest).0 > 0.0 {
-        falling_root(
+        falling_root::<STEPS>(
             |kappa| {
                 let (g, slope, _, _) = at(kappa);
                 (g, slope)
@@ -199,10 +228,15 @@ fn in_space<const D: usize>(
 /// Root of a function that is positive at `low` and negative far beyond: Newton inside a bracket, whose upper end is looked for in steps of `reach`.
 ///
 /// `at` gives value and slope.
-fn falling_root(at: impl Fn(f64) -> (f64, f64), mut low: f64, start: f64, reach: f64) -> f64 {
+fn falling_root<const STEPS: usize>(
+    at: impl Fn(f64) -> (f64, f64),
+    mut low: f64,
+    start: f64,
+    reach: f64,
+) -> f64 {
     let mut high = f64::INFINITY;
     let mut x = start;
-    for _ in 0..MAX_STEPS {
+    for _ in 0..STEPS {
         let (value, slope) = at(x);
         if value > 0.0 {
             low = x;

@@ -22,8 +22,16 @@ use crate::problem::Residual;
 /// Most systems to solve.
 const MAX_PIVOTS: usize = 80;
 
-/// `α` relative to the mean diagonal: small, since the ratio test keeps the impulse from running away along what W cannot see.
+/// First `α` relative to the mean diagonal: small, since the ratio test keeps the impulse from running away along what W cannot see.
 const ALPHA: f64 = 1e-10;
+
+/// Factor of `α` where full steps gain nothing, and the smallest one. Wheels that are squeezed to the limit of their friction slip at 1e-11 m/s, and the turning stiffness
+/// of such a slide is as small as `α`: on 749 recorded steps over rocks at 1 ms none was solved with the first `α`, nearly all within some ten systems with smaller ones.
+const ALPHA_SHRINK: f64 = 0.01;
+const SMALLEST_ALPHA: f64 = 1e-14;
+
+/// Least gain of a full step with the same `α`.
+const LEAST_GAIN: f64 = 0.5;
 
 /// How far the impulse may go, and who stops it.
 #[derive(Clone, Copy, Debug)]
@@ -197,7 +205,8 @@ pub(super) fn pivots<const D: usize>(
 ) -> (SolveStatus, Residual) {
     data.W.multiply_add(p, data.q, u);
     modes::recall::<D>(data.mu, p, u, &mut workspace.contacts);
-    let alpha = ALPHA * data.mean_diagonal;
+    let mut alpha = ALPHA * data.mean_diagonal;
+    let mut last = f64::INFINITY;
     let mut residual = data.measure::<D>(&workspace.rho, p, u);
     for _ in 0..MAX_PIVOTS.min(options.max_newton_steps) {
         let prediction = linearise::<D>(data.mu, &mut workspace.contacts, p, u);
@@ -247,6 +256,10 @@ pub(super) fn pivots<const D: usize>(
         if !residual.is_finite() {
             return (SolveStatus::NonFinite, residual);
         }
+        if residual.relative > LEAST_GAIN * last {
+            alpha = (ALPHA_SHRINK * alpha).max(SMALLEST_ALPHA * data.mean_diagonal);
+        }
+        last = residual.relative;
         if let Some((i, mode)) = worst_contradiction::<D>(data.mu, &workspace.contacts, p, u) {
             change_mode::<D>(
                 data.mu[i],

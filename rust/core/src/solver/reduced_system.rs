@@ -7,7 +7,7 @@
 //! Written for the increment it reads `(Bᵀ (W + α I) C + γ) y = −Bᵀ û − γ p_t`, symmetric when nothing slides with friction.
 
 use super::auto::Prepared;
-use super::dense;
+use super::dense::{self, Chunk, LANES};
 use super::modes::{Linearised, Prediction, Proximal, n_unknowns};
 use super::workspace::SolverWorkspace;
 use crate::law::coulomb::ContactMode;
@@ -76,62 +76,89 @@ fn snap<const D: usize>(mu: &[f64], contacts: &[Linearised], p: &mut [f64]) -> b
     moved
 }
 
-/// `Bᵀ (W + α I) C + γ` of the predicted modes, row-major `m × m`.
+/// Sets what a padded matrix of `m` unknowns has beyond them to the unit matrix.
 #[inline]
-fn assemble<const D: usize>(
-    data: &Prepared<'_>,
+fn pad(A: &mut [Chunk], m: usize) {
+    let size = dense::chunks(m);
+    if m == LANES * size {
+        return;
+    }
+    for column in A.chunks_exact_mut(size).take(m) {
+        column[size - 1][m % LANES..].fill(0.0);
+    }
+    for k in m..LANES * size {
+        let column = &mut A[k * size..(k + 1) * size];
+        column.fill([0.0; LANES]);
+        column[size - 1][k % LANES] = 1.0;
+    }
+}
+
+/// `W + α I` for a Cholesky factorisation, which reads the lower triangle of these columns: the rows of a symmetric `W`.
+#[inline]
+fn assemble_symmetric(W: &[f64], alpha: f64, n: usize, A: &mut [Chunk]) {
+    let size = dense::chunks(n);
+    pad(A, n);
+    for (k, (row, column)) in W.chunks_exact(n).zip(A.chunks_exact_mut(size)).enumerate() {
+        let column = column.as_flattened_mut();
+        column[..n].copy_from_slice(row);
+        column[k] += alpha;
+    }
+}
+
+/// `Bᵀ (W + α I) C + γ` of the predicted modes, `m × m`, padded.
+#[inline]
+pub(super) fn assemble<const D: usize>(
+    mu: &[f64],
     W: &[f64],
     alpha: f64,
     contacts: &[Linearised],
     m: usize,
-    row: &mut [f64],
-    A: &mut [f64],
+    A: &mut [Chunk],
 ) {
-    let n = data.n;
-    if m == n {
-        A[..n * n].copy_from_slice(W);
-        for k in 0..n {
-            A[k * (n + 1)] += alpha;
-        }
-        return;
-    }
-    for (i, contact) in contacts.iter().enumerate() {
-        let first = &W[i * D * n..];
-        let size = n_unknowns::<D>(contact.mode, data.mu[i]);
-        for k in 0..size {
-            let index = contact.start + k;
-            let target = &mut A[index * m..(index + 1) * m];
+    pad(A, m);
+    let n = D * contacts.len();
+    let height = LANES * dense::chunks(m);
+    let A = A.as_flattened_mut();
+    for ((contact, &mu_i), rows) in contacts.iter().zip(mu).zip(W.chunks_exact(D * n)) {
+        let rows: [&[[f64; D]]; D] =
+            std::array::from_fn(|r| rows[r * n..(r + 1) * n].as_chunks::<D>().0);
+        for k in 0..n_unknowns::<D>(contact.mode, mu_i) {
+            let column = &mut A[contact.start + k..];
+            let diagonal = (contact.start + k) * height;
             if contact.mode == ContactMode::Slide && k == 1 {
                 let [e0, e1] = contact.e;
-                let (a, b) = (&first[n..2 * n], &first[2 * n..3 * n]);
-                for ((out, x), y) in row.iter_mut().zip(a).zip(b) {
-                    *out = e0 * y - e1 * x;
-                }
-                combine_columns::<D>(row, data.mu, contacts, target);
-                target[index] += contact.gamma;
+                let turned = rows[1].iter().zip(rows[D - 1]);
+                let across = turned.map(|(x, y)| std::array::from_fn(|c| e0 * y[c] - e1 * x[c]));
+                combine_columns::<D>(across, mu, contacts, height, column);
+                column[diagonal] += contact.gamma;
             } else {
-                combine_columns::<D>(&first[k * n..(k + 1) * n], data.mu, contacts, target);
+                combine_columns::<D>(rows[k].iter().copied(), mu, contacts, height, column);
             }
-            target[index] += alpha;
+            column[diagonal] += alpha;
         }
     }
 }
 
-/// One row of `W C`: the columns that the unknowns of every contact act through.
+/// One row of `W C`, the columns that the unknowns of every contact act through, into every `height`-th entry of `target`.
 #[inline]
 fn combine_columns<const D: usize>(
-    row: &[f64],
+    row: impl Iterator<Item = [f64; D]>,
     mu: &[f64],
     contacts: &[Linearised],
+    height: usize,
     target: &mut [f64],
 ) {
-    let mut target = target.iter_mut();
-    for ((w, contact), &mu) in row.chunks_exact(D).zip(contacts).zip(mu) {
+    let mut at = 0;
+    let mut push = |x: f64| {
+        target[at] = x;
+        at += height;
+    };
+    for ((w, contact), &mu) in row.zip(contacts).zip(mu) {
         match contact.mode {
             ContactMode::Open => {}
             ContactMode::Stick => {
-                for (x, out) in w.iter().zip(target.by_ref()) {
-                    *out = *x;
+                for x in w {
+                    push(x);
                 }
             }
             ContactMode::Slide => {
@@ -141,14 +168,9 @@ fn combine_columns<const D: usize>(
                 } else {
                     w[1] * e0 + w[2] * e1
                 };
-                if let Some(out) = target.next() {
-                    *out = w[0] + mu * along;
-                }
-                if D == 3
-                    && mu > 0.0
-                    && let Some(out) = target.next()
-                {
-                    *out = e0 * w[2] - e1 * w[1];
+                push(w[0] + mu * along);
+                if D == 3 && mu > 0.0 {
+                    push(e0 * w[2] - e1 * w[1]);
                 }
             }
         }
@@ -262,30 +284,26 @@ pub(super) fn factorise<const D: usize>(
             };
         }
     };
-    assemble::<D>(
-        data,
-        W,
-        alpha,
-        &workspace.contacts,
-        m,
-        &mut workspace.row,
-        &mut workspace.matrix,
-    );
+    let SolverWorkspace {
+        contacts,
+        matrix,
+        pivots,
+        ..
+    } = workspace;
+    let size = dense::chunks(m);
+    let A = &mut matrix[..LANES * size * size];
     if !prediction.slides && allow_symmetric {
-        if dense::cholesky(&mut workspace.matrix[..m * m], m) {
+        if m == data.n {
+            assemble_symmetric(W, alpha, m, A);
+        } else {
+            assemble::<D>(data.mu, W, alpha, contacts, m, A);
+        }
+        if dense::cholesky(A, size) {
             return Factors::Symmetric;
         }
-        assemble::<D>(
-            data,
-            W,
-            alpha,
-            &workspace.contacts,
-            m,
-            &mut workspace.row,
-            &mut workspace.matrix,
-        );
     }
-    if dense::lu(&mut workspace.matrix[..m * m], m, &mut workspace.pivots) {
+    assemble::<D>(data.mu, W, alpha, contacts, m, A);
+    if dense::lu(A, size, pivots) {
         Factors::General
     } else {
         Factors::None
@@ -301,14 +319,19 @@ fn back_substitute<const D: usize>(
     workspace: &mut SolverWorkspace,
 ) {
     if let (Factors::Sparse, Operator::BlockSparse(W)) = (factors, data.W) {
-        workspace.block_lu.solve::<D>(W, &mut workspace.rhs);
+        workspace
+            .block_lu
+            .solve::<D>(W, &mut workspace.rhs.as_flattened_mut()[..data.n]);
         return;
     }
-    let rhs = &mut workspace.rhs[..m];
+    let size = dense::chunks(m);
+    let rhs = &mut workspace.rhs[..size];
+    let A = &workspace.matrix[..LANES * size * size];
+    rhs.as_flattened_mut()[m..].fill(0.0);
     match factors {
-        Factors::None | Factors::Sparse => rhs.fill(0.0),
-        Factors::Symmetric => dense::cholesky_solve(&workspace.matrix[..m * m], m, rhs),
-        Factors::General => dense::lu_solve(&workspace.matrix[..m * m], m, &workspace.pivots, rhs),
+        Factors::None | Factors::Sparse => rhs.fill([0.0; LANES]),
+        Factors::Symmetric => dense::cholesky_solve(A, size, rhs),
+        Factors::General => dense::lu_solve(A, size, &workspace.pivots, rhs),
     }
 }
 
@@ -334,7 +357,7 @@ pub(super) fn newton_point<const D: usize>(
         for (i, contact) in contacts.iter_mut().enumerate() {
             contact.start = D * i;
         }
-        rhs.fill(0.0);
+        rhs.fill([0.0; LANES]);
     }
     let mut u = u;
     if snap::<D>(data.mu, contacts, trial) {
@@ -345,12 +368,12 @@ pub(super) fn newton_point<const D: usize>(
         alpha: system.alpha,
         centre,
     };
-    right_hand_side::<D>(data, prox, contacts, trial, u, rhs);
+    right_hand_side::<D>(data, prox, contacts, trial, u, rhs.as_flattened_mut());
     back_substitute::<D>(data, system.factors, system.m, workspace);
     apply::<D>(
         data.mu,
         &workspace.contacts,
-        &workspace.rhs,
+        workspace.rhs.as_flattened(),
         system.on_cone,
         &mut workspace.trial,
     );

@@ -2,6 +2,7 @@
 
 use super::block_lu::BlockLu;
 use super::body_sweeps::BodySweeps;
+use super::dense::{self, Chunk, LANES};
 use super::islands::Islands;
 use super::modes::Linearised;
 use super::storage::Storage;
@@ -36,11 +37,9 @@ pub struct SolverWorkspace {
     pub(super) trial: Vec<f64>,
     pub(super) trial_velocity: Vec<f64>,
     /// Right-hand side and solution of the linear system.
-    pub(super) rhs: Vec<f64>,
-    /// One combined row of `W`.
-    pub(super) row: Vec<f64>,
+    pub(super) rhs: Vec<Chunk>,
     /// Matrix of the linear system, factored in place.
-    pub(super) matrix: Vec<f64>,
+    pub(super) matrix: Vec<Chunk>,
     /// Row exchanges of the factorisation.
     pub(super) pivots: Vec<usize>,
     /// Factors of the block-sparse system, and whether its pattern is that of the present problem.
@@ -67,25 +66,29 @@ impl SolverWorkspace {
         let mut workspace = Self::default();
         let n = n_contacts * components;
         workspace.resize(n_contacts, n);
-        workspace.matrix.resize(n * n, 0.0);
-        workspace.pivots.resize(n, 0);
+        workspace.resize_dense(n);
         workspace
     }
 
     /// Makes every buffer fit; the contents are unspecified.
     pub(super) fn fit(&mut self, n_contacts: usize, n: usize, W: Operator<'_>) {
-        if self.rhs.len() != n || self.rho.len() != n_contacts {
+        if self.trial.len() != n || self.rho.len() != n_contacts {
             self.resize(n_contacts, n);
         }
         match W {
             Operator::Dense(_) => {
-                if self.pivots.len() != n {
-                    self.matrix.resize(n * n, 0.0);
-                    self.pivots.resize(n, 0);
+                if self.pivots.len() != LANES * dense::chunks(n) {
+                    self.resize_dense(n);
                 }
             }
             Operator::BlockSparse(_) => self.is_analysed = false,
         }
+    }
+
+    fn resize_dense(&mut self, n: usize) {
+        let size = dense::chunks(n);
+        self.matrix.resize(LANES * size * size, [0.0; LANES]);
+        self.pivots.resize(LANES * size, 0);
     }
 
     fn resize(&mut self, n_contacts: usize, n: usize) {
@@ -93,6 +96,7 @@ impl SolverWorkspace {
         self.weights.resize(n_contacts, 0.0);
         self.rho_modes.resize(n_contacts, [0.0; 2]);
         self.contacts.resize(n_contacts, Linearised::default());
+        self.rhs.resize(dense::chunks(n), [0.0; LANES]);
         for buffer in [
             &mut self.centre,
             &mut self.start,
@@ -102,8 +106,6 @@ impl SolverWorkspace {
             &mut self.image,
             &mut self.trial,
             &mut self.trial_velocity,
-            &mut self.rhs,
-            &mut self.row,
         ] {
             buffer.resize(n, 0.0);
         }
