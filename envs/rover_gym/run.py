@@ -110,7 +110,16 @@ def read_run(path: str | Path) -> Run:
         OSError: The file is not there or cannot be read.
         MissingExtraError: h5py is not installed.
     """
-    trajectory = read_trajectory(path)
+    return run_of(read_trajectory(path), path)
+
+
+def run_of(trajectory: Trajectory, path: str | Path) -> Run:
+    """The run in a trajectory that was read from `path`.
+
+    Raises:
+        RecordingError: It holds no samples, rover or ground.
+        ModelError: The rover in it is not one.
+    """
     scene = trajectory.attributes.get("scene", {})
     if "q" not in trajectory.data or "model" not in scene:
         refuse(RecordingError, "path", str(path), "holds no rover: neither `q` nor `scene.model` may be missing")

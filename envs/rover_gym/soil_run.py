@@ -17,7 +17,7 @@ from rover_gym.recording import RecordingError, Trajectory, read_trajectory
 from rover_gym.run import film_rows
 from rover_gym.validation import refuse
 
-__all__ = ["SoilRun", "is_soil", "read_soil_run", "soil_run"]
+__all__ = ["SoilRun", "is_soil", "read_soil_run", "soil_run_of"]
 
 Array = npt.NDArray[np.float64]
 
@@ -121,10 +121,10 @@ def read_soil_run(path: str | Path) -> SoilRun:
         OSError: The file is not there or cannot be read.
         MissingExtraError: h5py is not installed.
     """
-    return soil_run(read_trajectory(path), path)
+    return soil_run_of(read_trajectory(path), path)
 
 
-def soil_run(trajectory: Trajectory, path: str | Path) -> SoilRun:
+def soil_run_of(trajectory: Trajectory, path: str | Path) -> SoilRun:
     """The run in a trajectory that was read from `path`.
 
     Raises:

@@ -34,8 +34,9 @@ SAND_COLOURS: tuple[Colour, Colour] = (
 DEPTH = 1.0  # of disks along the axis that the plane does not have, in their mean diameter
 BATCH = 100  # disks that are drawn at once: those of a batch where nothing moves need no update
 CHAINS = 300  # contacts that are drawn, the strongest
-SEEN = 3.0  # m of the soil that the eye sees at once
-FIELD_OF_VIEW = 0.35  # rad: narrow and from afar, so that the plane stays a plane
+SEEN = 2.6  # m of the soil that the eye sees at once
+ASPECT = 1.5  # of the picture, width over height, that they fill
+FIELD_OF_VIEW = 0.35  # rad, vertical: narrow and from afar, so that the plane stays a plane
 FOLLOW_TIME = 1.0  # s, over which the path that the eye follows is smoothed
 
 Array = npt.NDArray[np.float64]
@@ -56,12 +57,13 @@ def write_soil_page(run: SoilRun, path: str | Path, *, follow: bool = True) -> P
     with hidden_server() as server:
         scene = server.scene
         add_surroundings(scene)
+        scene.add_light_directional("/front", intensity=1.5, position=(1.0, 2.0, 6.0))  # the disks' faces look there
         world = scene.add_frame("/world", show_axes=False)
         moving: list[_Disks | _Wheels | _Chains] = [_Disks(run, scene), _Wheels(run, scene), _Chains(run, scene)]
         _add_walls(run, scene)
         eye = _eye(run, follow=follow)
-        distance = 0.5 * SEEN / np.tan(0.5 * FIELD_OF_VIEW)
-        server.initial_camera.position = (0.0, eye[0, 1] + 0.12 * distance, distance)
+        distance = 0.5 * SEEN / (ASPECT * np.tan(0.5 * FIELD_OF_VIEW))
+        server.initial_camera.position = (0.0, eye[0, 1] + 0.1 * distance, distance)
         server.initial_camera.look_at = (0.0, eye[0, 1], 0.0)
         server.initial_camera.fov = FIELD_OF_VIEW
         recording = server.get_scene_serializer()
@@ -201,8 +203,8 @@ def _disk_mesh(sides: int) -> Any:
         np.stack((rim, rim * [1.0, 1.0, -1.0], rim[after] * [1.0, 1.0, -1.0]), axis=1),
         np.stack((rim, rim[after] * [1.0, 1.0, -1.0], rim[after]), axis=1),
     ]
-    shades = np.array([rgb(colour) for colour in SAND_COLOURS])[(k >= sides // 2).astype(int)]
-    colours = np.concatenate((shades, np.tile(rgb(SAND_COLOURS[1]), (2 * sides, 1))))
+    linear = np.round(255.0 * np.array(SAND_COLOURS) ** 2.2).astype(np.uint8)  # a vertex's colour is linear in glTF
+    colours = np.concatenate((linear[(k >= sides // 2).astype(int)], np.tile(linear[1], (2 * sides, 1))))
     vertices = np.concatenate(corners).reshape(-1, 3)
     return trimesh.Trimesh(
         vertices,
