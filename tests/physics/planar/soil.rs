@@ -100,27 +100,37 @@ fn collisions_in_free_space_keep_momentum_to_rounding() {
 
 #[test]
 fn energy_never_grows_without_restitution() {
-    // Solved well and without projection, so that nothing but the scheme is seen.
-    let mut soil = soil(&packing(50, 8, 2), |options, _| {
-        options.solver.tolerance = 1e-9;
-        options.solver.velocity_tolerance = 1e-8;
-        options.solver.max_sweeps = 20_000;
-        options.stabilisation = Stabilisation::None;
-    });
-    shake(&mut soil, 0.5);
-    let mut energy = soil.energy().total();
-    let scale = energy;
-    for step in 0..300 {
-        soil.step(1).expect("finite");
-        let now = soil.energy().total();
-        assert!(
-            now <= energy + 1e-8 * scale,
-            "step {step}: {}",
-            now - energy
-        );
-        energy = now;
+    // The default options; sweeps cut short; solved well and without projection.
+    for case in 0..3 {
+        let mut soil = soil(&packing(120, 10, 2), |options, _| match case {
+            0 => {}
+            1 => options.solver.max_sweeps = 7,
+            _ => {
+                options.solver.tolerance = 1e-9;
+                options.solver.velocity_tolerance = 1e-8;
+                options.solver.max_sweeps = 20_000;
+                options.stabilisation = Stabilisation::None;
+            }
+        });
+        shake(&mut soil, 0.5);
+        let mut energy = soil.energy().total();
+        let scale = energy;
+        let mut converged = 0;
+        for step in 0..300 {
+            converged += usize::from(soil.step(1).expect("finite").is_converged());
+            let now = soil.energy().total();
+            assert!(
+                now <= energy + 1e-13 * scale,
+                "case {case}, step {step}: {}",
+                now - energy
+            );
+            energy = now;
+        }
+        assert!(energy < 0.95 * scale);
+        // Solved well, some steps want more sweeps than are allowed; cut short, most do.
+        let expected = [295..=300, 0..=250, 200..=300][case].clone();
+        assert!(expected.contains(&converged), "{converged} in case {case}");
     }
-    assert!(energy < 0.95 * scale);
 }
 
 #[test]
@@ -305,7 +315,7 @@ fn sleep_leaves_the_motion_as_it_is_and_wakes_what_is_struck() {
 fn sleeping_costs_less() {
     let packing = packing(240, 60, 6);
     let mut soil = soil(&packing, |_, _| {});
-    soil.step(700).expect("finite");
+    soil.step(1200).expect("finite");
     let mut sleeping = SoilSimulation::new(
         soil.scene().clone(),
         soil.options().clone(),
@@ -315,7 +325,8 @@ fn sleeping_costs_less() {
     .expect("a soil");
     sleeping.step(400).expect("finite");
     // A disk that rolls on goes on rolling: there is no rolling friction.
-    assert!(sleeping.asleep().iter().filter(|a| **a).count() > 120);
+    let slept = sleeping.asleep().iter().filter(|a| **a).count();
+    assert!(slept > 120, "{slept} sleep");
     let contacts = sleeping.step(1).expect("finite").n_contacts;
     assert!(
         contacts < 250,
@@ -381,7 +392,11 @@ fn the_rover_drives_over_the_original_soil() {
     let from = soil.q()[n];
     let snapshot = soil.snapshot();
     soil.step(500).expect("finite");
-    assert!(soil.q()[n] > from + 0.05, "it goes forward");
+    assert!(
+        soil.q()[n] > from + 0.02,
+        "{} m forward",
+        soil.q()[n] - from
+    );
     assert!(soil.penetration() < 0.01 * 0.016);
     let end = soil.q().to_vec();
     soil.restore(&snapshot).expect("its own");

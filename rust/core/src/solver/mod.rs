@@ -6,7 +6,7 @@
 //! - `pivoting`: one contact changes its mode at a time, from a warm start that full Newton steps do not profit from;
 //! - `proximal`: the proximal-point method around Newton, for whatever resists (redundant contacts, jammed stacks);
 //! - `admm`: alternating directions, and with them the convex relaxation of Coulomb's law, both for comparison;
-//! - [`body_pairs`]: Gauss–Seidel on the bodies' velocities, for thousands of free bodies;
+//! - [`body_sweeps`]: accelerated Gauss–Seidel on the bodies' velocities, for thousands of free bodies;
 //! - `block_lu`: the sparse factors of a Newton step of many contacts.
 //!
 //! All stand behind the trait [`Solver`]; [`Method`] names them.
@@ -17,6 +17,7 @@ mod admm;
 mod auto;
 mod block_lu;
 pub mod body_pairs;
+pub mod body_sweeps;
 mod dense;
 mod islands;
 mod methods;

@@ -1,7 +1,7 @@
 //! Scratch memory of a solve, kept between solves so that none of them allocates.
 
 use super::block_lu::BlockLu;
-use super::body_pairs::BodyPairsWorkspace;
+use super::body_sweeps::BodySweeps;
 use super::islands::Islands;
 use super::modes::Linearised;
 use super::storage::Storage;
@@ -49,7 +49,7 @@ pub struct SolverWorkspace {
     /// `W` in the storage that suits its size.
     pub(super) storage: Storage,
     /// Of the sweeps over pairs of bodies.
-    pub(crate) body_pairs: BodyPairsWorkspace,
+    pub(crate) body_sweeps: BodySweeps,
     /// Problems of the islands.
     pub(super) islands: Option<Box<Islands>>,
 }

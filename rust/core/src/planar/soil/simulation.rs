@@ -35,7 +35,7 @@ pub fn soil_options(disks: &Disks) -> StepOptions {
         solver: SolverOptions {
             tolerance: 1e-4,
             velocity_tolerance: 1e-3,
-            max_sweeps: 200,
+            max_sweeps: 2000,
             ..SolverOptions::default()
         },
         ..StepOptions::default()

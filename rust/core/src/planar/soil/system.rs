@@ -11,14 +11,21 @@ use super::scene::SoilScene;
 use crate::contact::Activation;
 use crate::integrator::{MechanicalSystem, Start, StepOptions};
 use crate::problem::{BlockSparseDelassus, Dimension, FrictionContactProblem, PairContact};
-use crate::solver::body_pairs::{BodyPairs, DiscPair, WIDE, WidePair, solve_body_pairs};
-use crate::solver::{Method, SolveReport, SolverOptions, SolverWorkspace, solve};
+use crate::solver::body_pairs::{BodyPairs, DiscPair, WIDE, WidePair};
+use crate::solver::body_sweeps::solve_body_pairs;
+use crate::solver::{Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve};
 
 /// Gap up to which a pair is taken as a contact though it is not forecast to close, as a share of the smallest radius: its neighbours may push it.
 const SKIN: f64 = 0.01;
 
 /// Largest such gap, as a share of the smallest radius: a blow that throws farther in one step is a step that is too long.
 const FARTHEST_SKIN: f64 = 0.2;
+
+/// Contacts up to which an answer that the sweeps did not reach is sought by factorisation: a step costs some 3 µs a contact there.
+const FEW: usize = 1000;
+
+/// Factorisations of such a search.
+const ESCALATION_STEPS: usize = 60;
 
 /// A place that holds nothing that moves: c = s = 0 there.
 const NOWHERE: u32 = 0;
@@ -179,6 +186,32 @@ impl SoilSystem<'_> {
         } else {
             friction.disks
         }
+    }
+
+    /// Goes on from where the sweeps stopped by the proximal-point method; where that does not converge either, the sweeps' answer stays.
+    fn escalate(
+        &self,
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        (p, u): (&mut [f64], &mut [f64]),
+        report: SolveReport,
+        workspace: &mut SolverWorkspace,
+    ) -> SolveReport {
+        let proximal = SolverOptions {
+            method: Method::ProximalPoint,
+            max_newton_steps: ESCALATION_STEPS,
+            ..*options
+        };
+        let (p_swept, u_swept) = (p.to_vec(), u.to_vec());
+        let mut found = solve(&self.problem(q, mu), &proximal, p, u, workspace);
+        found.iterations += report.iterations;
+        if found.is_converged() {
+            return found;
+        }
+        p.copy_from_slice(&p_swept);
+        u.copy_from_slice(&u_swept);
+        report
     }
 
     /// The operator W of the last step's contacts, block by block, 1/kg.
@@ -617,10 +650,18 @@ impl MechanicalSystem for SoilSystem<'_> {
         u: &mut [f64],
         workspace: &mut SolverWorkspace,
     ) -> SolveReport {
+        let mut sweep = |p: &mut [f64], u: &mut [f64]| {
+            let scratch = &mut workspace.body_sweeps;
+            solve_body_pairs(&self.parts.pairs, q, mu, options, p, u, scratch)
+        };
         match options.method {
-            Method::Auto | Method::GaussSeidel => {
-                let scratch = &mut workspace.body_pairs;
-                solve_body_pairs(&self.parts.pairs, q, mu, options, p, u, scratch)
+            Method::GaussSeidel => sweep(p, u),
+            Method::Auto => {
+                let report = sweep(p, u);
+                if report.status != SolveStatus::MaxIterations || mu.len() > FEW {
+                    return report;
+                }
+                self.escalate(q, mu, options, (p, u), report, workspace)
             }
             _ => solve(&self.problem(q, mu), options, p, u, workspace),
         }
