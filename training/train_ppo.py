@@ -24,6 +24,7 @@ from rover_gym.learning.callbacks import CheckpointCallback, CurriculumCallback,
 from rover_gym.learning.config import PPOConfig, read_config
 from rover_gym.learning.export import export
 from rover_gym.learning.provenance import provenance
+from rover_gym.learning.stopwatch import Stopwatch
 
 # Fields of different seeds and of resumed runs differ; all stay below the evaluations' million.
 SEED_STRIDE = 1000
@@ -56,11 +57,13 @@ def train(
     part = 0 if latest is None else int(latest["name"])
     stream = SEED_STRIDE * seed + 500_000 * (part > 0) + part % 997
     curve = folder / (f"curve-{part}.monitor.csv" if part else "curve.monitor.csv")
-    rovers = build_env(settings, seed=stream, monitor=curve)
-    watched = build_env(
-        settings,
-        num_envs=min(settings.num_envs, settings.evaluation.episodes),
-        environment=settings.evaluation.environment,
+    rovers = Stopwatch(build_env(settings, seed=stream, monitor=curve))
+    watched = Stopwatch(
+        build_env(
+            settings,
+            num_envs=min(settings.num_envs, settings.evaluation.episodes),
+            environment=settings.evaluation.environment,
+        )
     )
     if latest is None:
         envs = normalised(rovers, settings)
@@ -85,6 +88,7 @@ def train(
     )
     callbacks: list[BaseCallback] = [*([] if curriculum is None else [curriculum]), checkpoint, evaluation]
 
+    learn_clock = time.process_time()
     model.learn(
         max(0, total_steps - model.num_timesteps) if latest is not None else total_steps,
         callback=CallbackList(callbacks),
@@ -92,6 +96,7 @@ def train(
         progress_bar=progress,
     )
 
+    learn_seconds = time.process_time() - learn_clock
     model.logger.close()
     checkpoint.write()
     source = {
@@ -101,6 +106,7 @@ def train(
         "decisions": model.num_timesteps,
         "wall_seconds": round(time.perf_counter() - clock, 1),
         "cpu_seconds": round(time.process_time() - cpu_clock, 1),
+        "environment_share": round((rovers.cpu_seconds + watched.cpu_seconds) / max(learn_seconds, 1e-9), 3),
         "resumed_from": part,
         **origin,
     }

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym._core import Plane, RoverGymError, RoverModel, Simulation, SphereField, __version__
-from rover_gym.extras import MissingExtraError, require
+from rover_gym.extras import require
 from rover_gym.validation import refuse
 
 if TYPE_CHECKING:
@@ -35,7 +35,6 @@ __all__ = [
     "FORMAT",
     "FORMAT_VERSION",
     "Channel",
-    "MissingExtraError",
     "Recorder",
     "RecordingError",
     "Sampler",

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from typing import Any, TypeAlias
 
 from rover_gym._core import OptionError
-from rover_gym.recording import MissingExtraError
+from rover_gym.extras import MissingExtraError
 from rover_gym.validation import known_keys, number, refuse, vector
 
 RENDER_MODES = ("rgb_array",)

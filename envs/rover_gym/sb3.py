@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from rover_gym.batch import Rover, RoverBatch
 from rover_gym.env import RoverEnv
+from rover_gym.extras import MissingExtraError
 from rover_gym.observation import LARGEST, N_ACTIONS
-from rover_gym.recording import MissingExtraError
 from rover_gym.registration import MAX_EPISODE_STEPS
 from rover_gym.task import check_actions
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from rover_gym.recording import MissingExtraError
+from rover_gym.extras import MissingExtraError
 
 if TYPE_CHECKING:
     from collections.abc import Generator

@@ -21,7 +21,7 @@ from gymnasium.wrappers import RecordVideo
 import rover_gym
 from rover_gym import OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField
 from rover_gym import appearance as look
-from rover_gym.recording import MissingExtraError
+from rover_gym.extras import MissingExtraError
 from rover_gym.rendering import FrameRenderer
 from rover_gym.rendering.frames import contact_forces
 from rover_gym.start import resting_pose, tilted_plane

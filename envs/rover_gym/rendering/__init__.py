@@ -3,7 +3,7 @@
 Importing this imports VTK; `rover_gym.render_options` and `rover_gym.appearance` do not.
 """
 
-from rover_gym.recording import MissingExtraError
+from rover_gym.extras import MissingExtraError
 
 try:
     from rover_gym.rendering.frames import FrameRenderer

@@ -205,16 +205,19 @@ fn rolling_in_a_valley(variant: Variant, h: f64) -> [f64; 3] {
 }
 
 #[test]
-fn rolling_along_a_curve_is_of_second_order_with_newton() {
+fn rolling_along_a_curve_is_of_second_order() {
     let exact = rolling_in_a_valley(Variant::Newton, 1e-5);
-    for (variant, least) in [(Variant::Linearised, 0.9), (Variant::Newton, 0.9)] {
+    for variant in [Variant::Linearised, Variant::Newton] {
         let error = |h: f64| {
             let end = rolling_in_a_valley(variant, h);
             (end[0] - exact[0]).hypot(end[1] - exact[1])
         };
         let (coarse, fine) = (error(8e-3), error(1e-3));
         let order = (coarse / fine).log2() / 3.0;
-        assert!(order > least, "{variant:?}: {coarse} {fine} {order}");
+        assert!(
+            (1.9..2.1).contains(&order),
+            "{variant:?}: {coarse} {fine} {order}"
+        );
         assert!(fine < 1e-3, "{variant:?}: {fine}");
     }
 }
