@@ -172,11 +172,11 @@ def _sweep(
             advance(1)
             pull_beds.append(settled_bed(pull_disks, pull_layers, seed=seed, **UNEQUAL, **options))
             advance(1)
-        drives = over_beds(drive, [scale * torque for torque in TORQUES], beds, progress=advance)
         pulls = {}
         for load in LOADS:
             pull = partial(drawbar_pull, load=load, speed=0.3 / slowness, **rest)
             pulls[load] = over_beds(pull, SLIPS, pull_beds, progress=advance)
+        drives = over_beds(drive, [scale * torque for torque in TORQUES], beds, progress=advance)
     output.mkdir(parents=True, exist_ok=True)
     numbers = {
         "drives": [[asdict(drive) for drive in row] for row in drives],
