@@ -75,18 +75,19 @@ train-rllib: ## train Rover-v0 on a local Ray with 1 and with 2 workers; Ray wan
 	@$(MAKE) --no-print-directory VENV=$(VENV)-rllib $(VENV)-rllib/stamps/ray
 	$(VENV)-rllib/bin/python training/train_rllib.py --workers 1 --workers 2 --iterations 4
 
-profiles: $(STAMPS)/test $(STAMPS)/core ## performance profiles of the contact solvers, with Siconos' where it is installed
-	$(BIN)/python tests/comparison/solver_profiles.py
-
 # One thread for every engine, and the package of comparisons on the path.
 COMPARE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m comparison
 
-chart: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CPU time beside other engines: docs/comparison/ (20 minutes; CHART=--quick is shorter)
+chart: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CPU time beside other engines: docs/comparison/ (half an hour; CHART=--quick is shorter and goes to runs/)
 	$(COMPARE).chart $(CHART)
+	$(COMPARE).presets $(filter --quick,$(CHART))
 	$(COMPARE).sphere_scenes $(filter --quick,$(CHART))
 
 stability: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes where methods fail, ours and other engines': docs/stability.md (5 minutes)
 	$(COMPARE).stability
+
+profiles: $(STAMPS)/test $(STAMPS)/core ## performance profiles of the contact solvers, with Siconos' where it is installed
+	$(COMPARE).solver_profiles
 
 orders: $(STAMPS)/demo ## measure every time-stepping scheme: order, drift, energy, cost; redraw docs/comparison/orders.png
 	cargo run --release --locked --quiet -p rover-comparison --bin orders -- runs/orders.json

@@ -10,23 +10,19 @@ import json
 import platform
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
 from comparison.machine import processor, versions
-from comparison.peers import Variant, load
-from comparison.peers.ours import OurRunner
+from comparison.output import CHART, QUICK, page_of
+from comparison.peers import LeftOut, Variant, load
 from comparison.references import load as load_reference
 from comparison.run import run
 from comparison.scene import STEPS, RoverScene, Trace
 from comparison.scenes import flat_drive, parked, rocks, rug
 from comparison.tables import fill
-from rover_gym import accuracy_options
-
-OUTPUT = Path(__file__).parents[2] / "docs" / "comparison"
 
 
 @dataclass(frozen=True)
@@ -68,8 +64,8 @@ def measure(
                 continue
             try:
                 trace = run(variant, measured.scene, step, cap)
-            except NotImplementedError as reason:
-                rows.append(row | {"failure": f"left out: {reason}"})
+            except LeftOut as left_out:
+                rows.append(row | {"failure": f"left out: {left_out.reason}"})
                 continue
             cost = trace.cpu / trace.simulated
             for _ in range(2 if trace.cpu < 1.0 and not trace.failure else 0):
@@ -89,21 +85,6 @@ def measure(
                     else f"{row['error']:>10.2e} {measured.unit} {cost * 1e3:>9.2f} ms/s"
                 )
             )
-    return rows
-
-
-def presets(measured: Measured, console: Console) -> list[dict[str, Any]]:
-    """Error and cost of every named accuracy in a scene."""
-    rows = []
-    for name in ("fast", "balanced", "reference"):
-        options = accuracy_options(name)
-        step = options.pop("time_step")
-        variant = Variant("rover-gym", name, partial(OurRunner, **options), "", "")
-        traces = [run(variant, measured.scene, step, cap=1e3) for _ in range(1 if name == "reference" else 3)]
-        cost = 1e3 * min(t.cpu / t.simulated for t in traces)
-        error = measured.error(traces[0])
-        rows.append({"accuracy": name, "scene": measured.scene.name, "error": error, "cpu_ms_per_s": cost})
-        console.print(f"{measured.scene.name:<11} {name:<10} {error:.2e} {measured.unit} {cost:.2f} ms/s")
     return rows
 
 
@@ -134,34 +115,32 @@ def measure_all(path: Path, wanted: list[str] | None, steps: tuple[float, ...], 
         name = measured.scene.name
         if wanted and name not in wanted:
             continue
-        fresh = {"points": measure(measured, variants, steps, cap, console), "presets": presets(measured, console)}
-        for key, rows in fresh.items():
-            data[key] = [row for row in data.get(key, []) if row["scene"] != name] + rows
+        rows = measure(measured, variants, steps, cap, console)
+        data["points"] = [row for row in data.get("points", []) if row["scene"] != name] + rows
         path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
 
 
 def main() -> None:
     """Measures and draws."""
     parser = argparse.ArgumentParser(description="Error against CPU time for this project and its peers.")
-    parser.add_argument("--quick", action="store_true", help="four steps and a cap of 2 s a run")
+    parser.add_argument("--quick", action="store_true", help=f"four steps and a cap of 2 s a run, under {QUICK}")
     parser.add_argument("--draw", action="store_true", help="only draw what chart.json has")
     parser.add_argument("--scenes", nargs="*", help="only these; the rest is kept as it is in chart.json")
     parser.add_argument("--cap", type=float, default=8.0, help="CPU time that a run may take, s")
-    parser.add_argument("--output", type=Path, default=OUTPUT)
     arguments = parser.parse_args()
     console = Console(width=140)
-    arguments.output.mkdir(parents=True, exist_ok=True)
-    path = arguments.output / "chart.json"
+    output = QUICK if arguments.quick else CHART
+    output.mkdir(parents=True, exist_ok=True)
+    path = output / "chart.json"
     if not arguments.draw:
         steps, cap = (STEPS[3::2], 2.0) if arguments.quick else (STEPS, arguments.cap)
         measure_all(path, arguments.scenes, steps, cap, console)
     from comparison.drawing import draw  # noqa: PLC0415 - Matplotlib would load before the engines
 
     data = json.loads(path.read_text(encoding="utf-8"))
-    for picture in draw(data, arguments.output):
+    for picture in draw(data, output):
         console.print(str(picture))
-    if arguments.output == OUTPUT:
-        fill(OUTPUT.with_suffix(".md"), data)
+    fill(page_of(output), data)
 
 
 if __name__ == "__main__":

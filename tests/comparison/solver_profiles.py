@@ -1,6 +1,6 @@
 """Dolan–Moré performance profiles of the contact solvers: ours, and Siconos' where an interpreter has it.
 
-    python tests/comparison/solver_profiles.py [--problems FOLDER] [--siconos PYTHON] [--output FOLDER]
+    python -m comparison.solver_profiles [--problems FOLDER] [--siconos PYTHON] [--output FOLDER]
 
 Each solver starts every problem from zero. Its answer is judged here and not by itself: the natural map of the
 returned impulses, relative to the data, must be 1e-8 or less, and the velocity right to 1e-6 m/s at every contact.
@@ -31,6 +31,7 @@ import numpy as np
 import numpy.typing as npt
 
 import rover_gym
+from comparison.problems import Problem, problem_folder, recorded, residual
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -44,49 +45,6 @@ PEERS = ("NSGS", "NSN_AC", "ADMM", "PROX")
 CAP = 5.0  # s of CPU time per run of the peer
 STUCK = 600.0  # s of wall time after which the peer is given up
 HOPELESS = 0.3  # s of a failed run after which no tighter tolerance is tried
-
-
-@dataclass(frozen=True)
-class Problem:
-    """One friction-contact problem: W (n, n) 1/kg, q (n,) m/s, mu (n_c,)."""
-
-    name: str
-    W: Array
-    q: Array
-    mu: Array
-    dimension: int
-
-
-def residual(problem: Problem, impulses: Array) -> tuple[float, float]:
-    """Relative natural map and largest violation in m/s of impulses (n,), written out anew here."""
-    d = problem.dimension
-    p = impulses.reshape(-1, d)
-    if not np.isfinite(p).all():
-        return np.inf, np.inf
-    u = (problem.W @ impulses + problem.q).reshape(-1, d)
-    rho = d / np.diag(problem.W).reshape(-1, d).sum(1)
-    shifted = u.copy()
-    shifted[:, 0] += problem.mu * np.linalg.norm(u[:, 1:], axis=1)
-    z = p - rho[:, None] * shifted
-    normal, tangential = z[:, 0], np.linalg.norm(z[:, 1:], axis=1)
-    on_cone = np.maximum((normal + problem.mu * tangential) / (1 + problem.mu**2), 0.0)
-    scale = np.divide(problem.mu * on_cone, tangential, out=np.zeros_like(tangential), where=tangential > 0)
-    outside = np.column_stack([on_cone, scale[:, None] * z[:, 1:]])
-    inside = (tangential <= problem.mu * normal)[:, None]
-    polar = (normal <= -problem.mu * tangential)[:, None]
-    projected = np.where(polar, 0.0, np.where(inside, z, outside))
-    violation = np.linalg.norm(p - projected, axis=1)
-    data = float(np.linalg.norm(rho.repeat(d) * problem.q)) or 1.0
-    return float(np.linalg.norm(violation) / data), float((violation / rho).max(initial=0.0))
-
-
-def recorded(folder: Path | None) -> list[Problem]:
-    """The recorded problems of a folder, smallest first."""
-    found = []
-    for path in sorted(folder.glob("*.npz")) if folder else []:
-        with np.load(path) as data:
-            found.append(Problem(path.stem, data["W"], data["q"], data["mu"], int(data["dimension"])))
-    return sorted(found, key=lambda problem: len(problem.q))
 
 
 def pile(masses: list[float], mu: float) -> Problem:
@@ -268,12 +226,6 @@ def draw(profiles: dict[str, dict[str, list[float]]], taus: Array, n_problems: i
     axes[1].legend(fontsize=8, loc="lower right")
     figure.savefig(path, dpi=110)
     plt.close(figure)
-
-
-def problem_folder() -> Path | None:
-    """`shared/reference/contact_problems` beside the repository or above it."""
-    places = [ancestor / "shared" / "reference" / "contact_problems" for ancestor in Path(__file__).resolve().parents]
-    return next((place for place in places if place.is_dir()), None)
 
 
 def compare(problems: list[Problem], siconos: str | None) -> dict[str, dict[str, Run]]:

@@ -35,7 +35,9 @@ def _report(console: Console, findings: Iterable[Finding]) -> list[Finding]:
 def measure(console: Console, *, with_peers: bool) -> dict[str, Any]:
     """All scenes: law and solver, rover, peers."""
     groups = {
-        "bodies": [f for scene in bodies.SCENES for f in _report(console, scene(bodies.SOLVERS))],
+        "bodies": [f for scene in bodies.SCENES for f in _report(console, scene(bodies.SOLVERS))]
+        + [f for scene in bodies.SLOW for f in _report(console, scene(bodies.PATIENT))]
+        + [f for scene in bodies.PERSISTENT for f in _report(console, scene({"spring and damper": bodies.SPRING}))],
         "rover": [f for scene in rover.SCENES for f in _report(console, scene())],
     }
     missing: dict[str, str] = {}

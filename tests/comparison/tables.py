@@ -59,17 +59,6 @@ def settings(data: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def presets(data: dict[str, Any]) -> str:
-    """Error and cost of each named accuracy, one line a scene."""
-    names = list(dict.fromkeys(row["accuracy"] for row in data["presets"]))
-    lines = ["| scene | " + " | ".join(f'`"{n}"`' for n in names) + " |", "|---" * (len(names) + 1) + "|"]
-    for scene, facts in data["scenes"].items():
-        rows = {row["accuracy"]: row for row in data["presets"] if row["scene"] == scene}
-        cells = [f"{rows[n]['error']:.1e} {facts['unit']}, {_number(rows[n]['cpu_ms_per_s'])} ms/s" for n in names]
-        lines.append(f"| {facts['title']} ({facts['error']}) | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
-
-
 def fill(page: Path, data: dict[str, Any]) -> None:
     """Writes the tables into the page, after its mark."""
     meta = data["meta"]
@@ -81,6 +70,6 @@ def fill(page: Path, data: dict[str, Any]) -> None:
         f" {packages}; Python {meta['python']}.",
     ]
     parts += [f"Left out, not installed: {engine}." for engine in data["missing"]]
-    parts += ["\n## Settings\n", settings(data), "\n## What the named accuracies give\n", presets(data)]
+    parts += ["\n## Settings\n", settings(data)]
     head = page.read_text(encoding="utf-8").split(MARK)[0]
     page.write_text(head + MARK + "\n\n" + "\n".join(parts) + "\n", encoding="utf-8")

@@ -2,9 +2,11 @@
 
 #![allow(clippy::unwrap_used)] // a test stops where a scene is impossible
 
-use rover_comparison::free_spheres::{SphereKind, SphereSimulation};
+use rover_comparison::free_spheres::SphereKind;
 use rover_comparison::scenes::{G, options};
-use rover_comparison::sphere_scenes::{KIND, Scene, run};
+use rover_comparison::slab::Slab;
+use rover_comparison::sphere_scenes::{KIND, Push, Scene, Treatment, run};
+use rover_comparison::sphere_simulation::SphereSimulation;
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
 
@@ -23,7 +25,14 @@ fn weightless(friction: f64, restitution: f64, time_step: f64) -> StepOptions {
 #[test]
 fn bouncing_keeps_its_energy_at_any_step() {
     for step in [0.02, 0.01, 0.003, 0.001] {
-        let shown = run(Scene::Bouncing, step, false, 4.0, no_clock).unwrap();
+        let shown = run(
+            Scene::Bouncing,
+            step,
+            Treatment::VelocityLevel,
+            4.0,
+            no_clock,
+        )
+        .unwrap();
         assert!((shown.energy - 24034.5).abs() < 1e-8);
         assert!(shown.n_contacts == 49, "the balls did strike");
         assert!(shown.energy_change < 1e-13, "{shown:?}");
@@ -33,7 +42,14 @@ fn bouncing_keeps_its_energy_at_any_step() {
 #[test]
 fn elastic_impacts_of_the_block_keep_its_energy() {
     for step in [0.01, 0.005] {
-        let shown = run(Scene::ElasticBlock, step, false, 1.0, no_clock).unwrap();
+        let shown = run(
+            Scene::ElasticBlock,
+            step,
+            Treatment::VelocityLevel,
+            1.0,
+            no_clock,
+        )
+        .unwrap();
         assert!(shown.n_contacts > 100, "many at once: {shown:?}");
         assert!(shown.energy_change < 1e-12, "{shown:?}");
     }
@@ -41,14 +57,95 @@ fn elastic_impacts_of_the_block_keep_its_energy() {
 
 #[test]
 fn projection_keeps_the_block_apart() {
-    let projected = run(Scene::Block, 1e-3, true, 0.6, no_clock).unwrap();
+    let projected = run(Scene::Block, 1e-3, Treatment::Projection, 0.6, no_clock).unwrap();
     assert!(projected.n_contacts > 200 && projected.converged > 0.99);
     assert!(projected.penetration < 1e-5, "{projected:?}");
     assert!(projected.deepest < 5e-3, "{projected:?}");
     // The velocity law alone lets penetration stay.
-    let left = run(Scene::Block, 1e-3, false, 0.6, no_clock).unwrap();
+    let left = run(Scene::Block, 1e-3, Treatment::VelocityLevel, 0.6, no_clock).unwrap();
     assert!(left.penetration > projected.penetration, "{left:?}");
     assert!(left.penetration < 1e-4, "{left:?}");
+}
+
+#[test]
+fn projected_to_convergence_nothing_penetrates_at_the_end_of_any_step() {
+    // 216 contacts with the ground and among neighbours, each less than 1e-10 m deep: a sum below 1e-17 m².
+    let largest = |treatment: Treatment| {
+        let mut simulation = Scene::Block.start(1e-2, treatment).unwrap();
+        let mut largest = 0.0_f64;
+        for _ in 0..60 {
+            assert!(simulation.step(1).unwrap().is_converged());
+            largest = largest.max(simulation.penetration().sum_of_squares);
+        }
+        largest
+    };
+    let found = largest(Treatment::Convergence);
+    assert!(found < 1e-17, "{found:e} m²");
+    assert!(
+        largest(Treatment::Projection) > 1e-6,
+        "the scene tells them apart"
+    );
+}
+
+#[test]
+fn balls_roll_on_a_pushed_box_with_two_sevenths_of_its_acceleration() {
+    for push in [Push::X, Push::Z, Push::Diagonal] {
+        let scene = Scene::Rolling(push);
+        let [slab, ball] = scene.accelerations().unwrap().map(|a| a.norm());
+        assert!((slab - 0.7385).abs() < 5e-5 && (ball - 0.2110).abs() < 5e-5);
+        for step in [0.01, 0.002] {
+            let shown = run(scene, step, Treatment::Projection, 4.0, no_clock).unwrap();
+            assert!(shown.velocity_error.unwrap() < 1e-20, "{push:?}: {shown:?}");
+            assert!(shown.penetration < 1e-20, "{push:?}: {shown:?}");
+        }
+    }
+}
+
+fn brick() -> Slab {
+    Slab {
+        mass: 3.0,
+        half: Vector3::new(0.1, 0.2, 0.4),
+        friction: 0.5,
+        push: Vector3::zeros(),
+    }
+}
+
+#[test]
+fn a_tumbling_box_keeps_its_momenta_to_second_order() {
+    let drift = |step: f64| {
+        let start = Vector3::new(0.0, 5.0, 0.0);
+        let mut simulation = SphereSimulation::new(KIND, Vec::new(), weightless(0.5, 0.0, step))
+            .unwrap()
+            .with_slab(brick(), start);
+        simulation
+            .v_mut()
+            .copy_from_slice(&[1.0, 0.2, -0.3, 2.0, 3.0, -1.0]);
+        let (linear, angular) = (simulation.momentum(), simulation.angular_momentum());
+        while simulation.time() < 1.0 - 0.5 * step {
+            simulation.step(1).unwrap();
+        }
+        assert!((simulation.momentum() - linear).norm() < 1e-12);
+        (simulation.angular_momentum() - angular).norm()
+    };
+    let (coarse, fine) = (drift(2e-3), drift(1e-3));
+    assert!(coarse < 1e-4, "{coarse}");
+    let order = (coarse / fine).log2();
+    assert!((order - 2.0).abs() < 0.3, "order {order}");
+}
+
+#[test]
+fn a_box_dropped_askew_comes_to_rest_on_a_face() {
+    let mut simulation = SphereSimulation::new(KIND, Vec::new(), options(0.5, 0.0, 1e-3))
+        .unwrap()
+        .with_slab(brick(), Vector3::new(0.0, 0.6, 0.0));
+    simulation.v_mut()[3..6].copy_from_slice(&[0.5, 0.1, 1.0]);
+    simulation.step(4000).unwrap();
+    let height = simulation.centres()[0].y;
+    // A contact that rests within what gravity falls in a step, g h²/2 = 4.9e-6 m, is left where it is.
+    let face = [0.1, 0.2, 0.4].map(|half: f64| (height - half).abs());
+    assert!(face.iter().any(|off| *off < 5e-6), "height {height}");
+    assert!(simulation.v().iter().all(|v| v.abs() < 1e-9));
+    assert!(simulation.penetration().deepest < 1e-7);
 }
 
 #[test]

@@ -1,21 +1,20 @@
-//! Free spheres over a plane in space, by the rover's own time stepping.
+//! Free spheres over a plane in space, and perhaps a box among them, by the rover's own time stepping.
 //!
-//! M is diagonal, each sphere touches a handful of others, so W is assembled block-sparse and the solver works island by
-//! island. A homogeneous sphere looks the same from all sides: configurations hold centres, velocities the six components of each sphere
-//! (centre, m/s; spin in world axes, rad/s), and there is no gyroscopic term.
+//! M is diagonal, each body touches a handful of others, so W is assembled block-sparse and the solver works island by
+//! island. A homogeneous sphere looks the same from all sides: configurations hold its centre, velocities six components (centre, m/s; spin in
+//! world axes, rad/s), and there is no gyroscopic term. The box, the last of the bodies where there is one, has an attitude, spins in its own
+//! axes, and touches the plane with its corners.
 
 use rover_core::contact::{Activation, ContactFrame};
-use rover_core::integrator::{
-    Integrator, MechanicalSystem, NoProbe, OptionsError, Scratch, Start, StateMut, StepError,
-    StepOptions, StepReport, UnilateralContact, WarmStart,
-};
-use rover_core::nalgebra::Vector3;
+use rover_core::integrator::{MechanicalSystem, Start, StepOptions, UnilateralContact};
+use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::problem::{BlockSparseDelassus, Dimension, FrictionContactProblem, PairContact};
 
 use crate::cell_grid::CellGrid;
+use crate::slab::{CORNERS, Slab};
 
-/// Velocities of a sphere.
-const NV: usize = 6;
+/// Velocities of a body.
+pub(crate) const NV: usize = 6;
 
 /// The second name of a contact with the plane.
 pub const PLANE: u32 = u32::MAX;
@@ -35,54 +34,59 @@ impl SphereKind {
     pub fn inertia(&self) -> f64 {
         0.4 * self.mass * self.radius * self.radius
     }
+}
 
-    /// M of each velocity of a sphere: kg, kg m².
-    fn masses(&self) -> [f64; NV] {
-        let (m, i) = (self.mass, self.inertia());
-        [m, m, m, i, i, i]
+/// All bodies there are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bodies {
+    /// Of each sphere.
+    pub kind: SphereKind,
+    /// How many spheres.
+    pub n: usize,
+    /// The box, which is body `n`.
+    pub slab: Option<Slab>,
+}
+
+impl Bodies {
+    /// Spheres, and the box.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.n + usize::from(self.slab.is_some())
+    }
+
+    /// The diagonal of M for one body: kg, kg m².
+    #[must_use]
+    pub fn masses(&self, body: usize) -> [f64; NV] {
+        let (m, i) = match &self.slab {
+            Some(slab) if body == self.n => (slab.mass, slab.inertia()),
+            _ => (self.kind.mass, Vector3::repeat(self.kind.inertia())),
+        };
+        [m, m, m, i.x, i.y, i.z]
     }
 }
 
-/// A contact of two spheres, or of one with the plane y = 0.
+/// Where the bodies are.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Placement {
+    /// Of each body, the box last, world, m.
+    pub centres: Vec<Vector3<f64>>,
+    /// Attitude of the box.
+    pub turn: UnitQuaternion<f64>,
+}
+
+/// A contact of two bodies, or of one with the plane y = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphereContact {
-    /// The two spheres, ascending; the second is [`PLANE`] for the plane.
+    /// The two bodies, ascending, where corner k of the box counts as body n + k; the second is [`PLANE`] for the plane.
     pub key: (u32, u32),
+    /// The two bodies; `None` is the plane.
+    pub bodies: [Option<usize>; 2],
     /// n from the second to the first.
     pub frame: ContactFrame,
     /// m.
     pub gap: f64,
-}
-
-impl SphereContact {
-    fn first(&self) -> usize {
-        self.key.0 as usize
-    }
-
-    /// The second sphere, `None` for the plane.
-    fn second(&self) -> Option<usize> {
-        (self.key.1 != PLANE).then_some(self.key.1 as usize)
-    }
-
-    fn measure(&mut self, centres: &[Vector3<f64>], radius: f64) {
-        (self.gap, self.frame.n) = match self.second() {
-            None => (centres[self.first()].y - radius, Vector3::y()),
-            Some(j) => apart(&centres[self.first()], &centres[j], radius),
-        };
-    }
-}
-
-/// Gap, and direction from b to a.
-fn apart(a: &Vector3<f64>, b: &Vector3<f64>, radius: f64) -> (f64, Vector3<f64>) {
-    let between = a - b;
-    let distance = between.norm();
-    // Concentric spheres have no direction of their own.
-    let n = if distance > 0.0 {
-        between / distance
-    } else {
-        Vector3::y()
-    };
-    (distance - 2.0 * radius, n)
+    /// From each body's centre to where it touches, world, m.
+    pub arms: [Vector3<f64>; 2],
 }
 
 impl UnilateralContact for SphereContact {
@@ -97,33 +101,109 @@ impl UnilateralContact for SphereContact {
     }
 }
 
+/// Gap, and direction from b to a.
+pub(crate) fn apart(a: &Vector3<f64>, b: &Vector3<f64>, radius: f64) -> (f64, Vector3<f64>) {
+    let between = a - b;
+    let distance = between.norm();
+    // Concentric spheres have no direction of their own.
+    let n = if distance > 0.0 {
+        between / distance
+    } else {
+        Vector3::y()
+    };
+    (distance - 2.0 * radius, n)
+}
+
+impl Bodies {
+    /// Gap, normal and arms of the contact of a name.
+    #[inline]
+    fn measure(&self, at: &Placement, key: (u32, u32)) -> (f64, Vector3<f64>, [Vector3<f64>; 2]) {
+        let (i, j) = (key.0 as usize, key.1 as usize);
+        let radius = self.kind.radius;
+        let none = Vector3::zeros();
+        match &self.slab {
+            Some(slab) if i >= self.n => {
+                let arm = at.turn * slab.corner(i - self.n);
+                (at.centres[self.n].y + arm.y, Vector3::y(), [arm, none])
+            }
+            Some(slab) if j == self.n => {
+                let x = at.centres[i] - at.centres[j];
+                let (point, distance, n) = slab.nearest(&at.turn.inverse_transform_vector(&x));
+                let n = at.turn * n;
+                (distance - radius, n, [-n * radius, at.turn * point])
+            }
+            _ if key.1 == PLANE => {
+                let n = Vector3::y();
+                (at.centres[i].y - radius, n, [-n * radius, none])
+            }
+            _ => {
+                let (gap, n) = apart(&at.centres[i], &at.centres[j], radius);
+                (gap, n, [-n * radius, n * radius])
+            }
+        }
+    }
+
+    /// The bodies of a contact.
+    fn of_contact(&self, key: (u32, u32)) -> [Option<usize>; 2] {
+        let second = (key.1 != PLANE).then_some(key.1 as usize);
+        [Some((key.0 as usize).min(self.n)), second]
+    }
+
+    /// Velocity of a body's point at an arm (world, m) as far as a normal there feels it: a sphere's spin moves no point along its normal.
+    fn velocity_at(
+        &self,
+        v: &[f64],
+        body: usize,
+        arm: &Vector3<f64>,
+        turn: &UnitQuaternion<f64>,
+    ) -> Vector3<f64> {
+        let linear = linear(v, body);
+        if body < self.n {
+            return linear;
+        }
+        linear + (turn * spin(v, body)).cross(arm)
+    }
+
+    /// No point of a body is faster than this, m/s.
+    fn speed(&self, v: &[f64], body: usize) -> f64 {
+        let turning = match &self.slab {
+            Some(slab) if body == self.n => spin(v, body).norm() * slab.half.norm(),
+            _ => 0.0,
+        };
+        linear(v, body).norm() + turning
+    }
+}
+
+/// Velocity of a body's centre, m/s.
+pub(crate) fn linear(v: &[f64], body: usize) -> Vector3<f64> {
+    Vector3::from_column_slice(&v[NV * body..NV * body + 3])
+}
+
+/// Spin of a body, rad/s.
+pub(crate) fn spin(v: &[f64], body: usize) -> Vector3<f64> {
+    Vector3::from_column_slice(&v[NV * body + 3..NV * (body + 1)])
+}
+
 /// Poses and matrices of a step: scratch.
 #[derive(Clone, Debug, Default)]
 pub struct SphereScratch {
-    middle: Vec<Vector3<f64>>,
-    end: Vec<Vector3<f64>>,
+    middle: Placement,
+    end: Placement,
     grid: CellGrid,
     rows: Vec<PairContact<3, NV>>,
     inverse_masses: Vec<[f64; NV]>,
-    W: BlockSparseDelassus,
+    /// Square roots of M's diagonal.
+    roots: Vec<[f64; NV]>,
+    pub(crate) W: BlockSparseDelassus,
 }
 
-/// Spheres over the plane y = 0.
+/// Bodies over the plane y = 0.
 #[derive(Debug)]
 pub struct SphereSystem<'a> {
-    /// Each of them.
-    pub kind: SphereKind,
-    /// How many.
-    pub n: usize,
+    /// What there is.
+    pub bodies: &'a Bodies,
     /// Scratch.
     pub parts: &'a mut SphereScratch,
-}
-
-impl SphereSystem<'_> {
-    /// Velocity of sphere i's centre, m/s.
-    fn velocity(v: &[f64], i: usize) -> Vector3<f64> {
-        Vector3::from_column_slice(&v[NV * i..NV * i + 3])
-    }
 }
 
 /// `out[r] += rows[r] · v`.
@@ -133,108 +213,156 @@ fn add_product(rows: &[[f64; NV]; 3], v: &[f64], out: &mut [f64]) {
     }
 }
 
-/// Adds `H p` in the order of the velocities, each sphere's part divided by `scale`.
-fn add_transposed(contacts: &[PairContact<3, NV>], p: &[f64], scale: &[f64; NV], out: &mut [f64]) {
+/// Adds `H p` in the order of the velocities, each body's part divided by its `scale`, where there is one.
+fn add_transposed(
+    contacts: &[PairContact<3, NV>],
+    p: &[f64],
+    scale: Option<&[[f64; NV]]>,
+    out: &mut [f64],
+) {
     for (contact, p) in contacts.iter().zip(p.chunks_exact(3)) {
         for (body, rows) in contact.bodies.iter().zip(&contact.jacobians) {
-            let Some(body) = body else { continue };
+            let Some(body) = *body else { continue };
             let out = &mut out[NV * body..NV * (body + 1)];
             for k in 0..NV {
                 let sum: f64 = rows.iter().zip(p).map(|(row, p)| row[k] * p).sum();
-                out[k] += sum / scale[k];
+                out[k] += scale.map_or(sum, |scale| sum / scale[body][k]);
             }
         }
     }
 }
 
 impl MechanicalSystem for SphereSystem<'_> {
-    /// Centres, world, m.
-    type Configuration = Vec<Vector3<f64>>;
+    type Configuration = Placement;
     type Contact = SphereContact;
 
     const DIMENSION: Dimension = Dimension::Three;
 
     fn nv(&self) -> usize {
-        NV * self.n
+        NV * self.bodies.count()
     }
 
-    fn set_moved(&self, from: &Vec<Vector3<f64>>, v: &[f64], h: f64, to: &mut Vec<Vector3<f64>>) {
-        to.clone_from(from);
+    fn set_moved(&self, from: &Placement, v: &[f64], h: f64, to: &mut Placement) {
+        to.centres.clone_from(&from.centres);
+        to.turn = from.turn;
         self.advance(to, v, h);
     }
 
-    fn advance(&self, q: &mut Vec<Vector3<f64>>, v: &[f64], h: f64) {
-        for (i, x) in q.iter_mut().enumerate() {
-            *x += Self::velocity(v, i) * h;
+    fn advance(&self, q: &mut Placement, v: &[f64], h: f64) {
+        for (i, x) in q.centres.iter_mut().enumerate() {
+            *x += linear(v, i) * h;
+        }
+        if self.bodies.slab.is_some() {
+            q.turn *= UnitQuaternion::from_scaled_axis(spin(v, self.bodies.n) * h);
         }
     }
 
-    fn is_finite(&self, q: &Vec<Vector3<f64>>) -> bool {
-        q.iter().flatten().all(|x| x.is_finite())
+    fn is_finite(&self, q: &Placement) -> bool {
+        let turn = q.turn.coords.iter();
+        q.centres
+            .iter()
+            .flatten()
+            .chain(turn)
+            .all(|x| x.is_finite())
     }
 
-    fn place_middle(&mut self, q: &Vec<Vector3<f64>>) {
+    fn normalise(&self, q: &mut Placement) {
+        q.turn.renormalize();
+    }
+
+    fn place_middle(&mut self, q: &Placement) {
         self.parts.middle.clone_from(q);
     }
 
-    fn place_end(&mut self, q: &Vec<Vector3<f64>>) {
+    fn place_end(&mut self, q: &Placement) {
         self.parts.end.clone_from(q);
     }
 
     fn detect(&mut self, v: &[f64], mut activation: Activation, out: &mut Vec<SphereContact>) {
         out.clear();
-        let radius = self.kind.radius;
-        let fastest = (0..self.n).fold(0.0_f64, |m, i| m.max(Self::velocity(v, i).norm()));
+        let bodies = self.bodies;
+        let n = bodies.n;
+        let fastest = (0..bodies.count()).fold(0.0_f64, |m, i| m.max(bodies.speed(v, i)));
         activation.margin = 2.0 * activation.lead.abs() * fastest;
         let reach = activation.reach();
         let SphereScratch { middle, grid, .. } = &mut *self.parts;
         let name = |i: usize| u32::try_from(i).unwrap_or(PLANE);
-        let mut offer =
-            |i: usize, second: u32, gap: f64, n: Vector3<f64>, velocity: Vector3<f64>| {
-                if gap <= reach && activation.admits(gap, || n.dot(&velocity)) {
-                    out.push(SphereContact {
-                        key: (name(i), second),
-                        frame: ContactFrame::of_normal(&n),
-                        gap,
-                    });
-                }
+        let mut offer = |key: (u32, u32)| {
+            let (gap, normal, arms) = bodies.measure(middle, key);
+            if gap > reach {
+                return;
+            }
+            let of = bodies.of_contact(key);
+            let approach = || {
+                let velocity = |side: usize| {
+                    of[side].map_or_else(Vector3::zeros, |body| {
+                        bodies.velocity_at(v, body, &arms[side], &middle.turn)
+                    })
+                };
+                normal.dot(&(velocity(0) - velocity(1)))
             };
-        for (i, x) in middle.iter().enumerate() {
-            offer(i, PLANE, x.y - radius, Vector3::y(), Self::velocity(v, i));
+            if activation.admits(gap, approach) {
+                out.push(SphereContact {
+                    key,
+                    bodies: of,
+                    frame: ContactFrame::of_normal(&normal),
+                    gap,
+                    arms,
+                });
+            }
+        };
+        for i in 0..n {
+            offer((name(i), PLANE));
+            if bodies.slab.is_some() {
+                offer((name(i), name(n)));
+            }
         }
-        grid.visit_pairs(middle, 2.0 * radius + reach, |i, j| {
-            let (i, j) = (i.min(j), i.max(j));
-            let (gap, n) = apart(&middle[i], &middle[j], radius);
-            offer(
-                i,
-                name(j),
-                gap,
-                n,
-                Self::velocity(v, i) - Self::velocity(v, j),
-            );
+        if bodies.slab.is_some() {
+            for k in 0..CORNERS {
+                offer((name(n + k), PLANE));
+            }
+        }
+        let size = 2.0 * bodies.kind.radius + reach;
+        grid.visit_pairs(&middle.centres[..n], size, |i, j| {
+            offer((name(i.min(j)), name(i.max(j))));
         });
         out.sort_unstable_by_key(|contact| contact.key);
     }
 
     fn relocate(&mut self, contacts: &mut [SphereContact]) {
         for contact in contacts {
-            contact.measure(&self.parts.end, self.kind.radius);
-            contact.frame = ContactFrame::of_normal(&contact.frame.n);
+            let (gap, n, arms) = self.bodies.measure(&self.parts.end, contact.key);
+            contact.gap = gap;
+            contact.frame = ContactFrame::of_normal(&n);
+            contact.arms = arms;
+        }
+    }
+
+    fn friction_coefficient(&self, options: &StepOptions, contact: &SphereContact) -> f64 {
+        match &self.bodies.slab {
+            Some(slab) if contact.bodies[1].is_some_and(|b| b == self.bodies.n) => slab.friction,
+            _ => options.friction_coefficient,
         }
     }
 
     fn update_mass_matrix(&mut self, _options: &StepOptions) {
-        let inverse = self.kind.masses().map(f64::recip);
-        self.parts.inverse_masses.resize(self.n, inverse);
+        let n = self.bodies.count();
+        // Each sphere is like the others, and nothing here changes in a run.
+        if self.parts.roots.len() != n {
+            let masses = |body| self.bodies.masses(body);
+            self.parts.inverse_masses = (0..n).map(|b| masses(b).map(f64::recip)).collect();
+            self.parts.roots = (0..n).map(|b| masses(b).map(f64::sqrt)).collect();
+        }
     }
 
     fn factorise(&mut self, _options: &StepOptions) -> bool {
-        self.kind.masses().iter().all(|m| *m > 0.0)
+        self.parts.roots.iter().flatten().all(|m| *m > 0.0)
     }
 
     fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
-        let masses = self.kind.masses();
-        for (out, v) in out.chunks_exact_mut(NV).zip(v.chunks_exact(NV)) {
+        let bodies = out.chunks_exact_mut(NV).zip(v.chunks_exact(NV));
+        for (body, (out, v)) in bodies.enumerate() {
+            let masses = self.bodies.masses(body);
             for k in 0..NV {
                 out[k] = masses[k] * v[k];
             }
@@ -244,20 +372,28 @@ impl MechanicalSystem for SphereSystem<'_> {
     fn load(
         &mut self,
         options: &StepOptions,
-        _start: Start<'_, Vec<Vector3<f64>>>,
-        _v_mean: &[f64],
+        _start: Start<'_, Placement>,
+        v_mean: &[f64],
         y: &mut [f64],
     ) {
-        let weight = options.gravity * (self.kind.mass * options.time_step);
+        let h = options.time_step;
+        let weight = options.gravity * (self.bodies.kind.mass * h);
         for y in y.chunks_exact_mut(NV) {
             y[..3].copy_from_slice(weight.as_slice());
             y[3..].fill(0.0);
         }
+        if let Some(slab) = &self.bodies.slab {
+            let force = options.gravity * slab.mass + slab.push;
+            let omega = spin(v_mean, self.bodies.n);
+            let gyroscopic = slab.inertia().component_mul(&omega).cross(&omega);
+            let y = &mut y[NV * self.bodies.n..];
+            y[..3].copy_from_slice((force * h).as_slice());
+            y[3..].copy_from_slice((gyroscopic * h).as_slice());
+        }
     }
 
     fn half_solve(&self, y: &mut [f64]) {
-        let roots = self.kind.masses().map(f64::sqrt);
-        for y in y.chunks_exact_mut(NV) {
+        for (y, roots) in y.chunks_exact_mut(NV).zip(&self.parts.roots) {
             for k in 0..NV {
                 y[k] /= roots[k];
             }
@@ -269,22 +405,29 @@ impl MechanicalSystem for SphereSystem<'_> {
     }
 
     fn assemble(&mut self, contacts: &[SphereContact], v: &[f64], u: &mut [f64]) {
-        let radius = self.kind.radius;
+        let n = self.bodies.n;
         let parts = &mut *self.parts;
+        let turn = parts.end.turn;
         parts.rows.clear();
         parts.rows.extend(contacts.iter().map(|contact| {
-            let ContactFrame { n, t, b } = contact.frame;
-            // d · (ω × r) = ω · (r × d), with r = −R n on the first sphere and R n on the second: the same row for both spins.
-            let spins = [Vector3::zeros(), b * radius, -t * radius];
-            let side = |sign: f64| {
-                [0, 1, 2].map(|r| {
-                    let (d, s) = ([n, t, b][r] * sign, spins[r]);
+            let directions = contact.frame.rows();
+            // d · (ω × r) = ω · (r × d), and the box spins in its own axes.
+            let side = |side: usize, sign: f64| {
+                let is_slab = contact.bodies[side].is_some_and(|body| body == n);
+                directions.map(|d| {
+                    let d = d * sign;
+                    let moment = contact.arms[side].cross(&d);
+                    let s = if is_slab {
+                        turn.inverse_transform_vector(&moment)
+                    } else {
+                        moment
+                    };
                     [d.x, d.y, d.z, s.x, s.y, s.z]
                 })
             };
             PairContact {
-                bodies: [Some(contact.first()), contact.second()],
-                jacobians: [side(1.0), side(-1.0)],
+                bodies: contact.bodies,
+                jacobians: [side(0, 1.0), side(1, -1.0)],
             }
         }));
         parts.W.assemble(&parts.rows, &parts.inverse_masses);
@@ -293,11 +436,11 @@ impl MechanicalSystem for SphereSystem<'_> {
     }
 
     fn local(&self, y: &[f64], out: &mut [f64]) {
-        let roots = self.kind.masses().map(f64::sqrt);
         out.fill(0.0);
         for (contact, out) in self.parts.rows.iter().zip(out.chunks_exact_mut(3)) {
             for (body, rows) in contact.bodies.iter().zip(&contact.jacobians) {
-                if let Some(body) = body {
+                if let Some(body) = *body {
+                    let roots = &self.parts.roots[body];
                     let velocity: [f64; NV] = std::array::from_fn(|k| y[NV * body + k] / roots[k]);
                     add_product(rows, &velocity, out);
                 }
@@ -316,13 +459,12 @@ impl MechanicalSystem for SphereSystem<'_> {
     }
 
     fn add_impulses(&self, p: &[f64], y: &mut [f64]) {
-        let roots = self.kind.masses().map(f64::sqrt);
-        add_transposed(&self.parts.rows, p, &roots, y);
+        add_transposed(&self.parts.rows, p, Some(&self.parts.roots), y);
     }
 
     fn generalized_impulse(&self, _contacts: &[SphereContact], p: &[f64], out: &mut [f64]) {
         out.fill(0.0);
-        add_transposed(&self.parts.rows, p, &[1.0; NV], out);
+        add_transposed(&self.parts.rows, p, None, out);
     }
 
     fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a> {
@@ -330,178 +472,6 @@ impl MechanicalSystem for SphereSystem<'_> {
     }
 
     fn displacement(&self, y: &[f64]) -> f64 {
-        (0..self.n).fold(0.0, |m, i| Self::velocity(y, i).norm().max(m))
-    }
-}
-
-/// Overlap of the spheres with one another and with the plane.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Penetration {
-    /// Sum of the squared depths, m².
-    pub sum_of_squares: f64,
-    /// m.
-    pub deepest: f64,
-}
-
-/// Spheres over the plane y = 0, stepped through time.
-#[derive(Clone, Debug)]
-pub struct SphereSimulation {
-    kind: SphereKind,
-    options: StepOptions,
-    centres: Vec<Vector3<f64>>,
-    v: Vec<f64>,
-    time: f64,
-    warm_start: WarmStart<(u32, u32)>,
-    parts: SphereScratch,
-    scratch: Scratch<Vec<Vector3<f64>>, SphereContact>,
-    grid: CellGrid,
-}
-
-impl SphereSimulation {
-    /// At rest with these centres, m.
-    ///
-    /// # Errors
-    /// An option out of its range.
-    pub fn new(
-        kind: SphereKind,
-        centres: Vec<Vector3<f64>>,
-        options: StepOptions,
-    ) -> Result<Self, OptionsError> {
-        options.check()?;
-        let nv = NV * centres.len();
-        Ok(Self {
-            kind,
-            options,
-            v: vec![0.0; nv],
-            time: 0.0,
-            warm_start: WarmStart::default(),
-            parts: SphereScratch::default(),
-            scratch: Scratch::new(&centres, nv, 4 * centres.len(), 3),
-            grid: CellGrid::default(),
-            centres,
-        })
-    }
-
-    /// Centres, m.
-    #[must_use]
-    pub fn centres(&self) -> &[Vector3<f64>] {
-        &self.centres
-    }
-
-    /// Six velocities of each sphere, m/s and rad/s.
-    #[must_use]
-    pub fn v(&self) -> &[f64] {
-        &self.v
-    }
-
-    /// The same, to be set.
-    pub fn v_mut(&mut self) -> &mut [f64] {
-        self.warm_start.clear();
-        &mut self.v
-    }
-
-    /// s.
-    #[must_use]
-    pub fn time(&self) -> f64 {
-        self.time
-    }
-
-    /// The last step's operator W, 1/kg.
-    #[must_use]
-    pub fn operator(&self) -> &BlockSparseDelassus {
-        &self.parts.W
-    }
-
-    /// Contacts of the last step.
-    #[must_use]
-    pub fn contacts(&self) -> &[SphereContact] {
-        self.scratch.contacts()
-    }
-
-    /// Takes `n` steps, or stops at the first that fails, keeping the state before it.
-    ///
-    /// # Errors
-    /// See [`StepError`]. A solver that did not converge is no error: see the report.
-    pub fn step(&mut self, n: usize) -> Result<StepReport, StepError> {
-        let mut total = StepReport::default();
-        for _ in 0..n {
-            let mut system = SphereSystem {
-                kind: self.kind,
-                n: self.centres.len(),
-                parts: &mut self.parts,
-            };
-            let state = StateMut {
-                configuration: &mut self.centres,
-                v: &mut self.v,
-                time: &mut self.time,
-            };
-            let report = self.options.variant.step(
-                &mut system,
-                &self.options,
-                state,
-                &mut self.warm_start,
-                &mut self.scratch,
-                &mut NoProbe,
-            )?;
-            total.merge(&report);
-        }
-        Ok(total)
-    }
-
-    /// Kinetic and potential energy (0 with all centres in the plane), J.
-    #[must_use]
-    pub fn energy(&self) -> f64 {
-        let masses = self.kind.masses();
-        let of_sphere = |(x, v): (&Vector3<f64>, &[f64])| {
-            let kinetic: f64 = (0..NV).map(|k| 0.5 * masses[k] * v[k] * v[k]).sum();
-            kinetic - self.kind.mass * self.options.gravity.dot(x)
-        };
-        self.centres
-            .iter()
-            .zip(self.v.chunks_exact(NV))
-            .map(of_sphere)
-            .sum()
-    }
-
-    /// Linear momentum, N s.
-    #[must_use]
-    pub fn momentum(&self) -> Vector3<f64> {
-        let velocities = self.v.chunks_exact(NV);
-        velocities
-            .map(|v| Vector3::from_column_slice(&v[..3]) * self.kind.mass)
-            .sum()
-    }
-
-    /// Angular momentum about the origin, N m s.
-    #[must_use]
-    pub fn angular_momentum(&self) -> Vector3<f64> {
-        let of_sphere = |(x, v): (&Vector3<f64>, &[f64])| {
-            let linear = Vector3::from_column_slice(&v[..3]) * self.kind.mass;
-            x.cross(&linear) + Vector3::from_column_slice(&v[3..]) * self.kind.inertia()
-        };
-        self.centres
-            .iter()
-            .zip(self.v.chunks_exact(NV))
-            .map(of_sphere)
-            .sum()
-    }
-
-    /// Every overlap now, of spheres that were contacts or not.
-    pub fn penetration(&mut self) -> Penetration {
-        let mut found = Penetration::default();
-        let mut enter = |depth: f64| {
-            if depth > 0.0 {
-                found.sum_of_squares += depth * depth;
-                found.deepest = found.deepest.max(depth);
-            }
-        };
-        let (centres, radius) = (&self.centres, self.kind.radius);
-        for x in centres {
-            enter(radius - x.y);
-        }
-        self.grid.visit_pairs(centres, 2.0 * radius, |i, j| {
-            enter(2.0 * radius - (centres[i] - centres[j]).norm());
-        });
-        found
+        (0..self.bodies.count()).fold(0.0, |m, i| self.bodies.speed(y, i).max(m))
     }
 }

@@ -6,7 +6,8 @@
 //!
 //! - [`generalised_alpha`], [`schatzman_paoli`], [`event_driven`], [`penalty`]: one scheme each; [`scheme`]: the list;
 //! - [`scenes`]: motions with closed forms or a converged reference; [`measure`]: orders, drift, energy, cost.
-//! - [`free_spheres`] in space with a block-sparse W, found by a [`cell_grid`]; [`sphere_scenes`]: heaps and bounces of them.
+//! - [`free_spheres`] in space with a block-sparse W, found by a [`cell_grid`], and a [`slab`] among them; [`sphere_simulation`];
+//!   [`sphere_scenes`]: heaps, bounces and rolling; [`projected_to_convergence`]: no penetration at the end of any step.
 //!
 //! `make orders` writes the figures of `docs/integrators.md`.
 #![forbid(unsafe_code)]
@@ -18,13 +19,17 @@ pub mod free_spheres;
 pub mod generalised_alpha;
 pub mod measure;
 pub mod penalty;
+pub mod projected_to_convergence;
 pub mod scenes;
 pub mod schatzman_paoli;
 pub mod scheme;
+pub mod slab;
 pub mod sphere_scenes;
+pub mod sphere_simulation;
 
 pub use event_driven::EventDriven;
 pub use generalised_alpha::GeneralisedAlpha;
 pub use penalty::Penalty;
+pub use projected_to_convergence::ProjectedToConvergence;
 pub use schatzman_paoli::SchatzmanPaoli;
 pub use scheme::{Kind, SCHEMES, Scheme, Stepper};

@@ -5,7 +5,7 @@ use rover_core::integrator::{
     StepOptions, StepReport, Variant, WarmStart,
 };
 
-use crate::{EventDriven, GeneralisedAlpha, Penalty, SchatzmanPaoli};
+use crate::{EventDriven, GeneralisedAlpha, Penalty, ProjectedToConvergence, SchatzmanPaoli};
 
 /// Which family.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,6 +123,8 @@ impl Scheme {
 pub enum Stepper {
     /// The rover's own.
     MoreauJean(Variant),
+    /// See [`ProjectedToConvergence`].
+    ProjectedToConvergence(ProjectedToConvergence),
     /// See [`GeneralisedAlpha`].
     GeneralisedAlpha(GeneralisedAlpha),
     /// See [`SchatzmanPaoli`].
@@ -145,6 +147,9 @@ impl<S: MechanicalSystem> Integrator<S> for Stepper {
     ) -> Result<StepReport, StepError> {
         match self {
             Self::MoreauJean(s) => s.step(system, options, state, warm_start, scratch, probe),
+            Self::ProjectedToConvergence(s) => {
+                s.step(system, options, state, warm_start, scratch, probe)
+            }
             Self::GeneralisedAlpha(s) => s.step(system, options, state, warm_start, scratch, probe),
             Self::SchatzmanPaoli(s) => s.step(system, options, state, warm_start, scratch, probe),
             Self::EventDriven(s) => s.step(system, options, state, warm_start, scratch, probe),

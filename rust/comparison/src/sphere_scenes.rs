@@ -1,18 +1,42 @@
-//! Scenes of free spheres after SimBenchmark: a block that falls in a heap, the same with elastic impacts, balls that bounce.
+//! Scenes of free spheres after SimBenchmark: a block that falls in a heap, the same with elastic impacts, balls that bounce, balls that
+//! roll on a box that is pushed.
 //!
-//! Spheres of 10 kg and radius 0.1 m without friction. SimBenchmark's y and z are exchanged: y is up here.
+//! The first three: spheres of 10 kg and radius 0.1 m without friction. SimBenchmark's y and z are exchanged: y is up here.
 
 use rover_core::integrator::{OptionsError, Stabilisation, StepError, StepOptions};
 use rover_core::nalgebra::Vector3;
 use serde::Serialize;
 
-use crate::free_spheres::{SphereKind, SphereSimulation};
-use crate::scenes::options;
+use crate::free_spheres::SphereKind;
+use crate::scenes::{G, options};
+use crate::slab::Slab;
+use crate::sphere_simulation::SphereSimulation;
+use crate::{ProjectedToConvergence, Stepper};
 
-/// Of every scene.
+/// Of every scene but rolling.
 pub const KIND: SphereKind = SphereKind {
     mass: 10.0,
     radius: 0.1,
+};
+
+/// Of rolling.
+pub const BALL: SphereKind = SphereKind {
+    mass: 1.0,
+    radius: 0.5,
+};
+
+/// Rolling: μ between the box and the ground.
+pub const GROUND_FRICTION: f64 = 0.4;
+
+/// Rolling: the force on the box, N.
+pub const PUSH: f64 = 150.0;
+
+/// Rolling: the box without its push. 20 m wide, as SimBenchmark's.
+const BOX: Slab = Slab {
+    mass: 10.0,
+    half: Vector3::new(10.0, 0.5, 10.0),
+    friction: 0.8,
+    push: Vector3::new(0.0, 0.0, 0.0),
 };
 
 /// Distance of neighbours' centres in the block, m.
@@ -46,6 +70,29 @@ impl Random {
     }
 }
 
+/// Which way the box is pushed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Push {
+    /// Along x.
+    X,
+    /// Along z.
+    Z,
+    /// 60 degrees from x towards z, SimBenchmark's "diagonal".
+    Diagonal,
+}
+
+impl Push {
+    /// Unit vector.
+    #[must_use]
+    pub fn direction(self) -> Vector3<f64> {
+        match self {
+            Self::X => Vector3::x(),
+            Self::Z => Vector3::z(),
+            Self::Diagonal => Vector3::new(0.5, 0.0, 0.75_f64.sqrt()),
+        }
+    }
+}
+
 /// One of the scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scene {
@@ -55,11 +102,32 @@ pub enum Scene {
     ElasticBlock,
     /// 7 x 7 balls 0.4 m apart, centres at 5 m, e = 1.
     Bouncing,
+    /// A box of 10 kg is pushed over the plane with 150 N, 5 x 5 balls of 1 kg and 2 m apart roll on it.
+    Rolling(Push),
+}
+
+/// What is done about penetration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Treatment {
+    /// Nothing: it stays as the velocity law leaves it.
+    VelocityLevel,
+    /// The rover's projection of the step's contacts.
+    Projection,
+    /// [`ProjectedToConvergence`].
+    Convergence,
 }
 
 impl Scene {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Block, Self::ElasticBlock, Self::Bouncing];
+    pub const ALL: [Self; 6] = [
+        Self::Block,
+        Self::ElasticBlock,
+        Self::Bouncing,
+        Self::Rolling(Push::X),
+        Self::Rolling(Push::Z),
+        Self::Rolling(Push::Diagonal),
+    ];
 
     /// What the figures call it.
     #[must_use]
@@ -68,22 +136,88 @@ impl Scene {
             Self::Block => "666",
             Self::ElasticBlock => "elastic 666",
             Self::Bouncing => "bouncing",
+            Self::Rolling(Push::X) => "rolling, along x",
+            Self::Rolling(Push::Z) => "rolling, along z",
+            Self::Rolling(Push::Diagonal) => "rolling, diagonal",
         }
     }
 
     /// Simulated time, s.
     #[must_use]
     pub fn duration(self) -> f64 {
-        if self == Self::Bouncing { 20.0 } else { 10.0 }
+        match self {
+            Self::Block | Self::ElasticBlock => 10.0,
+            Self::Bouncing => 20.0,
+            Self::Rolling(_) => 4.0,
+        }
     }
 
     /// Newton's e.
     #[must_use]
     pub fn restitution(self) -> f64 {
-        if self == Self::Block { 0.0 } else { 1.0 }
+        match self {
+            Self::ElasticBlock | Self::Bouncing => 1.0,
+            Self::Block | Self::Rolling(_) => 0.0,
+        }
     }
 
-    /// Centres at the start, m.
+    /// Of the contacts with the plane, and of spheres with one another.
+    #[must_use]
+    pub fn friction(self) -> f64 {
+        if matches!(self, Self::Rolling(_)) {
+            GROUND_FRICTION
+        } else {
+            0.0
+        }
+    }
+
+    /// What its spheres are.
+    #[must_use]
+    pub fn kind(self) -> SphereKind {
+        if matches!(self, Self::Rolling(_)) {
+            BALL
+        } else {
+            KIND
+        }
+    }
+
+    /// Its box, and where its centre is, m.
+    #[must_use]
+    pub fn slab(self) -> Option<(Slab, Vector3<f64>)> {
+        let Self::Rolling(push) = self else {
+            return None;
+        };
+        let push = push.direction() * PUSH;
+        Some((Slab { push, ..BOX }, Vector3::new(0.0, BOX.half.y, 0.0)))
+    }
+
+    /// What is done about penetration in it: an elastic scene is never projected, for a projection lifts spheres, which is energy.
+    #[must_use]
+    pub fn treatments(self) -> &'static [Treatment] {
+        match self {
+            Self::Block => &[
+                Treatment::Convergence,
+                Treatment::Projection,
+                Treatment::VelocityLevel,
+            ],
+            Self::ElasticBlock | Self::Bouncing => &[Treatment::VelocityLevel],
+            Self::Rolling(_) => &[Treatment::Projection],
+        }
+    }
+
+    /// Exact accelerations of the box and of its balls, m/s², where there are any.
+    ///
+    /// A ball that rolls on a plate takes 2/7 of its acceleration: `F = m a + 25 · 2/7 m_b a + μ g (m + 25 m_b)`.
+    #[must_use]
+    pub fn accelerations(self) -> Option<[Vector3<f64>; 2]> {
+        let (slab, _) = self.slab()?;
+        let balls = self.centres().len() as f64 * BALL.mass;
+        let force = PUSH - GROUND_FRICTION * G * (slab.mass + balls);
+        let a = slab.push / PUSH * (force / (slab.mass + balls * 2.0 / 7.0));
+        Some([a, a * (2.0 / 7.0)])
+    }
+
+    /// Centres of the spheres at the start, m.
     #[must_use]
     pub fn centres(self) -> Vec<Vector3<f64>> {
         let lattice = |n: usize, layers: usize, spacing: f64, lowest: f64| {
@@ -102,6 +236,7 @@ impl Scene {
         };
         let lowest = match self {
             Self::Bouncing => return lattice(7, 1, 0.4, 5.0),
+            Self::Rolling(_) => return lattice(5, 1, 2.0, 2.0 * BOX.half.y + BALL.radius),
             Self::Block => 0.11,
             Self::ElasticBlock => 1.1,
         };
@@ -113,26 +248,33 @@ impl Scene {
         points
     }
 
-    /// The spheres at rest.
-    ///
-    /// `projects`: whether penetration is projected out, where impacts are plastic. Elastic scenes never do: a projection lifts spheres,
-    /// which is energy.
+    /// All at rest.
     ///
     /// # Errors
     /// A time step out of its range.
-    pub fn start(self, time_step: f64, projects: bool) -> Result<SphereSimulation, OptionsError> {
-        let is_plastic = self == Self::Block;
+    pub fn start(
+        self,
+        time_step: f64,
+        treatment: Treatment,
+    ) -> Result<SphereSimulation, OptionsError> {
         let options = StepOptions {
-            stabilisation: if projects && is_plastic {
-                Stabilisation::Projection
-            } else {
-                Stabilisation::None
+            stabilisation: match treatment {
+                Treatment::VelocityLevel => Stabilisation::None,
+                Treatment::Projection | Treatment::Convergence => Stabilisation::Projection,
             },
             // A plastic impact is taken where it would come within the step, so that nothing is first let in.
-            forecast: if is_plastic { 1.0 } else { 0.5 },
-            ..options(0.0, self.restitution(), time_step)
+            forecast: if self == Self::Block { 1.0 } else { 0.5 },
+            ..options(self.friction(), self.restitution(), time_step)
         };
-        SphereSimulation::new(KIND, self.centres(), options)
+        let mut simulation = SphereSimulation::new(self.kind(), self.centres(), options)?;
+        if let Some((slab, centre)) = self.slab() {
+            simulation = simulation.with_slab(slab, centre);
+        }
+        if treatment == Treatment::Convergence {
+            let stepper = Stepper::ProjectedToConvergence(ProjectedToConvergence::default());
+            simulation = simulation.with_stepper(stepper);
+        }
+        Ok(simulation)
     }
 }
 
@@ -145,6 +287,8 @@ pub struct SphereRun {
     pub penetration: f64,
     /// The same sum at the end, m².
     pub last_penetration: f64,
+    /// Largest such sum of any sample, m².
+    pub largest_penetration: f64,
     /// Deepest penetration of any sample, m.
     pub deepest: f64,
     /// Mean over the samples of (E − E0)², J².
@@ -153,6 +297,8 @@ pub struct SphereRun {
     pub energy_change: f64,
     /// Energy at the start, J.
     pub energy: f64,
+    /// Mean over the samples of the box's squared velocity error and the balls' mean of theirs, m²/s²; rolling only.
+    pub velocity_error: Option<f64>,
     /// CPU time in steps per simulated second, ms.
     pub cpu_ms_per_s: f64,
     /// CPU time of a step, us.
@@ -165,6 +311,20 @@ pub struct SphereRun {
     pub converged: f64,
 }
 
+/// Squared error of the velocities after `time` (s): the box's, and the mean of the balls', m²/s².
+fn velocity_error(
+    simulation: &SphereSimulation,
+    accelerations: &[Vector3<f64>; 2],
+    time: f64,
+) -> f64 {
+    let n = simulation.centres().len() - 1;
+    let [slab, ball] = accelerations.map(|a| a * time);
+    let balls: f64 = (0..n)
+        .map(|i| (simulation.velocity(i) - ball).norm_squared())
+        .sum();
+    (simulation.velocity(n) - slab).norm_squared() + balls / n as f64
+}
+
 /// Runs a scene for `duration` seconds; `clock` tells CPU time in s.
 ///
 /// # Errors
@@ -172,12 +332,13 @@ pub struct SphereRun {
 pub fn run(
     scene: Scene,
     time_step: f64,
-    projects: bool,
+    treatment: Treatment,
     duration: f64,
     clock: impl Fn() -> f64,
 ) -> Result<SphereRun, SphereRunError> {
-    let mut simulation = scene.start(time_step, projects)?;
+    let mut simulation = scene.start(time_step, treatment)?;
     let energy = simulation.energy();
+    let accelerations = scene.accelerations();
     // Rounded, so that a step that divides the interval does so; non-negative and far below 2^32.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let count = |x: f64| x.round() as usize;
@@ -187,16 +348,19 @@ pub fn run(
         time_step,
         penetration: 0.0,
         last_penetration: 0.0,
+        largest_penetration: 0.0,
         deepest: 0.0,
         energy_error: 0.0,
         energy_change: 0.0,
         energy,
+        velocity_error: accelerations.map(|_| 0.0),
         cpu_ms_per_s: 0.0,
         us_per_step: 0.0,
         n_contacts: 0,
         iterations: 0.0,
         converged: 0.0,
     };
+    let share = 1.0 / n_samples as f64;
     let mut cpu = 0.0;
     for _ in 0..n_samples {
         let start = clock();
@@ -204,11 +368,15 @@ pub fn run(
         cpu += clock() - start;
         let penetration = simulation.penetration();
         let change = simulation.energy() - energy;
-        out.penetration += penetration.sum_of_squares / n_samples as f64;
+        out.penetration += share * penetration.sum_of_squares;
         out.last_penetration = penetration.sum_of_squares;
+        out.largest_penetration = out.largest_penetration.max(penetration.sum_of_squares);
         out.deepest = out.deepest.max(penetration.deepest);
-        out.energy_error += change * change / n_samples as f64;
+        out.energy_error += share * change * change;
         out.energy_change = out.energy_change.max((change / energy).abs());
+        if let (Some(sum), Some(a)) = (&mut out.velocity_error, &accelerations) {
+            *sum += share * velocity_error(&simulation, a, simulation.time());
+        }
         out.n_contacts = out.n_contacts.max(report.n_contacts);
         out.iterations += report.iterations as f64;
         out.converged += if report.is_converged() { 1.0 } else { 0.0 };

@@ -18,8 +18,8 @@ Solver = Callable[[Array, Array, Array, Array | None], tuple[Array, bool, int]]
 G = 9.81  # m/s²; here z is up, as where these scenes come from
 
 
-def ours(name: str, tolerance: float = 1e-12, dimension: int = 3) -> Solver:
-    """This project's solver of a name."""
+def ours(name: str, tolerance: float = 1e-12, dimension: int = 3, max_iterations: int = 1000) -> Solver:
+    """This project's solver of a name; `max_iterations` are sweeps of "nsgs" and steps of "newton"."""
 
     def solve(W: Array, q: Array, mu: Array, initial: Array | None) -> tuple[Array, bool, int]:
         answer = solve_friction_contact(
@@ -30,6 +30,7 @@ def ours(name: str, tolerance: float = 1e-12, dimension: int = 3) -> Solver:
             dimension=3 if dimension == 3 else 2,
             solver=name,
             initial=initial,  # type: ignore[arg-type]
+            max_iterations=max_iterations,
         )
         return answer.impulses, answer.report.is_converged, answer.report.iterations
 
@@ -49,6 +50,39 @@ def relaxed(W: Array, q: Array, mu: Array, initial: Array | None) -> tuple[Array
         if change <= 1e-13 * max(np.abs(p).max(), 1e-300):
             return p, True, iteration
     return p, False, 20_000
+
+
+@dataclass
+class Spring:
+    """No solver: each contact is a spring and damper with regularised friction, as in `rust/comparison/src/penalty.rs`.
+
+    `p_N = h max(0, -k g_N - c u_N)` where `g_N < 0`, `p_T = -mu p_N u_T / sqrt(u_T² + v_s²)`, u before the step. Gaps
+    are those since the first step, which begins at 0, so it is for contacts that stay.
+
+    Attributes:
+        stiffness: k, N/m.
+        damping: c, N s/m.
+        slip_speed: v_s, m/s.
+    """
+
+    stiffness: float
+    damping: float
+    slip_speed: float
+    gaps: Array = field(default_factory=lambda: np.zeros(0))
+
+    def impulses(self, u: Array, mu: Array, h: float) -> Array:
+        """(n, 3) from the local velocities (3 n,) before the step."""
+        u = u.reshape(-1, 3)
+        if len(self.gaps) != len(u):
+            self.gaps = np.zeros(len(u))
+        normal = np.where(self.gaps < 0.0, -self.stiffness * self.gaps - self.damping * u[:, 0], 0.0)
+        normal = h * np.maximum(normal, 0.0)
+        slip = np.hypot(np.linalg.norm(u[:, 1:], axis=1), self.slip_speed)
+        return np.column_stack([normal, -(mu * normal / slip)[:, None] * u[:, 1:]])
+
+    def move(self, u: Array, h: float) -> None:
+        """Moves the gaps on with the local velocities (3 n,) after the step."""
+        self.gaps = self.gaps + h * u[::3]
 
 
 def onto_cone(p: Array, mu: float) -> Array:
@@ -115,7 +149,7 @@ class World:
                     H[3 * k : 3 * k + 3, 6 * body + 3 : 6 * body + 6] = sign * np.cross(r, frame)
         return H
 
-    def step(self, solver: Solver, *, warm: bool = True) -> None:
+    def step(self, solver: Solver | Spring, *, warm: bool = True) -> None:
         """One step, theta = 1/2."""
         h = self.h
         free = self.v.copy()
@@ -125,16 +159,20 @@ class World:
         contacts = self.contacts(self)
         if contacts:
             H, inverse = self.jacobian(contacts), self.inverse_masses()
-            W = (H * inverse) @ H.T
-            before = (H @ self.v.ravel())[::3]
-            q = H @ free.ravel()
-            q[::3] += self.restitution * np.minimum(before, 0.0)
             mu = np.array([c.mu for c in contacts])
-            initial = self.impulses.ravel() if warm and len(self.impulses) == len(contacts) else None
-            self.impulses, converged, iterations = solver(W, q, mu, initial)
-            self.converged &= converged
-            self.iterations += iterations
+            before = H @ self.v.ravel()
+            if isinstance(solver, Spring):
+                self.impulses = solver.impulses(before, mu, h)
+            else:
+                q = H @ free.ravel()
+                q[::3] += self.restitution * np.minimum(before[::3], 0.0)
+                initial = self.impulses.ravel() if warm and len(self.impulses) == len(contacts) else None
+                self.impulses, converged, iterations = solver((H * inverse) @ H.T, q, mu, initial)
+                self.converged &= converged
+                self.iterations += iterations
             free = free + (inverse * (H.T @ self.impulses.ravel())).reshape(free.shape)
+            if isinstance(solver, Spring):
+                solver.move(H @ free.ravel(), h)
         else:
             self.impulses = np.zeros((0, 3))
         self.places = self.places + 0.5 * h * (self.v + free)[:, :3]

@@ -3,9 +3,9 @@
 import importlib
 from types import ModuleType
 
-from comparison.peers.base import Runner, Variant
+from comparison.peers.base import LeftOut, Runner, Variant
 
-__all__ = ["MODULES", "Runner", "Variant", "load"]
+__all__ = ["MODULES", "LeftOut", "Runner", "Variant", "load"]
 
 #: Ours first; the others in the order of the legend.
 MODULES = ("ours", "drake", "mujoco_engine", "bullet", "pinocchio_admm", "siconos_nsgs")

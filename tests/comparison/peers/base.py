@@ -9,6 +9,18 @@ import numpy as np
 from comparison.scene import Array, Phase, RoverScene
 
 
+class LeftOut(Exception):  # noqa: N818 - no error: the chart has a gap there
+    """An engine is left out of a scene that it cannot be given.
+
+    Attributes:
+        reason: Why, for the table.
+    """
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+
+
 class Runner(Protocol):
     """One engine with one scene, ready to step."""
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from comparison.peers.base import Variant
+from comparison.peers.base import LeftOut, Variant
 from comparison.scene import Array, Phase, RoverScene
 from rover_gym import _core
 
@@ -42,7 +42,7 @@ class SiconosRunner:
 
     def __init__(self, scene: RoverScene, time_step: float, *, tolerance: float) -> None:
         if len(scene.spheres):
-            raise NotImplementedError("only one contact a wheel: no scenes of spheres")
+            raise LeftOut("only one contact a wheel: no scenes of spheres")
         self.child = subprocess.Popen(
             [SYSTEM_PYTHON, str(CHILD), str(_core.__file__)],
             stdin=subprocess.PIPE,

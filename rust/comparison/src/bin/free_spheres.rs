@@ -7,7 +7,8 @@
 use std::error::Error;
 use std::time::Instant;
 
-use rover_comparison::sphere_scenes::{KIND, Scene, run};
+use rover_comparison::sphere_scenes::{Scene, run};
+use rover_core::nalgebra::Vector3;
 
 /// CPU time of this thread where the system tells it, otherwise time, s.
 fn clock(origin: Instant) -> f64 {
@@ -34,31 +35,39 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut scenes = Vec::new();
     for scene in Scene::ALL.into_iter().filter(is_wanted) {
         let mut runs = Vec::new();
-        // Projection is for plastic impacts only.
-        let variants: &[bool] = if scene == Scene::Block {
-            &[true, false]
-        } else {
-            &[false]
-        };
-        for &projects in variants.iter().filter(|_| !only_start) {
+        for &treatment in scene.treatments().iter().filter(|_| !only_start) {
             for &step in &steps {
                 let seconds = duration.unwrap_or(scene.duration());
-                let shown = run(scene, step, projects, seconds, || clock(origin))?;
-                runs.push(serde_json::json!({ "projects": projects, "run": shown }));
+                let shown = run(scene, step, treatment, seconds, || clock(origin))?;
+                runs.push(serde_json::json!({ "treatment": treatment, "run": shown }));
             }
         }
+        let array = |x: &Vector3<f64>| [x.x, x.y, x.z];
         let centres: Vec<[f64; 3]> = if only_start {
-            scene.centres().iter().map(|x| [x.x, x.y, x.z]).collect()
+            scene.centres().iter().map(array).collect()
         } else {
             Vec::new()
         };
+        let slab = scene.slab().map(|(slab, centre)| {
+            serde_json::json!({
+                "mass": slab.mass,
+                "half": array(&slab.half),
+                "friction": slab.friction,
+                "push": array(&slab.push),
+                "centre": array(&centre),
+            })
+        });
+        let kind = scene.kind();
         scenes.push(serde_json::json!({
             "scene": scene.name(),
             "duration": scene.duration(),
             "restitution": scene.restitution(),
-            "mass": KIND.mass,
-            "radius": KIND.radius,
+            "friction": scene.friction(),
+            "mass": kind.mass,
+            "radius": kind.radius,
             "centres": centres,
+            "slab": slab,
+            "accelerations": scene.accelerations().map(|both| both.map(|a| array(&a))),
             "runs": runs,
         }));
     }
