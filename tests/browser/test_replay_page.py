@@ -341,9 +341,15 @@ def test_a_soils_timeline_moves_disks_chains_and_wheels_and_comes_back(soil_show
         for image in (first, later)
     ]
     assert pink[1] > pink[0]  # no contact had borne anything at the start
-    changed = (np.abs(later - first).max(axis=-1) > 30.0).mean()
-    assert changed > 0.005
-    assert (np.abs(back - first).max(axis=-1) > 30.0).mean() < 0.1 * changed
+    changed = (np.abs(coarse(later) - coarse(first)).max(axis=-1) > 15.0).mean()
+    assert changed > 0.01
+    assert (np.abs(coarse(back) - coarse(first)).max(axis=-1) > 15.0).mean() < 0.1 * changed
+
+
+def coarse(image: np.ndarray) -> np.ndarray:
+    """Means of squares of 8 pixels: the player draws with more or fewer pixels as it finds time."""
+    height, width = (8 * (n // 8) for n in image.shape[:2])
+    return image[:height, :width].reshape(height // 8, 8, width // 8, 8, 3).mean(axis=(1, 3))
 
 
 def test_a_missing_browser_is_named_and_fails(monkeypatch: pytest.MonkeyPatch) -> None:

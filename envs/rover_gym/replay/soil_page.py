@@ -35,7 +35,7 @@ DEPTH = 1.0  # of disks along the axis that the plane does not have, in their me
 BATCH = 100  # disks that are drawn at once: those of a batch where nothing moves need no update
 CHAINS = 300  # contacts that are drawn, the strongest
 SEEN = 2.6  # m of the soil that the eye sees at once
-ASPECT = 1.5  # of the picture, width over height, that they fill
+ASPECT = 1.2  # of the picture, width over height, that they fill
 FIELD_OF_VIEW = 0.35  # rad, vertical: narrow and from afar, so that the plane stays a plane
 FOLLOW_TIME = 1.0  # s, over which the path that the eye follows is smoothed
 
