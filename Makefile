@@ -14,7 +14,7 @@ UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
 export VIRTUAL_ENV := $(abspath $(VENV))# where maturin installs
 
-.PHONY: help demo test check lint types format test-rust test-slow test-python docs bench chart stability orders profiles train train-rllib pins clean
+.PHONY: help demo test check lint types format test-rust test-slow test-python docs bench chart stability validate orders profiles train train-rllib pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -88,6 +88,9 @@ stability: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes w
 
 profiles: $(STAMPS)/test $(STAMPS)/core ## performance profiles of the contact solvers, with Siconos' where it is installed
 	$(COMPARE).solver_profiles
+
+validate: $(STAMPS)/core ## the soil beside papers and closed forms: docs/validation.md (16 minutes of one core; VALIDATE="packing repose" measures some)
+	PYTHONPATH=tests $(BIN)/python -m validation $(VALIDATE)
 
 orders: $(STAMPS)/demo ## measure every time-stepping scheme: order, drift, energy, cost; redraw docs/comparison/orders.png
 	cargo run --release --locked --quiet -p rover-comparison --bin orders -- runs/orders.json

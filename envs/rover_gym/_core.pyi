@@ -747,6 +747,8 @@ class SoilSimulation:
         radius: (n,) m.
         mass: (n,) kg; the disks are solid.
         position: (n, 2) centres or (n, 3) with angles, m and rad.
+        kinematic: (n,) disks whose velocity nothing changes, as grains glued to a rough floor, or a piston with the
+            velocity that `set_state` gives it; none if not given. They may overlap one another and walls.
         walls: (n, 4) a point of each wall and the normal to its free side.
         ground: A ground of any shape.
         rover: Keyword arguments of `TwoWheelRoverSimulation` that describe a rover, such as its `parameters`.
@@ -779,6 +781,7 @@ class SoilSimulation:
         mass: npt.ArrayLike,
         position: npt.ArrayLike,
         *,
+        kinematic: npt.ArrayLike | None = None,
         walls: npt.ArrayLike | None = None,
         ground: Line | Sine | Spline | Polyline | None = None,
         rover: dict[str, Any] | None = None,
@@ -813,8 +816,11 @@ class SoilSimulation:
     def velocity(self) -> npt.NDArray[np.float64]:
         """(n, 3) their rates, m/s and rad/s."""
     @property
+    def kinematic(self) -> npt.NDArray[np.bool_]:
+        """(n,) disks whose velocity nothing changes."""
+    @property
     def asleep(self) -> npt.NDArray[np.bool_]:
-        """(n,) which disks sleep."""
+        """(n,) which disks sleep; kinematic ones always do."""
     @property
     def machine(self) -> npt.NDArray[np.float64]:
         """(5,) the machine's coordinates; empty without one."""
@@ -840,6 +846,12 @@ class SoilSimulation:
         machine_rate: npt.ArrayLike | None = None,
     ) -> None:
         """Sets the state at time 0; rates are 0 and the machine stays where it is if not given."""
+    def remove(self, which: npt.ArrayLike) -> None:
+        """Takes the disks that `which` (n,) marks out; the others go on under new numbers in the same order.
+
+        Raises:
+            ModelError: Another number of marks, or no disk would be left.
+        """
     def set_torques(self, torques: npt.ArrayLike) -> None:
         """(2,) N m of the rover's wheels, positive forward."""
     def set_pull(self, pull: npt.ArrayLike) -> None:
@@ -849,7 +861,7 @@ class SoilSimulation:
     def contacts(self) -> SoilContacts: ...
     def energy(self) -> Energy: ...
     def momentum(self) -> npt.NDArray[np.float64]:
-        """(3,) momentum of the disks (kg m/s) and their moment of momentum about the origin (kg m^2/s)."""
+        """(3,) momentum of the disks but kinematic ones (kg m/s), and its moment about the origin (kg m^2/s)."""
     def impulse_on_wheels(self) -> npt.NDArray[np.float64]:
         """(2,) of the last step's contacts, N s."""
     def penetration(self) -> float:

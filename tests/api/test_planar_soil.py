@@ -194,3 +194,46 @@ def test_a_trial_that_cannot_be_is_refused_by_name(call: Callable[[Bed], object]
     with pytest.raises(ValueError, match=r".+") as caught:
         call(bed)
     assert getattr(caught.value, "field", None) == field
+
+
+def test_kinematic_disks_bear_and_move_as_they_are_told() -> None:
+    # A disk lies on two that are held, then on the same two as a piston goes down at 0.1 m/s.
+    options = {"kinematic": [True, True, False], "friction": 0.0, "tolerance": 1e-10}
+    sim = SoilSimulation([0.1, 0.1, 0.1], [1.0, 1.0, 2.0], [[-0.1, 0.0], [0.1, 0.0], [0.0, 0.18]], **options)
+    sim.step(400)
+    np.testing.assert_allclose(sim.position[2, :2], [0.0, 0.1 * np.sqrt(3.0)], atol=1e-8)
+    np.testing.assert_array_equal(sim.position[:2, :2], [[-0.1, 0.0], [0.1, 0.0]])
+    np.testing.assert_array_equal(sim.kinematic, [True, True, False])
+    weight = 2.0 * 9.81 * sim.time_step
+    np.testing.assert_allclose(np.abs(sim.contacts.world_impulses[:, 1]), 0.5 * weight, rtol=1e-6)
+    assert sim.energy().potential == pytest.approx(2.0 * 9.81 * 0.1 * np.sqrt(3.0), rel=1e-6)
+    sim.set_state(sim.position, [[0.0, -0.1, 0.0], [0.0, -0.1, 0.0], [0.0, 0.0, 0.0]])
+    sim.step(200)
+    np.testing.assert_allclose(sim.position[:2, 1], -0.02, rtol=1e-9)
+    np.testing.assert_allclose(sim.position[2, 1], 0.1 * np.sqrt(3.0) - 0.02, atol=1e-6)
+    np.testing.assert_allclose(sim.momentum(), [0.0, -0.2, 0.0], atol=1e-6)
+    with pytest.raises(ValueError, match="kinematic") as caught:
+        SoilSimulation([0.1], [1.0], [[0.0, 0.0]], kinematic=[True, False])
+    assert getattr(caught.value, "field", None) == "kinematic"
+
+
+def test_removed_disks_leave_the_others_as_they_are() -> None:
+    radius, mass, centres = soil_packing(40, width=0.4, seed=1)
+    walls = [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [0.4, 0.0, -1.0, 0.0]]
+    # One more, held far off: with it or without it all go on bit for bit.
+    marks = np.arange(41) == 7
+    more = (np.insert(radius, 7, radius[0]), np.insert(mass, 7, 0.1), np.insert(centres, 7, [0.2, 9.0], axis=0))
+    far = SoilSimulation(*more, walls=walls, kinematic=marks)
+    alone = SoilSimulation(radius, mass, centres, walls=walls)
+    for sim in (far, alone):
+        sim.step(150)
+    far.remove(marks)
+    np.testing.assert_array_equal(far.radius, radius)
+    np.testing.assert_array_equal(far.position, alone.position)
+    for sim in (far, alone):
+        sim.step(100)
+    np.testing.assert_array_equal(far.position, alone.position)
+    for which, field in ((marks, "which"), (np.ones(40, dtype=bool), "radius")):
+        with pytest.raises(ValueError, match=field):
+            far.remove(which)
+    np.testing.assert_array_equal(far.radius, radius)

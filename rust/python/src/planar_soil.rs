@@ -259,7 +259,7 @@ fn with_angles(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<f64>> {
 impl SoilSimulation {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (radius, mass, position, *, walls = None, ground = None, rover = None, rig = None, machine = None,
+    #[pyo3(signature = (radius, mass, position, *, kinematic = None, walls = None, ground = None, rover = None, rig = None, machine = None,
         friction = 0.5, wall_friction = 0.5, wheel_friction = 0.9, restitution = 0.0, gravity = None, time_step = 1e-3,
         tolerance = 1e-4, max_iterations = 200, stabilisation = "projection", penetration_tolerance = None,
         sleep = false, sleep_speed = None, sleep_distance = None))]
@@ -267,6 +267,7 @@ impl SoilSimulation {
         radius: &Bound<'_, PyAny>,
         mass: &Bound<'_, PyAny>,
         position: &Bound<'_, PyAny>,
+        kinematic: Option<Vec<bool>>,
         walls: Option<&Bound<'_, PyAny>>,
         ground: Option<&Bound<'_, PyAny>>,
         rover: Option<&Bound<'_, PyDict>>,
@@ -288,7 +289,12 @@ impl SoilSimulation {
     ) -> PyResult<Self> {
         let radius = vector(radius, Kind::Model, "radius")?;
         let mass = vector(mass, Kind::Model, "mass")?;
-        let disks = Disks::new(radius, mass).map_err(|e| soil_error(&e))?;
+        let mut disks = Disks::new(radius, mass).map_err(|e| soil_error(&e))?;
+        if let Some(kinematic) = kinematic {
+            disks = disks
+                .with_kinematic(kinematic)
+                .map_err(|e| soil_error(&e))?;
+        }
         let mut q = with_angles(position, "position")?;
         if q.len() != 3 * disks.len() {
             let message = format!(
@@ -403,6 +409,11 @@ impl SoilSimulation {
     }
 
     #[getter]
+    fn kinematic<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+        PyArray1::from_slice(py, self.inner.scene().disks.kinematic())
+    }
+
+    #[getter]
     fn asleep<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
         PyArray1::from_slice(py, self.inner.asleep())
     }
@@ -484,6 +495,11 @@ impl SoilSimulation {
             None => v.resize(v.len() + self.inner.v().len() - 3 * n, 0.0),
         }
         Ok(self.inner.set_state(&q, &v).map_err(|e| soil_error(&e))?)
+    }
+
+    #[allow(clippy::needless_pass_by_value)] // made for this call
+    fn remove(&mut self, which: Vec<bool>) -> PyResult<()> {
+        Ok(self.inner.remove(&which).map_err(|e| soil_error(&e))?)
     }
 
     fn set_torques(&mut self, torques: &Bound<'_, PyAny>) -> PyResult<()> {

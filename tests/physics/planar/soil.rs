@@ -346,6 +346,47 @@ fn sleeping_costs_less() {
     );
 }
 
+#[test]
+fn what_is_left_after_a_removal_keeps_its_load_and_old_snapshots_do_not_fit() {
+    for sleep in [None, Some(SleepOptions::default())] {
+        let packing = packing(120, 30, 8);
+        let mut bed = soil(&packing, |_, _| {});
+        bed.step(900).expect("finite");
+        let mut soil = SoilSimulation::new(
+            bed.scene().clone(),
+            bed.options().clone(),
+            sleep,
+            bed.q().to_vec(),
+        )
+        .expect("a soil");
+        soil.step(300).expect("finite");
+        let snapshot = soil.snapshot();
+        // The highest disk bears nothing, so those below go on as they were but for its weight.
+        let heights = soil.q().chunks_exact(3).map(|disk| disk[1]);
+        let highest = heights.fold(f64::MIN, f64::max);
+        let marked: Vec<bool> = soil
+            .q()
+            .chunks_exact(3)
+            .map(|disk| disk[1] >= highest)
+            .collect();
+        let lowest = (0..120).filter(|i| soil.q()[3 * i + 1] < 0.02);
+        let lowest: Vec<[f64; 2]> = lowest
+            .map(|i| [soil.q()[3 * i], soil.q()[3 * i + 1]])
+            .collect();
+        soil.remove(&marked).expect("others are left");
+        assert_eq!(soil.scene().disks.len(), 119);
+        assert!(soil.restore(&snapshot).is_err(), "of another soil");
+        soil.step(20).expect("finite");
+        for before in lowest {
+            let rows = soil.q().chunks_exact(3);
+            let nearest = rows.map(|q| (q[0] - before[0]).hypot(q[1] - before[1]));
+            assert!(nearest.fold(f64::MAX, f64::min) < 1e-4, "it stays");
+        }
+        assert!(soil.remove(&[true; 119]).is_err(), "one must be left");
+        assert_eq!(soil.scene().disks.len(), 119);
+    }
+}
+
 fn rover() -> TwoWheelRover {
     let wheel = |x: f64| PlanarWheel {
         mass: 60.0,

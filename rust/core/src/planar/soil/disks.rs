@@ -2,8 +2,10 @@
 
 use super::super::error::positive;
 use super::error::SoilError;
+use super::removal::Renumbering;
 
-/// Solid disks, immutable: `J = m r²/2`.
+/// Solid disks, immutable: `J = m r²/2`. Some may be kinematic: nothing changes their velocity, as grains
+/// glued to a rough floor or a piston.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disks {
     radius: Vec<f64>,
@@ -14,6 +16,7 @@ pub struct Disks {
     pub(super) angular: Vec<f64>,
     /// `√m`, `√J`.
     pub(super) roots: Vec<[f64; 2]>,
+    kinematic: Vec<bool>,
     largest: f64,
     smallest: f64,
 }
@@ -48,9 +51,31 @@ impl Disks {
                 .collect(),
             largest: radius.iter().copied().fold(0.0, f64::max),
             smallest: radius.iter().copied().fold(f64::INFINITY, f64::min),
+            kinematic: vec![false; radius.len()],
             radius,
             mass,
         })
+    }
+
+    /// The same disks, of which those marked (n) are kinematic: no weight and no contact changes their velocity.
+    ///
+    /// # Errors
+    /// Another number of marks.
+    pub fn with_kinematic(self, kinematic: Vec<bool>) -> Result<Self, SoilError> {
+        if kinematic.len() != self.len() {
+            return Err(SoilError::Length {
+                field: "kinematic",
+                expected: self.len(),
+                count: kinematic.len(),
+            });
+        }
+        Ok(Self { kinematic, ..self })
+    }
+
+    /// Those that stay.
+    pub(super) fn without(&self, renumbering: &Renumbering) -> Result<Self, SoilError> {
+        let [radius, mass] = [&self.radius, &self.mass].map(|all| renumbering.keep(all, 1));
+        Self::new(radius, mass)?.with_kinematic(renumbering.keep(&self.kinematic, 1))
     }
 
     /// Number of disks.
@@ -75,6 +100,12 @@ impl Disks {
     #[must_use]
     pub fn mass(&self) -> &[f64] {
         &self.mass
+    }
+
+    /// Disks whose velocity nothing changes.
+    #[must_use]
+    pub fn kinematic(&self) -> &[bool] {
+        &self.kinematic
     }
 
     /// `J = m r²/2` of disk i, kg m².

@@ -3,7 +3,8 @@
 //! - [`disks`], [`wall`], [`scene`]: what there is; [`packing`]: where disks start, without overlap, from a seed;
 //! - [`grid`]: which disks are near which; [`contact`]: a contact and its name; contacts come and go with the disks;
 //! - [`system`]: the soil as a mechanical system, stepped by [`crate::integrator`] as everything else;
-//! - [`sleep`]: disks that rest far from anything that moves are left out; [`simulation`]: a scene through time;
+//! - [`sleep`]: disks that rest far from anything that moves are left out; [`simulation`]: a scene through time, from which disks can be
+//!   taken;
 //! - [`rig`]: one wheel at a given slip, for the drawbar pull.
 //!
 //! A soil steps with θ = 1: contacts are measured where the step begins and a contact may close as far as its gap goes,
@@ -18,6 +19,7 @@ pub mod disks;
 pub mod error;
 pub mod grid;
 pub mod packing;
+mod removal;
 pub mod rig;
 pub mod scene;
 pub mod simulation;

@@ -89,13 +89,14 @@ impl SoilScene {
         Ok(self.friction.check()?)
     }
 
-    /// Checks a configuration (nv): finite, and nothing deeper in anything than [`OVERLAP`] of the smallest radius.
+    /// Checks a configuration (nv): finite, and nothing deeper in anything than [`OVERLAP`] of the smallest radius. Kinematic disks may
+    /// overlap one another and walls.
     ///
     /// # Errors
     /// The first entry that is wrong, the first overlap.
     pub fn check_configuration(&self, q: &[f64]) -> Result<(), SoilError> {
         let n = self.disks.len();
-        let radius = self.disks.radius();
+        let (radius, kinematic) = (self.disks.radius(), self.disks.kinematic());
         if q.len() != self.nv() {
             return Err(SoilError::Length {
                 field: "position",
@@ -120,7 +121,8 @@ impl SoilScene {
             grid.near(disk[0], disk[1], 2.0 * self.disks.largest(), |item| {
                 let j = item.index as usize;
                 let gap = (item.x - disk[0]).hypot(item.y - disk[1]) - radius[i] - item.radius;
-                if j > i && gap < worst.map_or(allowed, |w| w.1) {
+                let may_overlap = kinematic[i] && kinematic[j];
+                if j > i && !may_overlap && gap < worst.map_or(allowed, |w| w.1) {
                     worst = Some((j, gap));
                 }
             });
@@ -130,6 +132,9 @@ impl SoilScene {
                     second,
                     value,
                 });
+            }
+            if kinematic[i] {
+                continue;
             }
             let found = self.deepest_fixed([disk[0], disk[1]], radius[i], &mut facing);
             if let Some((what, value)) = found.filter(|(_, gap)| *gap < allowed) {

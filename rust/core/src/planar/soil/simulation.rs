@@ -10,6 +10,7 @@ use super::contact::{SoilContact, SoilKey};
 use super::disks::Disks;
 use super::error::SoilError;
 use super::grid::Grid;
+use super::removal::Renumbering;
 use super::scene::SoilScene;
 use super::sleep::{Sleep, SleepOptions, StepTaken};
 use super::system::{SoilParts, SoilSystem};
@@ -127,7 +128,7 @@ impl SoilSimulation {
             inputs: vec![0.0; n_inputs],
             pull: Vector2::zeros(),
             warm_start: WarmStart::default(),
-            sleep: Sleep::new(n),
+            sleep: Sleep::new(scene.disks.kinematic()),
             parts: SoilParts::default(),
             has_contacts: false,
             scene,
@@ -178,7 +179,7 @@ impl SoilSimulation {
         self.pull
     }
 
-    /// Which disks sleep (n).
+    /// Which disks sleep (n); kinematic ones always do.
     #[must_use]
     pub fn asleep(&self) -> &[bool] {
         self.sleep.asleep()
@@ -201,7 +202,7 @@ impl SoilSimulation {
         })
     }
 
-    /// Sets configuration and rates (nv); time 0, all awake, warm start forgotten, torques kept.
+    /// Sets configuration and rates (nv), those that kinematic disks keep among them; time 0, all awake, warm start forgotten, torques kept.
     ///
     /// # Errors
     /// As [`Self::new`]; nothing is changed then.
@@ -228,7 +229,41 @@ impl SoilSimulation {
         self.time = 0.0;
         self.count = 0;
         self.warm_start.clear();
-        self.sleep = Sleep::new(n);
+        self.sleep = Sleep::new(self.scene.disks.kinematic());
+        self.has_contacts = false;
+        Ok(())
+    }
+
+    /// Takes the disks that are marked (n) out of the soil; the others go on as they are, under new numbers in the same order.
+    ///
+    /// Snapshots of before belong to another soil.
+    ///
+    /// # Errors
+    /// Another number of marks; none would be left. Nothing is changed then.
+    pub fn remove(&mut self, marked: &[bool]) -> Result<(), SoilError> {
+        let n = self.scene.disks.len();
+        if marked.len() != n {
+            return Err(SoilError::Length {
+                field: "which",
+                expected: n,
+                count: marked.len(),
+            });
+        }
+        let renumbering = Renumbering::without(marked);
+        let disks = self.scene.disks.without(&renumbering)?;
+        self.scene = Arc::new(SoilScene {
+            disks,
+            ..(*self.scene).clone()
+        });
+        self.q = renumbering.keep(&self.q, 3);
+        self.v = renumbering.keep(&self.v, 3);
+        self.sleep = self.sleep.without(&renumbering);
+        self.warm_start.persistent.clear();
+        let impulses = self.warm_start.impulses.iter();
+        self.warm_start.impulses = impulses
+            .filter_map(|(key, p)| Some((renumbering.key(*key)?, *p)))
+            .collect();
+        self.scratch = Scratch::new(&self.q, self.scene.nv(), 3 * renumbering.left(), 2);
         self.has_contacts = false;
         Ok(())
     }
@@ -326,13 +361,14 @@ impl SoilSimulation {
         Ok(total)
     }
 
-    /// Kinetic and potential energy now, J.
+    /// Kinetic and potential energy now, J, without kinematic disks.
     #[must_use]
     pub fn energy(&self) -> Energy {
         let disks = &self.scene.disks;
         let gravity = self.options.gravity.xy();
         let mut energy = Energy::default();
-        for (i, m) in disks.mass().iter().enumerate() {
+        let free = |(i, _): &(usize, &f64)| !disks.kinematic()[*i];
+        for (i, m) in disks.mass().iter().enumerate().filter(free) {
             let (q, v) = (&self.q[3 * i..3 * i + 3], &self.v[3 * i..3 * i + 3]);
             energy.kinetic += 0.5 * m * (v[0] * v[0] + v[1] * v[1]);
             energy.kinetic += 0.5 * disks.inertia(i) * v[2] * v[2];
@@ -354,12 +390,13 @@ impl SoilSimulation {
         )
     }
 
-    /// Momentum (x, y) of the disks, kg m/s, and their moment of momentum about the origin, kg m²/s.
+    /// Momentum (x, y) of the disks that are not kinematic, kg m/s, and their moment of momentum about the origin, kg m²/s.
     #[must_use]
     pub fn momentum(&self) -> [f64; 3] {
         let disks = &self.scene.disks;
         let mut sum = [0.0; 3];
-        for (i, m) in disks.mass().iter().enumerate() {
+        let free = |(i, _): &(usize, &f64)| !disks.kinematic()[*i];
+        for (i, m) in disks.mass().iter().enumerate().filter(free) {
             let (q, v) = (&self.q[3 * i..3 * i + 3], &self.v[3 * i..3 * i + 3]);
             sum[0] += m * v[0];
             sum[1] += m * v[1];
@@ -380,21 +417,26 @@ impl SoilSimulation {
         sum.into()
     }
 
-    /// Deepest overlap now, m: 0 where nothing overlaps.
+    /// Deepest overlap now, m: 0 where nothing overlaps. Kinematic disks among themselves and in walls do not count.
     #[must_use]
     pub fn penetration(&self) -> f64 {
         let disks = &self.scene.disks;
-        let (n, radius) = (disks.len(), disks.radius());
+        let (n, radius, kinematic) = (disks.len(), disks.radius(), disks.kinematic());
         let mut grid = Grid::default();
         grid.fill(&self.q, radius, 2.0 * disks.largest());
         let mut facing = Vec::new();
         let mut least = 0.0_f64;
         let mut meet = |i: usize, x: f64, y: f64, r: f64| {
+            let is_kinematic = i < n && kinematic[i];
             grid.near(x, y, r + disks.largest(), |item| {
-                if item.index as usize != i {
+                let other = item.index as usize;
+                if other != i && !(is_kinematic && kinematic[other]) {
                     least = least.min((item.x - x).hypot(item.y - y) - r - item.radius);
                 }
             });
+            if is_kinematic {
+                return;
+            }
             for wall in &self.scene.walls {
                 least = least.min(wall.distance(x, y) - r);
             }
@@ -419,7 +461,8 @@ impl SoilSimulation {
 
     /// Wakes all disks.
     pub fn wake(&mut self) {
-        self.sleep.wake_all(&mut self.warm_start);
+        self.sleep
+            .wake_all(self.scene.disks.kinematic(), &mut self.warm_start);
     }
 
     /// Everything that is needed to continue bit for bit.
@@ -455,7 +498,7 @@ impl SoilSimulation {
         let is_sound = snapshot.v.len() == nv
             && [0, nv].contains(&warm.persistent.len())
             && snapshot.time.is_finite()
-            && snapshot.sleep.is_of(self.scene.disks.len())
+            && snapshot.sleep.is_of(self.scene.disks.kinematic())
             && numbers.all(|x| x.is_finite());
         if !is_sound {
             return Err(SnapshotError::Damaged);

@@ -2,11 +2,13 @@
 //!
 //! A disk falls asleep after so many steps slower than a limit, with nothing faster than the limit within a distance. It wakes when something
 //! faster comes within the distance, or when the impulse of a neighbour that is awake differs from the one it fell asleep under by more than a share of its own
-//! weight. The impulses of sleeping contacts are kept, so a disk wakes with the load that it had.
+//! weight. The impulses of sleeping contacts are kept, so a disk wakes with the load that it had. A kinematic disk counts as
+//! asleep and never wakes.
 
 use serde::{Deserialize, Serialize};
 
 use super::contact::{SoilContact, SoilKey};
+use super::removal::Renumbering;
 use super::scene::SoilScene;
 use crate::integrator::WarmStart;
 
@@ -60,12 +62,24 @@ pub(super) struct StepTaken<'a> {
 }
 
 impl Sleep {
-    /// All n disks awake.
-    pub(super) fn new(n: usize) -> Self {
+    /// All disks awake that are not kinematic (n).
+    pub(super) fn new(kinematic: &[bool]) -> Self {
         Self {
-            still: vec![0; n],
-            asleep: vec![false; n],
+            still: vec![0; kinematic.len()],
+            asleep: kinematic.to_vec(),
             dormant: Vec::new(),
+        }
+    }
+
+    /// Of the disks that stay.
+    pub(super) fn without(&self, renumbering: &Renumbering) -> Self {
+        let dormant = self.dormant.iter();
+        Self {
+            still: renumbering.keep(&self.still, 1),
+            asleep: renumbering.keep(&self.asleep, 1),
+            dormant: dormant
+                .filter_map(|(key, p)| Some((renumbering.key(*key)?, *p)))
+                .collect(),
         }
     }
 
@@ -81,10 +95,11 @@ impl Sleep {
         &self.dormant
     }
 
-    /// Whether this is the sleep of n disks.
-    pub(super) fn is_of(&self, n: usize) -> bool {
-        self.still.len() == n
-            && self.asleep.len() == n
+    /// Whether this is the sleep of these disks (n).
+    pub(super) fn is_of(&self, kinematic: &[bool]) -> bool {
+        self.still.len() == kinematic.len()
+            && self.asleep.len() == kinematic.len()
+            && self.asleep.iter().zip(kinematic).all(|(s, k)| *s || !k)
             && self.dormant.is_sorted_by_key(|(key, _)| *key)
             && self
                 .dormant
@@ -92,12 +107,11 @@ impl Sleep {
                 .all(|(_, p)| p.iter().all(|x| x.is_finite()))
     }
 
-    /// Wakes all.
-    pub(super) fn wake_all(&mut self, warm_start: &mut WarmStart<SoilKey>) {
-        if self.asleep.contains(&true) {
-            let before = self.asleep.clone();
-            self.asleep.fill(false);
-            self.exchange(&before, warm_start);
+    /// Wakes all that are not kinematic (n).
+    pub(super) fn wake_all(&mut self, kinematic: &[bool], warm_start: &mut WarmStart<SoilKey>) {
+        if self.asleep != kinematic {
+            let before = std::mem::replace(&mut self.asleep, kinematic.to_vec());
+            self.exchange(kinematic, &before, warm_start);
         }
         self.still.fill(0);
     }
@@ -119,6 +133,7 @@ impl Sleep {
             count,
         } = step;
         let n = scene.disks.len();
+        let kinematic = scene.disks.kinematic();
         let rows = v[..3 * n].chunks_exact(3).zip(scene.disks.radius());
         for ((v, r), still) in rows.zip(&mut self.still) {
             let is_still = v[0].hypot(v[1]) + r * v[2].abs() < options.speed;
@@ -131,7 +146,7 @@ impl Sleep {
                 let Some(disk) = [a, b]
                     .into_iter()
                     .map(|body| body as usize)
-                    .find(|&body| body < n && self.asleep[body])
+                    .find(|&body| body < n && self.asleep[body] && !kinematic[body])
                 else {
                     continue;
                 };
@@ -156,7 +171,7 @@ impl Sleep {
         }
         if looks {
             let near = self.near_movers(options, scene, q, v);
-            for i in 0..n {
+            for i in (0..n).filter(|i| !kinematic[*i]) {
                 if near[i] {
                     if self.asleep[i] {
                         self.still[i] = 0;
@@ -169,7 +184,7 @@ impl Sleep {
             }
         }
         if self.asleep != before {
-            self.exchange(&before, warm_start);
+            self.exchange(kinematic, &before, warm_start);
         }
     }
 
@@ -230,10 +245,17 @@ impl Sleep {
     }
 
     /// After a change of who sleeps: loads of those that fell asleep are put away, those of the woken given back to the warm start.
-    fn exchange(&mut self, before: &[bool], warm_start: &mut WarmStart<SoilKey>) {
-        let n = self.asleep.len();
+    fn exchange(
+        &mut self,
+        kinematic: &[bool],
+        before: &[bool],
+        warm_start: &mut WarmStart<SoilKey>,
+    ) {
         let touches = |asleep: &[bool], key: &SoilKey| {
-            let sleeps = |body: u32| (body as usize) < n && asleep[body as usize];
+            let sleeps = |body: u32| {
+                let body = body as usize;
+                body < kinematic.len() && asleep[body] && !kinematic[body]
+            };
             sleeps(key.a) || sleeps(key.b)
         };
         // What the step just did is newer than what was put away, but the load to wake at stays the one of falling asleep.

@@ -1,0 +1,148 @@
+"""Columns of disks that are let go: how far they run out.
+
+Source: Staron, Hinch 2005, *Study of the collapse of granular columns using two-dimensional discrete-grain
+simulation*, J. Fluid Mech. 545, 1-27.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from validation.samples import DIAMETER, RADIUS, Array, Sample, box, glued_row, loose, settle
+from validation.watch import GRAVITY, Ledger
+
+FRICTION = 1.0
+#: Paper's power laws of (R - R0)/R0 in the aspect ratio: prefactor, exponent; the first below ASPECT, the second above.
+PAPER = ((2.5, 1.0), (3.25, 0.7))
+ASPECT = 2.0
+#: How long a column is watched, in units of the time that its height takes to fall.
+FALLS = 4.0
+COUNT = 700
+ASPECTS = (0.5, 0.8, 1.25, 2.0, 3.2, 5.0, 8.0)
+
+
+def column(count: int, aspect: float, seed: int, ledger: Ledger) -> tuple[Sample, float, float]:
+    """Disks settled between two smooth walls, and the column's half width and height, m.
+
+    The half width is chosen for the aspect ratio (height to half width) at a packing fraction of 0.8; the height is
+    measured: twice that of the mass centre.
+    """
+    half = RADIUS * np.sqrt(count * np.pi / (2.0 * 0.8 * aspect))
+    sample = loose(count, 2.0 * half, seed, left=-half)
+    watched = sample.watched(walls=box(-half, half), friction=FRICTION, wall_friction=0.0)
+    settle(watched, speed=0.02)
+    ledger.merge(watched.ledger)
+    settled = sample.after(watched.sim)
+    settled.velocity[:] = 0.0
+    height = 2.0 * float(np.average(settled.position[:, 1], weights=settled.mass))
+    return settled, float(half), height
+
+
+def run_out(
+    count: int,
+    aspect: float,
+    seed: int,
+    ledger: Ledger,
+    *,
+    rough: bool = False,
+    restitution: float = 0.0,
+) -> dict[str, object]:
+    """Lets a column go by taking both walls away.
+
+    Returns:
+        aspect: Height to half width as they were. run_out: (R - R0)/R0, R from the outermost disks that hang together
+        with the heap, both sides' mean; mass: the same for the 98% of the disks that stayed nearest; top: final height
+        over R0.
+    """
+    sample, half, height = column(count, aspect, seed, ledger)
+    fall = float(np.sqrt(2.0 * height / GRAVITY))
+    if rough:
+        reach = half + 3.0 * height
+        sample = sample + glued_row(-reach, reach, 100 + seed, y=-1.25 * RADIUS)
+    floor = None if rough else [[0.0, 0.0, 0.0, 1.0]]
+    watched = sample.watched(walls=floor, friction=FRICTION, restitution=restitution)
+    free = ~sample.kinematic
+    watched.step(round(FALLS * fall / watched.sim.time_step))
+    ledger.merge(watched.ledger)
+    position, radius = watched.sim.position[free], sample.radius[free]
+    joined = heap(position, radius)
+    x = position[joined, 0]
+    spread = float(np.quantile(np.abs(position[:, 0]), 0.98))
+    return {
+        "count": count,
+        "aspect": height / half,
+        "seed": seed,
+        "rough": rough,
+        "restitution": restitution,
+        "run_out": (0.5 * float(x.max() - x.min()) - half) / half,
+        "mass": (spread - half) / half,
+        "top": float(position[joined, 1].max()) / half,
+        "joined": float(joined.mean()),
+        "half_width": half / DIAMETER,
+    }
+
+
+def heap(position: Array, radius: Array, reach: float = 0.02 * RADIUS) -> npt.NDArray[np.bool_]:
+    """Which disks hang together with most others: (n,), by chains of gaps below `reach`."""
+    n = len(radius)
+    label = np.arange(n)
+    order = np.argsort(position[:, 0])
+    x, y, r = position[order, 0], position[order, 1], radius[order]
+    pairs = []
+    for shift in range(1, n):
+        dx = x[shift:] - x[:-shift]
+        if dx.min() > 2.0 * radius.max() + reach:
+            break
+        touching = np.hypot(dx, y[shift:] - y[:-shift]) - r[shift:] - r[:-shift] < reach
+        pairs.append(np.stack([order[:-shift][touching], order[shift:][touching]], axis=1))
+    edges = np.concatenate(pairs)
+    while True:
+        least = np.minimum(label[edges[:, 0]], label[edges[:, 1]])
+        before = label.copy()
+        np.minimum.at(label, edges[:, 0], least)
+        np.minimum.at(label, edges[:, 1], least)
+        label = label[label]
+        if np.array_equal(label, before):
+            break
+    names, counts = np.unique(label, return_counts=True)
+    return np.asarray(label == names[counts.argmax()])
+
+
+def power(aspect: Array, run: Array) -> tuple[float, float, float]:
+    """Prefactor and exponent of a power law fitted in logarithms, and the exponent's standard error."""
+    design = np.stack([np.log(aspect), np.ones_like(aspect)], axis=1)
+    solution, squares, _, _ = np.linalg.lstsq(design, np.log(run), rcond=None)
+    freedom = max(1, len(run) - 2)
+    variance = float(squares[0]) / freedom if len(squares) else 0.0
+    error = np.sqrt(variance * np.linalg.inv(design.T @ design)[0, 0])
+    return float(np.exp(solution[1])), float(solution[0]), float(error)
+
+
+def measure(ledger: Ledger) -> dict[str, object]:
+    """All columns, and the power laws that they follow."""
+    flat = [run_out(COUNT, aspect, seed, ledger) for seed in (0, 1) for aspect in ASPECTS]
+    rough = [run_out(COUNT, aspect, 0, ledger, rough=True) for aspect in ASPECTS[1::2]]
+    bouncing = [run_out(COUNT, aspect, 0, ledger, restitution=0.5) for aspect in (0.8,)]
+    sizes = [run_out(count, 2.0, 0, ledger) for count in (200, 2500)]
+    return {"flat": flat, "rough": rough, "bouncing": bouncing, "sizes": sizes, "fits": fits(flat)}
+
+
+def fits(runs: list[dict[str, object]], name: str = "run_out") -> list[dict[str, float]]:
+    """The two power laws of some runs: below and from the aspect ratio 2 on."""
+    aspect = np.array([r["aspect"] for r in runs], dtype=float)
+    run = np.array([r[name] for r in runs], dtype=float)
+    found = []
+    for is_low, paper in zip((True, False), PAPER, strict=True):
+        chosen = (aspect < 1.1 * ASPECT) if is_low else (aspect > 0.9 * ASPECT)
+        prefactor, exponent, error = power(aspect[chosen], run[chosen])
+        found.append(
+            {
+                "prefactor": prefactor,
+                "exponent": exponent,
+                "error": error,
+                "paper_prefactor": paper[0],
+                "paper_exponent": paper[1],
+            }
+        )
+    return found

@@ -1,0 +1,136 @@
+"""Pictures of the validation."""
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+
+mpl.use("Agg")
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.ticker import NullFormatter, ScalarFormatter
+
+OURS, PAPER, OTHER = "#d1361f", "#2f6db3", "#5b6770"
+
+
+def _finish(axes: Axes) -> None:
+    axes.grid(which="major", color="#dddddd", linewidth=0.7)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+
+
+def collapse(data: dict[str, Any], path: Path) -> None:
+    """Run-out against aspect ratio, both logarithmic."""
+    figure, axes = plt.subplots(figsize=(6.4, 4.8), dpi=110)
+    low, high = np.array([0.4, 2.0]), np.array([2.0, 10.0])
+    axes.plot(low, 2.5 * low, color=PAPER, label="Staron and Hinch 2005: 2.5 a, 3.25 a$^{0.7}$")
+    axes.plot(high, 3.25 * high**0.7, color=PAPER)
+    for fit, span in zip(data["fits"], (low, high), strict=True):
+        label = f"{fit['prefactor']:.2f} a$^{{{fit['exponent']:.2f}}}$"
+        axes.plot(span, fit["prefactor"] * span ** fit["exponent"], "--", color=OURS, linewidth=1.2, label=label)
+    series = (
+        ("flat", "o", OURS, f"{data['flat'][0]['count']} disks, flat floor"),
+        ("rough", "s", OTHER, "floor of glued disks"),
+        ("bouncing", "^", "#3f8f4f", "restitution 0.5"),
+    )
+    for name, marker, colour, label in series:
+        runs = data[name]
+        axes.plot(
+            [r["aspect"] for r in runs], [r["run_out"] for r in runs], marker, color=colour, markersize=5, label=label
+        )
+    for run in data["sizes"]:
+        axes.annotate(
+            f"{run['count']}", (run["aspect"], run["run_out"]), (7, -3), textcoords="offset points", fontsize=8
+        )
+        axes.plot(run["aspect"], run["run_out"], "D", color="#8a5fb0", markersize=5)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(ScalarFormatter())
+        axis.set_minor_formatter(NullFormatter())
+    axes.set_xticks([0.5, 1, 2, 4, 8])
+    axes.set_yticks([1, 2, 5, 10])
+    axes.set_xlabel("aspect ratio a = H$_0$/R$_0$")
+    axes.set_ylabel("run-out (R - R$_0$)/R$_0$")
+    axes.legend(frameon=False, fontsize=8.5)
+    _finish(axes)
+    figure.tight_layout()
+    figure.savefig(path)
+    plt.close(figure)
+
+
+def packing(data: dict[str, Any], path: Path) -> None:
+    """Packing fraction and contacts against friction."""
+    figure, panels = plt.subplots(1, 2, figsize=(8.4, 3.6), dpi=110)
+    for axes, name in zip(panels, ("fraction", "coordination"), strict=True):
+        for group, marker, colour, label in (("poured", "o", OURS, "poured"), ("knocked", "^", OTHER, "after knocks")):
+            runs = data[group]
+            axes.plot([r["friction"] for r in runs], [r[name] for r in runs], marker, color=colour, label=label)
+        axes.set_xlabel("friction µ")
+        _finish(axes)
+    panels[0].axhspan(0.81, 0.84, color=PAPER, alpha=0.12, label="0.81 to 0.84")
+    panels[0].set_ylabel("packing fraction")
+    panels[0].legend(frameon=False, fontsize=8.5)
+    for level, text in ((4.0, "isostatic, no friction"), (3.0, "isostatic, friction")):
+        panels[1].axhline(level, color=PAPER, linewidth=1.0, linestyle=":")
+        panels[1].text(1.0, level + 0.02, text, fontsize=8, color=PAPER, ha="right")
+    panels[1].set_ylabel("contacts of a disk that bears")
+    figure.tight_layout()
+    figure.savefig(path)
+    plt.close(figure)
+
+
+def repose(data: dict[str, Any], path: Path) -> None:
+    """Slopes, and their angle against friction."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.6), dpi=110, width_ratios=(1.5, 1.0))
+    colours = plt.get_cmap("viridis")(np.linspace(0.0, 0.85, len(data["means"])))
+    for mean, colour in zip(data["means"], colours, strict=True):
+        run = next(r for r in data["runs"] if r["friction"] == mean["friction"])
+        left.plot(*run["surface"], color=colour, label=f"µ {mean['friction']:g}")
+    left.set_aspect("equal")
+    left.set_xlabel("x, diameters")
+    left.set_ylabel("surface, diameters")
+    left.legend(frameon=False, fontsize=8, ncols=2)
+    right.plot([r["friction"] for r in data["runs"]], [r["angle"] for r in data["runs"]], "o", color=OURS)
+    right.plot([r["friction"] for r in data["means"]], [r["angle"] for r in data["means"]], color=OURS, linewidth=1.0)
+    right.set_xlabel("friction µ")
+    right.set_ylabel("angle of repose, degrees")
+    right.set_ylim(bottom=0.0)
+    for axes in (left, right):
+        _finish(axes)
+    figure.tight_layout()
+    figure.savefig(path)
+    plt.close(figure)
+
+
+def janssen(data: dict[str, Any], path: Path) -> None:
+    """Borne against filled mass."""
+    figure, axes = plt.subplots(figsize=(5.8, 4.2), dpi=110)
+    runs = data["runs"]
+    filling = np.linspace(0.0, 1.05 * max(r["filling"] for r in runs), 200)
+    mass = data["saturation"]
+    axes.plot(filling, filling, ":", color=OTHER, label="all of it")
+    axes.plot(filling, mass * -np.expm1(-filling / mass), color=PAPER, label=f"Janssen, m = {mass:.2f}")
+    axes.errorbar(
+        [r["filling"] for r in runs],
+        [r["borne"] for r in runs],
+        [2.0 * r["error"] for r in runs],
+        fmt="o",
+        color=OURS,
+        label="walls with µ 0.5",
+    )
+    smooth = data["smooth"]
+    axes.plot([r["filling"] for r in smooth], [r["borne"] for r in smooth], "s", color=OTHER, label="smooth walls")
+    axes.set_ylim(0.0, 1.2 * max([r["borne"] for r in runs] + [r["borne"] for r in smooth]))
+    axes.set_xlabel("mass of the filling, in fillings as high as wide")
+    axes.set_ylabel("mass that the bottom bears")
+    axes.legend(frameon=False, fontsize=8.5)
+    _finish(axes)
+    figure.tight_layout()
+    figure.savefig(path)
+    plt.close(figure)
+
+
+PICTURES = {"collapse": collapse, "packing": packing, "repose": repose, "janssen": janssen}

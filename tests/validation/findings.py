@@ -1,0 +1,191 @@
+"""What the measurements are held against, one row each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+STARON = "Staron and Hinch 2005"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One number.
+
+    Attributes:
+        what: Short.
+        expected: In words.
+        source: Of what is expected.
+        number: What was measured.
+        low: The finding holds from here,
+        high: to here.
+        unit: Of all three.
+        digits: To print.
+    """
+
+    what: str
+    expected: str
+    source: str
+    number: float
+    low: float
+    high: float
+    unit: str = ""
+    digits: str = ".2f"
+
+    @property
+    def holds(self) -> bool:
+        """Whether the number is in its range; one that is not finite is not."""
+        return bool(self.low <= self.number <= self.high)
+
+    def row(self) -> str:
+        """A line of a table."""
+        number = f"{self.number:{self.digits}} {self.unit}".strip()
+        return (
+            f"| {self.what} | {self.expected} | {self.source} | {number if self.holds else f'**outside**: {number}'} |"
+        )
+
+
+def collapse(data: dict[str, Any]) -> Iterator[Finding]:
+    """Power laws of the run-out."""
+    for fit, where in zip(data["fits"], ("a ≤ 2", "a ≥ 2"), strict=True):
+        n, c = fit["paper_exponent"], fit["paper_prefactor"]
+        yield Finding(f"run-out, exponent, {where}", f"{n:g} ± 0.1", STARON, fit["exponent"], n - 0.1, n + 0.1)
+        yield Finding(f"run-out, prefactor, {where}", f"{c:g} ± 20%", STARON, fit["prefactor"], 0.8 * c, 1.2 * c)
+
+
+def packing(data: dict[str, Any]) -> Iterator[Finding]:
+    """Packing fractions and contacts."""
+    poured = data["poured"]
+
+    def mean(name: str, friction: float) -> float:
+        return float(np.mean([r[name] for r in poured if r["friction"] == friction]))
+
+    yield Finding(
+        "packing fraction, no friction",
+        "0.84 ± 0.01",
+        "random close packing",
+        mean("fraction", 0.0),
+        0.83,
+        0.85,
+        digits=".3f",
+    )
+    yield Finding("contacts of a disk, no friction", "4 ± 0.1", "isostatic, 2d", mean("coordination", 0.0), 3.9, 4.1)
+    yield Finding(
+        "packing fraction, µ 0.5, poured",
+        "0.81 to 0.84",
+        "random packings of disks",
+        mean("fraction", 0.5),
+        0.81,
+        0.84,
+        digits=".3f",
+    )
+    for run in data["knocked"]:
+        if run["friction"] == 0.5:
+            yield Finding(
+                f"the same after {run['knocks']} knocks",
+                "0.81 to 0.84",
+                "random packings of disks",
+                run["fraction"],
+                0.81,
+                0.84,
+                digits=".3f",
+            )
+    rough = mean("coordination", 1.0)
+    yield Finding("contacts of a disk, µ 1", "3 to 3.3", "isostatic with friction, d + 1", rough, 2.95, 3.3)
+    frictions = sorted({r["friction"] for r in poured})
+    drops = np.diff([mean("coordination", mu) for mu in frictions])
+    yield Finding("largest rise of the contacts with µ", "none", "", float(drops.max()), -10.0, 0.0, digits=".3f")
+
+
+def repose(data: dict[str, Any]) -> Iterator[Finding]:
+    """The slope's angle against friction."""
+    angles = [row["angle"] for row in data["means"]]
+    yield Finding(
+        "angle of repose, smallest step up with µ",
+        "above 0: monotone",
+        "",
+        float(np.diff(angles).min()),
+        1e-9,
+        90.0,
+        "deg",
+    )
+
+
+def janssen(data: dict[str, Any]) -> Iterator[Finding]:
+    """Saturation of what a silo's bottom bears."""
+    yield Finding(
+        "silo, R² of Janssen's law", "above 0.95", "Janssen 1895", data["determination"], 0.95, 1.0, digits=".3f"
+    )
+    tall = [r for r in data["runs"] if r["height"] == max(q["height"] for q in data["runs"])]
+    share = float(np.mean([r["borne"] / r["filling"] for r in tall]))
+    law = data["saturation"] / tall[0]["filling"] * -np.expm1(-tall[0]["filling"] / data["saturation"])
+    yield Finding(
+        "share that the bottom of the tallest bears", f"{law:.2f} ± 25%", "the fit", share, 0.75 * law, 1.25 * law
+    )
+    worst = max((abs(r["borne"] / r["filling"] - 1.0) for r in data["smooth"]), default=np.nan)
+    yield Finding("smooth walls, error of the borne weight", "0", "balance of forces", worst, 0.0, 0.03, digits=".1e")
+
+
+def balance(data: dict[str, Any]) -> Iterator[Finding]:
+    """Energy and momentum of the runs made for them."""
+    for name, chosen in (
+        ("e = 0, any µ", [r for r in data["boxes"] if r["restitution"] == 0.0]),
+        ("µ = 0, e = 0.5 and 0.9", [r for r in data["boxes"] if r["friction"] == 0.0 and r["restitution"] > 0.0]),
+    ):
+        worst = max(r["grown"] for r in chosen)
+        yield Finding(
+            f"growth of the energy in a box, {name}",
+            "0",
+            "proof in soil.md",
+            worst,
+            0.0,
+            1e-12,
+            "of the start's",
+            ".1e",
+        )
+    yield Finding(
+        "momentum of two clouds that meet",
+        "0",
+        "exact",
+        max(r["momentum_error"] for r in data["clouds"]),
+        0.0,
+        1e-12,
+        digits=".1e",
+    )
+    kept = [r["kept"] for r in data["cooling"] if r["restitution"] == 0.9]
+    error = abs(kept[0] / kept[-1] - 1.0)
+    yield Finding("energy kept at e = 0.9, step 1 against 0.02 ms", "the same, 5%", "", error, 0.0, 0.05, digits=".3f")
+
+
+def everywhere(ledgers: dict[str, dict[str, float]]) -> Iterator[Finding]:
+    """What must hold in every step of all parts."""
+    for part, ledger in ledgers.items():
+        yield Finding(
+            f"{part}: deepest overlap", "below 1% of a radius", "", 100.0 * ledger["overlap"], 0.0, 1.0, "%", ".2g"
+        )
+        yield Finding(
+            f"{part}: momentum balance of a step", "rounding", "exact", ledger["momentum"], 0.0, 1e-12, "", ".1e"
+        )
+        if ledger["spent"] > 0.0:
+            yield Finding(
+                f"{part}: energy regained",
+                "0",
+                "proof in soil.md",
+                ledger["regained"],
+                0.0,
+                1e-6,
+                "of what was lost",
+                ".1e",
+            )
+
+
+PARTS = {"collapse": collapse, "packing": packing, "repose": repose, "janssen": janssen, "balance": balance}
+
+
+def table(found: list[Finding]) -> str:
+    """All rows."""
+    head = ["| what | expected | source | measured |", "|---|---|---|---|"]
+    return "\n".join(head + [f.row() for f in found])

@@ -1,0 +1,81 @@
+"""The slope that stays when one wall of a bed on a rough floor is taken away and what runs over the edge falls."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from validation.samples import DIAMETER, Array, box, glued_row, loose, settle, slow
+from validation.watch import Ledger
+
+FRICTIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7)
+LENGTH, COUNT = 32.0, 500
+
+
+def surface(position: Array, radius: Array, left: float, right: float) -> tuple[Array, Array]:
+    """Places along a heap, two diameters apart, and the height of the highest disk near each, m."""
+    edges = np.arange(left, right + 1e-9, 2.0 * DIAMETER)
+    x, top = position[:, 0], position[:, 1] + radius
+    places, heights = [], []
+    for a, b in itertools.pairwise(edges):
+        near = (x >= a) & (x < b)
+        if near.any():
+            k = np.flatnonzero(near)[top[near].argmax()]
+            places.append(x[k])
+            heights.append(top[k])
+    return np.array(places), np.array(heights)
+
+
+def slope(count: int, friction: float, seed: int, ledger: Ledger, *, length: float = LENGTH) -> dict[str, object]:
+    """Angle of repose of one bed.
+
+    Args:
+        count: Disks.
+        friction: Between all.
+        seed: Of disks and floor.
+        ledger: What the steps are entered into.
+        length: Of the floor, diameters.
+    """
+    width = length * DIAMETER
+    floor = glued_row(0.0, width, 1000 + seed)
+    edge = float((floor.position[:, 0] + floor.radius).max())
+    sample = loose(count, edge, seed, bottom=1.3 * DIAMETER) + floor
+    watched = sample.watched(walls=box(0.0, edge, -DIAMETER), friction=friction, wall_friction=0.0)
+    settle(watched)
+    ledger.merge(watched.ledger)
+    watched = sample.after(watched.sim).watched(walls=[[0.0, 0.0, 1.0, 0.0]], friction=friction, wall_friction=0.0)
+    sim = watched.sim
+    quiet = 0.0
+    while sim.time < 8.0 and quiet < 0.3:
+        watched.step(round(0.05 / sim.time_step))
+        fallen = sim.position[:, 1] < -2.0 * DIAMETER
+        watched.remove(fallen)
+        quiet = quiet + 0.05 if slow(watched, 0.01) and not fallen.any() else 0.0
+    ledger.merge(watched.ledger)
+    free = ~sim.kinematic
+    x, y = surface(sim.position[free], sim.radius[free], 0.0, edge)
+    inner = (x > 0.1 * edge) & (x < 0.9 * edge)
+    gradient = np.polyfit(x[inner], y[inner], 1)[0]
+    return {
+        "friction": friction,
+        "seed": seed,
+        "angle": float(np.degrees(np.arctan(-gradient))),
+        "left": int(free.sum()),
+        "seconds": float(sim.time),
+        "surface": [(x / DIAMETER).round(3).tolist(), (y / DIAMETER).round(3).tolist()],
+    }
+
+
+def measure(ledger: Ledger) -> dict[str, object]:
+    """Slopes of several frictions."""
+    runs = [slope(COUNT, mu, seed, ledger) for mu in FRICTIONS for seed in (0, 1)]
+    means = [
+        {
+            "friction": mu,
+            "angle": float(np.mean([r["angle"] for r in runs if r["friction"] == mu])),
+            "spread": float(np.ptp([r["angle"] for r in runs if r["friction"] == mu])),
+        }
+        for mu in FRICTIONS
+    ]
+    return {"runs": runs, "means": means}

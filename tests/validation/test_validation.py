@@ -1,0 +1,99 @@
+"""Small versions of `make validate`: the same programs on fewer disks, with wider ranges."""
+
+import numpy as np
+import pytest
+
+from validation import findings
+from validation.balance import cloud, free_cloud
+from validation.collapse import heap, power, run_out
+from validation.janssen import saturation, weigh
+from validation.packing import bed, covered
+from validation.repose import slope
+from validation.watch import Ledger
+
+
+def held(ledger: Ledger) -> None:
+    """What must hold in every step."""
+    assert ledger.steps
+    assert [f for f in findings.everywhere({"run": ledger.as_dict()}) if not f.holds] == []
+
+
+def test_columns_run_out_the_farther_the_taller_and_nearly_in_proportion() -> None:
+    ledger = Ledger()
+    runs = [run_out(220, aspect, 0, ledger, rough=True) for aspect in (0.7, 2.0)]
+    aspect, run = (np.array([r[name] for r in runs], dtype=float) for name in ("aspect", "run_out"))
+    _, exponent, _ = power(aspect, run)
+    assert exponent == pytest.approx(1.0, abs=0.25)
+    assert 1.0 < (run / aspect).min() < (run / aspect).max() < 3.0
+    held(ledger)
+
+
+def test_disks_without_friction_pack_at_random_and_isostatically_those_with_friction_loosely() -> None:
+    ledger = Ledger()
+    smooth, rough = (bed(250, mu, 0, ledger) for mu in (0.0, 1.0))
+    assert smooth["fraction"] == pytest.approx(0.84, abs=0.015)
+    assert smooth["coordination"] == pytest.approx(4.0, abs=0.15)
+    assert 0.76 < rough["fraction"] < 0.82
+    assert 2.9 < rough["coordination"] < 3.4
+    held(ledger)
+
+
+def test_a_slope_stays_the_steeper_the_more_friction() -> None:
+    ledger = Ledger()
+    angles = [slope(190, mu, 0, ledger, length=20.0)["angle"] for mu in (0.05, 0.5)]
+    assert 0.0 < angles[0] < angles[1] - 3.0 < 30.0
+    held(ledger)
+
+
+def test_rough_walls_bear_the_filling_and_smooth_ones_do_not() -> None:
+    ledger = Ledger()
+    low, high = (weigh(height, 0, ledger, diameters=8.0) for height in (0.5, 4.0))
+    assert low["borne"] > 0.5 * low["filling"]
+    assert high["borne"] < 0.5 * high["filling"]
+    smooth = weigh(2.0, 0, ledger, wall_friction=0.0, diameters=8.0)
+    assert smooth["borne"] == pytest.approx(smooth["filling"], rel=0.05)
+    held(ledger)
+
+
+@pytest.mark.parametrize(("friction", "restitution"), [(0.0, 0.0), (1.0, 0.0), (0.0, 0.9)])
+def test_a_box_of_flying_disks_never_gains_energy(friction: float, restitution: float) -> None:
+    ledger = Ledger()
+    run = cloud(80, friction, restitution, 0, ledger, steps=300)
+    assert run["grown"] < 1e-12
+    assert run["lost"] > 0.05
+    held(ledger)
+
+
+def test_clouds_that_meet_keep_their_momentum() -> None:
+    ledger = Ledger()
+    run = free_cloud(80, 0.5, 0, ledger)
+    assert run["momentum_error"] < 1e-13
+    assert run["energy_left"] < 0.9
+    held(ledger)
+
+
+def test_a_heap_is_what_hangs_together() -> None:
+    x = np.array([0.0, 2.0, 4.0, 7.0, 9.0, 30.0])
+    position = np.stack([x, np.zeros(6)], axis=1)
+    np.testing.assert_array_equal(heap(position, np.ones(6), 0.1), [True, True, True, False, False, False])
+
+
+def test_a_hexagonal_lattice_covers_what_the_closed_form_says() -> None:
+    rows, columns = np.mgrid[0:30, 0:30]
+    position = np.stack([2.0 * columns + rows % 2, np.sqrt(3.0) * rows], axis=-1).reshape(-1, 2)
+    window = (10.0, 10.0 + 2.0 * 12, 10.0, 10.0 + np.sqrt(3.0) * 14)
+    share = covered(position, np.ones(900), window)
+    assert share == pytest.approx(np.pi / np.sqrt(12.0), rel=1e-3)
+
+
+def test_janssens_law_is_found_again_in_its_own_points() -> None:
+    filling = np.linspace(0.3, 6.0, 9)
+    mass, determination = saturation(filling, 0.8 * -np.expm1(-filling / 0.8))
+    assert mass == pytest.approx(0.8, rel=2e-3)
+    assert determination > 0.9999
+
+
+def test_a_number_out_of_its_range_is_marked() -> None:
+    inside, outside = (findings.Finding("x", "1", "y", number, 0.9, 1.1) for number in (1.0, float("nan")))
+    assert inside.holds
+    assert "**outside**" in outside.row()

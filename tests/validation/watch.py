@@ -1,0 +1,135 @@
+"""What must hold in every step of every run: momentum, energy, no overlap. Measured while a soil is stepped."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from rover_gym._core import SoilSimulation
+
+GRAVITY = 9.81
+
+
+@dataclass
+class Ledger:
+    """The worst of all steps that were watched; several can be merged.
+
+    Attributes:
+        steps: How many were watched.
+        disk_steps: Disks times steps.
+        unconverged: Steps whose contacts were not solved to the tolerance.
+        residual: Largest residual of the contact solver, relative.
+        overlap: Deepest overlap after a step, in radii of the smallest disk.
+        momentum: Largest error of a step's momentum balance, relative to the momenta and impulses in it.
+        gain: Largest growth of the energy in one step, in units of the weight of a mean disk times its diameter.
+        growth: All growth of the energy together, J.
+        spent: How much energy the runs lost from their beginnings to their ends, J.
+    """
+
+    steps: int = 0
+    disk_steps: int = 0
+    unconverged: int = 0
+    residual: float = 0.0
+    overlap: float = 0.0
+    momentum: float = 0.0
+    gain: float = 0.0
+    growth: float = 0.0
+    spent: float = 0.0
+
+    def merge(self, other: Ledger) -> None:
+        """Takes another run in."""
+        for name in ("steps", "disk_steps", "unconverged", "growth", "spent"):
+            setattr(self, name, getattr(self, name) + getattr(other, name))
+        for name in ("residual", "overlap", "momentum", "gain"):
+            setattr(self, name, max(getattr(self, name), getattr(other, name)))
+
+    @property
+    def regained(self) -> float:
+        """Growth of the energy, as a share of what was lost."""
+        return self.growth / self.spent if self.spent > 0.0 else 0.0
+
+    def as_dict(self) -> dict[str, float]:
+        """For a JSON file."""
+        return asdict(self) | {"regained": self.regained}
+
+
+class Watched:
+    """A soil that is stepped under watch.
+
+    Args:
+        sim: The soil.
+        has_energy: False where kinematic disks move and do work: the energy is not looked at then.
+    """
+
+    def __init__(self, sim: SoilSimulation, *, has_energy: bool = True) -> None:
+        self.sim = sim
+        self.ledger = Ledger()
+        #: Impulse of kinematic disks on the free ones in the last step, N s.
+        self.from_kinematic = np.zeros(2)
+        self._has_energy = has_energy
+        self._look()
+
+    def _look(self) -> None:
+        sim = self.sim
+        self._free = ~sim.kinematic
+        self._mass = sim.mass[self._free]
+        self._gravity = np.array(sim.settings["gravity"])
+        weight = float(np.linalg.norm(self._gravity)) or GRAVITY
+        self._unit = weight * float(self._mass.mean()) * 2.0 * float(sim.radius[self._free].mean())
+        self._smallest = float(sim.radius[self._free].min())
+        self._energy = self._total()
+
+    def _total(self) -> float:
+        energy = self.sim.energy()
+        return float(energy.kinetic + energy.potential)
+
+    def restart(self) -> None:
+        """After the state was set from outside: what that did to the energy is not counted."""
+        self._look()
+
+    def remove(self, which: np.ndarray) -> None:
+        """Takes disks (n,) out; their energy is no longer counted."""
+        if which.any():
+            self.sim.remove(which)
+            self._look()
+
+    def step(self, n: int = 1) -> None:
+        """Takes n steps, one by one."""
+        for _ in range(n):
+            before = self.sim.momentum()[:2]
+            report = self.sim.step()
+            self._enter(report.residual, is_converged=report.is_converged)
+            self._weigh(before)
+
+    def _enter(self, residual: float, *, is_converged: bool) -> None:
+        ledger = self.ledger
+        if self._has_energy:
+            energy = self._total()
+            growth = max(0.0, energy - self._energy)
+            ledger.growth += growth
+            ledger.spent += self._energy - energy
+            ledger.gain = max(ledger.gain, growth / self._unit)
+            self._energy = energy
+        ledger.overlap = max(ledger.overlap, self.sim.penetration() / self._smallest)
+        ledger.residual = max(ledger.residual, residual)
+        ledger.unconverged += not is_converged
+        ledger.steps += 1
+        ledger.disk_steps += len(self._mass)
+
+    def _weigh(self, before: np.ndarray) -> None:
+        """The momentum balance of the last step: gravity, walls, ground, kinematic disks, and nothing else."""
+        contacts = self.sim.contacts
+        bodies, impulse = contacts.bodies, contacts.world_impulses
+        free = np.append(self._free, [False])  # number -1: walls and ground
+        first, second = free[bodies[:, 0]], free[bodies[:, 1]]
+        on_first, on_second = first & ~second, second & ~first
+        by_kinematic = on_first & (bodies[:, 1] >= 0)
+        self.from_kinematic = impulse[by_kinematic].sum(axis=0) - impulse[on_second].sum(axis=0)
+        outside = impulse[on_first].sum(axis=0) - impulse[on_second].sum(axis=0)
+        pull = self.sim.time_step * float(self._mass.sum()) * self._gravity
+        error = np.abs(self.sim.momentum()[:2] - before - outside - pull).max()
+        speeds = np.abs(self.sim.velocity[self._free, :2]).max(axis=1)
+        scale = float(np.abs(impulse).sum() + np.abs(pull).sum() + self._mass @ speeds)
+        if scale > 0.0:
+            self.ledger.momentum = max(self.ledger.momentum, float(error) / scale)
