@@ -31,7 +31,7 @@ def surface(position: Array, radius: Array, left: float, right: float) -> tuple[
 
 
 def angle(x: Array, y: Array) -> float:
-    """Angle of a heap's flank, degrees: of a line through its surface, x onwards, between HIGH and LOW of its height."""
+    """Degrees of a heap's flank: a line through its surface, x onwards, between HIGH and LOW of its height."""
     top = float(y.max())
     flank = (np.arange(len(x)) >= np.flatnonzero(y > HIGH * top)[-1]) & (y > LOW * top)
     return float(np.degrees(np.arctan(-np.polyfit(x[flank], y[flank], 1)[0])))
