@@ -762,8 +762,8 @@ class SoilSimulation:
         time_step: s.
         tolerance: Of the contact solver, relative.
         max_iterations: Most sweeps of the contact solver in a step.
-        stabilisation: "projection" or "none".
-        penetration_tolerance: Penetration that is projected away, m; 0.5% of the smallest radius if not given.
+        stabilisation: "none" or "projection", which lifts what lies above and so adds energy.
+        penetration_tolerance: Penetration from which on it is projected away, m; 0.5% of the smallest radius if not given.
         sleep: Whether disks sleep that rest far from anything that moves.
         sleep_speed: m/s below which a disk is still; 5e-4 if not given.
         sleep_distance: m within which nothing may move; 0.2 if not given.
@@ -794,8 +794,8 @@ class SoilSimulation:
         gravity: npt.ArrayLike | None = None,
         time_step: float = 0.001,
         tolerance: float = 0.0001,
-        max_iterations: int = 200,
-        stabilisation: Literal["projection", "none"] = "projection",
+        max_iterations: int = 2000,
+        stabilisation: Literal["projection", "none"] = "none",
         penetration_tolerance: float | None = None,
         sleep: bool = False,
         sleep_speed: float | None = None,

@@ -79,14 +79,26 @@ class Run:
         Raises:
             OptionError: `fps` is not a positive number.
         """
-        fps = number("fps", fps, above=0.0)
-        time = self.time
-        frames = np.floor((time[-1] - time[0]) * fps + 1e-6)  # a run of 2 s that ends at 1.999999999 s has its last
-        wanted = time[0] + np.arange(int(frames) + 1) / fps
-        between = 0.5 * (time[1:] + time[:-1])
-        rows = np.unique(np.searchsorted(between, wanted))
+        rows = film_rows(self.time, fps)
         data = {name: values[rows] for name, values in self.trajectory.data.items()}
         return replace(self, trajectory=replace(self.trajectory, data=data))
+
+
+def film_rows(time: npt.NDArray[np.float64], fps: float) -> npt.NDArray[np.int64]:
+    """Numbers of the samples that lie nearest to the times of a film's frames, none of them twice.
+
+    Args:
+        time: (n,) of the samples, s.
+        fps: Frames a second.
+
+    Raises:
+        OptionError: `fps` is not a positive number.
+    """
+    fps = number("fps", fps, above=0.0)
+    frames = np.floor((time[-1] - time[0]) * fps + 1e-6)  # a run of 2 s that ends at 1.999999999 s has its last
+    wanted = time[0] + np.arange(int(frames) + 1) / fps
+    between = 0.5 * (time[1:] + time[:-1])
+    return np.unique(np.searchsorted(between, wanted))
 
 
 def read_run(path: str | Path) -> Run:
@@ -98,7 +110,16 @@ def read_run(path: str | Path) -> Run:
         OSError: The file is not there or cannot be read.
         MissingExtraError: h5py is not installed.
     """
-    trajectory = read_trajectory(path)
+    return run_of(read_trajectory(path), path)
+
+
+def run_of(trajectory: Trajectory, path: str | Path) -> Run:
+    """The run in a trajectory that was read from `path`.
+
+    Raises:
+        RecordingError: It holds no samples, rover or ground.
+        ModelError: The rover in it is not one.
+    """
     scene = trajectory.attributes.get("scene", {})
     if "q" not in trajectory.data or "model" not in scene:
         refuse(RecordingError, "path", str(path), "holds no rover: neither `q` nor `scene.model` may be missing")

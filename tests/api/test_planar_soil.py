@@ -1,14 +1,18 @@
 """`rover_gym.planar.SoilSimulation`: arrays, bad input, snapshots, recording and pictures."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rover_gym.figures.soil import Frame, draw_soil
-from rover_gym.planar import Line, SoilSimulation, SoilSnapshot, soil_packing
-from rover_gym.planar_soil import record_soil, rover_on_soil, settled_bed
-from rover_gym.recording import read_trajectory
+from rover_gym.figures.soil import draw_soil
+from rover_gym.planar import BallSimulation, Line, SoilSimulation, SoilSnapshot, describe, record, soil_packing
+from rover_gym.planar_soil import Bed, record_soil, rover_on_soil, settled_bed
+from rover_gym.recording import RecordingError
+from rover_gym.soil_run import read_soil_run
+from rover_gym.soil_trials import drawbar_pull, drive_on_soil, over_beds
 
 
 def pair(**options: object) -> SoilSimulation:
@@ -89,31 +93,107 @@ def test_packings_repeat_and_do_not_overlap() -> None:
         soil_packing(10, width=0.01)
 
 
-def test_the_rover_crosses_and_a_snapshot_continues_bit_for_bit(tmp_path: Path) -> None:
-    bed = settled_bed(150, 3, settle=0.2)
+@pytest.fixture(scope="module")
+def bed() -> Bed:
+    """A hundred disks in two layers, 1.66 m wide."""
+    return settled_bed(100, 2, settle=0.1)
+
+
+def test_the_rover_drives_and_a_snapshot_continues_bit_for_bit(bed: Bed, tmp_path: Path) -> None:
     sim = rover_on_soil(bed)
     sim.set_torques([50.0, 50.0])
     start = sim.machine
-    sim.step(100)
+    sim.step(40)
     snapshot = SoilSnapshot.from_bytes(sim.snapshot().to_bytes())
-    frames: list[Frame] = []
-    record_soil(sim, tmp_path / "soil.h5", "a test", duration=0.1, look=lambda now: frames.append(Frame(now)))
+    path = tmp_path / "soil.h5"
+    record_soil(sim, path, "a test", duration=0.08, steps_per_row=20, walls=bed.walls)
     end = sim.position
     assert sim.machine[0] > start[0]
     sim.restore(snapshot)
-    sim.step(100)
+    impulse = np.zeros(2)
+    for _ in range(80):
+        sim.step()
+        impulse += sim.impulse_on_wheels()
     np.testing.assert_array_equal(sim.position, end)
-    run = read_trajectory(tmp_path / "soil.h5")
-    np.testing.assert_array_equal(run["position"][-1], end)
-    assert run["penetration"].max() < 0.01 * sim.radius.min()
-    assert len(frames) == len(run["time"]) == 6
-    impulses = []
-    for _ in range(100):
-        sim.step(1)
-        impulses.append(sim.impulse_on_wheels()[1])
-    weight = 250.0 * 9.81 * sim.time_step
-    assert np.mean(impulses) == pytest.approx(weight, rel=0.25)  # single steps carry knocks
-    assert draw_soil(frames[-1], tmp_path / "soil.png").read_bytes().startswith(b"\x89PNG")
+
+    run = read_soil_run(path)
+    assert run.title == "a test"
+    assert run.n_frames == 5
+    np.testing.assert_allclose(run.time, [0.04, 0.06, 0.08, 0.1, 0.12])
+    np.testing.assert_array_equal(run.positions[-1], end)
+    np.testing.assert_array_equal(run.walls, bed.walls)
+    assert run.trajectory["penetration"].max() < 0.01 * sim.radius.min()
+    # The forces of a row are means over its steps, so over equal rows their mean is the whole impulse.
+    np.testing.assert_allclose(run.wheel_forces[1:].mean(axis=0).sum(axis=0), impulse / 0.08, rtol=1e-9)
+    strengths = run.force_chains[1:, :, 4]
+    assert (np.diff(strengths, axis=1) <= 0.0).all()  # the strongest first
+    assert (strengths[:, 0] > 0.0).all()
+    assert len(run.resample(25.0).time) == 3
+    assert draw_soil(run, tmp_path / "soil.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_file_without_a_soil_is_refused(tmp_path: Path) -> None:
+    sim = BallSimulation(Line())
+    record(sim, tmp_path / "ball.h5", describe(sim, "a ball"), duration=0.01)
+    with pytest.raises(RecordingError, match="holds no soil"):
+        read_soil_run(tmp_path / "ball.h5")
+
+
+def test_a_weaker_gravity_gives_the_same_motion_slower() -> None:
+    # Froude: with g/s^2 and torques/s^2 and the step s h everything goes s times slower, on the same paths. A power of
+    # two changes no digit, so the paths are equal to the last bit. The original run, at g/100, is such a run.
+    ends = []
+    for s in (1.0, 4.0):
+        options = {"gravity": (0.0, -9.81 / s**2), "time_step": 1e-3 * s}
+        sim = rover_on_soil(settled_bed(80, 2, settle=0.1 * s, **options), start=0.66, **options)
+        sim.set_torques([50.0 / s**2] * 2)
+        sim.step(50)
+        ends.append((sim.position, sim.machine, s * sim.velocity, s * sim.machine_rate, sim.time / s))
+    assert (ends[0][1][3:] < -0.01).all()  # its wheels turned
+    for one, other in zip(*ends, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_wheel_pulls_more_with_more_slip() -> None:
+    # Two slips far apart on a short bed: the curve itself is `rover planar soil --sweep`.
+    bed = settled_bed(250, 4, radius_min=0.013, radius_max=0.0195, settle=0.2, time_step=2e-3)
+    trial = partial(drawbar_pull, run_in=0.2, distance=0.6, time_step=2e-3, tolerance=1e-3, sleep=True)
+    (dragged,), (slipping,) = over_beds(trial, [0.0, 0.7], [bed])
+    assert dragged.pull < 0.0 < slipping.pull
+    assert [dragged.slip, slipping.slip] == [0.0, 0.7]
+    for pull in (dragged, slipping):
+        assert pull.weight == pytest.approx(10.0 * 9.81, rel=0.1)
+
+
+def test_a_drive_tells_way_slip_and_sinkage(bed: Bed) -> None:
+    drive = drive_on_soil(bed, 60.0, run_in=0.05, duration=0.2)
+    assert drive.torque == 60.0
+    assert drive.distance > 0.0
+    assert drive.speed == pytest.approx(drive.distance / 0.2)
+    assert 0.0 < drive.slip < 1.0
+    assert -0.01 < drive.sinkage < 0.05
+    assert np.isnan(drive_on_soil(bed, 0.0, run_in=0.02, duration=0.05).slip)  # it stands
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda _: settled_bed(0), "count"),
+        (lambda _: settled_bed(10, 2.5), "layers"),
+        (lambda _: settled_bed(10, settle=-1.0), "settle"),
+        (lambda bed: rover_on_soil(bed, start=0.5), "start"),
+        (lambda bed: rover_on_soil(bed, start=1.2), "start"),
+        (lambda bed: drawbar_pull(bed, 1.0), "slip"),
+        (lambda bed: drawbar_pull(bed, 0.1, speed=0.0), "speed"),
+        (lambda bed: drawbar_pull(bed, 0.1, distance=3.0), "distance"),
+        (lambda bed: drive_on_soil(bed, 50.0, duration=0.0), "duration"),
+        (lambda bed: drive_on_soil(bed, np.nan), "torques[0]"),
+    ],
+)
+def test_a_trial_that_cannot_be_is_refused_by_name(call: Callable[[Bed], object], field: str, bed: Bed) -> None:
+    with pytest.raises(ValueError, match=r".+") as caught:
+        call(bed)
+    assert getattr(caught.value, "field", None) == field
 
 
 def test_kinematic_disks_bear_and_move_as_they_are_told() -> None:

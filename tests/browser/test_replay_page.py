@@ -6,6 +6,7 @@ import re
 import shutil
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,9 +19,11 @@ from selenium.webdriver.common.by import By
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
 from rover_gym.appearance import GROUND_COLOUR, TRUNK_COLOUR
+from rover_gym.planar_soil import record_soil, rover_on_soil, settled_bed
 from rover_gym.recording import Recorder, Sampler, describe
-from rover_gym.replay import write_page
+from rover_gym.replay import write_page, write_soil_page
 from rover_gym.run import Run, read_run
+from rover_gym.soil_run import SoilRun, read_soil_run
 
 ROCKS = SphereField([[1.6, 0.0, 0.6], [1.2, 0.05, -1.3], [-0.9, 0.0, 1.3]], [0.25, 0.2, 0.15], Plane())
 PEAK = 1e5  # N, of an impact
@@ -32,6 +35,14 @@ class Shown(NamedTuple):
 
     browser: webdriver.Chrome
     run: Run
+    page: Path
+
+
+class SoilShown(NamedTuple):
+    """A page of a run on a soil that is open."""
+
+    browser: webdriver.Chrome
+    run: SoilRun
     page: Path
 
 
@@ -93,7 +104,14 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown]:
     folder = tmp_path_factory.mktemp("page")
     run = drive(folder / "run.h5")
     page = write_page(run, folder / "replay.html")
-    browser = start_browser(folder / "profile")
+    with opened(page, folder / "profile") as browser:
+        yield Shown(browser, run, page)
+
+
+@contextmanager
+def opened(page: Path, profile: Path) -> Iterator[webdriver.Chrome]:
+    """A browser with the page, its player paused at the start."""
+    browser = start_browser(profile)
     try:
         browser.set_page_load_timeout(PATIENCE)
         browser.set_script_timeout(PATIENCE)
@@ -101,7 +119,7 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shown]:
         browser.get(page.as_uri())
         await_that(lambda: slider(browser) is not None, "the player's timeline")
         go_to(browser, 0.0)  # it plays from the start; what follows looks at times of its own choice
-        yield Shown(browser, run, page)
+        yield browser
     finally:
         browser.quit()
 
@@ -164,6 +182,12 @@ def messages(browser: webdriver.Chrome, method: str) -> list[dict[str, Any]]:
 
 
 def test_the_page_loads_without_errors_and_without_the_network(shown: Shown) -> None:
+    assert_alone(shown)
+    assert shown.browser.title == "a drive over rocks"
+
+
+def assert_alone(shown: Shown | SoilShown) -> None:
+    """The page asked for nothing outside itself, and the browser told of no error."""
     asked = [params["request"]["url"] for params in messages(shown.browser, "Network.requestWillBeSent")]
     assert shown.page.as_uri() in asked
     inside = ("data:", "blob:", "chrome:", shown.page.as_uri())
@@ -171,7 +195,6 @@ def test_the_page_loads_without_errors_and_without_the_network(shown: Shown) -> 
     assert messages(shown.browser, "Network.webSocketCreated") == []
     severe = [entry for entry in shown.browser.get_log("browser") if entry["level"] == "SEVERE"]
     assert severe == []
-    assert shown.browser.title == "a drive over rocks"
 
 
 def test_the_scene_shows_rover_rocks_and_ground_the_right_way_up(shown: Shown) -> None:
@@ -267,6 +290,66 @@ def test_it_plays(shown: Shown) -> None:
     shown.browser.find_element(By.CSS_SELECTOR, "#root button").click()
     await_that(lambda: (slider(shown.browser) or 0.0) > 0.25, "a later time")
     go_to(shown.browser, 0.0)
+
+
+# --- The two-wheel rover on a soil of disks
+
+
+@pytest.fixture(scope="module")
+def soil_shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SoilShown]:
+    """Half a second on 150 disks."""
+    folder = tmp_path_factory.mktemp("soil")
+    bed = settled_bed(150, 2, settle=0.1)
+    sim = rover_on_soil(bed)
+    sim.set_torques([50.0, 50.0])
+    record_soil(sim, folder / "soil.h5", "the rover on 150 disks", duration=0.5, steps_per_row=50, walls=bed.walls)
+    run = read_soil_run(folder / "soil.h5")
+    page = write_soil_page(run, folder / "soil.html")
+    with opened(page, folder / "profile") as browser:
+        yield SoilShown(browser, run, page)
+
+
+def test_a_soils_page_loads_alone_and_shows_rover_and_disks(soil_shown: SoilShown) -> None:
+    assert_alone(soil_shown)
+    browser = soil_shown.browser
+    assert browser.title == "the rover on 150 disks"
+    assert [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")] == [
+        "load of the wheel (N)",
+        "sinkage (mm)",
+        "rim faster than rover (mm/s)",
+    ]
+    red, green, blue = np.moveaxis(picture(browser), -1, 0)
+    assert ((blue > red + 60.0) & (green < blue)).mean() > 0.002  # the body, blue
+    assert (np.maximum(red, np.maximum(green, blue)) < 70.0).mean() > 0.002  # the tyres, black
+    sand = (blue < 110.0) & (red > blue + 30.0) & (green - blue > 0.45 * (red - blue))  # yellow, darker than the sky
+    assert sand.mean() > 0.005
+    assert np.nonzero(sand)[0].min() > 0.4 * sand.shape[0]  # below
+
+
+def test_a_soils_timeline_moves_disks_chains_and_wheels_and_comes_back(soil_shown: SoilShown) -> None:
+    browser, run = soil_shown.browser, soil_shown.run
+    go_to(browser, 0.0)
+    first = picture(browser)
+    go_to(browser, 0.5)
+    later = picture(browser)
+    end = f"{run.wheel_forces[-1, 0, 1]:.1f}"
+    await_that(lambda: end in readings(browser)[0], "the load at the end")
+    go_to(browser, 0.0)
+    back = picture(browser)
+    pink = [
+        ((image[..., 0] > image[..., 1] + 60.0) & (image[..., 2] > image[..., 1] + 20.0)).sum()
+        for image in (first, later)
+    ]
+    assert pink[1] > pink[0]  # no contact had borne anything at the start
+    changed = (np.abs(coarse(later) - coarse(first)).max(axis=-1) > 15.0).mean()
+    assert changed > 0.01
+    assert (np.abs(coarse(back) - coarse(first)).max(axis=-1) > 15.0).mean() < 0.1 * changed
+
+
+def coarse(image: np.ndarray) -> np.ndarray:
+    """Means of squares of 8 pixels: the player draws with more or fewer pixels as it finds time."""
+    height, width = (8 * (n // 8) for n in image.shape[:2])
+    return image[:height, :width].reshape(height // 8, 8, width // 8, 8, 3).mean(axis=(1, 3))
 
 
 def test_a_missing_browser_is_named_and_fails(monkeypatch: pytest.MonkeyPatch) -> None:

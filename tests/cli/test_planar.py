@@ -1,8 +1,11 @@
 """`rover planar`, and the figures of the report's chapter 3."""
 
+import json
 import struct
+import subprocess
 from pathlib import Path
 
+import imageio_ffmpeg
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -11,12 +14,19 @@ from rover_gym.cli import app
 from rover_gym.figures.chapter_3 import draw_chapter_3, incline, published
 from rover_gym.planar import describe, record
 from rover_gym.recording import read_trajectory
+from rover_gym.soil_run import read_soil_run
+
+
+def png_size(path: Path) -> tuple[int, int]:
+    head = path.read_bytes()[:24]
+    assert head.startswith(b"\x89PNG")
+    width, height = struct.unpack(">II", head[16:24])
+    return width, height
 
 
 def is_png(path: Path) -> bool:
-    head = path.read_bytes()[:24]
-    width, height = struct.unpack(">II", head[16:24])
-    return head.startswith(b"\x89PNG") and width >= 1200 and height >= 600
+    width, height = png_size(path)
+    return width >= 1100 and height >= 600
 
 
 @pytest.mark.parametrize(
@@ -65,6 +75,85 @@ def test_bad_options_end_with_one_line(options: list[str], field: str, tmp_path:
     assert result.exit_code == 2
     assert f"error: {field}" in result.output
     assert not (tmp_path / "ball.h5").exists()
+
+
+SMALL = ["--disks", "100", "--layers", "2"]
+
+
+def test_a_crossing_is_recorded_drawn_filmed_and_replayed(tmp_path: Path) -> None:
+    options = [*SMALL, "--duration", "0.2", "--output", str(tmp_path)]
+    result = CliRunner().invoke(app, ["planar", "soil", *options])
+    assert result.exit_code == 0, result.output
+    assert "distance" in result.output
+    run = read_soil_run(tmp_path / "soil.h5")
+    assert run.trajectory.attributes["complete"]
+    assert run.n_frames == 11
+    assert run.time[-1] == pytest.approx(0.2)
+    assert run.wheels[-1, 1, 0] > run.wheels[0, 1, 0]
+    width, height = png_size(tmp_path / "soil.png")
+    assert width == 1200
+    assert height > 300
+    command = [
+        imageio_ffmpeg.get_ffmpeg_exe(),
+        "-i",
+        str(tmp_path / "soil.mp4"),
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "gray",
+        "-",
+    ]
+    film = subprocess.run(command, capture_output=True, check=True).stdout
+    frames = np.frombuffer(film, np.uint8).astype(int).reshape(6, -1, 1200)
+    assert (np.abs(frames[0] - frames[-1]) > 60).mean() > 0.001  # it moves
+
+    page = tmp_path / "soil.html"
+    replay = CliRunner().invoke(app, ["replay", str(tmp_path / "soil.h5"), "--html", str(page)])
+    assert replay.exit_code == 0, replay.output
+    assert page.stat().st_size > 500_000
+    refused = CliRunner().invoke(app, ["replay", str(tmp_path / "soil.h5"), "--gltf", str(tmp_path / "soil.glb")])
+    assert refused.exit_code == 2
+    assert "error: gltf" in refused.output
+
+
+def test_a_crossing_ends_where_the_soil_does(tmp_path: Path) -> None:
+    options = ["--disks", "90", "--layers", "2", "--duration", "5", "--torque", "90", "--no-video"]
+    result = CliRunner().invoke(app, ["planar", "soil", *options, "--gravity", "0.61", "--output", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    assert read_soil_run(tmp_path / "soil.h5").time[-1] < 5.0
+
+
+def test_a_sweep_is_drawn_and_its_numbers_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, values in (("TORQUES", (50.0,)), ("SLIPS", (0.0, 0.7)), ("LOADS", (10.0,))):
+        monkeypatch.setattr(f"rover_gym.cli.soil.{name}", values)
+    options = [*SMALL, "--sweep", "--seeds", "1", "--pull-disks", "190", "--pull-layers", "3"]
+    result = CliRunner().invoke(app, ["planar", "soil", *options, "--output", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    numbers = json.loads((tmp_path / "soil-curves.json").read_text())
+    assert [row[0]["torque"] for row in numbers["drives"]] == [50.0]
+    assert [row[0]["slip"] for row in numbers["pulls"]["10.0"]] == [0.0, 0.7]
+    assert is_png(tmp_path / "soil-curves.png")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--disks", "40"], "error: start"),  # too narrow for the rover
+        (["--friction", "-1"], "error: friction"),
+        (["--wheel-friction", "nan"], "error: wheel_friction"),
+        (["--time-step", "0"], "error: time_step"),
+        (["--torque", "nan"], "error: torques[0]"),
+        (["--disks", "3"], "--disks"),
+        (["--gravity", "0"], "--gravity"),
+        (["--sweep", "--seeds", "1", "--pull-disks", "60"], "error: distance"),
+    ],
+)
+def test_a_soil_that_cannot_be_ends_with_one_line(options: list[str], message: str, tmp_path: Path) -> None:
+    arguments = ["planar", "soil", *SMALL, *options, "--output", str(tmp_path)]
+    result = CliRunner().invoke(app, arguments, env={"COLUMNS": "200", "NO_COLOR": "1"})
+    assert result.exit_code == 2
+    assert message in result.output
+    assert not any(tmp_path.iterdir())
 
 
 def test_the_incline_is_the_published_figure(tmp_path: Path) -> None:

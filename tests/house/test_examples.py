@@ -16,6 +16,7 @@ PAGES = (
     "docs/recording.md",
     "docs/replay.md",
     "docs/seeing.md",
+    "docs/soil.md",
     "docs/vector.md",
 )
 

@@ -102,15 +102,24 @@ def packing(data: dict[str, Any]) -> Iterator[Finding]:
 
 def repose(data: dict[str, Any]) -> Iterator[Finding]:
     """The slope's angle against friction."""
-    angles = [row["angle"] for row in data["means"]]
+    angles = np.array([row["angle"] for row in data["means"]])
+    errors = np.array([row["error"] for row in data["means"]])
+    falls = -np.diff(angles) / np.hypot(errors[1:], errors[:-1])
     yield Finding(
-        "angle of repose, smallest step up with µ",
-        "above 0: monotone",
+        "angle of repose, largest fall with µ in standard errors",
+        "below 2: monotone",
         "",
-        float(np.diff(angles).min()),
-        1e-9,
-        90.0,
-        "deg",
+        float(falls.max()),
+        -90.0,
+        2.0,
+    )
+    yield Finding(
+        "angle of repose, rise from µ 0.05 to 0.7 in standard errors",
+        "above 4",
+        "",
+        float((angles[-1] - angles[0]) / np.hypot(errors[-1], errors[0])),
+        4.0,
+        np.inf,
     )
 
 

@@ -67,7 +67,7 @@ def saturation(filling: np.ndarray, borne: np.ndarray) -> tuple[float, float]:
 
 def measure(ledger: Ledger) -> dict[str, object]:
     """Fillings of several heights between rough walls, and one between smooth walls."""
-    runs = [weigh(height, seed, ledger) for seed in (0, 1) for height in HEIGHTS]
+    runs = [weigh(height, seed, ledger) for seed in range(4) for height in HEIGHTS]
     smooth = [weigh(height, 0, ledger, wall_friction=0.0) for height in (1.0, 3.0)]
     mass, determination = saturation(np.array([r["filling"] for r in runs]), np.array([r["borne"] for r in runs]))
     return {"runs": runs, "smooth": smooth, "saturation": mass, "determination": determination}

@@ -10,7 +10,10 @@ from validation.samples import DIAMETER, Array, box, glued_row, loose, settle, s
 from validation.watch import Ledger
 
 FRICTIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7)
-LENGTH, COUNT = 32.0, 500
+LENGTH, COUNT = 60.0, 900
+SEEDS = (0, 1, 2)
+#: Shares of a heap's height between which its flank is taken: above it is flat, below it thins out.
+HIGH, LOW = 0.8, 0.2
 
 
 def surface(position: Array, radius: Array, left: float, right: float) -> tuple[Array, Array]:
@@ -25,6 +28,13 @@ def surface(position: Array, radius: Array, left: float, right: float) -> tuple[
             places.append(x[k])
             heights.append(top[k])
     return np.array(places), np.array(heights)
+
+
+def angle(x: Array, y: Array) -> float:
+    """Degrees of a heap's flank: a line through its surface, x onwards, between HIGH and LOW of its height."""
+    top = float(y.max())
+    flank = (np.arange(len(x)) >= np.flatnonzero(y > HIGH * top)[-1]) & (y > LOW * top)
+    return float(np.degrees(np.arctan(-np.polyfit(x[flank], y[flank], 1)[0])))
 
 
 def slope(count: int, friction: float, seed: int, ledger: Ledger, *, length: float = LENGTH) -> dict[str, object]:
@@ -55,12 +65,10 @@ def slope(count: int, friction: float, seed: int, ledger: Ledger, *, length: flo
     ledger.merge(watched.ledger)
     free = ~sim.kinematic
     x, y = surface(sim.position[free], sim.radius[free], 0.0, edge)
-    inner = (x > 0.1 * edge) & (x < 0.9 * edge)
-    gradient = np.polyfit(x[inner], y[inner], 1)[0]
     return {
         "friction": friction,
         "seed": seed,
-        "angle": float(np.degrees(np.arctan(-gradient))),
+        "angle": angle(x, y),
         "left": int(free.sum()),
         "seconds": float(sim.time),
         "surface": [(x / DIAMETER).round(3).tolist(), (y / DIAMETER).round(3).tolist()],
@@ -69,13 +77,15 @@ def slope(count: int, friction: float, seed: int, ledger: Ledger, *, length: flo
 
 def measure(ledger: Ledger) -> dict[str, object]:
     """Slopes of several frictions."""
-    runs = [slope(COUNT, mu, seed, ledger) for mu in FRICTIONS for seed in (0, 1)]
-    means = [
-        {
-            "friction": mu,
-            "angle": float(np.mean([r["angle"] for r in runs if r["friction"] == mu])),
-            "spread": float(np.ptp([r["angle"] for r in runs if r["friction"] == mu])),
-        }
-        for mu in FRICTIONS
-    ]
-    return {"runs": runs, "means": means}
+    runs = [slope(COUNT, mu, seed, ledger) for mu in FRICTIONS for seed in SEEDS]
+    return {"runs": runs, "means": means(runs)}
+
+
+def means(runs: list[dict[str, object]]) -> list[dict[str, float]]:
+    """Mean angle for each friction, with its standard error and the range of the seeds."""
+    rows = []
+    for mu in FRICTIONS:
+        angles = np.array([r["angle"] for r in runs if r["friction"] == mu], dtype=float)
+        error = float(angles.std(ddof=1) / np.sqrt(len(angles)))
+        rows.append({"friction": mu, "angle": float(angles.mean()), "error": error, "spread": float(np.ptp(angles))})
+    return rows

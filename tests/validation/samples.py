@@ -21,8 +21,6 @@ SPREAD = 0.2
 MASS = 0.1
 #: s; sqrt(d/g) is 45 ms.
 TIME_STEP = 5e-4
-#: Most sweeps of the contact solver in a step: the default's tolerance, a tenth of its patience.
-SWEEPS = 200
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,7 @@ class Sample:
 
     def watched(self, *, walls: object = None, friction: float, has_energy: bool = True, **options: object) -> Watched:
         """A simulation of these disks; their friction with walls is the same as among them unless given."""
-        given = {"wall_friction": friction, "time_step": TIME_STEP, "max_iterations": SWEEPS} | options
+        given = {"wall_friction": friction, "time_step": TIME_STEP} | options
         sim = SoilSimulation(
             self.radius, self.mass, self.position, kinematic=self.kinematic, walls=walls, friction=friction, **given
         )

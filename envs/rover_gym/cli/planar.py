@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -10,6 +10,7 @@ from rich.table import Table
 
 from rover_gym._core import OptionError
 from rover_gym.cli.console import console, plain_errors, progress_bar, say_path
+from rover_gym.cli.soil import soil
 from rover_gym.planar import (
     BallSimulation,
     Ground,
@@ -122,71 +123,7 @@ def rover(
     _run(sim, "the two-wheel rover", duration, output / "rover.h5")
 
 
-@planar.command()
-@plain_errors
-def soil(
-    *,
-    disks: Annotated[int, typer.Option(min=30, max=20_000, help="Number of disks.")] = 222,
-    layers: Annotated[int, typer.Option(min=1, max=100, help="Layers of disks.")] = 3,
-    torque: Annotated[float, typer.Option(help="Torque of each wheel, N m, positive forward.")] = 50.0,
-    gravity: Annotated[float, typer.Option(min=0.0, help="Gravity, m/s^2; the original run had 0.0981.")] = 9.81,
-    friction: Annotated[float, typer.Option(help="Coulomb's coefficient between disks.")] = 0.5,
-    wheel_friction: Annotated[float, typer.Option(help="Coulomb's coefficient at the wheels.")] = 0.9,
-    time_step: TimeStep = 0.001,
-    duration: Duration = 2.0,
-    seed: Annotated[int, typer.Option(min=0, help="Of the disks' radii and places.")] = 0,
-    video: Annotated[bool, typer.Option(help="Write a video, soil.mp4.")] = True,
-    sweep: Annotated[bool, typer.Option(help="Draw slip, sinkage and drawbar pull too; takes minutes.")] = False,
-    output: Output = Path("runs/planar"),
-) -> None:
-    """Drive the two-wheel rover over granular soil of disks; record, draw and film it."""
-    from rover_gym.figures.soil import Frame, draw_soil, film_soil  # noqa: PLC0415 - matplotlib is slow to load
-    from rover_gym.planar_soil import record_soil, rover_on_soil, settled_bed  # noqa: PLC0415 - h5py is slow to load
-
-    options: dict[str, Any] = {"gravity": (0.0, -gravity), "friction": friction, "time_step": time_step}
-    slowness = float(np.sqrt(9.81 / max(gravity, 1e-3)))
-    bed = settled_bed(disks, layers, seed=seed, settle=0.5 * slowness, **options)
-    sim = rover_on_soil(bed, wheel_friction=wheel_friction, **options)
-    sim.set_torques([torque, torque])
-    title = f"the two-wheel rover on a soil of {disks} disks"
-    path = output / "soil.h5"
-    steps_per_row = max(1, round(duration / time_step / 100))
-    frames: list[Frame] = []
-    start = sim.machine
-    with progress_bar() as bar:
-        task = bar.add_task("soil", total=duration, state="")
-        rows = record_soil(
-            sim,
-            path,
-            title,
-            duration=duration,
-            steps_per_row=steps_per_row,
-            progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
-            look=lambda now: frames.append(Frame(now)),
-        )
-    trajectory = read_trajectory(path)
-    table = Table(title=title, show_header=False, title_justify="left")
-    moved = sim.machine - start
-    turned = -0.2 * float(moved[3:].mean())
-    table.add_row("distance", f"{moved[0]:.3f} m in {sim.time:g} s")
-    table.add_row("slip", f"{1.0 - moved[0] / turned:.3f}" if abs(turned) > 1e-9 else "no turn")
-    table.add_row("contacts at the end", str(len(sim.contacts)))
-    share = float(trajectory["penetration"].max()) / float(sim.radius.min())
-    table.add_row("deepest overlap", f"{100.0 * share:.3f}% of the smallest radius")
-    table.add_row("rows not converged", f"{rows} of {len(frames) - 1}")
-    console().print(table)
-    say_path("trajectory", path)
-    say_path("figure", draw_soil(frames[len(frames) // 2], output / "soil.png"))
-    if video:
-        say_path("video", film_soil(frames, output / "soil.mp4"))
-    if sweep:
-        from rover_gym.figures.soil import draw_curves  # noqa: PLC0415 - as above
-        from rover_gym.planar_soil import drawbar_pull, slip_on_soil  # noqa: PLC0415 - as above
-
-        scale = gravity / 9.81
-        drives = [slip_on_soil(bed, scale * t, **options) for t in (5.0, 10.0, 20.0, 35.0, 50.0, 75.0, 100.0)]
-        pulls = [drawbar_pull(bed, slip, **options) for slip in (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7)]
-        say_path("curves", draw_curves(drives, pulls, output / "soil-curves.png"))
+planar.command()(soil)
 
 
 def _ground(

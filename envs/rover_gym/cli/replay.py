@@ -8,15 +8,20 @@ import typer
 from rover_gym._core import OptionError
 from rover_gym.cli.console import plain_errors, say_path
 from rover_gym.extras import require
-from rover_gym.replay import write_gltf, write_page, write_vrml
-from rover_gym.run import read_run
+from rover_gym.recording import Trajectory, read_trajectory
+from rover_gym.replay import write_gltf, write_page, write_soil_page, write_vrml
+from rover_gym.run import run_of
+from rover_gym.soil_run import is_soil, soil_run_of
 from rover_gym.validation import refuse
 
 
 @plain_errors
 def replay(
     *,
-    run: Annotated[Path, typer.Argument(help="A trajectory that `rover drive --output` or `rover report` wrote.")],
+    run: Annotated[
+        Path,
+        typer.Argument(help="A trajectory that `rover drive --output`, `rover report` or `rover planar soil` wrote."),
+    ],
     html: Annotated[Path | None, typer.Option(dir_okay=False, help="Page for the browser; needs no network.")] = None,
     vrml: Annotated[Path | None, typer.Option(dir_okay=False, help="VRML97 file, by custom .wrl.")] = None,
     gltf: Annotated[Path | None, typer.Option(dir_okay=False, help="Binary glTF 2.0 file, by custom .glb.")] = None,
@@ -29,10 +34,24 @@ def replay(
     for package, wanted in (("viser", html), ("pygltflib", gltf)):
         if wanted is not None:
             require(package, "replay")  # before the first file is written
-    frames = read_run(run).resample(fps)
+    trajectory = read_trajectory(run)
+    if is_soil(trajectory):
+        _replay_soil(trajectory, run, html, {"vrml": vrml, "gltf": gltf}, fps, follow=follow)
+        return
+    frames = run_of(trajectory, run).resample(fps)
     if html is not None:
         say_path("page", write_page(frames, html, follow=follow))
     if vrml is not None:
         say_path("VRML", write_vrml(frames, vrml))
     if gltf is not None:
         say_path("glTF", write_gltf(frames, gltf))
+
+
+def _replay_soil(
+    trajectory: Trajectory, run: Path, html: Path | None, others: dict[str, Path | None], fps: float, *, follow: bool
+) -> None:
+    for name, path in others.items():
+        if path is not None:
+            refuse(OptionError, name, str(path), "a run on a soil can be replayed as a page only, with --html")
+    if html is not None:
+        say_path("page", write_soil_page(soil_run_of(trajectory, run).resample(fps), html, follow=follow))

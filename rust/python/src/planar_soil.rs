@@ -261,7 +261,7 @@ impl SoilSimulation {
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
     #[pyo3(signature = (radius, mass, position, *, kinematic = None, walls = None, ground = None, rover = None, rig = None, machine = None,
         friction = 0.5, wall_friction = 0.5, wheel_friction = 0.9, restitution = 0.0, gravity = None, time_step = 1e-3,
-        tolerance = 1e-4, max_iterations = 200, stabilisation = "projection", penetration_tolerance = None,
+        tolerance = 1e-4, max_iterations = 2000, stabilisation = "none", penetration_tolerance = None,
         sleep = false, sleep_speed = None, sleep_distance = None))]
     fn new(
         radius: &Bound<'_, PyAny>,

@@ -1,0 +1,189 @@
+"""`rover planar soil`: the two-wheel rover on granular soil, a crossing or a sweep of trials."""
+
+import json
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.table import Table
+
+from rover_gym.cli.console import console, plain_errors, progress_bar, say_path
+
+EARTH = 9.81  # m/s^2
+FRAMES = 25.0  # of the video, a second at EARTH
+END = 0.02  # m between front wheel and wall at which a crossing ends
+
+#: Sweeps: torques of each wheel (N m, at EARTH), slips, and loads (kg) of the wheel that pulls.
+TORQUES = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 65.0, 80.0, 100.0)
+SLIPS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7)
+LOADS = (10.0, 30.0)
+#: Radii of the disks on which the wheel pulls, m: unequal, so that they do not lie in rows.
+UNEQUAL = {"radius_min": 0.013, "radius_max": 0.0195}
+
+
+@plain_errors
+def soil(
+    *,
+    disks: Annotated[
+        int | None, typer.Option(min=30, max=20_000, help="Number of disks; 222, and 444 in a sweep, if not given.")
+    ] = None,
+    layers: Annotated[int, typer.Option(min=1, max=100, help="Layers of disks.")] = 3,
+    torque: Annotated[float, typer.Option(help="Torque of each wheel, N m, positive forward.")] = 50.0,
+    gravity: Annotated[float, typer.Option(min=1e-3, help="Gravity, m/s^2; the original run had 0.0981.")] = EARTH,
+    friction: Annotated[float, typer.Option(help="Coulomb's coefficient between disks.")] = 0.5,
+    wheel_friction: Annotated[float, typer.Option(help="Coulomb's coefficient at the wheels.")] = 0.9,
+    time_step: Annotated[
+        float | None,
+        typer.Option(
+            help="Time step, s; 1 ms (in a sweep 2 ms) at 9.81 m/s^2, longer as gravity is weaker, if not given."
+        ),
+    ] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(
+            min=0.01,
+            max=1000.0,
+            help="Time to simulate, s; 4 s at 9.81 m/s^2, longer as gravity is weaker, if not given. "
+            "It ends earlier where the soil does.",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the disks' radii and places; a sweep's first.")] = 0,
+    video: Annotated[bool, typer.Option(help="Write a video, soil.mp4.")] = True,
+    sweep: Annotated[
+        bool,
+        typer.Option(
+            "--sweep",
+            help="Instead of a crossing: slip and sinkage against torque, drawbar pull against slip; takes minutes.",
+        ),
+    ] = False,
+    seeds: Annotated[int, typer.Option(min=1, max=100, help="Sweep: on how many beds each trial is made.")] = 4,
+    pull_disks: Annotated[int, typer.Option(min=30, max=20_000, help="Sweep: disks under the pulling wheel.")] = 480,
+    pull_layers: Annotated[int, typer.Option(min=1, max=100, help="Sweep: their layers.")] = 6,
+    output: Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)] = Path("runs/planar"),
+) -> None:
+    """Drive the two-wheel rover over granular soil of disks; record, draw and film it."""
+    slowness = float(np.sqrt(EARTH / gravity))
+    options: dict[str, Any] = {
+        "gravity": (0.0, -gravity),
+        "friction": friction,
+        "time_step": (2e-3 if sweep else 1e-3) * slowness if time_step is None else time_step,
+    }
+    if sweep:
+        beds = range(seed, seed + seeds)
+        _sweep(disks or 444, layers, pull_disks, pull_layers, beds, wheel_friction, options, output)
+    else:
+        seconds = 4.0 * slowness if duration is None else duration
+        _cross(disks or 222, layers, torque, seconds, seed, wheel_friction, options, output, video=video)
+
+
+def _cross(
+    disks: int,
+    layers: int,
+    torque: float,
+    duration: float,
+    seed: int,
+    wheel_friction: float,
+    options: dict[str, Any],
+    output: Path,
+    *,
+    video: bool,
+) -> None:
+    from rover_gym.figures.soil import draw_soil, film_soil  # noqa: PLC0415 - matplotlib is slow to load
+    from rover_gym.planar_soil import record_soil, rover_on_soil, settled_bed  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.soil_run import read_soil_run  # noqa: PLC0415 - as above
+
+    bed = settled_bed(disks, layers, seed=seed, **options)
+    sim = rover_on_soil(bed, wheel_friction=wheel_friction, **options)
+    sim.set_torques([torque, torque])
+    title = f"the two-wheel rover on a soil of {disks} disks"
+    path = output / "soil.h5"
+    rate = FRAMES * float(np.sqrt(-options["gravity"][1] / EARTH))
+    with progress_bar() as bar:
+        task = bar.add_task("soil", total=duration, state="")
+        rows = record_soil(
+            sim,
+            path,
+            title,
+            duration=duration,
+            steps_per_row=max(1, round(0.5 / rate / sim.time_step)),
+            walls=bed.walls,
+            until=lambda now: bool(now.wheels[-1, 0] + now.wheels[-1, 2] > bed.width - END),
+            progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
+        )
+    run = read_soil_run(path)
+    machine = run.trajectory["machine"]
+    distance, rims = (
+        machine[-1, 0] - machine[0, 0],
+        -float((run.wheels[0, :, 2] * (machine[-1] - machine[0])[3:]).mean()),
+    )
+    table = Table(title=title, show_header=False, title_justify="left")
+    table.add_row("distance", f"{distance:.3f} m in {sim.time:g} s")
+    table.add_row("slip", f"{1.0 - distance / rims:.3f}" if rims > 0.01 else "the wheels stand")
+    table.add_row("mean sinkage", f"{1e3 * run.sinkage.mean():.1f} mm")
+    table.add_row("contacts at the end", str(len(sim.contacts)))
+    share = float(run.trajectory["penetration"].max()) / float(sim.radius.min())
+    table.add_row("deepest overlap", f"{100.0 * share:.3f}% of the smallest radius")
+    table.add_row("rows not converged", f"{rows} of {run.n_frames - 1}")
+    console().print(table)
+    say_path("trajectory", path)
+    say_path("figure", draw_soil(run, output / "soil.png", row=run.n_frames // 2))
+    if video:
+        with console().status("drawing the video"):
+            film = film_soil(run.resample(rate), output / "soil.mp4", frames_per_second=round(FRAMES))
+        say_path("video", film)
+
+
+def _sweep(
+    disks: int,
+    layers: int,
+    pull_disks: int,
+    pull_layers: int,
+    seeds: range,
+    wheel_friction: float,
+    options: dict[str, Any],
+    output: Path,
+) -> None:
+    from rover_gym.figures.soil_curves import draw_curves  # noqa: PLC0415 - matplotlib is slow to load
+    from rover_gym.planar_soil import settled_bed  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.soil_trials import drawbar_pull, drive_on_soil, over_beds  # noqa: PLC0415 - as above
+
+    scale = -options["gravity"][1] / EARTH
+    slowness = float(scale**-0.5)
+    # Means over seconds and beds need no closer solution, and most of a bed lies still.
+    cheap = {"tolerance": 1e-3, "sleep": True, "sleep_speed": 5e-4 / slowness}
+    rest = {**options, **cheap, "wheel_friction": wheel_friction}
+    drive = partial(drive_on_soil, run_in=0.5 * slowness, duration=2.0 * slowness, **rest)
+    with progress_bar() as bar:
+        total = len(seeds) * (2 + len(TORQUES) + len(LOADS) * len(SLIPS))
+        task = bar.add_task("trials", total=total, state="")
+        done = 0
+
+        def advance(_: int) -> None:
+            nonlocal done
+            done += 1
+            bar.update(task, completed=done, state=f"{done} of {total}")
+
+        beds, pull_beds = [], []
+        for seed in seeds:
+            beds.append(settled_bed(disks, layers, seed=seed, **options))
+            advance(1)
+            pull_beds.append(settled_bed(pull_disks, pull_layers, seed=seed, **UNEQUAL, **options))
+            advance(1)
+        pulls = {}
+        for load in LOADS:
+            pull = partial(drawbar_pull, load=load, speed=0.3 / slowness, **rest)
+            pulls[load] = over_beds(pull, SLIPS, pull_beds, progress=advance)
+        drives = over_beds(drive, [scale * torque for torque in TORQUES], beds, progress=advance)
+    output.mkdir(parents=True, exist_ok=True)
+    numbers = {
+        "drives": [[asdict(drive) for drive in row] for row in drives],
+        "pulls": {str(load): [[asdict(pull) for pull in row] for row in rows] for load, rows in pulls.items()},
+    }
+    path = output / "soil-curves.json"
+    # JSON knows no nan: the slip of wheels that stood is null.
+    path.write_text(json.dumps(numbers, indent=1).replace("NaN", "null") + "\n", encoding="utf-8")
+    say_path("numbers", path)
+    say_path("curves", draw_curves(drives, pulls, output / "soil-curves.png"))

@@ -1,0 +1,93 @@
+"""What all pages for the browser share: viser's scene and player, and our curves beside them.
+
+The scene and its player are viser's [https://viser.studio]: its recording of scene updates, within the client that its
+package carries. The curves are drawn by a small script of ours, `panel.js`, that follows the player's own clock.
+"""
+
+from __future__ import annotations
+
+import html
+import io
+import json
+from collections.abc import Mapping
+from contextlib import contextmanager, redirect_stdout
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.appearance import GROUND_COLOUR, SKY_COLOUR, SKY_COLOUR_2, Colour
+from rover_gym.extras import require
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+Array = npt.NDArray[np.float64]
+
+
+@contextmanager
+def hidden_server() -> Iterator[Any]:
+    """A viser server that only this process sees: it holds the scene that is recorded.
+
+    Raises:
+        MissingExtraError: viser is not installed.
+    """
+    viser = require("viser", "replay")
+    with redirect_stdout(io.StringIO()):  # it announces its address, which nobody needs
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        yield server
+    finally:
+        with redirect_stdout(io.StringIO()):
+            server.stop()
+
+
+def add_surroundings(scene: Any) -> None:
+    """Says where up is, and adds light and sky."""
+    scene.set_up_direction("+y")
+    scene.configure_environment_map(None)  # a third of the time of a frame without it, where there is no GPU
+    scene.add_light_hemisphere("/sky", sky_color=rgb(SKY_COLOUR), ground_color=rgb(GROUND_COLOUR), intensity=1.2)
+    shades = np.linspace(rgb(SKY_COLOUR_2), rgb(SKY_COLOUR), 64).astype(np.uint8)
+    scene.set_background_image(np.repeat(shades[:, None], 2, axis=1), format="png")
+
+
+def add_meshes(
+    scene: Any, name: str, meshes: Iterable[tuple[Colour, Array, npt.NDArray[np.int32]]], *, cast_shadow: bool = True
+) -> None:
+    """Adds surfaces, each a colour, vertices (n, 3) and triangles (m, 3)."""
+    for i, (colour, vertices, triangles) in enumerate(meshes):
+        used, corners = np.unique(triangles, return_inverse=True)
+        scene.add_mesh_simple(
+            f"{name}/{i}", vertices[used], corners.reshape(-1, 3), color=rgb(colour), cast_shadow=cast_shadow
+        )
+
+
+def rgb(colour: Colour) -> tuple[int, int, int]:
+    """A colour in viser's numbers, 0 to 255."""
+    red, green, blue = (round(255 * value) for value in colour)
+    return red, green, blue
+
+
+def shortened(values: Array, bits: int = 18) -> Array:
+    """Values to 2^-bits, 4 micrometres or microradians, as binary fractions: their zeros make the recording smaller."""
+    result: Array = np.round(values * 2.0**bits) / 2.0**bits
+    return result
+
+
+def with_panel(page: str, title: str, curves: Mapping[str, Any]) -> str:
+    """Viser's page with our panel beside its scene."""
+    files = resources.files("rover_gym.replay")
+    style, script = (files.joinpath(name).read_text(encoding="utf-8") for name in ("panel.css", "panel.js"))
+    data = json.dumps(curves, separators=(",", ":")).replace("<", "\\u003c")  # no tag may end the script
+    panel = (
+        f"<style>{style}</style>"
+        '<aside id="panel"></aside>'
+        f'<script type="application/json" id="curves">{data}</script>'
+        f"<script>{script}</script>"
+    )
+    head, found, rest = page.partition("<title>Viser</title>")
+    body, end, tail = rest.rpartition("</body>")
+    if not found or not end:
+        raise RuntimeError("viser's page has changed: it lacks the title or the end of the body where ours begins")
+    return f"{head}<title>{html.escape(title)}</title>{body}{panel}{end}{tail}"

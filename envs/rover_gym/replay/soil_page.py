@@ -1,0 +1,289 @@
+"""The page of a run on a soil of disks: disks, wheels and force chains on a timeline, curves beside them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.appearance import (
+    AXLE_COLOUR,
+    FORCE_COLOUR,
+    GROUND_COLOUR,
+    HUB_COLOUR,
+    ROCK_COLOUR,
+    TYRE_COLOUR,
+    Colour,
+    Part,
+    part_mesh,
+)
+from rover_gym.extras import require
+from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, shortened, with_panel
+
+if TYPE_CHECKING:
+    from rover_gym.soil_run import SoilRun
+
+#: Curves of the back and of the front wheel.
+WHEEL_COLOURS = ("#0072B2", "#D55E00")
+SAND_COLOURS: tuple[Colour, Colour] = (
+    (0.86, 0.74, 0.54),
+    (0.66, 0.51, 0.33),
+)  # of a disk's halves: they show its turning
+DEPTH = 1.0  # of disks along the axis that the plane does not have, in their mean diameter
+BATCH = 100  # disks that are drawn at once: those of a batch where nothing moves need no update
+CHAINS = 300  # contacts that are drawn, the strongest
+SEEN = 2.6  # m of the soil that the eye sees at once
+ASPECT = 1.2  # of the picture, width over height, that they fill
+FIELD_OF_VIEW = 0.35  # rad, vertical: narrow and from afar, so that the plane stays a plane
+FOLLOW_TIME = 1.0  # s, over which the path that the eye follows is smoothed
+
+Array = npt.NDArray[np.float64]
+
+
+def write_soil_page(run: SoilRun, path: str | Path, *, follow: bool = True) -> Path:
+    """Writes a run on a soil as one page for the browser.
+
+    Args:
+        run: The run; every sample becomes a frame of the replay.
+        path: The file to write, by custom `.html`. Its folder is made.
+        follow: Whether the eye goes with the rover over a soil that is wider than the picture.
+
+    Raises:
+        MissingExtraError: viser is not installed.
+        OSError: The file cannot be written.
+    """
+    with hidden_server() as server:
+        scene = server.scene
+        add_surroundings(scene)
+        scene.add_light_directional("/front", intensity=1.5, position=(1.0, 2.0, 6.0))  # the disks' faces look there
+        world = scene.add_frame("/world", show_axes=False)
+        moving: list[_Disks | _Wheels | _Chains] = [_Disks(run, scene), _Wheels(run, scene), _Chains(run, scene)]
+        _add_walls(run, scene)
+        eye = _eye(run, follow=follow)
+        distance = 0.5 * SEEN / (ASPECT * np.tan(0.5 * FIELD_OF_VIEW))
+        server.initial_camera.position = (0.0, eye[0, 1] + 0.1 * distance, distance)
+        server.initial_camera.look_at = (0.0, eye[0, 1], 0.0)
+        server.initial_camera.fov = FIELD_OF_VIEW
+        recording = server.get_scene_serializer()
+        with server.atomic():
+            for frame, pause in enumerate(np.diff(run.time, append=run.time[-1])):
+                world.position = shortened(np.array([-eye[frame, 0], 0.0, 0.0]))
+                for part in moving:
+                    part.show(frame)
+                recording.insert_sleep(float(pause))
+        page = recording.as_html()
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(with_panel(page, run.title, _curves(run)), encoding="utf-8")
+    return path
+
+
+def _about_z(angles: Array) -> Array:
+    """(n, 4) unit quaternions w, x, y, z of turns about z."""
+    turns = np.zeros((len(angles), 4))
+    turns[:, 0], turns[:, 3] = np.cos(0.5 * angles), np.sin(0.5 * angles)
+    return turns
+
+
+def _depth(run: SoilRun) -> float:
+    return 2.0 * DEPTH * float(run.radius.mean())
+
+
+class _Disks:
+    """All disks, in batches of neighbours."""
+
+    def __init__(self, run: SoilRun, scene: Any) -> None:
+        self._run = run
+        n = len(run.radius)
+        order = np.argsort(run.positions[0, :, 0], kind="stable")
+        self._batches = np.array_split(order, -(-n // BATCH))
+        mesh = _disk_mesh(24 if n <= 500 else 12)
+        depth = _depth(run)
+        self._shown: list[Array] = [np.empty(0)] * len(self._batches)
+        self._handles = [
+            scene.add_batched_meshes_trimesh(
+                f"/world/disks/{i}",
+                mesh,
+                batched_wxyzs=_about_z(np.zeros(len(batch))),
+                batched_positions=np.zeros((len(batch), 3)),
+                batched_scales=np.stack((run.radius[batch], run.radius[batch], np.full(len(batch), depth)), axis=1),
+                lod="off",
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+            for i, batch in enumerate(self._batches)
+        ]
+
+    def show(self, frame: int) -> None:
+        """Moves what moved since the frame before."""
+        for i, (batch, handle) in enumerate(zip(self._batches, self._handles, strict=True)):
+            places = shortened(self._run.positions[frame, batch], 13)
+            if not np.array_equal(places, self._shown[i]):
+                self._shown[i] = places
+                handle.batched_positions = np.column_stack((places[:, :2], np.zeros(len(batch))))
+                handle.batched_wxyzs = shortened(_about_z(places[:, 2]), 9)
+
+
+class _Wheels:
+    """Wheels and, between two of them, the body."""
+
+    def __init__(self, run: SoilRun, scene: Any) -> None:
+        self._run, self._depth = run, _depth(run)
+        self._handles = []
+        for k, radius in enumerate(run.wheels[0, :, 2]):
+            name = f"/world/wheel_{k}"
+            self._handles.append(scene.add_frame(name, show_axes=False))
+            add_meshes(scene, name, _wheel_meshes(float(radius), self._depth), cast_shadow=False)
+        self._body = None
+        if len(self._handles) == 2:
+            self._body = scene.add_frame("/world/body", show_axes=False)
+            length = float(np.hypot(*np.diff(run.wheels[0, :, :2], axis=0)[0]))
+            beam = Part("", "box", (length, 0.05, 0.02), (0.0, 0.0, 0.8 * self._depth), np.eye(3), AXLE_COLOUR)
+            add_meshes(scene, "/world/body", [_surface(beam)], cast_shadow=False)
+
+    def show(self, frame: int) -> None:
+        """Moves wheels and body."""
+        wheels, angles = self._run.wheels[frame], self._run.wheel_angles[frame]
+        for handle, (x, y, _), turn in zip(self._handles, wheels, _about_z(angles), strict=True):
+            handle.position = shortened(np.array([x, y, 0.0]))
+            handle.wxyz = shortened(turn)
+        if self._body is not None:
+            (x, y), (dx, dy) = wheels[:, :2].mean(axis=0), np.diff(wheels[:, :2], axis=0)[0]
+            self._body.position = shortened(np.array([x, y, 0.0]))
+            self._body.wxyz = shortened(_about_z(np.array([np.arctan2(dy, dx)]))[0])
+
+
+class _Chains:
+    """The strongest contacts as bars in front of the disks, wider where the force is larger."""
+
+    def __init__(self, run: SoilRun, scene: Any) -> None:
+        self._run = run
+        self._n = min(CHAINS, run.force_chains.shape[1])
+        loads = np.linalg.norm(run.wheel_forces[1:], axis=-1)
+        self._full = max(1e-9, float(np.median(loads, axis=0).max()) if loads.size else 0.0)
+        self._width = float(run.radius.mean())
+        vertices, triangles = part_mesh(Part("", "box", (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), np.eye(3), FORCE_COLOUR))
+        self._handle = scene.add_batched_meshes_simple(
+            "/world/chains",
+            vertices,
+            triangles,
+            batched_wxyzs=_about_z(np.zeros(self._n)),
+            batched_positions=np.zeros((self._n, 3)),
+            batched_scales=np.full((self._n, 3), 1e-6),
+            batched_colors=rgb(FORCE_COLOUR),
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+    def show(self, frame: int) -> None:
+        """Lays the bars anew."""
+        chains = self._run.force_chains[frame, : self._n]
+        start, end = chains[:, :2], chains[:, 2:4]
+        along = end - start
+        widths = np.minimum(1.0, np.sqrt(chains[:, 4] / self._full)) * self._width
+        height = np.full(self._n, 0.5 * _depth(self._run))
+        self._handle.batched_positions = shortened(np.column_stack((0.5 * (start + end), height)), 13)
+        self._handle.batched_wxyzs = shortened(_about_z(np.arctan2(along[:, 1], along[:, 0])), 9)
+        length = np.hypot(along[:, 0], along[:, 1])
+        sizes = np.column_stack((length, widths, 0.2 * widths))
+        self._handle.batched_scales = np.maximum(shortened(sizes, 13), 1e-6)
+
+
+def _disk_mesh(sides: int) -> Any:
+    """A trimesh cylinder about z of radius 1 and height 1 with two colours; its back, which nobody sees, is open."""
+    trimesh = require("trimesh", "replay")
+    around = 2.0 * np.pi * np.arange(sides) / sides
+    rim = np.stack((np.cos(around), np.sin(around), np.full(sides, 0.5)), axis=1)
+    k, after = np.arange(sides), (np.arange(sides) + 1) % sides
+    corners = [
+        np.stack((np.tile([0.0, 0.0, 0.5], (sides, 1)), rim, rim[after]), axis=1),
+        np.stack((rim, rim * [1.0, 1.0, -1.0], rim[after] * [1.0, 1.0, -1.0]), axis=1),
+        np.stack((rim, rim[after] * [1.0, 1.0, -1.0], rim[after]), axis=1),
+    ]
+    linear = np.round(255.0 * np.array(SAND_COLOURS) ** 2.2).astype(np.uint8)  # a vertex's colour is linear in glTF
+    colours = np.concatenate((linear[(k >= sides // 2).astype(int)], np.tile(linear[1], (2 * sides, 1))))
+    vertices = np.concatenate(corners).reshape(-1, 3)
+    return trimesh.Trimesh(
+        vertices,
+        np.arange(len(vertices)).reshape(-1, 3),
+        vertex_colors=np.repeat(colours, 3, axis=0),
+        process=False,
+    )
+
+
+def _surface(part: Part) -> tuple[Colour, Array, npt.NDArray[np.int32]]:
+    vertices, triangles = part_mesh(part, 48)
+    return part.colour, vertices @ part.rotation.T + np.array(part.position), triangles
+
+
+def _wheel_meshes(radius: float, depth: float) -> list[tuple[Colour, Array, npt.NDArray[np.int32]]]:
+    """A tyre with three bars across it, about z."""
+    to_z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    parts = [
+        Part("", "cylinder", (radius, depth), (0.0, 0.0, 0.0), to_z, TYRE_COLOUR),
+        Part("", "cylinder", (0.9 * radius, 0.02), (0.0, 0.0, 0.5 * depth), to_z, HUB_COLOUR),
+    ]
+    for angle in np.pi / 3.0 * np.arange(3):
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+        parts.append(Part("", "box", (1.8 * radius, 0.05 * radius, 0.02), (0.0, 0.0, 0.55 * depth), turn, TYRE_COLOUR))
+    return [_surface(part) for part in parts]
+
+
+def _add_walls(run: SoilRun, scene: Any) -> None:
+    """Slabs under floors, as wide as the soil, and beside upright walls, as high as the soil."""
+    x, y = run.positions[..., 0], run.positions[..., 1]
+    left, right = float((x - run.radius).min()), float((x + run.radius).max())
+    bottom, top = float((y - run.radius).min()), float((y + run.radius).max())
+    thick, depth = 0.03, 1.5 * _depth(run)
+    for i, (px, py, nx, ny) in enumerate(run.walls):
+        length = float(np.hypot(nx, ny))
+        n = np.array([nx, ny]) / length
+        upright = abs(n[0]) > abs(n[1])
+        middle = np.array([0.5 * (left + right), 0.5 * (bottom + top)])
+        foot = middle - ((middle - [px, py]) @ n) * n - 0.5 * thick * n
+        reach = (top - bottom) if upright else (right - left) + 2.0 * thick
+        turn = np.array([[n[1], n[0], 0.0], [-n[0], n[1], 0.0], [0.0, 0.0, 1.0]])
+        colour = ROCK_COLOUR if upright else GROUND_COLOUR
+        slab = Part("", "box", (reach, thick, depth), (float(foot[0]), float(foot[1]), 0.0), turn, colour)
+        add_meshes(scene, f"/world/wall_{i}", [_surface(slab)], cast_shadow=False)
+
+
+def _eye(run: SoilRun, *, follow: bool) -> Array:
+    """(n, 2) the point in the picture's middle: the rover's, smoothed, kept so that the picture is full of soil."""
+    x = run.positions[0, :, 0]
+    left, right = float(x.min()), float(x.max())
+    height = float(run.wheels[0, :, 1].mean()) if run.wheels.size else 0.0
+    middle = np.full(run.n_frames, 0.5 * (left + right))
+    if follow and run.wheels.size and right - left > SEEN:
+        spans = np.abs(run.time[:, None] - run.time) <= FOLLOW_TIME / 2
+        middle = spans @ run.wheels[..., 0].mean(axis=1) / spans.sum(axis=1)
+        middle = np.clip(middle, left + 0.5 * SEEN, right - 0.5 * SEEN)
+    return np.column_stack((middle, np.full(run.n_frames, height)))
+
+
+def _curves(run: SoilRun) -> dict[str, Any]:
+    """What the panel draws."""
+    names = ("wheel",) if run.wheels.shape[1] == 1 else ("back", "front")
+    charts = [
+        ("load of the wheel", "N", run.wheel_forces[..., 1], 1),
+        ("sinkage", "mm", 1e3 * run.sinkage, 2),
+        ("rim faster than rover", "mm/s", 1e3 * run.slip_speeds, 1),
+    ]
+    return {
+        "title": run.title,
+        "time": [round(float(time - run.time[0]), 4) for time in run.time],
+        "wheels": [
+            {"name": name, "colour": colour} for name, colour in zip(names, WHEEL_COLOURS[: len(names)], strict=True)
+        ],
+        "charts": [
+            {
+                "title": title,
+                "unit": unit,
+                "values": [[round(float(value), digits) for value in column] for column in values.T],
+            }
+            for title, unit, values, digits in charts
+        ],
+    }
