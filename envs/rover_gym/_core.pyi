@@ -763,7 +763,7 @@ class SoilSimulation:
         tolerance: Of the contact solver, relative.
         max_iterations: Most sweeps of the contact solver in a step.
         stabilisation: "none" or "projection", which lifts what lies above and so adds energy.
-        penetration_tolerance: Penetration from which on it is projected away, m; 0.5% of the smallest radius if not given.
+        penetration_tolerance: From which overlap on it projects, m; 0.5% of the smallest radius if not given.
         sleep: Whether disks sleep that rest far from anything that moves.
         sleep_speed: m/s below which a disk is still; 5e-4 if not given.
         sleep_distance: m within which nothing may move; 0.2 if not given.
