@@ -762,7 +762,8 @@ class SoilSimulation:
         time_step: s.
         tolerance: Of the contact solver, relative.
         max_iterations: Most sweeps of the contact solver in a step.
-        stabilisation: "none" or "projection", which lifts what lies above and so adds energy.
+        stabilisation: "none" or "projection", which takes overlaps away and may add energy by lifting what lies above;
+            if not given, "none" without restitution and "projection" with it, for what is struck away may hit others.
         penetration_tolerance: From which overlap on it projects, m; 0.5% of the smallest radius if not given.
         sleep: Whether disks sleep that rest far from anything that moves.
         sleep_speed: m/s below which a disk is still; 5e-4 if not given.
@@ -795,7 +796,7 @@ class SoilSimulation:
         time_step: float = 0.001,
         tolerance: float = 0.0001,
         max_iterations: int = 2000,
-        stabilisation: Literal["projection", "none"] = "none",
+        stabilisation: Literal["projection", "none"] | None = None,
         penetration_tolerance: float | None = None,
         sleep: bool = False,
         sleep_speed: float | None = None,

@@ -124,7 +124,7 @@ def measure(ledger: Ledger) -> dict[str, object]:
     flat = [run_out(COUNT, aspect, seed, ledger) for seed in (0, 1) for aspect in ASPECTS]
     rough = [run_out(COUNT, aspect, 0, ledger, rough=True) for aspect in ASPECTS[1::2]]
     bouncing = [run_out(COUNT, aspect, 0, ledger, restitution=0.5) for aspect in (0.8,)]
-    sizes = [run_out(count, 2.0, 0, ledger) for count in (200, 2000, 5000)]
+    sizes = [run_out(count, 2.0, 0, ledger) for count in (200, 2500)]
     return {"flat": flat, "rough": rough, "bouncing": bouncing, "sizes": sizes, "fits": fits(flat)}
 
 

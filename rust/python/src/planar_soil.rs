@@ -261,7 +261,7 @@ impl SoilSimulation {
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
     #[pyo3(signature = (radius, mass, position, *, kinematic = None, walls = None, ground = None, rover = None, rig = None, machine = None,
         friction = 0.5, wall_friction = 0.5, wheel_friction = 0.9, restitution = 0.0, gravity = None, time_step = 1e-3,
-        tolerance = 1e-4, max_iterations = 2000, stabilisation = "none", penetration_tolerance = None,
+        tolerance = 1e-4, max_iterations = 2000, stabilisation = None, penetration_tolerance = None,
         sleep = false, sleep_speed = None, sleep_distance = None))]
     fn new(
         radius: &Bound<'_, PyAny>,
@@ -281,7 +281,7 @@ impl SoilSimulation {
         time_step: f64,
         tolerance: f64,
         max_iterations: usize,
-        stabilisation: &str,
+        stabilisation: Option<&str>,
         penetration_tolerance: Option<f64>,
         sleep: bool,
         sleep_speed: Option<f64>,
@@ -316,8 +316,17 @@ impl SoilSimulation {
         }
         (options.time_step, options.restitution) = (time_step, restitution);
         (options.solver.tolerance, options.solver.max_sweeps) = (tolerance, max_iterations);
-        options.stabilisation =
-            choice::<Stabilisation>("stabilisation", stabilisation, &STABILISATIONS)?;
+        // What is struck away meets others that were not forecast, and goes into them.
+        let usual = if restitution > 0.0 {
+            "projection"
+        } else {
+            "none"
+        };
+        options.stabilisation = choice::<Stabilisation>(
+            "stabilisation",
+            stabilisation.unwrap_or(usual),
+            &STABILISATIONS,
+        )?;
         options.solver.velocity_tolerance = 10.0 * tolerance;
         if let Some(depth) = penetration_tolerance {
             options.penetration_tolerance = depth;
