@@ -384,9 +384,7 @@ pub fn solve_body_pairs(
                 || report.iterations == 1
                 || report.iterations == options.max_sweeps;
             if !is_due {
-                let next = 0.5 * (1.0 + (1.0 + 4.0 * t * t).sqrt());
-                share = (t - 1.0) / next;
-                t = next;
+                share = next_share(&mut t);
                 continue;
             }
         }
@@ -414,8 +412,14 @@ pub fn solve_body_pairs(
         }
         let violation = (relative / options.tolerance).max(velocity / options.velocity_tolerance);
         (rate, last_look) = (violation / last_change.sqrt(), report.iterations);
-        let next = 0.5 * (1.0 + (1.0 + 4.0 * t * t).sqrt());
-        share = (t - 1.0) / next;
-        t = next;
+        share = next_share(&mut t);
     }
+}
+
+/// Share of the extrapolation after a sweep, and Nesterov's sequence one on.
+fn next_share(t: &mut f64) -> f64 {
+    let next = 0.5 * (1.0 + (1.0 + 4.0 * *t * *t).sqrt());
+    let share = (*t - 1.0) / next;
+    *t = next;
+    share
 }
