@@ -15,6 +15,7 @@
 use super::body_pairs::{BodyPairs, DiscPair, WIDE};
 use super::one_contact::solve_one_contact;
 use super::options::{Method, SolverOptions};
+use super::passivity::passive_share;
 use super::report::{SolveReport, SolveStatus};
 use crate::law::coulomb::natural_map;
 use crate::problem::Residual;
@@ -182,11 +183,6 @@ impl Measured {
     fn is_within(&self, options: &SolverOptions) -> bool {
         self.residual.relative <= options.tolerance
             && self.residual.velocity <= options.velocity_tolerance
-    }
-
-    /// Beyond the rounding of its sums.
-    fn adds_energy(&self) -> bool {
-        self.work > f64::EPSILON * self.free.abs()
     }
 }
 
@@ -390,8 +386,10 @@ pub fn solve_body_pairs(
         }
         let is_last = report.iterations >= options.max_sweeps;
         let mut measured = sweeps.measure(p, u);
-        if (is_last || measured.is_within(options)) && measured.adds_energy() {
-            sweeps.scale((-measured.free / (measured.work - measured.free)).clamp(0.0, 1.0));
+        if (is_last || measured.is_within(options))
+            && let Some(share) = passive_share(measured.work, measured.free)
+        {
+            sweeps.scale(share);
             measured = sweeps.measure(p, u);
             t = 1.0;
         }

@@ -28,6 +28,7 @@ mod newton;
 mod nsgs;
 pub mod one_contact;
 mod options;
+pub(crate) mod passivity;
 mod pivoting;
 mod proximal;
 mod reduced_system;
