@@ -31,6 +31,9 @@ const FEW: usize = 1000;
 /// Factorisations of such a search; wedged wheels have taken 77.
 const ESCALATION_STEPS: usize = 200;
 
+/// Such searches for one step, each after all the sweeps that are allowed.
+const ESCALATIONS: usize = 3;
+
 /// A place that holds nothing that moves: c = s = 0 there.
 const NOWHERE: u32 = 0;
 
@@ -192,8 +195,7 @@ impl SoilSystem<'_> {
         }
     }
 
-    /// Goes on from where the sweeps stopped by the proximal-point method; where that does not converge either, or only by adding energy,
-    /// the sweeps' answer stays.
+    /// Goes on from where the sweeps stopped by the proximal-point method. The better of both answers stays, and adds no energy.
     fn escalate(
         &self,
         q: &[f64],
@@ -212,21 +214,30 @@ impl SoilSystem<'_> {
         let problem = self.problem(q, mu);
         let mut found = solve(&problem, &proximal, p, u, workspace);
         found.iterations += report.iterations;
-        let mut holds = found.is_converged();
+        let violation = |relative: f64, velocity: f64| {
+            (relative / options.tolerance).max(velocity / options.velocity_tolerance)
+        };
         if let Some(share) = passive_share(dot(p, u), dot(p, q)) {
             for p in &mut *p {
                 *p *= share;
             }
             let Residual { relative, velocity } = evaluate_into(&problem, p, u);
             (found.residual, found.velocity_error) = (relative, velocity);
-            holds &= relative <= options.tolerance && velocity <= options.velocity_tolerance;
+            if violation(relative, velocity) > 1.0 {
+                found.status = SolveStatus::Stalled;
+            }
         }
-        if holds {
+        let is_better = violation(found.residual, found.velocity_error)
+            < violation(report.residual, report.velocity_error);
+        if found.is_converged() || is_better {
             return found;
         }
         p.copy_from_slice(&p_swept);
         u.copy_from_slice(&u_swept);
-        report
+        SolveReport {
+            iterations: found.iterations,
+            ..report
+        }
     }
 
     /// The operator W of the last step's contacts, block by block, 1/kg.
@@ -665,18 +676,27 @@ impl MechanicalSystem for SoilSystem<'_> {
         u: &mut [f64],
         workspace: &mut SolverWorkspace,
     ) -> SolveReport {
-        let mut sweep = |p: &mut [f64], u: &mut [f64]| {
+        let sweep = |p: &mut [f64], u: &mut [f64], workspace: &mut SolverWorkspace| {
             let scratch = &mut workspace.body_sweeps;
             solve_body_pairs(&self.parts.pairs, q, mu, options, p, u, scratch)
         };
         match options.method {
-            Method::GaussSeidel => sweep(p, u),
+            Method::GaussSeidel => sweep(p, u, workspace),
             Method::Auto => {
-                let report = sweep(p, u);
-                if report.status != SolveStatus::MaxIterations || mu.len() > FEW {
-                    return report;
+                let mut report = sweep(p, u, workspace);
+                for _ in 0..ESCALATIONS {
+                    if report.status != SolveStatus::MaxIterations || mu.len() > FEW {
+                        break;
+                    }
+                    report = self.escalate(q, mu, options, (p, u), report, workspace);
+                    if report.is_converged() {
+                        break;
+                    }
+                    let before = report.iterations;
+                    report = sweep(p, u, workspace);
+                    report.iterations += before;
                 }
-                self.escalate(q, mu, options, (p, u), report, workspace)
+                report
             }
             _ => solve(&self.problem(q, mu), options, p, u, workspace),
         }
