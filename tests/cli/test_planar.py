@@ -8,10 +8,12 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from rover_gym.cli import app
 from rover_gym.figures.chapter_3 import draw_chapter_3, incline, published
+from rover_gym.figures.soil_run import SOIL_DRAWINGS
 from rover_gym.planar import describe, record
 from rover_gym.recording import read_trajectory
 from rover_gym.soil_run import read_soil_run
@@ -114,6 +116,29 @@ def test_a_crossing_is_recorded_drawn_filmed_and_replayed(tmp_path: Path) -> Non
     refused = CliRunner().invoke(app, ["replay", str(tmp_path / "soil.h5"), "--gltf", str(tmp_path / "soil.glb")])
     assert refused.exit_code == 2
     assert "error: gltf" in refused.output
+
+
+def test_a_run_on_a_soil_is_plotted(tmp_path: Path) -> None:
+    options = [*SMALL, "--duration", "0.2", "--no-video", "--output", str(tmp_path)]
+    assert CliRunner().invoke(app, ["planar", "soil", *options]).exit_code == 0
+    result = CliRunner().invoke(app, ["plot", str(tmp_path / "soil.h5"), "--overview"])
+    assert result.exit_code == 0, result.output
+    files = sorted((tmp_path / "soil-plots").iterdir())
+    assert [file.stem for file in files] == sorted((*SOIL_DRAWINGS, "overview"))
+    assert all(is_png(file) for file in files)
+    run = read_soil_run(tmp_path / "soil.h5")
+    figure = Figure()
+    SOIL_DRAWINGS["driving"](figure, run)
+    assert run.title in figure.get_suptitle()
+    speed, slip, depth = figure.axes
+    assert [axes.get_ylabel() for axes in figure.axes] == ["speed (m/s)", "slip (%)", "sinkage (mm)"]
+    np.testing.assert_array_equal(speed.get_lines()[0].get_ydata(), run.trajectory["machine_rate"][:, 0])
+    np.testing.assert_allclose(depth.get_lines()[1].get_ydata(), 1e3 * run.sinkage[:, 1])
+    ratios = np.array([line.get_ydata() for line in slip.get_lines()])
+    assert np.nanmax(ratios) <= 100.0
+    refused = CliRunner().invoke(app, ["plot", str(tmp_path / "soil.h5"), "--format", "bmp"])
+    assert refused.exit_code == 2
+    assert "error: format" in refused.output
 
 
 def test_a_crossing_ends_where_the_soil_does(tmp_path: Path) -> None:
