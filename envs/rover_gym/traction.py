@@ -34,6 +34,10 @@ class Estimate:
     value: float
     error: float
 
+    def __str__(self) -> str:
+        """Three digits after the point, and the standard error if there is one."""
+        return f"{self.value:.3f}" + (f" ± {self.error:.3f}" if np.isfinite(self.error) else "")
+
 
 @dataclass(frozen=True)
 class Traction:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,10 +11,11 @@ import numpy as np
 
 from rover_gym.extras import MissingExtraError
 from rover_gym.soil_trials import Drive, Pull
-from rover_gym.traction import Estimate, Traction
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from rover_gym.traction import Traction
 
 __all__ = ["draw_curves"]
 
@@ -53,7 +55,7 @@ def draw_curves(
     slip.set_ylabel("slip")
     depth.set_ylabel("sinkage, mm")
     texts = []
-    for (load, rows), colour in zip(pulls.items(), COLOURS, strict=False):
+    for (load, rows), colour in zip(pulls.items(), cycle(COLOURS), strict=False):
         slips, fit = [row[0].slip for row in rows], fits[load]
         ratios = [[trial.pull / trial.weight for trial in row] for row in rows]
         _curve(pull, slips, ratios, f"{load:g} kg", fmt="o", color=colour)
@@ -61,8 +63,8 @@ def draw_curves(
         pull.plot(between, fit(between), color=colour)
         _curve(sinkage, slips, [[1e3 * trial.sinkage for trial in row] for row in rows], f"{load:g} kg", color=colour)
         texts.append(
-            f"{load:g} kg:\n  A = {_text(fit.limit)}\n  s₀ = {_text(fit.free_slip)}\n  K = {_text(fit.scale)}\n"
-            f"  slope from s = {fit.first:g} on: {_text(fit.last_slope)}"
+            f"{load:g} kg:\n  A = {fit.limit}\n  s₀ = {fit.free_slip}\n  K = {fit.scale}\n"
+            f"  slope from s = {fit.first:g} on: {fit.last_slope}"
         )
     pull.axhline(0.0, color="black", linewidth=0.8)
     pull.set(xlabel="slip", ylabel="drawbar pull / load of one wheel")
@@ -75,14 +77,10 @@ def draw_curves(
         "\n".join(("lines: pull / load = A (1 - exp(-(s - s₀) / K))\nof the slip s\n", *texts)),
         transform=note.transAxes,
         verticalalignment="top",
+        fontsize=11.0,
     )
     figure.savefig(path, dpi=100)
     return Path(path)
-
-
-def _text(estimate: Estimate) -> str:
-    """A number with its standard error, if it has one."""
-    return f"{estimate.value:.3f}" + (f" ± {estimate.error:.3f}" if np.isfinite(estimate.error) else "")
 
 
 def _curve(
