@@ -53,16 +53,18 @@ class Drive:
 
 @dataclass(frozen=True)
 class Pull:
-    """What a wheel that travels and turns at given rates does.
+    """What a wheel that turns and travels at given rates does.
 
     Attributes:
         slip: 1 - speed / (radius x turning rate).
+        speed: Of its travel, mean over the measurement, m/s.
         pull: Mean horizontal force of the soil on the wheel, N: positive where it could pull something.
         weight: Mean vertical force of the soil on the wheel, N.
         sinkage: Of its lowest point below the bed's mean surface, mean, m.
     """
 
     slip: float
+    speed: float
     pull: float
     weight: float
     sinkage: float
@@ -119,29 +121,34 @@ def drawbar_pull(
     slip: float,
     *,
     load: float = 10.0,
-    speed: float = 0.3,
+    rim_speed: float = 0.3,
     run_in: float = 0.3,
     distance: float = 1.0,
     radius: float = WHEEL_RADIUS,
     **options: Any,
 ) -> Pull:
-    """One wheel that travels over a bed at a given speed and slip, free to sink.
+    """One wheel on the carriage of a single-wheel test bed: it turns and travels at given rates and is free to sink.
+
+    The rim has one speed at every slip, so that a large slip throws no soil; the wheel travels at 1 - slip times it.
+    Run-in and measurement are the same stretches of the bed at every slip, as a wheel settles by leaving the hole that
+    it began in; they take 1 / (1 - slip) times as long.
 
     Args:
         bed: The soil.
-        slip: Below 1.
+        slip: Below 1; negative where the wheel is braked. A wheel that stands, at 1, digs a hole instead of reaching
+            a steady state.
         load: Mass that the wheel carries, kg.
-        speed: Forward, m/s.
-        run_in: Way before the measurement begins, m: the wheel sinks in.
-        distance: Way of the measurement, m.
+        rim_speed: Radius x turning rate, m/s; the wheel travels at 1 - slip times it.
+        run_in: Travel before the measurement begins, m: the wheel sinks in.
+        distance: Travel of the measurement, m.
         radius: Of the wheel, m.
         **options: Of `SoilSimulation`.
 
     Raises:
-        OptionError: A number is out of its range, or the bed is too short for the way.
+        OptionError: A number is out of its range, or the bed is too short for the travel.
         ModelError: Load or radius is not positive.
     """
-    slip, speed = number("slip", slip), number("speed", speed, above=0.0)
+    slip, rim_speed = number("slip", slip), number("rim_speed", rim_speed, above=0.0)
     if slip >= 1.0:
         refuse(OptionError, "slip", slip, "must be below 1: the wheel travels")
     run_in, distance = number("run_in", run_in, at_least=0.0), number("distance", distance, above=0.0)
@@ -159,17 +166,20 @@ def drawbar_pull(
         machine=[start, height + 1e-4, 0.0, 0.0, 0.0],
         **options,
     )
-    turning = -speed / (radius * (1.0 - slip))
-    sim.set_state(sim.position, None, sim.machine, [speed, 0.0, 0.0, turning, 0.0])
+    speed = rim_speed * (1.0 - slip)
+    sim.set_state(sim.position, None, sim.machine, [speed, 0.0, 0.0, -rim_speed / radius, 0.0])
     sim.step(round(run_in / speed / sim.time_step))
+    begin = float(sim.machine[0])
     surface, depths, impulse = bed.surface, [], np.zeros(2)
     steps = max(1, round(distance / speed / sim.time_step))
     for _ in range(steps):
         sim.step()
         impulse += sim.impulse_on_wheels()
         depths.append(surface - float(sim.wheels[0, 1] - radius))
-    pull, weight = impulse / (steps * sim.time_step)
-    return Pull(slip, float(pull), float(weight), float(np.mean(depths)))
+    duration = steps * sim.time_step
+    pull, weight = impulse / duration
+    travelled = (float(sim.machine[0]) - begin) / duration
+    return Pull(slip, travelled, float(pull), float(weight), float(np.mean(depths)))
 
 
 def over_beds(

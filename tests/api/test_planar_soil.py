@@ -12,7 +12,8 @@ from rover_gym.planar import BallSimulation, Line, SoilSimulation, SoilSnapshot,
 from rover_gym.planar_soil import Bed, record_soil, rover_on_soil, settled_bed
 from rover_gym.recording import RecordingError
 from rover_gym.soil_run import read_soil_run
-from rover_gym.soil_trials import drawbar_pull, drive_on_soil, over_beds
+from rover_gym.soil_trials import Pull, drawbar_pull, drive_on_soil, over_beds
+from rover_gym.traction import fit_traction
 
 
 def pair(**options: object) -> SoilSimulation:
@@ -154,15 +155,48 @@ def test_a_weaker_gravity_gives_the_same_motion_slower() -> None:
         np.testing.assert_array_equal(one, other)
 
 
-def test_a_wheel_pulls_more_with_more_slip() -> None:
-    # Two slips far apart on a short bed: the curve itself is `rover planar soil --sweep`.
+def test_a_wheel_is_dragged_without_slip_and_pulls_with_half() -> None:
+    # A few slips on a short bed: the curve itself is `rover planar soil --sweep`.
     bed = settled_bed(250, 4, radius_min=0.013, radius_max=0.0195, settle=0.2, time_step=2e-3)
-    trial = partial(drawbar_pull, run_in=0.2, distance=0.6, time_step=2e-3, tolerance=1e-3, sleep=True)
-    (dragged,), (slipping,) = over_beds(trial, [0.0, 0.7], [bed])
-    assert dragged.pull < 0.0 < slipping.pull
-    assert [dragged.slip, slipping.slip] == [0.0, 0.7]
-    for pull in (dragged, slipping):
-        assert pull.weight == pytest.approx(10.0 * 9.81, rel=0.1)
+    trial = partial(drawbar_pull, rim_speed=0.2, run_in=0.2, distance=0.6, time_step=2e-3, tolerance=1e-3, sleep=True)
+    (braked,), (dragged,), (slipping,) = over_beds(trial, [-0.5, 0.0, 0.5], [bed])
+    assert [braked.slip, dragged.slip, slipping.slip] == [-0.5, 0.0, 0.5]
+    assert [braked.speed, dragged.speed, slipping.speed] == pytest.approx([0.3, 0.2, 0.1])
+    # In ratios of the load; the smallest rolling resistance seen on such beds is 0.1.
+    assert max(braked.pull, dragged.pull) < -0.1 * 98.1
+    assert slipping.pull > 0.0
+    for pull in (braked, dragged, slipping):
+        assert pull.weight == pytest.approx(10.0 * 9.81, rel=0.05)
+
+
+def test_a_curve_of_pull_against_slip_is_found_again() -> None:
+    slips = np.array([0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9])
+    offsets = np.array([-0.02, 0.0, 0.02])  # of three beds
+
+    def trials(ratios: np.ndarray) -> list[list[Pull]]:
+        return [
+            [Pull(s, 0.1, 50.0 * (ratio + offset), 50.0, 0.01) for offset in offsets]
+            for s, ratio in zip(slips, ratios, strict=True)
+        ]
+
+    fit = fit_traction(trials(0.25 * (1.0 - np.exp(-(slips - 0.1) / 0.15))))
+    for estimate, value in ((fit.limit, 0.25), (fit.free_slip, 0.1), (fit.scale, 0.15)):
+        assert estimate.value == pytest.approx(value, rel=0.01)
+    # Offsets of the whole curve move its limit as they do a mean, and its last slope not at all.
+    assert fit.limit.error == pytest.approx(offsets.std(ddof=1) / np.sqrt(3.0), rel=0.01)
+    assert fit.last_slope.error == pytest.approx(0.0, abs=1e-12)
+    assert fit.rms < 1e-3
+    np.testing.assert_allclose(fit([0.1, 9.0]), [0.0, 0.25], atol=2e-3)
+
+    straight = fit_traction(trials(0.3 * slips - 0.1), first=0.3)
+    assert straight.last_slope.value == pytest.approx(0.3)
+    assert straight.scale.value > 2.0  # no limit within the slips
+    with pytest.raises(ValueError, match="four slips") as caught:
+        fit_traction(trials(slips)[:3])
+    assert getattr(caught.value, "field", None) == "pulls"
+    with pytest.raises(ValueError, match="two slips") as caught:
+        fit_traction(trials(slips), first=0.8)
+    assert getattr(caught.value, "field", None) == "first"
 
 
 def test_a_drive_tells_way_slip_and_sinkage(bed: Bed) -> None:
@@ -184,7 +218,7 @@ def test_a_drive_tells_way_slip_and_sinkage(bed: Bed) -> None:
         (lambda bed: rover_on_soil(bed, start=0.5), "start"),
         (lambda bed: rover_on_soil(bed, start=1.2), "start"),
         (lambda bed: drawbar_pull(bed, 1.0), "slip"),
-        (lambda bed: drawbar_pull(bed, 0.1, speed=0.0), "speed"),
+        (lambda bed: drawbar_pull(bed, 0.1, rim_speed=0.0), "rim_speed"),
         (lambda bed: drawbar_pull(bed, 0.1, distance=3.0), "distance"),
         (lambda bed: drive_on_soil(bed, 50.0, duration=0.0), "duration"),
         (lambda bed: drive_on_soil(bed, np.nan), "torques[0]"),

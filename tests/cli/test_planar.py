@@ -8,10 +8,12 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from rover_gym.cli import app
 from rover_gym.figures.chapter_3 import draw_chapter_3, incline, published
+from rover_gym.figures.soil_run import SOIL_DRAWINGS
 from rover_gym.planar import describe, record
 from rover_gym.recording import read_trajectory
 from rover_gym.soil_run import read_soil_run
@@ -116,6 +118,38 @@ def test_a_crossing_is_recorded_drawn_filmed_and_replayed(tmp_path: Path) -> Non
     assert "error: gltf" in refused.output
 
 
+def test_a_run_on_a_soil_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    options = [*SMALL, "--duration", "0.2", "--no-video", "--output", str(tmp_path)]
+    assert CliRunner().invoke(app, ["planar", "soil", *options]).exit_code == 0
+    run = read_soil_run(tmp_path / "soil.h5")
+    figures = {name: Figure() for name in SOIL_DRAWINGS}
+    for name, draw in SOIL_DRAWINGS.items():
+        draw(figures[name], run)
+        assert run.title in figures[name].get_suptitle()
+    labels = [[axes.get_ylabel().split("\n")[-1] for axes in figure.axes] for figure in figures.values()]
+    assert labels == [
+        ["speed (m/s)", "slip (%)", "sinkage (mm)"],
+        ["vertical force (N)", "positive forward (N)"],
+        ["energy (J)", "contacts (1)", "overlap (%)"],
+    ]
+    speed, slip, depth = figures["driving"].axes
+    np.testing.assert_array_equal(speed.get_lines()[0].get_ydata(), run.trajectory["machine_rate"][:, 0])
+    np.testing.assert_allclose(depth.get_lines()[1].get_ydata(), 1e3 * run.sinkage[:, 1])
+    ratios = np.array([line.get_ydata() for line in slip.get_lines()])
+    assert np.isfinite(ratios[:, 1:]).all()
+    assert 0.0 < ratios.mean() < 100.0
+
+    monkeypatch.setattr("rover_gym.figures.soil_run.SOIL_DRAWINGS", {"driving": SOIL_DRAWINGS["driving"]})
+    result = CliRunner().invoke(app, ["plot", str(tmp_path / "soil.h5"), "--overview"])
+    assert result.exit_code == 0, result.output
+    files = sorted((tmp_path / "soil-plots").iterdir())
+    assert [file.name for file in files] == ["driving.png", "overview.png"]
+    assert all(is_png(file) for file in files)
+    refused = CliRunner().invoke(app, ["plot", str(tmp_path / "soil.h5"), "--format", "bmp"])
+    assert refused.exit_code == 2
+    assert "error: format" in refused.output
+
+
 def test_a_crossing_ends_where_the_soil_does(tmp_path: Path) -> None:
     options = ["--disks", "90", "--layers", "2", "--duration", "5", "--torque", "90", "--no-video"]
     result = CliRunner().invoke(app, ["planar", "soil", *options, "--gravity", "0.61", "--output", str(tmp_path)])
@@ -124,14 +158,20 @@ def test_a_crossing_ends_where_the_soil_does(tmp_path: Path) -> None:
 
 
 def test_a_sweep_is_drawn_and_its_numbers_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, values in (("TORQUES", (50.0,)), ("SLIPS", (0.0, 0.7)), ("LOADS", (10.0,))):
+    for name, values in (("TORQUES", (50.0,)), ("SLIPS", (0.0, 0.2, 0.5, 0.7)), ("LOADS", (10.0,))):
         monkeypatch.setattr(f"rover_gym.cli.soil.{name}", values)
     options = [*SMALL, "--sweep", "--seeds", "1", "--pull-disks", "190", "--pull-layers", "3"]
     result = CliRunner().invoke(app, ["planar", "soil", *options, "--output", str(tmp_path)])
     assert result.exit_code == 0, result.output
     numbers = json.loads((tmp_path / "soil-curves.json").read_text())
     assert [row[0]["torque"] for row in numbers["drives"]] == [50.0]
-    assert [row[0]["slip"] for row in numbers["pulls"]["10.0"]] == [0.0, 0.7]
+    pulls = [row[0] for row in numbers["pulls"]["10.0"]]
+    assert [pull["slip"] for pull in pulls] == [0.0, 0.2, 0.5, 0.7]
+    assert [pull["speed"] for pull in pulls] == pytest.approx([0.3, 0.24, 0.15, 0.09])
+    fit = numbers["fits"]["10.0"]
+    ratio = [pull["pull"] / pull["weight"] for pull in pulls]
+    assert fit["last_slope"] == {"value": pytest.approx((ratio[3] - ratio[2]) / 0.2), "error": None}
+    assert "slope from s = 0.5 on" in result.output
     assert is_png(tmp_path / "soil-curves.png")
 
 

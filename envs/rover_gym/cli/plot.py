@@ -6,13 +6,18 @@ from typing import Annotated
 import typer
 
 from rover_gym.cli.console import plain_errors, say_path
-from rover_gym.run import read_run
+from rover_gym.recording import read_trajectory
+from rover_gym.run import run_of
+from rover_gym.soil_run import is_soil, soil_run_of
 
 
 @plain_errors
 def plot(
     recording: Annotated[
-        Path, typer.Argument(metavar="RUN", help="A trajectory that `rover drive --output` or `rover report` saved.")
+        Path,
+        typer.Argument(
+            metavar="RUN", help="A trajectory that `rover drive --output`, `rover report` or `rover planar soil` saved."
+        ),
     ],
     output: Annotated[
         Path | None, typer.Option(file_okay=False, help="Folder to write into; beside the run, if not given.")
@@ -20,10 +25,21 @@ def plot(
     file_format: Annotated[str, typer.Option("--format", help="'png', 'svg' or 'pdf'.")] = "png",
     overview: Annotated[bool, typer.Option("--overview/--no-overview", help="Add one page with all figures.")] = False,
 ) -> None:
-    """Draw a saved run: its way from above; gaps, loads, slip, attitude, torques, energy and solver over time."""
-    run = read_run(recording)
-    folder = recording.with_name(f"{recording.stem}-plots") if output is None else output
-    from rover_gym.figures import draw_run  # noqa: PLC0415 - slow to load, and a bad file is told at once
+    """Draw a saved run over time: gaps, loads, slip, attitude, torques, energy and solver, and its way from above.
 
-    for path in draw_run(run, folder, file_format=file_format, with_overview=overview):
+    Of a run on a soil: speed, slip and sinkage; forces on the wheels; energy, contacts and overlap.
+    """
+    folder = recording.with_name(f"{recording.stem}-plots") if output is None else output
+    trajectory = read_trajectory(recording)
+    if is_soil(trajectory):
+        soil_run = soil_run_of(trajectory, recording)
+        from rover_gym.figures.soil_run import draw_soil_run  # noqa: PLC0415 - as below
+
+        paths = draw_soil_run(soil_run, folder, file_format=file_format, with_overview=overview)
+    else:
+        run = run_of(trajectory, recording)
+        from rover_gym.figures import draw_run  # noqa: PLC0415 - slow to load, and a bad file is told at once
+
+        paths = draw_run(run, folder, file_format=file_format, with_overview=overview)
+    for path in paths:
         say_path("figure", path)

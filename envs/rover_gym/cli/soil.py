@@ -4,7 +4,7 @@ import json
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
@@ -12,14 +12,18 @@ from rich.table import Table
 
 from rover_gym.cli.console import console, plain_errors, progress_bar, say_path
 
+if TYPE_CHECKING:
+    from rover_gym.traction import Traction
+
 EARTH = 9.81  # m/s^2
 FRAMES = 25.0  # of the video, a second at EARTH
 END = 0.02  # m between front wheel and wall at which a crossing ends
 
-#: Sweeps: torques of each wheel (N m, at EARTH), slips, and loads (kg) of the wheel that pulls.
+#: Sweeps: torques of each wheel (N m, at EARTH); slips, loads (kg) and rim's speed (m/s, at EARTH) of a pulling wheel.
 TORQUES = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 65.0, 80.0, 100.0)
-SLIPS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7)
-LOADS = (10.0, 30.0)
+SLIPS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+LOADS = (10.0,)
+RIM_SPEED = 0.3
 #: Radii of the disks on which the wheel pulls, m: unequal, so that they do not lie in rows.
 UNEQUAL = {"radius_min": 0.013, "radius_max": 0.0195}
 
@@ -149,6 +153,7 @@ def _sweep(
     from rover_gym.figures.soil_curves import draw_curves  # noqa: PLC0415 - matplotlib is slow to load
     from rover_gym.planar_soil import settled_bed  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.soil_trials import drawbar_pull, drive_on_soil, over_beds  # noqa: PLC0415 - as above
+    from rover_gym.traction import fit_traction  # noqa: PLC0415 - as above
 
     scale = -options["gravity"][1] / EARTH
     slowness = float(scale**-0.5)
@@ -174,16 +179,31 @@ def _sweep(
             advance(1)
         pulls = {}
         for load in LOADS:
-            pull = partial(drawbar_pull, load=load, speed=0.3 / slowness, **rest)
+            pull = partial(drawbar_pull, load=load, rim_speed=RIM_SPEED / slowness, **rest)
             pulls[load] = over_beds(pull, SLIPS, pull_beds, progress=advance)
         drives = over_beds(drive, [scale * torque for torque in TORQUES], beds, progress=advance)
+    fits = {load: fit_traction(rows) for load, rows in pulls.items()}
+    _say_fits(fits)
     output.mkdir(parents=True, exist_ok=True)
     numbers = {
         "drives": [[asdict(drive) for drive in row] for row in drives],
         "pulls": {str(load): [[asdict(pull) for pull in row] for row in rows] for load, rows in pulls.items()},
+        "fits": {str(load): asdict(fit) for load, fit in fits.items()},
     }
     path = output / "soil-curves.json"
-    # JSON knows no nan: the slip of wheels that stood is null.
+    # JSON knows no nan: the slip of wheels that stood is null, and so is the standard error of one bed.
     path.write_text(json.dumps(numbers, indent=1).replace("NaN", "null") + "\n", encoding="utf-8")
     say_path("numbers", path)
-    say_path("curves", draw_curves(drives, pulls, output / "soil-curves.png"))
+    say_path("curves", draw_curves(drives, pulls, fits, output / "soil-curves.png"))
+
+
+def _say_fits(fits: dict[float, "Traction"]) -> None:
+    """The numbers of the pull's curve for each load."""
+    first = next(iter(fits.values())).first
+    table = Table(title="pull / load = A (1 - exp(-(s - s₀) / K)) of the slip s", title_justify="left")
+    for column in ("load", "A", "s₀", "K", f"slope from s = {first:g} on"):
+        table.add_column(column)
+    for load, fit in fits.items():
+        numbers = (fit.limit, fit.free_slip, fit.scale, fit.last_slope)
+        table.add_row(f"{load:g} kg", *map(str, numbers))
+    console().print(table)
