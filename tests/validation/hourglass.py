@@ -18,7 +18,7 @@ MARGIN, HEIGHT = 30, 1.2
 #: One opening with half of that filling, and with a step of half the length.
 REPEATED = 8
 #: s after the opening before disks are counted, and how many are then counted at least.
-START, COUNTED = 0.3, 1000
+START, COUNTED = 0.3, 800
 #: s between two looks at what has run out.
 EVERY = 0.01
 #: Stretches of equal length that a run is cut into for its standard error.
