@@ -134,14 +134,13 @@ def beverloo(opening: Array, rate: Array, exponent: float | None = None) -> tupl
         rate: (m,) over rho sqrt(g) d^1.5.
         exponent: n, if it is not to be fitted.
     """
-    best = (np.inf, np.nan, np.nan, np.nan)
-    for k in np.arange(-3.0, opening.min() - 1.0, 1e-3):
-        x, y = np.log(opening - k), np.log(rate)
-        n = float(np.polyfit(x, y, 1)[0]) if exponent is None else exponent
-        constant = float((y - n * x).mean())
-        squares = float(((y - n * x - constant) ** 2).sum())
-        best = min(best, (squares, float(np.exp(constant)), float(k), n))
-    return best[1:]
+    k = np.arange(-3.0, opening.min() - 1.0, 1e-3)
+    x, y = np.log(opening - k[:, None]), np.log(rate)
+    from_mean, above = x - x.mean(axis=1, keepdims=True), y - y.mean()
+    slope = from_mean @ above / (from_mean**2).sum(axis=1)
+    n = slope if exponent is None else np.full(len(k), exponent)
+    best = int(((from_mean * n[:, None] - above) ** 2).sum(axis=1).argmin())
+    return float(np.exp(y.mean() - n[best] * x[best].mean())), float(k[best]), float(n[best])
 
 
 def fits(runs: list[dict[str, object]]) -> dict[str, object]:
