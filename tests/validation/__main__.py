@@ -1,4 +1,4 @@
-"""Measures all parts, or some: `python -m validation [collapse packing repose janssen balance]`.
+"""Measures all parts, or some: `python -m validation [collapse packing repose janssen hourglass balance]`.
 
 Writes `docs/validation/*.json` and pictures, and the tables of `docs/validation.md` from all that is there.
 """
@@ -12,7 +12,7 @@ from typing import Any
 
 from rich.console import Console
 
-from validation import balance, collapse, drawing, findings, janssen, packing, repose
+from validation import balance, collapse, drawing, findings, hourglass, janssen, packing, repose
 from validation.watch import Ledger
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -23,6 +23,7 @@ PARTS: dict[str, ModuleType] = {
     "packing": packing,
     "repose": repose,
     "janssen": janssen,
+    "hourglass": hourglass,
     "balance": balance,
 }
 

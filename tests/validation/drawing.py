@@ -113,13 +113,15 @@ def janssen(data: dict[str, Any], path: Path) -> None:
     mass = data["saturation"]
     axes.plot(filling, filling, ":", color=OTHER, label="all of it")
     axes.plot(filling, mass * -np.expm1(-filling / mass), color=PAPER, label=f"Janssen, m = {mass:.2f}")
+    axes.plot([r["filling"] for r in runs], [r["borne"] for r in runs], ".", color=OURS, alpha=0.5)
     axes.errorbar(
-        [r["filling"] for r in runs],
-        [r["borne"] for r in runs],
-        [2.0 * r["error"] for r in runs],
+        [r["filling"] for r in data["means"]],
+        [r["borne"] for r in data["means"]],
+        [2.0 * r["error"] for r in data["means"]],
         fmt="o",
         color=OURS,
-        label="walls with µ 0.5",
+        capsize=3.0,
+        label="walls with µ 0.5, means and two standard errors",
     )
     smooth = data["smooth"]
     axes.plot([r["filling"] for r in smooth], [r["borne"] for r in smooth], "s", color=OTHER, label="smooth walls")
@@ -133,4 +135,56 @@ def janssen(data: dict[str, Any], path: Path) -> None:
     plt.close(figure)
 
 
-PICTURES = {"collapse": collapse, "packing": packing, "repose": repose, "janssen": janssen}
+def hourglass(data: dict[str, Any], path: Path) -> None:
+    """Rate to the power 2/3 against the opening, and over the law's power of the opening."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8.4, 3.6), dpi=110)
+    runs, fixed, free = data["runs"], data["fixed"], data["free"]
+    opening, rate, error = (np.array([r[name] for r in runs], dtype=float) for name in ("opening", "rate", "error"))
+    spans = np.linspace(fixed["k"], 1.05 * opening.max(), 200)
+    left.plot(
+        spans,
+        fixed["C"] ** (2.0 / 3.0) * (spans - fixed["k"]),
+        color=PAPER,
+        label=f"{fixed['C']:.2f} (D/d - {fixed['k']:.2f})$^{{3/2}}$",
+    )
+    left.errorbar(
+        opening, rate ** (2.0 / 3.0), 4.0 / 3.0 * error / rate ** (1.0 / 3.0), fmt="o", color=OURS, capsize=3.0
+    )
+    left.set_xlim(left=0.0)
+    left.set_ylim(bottom=0.0)
+    left.set_ylabel(r"W$^{2/3}$, W in $\rho\sqrt{g}\,$d$^{3/2}$")
+    left.legend(frameon=False, fontsize=8.5)
+    spans = np.linspace(0.9 * opening.min(), 1.05 * opening.max(), 200)
+    over = (opening - fixed["k"]) ** 1.5
+    right.axhline(fixed["C"], color=PAPER)
+    right.plot(
+        spans,
+        free["C"] * (spans - free["k"]) ** free["n"] / (spans - fixed["k"]) ** 1.5,
+        "--",
+        color=OURS,
+        linewidth=1.2,
+        label=f"{free['C']:.2f} (D/d - {free['k']:.2f})$^{{{free['n']:.2f}}}$",
+    )
+    right.errorbar(opening, rate / over, 2.0 * error / over, fmt="o", color=OURS, capsize=3.0)
+    for name, marker, label in (("lower", "s", "half the filling"), ("finer", "^", "and half the step")):
+        run = data[name]
+        right.plot(
+            run["opening"] + 0.3, run["rate"] / (run["opening"] - fixed["k"]) ** 1.5, marker, color=OTHER, label=label
+        )
+    right.set_ylabel(f"W / (D/d - {fixed['k']:.2f})$^{{3/2}}$")
+    right.legend(frameon=False, fontsize=8.5)
+    for axes in (left, right):
+        axes.set_xlabel("opening D, diameters d")
+        _finish(axes)
+    figure.tight_layout()
+    figure.savefig(path)
+    plt.close(figure)
+
+
+PICTURES = {
+    "collapse": collapse,
+    "packing": packing,
+    "repose": repose,
+    "janssen": janssen,
+    "hourglass": hourglass,
+}
