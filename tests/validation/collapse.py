@@ -24,7 +24,7 @@ ASPECT = 2.0
 FALLS = 4.0
 #: Disks of a column: as many for each aspect ratio, so that its area is a given number of disks.
 COUNT = 4000
-#: Of the contact solver. Ten times the default takes a sixth of the time and leaves the run-out as it is (`tolerances`).
+#: Of the contact solver: ten times the default, which takes a sixth of the time; `tolerances` has both.
 TOLERANCE = 1e-3
 ASPECTS = (0.5, 0.8, 1.25, 2.0, 3.2, 5.0, 8.0)
 
@@ -169,20 +169,20 @@ def measure(ledger: Ledger) -> dict[str, object]:
     }
     runs = iter(columns((options for part in parts.values() for options in part), ledger))
     found = {name: [next(runs) for _ in part] for name, part in parts.items()}
-    sizes = found["sizes"] + [run for run in found["flat"] if abs(run["aspect"] - ASPECT) < 0.1 * ASPECT]
-    return found | {"fits": fits(found["flat"]), "limit": limit(sizes)}
+    return found | {"fits": fits(found["flat"]), "limit": limit(found)}
 
 
-def limit(runs: list[dict[str, Any]]) -> dict[str, float]:
-    """Run-out over aspect ratio where disks are ever smaller: a straight line in the diameters that R0 has, 1/n.
+def limit(found: dict[str, list[dict[str, Any]]]) -> dict[str, Any]:
+    """Run-out over aspect ratio, at a = 2, where disks are ever smaller: a straight line in 1/n, R0 being n diameters.
 
     Returns:
-        value: At 1/n = 0. error: Its standard error. slope: By 1/n.
+        value: At 1/n = 0. error: Its standard error. slope: By 1/n. runs: Those that it was fitted to.
     """
+    runs = found["sizes"] + [run for run in found["flat"] if abs(run["aspect"] - ASPECT) < 0.1 * ASPECT]
     inverse = np.array([1.0 / run["half_width"] for run in runs])
     ratio = np.array([run["run_out"] / run["aspect"] for run in runs])
     (slope, value), covariance = np.polyfit(inverse, ratio, 1, cov=True)
-    return {"value": float(value), "error": float(np.sqrt(covariance[1, 1])), "slope": float(slope)}
+    return {"value": float(value), "error": float(np.sqrt(covariance[1, 1])), "slope": float(slope), "runs": runs}
 
 
 def fits(runs: list[dict[str, Any]], name: str = "run_out") -> list[dict[str, float]]:
