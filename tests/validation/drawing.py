@@ -22,8 +22,8 @@ def _finish(axes: Axes) -> None:
 
 
 def collapse(data: dict[str, Any], path: Path) -> None:
-    """Run-out against aspect ratio, both logarithmic."""
-    figure, axes = plt.subplots(figsize=(6.4, 4.8), dpi=110)
+    """Run-out against aspect ratio, both logarithmic; and against the size of the disks, at one aspect ratio."""
+    figure, (axes, sizes) = plt.subplots(1, 2, figsize=(10.4, 4.6), dpi=110, width_ratios=(1.5, 1.0))
     low, high = np.array([0.4, 2.0]), np.array([2.0, 10.0])
     axes.plot(low, 2.5 * low, color=PAPER, label="Staron and Hinch 2005: 2.5 a, 3.25 a$^{0.7}$")
     axes.plot(high, 3.25 * high**0.7, color=PAPER)
@@ -32,19 +32,14 @@ def collapse(data: dict[str, Any], path: Path) -> None:
         axes.plot(span, fit["prefactor"] * span ** fit["exponent"], "--", color=OURS, linewidth=1.2, label=label)
     series = (
         ("flat", "o", OURS, f"{data['flat'][0]['count']} disks, flat floor"),
-        ("rough", "s", OTHER, "floor of glued disks"),
-        ("bouncing", "^", "#3f8f4f", "restitution 0.5"),
+        ("rough", "s", OTHER, f"floor of glued disks, {data['rough'][0]['count']} disks"),
+        ("bouncing", "^", "#3f8f4f", f"restitution 0.5, {data['bouncing'][0]['count']} disks"),
     )
     for name, marker, colour, label in series:
         runs = data[name]
         axes.plot(
             [r["aspect"] for r in runs], [r["run_out"] for r in runs], marker, color=colour, markersize=5, label=label
         )
-    for run in data["sizes"]:
-        axes.annotate(
-            f"{run['count']}", (run["aspect"], run["run_out"]), (7, -3), textcoords="offset points", fontsize=8
-        )
-        axes.plot(run["aspect"], run["run_out"], "D", color="#8a5fb0", markersize=5)
     axes.set_xscale("log")
     axes.set_yscale("log")
     for axis in (axes.xaxis, axes.yaxis):
@@ -56,6 +51,18 @@ def collapse(data: dict[str, Any], path: Path) -> None:
     axes.set_ylabel("run-out (R - R$_0$)/R$_0$")
     axes.legend(frameon=False, fontsize=8.5)
     _finish(axes)
+    limit = data["limit"]
+    inverse = np.array([0.0, 0.1])
+    line = f"{limit['value']:.2f} ± {limit['error']:.2f} at 0"
+    sizes.plot(inverse, limit["value"] + limit["slope"] * inverse, "--", color=OURS, linewidth=1.2, label=line)
+    for run in limit["runs"]:
+        sizes.plot(1.0 / run["half_width"], run["run_out"] / run["aspect"], "o", color=OURS, markersize=5)
+    sizes.axhline(2.5, color=PAPER, label="Staron and Hinch 2005")
+    sizes.set_xlabel("mean diameter / R$_0$")
+    sizes.set_ylabel("run-out / a, at a = 2")
+    sizes.set_ylim(bottom=0.0)
+    sizes.legend(frameon=False, fontsize=8.5)
+    _finish(sizes)
     figure.tight_layout()
     figure.savefig(path)
     plt.close(figure)

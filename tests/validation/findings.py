@@ -54,7 +54,18 @@ def collapse(data: dict[str, Any]) -> Iterator[Finding]:
     for fit, where in zip(data["fits"], ("a ≤ 2", "a ≥ 2"), strict=True):
         n, c = fit["paper_exponent"], fit["paper_prefactor"]
         yield Finding(f"run-out, exponent, {where}", f"{n:g} ± 0.1", STARON, fit["exponent"], n - 0.1, n + 0.1)
-        yield Finding(f"run-out, prefactor, {where}", f"{c:g} ± 20%", STARON, fit["prefactor"], 0.8 * c, 1.2 * c)
+        yield Finding(
+            f"run-out / a^{n:g}, {where}", f"{c:g} ± 20%", STARON, fit["with_paper_exponent"], 0.8 * c, 1.2 * c
+        )
+    small = data["limit"]
+    yield Finding(
+        f"run-out / a at a = 2, disks ever smaller, ± {small['error']:.2f}",
+        "2.5 ± 20%",
+        STARON,
+        small["value"],
+        2.0,
+        3.0,
+    )
 
 
 def packing(data: dict[str, Any]) -> Iterator[Finding]:
