@@ -72,7 +72,7 @@ def packing(data: dict[str, Any], path: Path) -> None:
     """Packing fraction and contacts against friction."""
     figure, panels = plt.subplots(1, 2, figsize=(8.4, 3.6), dpi=110)
     for axes, name in zip(panels, ("fraction", "coordination"), strict=True):
-        for group, marker, colour, label in (("poured", "o", OURS, "poured"), ("knocked", "^", OTHER, "after knocks")):
+        for group, marker, colour, label in (("poured", "o", OURS, "poured"), ("shaken", "^", OTHER, "after shaking")):
             runs = data[group]
             axes.plot([r["friction"] for r in runs], [r[name] for r in runs], marker, color=colour, label=label)
         axes.set_xlabel("friction µ")
