@@ -48,6 +48,8 @@ class Traction:
         free_slip: `s₀`, the slip at which the wheel neither pulls nor is dragged.
         scale: `K`, slip.
         rms: Of what the fit leaves of the means over the beds, 1.
+        chi_square: Of the fit, by the beds' standard errors and a degree of freedom; nan where there is one bed.
+        line_chi_square: The same of a straight line through all slips: what the levelling off explains.
         first: Slip from which on the last slope is taken.
         last_slope: Of a straight line through pull / load from that slip on; 0 where the curve has levelled off.
     """
@@ -56,6 +58,8 @@ class Traction:
     free_slip: Estimate
     scale: Estimate
     rms: float
+    chi_square: float
+    line_chi_square: float
     first: float
     last_slope: Estimate
 
@@ -84,14 +88,35 @@ def fit_traction(pulls: Sequence[Sequence[Pull]], *, first: float = 0.5) -> Trac
         refuse(OptionError, "first", first, "must leave two slips or more")
     A, free_slip, K = _over_beds(lambda means: _fit(slips, means), ratios)
     (slope,) = _over_beds(lambda means: np.polyfit(slips[last], means[last], 1)[:1], ratios)
-    left = _curve(slips, A.value, free_slip.value, K.value) - ratios.mean(axis=1)
-    return Traction(A, free_slip, K, rms=float(np.sqrt(np.mean(left**2))), first=first, last_slope=slope)
+    means = ratios.mean(axis=1)
+    left = _curve(slips, A.value, free_slip.value, K.value) - means
+    from_line = np.polyval(np.polyfit(slips, means, 1), slips) - means
+    return Traction(
+        A,
+        free_slip,
+        K,
+        rms=float(np.sqrt(np.mean(left**2))),
+        chi_square=_chi_square(left, ratios, 3),
+        line_chi_square=_chi_square(from_line, ratios, 2),
+        first=first,
+        last_slope=slope,
+    )
 
 
 def _curve(s: Array, A: float, free_slip: float, K: float) -> Array:
     """Pull / load of the form at slips (n,)."""
     result: Array = A * (1.0 - np.exp(-(s - free_slip) / K))
     return result
+
+
+def _chi_square(left: Array, ratios: Array, n_fitted: int) -> float:
+    """Squares of what a fit leaves of the means (n,) in their standard errors, by the degrees of freedom."""
+    n_slips, n_beds = ratios.shape
+    if n_beds == 1 or n_slips <= n_fitted:
+        return float("nan")
+    variances = ratios.var(axis=1, ddof=1) / n_beds
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float((left**2 / variances).sum() / (n_slips - n_fitted))
 
 
 def _over_beds(of: Callable[[Array], Array], ratios: Array) -> list[Estimate]:

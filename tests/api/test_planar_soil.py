@@ -186,6 +186,7 @@ def test_a_curve_of_pull_against_slip_is_found_again() -> None:
     assert fit.limit.error == pytest.approx(offsets.std(ddof=1) / np.sqrt(3.0), rel=0.01)
     assert fit.last_slope.error == pytest.approx(0.0, abs=1e-12)
     assert fit.rms < 1e-3
+    assert fit.chi_square < 0.01 < 1.0 < fit.line_chi_square
     np.testing.assert_allclose(fit([0.1, 9.0]), [0.0, 0.25], atol=2e-3)
 
     straight = fit_traction(trials(0.3 * slips - 0.1), first=0.3)
