@@ -72,8 +72,9 @@ def packing(data: dict[str, Any], path: Path) -> None:
     """Packing fraction and contacts against friction."""
     figure, panels = plt.subplots(1, 2, figsize=(8.4, 3.6), dpi=110)
     for axes, name in zip(panels, ("fraction", "coordination"), strict=True):
-        for group, marker, colour, label in (("poured", "o", OURS, "poured"), ("shaken", "^", OTHER, "after shaking")):
-            runs = data[group]
+        series = (("poured", 0, "o", OURS), ("20 shakes", 20, "^", OTHER), ("60 shakes", 60, "s", "#3f8f4f"))
+        for label, shakes, marker, colour in series:
+            runs = [r for r in data["poured"] + data["shaken"] if r["shakes"] == shakes]
             axes.plot([r["friction"] for r in runs], [r[name] for r in runs], marker, color=colour, label=label)
         axes.set_xlabel("friction µ")
         _finish(axes)

@@ -14,9 +14,10 @@ FRICTIONS = (0.0, 0.1, 0.2, 0.3, 0.5, 1.0)
 MARGIN = 5.0
 COUNT = 800
 SEEDS = (0, 1, 2)
-#: Shakes that a bed is given after it has settled: each gives every disk a random velocity, both components with this
-#: standard deviation, in sqrt(9.81 DIAMETER). That lifts a disk by a twentieth of its diameter.
-SHAKES, SHAKE = 20, 0.3
+#: Shakes that a bed is given after it has settled; those of one friction that is shaken on; and a shake: it gives every disk
+#: a random velocity, both components with this standard deviation, in sqrt(9.81 DIAMETER), which lifts a disk by a
+#: twentieth of its diameter.
+SHAKES, LONG, SHAKE = 20, (0.5, 60), 0.3
 
 
 def covered(position: Array, radius: Array, window: tuple[float, float, float, float], points: int = 1500) -> float:
@@ -115,4 +116,5 @@ def measure(ledger: Ledger) -> dict[str, object]:
     """Beds of several frictions, poured; and shaken."""
     poured = [bed(COUNT, mu, seed, ledger) for mu in FRICTIONS for seed in SEEDS]
     shaken = [bed(COUNT, mu, seed, ledger, shakes=SHAKES) for mu in (0.2, 0.5, 1.0) for seed in SEEDS]
+    shaken += [bed(COUNT, LONG[0], seed, ledger, shakes=LONG[1]) for seed in SEEDS]
     return {"poured": poured, "shaken": shaken, "lifting": lifting()}
