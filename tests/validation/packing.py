@@ -15,8 +15,8 @@ MARGIN = 5.0
 COUNT = 800
 SEEDS = (0, 1, 2)
 #: Shakes that a settled bed is given; friction and shakes of beds that are shaken on; and a shake: each disk gets a
-#: random velocity, both components with this standard deviation, in sqrt(9.81 DIAMETER), which lifts it by a twentieth of
-#: its diameter.
+#: random velocity, both components with this standard deviation, in sqrt(9.81 DIAMETER), which lifts it by a twentieth
+#: of its diameter.
 SHAKES, LONG, SHAKE = 20, (0.5, 60), 0.3
 
 
