@@ -89,7 +89,7 @@ stability: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes w
 profiles: $(STAMPS)/test $(STAMPS)/core ## performance profiles of the contact solvers, with Siconos' where it is installed
 	$(COMPARE).solver_profiles
 
-validate: $(STAMPS)/core ## the soil beside papers and closed forms: docs/validation.md (half an hour of one core; VALIDATE="packing repose" measures some)
+validate: $(STAMPS)/core ## the soil beside papers and closed forms: docs/validation.md (an hour and a half on two cores; VALIDATE="packing repose" measures some)
 	PYTHONPATH=tests $(BIN)/python -m validation $(VALIDATE)
 
 orders: $(STAMPS)/demo ## measure every time-stepping scheme: order, drift, energy, cost; redraw docs/comparison/orders.png

@@ -6,13 +6,12 @@ simulation*, J. Fluid Mech. 545, 1-27.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from validation.pool import side_by_side
 from validation.samples import DIAMETER, RADIUS, Array, Sample, box, glued_row, loose, settle
 from validation.watch import GRAVITY, Ledger
 
@@ -145,21 +144,6 @@ def power(aspect: Array, run: Array) -> tuple[float, float, float]:
     return float(np.exp(solution[1])), float(solution[0]), float(error)
 
 
-def _one(options: dict[str, Any]) -> tuple[dict[str, Any], Ledger]:
-    ledger = Ledger()
-    return run_out(**options, ledger=ledger), ledger
-
-
-def columns(options: Iterable[dict[str, Any]], ledger: Ledger) -> list[dict[str, Any]]:
-    """Columns with given arguments of `run_out`, on all cores."""
-    found = []
-    with ProcessPoolExecutor() as pool:
-        for run, own in pool.map(_one, options):
-            ledger.merge(own)
-            found.append(run)
-    return found
-
-
 def measure(ledger: Ledger) -> dict[str, object]:
     """All columns, and the power laws that they follow."""
 
@@ -172,11 +156,11 @@ def measure(ledger: Ledger) -> dict[str, object]:
         "rough": [row(2000, aspect, rough=True) for aspect in ASPECTS[1::2]],
         "tolerances": [row(1000, ASPECT, seed, tolerance=1e-4) for seed in (0, 1)],
     }
-    runs = iter(columns((options for part in parts.values() for options in part), ledger))
+    runs = iter(side_by_side(run_out, (options for part in parts.values() for options in part), ledger))
     found: dict[str, Any] = {name: [next(runs) for _ in part] for name, part in parts.items()}
     # Newton's law may add energy where there is friction: not a part of the ledger.
     own = Ledger()
-    found["bouncing"] = columns((row(2000, aspect, restitution=0.5) for aspect in ASPECTS[1::2]), own)
+    found["bouncing"] = side_by_side(run_out, (row(2000, aspect, restitution=0.5) for aspect in ASPECTS[1::2]), own)
     found["bouncing_ledger"] = own.as_dict()
     return found | {"fits": fits(found["flat"]), "limit": limit(found)}
 

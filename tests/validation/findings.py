@@ -114,25 +114,18 @@ def packing(data: dict[str, Any]) -> Iterator[Finding]:
 
 def repose(data: dict[str, Any]) -> Iterator[Finding]:
     """The slope's angle against friction."""
-    angles = np.array([row["angle"] for row in data["means"]])
-    errors = np.array([row["error"] for row in data["means"]])
-    falls = -np.diff(angles) / np.hypot(errors[1:], errors[:-1])
-    yield Finding(
-        "angle of repose, largest fall with µ in standard errors",
-        "below 2: monotone",
-        "",
-        float(falls.max()),
-        -90.0,
-        2.0,
-    )
-    yield Finding(
-        "angle of repose, rise from µ 0.05 to 0.7 in standard errors",
-        "above 4",
-        "",
-        float((angles[-1] - angles[0]) / np.hypot(errors[-1], errors[0])),
-        4.0,
-        np.inf,
-    )
+    for what, name, error in (
+        ("angle of repose", "angle", "error"),
+        ("share of a bed that stays", "stays", "stays_error"),
+    ):
+        values = np.array([row[name] for row in data["means"]])
+        errors = np.array([row[error] for row in data["means"]])
+        falls = -np.diff(values) / np.hypot(errors[1:], errors[:-1])
+        rise = float((values[-1] - values[0]) / np.hypot(errors[-1], errors[0]))
+        yield Finding(
+            f"{what}, largest fall with µ in standard errors", "below 2: monotone", "", float(falls.max()), -90.0, 2.0
+        )
+        yield Finding(f"{what}, rise from µ 0.05 to 0.7 in standard errors", "above 4", "", rise, 4.0, np.inf)
 
 
 def janssen(data: dict[str, Any]) -> Iterator[Finding]:

@@ -6,12 +6,13 @@ import itertools
 
 import numpy as np
 
+from validation.pool import Run, side_by_side
 from validation.samples import DIAMETER, Array, box, glued_row, loose, settle, slow
 from validation.watch import Ledger
 
 FRICTIONS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7)
 LENGTH, COUNT = 60.0, 900
-SEEDS = (0, 1, 2)
+SEEDS = range(9)
 #: Shares of a heap's height between which its flank is taken: above it is flat, below it thins out.
 HIGH, LOW = 0.8, 0.2
 
@@ -37,7 +38,7 @@ def angle(x: Array, y: Array) -> float:
     return float(np.degrees(np.arctan(-np.polyfit(x[flank], y[flank], 1)[0])))
 
 
-def slope(count: int, friction: float, seed: int, ledger: Ledger, *, length: float = LENGTH) -> dict[str, object]:
+def slope(count: int, friction: float, seed: int, ledger: Ledger, *, length: float = LENGTH) -> Run:
     """Angle of repose of one bed.
 
     Args:
@@ -46,6 +47,10 @@ def slope(count: int, friction: float, seed: int, ledger: Ledger, *, length: flo
         seed: Of disks and floor.
         ledger: What the steps are entered into.
         length: Of the floor, diameters.
+
+    Returns:
+        angle: Degrees. stays: Share of the bed's disks that stay. seconds: Until the slope rests. surface: Places and
+        heights, diameters.
     """
     width = length * DIAMETER
     floor = glued_row(0.0, width, 1000 + seed)
@@ -69,7 +74,7 @@ def slope(count: int, friction: float, seed: int, ledger: Ledger, *, length: flo
         "friction": friction,
         "seed": seed,
         "angle": angle(x, y),
-        "left": int(free.sum()),
+        "stays": float(free.sum() / count),
         "seconds": float(sim.time),
         "surface": [(x / DIAMETER).round(3).tolist(), (y / DIAMETER).round(3).tolist()],
     }
@@ -77,15 +82,20 @@ def slope(count: int, friction: float, seed: int, ledger: Ledger, *, length: flo
 
 def measure(ledger: Ledger) -> dict[str, object]:
     """Slopes of several frictions."""
-    runs = [slope(COUNT, mu, seed, ledger) for mu in FRICTIONS for seed in SEEDS]
+    options = ({"count": COUNT, "friction": mu, "seed": seed} for mu in FRICTIONS for seed in SEEDS)
+    runs = side_by_side(slope, options, ledger)
     return {"runs": runs, "means": means(runs)}
 
 
-def means(runs: list[dict[str, object]]) -> list[dict[str, float]]:
-    """Mean angle for each friction, with its standard error and the range of the seeds."""
+def means(runs: list[Run]) -> list[dict[str, float]]:
+    """Mean angle and share that stays for each friction, with their standard errors, and the range of the angles."""
     rows = []
     for mu in FRICTIONS:
-        angles = np.array([r["angle"] for r in runs if r["friction"] == mu], dtype=float)
-        error = float(angles.std(ddof=1) / np.sqrt(len(angles)))
-        rows.append({"friction": mu, "angle": float(angles.mean()), "error": error, "spread": float(np.ptp(angles))})
+        row = {"friction": mu}
+        for name, error in (("angle", "error"), ("stays", "stays_error")):
+            values = np.array([r[name] for r in runs if r["friction"] == mu], dtype=float)
+            row |= {name: float(values.mean()), error: float(values.std(ddof=1) / np.sqrt(len(values)))}
+            if name == "angle":
+                row["spread"] = float(np.ptp(values))
+        rows.append(row)
     return rows
