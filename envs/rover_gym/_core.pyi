@@ -760,7 +760,8 @@ class SoilSimulation:
         restitution: Newton's coefficient of all contacts.
         gravity: (2,) m/s^2; (0, -9.81) if not given.
         time_step: s.
-        tolerance: Of the contact solver, relative.
+        tolerance: Of the contact solver, relative; its velocities are also right to ten times that in m/s, times the
+            root of gravity over 9.81 m/s^2.
         max_iterations: Most sweeps of the contact solver in a step.
         stabilisation: "none" or "projection", which takes overlaps away and may add energy by lifting what lies above;
             if not given, "none" without restitution and "projection" with it, for what is struck away may hit others.

@@ -25,7 +25,8 @@ def test_columns_run_out_the_farther_the_taller_and_nearly_in_proportion() -> No
     aspect, run = (np.array([r[name] for r in runs], dtype=float) for name in ("aspect", "run_out"))
     _, exponent, _ = power(aspect, run)
     assert exponent == pytest.approx(1.0, abs=0.25)
-    assert 1.0 < (run / aspect).min() < (run / aspect).max() < 3.0
+    # As few disks run out less far than the 2.5 a of ever smaller ones.
+    assert 0.8 < (run / aspect).min() < (run / aspect).max() < 2.5
     held(ledger)
 
 

@@ -311,6 +311,7 @@ impl SoilSimulation {
             .into());
         }
         let mut options = soil_options(&disks);
+        let usual_weight = options.gravity.norm();
         if let Some(gravity) = gravity {
             options.gravity = pair(gravity, Kind::Option, "gravity")?.push(0.0);
         }
@@ -327,7 +328,14 @@ impl SoilSimulation {
             stabilisation.unwrap_or(usual),
             &STABILISATIONS,
         )?;
-        options.solver.velocity_tolerance = 10.0 * tolerance;
+        // Speeds go with the root of gravity, so the same soil under another gravity is solved alike.
+        let weight = options.gravity.norm();
+        let speed = if weight > 0.0 {
+            (weight / usual_weight).sqrt()
+        } else {
+            1.0
+        };
+        options.solver.velocity_tolerance = 10.0 * tolerance * speed;
         if let Some(depth) = penetration_tolerance {
             options.penetration_tolerance = depth;
         }
