@@ -255,6 +255,24 @@ fn with_angles(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<f64>> {
     rows(value, Kind::State, field, 3)
 }
 
+/// What is struck away meets others that were not forecast, and goes into them.
+fn usual_stabilisation(restitution: f64) -> &'static str {
+    if restitution > 0.0 {
+        "projection"
+    } else {
+        "none"
+    }
+}
+
+/// Speeds go with the root of gravity, so the same soil under another gravity is solved alike; 1 without gravity.
+fn speed_scale(gravity: f64, usual: f64) -> f64 {
+    if gravity > 0.0 {
+        (gravity / usual).sqrt()
+    } else {
+        1.0
+    }
+}
+
 #[pymethods]
 impl SoilSimulation {
     #[new]
@@ -317,25 +335,13 @@ impl SoilSimulation {
         }
         (options.time_step, options.restitution) = (time_step, restitution);
         (options.solver.tolerance, options.solver.max_sweeps) = (tolerance, max_iterations);
-        // What is struck away meets others that were not forecast, and goes into them.
-        let usual = if restitution > 0.0 {
-            "projection"
-        } else {
-            "none"
-        };
         options.stabilisation = choice::<Stabilisation>(
             "stabilisation",
-            stabilisation.unwrap_or(usual),
+            stabilisation.unwrap_or(usual_stabilisation(restitution)),
             &STABILISATIONS,
         )?;
-        // Speeds go with the root of gravity, so the same soil under another gravity is solved alike.
-        let weight = options.gravity.norm();
-        let speed = if weight > 0.0 {
-            (weight / usual_weight).sqrt()
-        } else {
-            1.0
-        };
-        options.solver.velocity_tolerance = 10.0 * tolerance * speed;
+        options.solver.velocity_tolerance =
+            10.0 * tolerance * speed_scale(options.gravity.norm(), usual_weight);
         if let Some(depth) = penetration_tolerance {
             options.penetration_tolerance = depth;
         }
