@@ -61,7 +61,7 @@ def page(parts: dict[str, dict[str, Any]]) -> tuple[str, list[findings.Finding]]
             "\n## In every step of every run\n",
             findings.table(held),
             "\n`gain` is the largest growth of the energy in one step, in weights of a disk times its diameter.\n",
-            "| part | steps | disk-steps | not solved to 1e-4 | worst residual | gain | CPU time |",
+            "| part | steps | disk-steps | not solved to the tolerance | worst residual | gain | CPU time |",
             "|---|---|---|---|---|---|---|",
             steps,
         ]
