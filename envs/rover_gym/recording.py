@@ -188,8 +188,9 @@ class Recorder:
             data = self._file.create_dataset(
                 channel.name,
                 shape=(0, *channel.shape),
-                maxshape=(None, *channel.shape),
-                chunks=(rows_per_flush, *channel.shape),
+                # HDF5 knows no empty chunk: a channel of nothing (the wheels of a soil without a machine) may grow.
+                maxshape=(None, *(n or None for n in channel.shape)),
+                chunks=(rows_per_flush, *(n or 1 for n in channel.shape)),
                 dtype="f8",
             )
             data.attrs["unit"] = channel.unit

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rover_gym.figures.soil import draw_soil
+from rover_gym.figures.soil_run import draw_soil_run
 from rover_gym.planar import BallSimulation, Line, SoilSimulation, SoilSnapshot, describe, record, soil_packing
 from rover_gym.planar_soil import Bed, record_soil, rover_on_soil, settled_bed
 from rover_gym.recording import RecordingError
@@ -131,6 +132,17 @@ def test_the_rover_drives_and_a_snapshot_continues_bit_for_bit(bed: Bed, tmp_pat
     assert (strengths[:, 0] > 0.0).all()
     assert len(run.resample(25.0).time) == 3
     assert draw_soil(run, tmp_path / "soil.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_soil_without_a_machine_is_recorded_and_drawn(bed: Bed, tmp_path: Path) -> None:
+    sim = SoilSimulation(bed.radius, bed.mass, bed.position, walls=bed.walls)
+    record_soil(sim, tmp_path / "soil.h5", "disks alone", duration=0.04, steps_per_row=20, walls=bed.walls)
+    run = read_soil_run(tmp_path / "soil.h5")
+    assert run.wheels.shape == (3, 0, 3)
+    np.testing.assert_array_equal(run.positions[-1], sim.position)
+    assert draw_soil(run, tmp_path / "soil.png").exists()
+    paths = draw_soil_run(run, tmp_path / "plots", with_overview=True)
+    assert [path.name for path in paths] == ["disks-and-contacts.png", "overview.png"]
 
 
 def test_a_file_without_a_soil_is_refused(tmp_path: Path) -> None:

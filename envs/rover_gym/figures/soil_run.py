@@ -38,7 +38,7 @@ def draw_soil_run(
 
     Args:
         run: From `read_soil_run`.
-        folder: Where the files go; made if it is not there.
+        folder: Where the files go; made if it is not there. Of a soil without wheels only its disks are drawn.
         file_format: "png", "svg" or "pdf".
         with_overview: Whether to add one page with all figures.
 
@@ -50,11 +50,12 @@ def draw_soil_run(
         MissingExtraError: matplotlib is not installed.
     """
     check_format(file_format)
-    drawings = {name: partial(_fill, draw=draw, run=run) for name, draw in SOIL_DRAWINGS.items()}
+    chosen = {name: draw for name, draw in SOIL_DRAWINGS.items() if run.wheels.shape[1] or name not in OF_WHEELS}
+    drawings = {name: partial(_fill, draw=draw, run=run) for name, draw in chosen.items()}
     paths = save_figures(drawings, folder, height=6.5, file_format=file_format)
     if with_overview:
-        page = {"overview": partial(_overview, run=run)}
-        paths += save_figures(page, folder, height=6.5 * len(SOIL_DRAWINGS), file_format=file_format)
+        page = {"overview": partial(_overview, draws=list(chosen.values()), run=run)}
+        paths += save_figures(page, folder, height=6.5 * len(chosen), file_format=file_format)
     return paths
 
 
@@ -118,6 +119,8 @@ SOIL_DRAWINGS: dict[str, Callable[[Sheet, SoilRun], None]] = {
     "wheel-forces": wheel_forces,
     "disks-and-contacts": disks_and_contacts,
 }
+#: Those that a soil without wheels has not.
+OF_WHEELS = frozenset({"driving", "wheel-forces"})
 
 
 def _fill(figure: Sheet, draw: Callable[[Sheet, SoilRun], None], run: SoilRun) -> None:
@@ -145,8 +148,8 @@ def _finish(figure: Sheet, panels: tuple[Axes, ...], what: str, run: SoilRun) ->
     figure.suptitle(f"{what}\n{run.title}{broken_off}")
 
 
-def _overview(figure: Sheet, run: SoilRun) -> None:
+def _overview(figure: Sheet, draws: list[Callable[[Sheet, SoilRun], None]], run: SoilRun) -> None:
     """All figures on one page, below one another."""
-    parts = figure.subfigures(len(SOIL_DRAWINGS), 1, squeeze=False).flat
-    for part, draw in zip(parts, SOIL_DRAWINGS.values(), strict=True):
+    parts = figure.subfigures(len(draws), 1, squeeze=False).flat
+    for part, draw in zip(parts, draws, strict=True):
         draw(part, run)
