@@ -14,7 +14,7 @@ UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
 export VIRTUAL_ENV := $(abspath $(VENV))# where maturin installs
 
-.PHONY: help demo test check lint types format test-rust test-slow test-python docs bench chart stability validate orders profiles train train-rllib pins clean
+.PHONY: help demo test check lint types format test-rust test-python docs bench chart stability validate orders profiles train train-rllib pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -46,9 +46,6 @@ format: $(STAMPS)/test ## rewrite the sources as the linters want them
 
 test-rust: ## the Rust tests only
 	cargo test --locked --quiet
-
-test-slow: ## the Rust tests that take minutes: recorded contact problems of any size
-	cargo test --locked --release -- --ignored
 
 test-python: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core $(STAMPS)/debian-demo $(STAMPS)/debian-test ## the Python tests only
 	$(BIN)/pytest --numprocesses auto

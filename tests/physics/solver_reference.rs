@@ -113,7 +113,6 @@ fn recorded_problems_of_any_size() {
 }
 
 #[test]
-#[ignore = "a second, for a release build: cargo test --release -- --ignored"]
 fn the_recorded_periodic_box() {
     for problem in recorded(|name| name.starts_with("LMGC")) {
         let (_, report) = answer(&problem, &SolverOptions::default());
