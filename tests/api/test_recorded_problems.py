@@ -6,9 +6,9 @@ skipped and say so. The shelf (`tests/shelf`) is always tested.
 
 import numpy as np
 import pytest
+from comparison.problems import SETTING, Problem, problem_folder, recorded, residual
 
 import rover_gym
-from comparison.problems import SETTING, Problem, problem_folder, recorded, residual
 from rover_gym._core import FrictionContactSolution
 
 pytestmark = pytest.mark.skipif(

@@ -4,11 +4,12 @@ The y axis points up. Where nothing can move, or the motion has a closed form, t
 """
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
-from shelf.problem import GROUND, Array, Dense, FreeBodies, frames_of
 from shelf.piles import skew
+from shelf.problem import GROUND, Array, Dense, FreeBodies, frames_of
 
 GRAVITY = 9.81
 UP = np.array([0.0, 1.0, 0.0])
@@ -136,7 +137,7 @@ def arch(n: int, thickness: float, mu: float = 0.7) -> FreeBodies:
     """
     scene, width = Scene(), 0.4
     joints = np.linspace(0.0, np.pi, n + 1)
-    for start, end in zip(joints, joints[1:], strict=False):
+    for start, end in pairwise(joints):
         middle = 0.5 * (start + end)
         outward = np.array([np.cos(middle), np.sin(middle), 0.0])
         mass = 2500.0 * thickness * width * (end - start)
@@ -214,8 +215,10 @@ def heap_of_disks(rows: int, mu: float = 0.5) -> Dense:
     found = [(GROUND, index[0, i], np.array([0.0, 1.0])) for i in range(rows)]
     for (row, i), body in index.items():
         if row:
-            for below in (index[row - 1, i], index[row - 1, i + 1]):
-                found.append((below, body, (place[body] - place[below]) / (2.0 * r)))
+            found += [
+                (below, body, (place[body] - place[below]) / (2.0 * r))
+                for below in (index[row - 1, i], index[row - 1, i + 1])
+            ]
     jacobian = np.zeros((len(found), 2, len(place), 3))
     for k, (first, second, normal) in enumerate(found):
         tangent = np.array([normal[1], -normal[0]])

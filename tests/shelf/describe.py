@@ -28,9 +28,11 @@ def row(name: str) -> str:
             solver=method,
         ).report.is_converged
     ]
-    unsymmetric = f"{asymmetry:.0e}" if asymmetry > 1e-12 else "–"
+    unsymmetric = f"{asymmetry:.0e}" if asymmetry > 1e-12 else "none"
     unique = "yes" if velocities is not None else "no"
-    return f"| `{name}` | {len(problem.mu)} | {rank}/{size} | {unsymmetric} | {unique} | {', '.join(solved) or '–'} |"
+    return (
+        f"| `{name}` | {len(problem.mu)} | {rank}/{size} | {unsymmetric} | {unique} | {', '.join(solved) or 'none'} |"
+    )
 
 
 def main() -> None:

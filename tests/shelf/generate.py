@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from comparison.problems import Problem, residual
 
 import rover_gym
-from comparison.problems import Problem, residual
 from shelf import built, driving
 from shelf.piles import Scene, pile
 from shelf.problem import DATA, Array, Dense, FreeBodies, block_rows, frames_of, load, save

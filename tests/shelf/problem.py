@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-
 from comparison.problems import Problem
 
 DATA = Path(__file__).parent / "data"
