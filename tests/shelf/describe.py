@@ -1,4 +1,4 @@
-"""Prints the table of README.md: ``PYTHONPATH=tests python -m shelf.describe`` (some minutes)."""
+"""Prints the table of README.md: ``PYTHONPATH=tests python -m shelf.describe [part of a name]`` (some minutes)."""
 
 import sys
 
@@ -35,11 +35,11 @@ def row(name: str) -> str:
     )
 
 
-def main() -> None:
-    """Prints a row for every problem, by number of contacts."""
-    rows = {name: row(name) for name in sorted(names(), key=lambda name: (len(load(name)[0].mu), name))}
-    sys.stdout.write("\n".join(rows.values()) + "\n")
+def main(wanted: str = "") -> None:
+    """Prints a row for every problem whose name holds `wanted`, by number of contacts."""
+    chosen = sorted((len(load(name)[0].mu), name) for name in names() if wanted in name)
+    sys.stdout.write("\n".join(row(name) for _, name in chosen) + "\n")
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])
