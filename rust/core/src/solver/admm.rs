@@ -158,10 +158,7 @@ pub(super) fn solve<const D: usize>(
         }
     }
     if !factorise::<D>(data, sigma, workspace) {
-        return (
-            SolveStatus::Stalled,
-            data.measure::<D>(&workspace.rho, p, u),
-        );
+        return (SolveStatus::Stalled, data.measure::<D>(workspace, p, u));
     }
     let mut best = Residual::UNSOLVED;
     workspace.best.copy_from_slice(p);
@@ -170,7 +167,7 @@ pub(super) fn solve<const D: usize>(
         if step % LOOK == 0 || step == options.max_sweeps {
             data.W.multiply_add(p, data.q, u);
             let residual = if shifts {
-                data.measure::<D>(&workspace.rho, p, u)
+                data.measure::<D>(workspace, p, u)
             } else {
                 relaxed_residual::<D>(data, &workspace.rho, p, u)
             };
@@ -190,7 +187,7 @@ pub(super) fn solve<const D: usize>(
                     (true, ContactLaw::Coulomb) => SolveStatus::Converged,
                     (true, ContactLaw::Relaxed) => SolveStatus::SolvedRelaxed,
                 };
-                return (status, data.measure::<D>(&workspace.rho, p, u));
+                return (status, data.measure::<D>(workspace, p, u));
             }
         }
         let rhs = workspace.rhs.as_flattened_mut();

@@ -1,13 +1,16 @@
 //! The choice of method, and what all methods share: prepared scales, the acceptance test, the final report.
 
-use super::methods::{Algorithm, Outcome};
+use super::methods::{Algorithm, ContactLaw, Outcome};
 use super::modes::Proximal;
 use super::nsgs::Budget;
 use super::report::{SolveReport, SolveStatus};
 use super::workspace::SolverWorkspace;
 use super::{Method, SolverOptions, guided, islands, newton, nsgs, pivoting, proximal};
 use crate::law::coulomb::natural_map;
-use crate::problem::{FrictionContactProblem, Operator, Residual, evaluate_contact};
+use crate::problem::{
+    ContactScales, FrictionContactProblem, Magnitudes, Operator, Residual, Violations,
+    evaluate_contact, evaluate_into, power_of_two,
+};
 
 /// The problem's slices and the scales derived from them.
 #[derive(Clone, Copy, Debug)]
@@ -22,7 +25,9 @@ pub(super) struct Prepared<'a> {
     pub n: usize,
     /// Mean diagonal entry of `W`, 1/kg; 1 if not positive.
     pub mean_diagonal: f64,
-    /// `1/|(ρ_i q_i)|`, or 1 if that is no number.
+    /// `1/|q|`, 0 if `q = 0`.
+    pub inverse_speed: f64,
+    /// `1/|(ρ_i q_i)|`, 1 if `q = 0`.
     pub inverse_data: f64,
 }
 
@@ -39,32 +44,21 @@ impl<'a> Prepared<'a> {
             problem.n_unknowns(),
         );
         let mut trace = 0.0;
-        let mut data = 0.0;
-        for i in 0..mu.len() {
+        let mut data = Magnitudes::default();
+        for (i, q) in q.chunks_exact(D).enumerate() {
             let normal = W.diagonal(dimension, n, i, 0);
             let mut tangential = 0.0;
             for k in 1..D {
                 tangential += W.diagonal(dimension, n, i, k);
             }
-            let own = normal + tangential;
-            let rho = if own > 0.0 { D as f64 / own } else { 1.0 };
-            workspace.rho[i] = rho;
             trace += normal + tangential;
-            tangential /= (D - 1) as f64;
-            workspace.rho_modes[i] = [
-                if normal > 0.0 { 1.0 / normal } else { rho },
-                if tangential > 0.0 {
-                    1.0 / tangential
-                } else {
-                    rho
-                },
-            ];
-            for q in &q[D * i..D * (i + 1)] {
-                data += (rho * q) * (rho * q);
-            }
+            let scales = ContactScales::new::<D>(normal, tangential);
+            workspace.rho[i] = scales.mass;
+            workspace.rho_modes[i] = scales.modes;
+            data.add(q, scales.mass);
         }
         let mean = trace / n.max(1) as f64;
-        let inverse = 1.0 / data.sqrt();
+        let [inverse_speed, inverse_data] = data.inverses();
         Self {
             W,
             q,
@@ -75,11 +69,8 @@ impl<'a> Prepared<'a> {
             } else {
                 1.0
             },
-            inverse_data: if inverse.is_finite() && inverse > 0.0 {
-                inverse
-            } else {
-                1.0
-            },
+            inverse_speed,
+            inverse_data,
         }
     }
 
@@ -91,21 +82,18 @@ impl<'a> Prepared<'a> {
 
     /// Residual of `(p, u)`; the same numbers as [`crate::problem::evaluate`], with the scales already at hand.
     #[inline]
-    pub fn measure<const D: usize>(&self, rho: &[f64], p: &[f64], u: &[f64]) -> Residual {
-        let (mut map, mut velocity) = (0.0, 0.0_f64);
-        for (i, (&mu, &rho)) in self.mu.iter().zip(rho).enumerate() {
-            let square = evaluate_contact::<D>(p, u, D * i, mu, rho);
-            map += square;
-            velocity = velocity.max(square / (rho * rho));
+    pub fn measure<const D: usize>(
+        &self,
+        workspace: &SolverWorkspace,
+        p: &[f64],
+        u: &[f64],
+    ) -> Residual {
+        let mut violations = Violations::default();
+        let scales = workspace.rho.iter().zip(&workspace.rho_modes);
+        for (i, (&mu, (&mass, &modes))) in self.mu.iter().zip(scales).enumerate() {
+            violations.add(evaluate_contact::<D>(p, u, D * i, mu, modes), mass);
         }
-        if map.is_finite() {
-            Residual {
-                relative: map.sqrt() * self.inverse_data,
-                velocity: velocity.sqrt(),
-            }
-        } else {
-            Residual::UNSOLVED
-        }
+        violations.residual(self.inverse_speed, self.inverse_data)
     }
 
     /// Squared natural map of the regularised problem (`W + α I`, `q − α c`) at `(p, u)`, `u = W p + q`, in (N s)².
@@ -137,9 +125,15 @@ impl<'a> Prepared<'a> {
     }
 
     /// Whether each contact's violation is within the rounding of its own rows of `W p + q`: then no impulse does better.
-    pub fn is_within_rounding<const D: usize>(&self, rho: &[f64], p: &[f64], u: &[f64]) -> bool {
-        self.mu.iter().zip(rho).enumerate().all(|(i, (&mu, &rho))| {
-            let violation = evaluate_contact::<D>(p, u, D * i, mu, rho).sqrt() / rho;
+    pub fn is_within_rounding<const D: usize>(
+        &self,
+        workspace: &SolverWorkspace,
+        p: &[f64],
+        u: &[f64],
+    ) -> bool {
+        let contacts = self.mu.iter().zip(&workspace.rho_modes);
+        contacts.enumerate().all(|(i, (&mu, &modes))| {
+            let violation = evaluate_contact::<D>(p, u, D * i, mu, modes).sqrt();
             let size: f64 = (D * i..D * (i + 1))
                 .map(|r| self.W.row_magnitude(r, p) + self.q[r].abs())
                 .sum();
@@ -159,22 +153,148 @@ pub(super) fn solve_in<A: Algorithm, const D: usize>(
     if p.iter().any(|x| !x.is_finite()) {
         p.fill(0.0);
     }
+    let q = problem.free_velocity();
+    if q.iter().all(|q| *q == 0.0) {
+        return at_rest::<A>(problem, p, u);
+    }
+    let report = solve_with_scales::<A, D>(problem, options, p, u, workspace, false);
+    match report {
+        Some(report) => report,
+        None => solve_scaled::<A, D>(problem, options, p, u, workspace),
+    }
+}
+
+/// Nothing moves and nothing is pushed: `p = 0` and `u = 0`.
+fn at_rest<A: Algorithm>(
+    problem: &FrictionContactProblem<'_>,
+    p: &mut [f64],
+    u: &mut [f64],
+) -> SolveReport {
+    p.fill(0.0);
+    u.fill(0.0);
+    let is_finite = problem
+        .operator()
+        .first_non_finite(problem.n_unknowns())
+        .is_none();
+    let status = match A::METHOD.law() {
+        _ if !is_finite => SolveStatus::NonFinite,
+        ContactLaw::Coulomb => SolveStatus::Converged,
+        ContactLaw::Relaxed => SolveStatus::SolvedRelaxed,
+    };
+    let error = if is_finite { 0.0 } else { f64::INFINITY };
+    SolveReport {
+        status,
+        iterations: 0,
+        residual: error,
+        velocity_error: error,
+        method: A::METHOD,
+    }
+}
+
+/// Solves the problem as it is; `None`, and nothing done, where `|q|` or the mean diagonal of `W` is so large or small that squares
+/// overflow or vanish, unless `at_any_scale`.
+fn solve_with_scales<A: Algorithm, const D: usize>(
+    problem: &FrictionContactProblem<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    workspace: &mut SolverWorkspace,
+    at_any_scale: bool,
+) -> Option<SolveReport> {
+    const LARGEST: f64 = 1e60;
     let (n_contacts, n) = (problem.n_contacts(), problem.n_unknowns());
+    let is_sound = |data: &Prepared<'_>| {
+        let scales = [data.inverse_speed, data.mean_diagonal];
+        at_any_scale || scales.iter().all(|x| *x > 1.0 / LARGEST && *x < LARGEST)
+    };
     if let W @ Operator::Dense(_) = problem.operator()
         && n_contacts <= options.direct_contacts
     {
         workspace.fit(n_contacts, n, W);
         let data = Prepared::new::<D>(problem, W, workspace);
-        return judge::<A, D>(&data, options, p, u, workspace);
+        return is_sound(&data).then(|| judge::<A, D>(&data, options, p, u, workspace));
     }
     // Taken out of the workspace while the solve borrows it.
     let mut storage = std::mem::take(&mut workspace.storage);
     let W = storage.choose(problem, options.direct_contacts);
     workspace.fit(n_contacts, n, W);
     let data = Prepared::new::<D>(problem, W, workspace);
-    let report = judge::<A, D>(&data, options, p, u, workspace);
+    let report = is_sound(&data).then(|| judge::<A, D>(&data, options, p, u, workspace));
     workspace.storage = storage;
     report
+}
+
+/// Solves in units of the largest free velocity and the largest diagonal entry of `W`, both taken as powers of two, so that no digit is lost.
+fn solve_scaled<A: Algorithm, const D: usize>(
+    problem: &FrictionContactProblem<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    workspace: &mut SolverWorkspace,
+) -> SolveReport {
+    let (dimension, n, mu) = (
+        problem.dimension(),
+        problem.n_unknowns(),
+        problem.friction_coefficients(),
+    );
+    let largest = |values: &mut dyn Iterator<Item = f64>| {
+        power_of_two(values.fold(0.0, |m, x: f64| m.max(x.abs())))
+    };
+    let speed = largest(&mut problem.free_velocity().iter().copied());
+    let W = problem.operator();
+    let stiffness = largest(&mut (0..n).map(|k| W.diagonal(dimension, n, k / D, k % D)));
+    let q: Vec<f64> = problem.free_velocity().iter().map(|x| x / speed).collect();
+    let scaled_options = SolverOptions {
+        velocity_tolerance: options.velocity_tolerance / speed,
+        ..*options
+    };
+    for p in &mut *p {
+        *p = *p / speed * stiffness;
+    }
+    let solved = match W {
+        Operator::Dense(W) => {
+            let W: Vec<f64> = W.iter().map(|x| x / stiffness).collect();
+            let scaled = FrictionContactProblem::from_assembled(dimension, &W, &q, mu);
+            solve_with_scales::<A, D>(&scaled, &scaled_options, p, u, workspace, true)
+        }
+        Operator::BlockSparse(W) => {
+            let W = W.scaled(1.0 / stiffness);
+            let scaled = FrictionContactProblem::from_assembled_sparse(&W, &q, mu);
+            solve_with_scales::<A, D>(&scaled, &scaled_options, p, u, workspace, true)
+        }
+    };
+    for p in &mut *p {
+        *p = *p * speed / stiffness;
+    }
+    // In the caller's units the impulse may overflow or lose its digits.
+    let residual = evaluate_into(problem, p, u);
+    let is_finite = residual.is_finite() && p.iter().chain(&*u).all(|x| x.is_finite());
+    match solved {
+        Some(report) if is_finite => SolveReport {
+            status: match report.status {
+                SolveStatus::Converged
+                    if residual.relative > 2.0 * report.residual.max(options.tolerance) =>
+                {
+                    SolveStatus::Stalled
+                }
+                status => status,
+            },
+            residual: residual.relative,
+            velocity_error: residual.velocity,
+            ..report
+        },
+        _ => {
+            p.fill(0.0);
+            u.fill(0.0);
+            SolveReport {
+                status: SolveStatus::NonFinite,
+                iterations: solved.map_or(0, |report| report.iterations),
+                residual: f64::INFINITY,
+                velocity_error: f64::INFINITY,
+                method: A::METHOD,
+            }
+        }
+    }
 }
 
 /// Runs the method and judges what it returns.

@@ -9,7 +9,9 @@ use super::methods::{Automatic, Outcome, solve_by};
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
 use super::{Method, SolverOptions};
-use crate::problem::{BlockSparseDelassus, Dimension, FrictionContactProblem, evaluate_contact};
+use crate::problem::{
+    BlockSparseDelassus, Dimension, FrictionContactProblem, Residual, Violations, evaluate_contact,
+};
 
 /// Most contacts of an island whose `W` is copied as a dense matrix.
 const DENSE_ISLAND: usize = 64;
@@ -101,14 +103,8 @@ pub(super) fn solve<const D: usize>(
     if n_islands > 1 {
         for island in 0..n_islands {
             let range = islands.starts[island]..islands.starts[island + 1];
-            if !is_solved::<D>(
-                data,
-                options,
-                &workspace.rho,
-                &islands.contacts[range],
-                p,
-                u,
-            ) {
+            let contacts = &islands.contacts[range];
+            if !is_solved::<D>(data, options, workspace, contacts, p, u) {
                 let method =
                     solve_island::<D>(data, W, options, island, p, &mut islands, iterations);
                 if rank(method) > rank(worst) {
@@ -122,9 +118,9 @@ pub(super) fn solve<const D: usize>(
         return None;
     }
     data.W.multiply_add(p, data.q, u);
-    let residual = data.measure::<D>(&workspace.rho, p, u);
+    let residual = data.measure::<D>(workspace, p, u);
     let status = if Prepared::accepts(options, residual)
-        || (residual.relative < 1e-7 && data.is_within_rounding::<D>(&workspace.rho, p, u))
+        || (residual.relative < 1e-7 && data.is_within_rounding::<D>(workspace, p, u))
     {
         SolveStatus::Converged
     } else {
@@ -146,21 +142,20 @@ fn rank(method: Method) -> usize {
 fn is_solved<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
-    rho: &[f64],
+    workspace: &SolverWorkspace,
     contacts: &[usize],
     p: &[f64],
     u: &[f64],
 ) -> bool {
     let share = contacts.len() as f64 / data.mu.len() as f64;
-    let mut map = 0.0;
+    let mut violations = Violations::default();
     for &i in contacts {
-        let square = evaluate_contact::<D>(p, u, D * i, data.mu[i], rho[i]);
-        map += square;
-        if square.sqrt() > options.velocity_tolerance * rho[i] {
-            return false;
-        }
+        let square = evaluate_contact::<D>(p, u, D * i, data.mu[i], workspace.rho_modes[i]);
+        violations.add(square, workspace.rho[i]);
     }
-    map.sqrt() * data.inverse_data <= options.tolerance * share.sqrt()
+    let Residual { relative, velocity } =
+        violations.residual(data.inverse_speed, data.inverse_data);
+    velocity <= options.velocity_tolerance && relative <= options.tolerance * share.sqrt()
 }
 
 fn solve_island<const D: usize>(

@@ -155,7 +155,7 @@ pub(super) fn full_steps<const D: usize>(
     let mut step = 0;
     let mut best = Residual::UNSOLVED;
     loop {
-        let residual = data.measure::<D>(&workspace.rho, p, u);
+        let residual = data.measure::<D>(workspace, p, u);
         if residual.relative < best.relative {
             best = residual;
             workspace.best.copy_from_slice(p);
@@ -172,7 +172,7 @@ pub(super) fn full_steps<const D: usize>(
         let progress = residual.relative / course.last;
         if progress > 0.5
             && residual.relative < ROUNDING_ASKED
-            && data.is_within_rounding::<D>(&workspace.rho, p, u)
+            && data.is_within_rounding::<D>(workspace, p, u)
         {
             return (SolveStatus::Converged, residual);
         }

@@ -96,7 +96,7 @@ pub(super) fn sweeps<const D: usize>(
     let mut last = f64::INFINITY;
     loop {
         data.W.multiply_add(p, data.q, u);
-        let residual = data.measure::<D>(&workspace.rho, p, u);
+        let residual = data.measure::<D>(workspace, p, u);
         if Prepared::accepts(options, residual) {
             return (SolveStatus::Converged, residual);
         }
@@ -105,7 +105,7 @@ pub(super) fn sweeps<const D: usize>(
         }
         if residual.relative < 1e-7
             && residual.relative > 0.5 * last
-            && data.is_within_rounding::<D>(&workspace.rho, p, u)
+            && data.is_within_rounding::<D>(workspace, p, u)
         {
             return (SolveStatus::Converged, residual);
         }

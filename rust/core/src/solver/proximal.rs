@@ -264,7 +264,7 @@ pub(super) fn solve<const D: usize>(
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     data.W.multiply_add(p, data.q, u);
-    let mut best = data.measure::<D>(&workspace.rho, p, u);
+    let mut best = data.measure::<D>(workspace, p, u);
     if Prepared::accepts(options, best) {
         return (SolveStatus::Converged, best);
     }
@@ -310,9 +310,9 @@ pub(super) fn solve<const D: usize>(
         let solved = descend::<D>(data, task, p, u, workspace, iterations);
         // A round counts even where its start was its answer, so that the search ends.
         *iterations = (*iterations).max(before + 1);
-        let residual = data.measure::<D>(&workspace.rho, p, u);
+        let residual = data.measure::<D>(workspace, p, u);
         if Prepared::accepts(options, residual)
-            || (residual.relative < LOOSE && data.is_within_rounding::<D>(&workspace.rho, p, u))
+            || (residual.relative < LOOSE && data.is_within_rounding::<D>(workspace, p, u))
         {
             return (SolveStatus::Converged, residual);
         }
@@ -354,5 +354,5 @@ pub(super) fn solve<const D: usize>(
     }
     p.copy_from_slice(&workspace.best);
     data.W.multiply_add(p, data.q, u);
-    (status, data.measure::<D>(&workspace.rho, p, u))
+    (status, data.measure::<D>(workspace, p, u))
 }
