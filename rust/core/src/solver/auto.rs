@@ -3,9 +3,10 @@
 use super::methods::{Algorithm, ContactLaw, Outcome};
 use super::modes::Proximal;
 use super::nsgs::Budget;
-use super::report::{SolveReport, SolveStatus};
+use super::report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
+use super::work::Work;
 use super::workspace::SolverWorkspace;
-use super::{Method, SolverOptions, guided, islands, newton, nsgs, pivoting, proximal};
+use super::{Method, SolverOptions, guided, islands, newton, nsgs, pivoting, proximal, work};
 use crate::law::coulomb::natural_map;
 use crate::problem::{
     ContactScales, FrictionContactProblem, Magnitudes, Operator, Residual, Violations,
@@ -25,6 +26,8 @@ pub(super) struct Prepared<'a> {
     pub n: usize,
     /// Mean diagonal entry of `W`, 1/kg; 1 if not positive.
     pub mean_diagonal: f64,
+    /// Work of one product with `W`.
+    pub product: u64,
     /// `1/|q|`, 0 if `q = 0`.
     pub inverse_speed: f64,
     /// `1/|(ρ_i q_i)|`, 1 if `q = 0`.
@@ -69,6 +72,7 @@ impl<'a> Prepared<'a> {
             } else {
                 1.0
             },
+            product: work::product(W, n),
             inverse_speed,
             inverse_data,
         }
@@ -181,13 +185,27 @@ fn at_rest<A: Algorithm>(
         ContactLaw::Coulomb => SolveStatus::Converged,
         ContactLaw::Relaxed => SolveStatus::SolvedRelaxed,
     };
-    let error = if is_finite { 0.0 } else { f64::INFINITY };
+    let method = match A::METHOD {
+        Method::Auto => Method::Newton,
+        method => method,
+    };
     SolveReport {
         status,
+        ..report_of(if is_finite { 0.0 } else { f64::INFINITY }, method)
+    }
+}
+
+/// A report of no work at all, with this residual.
+fn report_of(residual: f64, method: Method) -> SolveReport {
+    SolveReport {
+        status: SolveStatus::NonFinite,
         iterations: 0,
-        residual: error,
-        velocity_error: error,
-        method: A::METHOD,
+        work: 0,
+        residual,
+        velocity_error: residual,
+        method,
+        stage: Stage::AtRest,
+        rungs: Rungs::default(),
     }
 }
 
@@ -288,10 +306,9 @@ fn solve_scaled<A: Algorithm, const D: usize>(
             u.fill(0.0);
             SolveReport {
                 status: SolveStatus::NonFinite,
-                iterations: solved.map_or(0, |report| report.iterations),
                 residual: f64::INFINITY,
                 velocity_error: f64::INFINITY,
-                method: A::METHOD,
+                ..solved.unwrap_or_else(|| report_of(f64::INFINITY, A::METHOD))
             }
         }
     }
@@ -306,26 +323,45 @@ fn judge<A: Algorithm, const D: usize>(
     workspace: &mut SolverWorkspace,
 ) -> SolveReport {
     let mut iterations = 0;
-    let (method, status, residual) = A::run::<D>(data, options, p, u, workspace, &mut iterations);
-    // An infinite velocity can hide from the natural map of an open contact.
+    workspace.work = Work::new(options.budget);
+    workspace.rungs = Rungs::default();
+    let outcome = A::run::<D>(data, options, p, u, workspace, &mut iterations);
+    let Outcome {
+        method,
+        stage,
+        status,
+        residual,
+    } = outcome;
+    let report = SolveReport {
+        status,
+        iterations,
+        work: workspace.work.spent,
+        residual: residual.relative,
+        velocity_error: residual.velocity,
+        method,
+        stage,
+        rungs: workspace.rungs,
+    };
+    // An infinite velocity can hide from the residual of an open contact.
     let is_finite = residual.is_finite() && p.iter().chain(u.iter()).all(|x| x.is_finite());
     if status == SolveStatus::NonFinite || !is_finite {
         p.fill(0.0);
         u.fill(0.0);
         return SolveReport {
             status: SolveStatus::NonFinite,
-            iterations,
             residual: f64::INFINITY,
             velocity_error: f64::INFINITY,
-            method,
+            ..report
         };
     }
-    SolveReport {
-        status,
-        iterations,
-        residual: residual.relative,
-        velocity_error: residual.velocity,
-        method,
+    match status {
+        SolveStatus::MaxIterations | SolveStatus::Stalled if workspace.work.is_exhausted => {
+            SolveReport {
+                status: SolveStatus::BudgetExhausted,
+                ..report
+            }
+        }
+        _ => report,
     }
 }
 
@@ -338,6 +374,98 @@ fn sweep_budget(data: &Prepared<'_>) -> usize {
     }
 }
 
+/// The stages of [`Method::Auto`] so far: what each came to, and the nearest answer.
+struct Ladder<'a> {
+    options: &'a SolverOptions,
+    /// Iterations before the present stage.
+    before: usize,
+    /// The nearest answer, whose impulse is in the workspace.
+    nearest: Outcome,
+}
+
+impl<'a> Ladder<'a> {
+    fn new(options: &'a SolverOptions) -> Self {
+        Self {
+            options,
+            before: 0,
+            nearest: Outcome {
+                method: Method::Newton,
+                stage: Stage::AtRest,
+                status: SolveStatus::Stalled,
+                residual: Residual::UNSOLVED,
+            },
+        }
+    }
+
+    /// Enters a stage that ended with `p`; an outcome if it is the answer.
+    #[inline]
+    fn enter(
+        &mut self,
+        (method, stage): (Method, Stage),
+        (status, residual): (SolveStatus, Residual),
+        p: &[f64],
+        workspace: &mut SolverWorkspace,
+        iterations: usize,
+    ) -> Option<Outcome> {
+        let status = match status {
+            SolveStatus::Converged | SolveStatus::NonFinite => status,
+            _ if workspace.work.is_exhausted => SolveStatus::BudgetExhausted,
+            _ => status,
+        };
+        workspace.rungs.push(Rung {
+            stage,
+            status,
+            iterations: iterations - self.before,
+        });
+        self.before = iterations;
+        let outcome = Outcome {
+            method,
+            stage,
+            status,
+            residual,
+        };
+        if status == SolveStatus::Converged {
+            return Some(outcome);
+        }
+        let is_nearer =
+            excess(self.options, residual) < excess(self.options, self.nearest.residual);
+        if is_nearer {
+            self.nearest = outcome;
+            workspace.nearest.copy_from_slice(p);
+        }
+        None
+    }
+
+    /// Ends with the nearest answer; `last` is the status of the last stage. `u` is `W p + q` on return.
+    fn give_nearest<const D: usize>(
+        self,
+        last: SolveStatus,
+        data: &Prepared<'_>,
+        p: &mut [f64],
+        u: &mut [f64],
+        workspace: &SolverWorkspace,
+    ) -> Outcome {
+        if !self.nearest.residual.is_finite() {
+            return Outcome {
+                status: SolveStatus::NonFinite,
+                ..self.nearest
+            };
+        }
+        p.copy_from_slice(&workspace.nearest);
+        data.W.multiply_add(p, data.q, u);
+        Outcome {
+            status: last,
+            residual: data.measure::<D>(workspace, p, u),
+            ..self.nearest
+        }
+    }
+}
+
+/// How far a residual is above the tolerances, as a factor.
+fn excess(options: &SolverOptions, residual: Residual) -> f64 {
+    (residual.relative / options.tolerance).max(residual.velocity / options.velocity_tolerance)
+}
+
 /// [`Method::Auto`]: what is cheap first, what is robust last.
 pub(super) fn escalate<const D: usize>(
     data: &Prepared<'_>,
@@ -347,6 +475,7 @@ pub(super) fn escalate<const D: usize>(
     workspace: &mut SolverWorkspace,
     iterations: &mut usize,
 ) -> Outcome {
+    let mut ladder = Ladder::new(options);
     workspace.start.copy_from_slice(p);
     let steps = newton::FULL_STEPS.min(options.max_newton_steps);
     let is_few = data.mu.len() <= options.direct_contacts;
@@ -356,46 +485,61 @@ pub(super) fn escalate<const D: usize>(
             sweeps: sweep_budget(data),
             predict: true,
         };
-        let (status, residual) =
-            nsgs::sweeps::<D>(data, options, budget, p, u, workspace, iterations);
-        if matches!(status, SolveStatus::Converged | SolveStatus::NonFinite) {
-            return (Method::GaussSeidel, status, residual);
+        let found = nsgs::sweeps::<D>(data, options, budget, p, u, workspace, iterations);
+        let stage = (Method::GaussSeidel, Stage::Sweeps);
+        if let Some(outcome) = ladder.enter(stage, found, p, workspace, *iterations) {
+            return outcome;
+        }
+        if found.0 == SolveStatus::NonFinite {
+            return ladder.give_nearest::<D>(found.0, data, p, u, workspace);
         }
         if let Operator::BlockSparse(W) = data.W
-            && let Some(outcome) =
-                islands::solve::<D>(data, W, options, p, u, workspace, iterations)
-            && outcome.1 == SolveStatus::Converged
+            && let Some(found) = islands::solve::<D>(data, W, options, p, u, workspace, iterations)
         {
-            return outcome;
+            let stage = (found.method, Stage::Islands);
+            let found = (found.status, found.residual);
+            if let Some(outcome) = ladder.enter(stage, found, p, workspace, *iterations) {
+                return outcome;
+            }
         }
         workspace.start.copy_from_slice(p);
     } else if is_warm {
         // Where the modes of the last step serve, this is the end; where they do not, more full steps seldom help.
         let few = newton::WARM_STEPS.min(steps);
-        let (status, residual) =
-            newton::full_steps::<D>(data, options, few, p, u, workspace, iterations);
-        if status == SolveStatus::Converged {
-            return (Method::Newton, status, residual);
+        let found = newton::full_steps::<D>(data, options, few, p, u, workspace, iterations);
+        let stage = (Method::Newton, Stage::WarmNewton);
+        if let Some(outcome) = ladder.enter(stage, found, p, workspace, *iterations) {
+            return outcome;
         }
         p.copy_from_slice(&workspace.start);
-        let (status, residual) = pivoting::pivots::<D>(data, options, p, u, workspace, iterations);
-        if status == SolveStatus::Converged {
-            return (Method::Newton, status, residual);
+        let found = pivoting::pivots::<D>(data, options, p, u, workspace, iterations);
+        let stage = (Method::Newton, Stage::Pivoting);
+        if let Some(outcome) = ladder.enter(stage, found, p, workspace, *iterations) {
+            return outcome;
         }
         // A warm start can mislead where zero does not.
         p.fill(0.0);
     } else if data.q.chunks_exact(D).any(|q| q[0] < 0.0) {
-        if let Some(residual) = guided::solve::<D>(data, options, p, u, workspace, iterations) {
-            return (Method::Newton, SolveStatus::Converged, residual);
+        let found = match guided::solve::<D>(data, options, p, u, workspace, iterations) {
+            Some(residual) => (SolveStatus::Converged, residual),
+            None => (SolveStatus::Stalled, Residual::UNSOLVED),
+        };
+        let stage = (Method::Newton, Stage::GuidedNewton);
+        if let Some(outcome) = ladder.enter(stage, found, p, workspace, *iterations) {
+            return outcome;
         }
         p.fill(0.0);
     }
-    let (status, residual) =
-        newton::full_steps::<D>(data, options, steps, p, u, workspace, iterations);
-    if status == SolveStatus::Converged {
-        return (Method::Newton, status, residual);
+    let found = newton::full_steps::<D>(data, options, steps, p, u, workspace, iterations);
+    let stage = (Method::Newton, Stage::Newton);
+    if let Some(outcome) = ladder.enter(stage, found, p, workspace, *iterations) {
+        return outcome;
     }
     p.copy_from_slice(&workspace.start);
-    let (status, residual) = proximal::solve::<D>(data, options, p, u, workspace, iterations);
-    (Method::ProximalPoint, status, residual)
+    let found = proximal::solve::<D>(data, options, p, u, workspace, iterations);
+    let stage = (Method::ProximalPoint, Stage::ProximalPoint);
+    if let Some(outcome) = ladder.enter(stage, found, p, workspace, *iterations) {
+        return outcome;
+    }
+    ladder.give_nearest::<D>(found.0, data, p, u, workspace)
 }

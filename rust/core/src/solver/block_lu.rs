@@ -224,6 +224,19 @@ impl BlockLu {
         self.correction.resize(W.components() * n, 0.0);
     }
 
+    /// Work of a factorisation of the analysed pattern and of the step that it serves.
+    pub fn work(&self) -> u64 {
+        let d = if self.order.is_empty() {
+            0
+        } else {
+            self.rhs.len() / self.order.len()
+        };
+        let rows = (0..self.order.len()).map(|k| self.upper.row(k).len());
+        let products: usize = rows.map(|columns| columns * (columns + 4)).sum();
+        let blocks = self.matrix.len() / (d * d).max(1);
+        (d * d * d * products + 4 * d * d * (blocks + self.order.len())) as u64
+    }
+
     /// Builds and factors `Bᵀ (W + α R) C + γ` of the predicted modes; `weights` is the diagonal of `R`, one number a contact. `false` at a singular pivot.
     pub fn factorise<const D: usize>(
         &mut self,

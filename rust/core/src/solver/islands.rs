@@ -6,7 +6,7 @@
 
 use super::auto::Prepared;
 use super::methods::{Automatic, Outcome, solve_by};
-use super::report::SolveStatus;
+use super::report::{SolveReport, SolveStatus, Stage};
 use super::workspace::SolverWorkspace;
 use super::{Method, SolverOptions};
 use crate::problem::{
@@ -105,10 +105,16 @@ pub(super) fn solve<const D: usize>(
             let range = islands.starts[island]..islands.starts[island + 1];
             let contacts = &islands.contacts[range];
             if !is_solved::<D>(data, options, workspace, contacts, p, u) {
-                let method =
-                    solve_island::<D>(data, W, options, island, p, &mut islands, iterations);
-                if rank(method) > rank(worst) {
-                    worst = method;
+                let own = SolverOptions {
+                    budget: workspace.work.budget.saturating_sub(workspace.work.spent),
+                    ..*options
+                };
+                let report = solve_island::<D>(data, W, &own, island, p, &mut islands);
+                *iterations += report.iterations;
+                workspace.work.spent += report.work;
+                workspace.work.is_exhausted |= report.status == SolveStatus::BudgetExhausted;
+                if rank(report.method) > rank(worst) {
+                    worst = report.method;
                 }
             }
         }
@@ -126,7 +132,12 @@ pub(super) fn solve<const D: usize>(
     } else {
         SolveStatus::Stalled
     };
-    Some((worst, status, residual))
+    Some(Outcome {
+        method: worst,
+        stage: Stage::Islands,
+        status,
+        residual,
+    })
 }
 
 /// How far an answer had to escalate.
@@ -165,8 +176,7 @@ fn solve_island<const D: usize>(
     island: usize,
     p: &mut [f64],
     islands: &mut Islands,
-    iterations: &mut usize,
-) -> Method {
+) -> SolveReport {
     let Islands {
         starts,
         contacts,
@@ -214,13 +224,12 @@ fn solve_island<const D: usize>(
         let problem = FrictionContactProblem::from_assembled_sparse(&sparse, q, mu);
         solve_by::<Automatic>(&problem, options, own_p, own_u, workspace)
     };
-    *iterations += report.iterations;
     if report.status != SolveStatus::NonFinite {
         for (k, &i) in contacts.iter().enumerate() {
             p[D * i..D * (i + 1)].copy_from_slice(&own_p[D * k..D * (k + 1)]);
         }
     }
-    report.method
+    report
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use super::modes::{self, Prediction, Proximal};
 use super::reduced_system::{self, Factors, System};
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
-use super::{SolverOptions, auto::Prepared, nsgs};
+use super::{SolverOptions, auto::Prepared, nsgs, work};
 use crate::problem::Residual;
 
 /// Most full steps before the safeguarded method takes over. Measured on the recorded problems: modes that full steps find at
@@ -191,6 +191,12 @@ pub(super) fn full_steps<const D: usize>(
                 alpha: course.alpha,
                 centre: &workspace.centre,
             };
+            if !workspace
+                .work
+                .affords(CYCLE_SWEEPS as u64 * work::sweep(data.product, data.mu.len()))
+            {
+                return give_best(data, best, p, u, workspace);
+            }
             for _ in 0..CYCLE_SWEEPS {
                 nsgs::sweep::<D>(data, prox, p);
             }

@@ -12,7 +12,7 @@ use super::modes::{self, Proximal};
 use super::reduced_system::{self, Factors, System};
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
-use super::{SolverOptions, auto::Prepared, nsgs};
+use super::{SolverOptions, auto::Prepared, nsgs, work};
 use crate::problem::Residual;
 
 /// Most Newton steps for one value of `α`.
@@ -245,6 +245,12 @@ fn descend<const D: usize>(
             alpha,
             centre: &workspace.centre,
         };
+        if !workspace
+            .work
+            .affords(SWEEPS as u64 * work::sweep(data.product, data.mu.len()))
+        {
+            return false;
+        }
         for _ in 0..SWEEPS {
             nsgs::sweep::<D>(data, prox, p);
         }
@@ -281,7 +287,7 @@ pub(super) fn solve<const D: usize>(
     let mut asked = options.tolerance;
     let limit = *iterations + options.max_newton_steps;
     let mut status = SolveStatus::MaxIterations;
-    while *iterations < limit {
+    while *iterations < limit && !workspace.work.is_exhausted {
         let sprints = course.begins_sprint();
         let task = if sprints {
             let tolerance = 1e-2 * asked;
