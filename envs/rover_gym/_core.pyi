@@ -962,7 +962,7 @@ def solve_friction_contact(
     solver: Literal["auto", "nsgs", "newton", "proximal", "admm", "relaxed"] = "auto",
     max_iterations: int = 1000,
     initial: npt.ArrayLike | None = None,
-    budget: int = 500000000,
+    budget: int = 300000000,
 ) -> FrictionContactSolution:
     """Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K, for any W (n_c d, n_c d).
 

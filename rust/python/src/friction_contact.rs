@@ -252,7 +252,7 @@ fn given<'py, T: for<'a> FromPyObject<'a, 'py>>(
 #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
 #[pyo3(signature = (
     W, q, mu, tolerance = None, *, dimension = None, solver = None, max_iterations = None, initial = None, budget = None
-), text_signature = "(W, q, mu, tolerance=1e-08, *, dimension=3, solver='auto', max_iterations=1000, initial=None, budget=500000000)")]
+), text_signature = "(W, q, mu, tolerance=1e-08, *, dimension=3, solver='auto', max_iterations=1000, initial=None, budget=300000000)")]
 pub fn solve_friction_contact(
     py: Python<'_>,
     W: &Bound<'_, PyAny>,

@@ -1,17 +1,22 @@
 //! The choice of method, and what all methods share: prepared scales, the acceptance test, the final report.
 
 use super::methods::{Algorithm, ContactLaw, Outcome};
-use super::modes::Proximal;
 use super::nsgs::Budget;
-use super::report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
+use super::report::{Rungs, SolveReport, SolveStatus, Stage};
 use super::work::Work;
 use super::workspace::SolverWorkspace;
-use super::{Method, SolverOptions, guided, islands, newton, nsgs, pivoting, proximal, work};
-use crate::law::coulomb::natural_map;
+use super::{Method, SolverOptions, admm, guided, islands, newton, nsgs, pivoting, proximal, work};
+use crate::law::coulomb::{natural_map, violation};
 use crate::problem::{
     ContactScales, FrictionContactProblem, Magnitudes, Operator, Residual, Violations,
     evaluate_contact, evaluate_into, power_of_two,
 };
+
+/// Friction coefficient from which the natural map is no measure of progress.
+const STEEP: f64 = 1e3;
+
+/// Largest rounding of `W p`, relative to `|q|`, of an answer that counts as converged.
+const RESOLVED: f64 = 1e-6;
 
 /// The problem's slices and the scales derived from them.
 #[derive(Clone, Copy, Debug)]
@@ -100,24 +105,27 @@ impl<'a> Prepared<'a> {
         violations.residual(self.inverse_speed, self.inverse_data)
     }
 
-    /// Squared natural map of the regularised problem (`W + α I`, `q − α c`) at `(p, u)`, `u = W p + q`, in (N s)².
+    /// What a damped step has to make smaller, for the regularised problem (`W + α I`, `q − α c`) at `(p, u)`, `u = W p + q`: the squared natural map, in
+    /// (N s)², or the violation itself where μ leaves the map no digits. Measured on piles of 460 contacts: with the map a tenth to a third fewer steps.
     pub fn merit<const D: usize>(
         &self,
-        rho: &[f64],
-        prox: Proximal<'_>,
+        workspace: &SolverWorkspace,
+        alpha: f64,
         p: &[f64],
         u: &[f64],
     ) -> f64 {
-        let mut sum = 0.0;
-        for (i, (&mu, &rho)) in self.mu.iter().zip(rho).enumerate() {
+        let (mut sum, centre) = (0.0, &workspace.centre);
+        let scales = workspace.rho.iter().zip(&workspace.rho_modes);
+        for (i, (&mu, (&mass, &modes))) in self.mu.iter().zip(scales).enumerate() {
             let p_i: [f64; D] = std::array::from_fn(|k| p[D * i + k]);
-            let u_hat = std::array::from_fn(|k| {
-                u[D * i + k] + prox.alpha * (p_i[k] - prox.centre[D * i + k])
-            });
-            sum += natural_map(&p_i, &u_hat, mu, rho)
-                .iter()
-                .map(|x| x * x)
-                .sum::<f64>();
+            let u_hat =
+                std::array::from_fn(|k| u[D * i + k] + alpha * (p_i[k] - centre[D * i + k]));
+            let squares = |map: [f64; D]| map.iter().map(|x| x * x).sum::<f64>();
+            sum += if mu <= STEEP {
+                squares(natural_map(&p_i, &u_hat, mu, mass))
+            } else {
+                (mass * mass) * squares(violation(&p_i, &u_hat, mu, modes))
+            };
         }
         sum
     }
@@ -126,6 +134,16 @@ impl<'a> Prepared<'a> {
     #[inline]
     pub fn accepts(options: &SolverOptions, residual: Residual) -> bool {
         residual.relative <= options.tolerance && residual.velocity <= options.velocity_tolerance
+    }
+
+    /// Whether the rounding of `W p` is small beside the free velocity, so that the velocities of `p` mean something. At mass ratios of about
+    /// 1e10 they need not.
+    pub fn is_resolved(&self, p: &[f64]) -> bool {
+        let allowed = RESOLVED / self.inverse_speed;
+        let largest = p.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let bound = self.mean_diagonal * (self.n * self.n) as f64 * largest;
+        f64::EPSILON * bound <= allowed
+            || (0..self.n).all(|r| f64::EPSILON * self.W.row_magnitude(r, p) <= allowed)
     }
 
     /// Whether each contact's violation is within the rounding of its own rows of `W p + q`: then no impulse does better.
@@ -354,15 +372,13 @@ fn judge<A: Algorithm, const D: usize>(
             ..report
         };
     }
-    match status {
-        SolveStatus::MaxIterations | SolveStatus::Stalled if workspace.work.is_exhausted => {
-            SolveReport {
-                status: SolveStatus::BudgetExhausted,
-                ..report
-            }
-        }
-        _ => report,
+    if status == SolveStatus::Converged && !data.is_resolved(p) {
+        return SolveReport {
+            status: SolveStatus::Stalled,
+            ..report
+        };
     }
+    report
 }
 
 /// Most sweeps over many contacts before Newton. Dense, a Newton step costs about as much as `n` sweeps; block-sparse the fill grows with the problem; 20, 50 and 200 were
@@ -373,6 +389,9 @@ fn sweep_budget(data: &Prepared<'_>) -> usize {
         Operator::BlockSparse(_) => (data.mu.len() / 20).max(50),
     }
 }
+
+/// Alternations that bring many contacts near enough for the proximal point: on piles of 250 and 460 contacts it then takes a third to five sixths of the steps.
+const ALTERNATIONS: usize = 300;
 
 /// The stages of [`Method::Auto`] so far: what each came to, and the nearest answer.
 struct Ladder<'a> {
@@ -407,16 +426,7 @@ impl<'a> Ladder<'a> {
         workspace: &mut SolverWorkspace,
         iterations: usize,
     ) -> Option<Outcome> {
-        let status = match status {
-            SolveStatus::Converged | SolveStatus::NonFinite => status,
-            _ if workspace.work.is_exhausted => SolveStatus::BudgetExhausted,
-            _ => status,
-        };
-        workspace.rungs.push(Rung {
-            stage,
-            status,
-            iterations: iterations - self.before,
-        });
+        let status = workspace.list_stage(stage, status, iterations - self.before);
         self.before = iterations;
         let outcome = Outcome {
             method,
@@ -436,10 +446,9 @@ impl<'a> Ladder<'a> {
         None
     }
 
-    /// Ends with the nearest answer; `last` is the status of the last stage. `u` is `W p + q` on return.
+    /// Ends with the nearest answer, for the reason of the last stage. `u` is `W p + q` on return.
     fn give_nearest<const D: usize>(
         self,
-        last: SolveStatus,
         data: &Prepared<'_>,
         p: &mut [f64],
         u: &mut [f64],
@@ -454,7 +463,11 @@ impl<'a> Ladder<'a> {
         p.copy_from_slice(&workspace.nearest);
         data.W.multiply_add(p, data.q, u);
         Outcome {
-            status: last,
+            status: workspace
+                .rungs
+                .as_slice()
+                .last()
+                .map_or(self.nearest.status, |rung| rung.status),
             residual: data.measure::<D>(workspace, p, u),
             ..self.nearest
         }
@@ -491,7 +504,7 @@ pub(super) fn escalate<const D: usize>(
             return outcome;
         }
         if found.0 == SolveStatus::NonFinite {
-            return ladder.give_nearest::<D>(found.0, data, p, u, workspace);
+            return ladder.give_nearest::<D>(data, p, u, workspace);
         }
         if let Operator::BlockSparse(W) = data.W
             && let Some(found) = islands::solve::<D>(data, W, options, p, u, workspace, iterations)
@@ -536,10 +549,25 @@ pub(super) fn escalate<const D: usize>(
         return outcome;
     }
     p.copy_from_slice(&workspace.start);
+    if !is_few {
+        let own = SolverOptions {
+            max_sweeps: ALTERNATIONS.min(options.max_sweeps),
+            ..*options
+        };
+        let law = ContactLaw::Coulomb;
+        let found = admm::solve::<D>(data, &own, law, p, u, workspace, iterations);
+        let stage = (Method::Admm, Stage::Admm);
+        if let Some(outcome) = ladder.enter(stage, found, p, workspace, *iterations) {
+            return outcome;
+        }
+        if ladder.nearest.stage != Stage::Admm {
+            p.copy_from_slice(&workspace.start);
+        }
+    }
     let found = proximal::solve::<D>(data, options, p, u, workspace, iterations);
     let stage = (Method::ProximalPoint, Stage::ProximalPoint);
     if let Some(outcome) = ladder.enter(stage, found, p, workspace, *iterations) {
         return outcome;
     }
-    ladder.give_nearest::<D>(found.0, data, p, u, workspace)
+    ladder.give_nearest::<D>(data, p, u, workspace)
 }

@@ -70,9 +70,26 @@ fn product<const D: usize>(a: &Block<D>, b: &Block<D>) -> Block<D> {
     std::array::from_fn(|r| std::array::from_fn(|c| (0..D).map(|k| a[r][k] * b[k][c]).sum()))
 }
 
+/// `out -= A B` of one block.
+#[inline]
+fn subtract_block<const D: usize>(a: &Block<D>, b: &[f64], out: &mut [f64]) {
+    // Lengths that the compiler knows.
+    let (b, out) = (&b[..D * D], &mut out[..D * D]);
+    for r in 0..D {
+        for c in 0..D {
+            let mut sum = 0.0;
+            for m in 0..D {
+                sum += a[r][m] * b[D * m + c];
+            }
+            out[D * r + c] -= sum;
+        }
+    }
+}
+
 /// `out -= A x` of one block.
 #[inline]
 fn subtract_product<const D: usize>(block: &[f64], x: &[f64; D], out: &mut [f64; D]) {
+    let block = &block[..D * D];
     for r in 0..D {
         for k in 0..D {
             out[r] -= block[D * r + k] * x[k];
@@ -300,15 +317,7 @@ impl BlockLu {
                 let target = self.upper.columns[up];
                 let out = &mut self.row[D * D * target..D * D * (target + 1)];
                 let block = &self.upper_blocks[D * D * up..D * D * (up + 1)];
-                for r in 0..D {
-                    for c in 0..D {
-                        let mut sum = 0.0;
-                        for m in 0..D {
-                            sum += factor[r][m] * block[D * m + c];
-                        }
-                        out[D * r + c] -= sum;
-                    }
-                }
+                subtract_block(&factor, block, out);
             }
         }
         for at in self.upper.row(k) {

@@ -2,7 +2,7 @@
 
 use super::auto::{Prepared, solve_in};
 use super::nsgs::{self, Budget};
-use super::report::{Rung, SolveReport, SolveStatus, Stage};
+use super::report::{SolveReport, SolveStatus, Stage};
 use super::workspace::SolverWorkspace;
 use super::{Method, SolverOptions, admm, auto, newton, proximal};
 use crate::problem::{Dimension, FrictionContactProblem, Residual};
@@ -67,11 +67,7 @@ impl Outcome {
         iterations: usize,
         workspace: &mut SolverWorkspace,
     ) -> Self {
-        workspace.rungs.push(Rung {
-            stage,
-            status,
-            iterations,
-        });
+        let status = workspace.list_stage(stage, status, iterations);
         Self {
             method,
             stage,

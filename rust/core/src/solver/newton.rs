@@ -107,7 +107,7 @@ fn predict<const D: usize>(
     // impulses that W cannot see. The modes of the warm start need no such care.
     if !course.exact
         || course.settled > PATIENCE
-        || data.merit::<D>(&workspace.rho, prox, p, u).sqrt() * data.inverse_data <= SOLVED
+        || data.merit::<D>(workspace, course.alpha, p, u).sqrt() * data.inverse_data <= SOLVED
     {
         workspace.centre.copy_from_slice(p);
     }

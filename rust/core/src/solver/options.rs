@@ -15,7 +15,7 @@ pub enum Method {
     Newton,
     /// Proximal point outside, damped Newton inside.
     ProximalPoint,
-    /// Alternating directions with De Saxcé's shift renewed at every iteration; for comparison, `Auto` never takes it.
+    /// Alternating directions with De Saxcé's shift renewed at every iteration; `Auto` takes some to bring many contacts near.
     Admm,
     /// The convex relaxation of Coulomb's law, for comparison: its answer obeys another law and never counts as converged.
     Relaxed,
@@ -106,7 +106,7 @@ pub struct SolverOptions {
 
 impl SolverOptions {
     /// About 0.3 s on a processor of 2024.
-    pub const DEFAULT_BUDGET: u64 = 500_000_000;
+    pub const DEFAULT_BUDGET: u64 = 300_000_000;
 }
 
 impl Default for SolverOptions {

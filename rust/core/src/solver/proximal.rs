@@ -151,30 +151,30 @@ fn backtrack<const D: usize>(
     u: &mut [f64],
     workspace: &mut SolverWorkspace,
 ) -> bool {
-    let SolverWorkspace {
-        direction,
-        image,
-        trial,
-        trial_velocity,
-        centre,
-        rho,
-        ..
-    } = workspace;
-    for ((d, t), x) in direction.iter_mut().zip(&*trial).zip(&*p) {
+    for ((d, t), x) in workspace
+        .direction
+        .iter_mut()
+        .zip(&workspace.trial)
+        .zip(&*p)
+    {
         *d = t - x;
     }
-    trial_velocity.fill(0.0);
-    data.W.multiply_add(direction, trial_velocity, image);
-    let prox = Proximal { alpha, centre };
+    workspace.trial_velocity.fill(0.0);
+    data.W.multiply_add(
+        &workspace.direction,
+        &workspace.trial_velocity,
+        &mut workspace.image,
+    );
     let mut t = 1.0;
     for _ in 0..HALVINGS {
         for k in 0..data.n {
-            trial[k] = p[k] + t * direction[k];
-            trial_velocity[k] = u[k] + t * image[k];
+            workspace.trial[k] = p[k] + t * workspace.direction[k];
+            workspace.trial_velocity[k] = u[k] + t * workspace.image[k];
         }
-        if data.merit::<D>(rho, prox, trial, trial_velocity) < (1.0 - 1e-3 * t) * current {
+        let (trial, velocity) = (&workspace.trial, &workspace.trial_velocity);
+        if data.merit::<D>(workspace, alpha, trial, velocity) < (1.0 - 1e-3 * t) * current {
             p.copy_from_slice(trial);
-            u.copy_from_slice(trial_velocity);
+            u.copy_from_slice(velocity);
             return true;
         }
         t *= 0.5;
@@ -206,7 +206,7 @@ fn descend<const D: usize>(
             alpha,
             centre: &workspace.centre,
         };
-        let current = data.merit::<D>(&workspace.rho, prox, p, u);
+        let current = data.merit::<D>(workspace, alpha, p, u);
         if !current.is_finite() || step == steps {
             return current <= threshold;
         }

@@ -97,7 +97,7 @@ pub struct Rung {
 }
 
 /// The stages that were tried, in their order.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
 pub struct Rungs {
     list: [Rung; Self::MOST],
     len: usize,
@@ -120,6 +120,12 @@ impl Rungs {
     #[must_use]
     pub fn as_slice(&self) -> &[Rung] {
         &self.list[..self.len]
+    }
+}
+
+impl std::fmt::Debug for Rungs {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_list().entries(self.as_slice()).finish()
     }
 }
 
