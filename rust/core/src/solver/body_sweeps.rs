@@ -7,7 +7,7 @@
 //!
 //! Contacts are visited in four places of the list in turn, so that one need not wait for what the one before it wrote.
 //!
-//! The answer is judged as every solver's: by the natural map of the returned impulse, with the velocities summed anew. It never adds energy:
+//! The answer is judged as every solver's: by the violation of the returned impulse, with the velocities summed anew. It never adds energy:
 //! an approximate answer with `pᵀu > 0` is shortened until pᵀu = 0.
 //!
 //! Source: Jean 1999 and Moreau 1999 (the sweep); Nesterov 1983, O'Donoghue and Candès 2015 (extrapolation with restart).

@@ -101,7 +101,10 @@ pub(super) fn solve<const D: usize>(
     let n_islands = islands.find(W);
     let mut worst = Method::GaussSeidel;
     if n_islands > 1 {
-        for island in 0..n_islands {
+        // The small ones first: a large one may take all that is left of the budget.
+        let mut order: Vec<usize> = (0..n_islands).collect();
+        order.sort_by_key(|&island| islands.starts[island + 1] - islands.starts[island]);
+        for island in order {
             let range = islands.starts[island]..islands.starts[island + 1];
             let contacts = &islands.contacts[range];
             if !is_solved::<D>(data, options, workspace, contacts, p, u) {
