@@ -1,9 +1,10 @@
-//! Reader of the recorded friction-contact problems (`.npz`: a zip of NumPy arrays), for tests and examples only.
+//! Reader of friction-contact problems, the shelf's and recorded ones (`.npz`: a zip of NumPy arrays), for tests and
+//! examples only.
 
-#![allow(clippy::print_stdout)] // a silent skip would look like a pass
+#![allow(clippy::print_stdout)] // what is left out is said
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
 use rover_core::problem::Dimension;
@@ -18,15 +19,8 @@ pub struct Recorded {
     pub mu: Vec<f64>,
 }
 
-/// Folder of the recorded problems, `../shared/reference/contact_problems` beside the repository; `None` where absent.
-///
-/// Worktrees lie deeper than the main checkout, so every ancestor is asked.
-pub fn folder() -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    root.ancestors()
-        .map(|ancestor| ancestor.join("shared/reference/contact_problems"))
-        .find(|path| path.is_dir())
-}
+/// Environment variable that names the folder of the recorded problems, which are no part of this repository.
+const SETTING: &str = "ROVER_GYM_CONTACT_PROBLEMS";
 
 /// The problems of this repository's shelf, `tests/shelf/data`, whose name passes the filter, sorted by size.
 #[allow(dead_code)] // not every user of this page asks for it
@@ -37,21 +31,20 @@ pub fn shelf(filter: impl Fn(&str) -> bool) -> Vec<Recorded> {
     )
 }
 
-/// All recorded problems whose name passes the filter, sorted by size; says loudly when there is nothing to read.
+/// The recorded problems, of the folder that the environment variable names, whose name passes the filter, sorted by
+/// size; says so when none is named.
 #[allow(dead_code)] // not every user of this page asks for it
 pub fn recorded(filter: impl Fn(&str) -> bool) -> Vec<Recorded> {
-    let Some(folder) = folder() else {
-        println!(
-            "SKIPPED: no ../shared/reference/contact_problems beside the repository, recorded problems not checked"
-        );
+    let Some(folder) = std::env::var_os(SETTING) else {
+        println!("{SETTING} is not set: the recorded problems are left out");
         return Vec::new();
     };
-    read_all(&folder, filter)
+    read_all(Path::new(&folder), filter)
 }
 
 fn read_all(folder: &Path, filter: impl Fn(&str) -> bool) -> Vec<Recorded> {
     let mut problems: Vec<Recorded> = fs::read_dir(folder)
-        .expect("readable folder")
+        .unwrap_or_else(|error| panic!("{}: {error}", folder.display()))
         .filter_map(|entry| {
             let path = entry.expect("readable entry").path();
             let name = path.file_stem()?.to_str()?.to_owned();

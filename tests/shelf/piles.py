@@ -17,7 +17,7 @@ from itertools import combinations
 import numpy as np
 
 import rover_gym
-from shelf.free_bodies import GROUND, Array, FreeBodies, Indices, block_rows, frames_of
+from shelf.problem import GROUND, Array, FreeBodies, Indices, block_rows, frames_of
 
 GRAVITY = 9.81
 MARGIN = 1e-3  # contacts closer than this are active, m
@@ -195,9 +195,7 @@ class Stones:
 
     def contacts(self, x: Array, R: Array, walls: tuple[Array, Array]) -> Contacts:
         """All contacts of bodies at x (n, 3), turned by R (n, 3, 3), among themselves and with walls n . x >= d."""
-        placed = [
-            Placed(s, s.vertices @ R[i].T + x[i], s.normals @ R[i].T) for i, s in enumerate(self.shapes)
-        ]
+        placed = [Placed(s, s.vertices @ R[i].T + x[i], s.normals @ R[i].T) for i, s in enumerate(self.shapes)]
         found = []
         for i, j in near(x, self.radius):
             if (hit := polyhedra_in_contact(placed[i], placed[j])) is not None:

@@ -1,9 +1,9 @@
-"""Free rigid bodies in contact: their friction-contact problem (W, q, mu), and how the shelf stores it.
+"""A problem of the shelf and its file: W, q and mu, where bodies are free by the factors of W.
 
     u = Hᵀ v,   v = v_free + M̂⁻¹ H p,   so that   u = W p + q   with   W = Hᵀ M̂⁻¹ H,   q = Hᵀ v_free - u_wall.
 
 A body's velocity is (speed of its mass centre, spin), both in the world's axes. The implicit part of the gyroscopic
-couple makes M̂, and with it W, unsymmetric.
+couple makes M̂, and with it W, unsymmetric. `tests/physics/solver_npz.rs` reads the same files.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from comparison.problems import Problem
 
+DATA = Path(__file__).parent / "data"
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
@@ -65,21 +67,6 @@ class FreeBodies:
         jacobian = self.jacobian()
         return jacobian @ self.apply_inverse_mass(jacobian.T)
 
-    def save(self, path: Path) -> None:
-        """Writes the problem where `shelf.load` and the reader of the Rust tests find it."""
-        np.savez_compressed(
-            path,
-            dimension=np.int64(3),
-            contacts=np.int64(len(self.mu)),
-            mass=self.mass,
-            inertia_inverse=np.ascontiguousarray(self.inertia_inverse),
-            pairs=self.pairs,
-            frames=self.frames,
-            levers=self.levers,
-            q=self.q,
-            mu=self.mu,
-        )
-
 
 def frames_of(normals: Array) -> Array:
     """Right-handed frames (n, 3, 3) with the given unit normals (n, 3) as their first rows."""
@@ -95,3 +82,40 @@ def block_rows(W: Array) -> tuple[Indices, Indices, Array]:
     blocks = W.reshape(n_contacts, 3, n_contacts, 3).swapaxes(1, 2)
     rows, columns = np.nonzero(np.any(blocks != 0.0, axis=(2, 3)))
     return np.searchsorted(rows, np.arange(n_contacts + 1)), columns, blocks[rows, columns]
+
+
+@dataclass(frozen=True)
+class Dense:
+    """A problem by its operator W (n_c d, n_c d), 1/kg; q (n_c d,), m/s; mu (n_c,); d is 2 or 3."""
+
+    W: Array
+    q: Array
+    mu: Array
+    dimension: int = 3
+
+    def delassus(self) -> Array:
+        """W, as it is."""
+        return self.W
+
+
+def save(name: str, problem: FreeBodies | Dense, velocities: Array | None) -> None:
+    """Writes a problem and, where they are unique, the velocities u (n_c d,) of its answer, m/s."""
+    arrays = {key: np.ascontiguousarray(value) for key, value in vars(problem).items() if key != "dimension"}
+    if velocities is not None:
+        arrays["velocities"] = velocities
+    dimension = problem.dimension if isinstance(problem, Dense) else 3
+    np.savez_compressed(DATA / f"{name}.npz", dimension=np.int64(dimension), **arrays)
+
+
+def names() -> list[str]:
+    """The shelf's problems, smallest file first."""
+    return [path.stem for path in sorted(DATA.glob("*.npz"), key=lambda path: (path.stat().st_size, path.stem))]
+
+
+def load(name: str) -> tuple[Problem, Array | None]:
+    """A problem of the shelf and, where they are unique, the velocities of its answer."""
+    with np.load(DATA / f"{name}.npz") as data:
+        arrays = dict(data)
+    dimension, velocities = int(arrays.pop("dimension")), arrays.pop("velocities", None)
+    stored = Dense(**arrays, dimension=dimension) if "W" in arrays else FreeBodies(**arrays)
+    return Problem(name, stored.delassus(), stored.q, stored.mu, dimension), velocities
