@@ -30,6 +30,7 @@ pub enum Value {
     Numbers(Vec<f64>),
     Count(usize),
     Text(String),
+    Object(Py<PyAny>),
 }
 
 /// An error on its way to Python. A newtype, since neither crate owns both `ModelError` and `PyErr`.
@@ -142,6 +143,7 @@ impl From<BorderError> for PyErr {
                     Value::Numbers(x) => instance.setattr("value", x)?,
                     Value::Count(x) => instance.setattr("value", x)?,
                     Value::Text(x) => instance.setattr("value", x)?,
+                    Value::Object(x) => instance.setattr("value", x)?,
                 }
                 Ok(PyErr::from_value(instance))
             };
@@ -173,11 +175,15 @@ impl From<ModelError> for BorderError {
             ModelError::DuplicateName { name, .. }
             | ModelError::UnknownParent { name, .. }
             | ModelError::UnknownName { name, .. }
+            | ModelError::NotADisc { solid: name, .. }
             | ModelError::SteeringNotAbove { name, .. } => Value::Text(name.clone()),
             ModelError::NotFinite { value, .. }
             | ModelError::NotPositive { value, .. }
             | ModelError::Negative { value, .. }
+            | ModelError::OutOfRange { value, .. }
+            | ModelError::RadiusContradictsShape { value, .. }
             | ModelError::NotASign { value, .. } => Value::Number(*value),
+            ModelError::TooMany { count, .. } => Value::Count(*count),
             ModelError::NoDirection { value, .. } => Value::Numbers(value.to_vec()),
             ModelError::ImpossibleInertia { principal, .. } => Value::Numbers(principal.to_vec()),
         };

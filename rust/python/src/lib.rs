@@ -2,10 +2,12 @@
 #![forbid(unsafe_code)]
 
 mod accuracy;
+mod arguments;
 mod arrays;
 mod batch;
 mod contacts;
 mod errors;
+mod files;
 mod friction_contact;
 mod model;
 mod planar;

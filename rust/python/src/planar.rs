@@ -13,15 +13,16 @@ use rover_core::planar::{
 use rover_core::simulation::{CommandError, SnapshotError};
 use std::sync::Arc;
 
+use crate::arguments::{Given, count, flag, number, text};
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
 use crate::model::RoverModel;
 use crate::planar_ground::{border, parse};
 use crate::simulation::{
-    Energy, Problem, STABILISATIONS, StepReport, VARIANTS, choice, name_of, step_count,
+    Energy, Problem, STABILISATIONS, StepReport, VARIANTS, choice, name_of,
 };
-use crate::snapshot::damaged;
+use crate::snapshot::{belonging, damaged, read};
 
 const RULES: [(&str, ContactRule); 2] = [
     ("nearest", ContactRule::Nearest),
@@ -115,10 +116,8 @@ pub struct PlanarSnapshot {
 #[pymethods]
 impl PlanarSnapshot {
     #[staticmethod]
-    fn from_bytes(data: &[u8]) -> PyResult<Self> {
-        Ok(Self {
-            inner: postcard::from_bytes(data).map_err(|e| damaged(&e))?,
-        })
+    fn from_bytes(data: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Ok(Self { inner: read(data)? })
     }
 
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
@@ -232,26 +231,23 @@ fn options(given: Option<&Bound<'_, PyDict>>) -> PyResult<Options> {
     let (mut solver, mut tolerance, mut max_iterations) = ("auto".to_owned(), 1e-12, 1000_usize);
     for (key, value) in given.into_iter().flatten() {
         let key: String = key.extract()?;
-        match key.as_str() {
-            "gravity" => step.gravity = pair(&value, Kind::Option, "gravity")?.push(0.0),
-            "friction" => step.friction_coefficient = value.extract()?,
-            "restitution" => step.restitution = value.extract()?,
-            "time_step" => step.time_step = value.extract()?,
-            "variant" => step.variant = choice("variant", &value.extract::<String>()?, &VARIANTS)?,
-            "theta" => step.theta = value.extract()?,
-            "forecast" => step.forecast = value.extract()?,
-            "stabilisation" => {
-                step.stabilisation = choice(
-                    "stabilisation",
-                    &value.extract::<String>()?,
-                    &STABILISATIONS,
-                )?;
-            }
-            "warm_start" => step.warm_start = value.extract()?,
-            "contact" => rule = choice("contact", &value.extract::<String>()?, &RULES)?,
-            "solver" => solver = value.extract()?,
-            "tolerance" => tolerance = value.extract()?,
-            "max_iterations" => max_iterations = value.extract()?,
+        let field = key.as_str();
+        let number = || number(&value, Kind::Option, field);
+        let text = || text(&value, Kind::Option, field);
+        match field {
+            "gravity" => step.gravity = pair(&value, Kind::Option, field)?.push(0.0),
+            "friction" => step.friction_coefficient = number()?,
+            "restitution" => step.restitution = number()?,
+            "time_step" => step.time_step = number()?,
+            "variant" => step.variant = choice(field, &text()?, &VARIANTS)?,
+            "theta" => step.theta = number()?,
+            "forecast" => step.forecast = number()?,
+            "stabilisation" => step.stabilisation = choice(field, &text()?, &STABILISATIONS)?,
+            "warm_start" => step.warm_start = flag(&value, Kind::Option, field)?,
+            "contact" => rule = choice(field, &text()?, &RULES)?,
+            "solver" => solver = text()?,
+            "tolerance" => tolerance = number()?,
+            "max_iterations" => max_iterations = count(&value, Kind::Option, field)?,
             _ => {
                 let message = format!("{key}: is no option of a planar simulation");
                 return Err(pyo3::exceptions::PyTypeError::new_err(message));
@@ -386,9 +382,10 @@ impl PlanarSimulation {
         Ok(self.inner.set_inputs(&torques).map_err(BorderError::from)?)
     }
 
-    #[pyo3(signature = (n = 1))]
-    fn step(&mut self, py: Python<'_>, n: i64) -> PyResult<StepReport> {
-        let steps = step_count(n)?;
+    #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
+    fn step(&mut self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
+        let steps = n.count(1, Kind::Option, "n")?;
         let inner = &mut self.inner;
         let report = py.detach(|| inner.step(steps)).map_err(BorderError::from)?;
         Ok(report.into())
@@ -424,11 +421,10 @@ impl PlanarSimulation {
         }
     }
 
-    fn restore(&mut self, snapshot: &PlanarSnapshot) -> PyResult<()> {
-        Ok(self
-            .inner
-            .restore(&snapshot.inner)
-            .map_err(BorderError::from)?)
+    fn restore(&mut self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
+        let snapshot = belonging::<PlanarSnapshot>(snapshot, "a PlanarSnapshot")?;
+        let restored = self.inner.restore(&snapshot.get().inner);
+        Ok(restored.map_err(BorderError::from)?)
     }
 
     fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
@@ -452,7 +448,7 @@ impl PlanarSimulation {
         kind: &Bound<'py, PyAny>,
         ground: &Bound<'py, PyAny>,
         settings: &Bound<'py, PyDict>,
-        snapshot: &PlanarSnapshot,
+        snapshot: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let made = kind.call((ground,), Some(settings))?;
         made.cast::<Self>()?.borrow_mut().restore(snapshot)?;
@@ -467,14 +463,19 @@ pub struct BallSimulation;
 #[pymethods]
 impl BallSimulation {
     #[new]
-    #[pyo3(signature = (ground, *, mass = 3.0, radius = 1.5, inertia = None, **options))]
+    #[pyo3(signature = (ground, *, mass = Given::MISSING, radius = Given::MISSING, inertia = Given::MISSING, **options),
+        text_signature = "(ground, *, mass=3.0, radius=1.5, inertia=None, **options)")]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn new(
         ground: &Bound<'_, PyAny>,
-        mass: f64,
-        radius: f64,
-        inertia: Option<f64>,
+        mass: Given<'_>,
+        radius: Given<'_>,
+        inertia: Given<'_>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyClassInitializer<Self>> {
+        let mass = mass.number(3.0, Kind::Model, "mass")?;
+        let radius = radius.number(1.5, Kind::Model, "radius")?;
+        let inertia = inertia.maybe(Kind::Model, "inertia")?;
         let inertia = inertia.unwrap_or(0.5 * mass * radius * radius);
         let ball = Ball::new(mass, radius, inertia).map_err(|e| border(Kind::Model, &e))?;
         let parameters = PyDict::new(ground.py());
@@ -495,8 +496,13 @@ fn both(value: Option<&Bound<'_, PyAny>>, field: &str, default: [f64; 2]) -> PyR
     let Some(value) = value else {
         return Ok(default);
     };
-    if let Ok(x) = value.extract::<f64>() {
-        return Ok([x, x]);
+    one_or_two(value, field)
+}
+
+/// One number for both, or two.
+pub fn one_or_two(value: &Bound<'_, PyAny>, field: &str) -> PyResult<[f64; 2]> {
+    if value.len().is_err() {
+        return Ok([number(value, Kind::Model, field)?; 2]);
     }
     Ok(pair(value, Kind::Model, field)?.into())
 }
@@ -505,12 +511,14 @@ fn both(value: Option<&Bound<'_, PyAny>>, field: &str, default: [f64; 2]) -> PyR
 impl TwoWheelRoverSimulation {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (ground, *, mass = 130.0, inertia = None, wheel_mass = None, wheel_radius = None, wheel_inertia = None,
-        axle_a = None, axle_b = None, **options))]
+    #[pyo3(signature = (ground, *, mass = Given::MISSING, inertia = Given::MISSING, wheel_mass = None, wheel_radius = None,
+        wheel_inertia = None, axle_a = None, axle_b = None, **options),
+        text_signature = "(ground, *, mass=130.0, inertia=None, wheel_mass=None, wheel_radius=None, wheel_inertia=None, axle_a=None, axle_b=None, **options)")]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn new(
         ground: &Bound<'_, PyAny>,
-        mass: f64,
-        inertia: Option<f64>,
+        mass: Given<'_>,
+        inertia: Given<'_>,
         wheel_mass: Option<&Bound<'_, PyAny>>,
         wheel_radius: Option<&Bound<'_, PyAny>>,
         wheel_inertia: Option<&Bound<'_, PyAny>>,
@@ -518,6 +526,8 @@ impl TwoWheelRoverSimulation {
         axle_b: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyClassInitializer<Self>> {
+        let mass = mass.number(130.0, Kind::Model, "mass")?;
+        let inertia = inertia.maybe(Kind::Model, "inertia")?;
         let masses = both(wheel_mass, "wheel_mass", [60.0; 2])?;
         let radii = both(wheel_radius, "wheel_radius", [0.2; 2])?;
         // Discs, unless told otherwise.
@@ -560,12 +570,14 @@ pub struct MirroredRoverSimulation {
 #[pymethods]
 impl MirroredRoverSimulation {
     #[new]
-    #[pyo3(signature = (ground, *, model = None, **options))]
+    #[pyo3(signature = (ground, *, model = Given::MISSING, **options), text_signature = "(ground, *, model=None, **options)")]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn new(
         ground: &Bound<'_, PyAny>,
-        model: Option<RoverModel>,
+        model: Given<'_>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyClassInitializer<Self>> {
+        let model = model.object::<RoverModel>(Kind::Model, "model", "a RoverModel")?;
         let inner = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
         let rover = MirroredRover::<7>::new(&inner).map_err(|e| border(Kind::Model, &e))?;
         let own = Self {

@@ -12,6 +12,7 @@ use rover_core::simulation::{Look, ReadingLayout, Simulation as CoreSimulation};
 use std::sync::Arc;
 
 use crate::accuracy;
+use crate::arguments::{Given, number, text, texts};
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Value};
@@ -19,7 +20,7 @@ use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::plane::Plane;
 use crate::reading::{place, scan_points, slices};
-use crate::snapshot::Snapshot;
+use crate::snapshot::{Snapshot, belonging};
 use crate::sphere_field::Ground;
 
 /// What the solver says of the steps just taken (worst over the steps of one call).
@@ -136,15 +137,12 @@ pub type Problem<'py> = (
 );
 
 fn names(joints: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
-    joints
-        .extract::<String>()
-        .map(|name| vec![name])
-        .or_else(|_| joints.extract())
+    texts(joints, Kind::Command, "joints")
 }
 
 /// The value that a word stands for.
 pub fn choice<T: Copy>(
-    field: &'static str,
+    field: &str,
     given: &str,
     choices: &[(&str, T)],
 ) -> Result<T, BorderError> {
@@ -181,14 +179,6 @@ pub fn name_of<T: PartialEq + Copy>(value: T, choices: &[(&'static str, T)]) -> 
         .map_or("", |(name, _)| name)
 }
 
-/// A number of steps.
-pub fn step_count(n: i64) -> Result<usize, BorderError> {
-    usize::try_from(n).map_err(|_| {
-        let message = format!("n: must not be negative, is {n}");
-        BorderError::option("n", message, Value::Number(n as f64))
-    })
-}
-
 impl From<CoreReport> for StepReport {
     fn from(inner: CoreReport) -> Self {
         Self { inner }
@@ -210,27 +200,39 @@ impl Simulation {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (model = None, terrain = None, *, gravity = None, friction = 0.7, restitution = 0.0, time_step = None,
-        variant = None, theta = 0.5, forecast = 0.5, solver = "auto", tolerance = None, max_iterations = 1000,
-        stabilisation = "projection", warm_start = true, accuracy = None))]
+    #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // keyword arguments of a Python class
+    #[pyo3(signature = (model = Given::MISSING, terrain = None, *, gravity = None, friction = Given::MISSING, restitution = Given::MISSING,
+        time_step = Given::MISSING, variant = Given::MISSING, theta = Given::MISSING, forecast = Given::MISSING,
+        solver = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING,
+        stabilisation = Given::MISSING, warm_start = Given::MISSING, accuracy = None),
+        text_signature = "(model=None, terrain=None, *, gravity=None, friction=0.7, restitution=0.0, time_step=None, variant=None, theta=0.5, forecast=0.5, solver='auto', tolerance=None, max_iterations=1000, stabilisation='projection', warm_start=True, accuracy=None)")]
     fn new(
-        model: Option<RoverModel>,
+        model: Given<'_>,
         terrain: Option<&Bound<'_, PyAny>>,
         gravity: Option<&Bound<'_, PyAny>>,
-        friction: f64,
-        restitution: f64,
-        time_step: Option<f64>,
-        variant: Option<&str>,
-        theta: f64,
-        forecast: f64,
-        solver: &str,
-        tolerance: Option<f64>,
-        max_iterations: usize,
-        stabilisation: &str,
-        warm_start: bool,
+        friction: Given<'_>,
+        restitution: Given<'_>,
+        time_step: Given<'_>,
+        variant: Given<'_>,
+        theta: Given<'_>,
+        forecast: Given<'_>,
+        solver: Given<'_>,
+        tolerance: Given<'_>,
+        max_iterations: Given<'_>,
+        stabilisation: Given<'_>,
+        warm_start: Given<'_>,
         accuracy: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let option = Kind::Option;
+        let time_step = time_step.maybe(option, "time_step")?;
+        let tolerance = tolerance.maybe(option, "tolerance")?;
+        let variant = (variant.some())
+            .map(|v| choice("variant", &text(v, option, "variant")?, &VARIANTS).map_err(PyErr::from))
+            .transpose()?;
+        let solver = solver.text("auto", option, "solver")?;
+        let max_iterations = max_iterations.count(1000, option, "max_iterations")?;
+        let stabilisation = stabilisation.text("projection", option, "stabilisation")?;
+        let model = model.object::<RoverModel>(Kind::Model, "model", "a RoverModel")?;
         let model = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
         let terrain = match terrain {
             None => Ground::Plane(Plane {
@@ -258,22 +260,22 @@ impl Simulation {
         let tolerance = tolerance.unwrap_or(chosen.tolerance);
         let options = StepOptions {
             gravity: checked_gravity(gravity)?,
-            friction_coefficient: friction,
-            restitution,
+            friction_coefficient: friction.number(0.7, option, "friction")?,
+            restitution: restitution.number(0.0, option, "restitution")?,
             time_step: time_step.unwrap_or(chosen.time_step),
-            theta,
-            forecast,
-            variant: variant.map_or(Ok(chosen.variant), |v| choice("variant", v, &VARIANTS))?,
-            stabilisation: choice("stabilisation", stabilisation, &STABILISATIONS)?,
-            warm_start,
-            solver: solver_options(solver, tolerance, max_iterations, &SIMULATION_SOLVERS)?,
+            theta: theta.number(0.5, option, "theta")?,
+            forecast: forecast.number(0.5, option, "forecast")?,
+            variant: variant.unwrap_or(chosen.variant),
+            stabilisation: choice("stabilisation", &stabilisation, &STABILISATIONS)?,
+            warm_start: warm_start.flag(true, option, "warm_start")?,
+            solver: solver_options(&solver, tolerance, max_iterations, &SIMULATION_SOLVERS)?,
             ..StepOptions::default()
         };
         let inner =
             CoreSimulation::new(model, terrain.terrain(), options).map_err(BorderError::from)?;
         let origin = Origin {
             terrain,
-            solver: solver.to_owned(),
+            solver,
             max_iterations,
         };
         Ok(Self { inner, origin })
@@ -363,14 +365,15 @@ impl Simulation {
         )
     }
 
-    #[pyo3(signature = (q, qdot = None, *, coordinates = "state"))]
+    #[pyo3(signature = (q, qdot = None, *, coordinates = Given::MISSING), text_signature = "($self, q, qdot=None, *, coordinates='state')")]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn set_state(
         &mut self,
         q: &Bound<'_, PyAny>,
         qdot: Option<&Bound<'_, PyAny>>,
-        coordinates: &str,
+        coordinates: Given<'_>,
     ) -> PyResult<()> {
-        let kind = Coordinates::parse(coordinates)?;
+        let kind = Coordinates::given(&coordinates)?;
         let q = vector(q, Kind::State, "q")?;
         let configuration = kind.configuration(self.model_ref(), &q)?;
         let qdot = qdot.map_or_else(
@@ -428,16 +431,17 @@ impl Simulation {
         &mut self,
         joints: &Bound<'_, PyAny>,
         set_points: Option<&Bound<'_, PyAny>>,
-        stiffness: Option<f64>,
-        damping: Option<f64>,
+        stiffness: Option<&Bound<'_, PyAny>>,
+        damping: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let set_points = set_points
-            .map(|s| {
-                s.extract::<f64>()
-                    .map(|x| vec![x])
-                    .or_else(|_| vector(s, Kind::Command, "set_points"))
-            })
-            .transpose()?;
+        let one = |x: &Bound<'_, PyAny>, field| number(x, Kind::Command, field);
+        let read = |s: &Bound<'_, PyAny>| match s.len() {
+            Ok(_) => vector(s, Kind::Command, "set_points"),
+            Err(_) => one(s, "set_points").map(|x| vec![x]),
+        };
+        let set_points = set_points.map(read).transpose()?;
+        let stiffness = stiffness.map(|x| one(x, "stiffness")).transpose()?;
+        let damping = damping.map(|x| one(x, "damping")).transpose()?;
         let held = self
             .inner
             .hold(&names(joints)?, set_points.as_deref(), stiffness, damping);
@@ -455,9 +459,10 @@ impl Simulation {
         self.inner.brake();
     }
 
-    #[pyo3(signature = (n = 1))]
-    fn step(&mut self, py: Python<'_>, n: i64) -> PyResult<StepReport> {
-        let steps = step_count(n)?;
+    #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
+    fn step(&mut self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
+        let steps = n.count(1, Kind::Option, "n")?;
         let inner = &mut self.inner;
         let report = py.detach(|| inner.step(steps)).map_err(BorderError::from)?;
         Ok(StepReport { inner: report })
@@ -542,11 +547,10 @@ impl Simulation {
         }
     }
 
-    fn restore(&mut self, snapshot: &Snapshot) -> PyResult<()> {
-        Ok(self
-            .inner
-            .restore(&snapshot.inner)
-            .map_err(BorderError::from)?)
+    fn restore(&mut self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
+        let snapshot = belonging::<Snapshot>(snapshot, "a Snapshot")?;
+        let restored = self.inner.restore(&snapshot.get().inner);
+        Ok(restored.map_err(BorderError::from)?)
     }
 
     /// W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem.
@@ -558,8 +562,10 @@ impl Simulation {
         Ok((fresh_matrix(py, &W)?, fresh(py, q), fresh(py, mu)))
     }
 
-    #[pyo3(signature = (n = 1000))]
-    fn profile<'py>(&self, py: Python<'py>, n: usize) -> PyResult<Bound<'py, PyDict>> {
+    #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1000)")]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
+    fn profile<'py>(&self, py: Python<'py>, n: Given<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let n = n.count(1000, Kind::Option, "n")?;
         let stopwatch = self.inner.profile(n).map_err(BorderError::from)?;
         let parts = PyDict::new(py);
         for (phase, microseconds) in stopwatch.microseconds() {
@@ -597,7 +603,7 @@ impl Simulation {
         model: &Bound<'py, PyAny>,
         terrain: &Bound<'py, PyAny>,
         settings: &Bound<'py, PyDict>,
-        snapshot: &Snapshot,
+        snapshot: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let made = py
             .get_type::<Self>()
