@@ -20,7 +20,9 @@ pub fn path(value: &Bound<'_, PyAny>, kind: Kind) -> PyResult<PathBuf> {
 fn os_error(py: Python<'_>, e: &io::Error, path: &Path) -> PyErr {
     match e.raw_os_error() {
         Some(code) => {
-            let words = py.import("os").and_then(|os| os.call_method1("strerror", (code,)));
+            let words = py
+                .import("os")
+                .and_then(|os| os.call_method1("strerror", (code,)));
             let words = words.map_or_else(|_| e.to_string(), |w| w.to_string());
             PyOSError::new_err((code, words, path.display().to_string()))
         }

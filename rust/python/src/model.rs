@@ -9,8 +9,8 @@ use pyo3::types::{PyDict, PyMapping};
 use rover_core::contact::{Contact, detection::wheel_contacts};
 use rover_core::multibody::bias::BiasScratch;
 use rover_core::multibody::{
-    Configuration, Kinematics, MassMatrix, Model, ModelDescription, ModelError, SolidDescription, bias,
-    coordinates, description::MAX_TEXT, momentum,
+    Configuration, Kinematics, MassMatrix, Model, ModelDescription, ModelError, SolidDescription,
+    bias, coordinates, description::MAX_TEXT, momentum,
 };
 use rover_core::nalgebra::{DMatrix, DVector, Vector3};
 
@@ -54,7 +54,11 @@ impl Coordinates {
 
     /// Those that a caller named; the state's by default, everywhere.
     pub fn given(name: &Given<'_>) -> PyResult<Self> {
-        Ok(Self::parse(&name.text("state", Kind::Option, "coordinates")?)?)
+        Ok(Self::parse(&name.text(
+            "state",
+            Kind::Option,
+            "coordinates",
+        )?)?)
     }
 
     pub fn configuration(self, model: &Model, q: &[f64]) -> Result<Configuration, BorderError> {

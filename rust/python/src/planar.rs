@@ -19,9 +19,7 @@ use crate::errors::{BorderError, Kind, Value};
 use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
 use crate::model::RoverModel;
 use crate::planar_ground::{border, parse};
-use crate::simulation::{
-    Energy, Problem, STABILISATIONS, StepReport, VARIANTS, choice, name_of,
-};
+use crate::simulation::{Energy, Problem, STABILISATIONS, StepReport, VARIANTS, choice, name_of};
 use crate::snapshot::{belonging, damaged, read};
 
 const RULES: [(&str, ContactRule); 2] = [

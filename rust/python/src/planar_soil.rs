@@ -13,7 +13,7 @@ use rover_core::planar::soil::{
 use rover_core::planar::{Ground, PlanarWheel, TwoWheelRover};
 use std::sync::Arc;
 
-use crate::arguments::{Given, flags, number, text, whole};
+use crate::arguments::{Given, flags, number, text};
 use crate::arrays::{array, fresh, fresh_rows, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::planar::{one_or_two, pair};
@@ -277,7 +277,7 @@ impl SoilSimulation {
         clippy::too_many_lines,
         clippy::needless_pass_by_value
     )] // keyword arguments of a Python class
-    #[pyo3(signature = (radius, mass, position, *, kinematic = None, walls = None, ground = None, rover = None, rig = None, machine = None,
+    #[pyo3(signature = (radius, mass, position, *, kinematic = Given::MISSING, walls = None, ground = None, rover = Given::MISSING, rig = None, machine = None,
         friction = Given::MISSING, wall_friction = Given::MISSING, wheel_friction = Given::MISSING, restitution = Given::MISSING,
         gravity = None, time_step = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING,
         stabilisation = Given::MISSING, penetration_tolerance = Given::MISSING,
@@ -615,8 +615,8 @@ impl SoilSimulation {
     left = Given::MISSING, width = Given::MISSING, bottom = Given::MISSING, seed = Given::MISSING),
     text_signature = "(count=222, *, radius_min=0.016, radius_max=0.0165, mass=0.7, left=0.0, width=2.4494, bottom=0.0, seed=0)")]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // keyword arguments of a Python function
-pub fn soil_packing(
-    py: Python<'_>,
+pub fn soil_packing<'py>(
+    py: Python<'py>,
     count: Given<'_>,
     radius_min: Given<'_>,
     radius_max: Given<'_>,
@@ -625,9 +625,8 @@ pub fn soil_packing(
     width: Given<'_>,
     bottom: Given<'_>,
     seed: Given<'_>,
-) -> PyResult<Packed<'_>> {
+) -> PyResult<Packed<'py>> {
     let kind = Kind::Model;
-    let seed = seed.some().map_or(Ok(0), |given| whole(given, kind, "seed"));
     let packing = Packing {
         count: count.count(222, kind, "count")?,
         radius_min: radius_min.number(0.016, kind, "radius_min")?,
@@ -636,7 +635,7 @@ pub fn soil_packing(
         left: left.number(0.0, kind, "left")?,
         width: width.number(2.4494, kind, "width")?,
         bottom: bottom.number(0.0, kind, "bottom")?,
-        seed: seed?,
+        seed: seed.whole(0, kind, "seed")?,
     };
     let built = py.detach(|| packing.build());
     let (disks, q) = built.map_err(|e| soil_error(&e))?;

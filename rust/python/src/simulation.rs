@@ -141,11 +141,7 @@ fn names(joints: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
 }
 
 /// The value that a word stands for.
-pub fn choice<T: Copy>(
-    field: &str,
-    given: &str,
-    choices: &[(&str, T)],
-) -> Result<T, BorderError> {
+pub fn choice<T: Copy>(field: &str, given: &str, choices: &[(&str, T)]) -> Result<T, BorderError> {
     let found = choices
         .iter()
         .find(|(name, _)| *name == given)
@@ -227,7 +223,9 @@ impl Simulation {
         let time_step = time_step.maybe(option, "time_step")?;
         let tolerance = tolerance.maybe(option, "tolerance")?;
         let variant = (variant.some())
-            .map(|v| choice("variant", &text(v, option, "variant")?, &VARIANTS).map_err(PyErr::from))
+            .map(|v| {
+                choice("variant", &text(v, option, "variant")?, &VARIANTS).map_err(PyErr::from)
+            })
             .transpose()?;
         let solver = solver.text("auto", option, "solver")?;
         let max_iterations = max_iterations.count(1000, option, "max_iterations")?;

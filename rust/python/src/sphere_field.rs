@@ -235,7 +235,8 @@ impl SphereField {
                 .iter()
                 .map(|&[x, z, radius]| Clearing { x, z, radius })
                 .collect(),
-            ground: plane(ground)?.map_or_else(rover_core::geometry::Plane::ground, |plane| plane.inner),
+            ground: plane(ground)?
+                .map_or_else(rover_core::geometry::Plane::ground, |plane| plane.inner),
         };
         let field = py.detach(|| CoreField::rocks(&rocks));
         Ok(Self {

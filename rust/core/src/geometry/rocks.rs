@@ -194,7 +194,12 @@ impl Rocks {
                 demand("clear", value, is_near, "within 1e6 m of the origin")?;
             }
             let radius = clearing.radius;
-            demand("clear", radius, radius >= 0.0, "of a radius that is not negative")?;
+            demand(
+                "clear",
+                radius,
+                radius >= 0.0,
+                "of a radius that is not negative",
+            )?;
         }
         let up = self.ground.normal().y;
         demand("ground", up, up > 1e-3, "a plane whose normal points up")

@@ -227,7 +227,10 @@ impl Model {
                 .axis
                 .and_then(|a| JointAxis::from_direction(&a.into()))
                 .unwrap_or(JointAxis::X);
-            let parent = solid.parent.as_deref().and_then(|p| index_of.get(p).copied());
+            let parent = solid
+                .parent
+                .as_deref()
+                .and_then(|p| index_of.get(p).copied());
             let frame = if let (Some(p), true) = (parent, i > 0) {
                 let carrier: Frame = frames[p].clone();
                 let position = carrier.position
@@ -332,7 +335,10 @@ impl Model {
         let joint_of = |name: &str| joints.get(name).copied();
         let mut wheels = Vec::new();
         for wheel in &description.wheels {
-            let Some(frame) = index_of.get(wheel.solid.as_str()).map(|&k| frames[k].clone()) else {
+            let Some(frame) = index_of
+                .get(wheel.solid.as_str())
+                .map(|&k| frames[k].clone())
+            else {
                 continue;
             };
             let axle = frame.rotation * Vector3::from(wheel.axle).normalize();
@@ -517,8 +523,8 @@ fn mark_spinners(bodies: &mut [Body], wheels: &[Wheel], boxes: &[CollisionBox]) 
         let is_symmetric =
             body.principal_axes.is_none() && (across[0] - across[1]).abs() <= 1e-14 * I.sum();
         let is_leaf = !carriers.contains(&b);
-        let wheels_spin = (wheels_of.get(&b).into_iter().flatten())
-            .all(|w| along(&w.centre) && along(&w.axle));
+        let wheels_spin =
+            (wheels_of.get(&b).into_iter().flatten()).all(|w| along(&w.centre) && along(&w.axle));
         let is_spinner = is_leaf
             && is_symmetric
             && wheels_spin
@@ -555,12 +561,7 @@ fn perpendicular(axle: &Vector3<f64>) -> Vector3<f64> {
 }
 
 /// Finite, and at most `limit` either way.
-fn in_range(
-    field: &str,
-    value: f64,
-    limit: f64,
-    range: &'static str,
-) -> Result<(), ModelError> {
+fn in_range(field: &str, value: f64, limit: f64, range: &'static str) -> Result<(), ModelError> {
     finite(field, &[value])?;
     if value.abs() <= limit {
         return Ok(());

@@ -666,11 +666,17 @@ mod tests {
             let found = all(&sine, [17.3, -depth], 1.0);
             assert_eq!(found.len(), 1);
             // The nearest trough.
-            assert!((-found[0].distance / (depth - 1.0) - 1.0).abs() < 1e-7, "{found:?}");
+            assert!(
+                (-found[0].distance / (depth - 1.0) - 1.0).abs() < 1e-7,
+                "{found:?}"
+            );
             // The spline goes on steeply downwards beyond its ends, and its side is nearer than its top.
             let found = all(&spline, [17.3, -depth], 1.0);
             assert_eq!(found.len(), 1);
-            assert!((-depth..-0.05 * depth).contains(&found[0].distance), "{found:?}");
+            assert!(
+                (-depth..-0.05 * depth).contains(&found[0].distance),
+                "{found:?}"
+            );
         }
     }
 
@@ -681,7 +687,10 @@ mod tests {
             let found = all(&sine, [0.0, 0.3], reach);
             assert!(found.len() <= MAX_FACING, "{}", found.len());
             assert!(found.is_sorted_by_key(|f| f.foot.x));
-            let nearest = found.iter().map(|f| f.distance).fold(f64::INFINITY, f64::min);
+            let nearest = found
+                .iter()
+                .map(|f| f.distance)
+                .fold(f64::INFINITY, f64::min);
             assert!((nearest - 0.2).abs() < 1e-6, "{nearest}");
         }
     }

@@ -196,11 +196,7 @@ pub const PLACES: Range = Range {
 ///
 /// # Errors
 /// [`PlanarError::NotFinite`], [`PlanarError::NotPositive`] or [`PlanarError::OutOfRange`].
-pub fn within(
-    field: impl Fn() -> String,
-    value: f64,
-    range: Range,
-) -> Result<f64, PlanarError> {
+pub fn within(field: impl Fn() -> String, value: f64, range: Range) -> Result<f64, PlanarError> {
     let Range {
         ends: [low, high],
         words,

@@ -293,7 +293,11 @@ mod tests {
         assert!(sum.abs() < 1e-12);
         let found = all(&ground, [5.0, 1.001], 10.0);
         assert_eq!(found.len(), MAX_FACING);
-        assert!(found.iter().all(|f| (1.0..1.0 + 1e-6).contains(&f.distance)));
+        assert!(
+            found
+                .iter()
+                .all(|f| (1.0..1.0 + 1e-6).contains(&f.distance))
+        );
     }
 
     #[test]

@@ -206,6 +206,9 @@ impl PlanarMachine<5> for TwoWheelRover {
     fn fingerprint(&self) -> u64 {
         let of_wheel = |w: &PlanarWheel| [w.mass, w.radius, w.inertia, w.axle.x, w.axle.y];
         let wheels = self.wheels.iter().flat_map(of_wheel);
-        fingerprint("two wheels", [self.mass, self.inertia].into_iter().chain(wheels))
+        fingerprint(
+            "two wheels",
+            [self.mass, self.inertia].into_iter().chain(wheels),
+        )
     }
 }
