@@ -123,7 +123,7 @@ class RoverModel:
             ModelError: A number out of its range, or a wheel radius where a wheel's solid is no disc.
         """
     def weld(self, joints: Mapping[str, float] | Sequence[str] | str) -> RoverModel:
-        """The same machine with joints locked at 0 or at the given angles, rad; files and dictionaries keep them locked."""
+        """The same machine with joints locked at 0, or at the given angles (rad), also in files and dictionaries."""
     @property
     def name(self) -> str: ...
     @property

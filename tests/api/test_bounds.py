@@ -5,14 +5,14 @@ These asked for terabytes and died with an abort, or never came back.
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from rover_gym import ModelError, Plane, RoverModel, Simulation, SphereField, TerrainError
+from rover_gym import ModelError, Plane, RoverModel, Simulation, SphereField, StepError, TerrainError
 from rover_gym._core import SoilSimulation, soil_packing
 from rover_gym.planar import BallSimulation, Line, Polyline, Sine, Spline, TwoWheelRoverSimulation
 
@@ -61,7 +61,7 @@ def test_a_chain_of_a_thousand_solids_is_built_at_once() -> None:
     with within(10.0):
         model = RoverModel.from_dict(chain(1000))
     assert model.nv == 1005
-    everything = {name: 0.0 for name in model.joint_names}
+    everything = dict.fromkeys(model.joint_names, 0.0)
     with within(10.0):
         assert model.weld(everything).nv == 6
 
@@ -140,10 +140,8 @@ def test_a_ball_a_million_kilometres_down_is_stepped_at_once(ground: Any, q: lis
     sim.set_state(q, [0.0, -10.0, 0.0])
     with within(5.0):
         assert sim.gaps.shape == (1,)
-        try:
+        with suppress(StepError):
             sim.step(3)
-        except Exception as error:  # noqa: BLE001 - a place that no double resolves may be refused by the step
-            assert type(error).__name__ == "StepError"  # noqa: PT017
 
 
 def test_a_polyline_of_a_million_points_is_driven_over() -> None:
@@ -184,11 +182,8 @@ def test_an_abundance_that_vanishes_gives_no_rocks() -> None:
 def test_a_soil_flung_to_the_end_of_the_world_is_stepped_or_refused() -> None:
     sim = SoilSimulation([0.1, 0.1], [1.0, 1.0], [[0.0, 0.0], [1.0, 0.0]])
     sim.set_state([[0.0, 0.0, 0.0], [1e300, -1e300, 0.0]], [[1e300, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    with within(5.0):
-        try:
-            sim.step()
-        except Exception as error:  # noqa: BLE001 - the simulator's own
-            assert type(error).__name__ == "StepError"  # noqa: PT017
+    with within(5.0), suppress(StepError):
+        sim.step()
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import math
 import pickle
 import struct
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rover_gym import Plane, RoverModel, Simulation, SphereField, StateError
+from rover_gym import Plane, RoverModel, Simulation, SphereField, StateError, StepError
 from rover_gym._core import PlanarSnapshot, Snapshot, SoilSimulation, SoilSnapshot, soil_packing
 from rover_gym.planar import (
     BallSimulation,
@@ -261,11 +262,11 @@ def test_bytes_that_are_no_snapshot_are_refused(sim: Any, read: Any) -> None:
 
 def test_a_quaternion_that_is_no_rotation_is_refused() -> None:
     """A snapshot whose quaternion was twice as long scaled the rover, and the steps went on."""
-    sim = driven(Simulation())
-    sim.step(5)
+    sim = Simulation()
+    sim.set_state([0.0, 1.0, 0.0, 0.3, 0.2, 0.1] + [0.0] * 15)
     before = sim.snapshot()
     data = before.to_bytes()
-    scalar = 0.5 * np.sqrt(1.0 + np.trace(sim.rotation))
+    scalar = 0.5 * math.sqrt(1.0 + np.trace(sim.rotation))
     places = range(len(data) - 8)
     (at,) = [k for k in places if abs(struct.unpack_from("<d", data, k)[0] - scalar) < 1e-12]
     for other in (0.5, 2.0, 1.0 + 1e-9, math.nan):
@@ -293,7 +294,5 @@ def test_a_snapshot_with_damaged_bytes_is_refused_or_goes_on(data: st.DataObject
             sim.restore(read(bytes(damaged)))
         except StateError:
             continue
-        try:
+        with suppress(StepError):
             sim.step()
-        except Exception as error:  # noqa: BLE001 - whatever it is, it must be the simulator's own
-            assert type(error).__name__ == "StepError"  # noqa: PT017

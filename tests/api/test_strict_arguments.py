@@ -1,7 +1,7 @@
 """The border takes numbers for numbers, and refuses the rest under its name.
 
-A `timedelta64`, a complex number and a truth value passed as floats; a text, an int of 400 digits and a wrong object came
-back as `TypeError` or `OverflowError` from somewhere in the conversion.
+A `timedelta64`, a complex number and a truth value passed as floats; a text, an integer of 400 digits and a wrong
+object came back as `TypeError` or `OverflowError` from somewhere in the conversion.
 """
 
 import datetime
@@ -81,7 +81,7 @@ COUNTS: list[tuple[str, Callable[[Any], Any]]] = [
     ("n", lambda n: BallSimulation(Line()).step(n)),
     ("n", lambda n: SoilSimulation(*one_disk).step(n)),
     ("seed", lambda n: SphereField.rocks(0.1, rocks[1], n)),
-    ("count", lambda n: soil_packing(n)),
+    ("count", soil_packing),
     ("seed", lambda n: soil_packing(seed=n)),
 ]
 
@@ -115,7 +115,7 @@ VECTORS: list[tuple[str, Callable[[Any], Any]]] = [
     ("q", lambda x: Simulation().set_state(x)),
     ("torques", lambda x: Simulation().set_wheel_torques(x)),
     ("gravity", lambda x: Simulation(gravity=x)),
-    ("normal", lambda x: Plane(x)),
+    ("normal", Plane),
     ("radii", lambda x: SphereField(np.zeros((3, 3)), x)),
     ("masses", lambda x: RoverModel().replace(masses=x)),
     ("x", lambda x: Polyline(x, [0.0, 1.0, 2.0])),
@@ -127,7 +127,7 @@ def refused(field: str, call: Callable[[], Any]) -> None:
         call()
     assert isinstance(caught.value, ValueError)
     assert getattr(caught.value, "field", None) == field, caught.value
-    assert field.split("[")[0] in str(caught.value)
+    assert field.split("[", maxsplit=1)[0] in str(caught.value)
     assert len(str(caught.value)) < 400
 
 
@@ -172,7 +172,7 @@ def test_arrays_of_what_are_no_numbers_are_refused_by_name(field: str, call: Cal
 
 def test_the_value_that_was_given_stands_in_the_error() -> None:
     given = datetime.timedelta(seconds=1)
-    with pytest.raises(RoverGymError, match="must be a number, is datetime.timedelta") as caught:
+    with pytest.raises(RoverGymError, match=r"must be a number, is datetime\.timedelta") as caught:
         Simulation(friction=given)  # type: ignore[arg-type]
     assert caught.value.value is given
 
