@@ -27,60 +27,55 @@ impl<'py> Given<'py> {
     pub const MISSING: Self = Self(None);
 
     /// What was given; nothing where that is `None` or missing.
-    pub fn some(&self) -> Option<&Bound<'py, PyAny>> {
-        self.0.as_ref().filter(|given| !given.is_none())
+    pub fn some(self) -> Option<Bound<'py, PyAny>> {
+        self.0.filter(|given| !given.is_none())
     }
 
     /// A number.
-    pub fn number(&self, default: f64, kind: Kind, field: &str) -> PyResult<f64> {
+    pub fn number(self, default: f64, kind: Kind, field: &str) -> PyResult<f64> {
         self.0
-            .as_ref()
-            .map_or(Ok(default), |given| number(given, kind, field))
+            .map_or(Ok(default), |given| number(&given, kind, field))
     }
 
     /// A number, or nothing where `None` was given.
-    pub fn maybe(&self, kind: Kind, field: &str) -> PyResult<Option<f64>> {
+    pub fn maybe(self, kind: Kind, field: &str) -> PyResult<Option<f64>> {
         self.some()
-            .map(|given| number(given, kind, field))
+            .map(|given| number(&given, kind, field))
             .transpose()
     }
 
     /// A whole number that is not negative.
-    pub fn whole(&self, default: u64, kind: Kind, field: &str) -> PyResult<u64> {
+    pub fn whole(self, default: u64, kind: Kind, field: &str) -> PyResult<u64> {
         self.0
-            .as_ref()
-            .map_or(Ok(default), |given| whole(given, kind, field))
+            .map_or(Ok(default), |given| whole(&given, kind, field))
     }
 
     /// A count.
-    pub fn count(&self, default: usize, kind: Kind, field: &str) -> PyResult<usize> {
+    pub fn count(self, default: usize, kind: Kind, field: &str) -> PyResult<usize> {
         self.0
-            .as_ref()
-            .map_or(Ok(default), |given| count(given, kind, field))
+            .map_or(Ok(default), |given| count(&given, kind, field))
     }
 
     /// A truth value.
-    pub fn flag(&self, default: bool, kind: Kind, field: &str) -> PyResult<bool> {
+    pub fn flag(self, default: bool, kind: Kind, field: &str) -> PyResult<bool> {
         self.0
-            .as_ref()
-            .map_or(Ok(default), |given| flag(given, kind, field))
+            .map_or(Ok(default), |given| flag(&given, kind, field))
     }
 
     /// A text.
-    pub fn text(&self, default: &str, kind: Kind, field: &str) -> PyResult<String> {
+    pub fn text(self, default: &str, kind: Kind, field: &str) -> PyResult<String> {
         self.0
-            .as_ref()
-            .map_or_else(|| Ok(default.to_owned()), |given| text(given, kind, field))
+            .map_or_else(|| Ok(default.to_owned()), |given| text(&given, kind, field))
     }
 
     /// An object of a class, or nothing where `None` was given. `what`: its name with an article.
-    pub fn object<T>(&self, kind: Kind, field: &str, what: &str) -> PyResult<Option<T>>
+    pub fn object<T>(self, kind: Kind, field: &str, what: &str) -> PyResult<Option<T>>
     where
         T: for<'a> FromPyObject<'a, 'py>,
     {
-        let read = |given: &Bound<'py, PyAny>| {
+        let read = |given: Bound<'py, PyAny>| {
             let found = given.extract::<T>();
-            found.map_err(|_| refused(given, kind, field, what).into())
+            found.map_err(|_| refused(&given, kind, field, what).into())
         };
         self.some().map(read).transpose()
     }

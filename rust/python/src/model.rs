@@ -53,7 +53,7 @@ impl Coordinates {
     }
 
     /// Those that a caller named; the state's by default, everywhere.
-    pub fn given(name: &Given<'_>) -> PyResult<Self> {
+    pub fn given(name: Given<'_>) -> PyResult<Self> {
         Ok(Self::parse(&name.text(
             "state",
             Kind::Option,
@@ -86,7 +86,7 @@ impl RoverModel {
     fn placed(
         &self,
         q: &Bound<'_, PyAny>,
-        coordinates: &Given<'_>,
+        coordinates: Given<'_>,
     ) -> PyResult<(Vec<f64>, Coordinates, Kinematics)> {
         let kind = Coordinates::given(coordinates)?;
         let q = vector(q, Kind::State, "q")?;
@@ -98,7 +98,7 @@ impl RoverModel {
         &self,
         q: &Bound<'_, PyAny>,
         terrain: &Bound<'_, PyAny>,
-        coordinates: &Given<'_>,
+        coordinates: Given<'_>,
     ) -> PyResult<(Vec<f64>, Coordinates, Kinematics, Vec<Contact>)> {
         let (q, kind, kinematics) = self.placed(q, coordinates)?;
         let contacts = wheel_contacts(
@@ -400,7 +400,7 @@ impl RoverModel {
         q: &Bound<'_, PyAny>,
         coordinates: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let (q, kind, kinematics) = self.placed(q, &coordinates)?;
+        let (q, kind, kinematics) = self.placed(q, coordinates)?;
         let dense = dense_mass_matrix(&self.inner, &kinematics);
         match kind {
             Coordinates::State => fresh_matrix(py, &dense),
@@ -421,7 +421,7 @@ impl RoverModel {
         gravity: Option<&Bound<'_, PyAny>>,
         coordinates: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let (q, kind, kinematics) = self.placed(q, &coordinates)?;
+        let (q, kind, kinematics) = self.placed(q, coordinates)?;
         let qdot = vector(qdot, Kind::State, "qdot")?;
         let v = kind.velocity(&self.inner, &q, &qdot)?;
         let gravity = checked_gravity(gravity)?;
@@ -467,7 +467,7 @@ impl RoverModel {
         qdot: &Bound<'_, PyAny>,
         coordinates: Given<'_>,
     ) -> PyResult<f64> {
-        let (q, kind, kinematics) = self.placed(q, &coordinates)?;
+        let (q, kind, kinematics) = self.placed(q, coordinates)?;
         let v = kind.velocity(&self.inner, &q, &vector(qdot, Kind::State, "qdot")?)?;
         Ok(momentum::energy(&self.inner, &kinematics, &v, &Vector3::zeros()).kinetic)
     }
@@ -480,7 +480,7 @@ impl RoverModel {
         q: &Bound<'_, PyAny>,
         coordinates: Given<'py>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        tags(py, &self.inner, &self.placed(q, &coordinates)?.2)
+        tags(py, &self.inner, &self.placed(q, coordinates)?.2)
     }
 
     /// {name: ((3,), (3, 3))}: origin and rotation matrix of every solid, world.
@@ -491,7 +491,7 @@ impl RoverModel {
         q: &Bound<'_, PyAny>,
         coordinates: Given<'py>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        poses(py, &self.inner, &self.placed(q, &coordinates)?.2)
+        poses(py, &self.inner, &self.placed(q, coordinates)?.2)
     }
 
     /// (n_wheels,) m, positive when apart.
@@ -503,7 +503,7 @@ impl RoverModel {
         terrain: &Bound<'_, PyAny>,
         coordinates: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let contacts = self.contacts(q, terrain, &coordinates)?.3;
+        let contacts = self.contacts(q, terrain, coordinates)?.3;
         Ok(PyArray1::from_iter(py, contacts.iter().map(|c| c.gap)))
     }
 
@@ -516,7 +516,7 @@ impl RoverModel {
         terrain: &Bound<'_, PyAny>,
         coordinates: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let (_, _, kinematics, contacts) = self.contacts(q, terrain, &coordinates)?;
+        let (_, _, kinematics, contacts) = self.contacts(q, terrain, coordinates)?;
         let rows: Vec<[f64; 3]> = contacts
             .iter()
             .map(|c| (kinematics.base + c.point).into())
@@ -533,7 +533,7 @@ impl RoverModel {
         terrain: &Bound<'_, PyAny>,
         coordinates: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let (q, kind, kinematics, contacts) = self.contacts(q, terrain, &coordinates)?;
+        let (q, kind, kinematics, contacts) = self.contacts(q, terrain, coordinates)?;
         let nv = self.inner.nv();
         let mut rows = Vec::with_capacity(contacts.len() * 3 * nv);
         for contact in &contacts {

@@ -381,7 +381,6 @@ impl PlanarSimulation {
     }
 
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn step(&mut self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
         let steps = n.count(1, Kind::Option, "n")?;
         let inner = &mut self.inner;
@@ -463,7 +462,6 @@ impl BallSimulation {
     #[new]
     #[pyo3(signature = (ground, *, mass = Given::MISSING, radius = Given::MISSING, inertia = Given::MISSING, **options),
         text_signature = "(ground, *, mass=3.0, radius=1.5, inertia=None, **options)")]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn new(
         ground: &Bound<'_, PyAny>,
         mass: Given<'_>,
@@ -512,7 +510,6 @@ impl TwoWheelRoverSimulation {
     #[pyo3(signature = (ground, *, mass = Given::MISSING, inertia = Given::MISSING, wheel_mass = None, wheel_radius = None,
         wheel_inertia = None, axle_a = None, axle_b = None, **options),
         text_signature = "(ground, *, mass=130.0, inertia=None, wheel_mass=None, wheel_radius=None, wheel_inertia=None, axle_a=None, axle_b=None, **options)")]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn new(
         ground: &Bound<'_, PyAny>,
         mass: Given<'_>,
@@ -569,7 +566,6 @@ pub struct MirroredRoverSimulation {
 impl MirroredRoverSimulation {
     #[new]
     #[pyo3(signature = (ground, *, model = Given::MISSING, **options), text_signature = "(ground, *, model=None, **options)")]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn new(
         ground: &Bound<'_, PyAny>,
         model: Given<'_>,

@@ -63,7 +63,6 @@ pub struct Line {
 impl Line {
     #[new]
     #[pyo3(signature = (slope = Given::MISSING, offset = Given::MISSING), text_signature = "(slope=0.0, offset=0.0)")]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn new(slope: Given<'_>, offset: Given<'_>) -> PyResult<Self> {
         let slope = slope.number(0.0, Kind::Terrain, "slope")?;
         let offset = offset.number(0.0, Kind::Terrain, "offset")?;
@@ -107,7 +106,6 @@ impl Sine {
     #[new]
     #[pyo3(signature = (amplitude, wavelength, phase = Given::MISSING, offset = Given::MISSING),
         text_signature = "(amplitude, wavelength, phase=0.0, offset=0.0)")]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn new(
         amplitude: &Bound<'_, PyAny>,
         wavelength: &Bound<'_, PyAny>,

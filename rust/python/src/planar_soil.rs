@@ -272,11 +272,7 @@ fn speed_scale(gravity: f64, usual: f64) -> f64 {
 #[pymethods]
 impl SoilSimulation {
     #[new]
-    #[allow(
-        clippy::too_many_arguments,
-        clippy::too_many_lines,
-        clippy::needless_pass_by_value
-    )] // keyword arguments of a Python class
+    #[allow(clippy::too_many_arguments, clippy::too_many_lines)] // keyword arguments of a Python class
     #[pyo3(signature = (radius, mass, position, *, kinematic = Given::MISSING, walls = None, ground = None, rover = Given::MISSING, rig = None, machine = None,
         friction = Given::MISSING, wall_friction = Given::MISSING, wheel_friction = Given::MISSING, restitution = Given::MISSING,
         gravity = None, time_step = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING,
@@ -314,7 +310,7 @@ impl SoilSimulation {
         let mass = vector(mass, Kind::Model, "mass")?;
         let mut disks = Disks::new(radius, mass).map_err(|e| soil_error(&e))?;
         if let Some(kinematic) = kinematic.some() {
-            let kinematic = flags(kinematic, Kind::Model, "kinematic")?;
+            let kinematic = flags(&kinematic, Kind::Model, "kinematic")?;
             disks = disks
                 .with_kinematic(kinematic)
                 .map_err(|e| soil_error(&e))?;
@@ -344,7 +340,7 @@ impl SoilSimulation {
         options.solver.tolerance = tolerance;
         options.solver.max_sweeps = max_iterations.count(2000, option, "max_iterations")?;
         let stabilisation = match stabilisation.some() {
-            Some(given) => text(given, option, "stabilisation")?,
+            Some(given) => text(&given, option, "stabilisation")?,
             None => usual_stabilisation(restitution).to_owned(),
         };
         options.stabilisation =
@@ -545,7 +541,6 @@ impl SoilSimulation {
     }
 
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn step(&mut self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
         let steps = n.count(1, Kind::Option, "n")?;
         let inner = &mut self.inner;
@@ -614,7 +609,7 @@ impl SoilSimulation {
 #[pyo3(signature = (count = Given::MISSING, *, radius_min = Given::MISSING, radius_max = Given::MISSING, mass = Given::MISSING,
     left = Given::MISSING, width = Given::MISSING, bottom = Given::MISSING, seed = Given::MISSING),
     text_signature = "(count=222, *, radius_min=0.016, radius_max=0.0165, mass=0.7, left=0.0, width=2.4494, bottom=0.0, seed=0)")]
-#[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // keyword arguments of a Python function
+#[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
 pub fn soil_packing<'py>(
     py: Python<'py>,
     count: Given<'_>,

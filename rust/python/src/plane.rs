@@ -21,7 +21,6 @@ pub struct Plane {
 impl Plane {
     #[new]
     #[pyo3(signature = (normal = None, offset = Given::MISSING), text_signature = "(normal=None, offset=0.0)")]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn new(normal: Option<&Bound<'_, PyAny>>, offset: Given<'_>) -> PyResult<Self> {
         let offset = offset.number(0.0, Kind::Terrain, "offset")?;
         let normal = normal.map_or(Ok([0.0, 1.0, 0.0]), |n| triple(n, Kind::Terrain, "normal"))?;

@@ -216,7 +216,7 @@ impl Simulation {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // keyword arguments of a Python class
+    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
     #[pyo3(signature = (model = Given::MISSING, terrain = None, *, gravity = None, friction = Given::MISSING, restitution = Given::MISSING,
         time_step = Given::MISSING, variant = Given::MISSING, theta = Given::MISSING, forecast = Given::MISSING,
         solver = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING,
@@ -244,7 +244,7 @@ impl Simulation {
         let tolerance = tolerance.maybe(option, "tolerance")?;
         let variant = (variant.some())
             .map(|v| {
-                choice("variant", &text(v, option, "variant")?, &VARIANTS).map_err(PyErr::from)
+                choice("variant", &text(&v, option, "variant")?, &VARIANTS).map_err(PyErr::from)
             })
             .transpose()?;
         let solver = solver.text("auto", option, "solver")?;
@@ -384,14 +384,13 @@ impl Simulation {
     }
 
     #[pyo3(signature = (q, qdot = None, *, coordinates = Given::MISSING), text_signature = "($self, q, qdot=None, *, coordinates='state')")]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn set_state(
         &mut self,
         q: &Bound<'_, PyAny>,
         qdot: Option<&Bound<'_, PyAny>>,
         coordinates: Given<'_>,
     ) -> PyResult<()> {
-        let kind = Coordinates::given(&coordinates)?;
+        let kind = Coordinates::given(coordinates)?;
         let q = vector(q, Kind::State, "q")?;
         let configuration = kind.configuration(self.model_ref(), &q)?;
         let qdot = qdot.map_or_else(
@@ -478,7 +477,6 @@ impl Simulation {
     }
 
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn step(&mut self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
         let steps = n.count(1, Kind::Option, "n")?;
         let inner = &mut self.inner;
@@ -581,7 +579,6 @@ impl Simulation {
     }
 
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1000)")]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn profile<'py>(&self, py: Python<'py>, n: Given<'py>) -> PyResult<Bound<'py, PyDict>> {
         let n = n.count(1000, Kind::Option, "n")?;
         let stopwatch = self.inner.profile(n).map_err(BorderError::from)?;

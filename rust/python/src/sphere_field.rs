@@ -201,7 +201,7 @@ impl SphereField {
 
     /// Rocks with the size-frequency distribution of Mars (Golombek and Rapp 1997) on a plane.
     #[staticmethod]
-    #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // keyword arguments of a Python function
+    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
     #[pyo3(signature = (abundance, area, seed, *, max_diameter = Given::MISSING, min_diameter = Given::MISSING, burial = None, ground = None,
         clear = None),
         text_signature = "(abundance, area, seed, *, max_diameter=0.5, min_diameter=0.05, burial=None, ground=None, clear=None)")]
