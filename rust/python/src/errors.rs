@@ -20,6 +20,7 @@ pub enum Kind {
     Command,
     Problem,
     Step,
+    Busy,
 }
 
 /// What was given where something else was needed.
@@ -30,6 +31,7 @@ pub enum Value {
     Numbers(Vec<f64>),
     Count(usize),
     Text(String),
+    Object(Py<PyAny>),
 }
 
 /// An error on its way to Python. A newtype, since neither crate owns both `ModelError` and `PyErr`.
@@ -49,6 +51,7 @@ struct Classes {
     command: Py<PyType>,
     problem: Py<PyType>,
     step: Py<PyType>,
+    busy: Py<PyType>,
 }
 
 static CLASSES: PyOnceLock<Classes> = PyOnceLock::new();
@@ -113,6 +116,11 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
             PyTuple::new(py, [root.clone(), py.get_type::<PyRuntimeError>()])?,
             "A time step could not be taken; the state is as it was before the call's failing step.",
         )?,
+        busy: make(
+            "BusyError",
+            PyTuple::new(py, [root.clone(), py.get_type::<PyRuntimeError>()])?,
+            "An object was used while another call on it was still going on; nothing has changed.",
+        )?,
     };
     let _ = CLASSES.set(py, classes);
     Ok(())
@@ -132,6 +140,7 @@ impl From<BorderError> for PyErr {
                 Kind::Command => &classes.command,
                 Kind::Problem => &classes.problem,
                 Kind::Step => &classes.step,
+                Kind::Busy => &classes.busy,
             };
             let raise = || -> PyResult<PyErr> {
                 let instance = class.bind(py).call1((error.message,))?;
@@ -142,6 +151,7 @@ impl From<BorderError> for PyErr {
                     Value::Numbers(x) => instance.setattr("value", x)?,
                     Value::Count(x) => instance.setattr("value", x)?,
                     Value::Text(x) => instance.setattr("value", x)?,
+                    Value::Object(x) => instance.setattr("value", x)?,
                 }
                 Ok(PyErr::from_value(instance))
             };

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod accuracy;
+mod arguments;
 mod arrays;
 mod batch;
 mod contacts;
@@ -13,6 +14,7 @@ mod planar_ground;
 mod planar_soil;
 mod plane;
 mod reading;
+mod shared;
 mod simulation;
 mod snapshot;
 mod sphere_field;

@@ -18,6 +18,7 @@ use crate::errors::{BorderError, Kind, Value};
 use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
 use crate::model::RoverModel;
 use crate::planar_ground::{border, parse};
+use crate::shared::Watch;
 use crate::simulation::{
     Energy, Problem, STABILISATIONS, StepReport, VARIANTS, choice, name_of, step_count,
 };
@@ -44,7 +45,11 @@ trait Run: Send + Sync {
     fn last_problem(&self) -> (&[f64], &[f64], &[f64]);
     fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), StateError>;
     fn set_inputs(&mut self, inputs: &[f64]) -> Result<(), CommandError>;
-    fn step(&mut self, n: usize) -> Result<CoreReport, StepError>;
+    fn step_while(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<CoreReport, StepError>;
     fn snapshot(&self) -> CoreSnapshot;
     fn restore(&mut self, snapshot: &CoreSnapshot) -> Result<(), SnapshotError>;
 }
@@ -95,8 +100,12 @@ impl<const NV: usize, M: PlanarMachine<NV>> Run for Core<NV, M> {
     fn set_inputs(&mut self, inputs: &[f64]) -> Result<(), CommandError> {
         self.set_inputs(inputs)
     }
-    fn step(&mut self, n: usize) -> Result<CoreReport, StepError> {
-        self.step(n)
+    fn step_while(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<CoreReport, StepError> {
+        self.step_while(n, go_on)
     }
     fn snapshot(&self) -> CoreSnapshot {
         self.snapshot()
@@ -389,9 +398,9 @@ impl PlanarSimulation {
     #[pyo3(signature = (n = 1))]
     fn step(&mut self, py: Python<'_>, n: i64) -> PyResult<StepReport> {
         let steps = step_count(n)?;
-        let inner = &mut self.inner;
-        let report = py.detach(|| inner.step(steps)).map_err(BorderError::from)?;
-        Ok(report.into())
+        let (inner, mut watch) = (&mut self.inner, Watch::new());
+        let report = py.detach(|| inner.step_while(steps, &mut || watch.go_on()));
+        Ok(watch.result(report)?.into())
     }
 
     #[getter]

@@ -17,6 +17,7 @@ use crate::arrays::{array, fresh, fresh_rows, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::planar::pair;
 use crate::planar_ground::{border, parse};
+use crate::shared::Watch;
 use crate::simulation::{Energy, STABILISATIONS, StepReport, choice, name_of, step_count};
 use crate::snapshot::damaged;
 
@@ -544,9 +545,9 @@ impl SoilSimulation {
     #[pyo3(signature = (n = 1))]
     fn step(&mut self, py: Python<'_>, n: i64) -> PyResult<StepReport> {
         let steps = step_count(n)?;
-        let inner = &mut self.inner;
-        let report = py.detach(|| inner.step(steps)).map_err(BorderError::from)?;
-        Ok(report.into())
+        let (inner, mut watch) = (&mut self.inner, Watch::new());
+        let report = py.detach(|| inner.step_while(steps, &mut || watch.go_on()));
+        Ok(watch.result(report)?.into())
     }
 
     #[getter]
