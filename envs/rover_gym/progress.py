@@ -135,6 +135,16 @@ class Progress:
         for name, value in vars(self).items():
             value[i] = getattr(one, name)
 
+    def is_of(self, task: Task) -> bool:
+        """Whether this can be the progress of one rover with a task: its shapes and that all of it is finite."""
+        shapes = {"previous_action": (N_ACTIONS,), "domain": (len(DOMAIN),), "observation": (task.layout.size,)}
+        return all(
+            isinstance(value, np.ndarray if name in shapes else (float, int))
+            and np.shape(value) == shapes.get(name, ())
+            and bool(np.isfinite(value).all())
+            for name, value in vars(self).items()
+        )
+
     def copy(self) -> "Progress":
         """A deep copy."""
         return copy.deepcopy(self)
