@@ -6,6 +6,7 @@ venv = RoverVecEnv(64, terrain="sphere_field", height_scan=True)
 model = stable_baselines3.PPO("MlpPolicy", VecMonitor(venv))
 """
 
+import copy
 from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import Any
@@ -109,7 +110,7 @@ class RoverVecEnv(VecEnv):
             refuse(OptionError, "options", options, f"must be one mapping, or a list of {self.num_envs}")
         for one in given:
             self.batch.check_options(one)
-        self._options = [dict(one or {}) for one in given]
+        self._options = [copy.deepcopy(dict(one or {})) for one in given]
 
     def step_async(self, actions: npt.NDArray[np.float32]) -> None:
         """Takes the actions `(n_envs, 12)`.

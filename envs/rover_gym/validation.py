@@ -33,7 +33,7 @@ def shown(value: object) -> str:
     """How a value looks in a message: whatever it is, and not too long."""
     try:
         text = repr(value)
-    except Exception:  # noqa: BLE001 - an integer of thousands of digits, or whatever somebody's own class raises
+    except Exception:  # an integer of thousands of digits, or whatever a class of somebody's raises
         text = f"a {type(value).__name__}"
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 

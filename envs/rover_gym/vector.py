@@ -107,7 +107,8 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observations, Array, Mask, Mask, _Info]:
         """Applies actions `(num_envs, 12)` for one control period.
 
-        An episode that cannot begin is refused before anything moves: with autoreset in the same step by the step after.
+        An episode that cannot begin is refused before anything moves; with autoreset in the same step, that is by the
+        step after.
 
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite or outside [-1, 1]; nothing
