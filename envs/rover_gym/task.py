@@ -19,7 +19,7 @@ from rover_gym._core import (
     SphereField,
     TerrainError,
 )
-from rover_gym.observation import N_ACTIONS, N_WHEELS, ObservationLayout, build_layout
+from rover_gym.observation import N_WHEELS, ObservationLayout, build_layout
 from rover_gym.randomisation import Domain, DomainDistribution
 from rover_gym.rocks import MAX_GOAL_DISTANCE, RockDistribution, check_rocks, check_scan
 from rover_gym.start import StartDistribution, slope_of

@@ -183,11 +183,15 @@ impl From<ModelError> for BorderError {
             ModelError::DuplicateName { name, .. }
             | ModelError::UnknownParent { name, .. }
             | ModelError::UnknownName { name, .. }
+            | ModelError::NotADisc { solid: name, .. }
             | ModelError::SteeringNotAbove { name, .. } => Value::Text(name.clone()),
             ModelError::NotFinite { value, .. }
             | ModelError::NotPositive { value, .. }
             | ModelError::Negative { value, .. }
+            | ModelError::OutOfRange { value, .. }
+            | ModelError::RadiusContradictsShape { value, .. }
             | ModelError::NotASign { value, .. } => Value::Number(*value),
+            ModelError::TooMany { count, .. } => Value::Count(*count),
             ModelError::NoDirection { value, .. } => Value::Numbers(value.to_vec()),
             ModelError::ImpossibleInertia { principal, .. } => Value::Numbers(principal.to_vec()),
         };

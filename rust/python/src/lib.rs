@@ -7,6 +7,7 @@ mod arrays;
 mod batch;
 mod contacts;
 mod errors;
+mod files;
 mod friction_contact;
 mod model;
 mod planar;

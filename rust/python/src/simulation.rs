@@ -12,7 +12,7 @@ use rover_core::simulation::{Look, ReadingLayout, Simulation as CoreSimulation};
 use std::sync::{Arc, MutexGuard};
 
 use crate::accuracy;
-use crate::arguments::{Given, number, refused, text, texts};
+use crate::arguments::{Given, number, text, texts};
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Value};
@@ -21,7 +21,7 @@ use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::plane::Plane;
 use crate::reading::{place, scan_points, slices};
 use crate::shared::{Shared, Watch};
-use crate::snapshot::Snapshot;
+use crate::snapshot::{Snapshot, belonging};
 use crate::sphere_field::Ground;
 
 /// What the solver says of the steps just taken (worst over the steps of one call).
@@ -144,11 +144,7 @@ fn names(joints: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
 }
 
 /// The value that a word stands for.
-pub fn choice<T: Copy>(
-    field: &'static str,
-    given: &str,
-    choices: &[(&str, T)],
-) -> Result<T, BorderError> {
+pub fn choice<T: Copy>(field: &str, given: &str, choices: &[(&str, T)]) -> Result<T, BorderError> {
     let found = choices
         .iter()
         .find(|(name, _)| *name == given)
@@ -180,14 +176,6 @@ pub fn name_of<T: PartialEq + Copy>(value: T, choices: &[(&'static str, T)]) -> 
         .iter()
         .find(|(_, v)| *v == value)
         .map_or("", |(name, _)| name)
-}
-
-/// A number of steps.
-pub fn step_count(n: i64) -> Result<usize, BorderError> {
-    usize::try_from(n).map_err(|_| {
-        let message = format!("n: must not be negative, is {n}");
-        BorderError::option("n", message, Value::Number(n as f64))
-    })
 }
 
 impl From<CoreReport> for StepReport {
@@ -227,13 +215,12 @@ impl Simulation {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
+    #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // keyword arguments of a Python class
     #[pyo3(signature = (model = Given::MISSING, terrain = None, *, gravity = None, friction = Given::MISSING, restitution = Given::MISSING,
-        time_step = Given::MISSING, variant = Given::MISSING, theta = Given::MISSING, forecast = Given::MISSING, solver = Given::MISSING, tolerance = Given::MISSING,
-        max_iterations = Given::MISSING, stabilisation = Given::MISSING, warm_start = Given::MISSING, accuracy = None),
-        text_signature = "(model=None, terrain=None, *, gravity=None, friction=0.7, restitution=0.0, time_step=None, \
-        variant=None, theta=0.5, forecast=0.5, solver='auto', tolerance=None, max_iterations=1000, \
-        stabilisation='projection', warm_start=True, accuracy=None)")]
+        time_step = Given::MISSING, variant = Given::MISSING, theta = Given::MISSING, forecast = Given::MISSING,
+        solver = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING,
+        stabilisation = Given::MISSING, warm_start = Given::MISSING, accuracy = None),
+        text_signature = "(model=None, terrain=None, *, gravity=None, friction=0.7, restitution=0.0, time_step=None, variant=None, theta=0.5, forecast=0.5, solver='auto', tolerance=None, max_iterations=1000, stabilisation='projection', warm_start=True, accuracy=None)")]
     fn new(
         model: Given<'_>,
         terrain: Option<&Bound<'_, PyAny>>,
@@ -251,6 +238,17 @@ impl Simulation {
         warm_start: Given<'_>,
         accuracy: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let option = Kind::Option;
+        let time_step = time_step.maybe(option, "time_step")?;
+        let tolerance = tolerance.maybe(option, "tolerance")?;
+        let variant = (variant.some())
+            .map(|v| {
+                choice("variant", &text(v, option, "variant")?, &VARIANTS).map_err(PyErr::from)
+            })
+            .transpose()?;
+        let solver = solver.text("auto", option, "solver")?;
+        let max_iterations = max_iterations.count(1000, option, "max_iterations")?;
+        let stabilisation = stabilisation.text("projection", option, "stabilisation")?;
         let model = model.object::<RoverModel>(Kind::Model, "model", "a RoverModel")?;
         let model = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
         let terrain = match terrain {
@@ -264,9 +262,9 @@ impl Simulation {
             Some(given) => {
                 let chosen = accuracy::parse(given)?;
                 let clash = [
-                    ("time_step", time_step.some().is_some()),
-                    ("variant", variant.some().is_some()),
-                    ("tolerance", tolerance.some().is_some()),
+                    ("time_step", time_step.is_some()),
+                    ("variant", variant.is_some()),
+                    ("tolerance", tolerance.is_some()),
                 ];
                 if let Some((field, _)) = clash.iter().find(|(_, given)| *given) {
                     let message =
@@ -276,27 +274,17 @@ impl Simulation {
                 chosen
             }
         };
-        let kind = Kind::Option;
-        let variant = match variant.some() {
-            None => chosen.variant,
-            Some(given) => choice("variant", &text(given, kind, "variant")?, &VARIANTS)?,
-        };
-        let stabilisation = stabilisation.text("projection", kind, "stabilisation")?;
-        let solver = solver.text("auto", kind, "solver")?;
-        let time_step = time_step.maybe(kind, "time_step")?;
-        let tolerance = tolerance.maybe(kind, "tolerance")?;
         let tolerance = tolerance.unwrap_or(chosen.tolerance);
-        let max_iterations = max_iterations.count(1000, kind, "max_iterations")?;
         let options = StepOptions {
             gravity: checked_gravity(gravity)?,
-            friction_coefficient: friction.number(0.7, kind, "friction")?,
-            restitution: restitution.number(0.0, kind, "restitution")?,
+            friction_coefficient: friction.number(0.7, option, "friction")?,
+            restitution: restitution.number(0.0, option, "restitution")?,
             time_step: time_step.unwrap_or(chosen.time_step),
-            theta: theta.number(0.5, kind, "theta")?,
-            forecast: forecast.number(0.5, kind, "forecast")?,
-            variant,
+            theta: theta.number(0.5, option, "theta")?,
+            forecast: forecast.number(0.5, option, "forecast")?,
+            variant: variant.unwrap_or(chosen.variant),
             stabilisation: choice("stabilisation", &stabilisation, &STABILISATIONS)?,
-            warm_start: warm_start.flag(true, kind, "warm_start")?,
+            warm_start: warm_start.flag(true, option, "warm_start")?,
             solver: solver_options(&solver, tolerance, max_iterations, &SIMULATION_SOLVERS)?,
             ..StepOptions::default()
         };
@@ -393,13 +381,14 @@ impl Simulation {
     }
 
     #[pyo3(signature = (q, qdot = None, *, coordinates = Given::MISSING), text_signature = "($self, q, qdot=None, *, coordinates='state')")]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn set_state(
         &self,
         q: &Bound<'_, PyAny>,
         qdot: Option<&Bound<'_, PyAny>>,
         coordinates: Given<'_>,
     ) -> PyResult<()> {
-        let kind = Coordinates::parse(&coordinates.text("state", Kind::State, "coordinates")?)?;
+        let kind = Coordinates::given(&coordinates)?;
         let q = vector(q, Kind::State, "q")?;
         let configuration = kind.configuration(&self.model, &q)?;
         let qdot = qdot.map_or_else(
@@ -474,20 +463,18 @@ impl Simulation {
         stiffness: Option<&Bound<'_, PyAny>>,
         damping: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
+        let one = |x: &Bound<'_, PyAny>, field| number(x, Kind::Command, field);
+        let read = |s: &Bound<'_, PyAny>| match s.len() {
+            Ok(_) => vector(s, Kind::Command, "set_points"),
+            Err(_) => one(s, "set_points").map(|x| vec![x]),
+        };
+        let set_points = set_points.map(read).transpose()?;
+        let stiffness = stiffness.map(|x| one(x, "stiffness")).transpose()?;
+        let damping = damping.map(|x| one(x, "damping")).transpose()?;
         let joints = names(joints)?;
-        let one_or_more = |s: &Bound<'_, PyAny>| {
-            number(s, Kind::Command, "set_points")
-                .map(|x| vec![x])
-                .or_else(|_| vector(s, Kind::Command, "set_points"))
-        };
-        let set_points = set_points.map(one_or_more).transpose()?;
-        let gain = |value: Option<&Bound<'_, PyAny>>, field| {
-            value.map(|x| number(x, Kind::Command, field)).transpose()
-        };
-        let (stiffness, damping) = (gain(stiffness, "stiffness")?, gain(damping, "damping")?);
-        let mut held = self.open()?;
-        let done = held.hold(&joints, set_points.as_deref(), stiffness, damping);
-        Ok(done.map_err(BorderError::from)?)
+        let mut inner = self.open()?;
+        let held = inner.hold(&joints, set_points.as_deref(), stiffness, damping);
+        Ok(held.map_err(BorderError::from)?)
     }
 
     fn release(&self, joints: &Bound<'_, PyAny>) -> PyResult<()> {
@@ -503,6 +490,7 @@ impl Simulation {
     }
 
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
         let steps = n.count(1, Kind::Option, "n")?;
         let mut held = self.open()?;
@@ -555,6 +543,7 @@ impl Simulation {
     }
 
     #[pyo3(signature = (n_scan = Given::MISSING), text_signature = "($self, n_scan=0)")]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn reading_layout<'py>(
         &self,
         py: Python<'py>,
@@ -595,14 +584,9 @@ impl Simulation {
     }
 
     fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
-        let cast = snapshot.cast::<Snapshot>();
-        let snapshot = cast
-            .map_err(|_| refused(snapshot, Kind::State, "snapshot", "a Snapshot"))?
-            .get();
-        Ok(self
-            .open()?
-            .restore(&snapshot.inner)
-            .map_err(BorderError::from)?)
+        let snapshot = belonging::<Snapshot>(snapshot, "a Snapshot")?;
+        let restored = self.open()?.restore(&snapshot.get().inner);
+        Ok(restored.map_err(BorderError::from)?)
     }
 
     /// W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem.
@@ -616,6 +600,7 @@ impl Simulation {
     }
 
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1000)")]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn profile<'py>(&self, py: Python<'py>, n: Given<'_>) -> PyResult<Bound<'py, PyDict>> {
         let steps = n.count(1000, Kind::Option, "n")?;
         let (held, mut watch) = (self.open()?, Watch::new());

@@ -22,6 +22,7 @@ pub use error::{ModelError, StateError};
 pub use joint::JointAxis;
 pub use kinematics::Kinematics;
 pub use mass_matrix::{FactoredMassMatrix, MassMatrix};
-pub use model::{Body, Frame, Model, Wheel};
+pub(crate) use model::fingerprint;
+pub use model::{Body, Frame, MAX_SOLIDS, Model, Wheel};
 pub use momentum::{Energy, Momentum};
 pub use state::{Configuration, State};

@@ -28,6 +28,8 @@ pub struct PlanarActiveContact {
 /// All that a planar simulation needs to continue bit for bit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanarSnapshot {
+    /// [`PlanarMachine::fingerprint`] of the machine.
+    pub machine: u64,
     /// Coordinates (nv), m and rad.
     pub q: Vec<f64>,
     /// Their rates (nv).
@@ -307,6 +309,7 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSimulation<NV, M> {
     /// Everything that is needed to continue bit for bit.
     pub fn snapshot(&self) -> PlanarSnapshot {
         PlanarSnapshot {
+            machine: self.machine.fingerprint(),
             q: self.q.as_slice().to_vec(),
             v: self.v.as_slice().to_vec(),
             time: self.time,
@@ -321,7 +324,7 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSimulation<NV, M> {
     /// # Errors
     /// A snapshot of another kind of machine or with damaged contents; nothing is changed then.
     pub fn restore(&mut self, snapshot: &PlanarSnapshot) -> Result<(), SnapshotError> {
-        if snapshot.q.len() != NV || snapshot.inputs.len() != self.inputs.len() {
+        if snapshot.machine != self.machine.fingerprint() {
             return Err(SnapshotError::OtherModel);
         }
         let warm = &snapshot.warm_start;
@@ -332,7 +335,16 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSimulation<NV, M> {
             .chain(&snapshot.inputs)
             .chain(&warm.persistent)
             .chain(warm.impulses.iter().flat_map(|(_, p)| p));
-        let is_sound = snapshot.v.len() == NV
+        let active = |a: &PlanarActiveContact| {
+            let numbers = [a.contact.point, a.contact.foot, a.contact.n];
+            (a.contact.key.disc as usize) < self.machine.n_discs()
+                && numbers.iter().flatten().all(|x| x.is_finite())
+                && a.impulse.iter().chain(&a.velocity).all(|x| x.is_finite())
+                && a.contact.gap.is_finite()
+        };
+        let is_sound = [snapshot.q.len(), snapshot.v.len()] == [NV; 2]
+            && snapshot.inputs.len() == self.inputs.len()
+            && snapshot.active.iter().all(active)
             && [0, NV].contains(&warm.persistent.len())
             && snapshot.time.is_finite()
             && numbers.copied().all(f64::is_finite);

@@ -16,6 +16,9 @@ use crate::integrator::{
 };
 use crate::multibody::{Configuration, Energy, Kinematics, Model, Momentum, State, momentum};
 
+/// How far the squared length of a snapshot's quaternion may be from 1: the steps keep it within rounding.
+const UNIT: f64 = 1e-12;
+
 /// A machine on a terrain. Model and terrain are shared; everything else is its own.
 #[derive(Clone)]
 pub struct Simulation {
@@ -571,7 +574,9 @@ impl Simulation {
             .iter()
             .chain(&snapshot.wheel_torque)
             .chain(&snapshot.joint_torque);
+        let attitude = snapshot.state.configuration.attitude.norm_squared();
         let is_sound = snapshot.state.is_finite()
+            && (attitude - 1.0).abs() <= UNIT
             && snapshot.state.configuration.joints.len() == expected
             && snapshot.wheel_torque.len() == self.model.wheels().len()
             && snapshot.state.v.len() == self.model.nv()
@@ -587,10 +592,7 @@ impl Simulation {
                 .impulses
                 .iter()
                 .all(|(_, p)| p.iter().all(|x| x.is_finite()))
-            && snapshot.active.iter().all(|a| match a.contact.part {
-                Part::Wheel(i) => i < self.model.wheels().len(),
-                Part::Box(i) => i < self.model.boxes().len(),
-            });
+            && snapshot.active.iter().all(|a| is_sound(&self.model, a));
         if !is_sound {
             return Err(SnapshotError::Damaged);
         }
@@ -603,6 +605,24 @@ impl Simulation {
         self.last_call = LastCall::default();
         Ok(())
     }
+}
+
+/// Whether a contact is one of finite numbers, of a part that a model has.
+fn is_sound(model: &Model, active: &ActiveContact) -> bool {
+    let contact = &active.contact;
+    let is_part = match contact.part {
+        Part::Wheel(i) => i < model.wheels().len(),
+        Part::Box(i) => i < model.boxes().len(),
+    };
+    is_part
+        && contact.body < model.bodies().len()
+        && contact.frame.rows().iter().flatten().all(|x| x.is_finite())
+        && (contact.point.iter())
+            .chain(&active.position)
+            .chain(&active.impulse)
+            .chain(&active.velocity)
+            .all(|x| x.is_finite())
+        && contact.gap.is_finite()
 }
 
 /// A command of `expected` finite entries.

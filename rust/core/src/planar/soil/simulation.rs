@@ -45,6 +45,9 @@ pub fn soil_options(disks: &Disks) -> StepOptions {
     }
 }
 
+/// Most steps that a snapshot may have behind it.
+const MAX_STEPS: usize = 1 << 53;
+
 /// A contact of the last step with what it did.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SoilActiveContact {
@@ -59,6 +62,8 @@ pub struct SoilActiveContact {
 /// All that a soil needs to continue bit for bit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SoilSnapshot {
+    /// [`SoilScene::fingerprint`] of what moves.
+    pub scene: u64,
     /// (x, y, θ) of each disk, then the machine's coordinates, m and rad.
     pub q: Vec<f64>,
     /// Their rates.
@@ -497,6 +502,7 @@ impl SoilSimulation {
     #[must_use]
     pub fn snapshot(&self) -> SoilSnapshot {
         SoilSnapshot {
+            scene: self.scene.fingerprint(),
             q: self.q.clone(),
             v: self.v.clone(),
             time: self.time,
@@ -514,7 +520,7 @@ impl SoilSimulation {
     /// A snapshot of another scene or with damaged contents; nothing is changed then.
     pub fn restore(&mut self, snapshot: &SoilSnapshot) -> Result<(), SnapshotError> {
         let nv = self.scene.nv();
-        if snapshot.q.len() != nv || snapshot.inputs.len() != self.inputs.len() {
+        if snapshot.scene != self.scene.fingerprint() {
             return Err(SnapshotError::OtherModel);
         }
         let warm = &snapshot.warm_start;
@@ -523,7 +529,9 @@ impl SoilSimulation {
             .flatten()
             .chain(&snapshot.pull)
             .chain(warm.impulses.iter().flat_map(|(_, p)| p));
-        let is_sound = snapshot.v.len() == nv
+        let is_sound = [snapshot.q.len(), snapshot.v.len()] == [nv; 2]
+            && snapshot.inputs.len() == self.inputs.len()
+            && snapshot.count <= MAX_STEPS
             && [0, nv].contains(&warm.persistent.len())
             && snapshot.time.is_finite()
             && snapshot.sleep.is_of(self.scene.disks.kinematic())
