@@ -124,6 +124,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     uniformly from `slope_deg` and `uphill_deg`. The rover rests on it at the origin, joints at zero,
     heading drawn from `heading_deg`; the goal lies at a distance from `goal_distance` in a direction
     from `goal_bearing_deg`, seen from the heading. It has no brakes: without torque it rolls downhill.
+    A scene in which the rover would stand in the ground or in a sphere is drawn again; after 100 scenes
+    `reset` raises `TerrainError`. A reset that is refused, for whatever reason, changes nothing.
 
     `reset(options=...)` fixes what it names: `difficulty`, `slope_deg`, `uphill_deg`, `position` (x, z),
     `heading_deg`, `goal` (x, z), or the whole state as `q` (21,) with `v` (21,), as

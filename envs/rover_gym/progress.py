@@ -316,7 +316,12 @@ def advance(
         noise: `(..., size)` of the observations, or None.
     """
     dt, w = task.dt, task.reward_weights
+    broken = ~np.isfinite(readings).all(axis=-1)
+    if broken.any():
+        readings = np.where(np.isfinite(readings), readings, 0.0)
     now = Scalars.of(task, readings)
+    if broken.any():
+        now = now._replace(distance=np.where(broken, progress.distance, now.distance)[()])
     torque_change, steering_change = _squares(commands - progress.previous_action)
     distance_before, observation_before = progress.distance, progress.observation
 
@@ -328,6 +333,7 @@ def advance(
     progress.stuck_time = (progress.stuck_time + dt) * stuck
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite ends the episode
         observation, finite = observe(task, readings, commands, progress.stuck_time, noise)
+    finite = finite & ~broken
 
     reasons = (
         (now.distance <= task.goal_tolerance)
