@@ -16,7 +16,7 @@ speed along the circle that is tangential to the heading and meets the goal (pur
 """
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -52,7 +52,7 @@ class CommandLimits:
     response: float = 0.2
 
     def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
+        for name, value in vars(self).items():
             number(f"command.{name}", value, at_least=1e-3, at_most=180.0 if name == "sideways_deg" else 1e3)
 
 

@@ -11,7 +11,7 @@ with `v` the speed of the point `(x_c, 0)`.
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,7 @@ class PDGains:
     switch_cost: float = 1.0
 
     def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
+        for name, value in vars(self).items():
             number(f"gains.{name}", value, at_least=1e-3, at_most=1e3)
 
 

@@ -98,9 +98,11 @@ def vector(field: str, value: object, size: int, *, error: type[RoverGymError] =
 
 def array(field: str, value: object, *, error: type[RoverGymError]) -> npt.NDArray[np.float64]:
     """Numbers of any shape, finite or not, as an array of their own."""
+    if isinstance(value, range):  # short to write, and as long as can be
+        refuse(error, field, value, "must be numbers")
     try:
         given = np.asarray(value)
-    except (TypeError, ValueError):  # a ragged sequence
+    except Exception:  # a ragged sequence, or whatever a class of somebody's raises
         refuse(error, field, value, "must be numbers")
     if given.dtype.kind not in "fiu":
         refuse(error, field, value, "must be numbers")
@@ -136,7 +138,7 @@ def known_keys(field: str, value: Iterable[object], known: Iterable[str]) -> Non
     names = tuple(known)
     for key in value:
         if not isinstance(key, str) or key not in names:
-            name = key if isinstance(key, str) else shown(key)
+            name = key if isinstance(key, str) and len(key) <= SHOWN else shown(key)
             refuse(OptionError, f"{field}.{name}", key, f"unknown; known are {', '.join(names)}")
 
 

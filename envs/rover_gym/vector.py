@@ -46,10 +46,13 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         **arguments: Any,
     ) -> None:
         super().__init__()
-        try:
-            self.autoreset_mode = AutoresetMode(autoreset_mode)
-        except ValueError:
-            names = ", ".join(mode.value for mode in AutoresetMode)
+        modes = {mode.value: mode for mode in AutoresetMode}
+        if isinstance(autoreset_mode, AutoresetMode):
+            self.autoreset_mode = autoreset_mode
+        elif isinstance(autoreset_mode, str) and autoreset_mode in modes:
+            self.autoreset_mode = modes[autoreset_mode]
+        else:
+            names = ", ".join(modes)
             refuse(OptionError, "autoreset_mode", autoreset_mode, f"must be one of {names}")
         self.batch = RoverBatch(num_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments)
         self.prototype = self.batch.prototype

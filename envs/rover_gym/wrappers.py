@@ -15,6 +15,9 @@ from rover_gym.validation import known_keys, vector, whole
 
 Array = npt.NDArray[np.float32]
 
+#: Steps for which a command may hold, some minutes.
+MAX_REPEAT = 10_000
+
 
 class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
     """Holds a command for some steps of the rover; the rewards are summed.
@@ -35,7 +38,7 @@ class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
     def __init__(
         self, env: gym.Env[Array, Array], repeat: int = 4, guided: bool = False, pool: int = 1, **limits: float
     ) -> None:
-        repeat = whole("repeat", repeat, at_least=1)
+        repeat = whole("repeat", repeat, at_least=1, at_most=MAX_REPEAT)
         known_keys("limits", limits, [field.name for field in fields(CommandLimits)])
         rover = rover_env(env)
         super().__init__(env)

@@ -10,6 +10,9 @@ use rover_core::multibody::{ModelError, StateError};
 use rover_core::problem::ProblemError;
 use rover_core::simulation::{BatchError, CommandError, SnapshotError};
 
+/// Characters of an exception's message.
+const LONGEST_MESSAGE: usize = 1000;
+
 /// Which exception.
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {
@@ -143,7 +146,7 @@ impl From<BorderError> for PyErr {
                 Kind::Busy => &classes.busy,
             };
             let raise = || -> PyResult<PyErr> {
-                let instance = class.bind(py).call1((error.message,))?;
+                let instance = class.bind(py).call1((shortened(error.message),))?;
                 instance.setattr("field", error.field)?;
                 match error.value {
                     Value::Nothing => instance.setattr("value", py.None())?,
@@ -158,6 +161,15 @@ impl From<BorderError> for PyErr {
             raise().unwrap_or_else(|e| e)
         })
     }
+}
+
+/// A message that may hold a long text that was given.
+fn shortened(message: String) -> String {
+    if message.chars().count() <= LONGEST_MESSAGE {
+        return message;
+    }
+    let start = message.chars().take(LONGEST_MESSAGE);
+    start.chain("…".chars()).collect()
 }
 
 impl BorderError {
