@@ -105,14 +105,29 @@ class RoverModel:
         self,
         *,
         wheel_radius: float | None = None,
+        contact_radius: float | None = None,
         masses: Mapping[str, float] | Sequence[float] | None = None,
         steering_stiffness: float | None = None,
         steering_damping: float | None = None,
         wheel_torque_limit: float | None = None,
         mass_scale: float | None = None,
     ) -> RoverModel:
-        """A model that differs in what is given. `mass_scale` multiplies masses and inertias."""
-    def weld(self, joints: Mapping[str, float] | Sequence[str]) -> RoverModel: ...
+        """A model that differs in what is given.
+
+        Args:
+            wheel_radius: Of all wheels, m: shape, inertia and contact change together.
+            contact_radius: Radius at which the wheels touch the ground, m; shape and inertia stay as they are.
+            masses: kg, by solid or one for each. Inertias go with them.
+            steering_stiffness: N m/rad.
+            steering_damping: N m s/rad.
+            wheel_torque_limit: N m.
+            mass_scale: Multiplies masses and inertias.
+
+        Raises:
+            ModelError: A number out of its range, or a wheel radius where a wheel's solid is no disc.
+        """
+    def weld(self, joints: Mapping[str, float] | Sequence[str] | str) -> RoverModel:
+        """The same machine with joints locked at 0 or at the given angles, rad; files and dictionaries keep them locked."""
     @property
     def name(self) -> str: ...
     @property
@@ -142,27 +157,27 @@ class RoverModel:
     @property
     def steering_limit(self) -> float:
         """Largest steering set-point, rad, either way."""
-    def mass_matrix(self, q: npt.ArrayLike, coordinates: _Coordinates = "report") -> _Array: ...
+    def mass_matrix(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> _Array: ...
     def bias(
         self,
         q: npt.ArrayLike,
         qdot: npt.ArrayLike,
         gravity: npt.ArrayLike | None = None,
-        coordinates: _Coordinates = "report",
+        coordinates: _Coordinates = "state",
     ) -> _Array: ...
     def actuation_matrix(self) -> _Array: ...
-    def kinetic_energy(self, q: npt.ArrayLike, qdot: npt.ArrayLike, coordinates: _Coordinates = "report") -> float: ...
-    def tags(self, q: npt.ArrayLike, coordinates: _Coordinates = "report") -> dict[str, _Array]: ...
-    def poses(self, q: npt.ArrayLike, coordinates: _Coordinates = "report") -> dict[str, tuple[_Array, _Array]]:
+    def kinetic_energy(self, q: npt.ArrayLike, qdot: npt.ArrayLike, coordinates: _Coordinates = "state") -> float: ...
+    def tags(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> dict[str, _Array]: ...
+    def poses(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> dict[str, tuple[_Array, _Array]]:
         """Origin (3,) and rotation matrix (3, 3) of every solid, world frame."""
     def wheel_gaps(
-        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "report"
+        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
     ) -> _Array: ...
     def wheel_contact_points(
-        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "report"
+        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
     ) -> _Array: ...
     def wheel_jacobians(
-        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "report"
+        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
     ) -> _Array: ...
     def to_report(self, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[_Array, _Array]:
         """Public q and state velocity -> the report's q and qdot."""

@@ -45,6 +45,13 @@ impl<'py> Given<'py> {
             .transpose()
     }
 
+    /// A whole number that is not negative.
+    pub fn whole(&self, default: u64, kind: Kind, field: &str) -> PyResult<u64> {
+        self.0
+            .as_ref()
+            .map_or(Ok(default), |given| whole(given, kind, field))
+    }
+
     /// A count.
     pub fn count(&self, default: usize, kind: Kind, field: &str) -> PyResult<usize> {
         self.0

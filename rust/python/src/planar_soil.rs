@@ -13,7 +13,7 @@ use rover_core::planar::soil::{
 use rover_core::planar::{Ground, PlanarWheel, TwoWheelRover};
 use std::sync::{Arc, MutexGuard};
 
-use crate::arguments::{Given, flags, number, text, whole};
+use crate::arguments::{Given, flags, number, text};
 use crate::arrays::{array, fresh, fresh_rows, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::planar::{one_or_two, pair};
@@ -658,9 +658,6 @@ pub fn soil_packing<'py>(
     seed: Given<'_>,
 ) -> PyResult<Packed<'py>> {
     let kind = Kind::Model;
-    let seed = seed
-        .some()
-        .map_or(Ok(0), |given| whole(given, kind, "seed"));
     let packing = Packing {
         count: count.count(222, kind, "count")?,
         radius_min: radius_min.number(0.016, kind, "radius_min")?,
@@ -669,7 +666,7 @@ pub fn soil_packing<'py>(
         left: left.number(0.0, kind, "left")?,
         width: width.number(2.4494, kind, "width")?,
         bottom: bottom.number(0.0, kind, "bottom")?,
-        seed: seed?,
+        seed: seed.whole(0, kind, "seed")?,
     };
     let built = py.detach(|| packing.build());
     let (disks, q) = built.map_err(|e| soil_error(&e))?;
