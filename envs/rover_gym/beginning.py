@@ -1,6 +1,6 @@
 """How an episode begins: all of it is drawn and checked first, and only then taken over by whoever asked for it."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -74,8 +74,7 @@ def spread_seeds(seed: object, n: int) -> list[int | None]:
     Raises:
         OptionError: It is neither None, a whole number from 0, nor n of these.
     """
-    is_sequence = isinstance(seed, Sequence) and not isinstance(seed, (str, bytes))
-    if is_sequence or (isinstance(seed, np.ndarray) and seed.ndim == 1):
+    if isinstance(seed, (list, tuple, range)) or (isinstance(seed, np.ndarray) and seed.ndim == 1):
         if len(seed) != n:
             refuse(OptionError, "seed", seed, f"must be one seed, or {n}")
         return [check_seed(one, f"seed[{i}]") for i, one in enumerate(seed)]

@@ -321,7 +321,8 @@ def advance(
         readings = np.where(np.isfinite(readings), readings, 0.0)
     now = Scalars.of(task, readings)
     if broken.any():
-        now = now._replace(distance=np.where(broken, progress.distance, now.distance)[()])
+        distance: Quantity = np.where(broken, progress.distance, now.distance)
+        now = now._replace(distance=distance[()])
     torque_change, steering_change = _squares(commands - progress.previous_action)
     distance_before, observation_before = progress.distance, progress.observation
 
@@ -364,7 +365,7 @@ def advance(
     if not sound:
         # Where the physics failed its numbers earn nothing, and the last finite observation stays.
         terms = {name: term if name == "failure" else np.where(failed, 0.0, term)[()] for name, term in terms.items()}
-        observation = np.where(finite[..., None], observation, observation_before)
+        observation = np.where(failed[..., None], observation_before, observation)
     progress.observation = observation
     reward: Quantity = 0.0
     for term in terms.values():

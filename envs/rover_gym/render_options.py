@@ -66,7 +66,7 @@ def check_render_options(field: str, given: Mapping[str, Any]) -> RenderOptions:
     return RenderOptions(**options)
 
 
-def check_render_mode(render_mode: str | None) -> None:
+def check_render_mode(render_mode: object) -> None:
     """Refuses a mode that the environment cannot render, or whose packages are missing.
 
     Raises:

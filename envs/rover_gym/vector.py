@@ -46,14 +46,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         **arguments: Any,
     ) -> None:
         super().__init__()
-        modes = {mode.value: mode for mode in AutoresetMode}
-        if isinstance(autoreset_mode, AutoresetMode):
-            self.autoreset_mode = autoreset_mode
-        elif isinstance(autoreset_mode, str) and autoreset_mode in modes:
-            self.autoreset_mode = modes[autoreset_mode]
-        else:
-            names = ", ".join(modes)
-            refuse(OptionError, "autoreset_mode", autoreset_mode, f"must be one of {names}")
+        self.autoreset_mode = _check_mode(autoreset_mode)
         self.batch = RoverBatch(num_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments)
         self.prototype = self.batch.prototype
         self.num_envs = self.batch.n
@@ -170,3 +163,12 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
             refuse(OptionError, "options.reset_mask", mask, f"must be an array of {self.num_envs} bool")
         return [int(i) for i in np.flatnonzero(mask)]
+
+
+def _check_mode(mode: object) -> AutoresetMode:
+    if isinstance(mode, AutoresetMode):
+        return mode
+    modes = {known.value: known for known in AutoresetMode}
+    if not (isinstance(mode, str) and mode in modes):
+        refuse(OptionError, "autoreset_mode", mode, f"must be one of {', '.join(modes)}")
+    return modes[mode]

@@ -1,4 +1,4 @@
-"""Long calls leave the interpreter free, end at Ctrl-C between two steps, and say so when their object is used meanwhile."""
+"""Long calls leave the interpreter free and end at Ctrl-C between two steps; an object in use says so."""
 
 import copy
 import pickle
@@ -19,17 +19,17 @@ from rover_gym.planar import BallSimulation, Line, SoilSimulation
 FOR_EVER = 10**12
 
 
-class Alarm(Exception):
+class AlarmError(Exception):
     """What the signal handler raises, as Ctrl-C's raises KeyboardInterrupt."""
 
 
 @contextmanager
 def alarm(seconds: float, handler: Callable[[], None] | None = None) -> Iterator[None]:
-    """Runs a handler, one that raises `Alarm` if none is given, so many seconds from now."""
+    """Runs a handler, one that raises `AlarmError` if none is given, so many seconds from now."""
 
     def handle(*_: object) -> None:
         if handler is None:
-            raise Alarm
+            raise AlarmError
         handler()
 
     before = signal.signal(signal.SIGALRM, handle)
@@ -62,7 +62,7 @@ def test_a_long_step_ends_at_ctrl_c_with_the_state_of_the_last_whole_step(make: 
     # `sim.step(10**6)` could not be stopped: Ctrl-C was heard when all steps had been taken.
     sim, twin = make(), make()
     start = time.perf_counter()
-    with alarm(0.1), pytest.raises(Alarm):
+    with alarm(0.1), pytest.raises(AlarmError):
         sim.step(FOR_EVER)
     # 0.1 s until the signal; 0.02 s from there on an idle machine, and some more on one that is not.
     assert time.perf_counter() - start < 1.0
@@ -77,7 +77,7 @@ def test_a_long_step_ends_at_ctrl_c_with_the_state_of_the_last_whole_step(make: 
 
 def test_an_ended_call_is_accounted_for_as_far_as_it_went() -> None:
     sim, twin = rover(), rover()
-    with alarm(0.05), pytest.raises(Alarm):
+    with alarm(0.05), pytest.raises(AlarmError):
         sim.step(FOR_EVER)
     twin.step(round(sim.time / sim.time_step))
     np.testing.assert_array_equal(sim.reading(), twin.reading())
@@ -88,7 +88,7 @@ def test_an_ended_call_is_accounted_for_as_far_as_it_went() -> None:
 def test_a_long_step_of_a_batch_ends_at_ctrl_c(threads: int) -> None:
     batch = SimulationBatch([rover()] * 3, threads=threads)
     start = time.perf_counter()
-    with alarm(0.1), pytest.raises(Alarm):
+    with alarm(0.1), pytest.raises(AlarmError):
         batch.step(np.full((3, 6), 20.0), np.zeros((3, 6)), FOR_EVER)
     assert time.perf_counter() - start < 1.0
     for i in range(3):
@@ -105,7 +105,7 @@ def test_a_long_step_of_a_batch_ends_at_ctrl_c(threads: int) -> None:
 def test_a_long_profile_ends_at_ctrl_c() -> None:
     sim = rover()
     before = sim.snapshot()
-    with alarm(0.1), pytest.raises(Alarm):
+    with alarm(0.1), pytest.raises(AlarmError):
         sim.profile(FOR_EVER)
     assert sim.snapshot() == before
 
@@ -201,7 +201,7 @@ def test_a_batch_that_another_thread_steps_says_that_it_is_busy() -> None:
     thread = threading.Thread(target=batch.step, args=(np.zeros((2, 6)), np.zeros((2, 6)), 10000))
     thread.start()
     time.sleep(0.02)
-    for use in (lambda: batch.readings(), lambda: batch.simulation(0), lambda: batch.replace(0, rover())):
+    for use in (batch.readings, lambda: batch.simulation(0), lambda: batch.replace(0, rover())):
         with pytest.raises(BusyError):
             use()
     thread.join()

@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use super::description::{Hold, ModelDescription, Shape, SolidDescription};
 use super::error::ModelError;
 use super::joint::JointAxis;
+use super::motor::Motor;
 use crate::spatial::SymmetricMatrix3;
 
 /// Most solids of a model, and most wheels and tags: beyond it a step costs seconds and matrices gigabytes.
@@ -79,6 +80,8 @@ pub struct Wheel {
     pub torque_limit: f64,
     /// 1 or −1: joint torque of a positive (forward) command.
     pub drive_sign: f64,
+    /// Torque–speed line of its motor, where it has one.
+    pub motor: Option<Motor>,
     /// Velocity index of the wheel's own joint; none where it is locked.
     pub joint: Option<usize>,
     /// Velocity index of its steering joint; none where there is none or it is locked.
@@ -209,6 +212,18 @@ impl Model {
         length("contact_radius", radius)?;
         for wheel in &mut description.wheels {
             wheel.contact_radius = Some(radius);
+        }
+        Self::from_description(description)
+    }
+
+    /// The same machine with another torque–speed line, or none, on all wheels.
+    ///
+    /// # Errors
+    /// `NotPositive` or `NotFinite` for a torque or a speed that is none.
+    pub fn with_motors(&self, motor: Option<Motor>) -> Result<Self, ModelError> {
+        let mut description = self.description.clone();
+        for wheel in &mut description.wheels {
+            wheel.motor = motor;
         }
         Self::from_description(description)
     }
@@ -351,6 +366,7 @@ impl Model {
                 radius: wheel.contact_radius.unwrap_or(wheel.radius),
                 torque_limit: wheel.torque_limit,
                 drive_sign: wheel.drive_sign,
+                motor: wheel.motor,
                 joint: joint_of(&wheel.solid),
                 steering: wheel.steering.as_deref().and_then(joint_of),
                 steering_limit: wheel.steering_limit.unwrap_or(0.0),
@@ -836,6 +852,10 @@ fn check_wheels(
                 field: at("drive_sign"),
                 value: wheel.drive_sign,
             });
+        }
+        if let Some(motor) = wheel.motor {
+            positive(&at("motor.stall_torque"), motor.stall_torque)?;
+            positive(&at("motor.no_load_speed"), motor.no_load_speed)?;
         }
         if let Some(name) = &wheel.steering {
             let steering = find("steering", name)?;
