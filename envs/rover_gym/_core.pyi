@@ -17,6 +17,7 @@ _Coordinates: TypeAlias = Literal["report", "state"]
 
 __all__ = [
     "BallSimulation",
+    "BusyError",
     "CommandError",
     "Contacts",
     "Energy",
@@ -82,6 +83,9 @@ class ProblemError(RoverGymError, ValueError):
 
 class StepError(RoverGymError, RuntimeError):
     """A time step could not be taken; the state is as it was before the call."""
+
+class BusyError(RoverGymError, RuntimeError):
+    """An object was used while another call on it was still going on; nothing has changed."""
 
 @final
 class RoverModel:
@@ -402,6 +406,8 @@ class Simulation:
     def steering(self) -> _Array: ...
     def set_steering(self, set_points: npt.ArrayLike) -> None:
         """(6,) rad, held by the implicit PD with the model's gains."""
+    def set_commands(self, torques: npt.ArrayLike, set_points: npt.ArrayLike) -> None:
+        """`set_wheel_torques` and `set_steering` in one: both, or neither where either is refused."""
     def set_joint_torques(self, torques: npt.ArrayLike) -> None:
         """(nv - 6,) N m about the joint axes, added to what set_wheel_torques gives; no limit."""
     def hold(
@@ -416,7 +422,15 @@ class Simulation:
     def release(self, joints: str | Sequence[str]) -> None: ...
     def brake(self) -> None:
         """Holds the six wheels where they are (`hold` on the wheel joints), and zeroes their torques."""
-    def step(self, n: int = 1) -> StepReport: ...
+    def step(self, n: int = 1) -> StepReport:
+        """Takes n steps.
+
+        Other threads run meanwhile; on this object their calls are refused with BusyError. Ctrl-C, or whatever a signal
+        handler raises, ends the call after a whole step, whose state stays.
+
+        Raises:
+            StepError: A step could not be taken; the state before it stays.
+        """
     @property
     def contacts(self) -> Contacts: ...
     @property
@@ -721,7 +735,8 @@ class SimulationBatch:
         """Commands (n_rovers, 6) as `set_wheel_torques` and `set_steering` take them, then n steps.
 
         Rovers that are not `active` keep still. Returns a fresh row of readings a rover, and why a rover could not
-        take a step, by its number; the others have gone on.
+        take a step, by its number; the others have gone on. Ctrl-C ends the call after a whole step of each rover, not
+        the same one for all.
         """
     def readings(self) -> _Array:
         """(n_rovers, size) as the rovers are now."""

@@ -15,6 +15,7 @@ mod planar_ground;
 mod planar_soil;
 mod plane;
 mod reading;
+mod shared;
 mod simulation;
 mod snapshot;
 mod sphere_field;

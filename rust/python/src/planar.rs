@@ -11,7 +11,7 @@ use rover_core::planar::{
     PlanarSimulation as Core, PlanarSnapshot as CoreSnapshot, PlanarWheel, TwoWheelRover,
 };
 use rover_core::simulation::{CommandError, SnapshotError};
-use std::sync::Arc;
+use std::sync::{Arc, MutexGuard};
 
 use crate::arguments::{Given, count, flag, number, text};
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
@@ -19,6 +19,7 @@ use crate::errors::{BorderError, Kind, Value};
 use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
 use crate::model::RoverModel;
 use crate::planar_ground::{border, parse};
+use crate::shared::{Shared, Watch};
 use crate::simulation::{Energy, Problem, STABILISATIONS, StepReport, VARIANTS, choice, name_of};
 use crate::snapshot::{belonging, damaged, read};
 
@@ -43,7 +44,11 @@ trait Run: Send + Sync {
     fn last_problem(&self) -> (&[f64], &[f64], &[f64]);
     fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), StateError>;
     fn set_inputs(&mut self, inputs: &[f64]) -> Result<(), CommandError>;
-    fn step(&mut self, n: usize) -> Result<CoreReport, StepError>;
+    fn step_while(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<CoreReport, StepError>;
     fn snapshot(&self) -> CoreSnapshot;
     fn restore(&mut self, snapshot: &CoreSnapshot) -> Result<(), SnapshotError>;
 }
@@ -94,8 +99,12 @@ impl<const NV: usize, M: PlanarMachine<NV>> Run for Core<NV, M> {
     fn set_inputs(&mut self, inputs: &[f64]) -> Result<(), CommandError> {
         self.set_inputs(inputs)
     }
-    fn step(&mut self, n: usize) -> Result<CoreReport, StepError> {
-        self.step(n)
+    fn step_while(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<CoreReport, StepError> {
+        self.step_while(n, go_on)
     }
     fn snapshot(&self) -> CoreSnapshot {
         self.snapshot()
@@ -205,9 +214,9 @@ impl PlanarContacts {
 }
 
 /// A planar machine on a ground, stepped through time by the rover's own schemes.
-#[pyclass(module = "rover_gym._core", subclass)]
+#[pyclass(module = "rover_gym._core", subclass, frozen)]
 pub struct PlanarSimulation {
-    inner: Box<dyn Run>,
+    inner: Shared<Box<dyn Run>>,
     ground: Py<PyAny>,
     parameters: Py<PyDict>,
     solver: String,
@@ -277,6 +286,10 @@ pub fn pair(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vecto
 }
 
 impl PlanarSimulation {
+    fn open(&self) -> Result<MutexGuard<'_, Box<dyn Run>>, BorderError> {
+        self.inner.open()
+    }
+
     fn build<const NV: usize, M: PlanarMachine<NV> + 'static>(
         machine: M,
         ground: &Bound<'_, PyAny>,
@@ -288,7 +301,7 @@ impl PlanarSimulation {
         let inner =
             Core::new(machine, terrain, options.rule, options.step).map_err(BorderError::from)?;
         Ok(Self {
-            inner: Box::new(inner),
+            inner: Shared::new(Box::new(inner)),
             ground: ground.clone().unbind(),
             parameters: parameters.unbind(),
             solver: options.solver,
@@ -305,39 +318,46 @@ impl PlanarSimulation {
     }
 
     #[getter]
-    fn time(&self) -> f64 {
-        self.inner.time()
+    fn time(&self) -> PyResult<f64> {
+        let inner = self.open()?;
+        Ok(inner.time())
     }
 
     #[getter]
-    fn time_step(&self) -> f64 {
-        self.inner.options().time_step
+    fn time_step(&self) -> PyResult<f64> {
+        let inner = self.open()?;
+        Ok(inner.options().time_step)
     }
 
     #[getter]
-    fn q<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.q())
+    fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, inner.q()))
     }
 
     #[getter]
-    fn v<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.v())
+    fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, inner.v()))
     }
 
     /// Centres of the discs that touch the ground.
     #[getter]
     fn centres<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        fresh_rows(py, &self.inner.centres())
+        let inner = self.open()?;
+        fresh_rows(py, &inner.centres())
     }
 
     #[getter]
-    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, &self.inner.gaps())
+    fn gaps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, &inner.gaps()))
     }
 
     #[getter]
-    fn torques<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.inputs())
+    fn torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, inner.inputs()))
     }
 
     /// The keyword arguments that describe the machine.
@@ -349,7 +369,8 @@ impl PlanarSimulation {
     /// The keyword arguments that make a simulation with these options.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let o = self.inner.options();
+        let inner = self.open()?;
+        let o = inner.options();
         let settings = PyDict::new(py);
         settings.set_item("gravity", (o.gravity.x, o.gravity.y))?;
         settings.set_item("friction", o.friction_coefficient)?;
@@ -363,80 +384,92 @@ impl PlanarSimulation {
         settings.set_item("max_iterations", self.max_iterations)?;
         settings.set_item("stabilisation", name_of(o.stabilisation, &STABILISATIONS))?;
         settings.set_item("warm_start", o.warm_start)?;
-        settings.set_item("contact", name_of(self.inner.rule(), &RULES))?;
+        settings.set_item("contact", name_of(inner.rule(), &RULES))?;
         Ok(settings)
     }
 
     #[pyo3(signature = (q, v = None))]
-    fn set_state(&mut self, q: &Bound<'_, PyAny>, v: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+    fn set_state(&self, q: &Bound<'_, PyAny>, v: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let mut inner = self.open()?;
         let q = vector(q, Kind::State, "q")?;
-        let rest = || Ok(vec![0.0; self.inner.v().len()]);
+        let rest = || Ok(vec![0.0; inner.v().len()]);
         let v = v.map_or_else(rest, |v| vector(v, Kind::State, "v"))?;
-        Ok(self.inner.set_state(&q, &v).map_err(BorderError::from)?)
+        Ok(inner.set_state(&q, &v).map_err(BorderError::from)?)
     }
 
-    fn set_torques(&mut self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut inner = self.open()?;
         let torques = vector(torques, Kind::Command, "torques")?;
-        Ok(self.inner.set_inputs(&torques).map_err(BorderError::from)?)
+        Ok(inner.set_inputs(&torques).map_err(BorderError::from)?)
     }
 
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
-    fn step(&mut self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
+    fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
         let steps = n.count(1, Kind::Option, "n")?;
-        let inner = &mut self.inner;
-        let report = py.detach(|| inner.step(steps)).map_err(BorderError::from)?;
-        Ok(report.into())
+        let mut held = self.open()?;
+        let (inner, mut watch) = (&mut *held, Watch::new());
+        let report = py.detach(|| inner.step_while(steps, &mut || watch.go_on()));
+        Ok(watch.result(report)?.into())
     }
 
     #[getter]
-    fn contacts(&self) -> PlanarContacts {
-        PlanarContacts {
-            active: self.inner.contacts().to_vec(),
-        }
+    fn contacts(&self) -> PyResult<PlanarContacts> {
+        let inner = self.open()?;
+        Ok(PlanarContacts {
+            active: inner.contacts().to_vec(),
+        })
     }
 
-    fn energy(&self) -> Energy {
-        self.inner.energy().into()
+    fn energy(&self) -> PyResult<Energy> {
+        let inner = self.open()?;
+        Ok(inner.energy().into())
     }
 
     fn mass_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        fresh_matrix(py, &self.inner.mass_matrix())
+        let inner = self.open()?;
+        fresh_matrix(py, &inner.mass_matrix())
     }
 
     /// W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem.
     fn last_problem<'py>(&self, py: Python<'py>) -> PyResult<Problem<'py>> {
-        let (W, q, mu) = self.inner.last_problem();
+        let inner = self.open()?;
+        let (W, q, mu) = inner.last_problem();
         let size = 2 * mu.len();
         let q = if size == 0 { &q[..0] } else { q };
         let W = DMatrix::from_row_slice(size, size, &W[..size * size]);
         Ok((fresh_matrix(py, &W)?, fresh(py, q), fresh(py, mu)))
     }
 
-    fn snapshot(&self) -> PlanarSnapshot {
-        PlanarSnapshot {
-            inner: self.inner.snapshot(),
-        }
+    fn snapshot(&self) -> PyResult<PlanarSnapshot> {
+        let inner = self.open()?;
+        Ok(PlanarSnapshot {
+            inner: inner.snapshot(),
+        })
     }
 
-    fn restore(&mut self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut inner = self.open()?;
         let snapshot = belonging::<PlanarSnapshot>(snapshot, "a PlanarSnapshot")?;
-        let restored = self.inner.restore(&snapshot.get().inner);
+        let restored = inner.restore(&snapshot.get().inner);
         Ok(restored.map_err(BorderError::from)?)
     }
 
     fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
-        let own = slf.borrow();
+        let own = slf.get();
         let (kind, ground) = (slf.get_type().name()?, own.ground.bind(slf.py()).repr()?);
-        Ok(format!("{kind}({ground}, time={})", own.time()))
+        Ok(match own.time() {
+            Ok(time) => format!("{kind}({ground}, time={time})"),
+            Err(_) => format!("{kind}({ground}, stepping)"),
+        })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let py = slf.py();
-        let own = slf.borrow();
+        let own = slf.get();
         let settings = own.settings(py)?;
         settings.update(own.parameters.bind(py).as_mapping())?;
         let rebuild = slf.get_type().getattr("_rebuild")?;
-        let arguments = (slf.get_type(), own.ground(py), settings, own.snapshot());
+        let arguments = (slf.get_type(), own.ground(py), settings, own.snapshot()?);
         (rebuild, arguments).into_pyobject(py)
     }
 
@@ -448,13 +481,13 @@ impl PlanarSimulation {
         snapshot: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let made = kind.call((ground,), Some(settings))?;
-        made.cast::<Self>()?.borrow_mut().restore(snapshot)?;
+        made.cast::<Self>()?.get().restore(snapshot)?;
         Ok(made)
     }
 }
 
 /// The ball of the report's section 3.1: coordinates x, y, theta.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation)]
+#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
 pub struct BallSimulation;
 
 #[pymethods]
@@ -484,7 +517,7 @@ impl BallSimulation {
 }
 
 /// The two-wheel rover of the report's section 3.1: coordinates x, y, theta, theta_A, theta_B.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation)]
+#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
 pub struct TwoWheelRoverSimulation;
 
 /// One number for both wheels, or one for each.
@@ -556,7 +589,7 @@ impl TwoWheelRoverSimulation {
 }
 
 /// The six-wheel rover driven straight: coordinates x, y, theta and one angle a pair of joints.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation)]
+#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
 pub struct MirroredRoverSimulation {
     joints: Vec<Vec<String>>,
     wheels: Vec<Vec<String>>,

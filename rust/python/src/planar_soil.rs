@@ -11,13 +11,14 @@ use rover_core::planar::soil::{
     soil_options,
 };
 use rover_core::planar::{Ground, PlanarWheel, TwoWheelRover};
-use std::sync::Arc;
+use std::sync::{Arc, MutexGuard};
 
 use crate::arguments::{Given, flags, number, text};
 use crate::arrays::{array, fresh, fresh_rows, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::planar::{one_or_two, pair};
 use crate::planar_ground::{border, parse};
+use crate::shared::{Shared, Watch};
 use crate::simulation::{Energy, STABILISATIONS, StepReport, choice, name_of};
 use crate::snapshot::{belonging, damaged, read};
 
@@ -218,20 +219,24 @@ impl SoilSnapshot {
 }
 
 /// A soil of free disks, with walls, a ground and perhaps a machine on it.
-#[pyclass(module = "rover_gym._core")]
+#[pyclass(module = "rover_gym._core", frozen)]
 pub struct SoilSimulation {
-    inner: Core,
+    inner: Shared<Core>,
 }
 
 impl SoilSimulation {
-    fn n(&self) -> usize {
-        self.inner.scene().disks.len()
+    fn open(&self) -> Result<MutexGuard<'_, Core>, BorderError> {
+        self.inner.open()
     }
 
     fn disks(values: &[f64], n: usize) -> Vec<[f64; 3]> {
         let rows = values.chunks_exact(3).take(n);
         rows.map(|row| [row[0], row[1], row[2]]).collect()
     }
+}
+
+fn n_disks(inner: &Core) -> usize {
+    inner.scene().disks.len()
 }
 
 /// Positions with an angle where none was given.
@@ -397,66 +402,79 @@ impl SoilSimulation {
         let sleep = sleep.flag(false, option, "sleep")?;
         let inner =
             Core::new(Arc::new(scene), options, sleep.then_some(rest), q).map_err(setup_error)?;
-        Ok(Self { inner })
+        Ok(Self {
+            inner: Shared::new(inner),
+        })
     }
 
     #[getter]
-    fn time(&self) -> f64 {
-        self.inner.time()
+    fn time(&self) -> PyResult<f64> {
+        let inner = self.open()?;
+        Ok(inner.time())
     }
 
     #[getter]
-    fn time_step(&self) -> f64 {
-        self.inner.options().time_step
+    fn time_step(&self) -> PyResult<f64> {
+        let inner = self.open()?;
+        Ok(inner.options().time_step)
     }
 
     #[getter]
-    fn radius<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.scene().disks.radius())
+    fn radius<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, inner.scene().disks.radius()))
     }
 
     #[getter]
-    fn mass<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.scene().disks.mass())
+    fn mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, inner.scene().disks.mass()))
     }
 
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        fresh_rows(py, &Self::disks(self.inner.q(), self.n()))
+        let inner = self.open()?;
+        fresh_rows(py, &Self::disks(inner.q(), n_disks(&inner)))
     }
 
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        fresh_rows(py, &Self::disks(self.inner.v(), self.n()))
+        let inner = self.open()?;
+        fresh_rows(py, &Self::disks(inner.v(), n_disks(&inner)))
     }
 
     #[getter]
-    fn kinematic<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
-        PyArray1::from_slice(py, self.inner.scene().disks.kinematic())
+    fn kinematic<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let inner = self.open()?;
+        Ok(PyArray1::from_slice(py, inner.scene().disks.kinematic()))
     }
 
     #[getter]
-    fn asleep<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
-        PyArray1::from_slice(py, self.inner.asleep())
+    fn asleep<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let inner = self.open()?;
+        Ok(PyArray1::from_slice(py, inner.asleep()))
     }
 
     #[getter]
-    fn machine<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, &self.inner.q()[3 * self.n()..])
+    fn machine<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, &inner.q()[3 * n_disks(&inner)..]))
     }
 
     #[getter]
-    fn machine_rate<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, &self.inner.v()[3 * self.n()..])
+    fn machine_rate<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, &inner.v()[3 * n_disks(&inner)..]))
     }
 
     /// Centre (x, y) and radius of each wheel.
     #[getter]
     fn wheels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let Some(machine) = &self.inner.scene().machine else {
+        let inner = self.open()?;
+        let Some(machine) = &inner.scene().machine else {
             return fresh_rows::<3>(py, &[]);
         };
-        let own = &self.inner.q()[3 * self.n()..];
+        let own = &inner.q()[3 * n_disks(&inner)..];
         let pose = rover_core::nalgebra::SVector::<f64, 5>::from_column_slice(own);
         let row = |k| {
             let disc = machine.disc(k, &pose);
@@ -466,20 +484,23 @@ impl SoilSimulation {
     }
 
     #[getter]
-    fn torques<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.inputs())
+    fn torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, inner.inputs()))
     }
 
     #[getter]
-    fn pull(&self) -> (f64, f64) {
-        let pull = self.inner.pull();
-        (pull.x, pull.y)
+    fn pull(&self) -> PyResult<(f64, f64)> {
+        let inner = self.open()?;
+        let pull = inner.pull();
+        Ok((pull.x, pull.y))
     }
 
     /// Numbers and names of the options.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let (o, friction) = (self.inner.options(), &self.inner.scene().friction);
+        let inner = self.open()?;
+        let (o, friction) = (inner.options(), &inner.scene().friction);
         let settings = PyDict::new(py);
         settings.set_item("friction", friction.disks)?;
         settings.set_item("wall_friction", friction.walls)?;
@@ -496,13 +517,14 @@ impl SoilSimulation {
 
     #[pyo3(signature = (position, velocity = None, machine = None, machine_rate = None))]
     fn set_state(
-        &mut self,
+        &self,
         position: &Bound<'_, PyAny>,
         velocity: Option<&Bound<'_, PyAny>>,
         machine: Option<&Bound<'_, PyAny>>,
         machine_rate: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let n = self.n();
+        let mut inner = self.open()?;
+        let n = n_disks(&inner);
         let mut q = with_angles(position, "position")?;
         let mut v = match velocity {
             Some(velocity) => with_angles(velocity, "velocity")?,
@@ -510,96 +532,105 @@ impl SoilSimulation {
         };
         match machine {
             Some(machine) => q.extend(vector(machine, Kind::State, "machine")?),
-            None => q.extend(&self.inner.q()[3 * n..]),
+            None => q.extend(&inner.q()[3 * n..]),
         }
         match machine_rate {
             Some(rate) => v.extend(vector(rate, Kind::State, "machine_rate")?),
-            None => v.resize(v.len() + self.inner.v().len() - 3 * n, 0.0),
+            None => v.resize(v.len() + inner.v().len() - 3 * n, 0.0),
         }
-        Ok(self.inner.set_state(&q, &v).map_err(|e| soil_error(&e))?)
+        Ok(inner.set_state(&q, &v).map_err(|e| soil_error(&e))?)
     }
 
-    fn remove(&mut self, which: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn remove(&self, which: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut inner = self.open()?;
         let which = flags(which, Kind::Model, "which")?;
-        Ok(self.inner.remove(&which).map_err(|e| soil_error(&e))?)
+        Ok(inner.remove(&which).map_err(|e| soil_error(&e))?)
     }
 
-    fn set_torques(&mut self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
         let torques = vector(torques, Kind::Command, "torques")?;
         Ok(self
-            .inner
+            .open()?
             .set_inputs(&torques)
             .map_err(|e| soil_error(&e))?)
     }
 
-    fn set_pull(&mut self, pull: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_pull(&self, pull: &Bound<'_, PyAny>) -> PyResult<()> {
         let pull = pair(pull, Kind::Command, "pull")?;
         Ok(self
-            .inner
+            .open()?
             .set_pull(pull.into())
             .map_err(|e| soil_error(&e))?)
     }
 
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
-    fn step(&mut self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
+    fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
         let steps = n.count(1, Kind::Option, "n")?;
-        let inner = &mut self.inner;
-        let report = py.detach(|| inner.step(steps)).map_err(BorderError::from)?;
-        Ok(report.into())
+        let mut held = self.open()?;
+        let (inner, mut watch) = (&mut *held, Watch::new());
+        let report = py.detach(|| inner.step_while(steps, &mut || watch.go_on()));
+        Ok(watch.result(report)?.into())
     }
 
     #[getter]
-    fn contacts(&self) -> SoilContacts {
-        let n = self.n();
-        let wheels = self
-            .inner
-            .scene()
-            .machine
-            .as_ref()
-            .map_or(0, |m| m.n_discs());
-        SoilContacts {
-            active: self.inner.contacts().collect(),
+    fn contacts(&self) -> PyResult<SoilContacts> {
+        let inner = self.open()?;
+        let n = n_disks(&inner);
+        let wheels = inner.scene().machine.as_ref().map_or(0, |m| m.n_discs());
+        Ok(SoilContacts {
+            active: inner.contacts().collect(),
             counts: [n, n + wheels],
-        }
+        })
     }
 
-    fn energy(&self) -> Energy {
-        self.inner.energy().into()
+    fn energy(&self) -> PyResult<Energy> {
+        let inner = self.open()?;
+        Ok(inner.energy().into())
     }
 
     /// Momentum of the disks (x, y) and their moment of momentum about the origin.
-    fn momentum<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, &self.inner.momentum())
+    fn momentum<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, &inner.momentum()))
     }
 
     /// Impulse of the last step's contacts on the wheels.
-    fn impulse_on_wheels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, &self.inner.impulse_on_wheels())
+    fn impulse_on_wheels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, &inner.impulse_on_wheels()))
     }
 
     /// Deepest overlap now.
-    fn penetration(&self) -> f64 {
-        self.inner.penetration()
+    fn penetration(&self) -> PyResult<f64> {
+        let inner = self.open()?;
+        Ok(inner.penetration())
     }
 
-    fn wake(&mut self) {
-        self.inner.wake();
+    fn wake(&self) -> PyResult<()> {
+        let mut inner = self.open()?;
+        inner.wake();
+        Ok(())
     }
 
-    fn snapshot(&self) -> SoilSnapshot {
-        SoilSnapshot {
-            inner: self.inner.snapshot(),
-        }
+    fn snapshot(&self) -> PyResult<SoilSnapshot> {
+        let inner = self.open()?;
+        Ok(SoilSnapshot {
+            inner: inner.snapshot(),
+        })
     }
 
-    fn restore(&mut self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut inner = self.open()?;
         let snapshot = belonging::<SoilSnapshot>(snapshot, "a SoilSnapshot")?;
-        let restored = self.inner.restore(&snapshot.get().inner);
+        let restored = inner.restore(&snapshot.get().inner);
         Ok(restored.map_err(BorderError::from)?)
     }
 
     fn __repr__(&self) -> String {
-        let (n, time) = (self.n(), self.inner.time());
+        let Ok(inner) = self.open() else {
+            return "SoilSimulation(stepping)".to_owned();
+        };
+        let (n, time) = (n_disks(&inner), inner.time());
         format!("SoilSimulation({n} disks, time={time} s)")
     }
 }

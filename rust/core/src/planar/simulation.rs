@@ -188,8 +188,22 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSimulation<NV, M> {
     /// # Errors
     /// See [`StepError`]. A solver that did not converge is no error: see the report.
     pub fn step(&mut self, n: usize) -> Result<StepReport, StepError> {
+        self.step_while(n, &mut || true)
+    }
+
+    /// The same, but stops after a whole step once `go_on`, which is asked after each, says no.
+    ///
+    /// The report's `steps` says how many were taken.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_while(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<StepReport, StepError> {
         let variant = self.options.variant;
-        self.step_with(&variant, n)
+        self.steps_of(&variant, n, go_on)
     }
 
     /// Takes `n` steps of another scheme, with the same options.
@@ -197,6 +211,18 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSimulation<NV, M> {
     /// # Errors
     /// As [`Self::step`].
     pub fn step_with<I>(&mut self, integrator: &I, n: usize) -> Result<StepReport, StepError>
+    where
+        I: for<'a> Integrator<PlanarSystem<'a, NV, M>>,
+    {
+        self.steps_of(integrator, n, &mut || true)
+    }
+
+    fn steps_of<I>(
+        &mut self,
+        integrator: &I,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<StepReport, StepError>
     where
         I: for<'a> Integrator<PlanarSystem<'a, NV, M>>,
     {
@@ -224,6 +250,9 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSimulation<NV, M> {
             )?;
             total.merge(&report);
             self.list_active();
+            if !go_on() {
+                break;
+            }
         }
         Ok(total)
     }

@@ -262,6 +262,20 @@ impl Simulation {
         Ok(())
     }
 
+    /// [`Self::set_wheel_torques`] and [`Self::set_steering`] in one: both or neither.
+    ///
+    /// # Errors
+    /// As these two; nothing is changed then.
+    pub fn set_commands(
+        &mut self,
+        torques: &[f64],
+        set_points: &[f64],
+    ) -> Result<(), CommandError> {
+        self.check_commands(torques, set_points)?;
+        self.set_wheel_torques(torques)?;
+        self.set_steering(set_points)
+    }
+
     /// Whether [`Self::set_wheel_torques`] and [`Self::set_steering`] would take these.
     ///
     /// # Errors
@@ -349,8 +363,22 @@ impl Simulation {
     /// # Errors
     /// See [`StepError`]. A solver that did not converge is no error: see the report.
     pub fn step(&mut self, n: usize) -> Result<StepReport, StepError> {
+        self.step_while(n, &mut || true)
+    }
+
+    /// The same, but stops after a whole step once `go_on`, which is asked after each, says no.
+    ///
+    /// The report's `steps` says how many were taken.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_while(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<StepReport, StepError> {
         self.drive_work.fill(0.0);
-        let result = self.step_probed(n, &mut NoProbe);
+        let result = self.step_probed(n, go_on, &mut NoProbe);
         // A joint's work over the call counts as driving or as braking.
         let work = self.drive_work.iter().map(|joules| joules.abs()).sum();
         let positive_work = self.drive_work.iter().map(|joules| joules.max(0.0)).sum();
@@ -368,7 +396,12 @@ impl Simulation {
         &self.last_call
     }
 
-    fn step_probed(&mut self, n: usize, probe: &mut dyn Probe) -> Result<StepReport, StepError> {
+    fn step_probed(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError> {
         let mut total = StepReport::default();
         for _ in 0..n {
             let mut system = TreeSystem {
@@ -399,20 +432,27 @@ impl Simulation {
                 *sum += joules;
             }
             self.workspace.list_active(&mut self.active);
+            if !go_on() {
+                break;
+            }
         }
         Ok(total)
     }
 
-    /// Takes `n` steps of a copy and says where their time went.
+    /// Takes `n` steps of a copy and says where their time went; `go_on` as for [`Self::step_while`].
     ///
     /// # Errors
     /// As [`Self::step`].
-    pub fn profile(&self, n: usize) -> Result<Stopwatch, StepError> {
+    pub fn profile(
+        &self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<Stopwatch, StepError> {
         let mut copy = self.clone();
-        copy.step(n.min(10))?;
+        copy.step_while(n.min(10), go_on)?;
         let mut stopwatch = Stopwatch::start();
-        copy.step_probed(n, &mut stopwatch)?;
-        stopwatch.finish(n);
+        let report = copy.step_probed(n, go_on, &mut stopwatch)?;
+        stopwatch.finish(report.steps);
         Ok(stopwatch)
     }
 

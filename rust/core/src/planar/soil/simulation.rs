@@ -314,7 +314,21 @@ impl SoilSimulation {
     /// # Errors
     /// See [`StepError`]. A solver that did not converge is no error: see the report.
     pub fn step(&mut self, n: usize) -> Result<StepReport, StepError> {
-        self.step_probed(n, &mut NoProbe)
+        self.step_while(n, &mut || true)
+    }
+
+    /// The same, but stops after a whole step once `go_on`, which is asked after each, says no.
+    ///
+    /// The report's `steps` says how many were taken.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_while(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<StepReport, StepError> {
+        self.steps(n, go_on, &mut NoProbe)
     }
 
     /// The same, telling `probe` of the phases.
@@ -324,6 +338,15 @@ impl SoilSimulation {
     pub fn step_probed(
         &mut self,
         n: usize,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError> {
+        self.steps(n, &mut || true, probe)
+    }
+
+    fn steps(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
         let variant = self.options.variant;
@@ -363,6 +386,9 @@ impl SoilSimulation {
                     count: self.count,
                 };
                 self.sleep.update(options, taken, &mut self.warm_start);
+            }
+            if !go_on() {
+                break;
             }
         }
         Ok(total)
