@@ -108,7 +108,10 @@ OTHERS: list[tuple[str, Callable[[], Any]]] = [
     ("kinematic[0]", lambda: SoilSimulation(*one_disk, kinematic=[1.0])),  # type: ignore[list-item]
     ("which", lambda: SoilSimulation(*one_disk).remove(3)),  # type: ignore[arg-type]
     ("rover", lambda: SoilSimulation(*one_disk, rover=3)),  # type: ignore[arg-type]
-    ("accuracy", lambda: accuracy_options(10**400)),
+    ("accuracy", lambda: accuracy_options(10**400)),  # type: ignore[arg-type]
+    ("accuracy", lambda: accuracy_options(True)),
+    ("accuracy", lambda: accuracy_options(np.timedelta64(1, "s"))),  # type: ignore[arg-type]
+    ("accuracy", lambda: accuracy_options(1e-300)),
 ]
 
 VECTORS: list[tuple[str, Callable[[Any], Any]]] = [
