@@ -121,6 +121,7 @@ impl SimulationBatch {
         slices(py, self.0.open()?.inner.layout())
     }
 
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     #[pyo3(signature = (torques, set_points, n = Given::MISSING, *, active = None),
         text_signature = "($self, torques, set_points, n=1, *, active=None)")]
     fn step<'py>(
