@@ -10,16 +10,11 @@ from __future__ import annotations
 import errno
 import os
 import stat
+import sys
 from typing import TYPE_CHECKING
 
-try:
-    from fcntl import LOCK_EX, LOCK_NB, LOCK_SH, flock
-except ImportError:  # Windows has no such locks
-    LOCK_EX = LOCK_NB = LOCK_SH = 0
-
-    def flock(_descriptor: int, _operation: int) -> None:  # type: ignore[misc]
-        """Nothing."""
-
+if sys.platform != "win32":
+    import fcntl
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -38,8 +33,10 @@ def lock(descriptor: int, *, shared: bool = False) -> None:
     Raises:
         FileInUseError: Someone else holds a lock.
     """
+    if sys.platform == "win32":  # it has no such locks
+        return
     try:
-        flock(descriptor, (LOCK_SH if shared else LOCK_EX) | LOCK_NB)
+        fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
     except OSError as error:
         if error.errno in NO_LOCKS:
             return
