@@ -6,10 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import gymnasium as gym
+import numpy as np
 
+from rover_gym._core import OptionError
 from rover_gym.episodes import Episode, Policy, run_episode
 from rover_gym.policy import PDPolicy
 from rover_gym.trained import TrainedPolicy, find_policy, policy_arguments
+from rover_gym.validation import number, refuse
 
 DIFFICULTIES = (0.0, 0.25, 0.5, 0.75, 1.0)
 ENDS = ("goal", "time", "high_centred", "roll_over", "step_failed")
@@ -40,6 +43,18 @@ class BaselineRow:
     ends: dict[str, int]
 
 
+class BaselineInterrupt(KeyboardInterrupt):
+    """The user ended a measurement.
+
+    Attributes:
+        rows: Of the episodes that are done; the last may have fewer than the others.
+    """
+
+    def __init__(self, rows: list[BaselineRow]) -> None:
+        super().__init__()
+        self.rows = rows
+
+
 def measure_baseline(
     difficulties: Sequence[float] = DIFFICULTIES,
     *,
@@ -58,19 +73,35 @@ def measure_baseline(
         progress: Called with the difficulty and the number of episodes done, after each.
 
     Raises:
-        OptionError: A difficulty is out of its range, or there is no such policy.
+        OptionError: A difficulty is out of its range, there is no such policy, or `episodes` or `seed` is no whole
+            number or out of its range.
+        BaselineInterrupt: The user interrupted it; the episodes that are done are in it.
     """
+    episodes, seed = _whole("episodes", episodes, 1), _whole("seed", seed, 0)
+    difficulties = tuple(number("difficulty", level, at_least=0.0, at_most=1.0) for level in difficulties)
     folder = find_policy(policy, "sphere_field")
     env = gym.make("RoverRocks-v0", **({} if folder is None else policy_arguments(folder)))
     driver: Policy = PDPolicy(env) if folder is None else TrainedPolicy.load(env, folder)
-    rows = []
-    for difficulty in difficulties:
-        results = []
-        for number in range(seed, seed + episodes):
-            results.append(run_episode(env, driver, number, options={"difficulty": difficulty}))
-            progress(difficulty, len(results))
-        rows.append(_summarise(difficulty, results))
+    rows: list[BaselineRow] = []
+    results: list[Episode] = []
+    try:
+        for difficulty in difficulties:
+            results = []
+            for now in range(seed, seed + episodes):
+                results.append(run_episode(env, driver, now, options={"difficulty": difficulty}))
+                progress(difficulty, len(results))
+            rows.append(_summarise(difficulty, results))
+    except KeyboardInterrupt as interrupt:
+        if len(rows) < len(difficulties) and 0 < len(results) < episodes:
+            rows.append(_summarise(difficulties[len(rows)], results))
+        raise BaselineInterrupt(rows) from interrupt
     return rows
+
+
+def _whole(field: str, value: object, at_least: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < at_least:
+        refuse(OptionError, field, value, f"must be a whole number from {at_least}")
+    return int(value)
 
 
 def wilson_interval(successes: int, n: int, z: float = 1.959963984540054) -> tuple[float, float]:
