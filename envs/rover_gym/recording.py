@@ -24,7 +24,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym._core import Plane, RoverGymError, RoverModel, Simulation, SphereField, __version__
+from rover_gym._core import OptionError, Plane, RoverGymError, RoverModel, Simulation, SphereField, __version__
 from rover_gym.extras import require
 from rover_gym.steady_file import FileInUseError, SteadyFile, lock
 from rover_gym.validation import number, refuse
@@ -41,6 +41,9 @@ LIBRARY = "v108"
 TERRAIN = "terrain"  # the group that holds the ground
 OBJECTS = ("scene", "solver")  # attributes that are JSON objects
 
+#: Rows of a run; more, and neither the disk nor the user's patience holds them.
+MOST_ROWS = 10_000_000
+
 #: What a file says it holds is at most so many times as large as the file: packed files are read, bombs are not.
 LARGEST_EXPANSION = 100
 
@@ -56,6 +59,8 @@ __all__ = [
     "Trajectory",
     "describe",
     "read_trajectory",
+    "row_count",
+    "sound",
 ]
 
 
@@ -627,6 +632,29 @@ def _storable(attributes: Mapping[str, Any]) -> dict[str, Any]:
             refuse(RecordingError, str(key), value, "must not hold the character NUL")
         result[key] = stored
     return result
+
+
+def row_count(duration: float, time_step: float, steps_per_row: int = 1) -> int:
+    """How many rows a run has after its first.
+
+    Args:
+        duration: s.
+        time_step: s.
+        steps_per_row: From one row to the next.
+
+    Raises:
+        OptionError: `duration` is no positive number, `steps_per_row` no positive whole number, or the rows are more
+            than `MOST_ROWS`.
+    """
+    seconds = number("duration", duration, above=0.0)
+    per_row = number("steps_per_row", steps_per_row, at_least=1.0)
+    if per_row != math.floor(per_row):
+        refuse(OptionError, "steps_per_row", steps_per_row, "must be a whole number")
+    rows = seconds / time_step / per_row
+    if not rows <= MOST_ROWS:
+        reason = f"at a step of {time_step:g} s makes more than {MOST_ROWS} rows"
+        refuse(OptionError, "duration", duration, reason)
+    return round(rows)
 
 
 def describe(

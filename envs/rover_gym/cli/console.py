@@ -1,5 +1,6 @@
 """What the commands share: where they print, their progress bars, where they may write, and how they fail."""
 
+import errno
 import functools
 import inspect
 import math
@@ -10,7 +11,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn, ParamSpec, TypeVar
 
-import click
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -28,7 +28,7 @@ SET_BY = {
     "uphill_deg": ("uphill", "--uphill"),
     "heading_deg": ("heading", "--heading"),
     "format": ("file_format", "--format"),
-    "as_json": ("as_json", "--json"),
+    "torques": ("torque", "--torque"),
 }
 #: Set to anything, the commands show where an error came from.
 DEBUG = "ROVER_DEBUG"
@@ -76,41 +76,52 @@ def keeping(what: str, *paths: Path) -> Iterator[None]:
 
 
 def check_file(option: str, path: Path | None) -> None:
-    """Refuses a file that cannot be written, before the work is done whose result it takes. Makes its folder.
+    """Refuses a file that cannot be written, before the work is done whose result it takes. Leaves nothing behind.
 
     Raises:
         OptionError: It cannot be written.
     """
     if path is None:
         return
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with _tried(option, path, path.parent):
         is_new = not path.exists()
         if not is_new and not stat.S_ISREG(path.stat().st_mode):
-            refuse(OptionError, option, str(path), "must be a regular file")
+            raise OSError(errno.EINVAL, "no regular file")
         with path.open("ab"):
             pass
         if is_new:
             path.unlink()
-    except (OSError, ValueError) as error:
-        _refuse_place(option, path, error)
 
 
 def check_folder(option: str, path: Path | None) -> None:
-    """Refuses a folder that cannot be written into, before the work is done whose results it takes. Makes it.
+    """Refuses a folder that cannot be written into, before the work is done whose results it takes. Leaves nothing.
 
     Raises:
         OptionError: It cannot be written into.
     """
     if path is None:
         return
-    probe = path / f".rover-{os.getpid()}"
-    try:
-        path.mkdir(parents=True, exist_ok=True)
+    with _tried(option, path, path):
+        probe = path / f".rover-{os.getpid()}"
         probe.touch()
         probe.unlink()
+
+
+@contextmanager
+def _tried(option: str, path: Path, folder: Path) -> Iterator[None]:
+    """Makes a folder for what stands below, and takes away what was not there."""
+    try:
+        missing = [place for place in (folder, *folder.parents) if not place.exists()]
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            yield
+        finally:
+            for place in missing:
+                if place.exists():
+                    place.rmdir()
     except (OSError, ValueError) as error:
-        _refuse_place(option, path, error)
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        refuse(OptionError, option, str(path), f"cannot be written ({reason})")
 
 
 def plain_errors(command: Callable[P, R]) -> Callable[P, R]:
@@ -142,7 +153,7 @@ def one_line(options: Mapping[str, str]) -> Iterator[None]:
     """
     try:
         yield
-    except (click.exceptions.ClickException, click.exceptions.Exit, click.exceptions.Abort, BrokenPipeError):
+    except (typer.Exit, typer.Abort, BrokenPipeError):
         raise  # these have their own ways
     except KeyboardInterrupt:
         _end("interrupted", INTERRUPTED)
@@ -182,8 +193,3 @@ def _check_finite(name: str, value: object) -> None:
     for entry in entries:
         if isinstance(entry, float) and not math.isfinite(entry):
             refuse(OptionError, name, entry, "must be finite")
-
-
-def _refuse_place(option: str, path: Path, error: OSError | ValueError) -> NoReturn:
-    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    refuse(OptionError, option, str(path), f"cannot be written ({reason})")

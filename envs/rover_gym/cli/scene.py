@@ -100,9 +100,10 @@ def _accuracy(text: str) -> Accuracy:
     if text in ("fast", "balanced", "reference"):
         return text  # type: ignore[return-value]
     try:
-        return number("accuracy", float(text), above=0.0)
+        metres = float(text)
     except ValueError:
         refuse(OptionError, "accuracy", text, "must be fast, balanced, reference or a number of metres")
+    return number("accuracy", metres, above=0.0)
 
 
 def _scene(

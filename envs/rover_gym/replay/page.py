@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from rover_gym.replay.scenery import (
     first_view,
     goal_parts,
     ground_tiles,
+    identifiers,
     parts_by_solid,
     sphere_mesh,
     spheres,
@@ -73,9 +75,12 @@ def _build(run: Run, scene: Any) -> tuple[Any, list[Any]]:
     add_surroundings(scene)
     world = scene.add_frame("/world", show_axes=False)
     solids = []
-    for name, parts in parts_by_solid(run).items():
-        solids.append(scene.add_frame(f"/world/{name}", show_axes=False))
-        add_meshes(scene, f"/world/{name}", coloured_meshes(parts))
+    named = parts_by_solid(run)
+    nodes = identifiers(named)
+    for name, parts in named.items():
+        # In a folder of their own: a solid may be called as the ground is.
+        solids.append(scene.add_frame(f"/world/solids/{nodes[name]}", show_axes=False))
+        add_meshes(scene, f"/world/solids/{nodes[name]}", coloured_meshes(parts))
     tiles = ground_tiles(run)
     if tiles is not None:
         vertices, light, dark = tiles
@@ -121,7 +126,9 @@ def _curves(run: Run) -> dict[str, Any]:
     return {
         "title": run.title,
         "time": [round(float(time - run.time[0]), 4) for time in run.time],
-        "wheels": [{"name": name, "colour": colour} for name, colour in zip(wheels, WHEEL_COLOURS, strict=True)],
+        "wheels": [
+            {"name": name, "colour": colour} for name, colour in zip(wheels, cycle(WHEEL_COLOURS), strict=False)
+        ],
         "charts": [
             {
                 "title": title,
