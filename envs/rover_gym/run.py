@@ -134,6 +134,7 @@ def run_of(trajectory: Trajectory, path: str | Path) -> Run:
     check_time(trajectory, path)
     with sound(path, "scene.model"):
         model = RoverModel.from_dict(scene["model"])
+    _check_solver(trajectory.attributes.get("solver", {}), path)
     shapes = {channel.name: channel.shape for channel in Sampler(model).channels}
     check_rows(trajectory, path, {**shapes, **OF_EPISODES}, bounded=("q", "wheel_centres"))
     return Run(
@@ -189,6 +190,17 @@ def check_rows(
         if name in bounded and not (np.abs(values) <= LARGEST).all():
             worst = float(values[~(np.abs(values) <= LARGEST)][0])
             refuse(RecordingError, f"{path}: {name}", worst, f"must be finite and within {LARGEST:g}")
+
+
+def _check_solver(solver: object, path: str | Path) -> None:
+    """Refuses settings that the figures cannot show."""
+    if not isinstance(solver, dict):
+        refuse(RecordingError, f"{path}: solver", solver, "must be an object")
+    for name in ("time_step", "tolerance"):
+        if name in solver:
+            number(f"{path}: solver.{name}", solver[name], above=0.0, at_most=LARGEST, error=RecordingError)
+    if "gravity" in solver:
+        vector(f"{path}: solver.gravity", solver["gravity"], 3, error=RecordingError)
 
 
 def _goal(goal: object, path: str | Path) -> tuple[float, float] | None:

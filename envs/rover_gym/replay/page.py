@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR
-from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, shortened, with_panel
+from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, rounded, shortened, with_panel
 from rover_gym.replay.rotation import continuous, quaternions
 from rover_gym.replay.scenery import (
     coloured_meshes,
@@ -118,7 +118,7 @@ def _followed(run: Run) -> Array:
 
 def _curves(run: Run) -> dict[str, Any]:
     """What the panel draws: its title, the time, and for each chart a curve a wheel."""
-    data, wheels = run.trajectory.data, run.model.wheel_names
+    data, wheels = run.trajectory, run.model.wheel_names
     charts = [
         ("wheel load", "N", data["wheel_forces"][:, :, 0], 1),
         ("wheel gap", "mm", 1e3 * data["wheel_gaps"], 2),
@@ -133,11 +133,7 @@ def _curves(run: Run) -> dict[str, Any]:
             {
                 "title": title,
                 "unit": unit,
-                # JSON knows neither nan nor infinity: where a gap is not known, the curve has a hole.
-                "values": [
-                    [round(float(value), digits) if np.isfinite(value) else None for value in column]
-                    for column in values.T
-                ],
+                "values": [rounded(column, digits) for column in values.T],
             }
             for title, unit, values, digits in charts
         ],
