@@ -276,14 +276,19 @@ def _mutate_attributes(rng: np.random.Generator, owner: h5py.Group) -> None:
         del owner.attrs[name]
         return
     value = owner.attrs[name]
-    if kind == 1 and isinstance(value, str) and value[:1] in ("{", "["):
-        text = mutate_json(rng, value)
+    text = value.decode(errors="replace") if isinstance(value, bytes) else value
+    if kind == 1 and isinstance(text, str) and text[:1] in ("{", "["):
+        text = mutate_json(rng, text)
     elif kind == 2:
         owner.attrs[name] = np.array(rng.choice([np.nan, -1.0, 1e300, 7.0]))
         return
     else:
         text = UNKIND_TEXT[rng.integers(len(UNKIND_TEXT))]
-    owner.attrs[name] = text.encode("utf-8", errors="replace").replace(b"\x00", b"")[:60_000].decode(errors="replace")
+    data = text.encode("utf-8", errors="replace")[:60_000]
+    if rng.random() < 0.8:
+        owner.attrs.create(name, np.bytes_(data or b" "))
+    else:  # of no fixed length
+        owner.attrs[name] = data.replace(b"\x00", b"").decode(errors="replace")
 
 
 def _hdf5_drop(_rng: np.random.Generator, owner: h5py.Group, name: str, _elsewhere: Path) -> None:
@@ -299,7 +304,7 @@ def _hdf5_array(rng: np.random.Generator, owner: h5py.Group, name: str, _elsewhe
         changed = changed.astype("S8")
     data = owner.create_dataset(name, data=changed)
     if rng.random() < 0.7:
-        data.attrs["unit"] = "m"
+        data.attrs["unit"] = np.bytes_(b"m")
 
 
 def _hdf5_huge(rng: np.random.Generator, owner: h5py.Group, name: str, _elsewhere: Path) -> None:
@@ -307,13 +312,13 @@ def _hdf5_huge(rng: np.random.Generator, owner: h5py.Group, name: str, _elsewher
     del owner[name]
     shape = (2 * 10**9, *((3,) * int(rng.integers(0, 3))))
     data = owner.create_dataset(name, shape=shape, chunks=(1000, *shape[1:]), dtype="f8")
-    data.attrs["unit"] = "m"
+    data.attrs["unit"] = np.bytes_(b"m")
 
 
 def _hdf5_bomb(_rng: np.random.Generator, owner: h5py.Group, name: str, _elsewhere: Path) -> None:
     del owner[name]
     data = owner.create_dataset(name, data=np.zeros(2_000_000), compression="gzip", chunks=(1_000_000,))
-    data.attrs["unit"] = "m"
+    data.attrs["unit"] = np.bytes_(b"m")
 
 
 def _hdf5_outside(rng: np.random.Generator, owner: h5py.Group, name: str, elsewhere: Path) -> None:
