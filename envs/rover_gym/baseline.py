@@ -111,7 +111,13 @@ def wilson_interval(successes: int, n: int, z: float = 1.959963984540054) -> tup
         successes: How many of the trials succeeded.
         n: How many trials; at least one.
         z: Quantile of the normal distribution; the default makes it a 95% interval.
+
+    Raises:
+        OptionError: There are no trials, or more successes than trials.
     """
+    n = _whole("n", n, 1)
+    if not 0 <= successes <= n:
+        refuse(OptionError, "successes", successes, f"must be from 0 to {n}, the number of trials")
     share = successes / n
     centre = (share + z * z / (2 * n)) / (1 + z * z / n)
     half = z / (1 + z * z / n) * math.sqrt(share * (1 - share) / n + z * z / (4 * n * n))

@@ -12,7 +12,16 @@ import typer
 from rich.table import Table
 
 from rover_gym._core import OptionError
-from rover_gym.cli.console import LARGEST_SEED, check_folder, console, keeping, plain_errors, progress_bar, say_path
+from rover_gym.cli.console import (
+    INTERRUPTED,
+    LARGEST_SEED,
+    check_folder,
+    console,
+    keeping,
+    plain_errors,
+    progress_bar,
+    say_path,
+)
 from rover_gym.validation import refuse
 
 if TYPE_CHECKING:
@@ -202,11 +211,16 @@ def _sweep(
             advance(1)
             pull_beds.append(settled_bed(pull_disks, pull_layers, seed=seed, **UNEQUAL, **options))
             advance(1)
-        pulls = {}
-        for load in LOADS:
-            pull = partial(drawbar_pull, load=load, rim_speed=RIM_SPEED / slowness, **rest)
-            pulls[load] = over_beds(pull, SLIPS, pull_beds, progress=advance)
-        drives = over_beds(drive, [scale * torque for torque in TORQUES], beds, progress=advance)
+        pulls, drives, interrupted = {}, [], False
+        try:
+            for load in LOADS:
+                pull = partial(drawbar_pull, load=load, rim_speed=RIM_SPEED / slowness, **rest)
+                pulls[load] = over_beds(pull, SLIPS, pull_beds, progress=advance)
+            drives = over_beds(drive, [scale * torque for torque in TORQUES], beds, progress=advance)
+        except KeyboardInterrupt:
+            interrupted = True
+    if interrupted and not pulls:
+        raise KeyboardInterrupt
     fits = {load: fit_traction(rows) for load, rows in pulls.items()}
     _say_fits(fits)
     output.mkdir(parents=True, exist_ok=True)
@@ -219,6 +233,9 @@ def _sweep(
     # JSON knows no nan: the slip of wheels that stood is null, and so is the standard error of one bed.
     path.write_text(json.dumps(numbers, indent=1).replace("NaN", "null") + "\n", encoding="utf-8")
     say_path("numbers", path)
+    if interrupted:
+        typer.echo("interrupted: the pulls are done, the drives are not", err=True)
+        raise typer.Exit(INTERRUPTED)
     say_path("curves", draw_curves(drives, pulls, fits, output / "soil-curves.png"))
 
 
