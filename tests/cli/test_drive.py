@@ -78,7 +78,7 @@ def test_a_short_time_limit_ends_the_episode_without_success() -> None:
         (["--terrain", "sphere_field", "--difficulty", "1.5"], "difficulty"),
         (["--slope", "nan"], "--slope: must be finite, got nan"),
         (["--friction", "-1"], "--friction"),
-        (["--time-step", "0"], "--time-step: must be above 0"),
+        (["--time-step", "0"], "--time-step: must be at least 1e-05"),
         (["--time-step", "0.007"], "--time-step: must divide the control period of 0.05 s"),
         (["--goal", "inf", "0"], "--goal"),
     ],

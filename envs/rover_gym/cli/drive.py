@@ -36,6 +36,7 @@ from rover_gym.validation import number, refuse
 from rover_gym.video import VideoWriter
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
+SHORTEST_STEP = 1e-5  # s: a shorter one makes no episode end
 
 
 @plain_errors
@@ -137,9 +138,9 @@ def drive(
 
 def _check_time_step(time_step: float) -> None:
     """Refuses a step of which no whole number makes a control period."""
-    number("time_step", time_step, above=0.0)
+    number("time_step", time_step, at_least=SHORTEST_STEP)
     steps = CONTROL_PERIOD / time_step
-    if not (math.isfinite(steps) and round(steps) >= 1 and math.isclose(steps, round(steps), rel_tol=1e-9)):
+    if not (round(steps) >= 1 and math.isclose(steps, round(steps), rel_tol=1e-9)):
         reason = f"must divide the control period of {CONTROL_PERIOD:g} s into a whole number of steps"
         refuse(OptionError, "time_step", time_step, reason)
 
