@@ -56,7 +56,7 @@ Friction = Annotated[float, typer.Option(help="Coulomb's coefficient.")]
 Restitution = Annotated[float, typer.Option(help="Newton's coefficient.")]
 TimeStep = Annotated[float, typer.Option(help="Time step, s.")]
 Duration = Annotated[float, typer.Option(min=0.01, max=1000.0, help="Time to simulate, s.")]
-Speed = Annotated[float, typer.Option(help="Forward speed at the start, m/s.")]
+Speed = Annotated[float, typer.Option(min=-1e4, max=1e4, help="Forward speed at the start, m/s.")]
 Output = Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)]
 
 
