@@ -17,6 +17,7 @@ _Coordinates: TypeAlias = Literal["report", "state"]
 
 __all__ = [
     "BallSimulation",
+    "BusyError",
     "CommandError",
     "Contacts",
     "Energy",
@@ -83,6 +84,9 @@ class ProblemError(RoverGymError, ValueError):
 class StepError(RoverGymError, RuntimeError):
     """A time step could not be taken; the state is as it was before the call."""
 
+class BusyError(RoverGymError, RuntimeError):
+    """An object was used while another call on it was still going on; nothing has changed."""
+
 @final
 class RoverModel:
     """A tree of solids under a free base, read from data. Immutable."""
@@ -101,14 +105,29 @@ class RoverModel:
         self,
         *,
         wheel_radius: float | None = None,
+        contact_radius: float | None = None,
         masses: Mapping[str, float] | Sequence[float] | None = None,
         steering_stiffness: float | None = None,
         steering_damping: float | None = None,
         wheel_torque_limit: float | None = None,
         mass_scale: float | None = None,
     ) -> RoverModel:
-        """A model that differs in what is given. `mass_scale` multiplies masses and inertias."""
-    def weld(self, joints: Mapping[str, float] | Sequence[str]) -> RoverModel: ...
+        """A model that differs in what is given.
+
+        Args:
+            wheel_radius: Of all wheels, m: shape, inertia and contact change together.
+            contact_radius: Radius at which the wheels touch the ground, m; shape and inertia stay as they are.
+            masses: kg, by solid or one for each. Inertias go with them.
+            steering_stiffness: N m/rad.
+            steering_damping: N m s/rad.
+            wheel_torque_limit: N m.
+            mass_scale: Multiplies masses and inertias.
+
+        Raises:
+            ModelError: A number out of its range, or a wheel radius where a wheel's solid is no disc.
+        """
+    def weld(self, joints: Mapping[str, float] | Sequence[str] | str) -> RoverModel:
+        """The same machine with joints locked at 0, or at the given angles (rad), also in files and dictionaries."""
     @property
     def name(self) -> str: ...
     @property
@@ -138,27 +157,27 @@ class RoverModel:
     @property
     def steering_limit(self) -> float:
         """Largest steering set-point, rad, either way."""
-    def mass_matrix(self, q: npt.ArrayLike, coordinates: _Coordinates = "report") -> _Array: ...
+    def mass_matrix(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> _Array: ...
     def bias(
         self,
         q: npt.ArrayLike,
         qdot: npt.ArrayLike,
         gravity: npt.ArrayLike | None = None,
-        coordinates: _Coordinates = "report",
+        coordinates: _Coordinates = "state",
     ) -> _Array: ...
     def actuation_matrix(self) -> _Array: ...
-    def kinetic_energy(self, q: npt.ArrayLike, qdot: npt.ArrayLike, coordinates: _Coordinates = "report") -> float: ...
-    def tags(self, q: npt.ArrayLike, coordinates: _Coordinates = "report") -> dict[str, _Array]: ...
-    def poses(self, q: npt.ArrayLike, coordinates: _Coordinates = "report") -> dict[str, tuple[_Array, _Array]]:
+    def kinetic_energy(self, q: npt.ArrayLike, qdot: npt.ArrayLike, coordinates: _Coordinates = "state") -> float: ...
+    def tags(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> dict[str, _Array]: ...
+    def poses(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> dict[str, tuple[_Array, _Array]]:
         """Origin (3,) and rotation matrix (3, 3) of every solid, world frame."""
     def wheel_gaps(
-        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "report"
+        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
     ) -> _Array: ...
     def wheel_contact_points(
-        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "report"
+        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
     ) -> _Array: ...
     def wheel_jacobians(
-        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "report"
+        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
     ) -> _Array: ...
     def to_report(self, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[_Array, _Array]:
         """Public q and state velocity -> the report's q and qdot."""
@@ -387,6 +406,8 @@ class Simulation:
     def steering(self) -> _Array: ...
     def set_steering(self, set_points: npt.ArrayLike) -> None:
         """(6,) rad, held by the implicit PD with the model's gains."""
+    def set_commands(self, torques: npt.ArrayLike, set_points: npt.ArrayLike) -> None:
+        """`set_wheel_torques` and `set_steering` in one: both, or neither where either is refused."""
     def set_joint_torques(self, torques: npt.ArrayLike) -> None:
         """(nv - 6,) N m about the joint axes, added to what set_wheel_torques gives; no limit."""
     def hold(
@@ -401,7 +422,15 @@ class Simulation:
     def release(self, joints: str | Sequence[str]) -> None: ...
     def brake(self) -> None:
         """Holds the six wheels where they are (`hold` on the wheel joints), and zeroes their torques."""
-    def step(self, n: int = 1) -> StepReport: ...
+    def step(self, n: int = 1) -> StepReport:
+        """Takes n steps.
+
+        Other threads run meanwhile; on this object their calls are refused with BusyError. Ctrl-C, or whatever a signal
+        handler raises, ends the call after a whole step, whose state stays.
+
+        Raises:
+            StepError: A step could not be taken; the state before it stays.
+        """
     @property
     def contacts(self) -> Contacts: ...
     @property
@@ -706,7 +735,8 @@ class SimulationBatch:
         """Commands (n_rovers, 6) as `set_wheel_torques` and `set_steering` take them, then n steps.
 
         Rovers that are not `active` keep still. Returns a fresh row of readings a rover, and why a rover could not
-        take a step, by its number; the others have gone on.
+        take a step, by its number; the others have gone on. Ctrl-C ends the call after a whole step of each rover, not
+        the same one for all.
         """
     def readings(self) -> _Array:
         """(n_rovers, size) as the rovers are now."""
@@ -908,21 +938,46 @@ def soil_packing(
 @final
 class SolverReport:
     @property
-    def status(self) -> Literal["converged", "relaxed", "not_converged"]:
-        """ "relaxed": the convex relaxation is solved, not Coulomb's law."""
+    def status(self) -> Literal["converged", "relaxed", "not_converged", "budget_exhausted"]:
+        """ "relaxed": the convex relaxation is solved, not Coulomb's law. "budget_exhausted": the work that `budget`
+        allows was done; the answer is the nearest one known by then."""
     @property
     def is_converged(self) -> bool: ...
     @property
     def iterations(self) -> int: ...
     @property
     def residual(self) -> float:
-        """Violation of Coulomb's law relative to the data, computed from the returned impulses."""
+        """Violation of Signorini's and Coulomb's laws relative to the data, computed from the returned impulses."""
     @property
     def velocity_error(self) -> float:
-        """Largest violation of Coulomb's law at one contact, m/s."""
+        """Largest violation of Signorini's and Coulomb's laws at one contact, m/s."""
     @property
     def solver(self) -> str:
         """The method that answered; never "auto"."""
+    @property
+    def stage(
+        self,
+    ) -> Literal[
+        "at_rest",
+        "sweeps",
+        "body_sweeps",
+        "islands",
+        "warm_newton",
+        "pivoting",
+        "guided_newton",
+        "newton",
+        "proximal",
+        "admm",
+        "relaxed",
+    ]:
+        """The stage that answered; "at_rest" where q = 0 left nothing to do."""
+    @property
+    def stages(self) -> list[tuple[str, str, int]]:
+        """Every stage that was tried, in order: its name, why it ended ("converged", "max_iterations", "stalled",
+        "budget_exhausted", "non_finite", "relaxed") and its iterations."""
+    @property
+    def work(self) -> int:
+        """Work done, in the unit of `budget`."""
     @property
     def law(self) -> Literal["coulomb", "relaxed"]:
         """The law that the answer obeys."""
@@ -949,6 +1004,7 @@ def solve_friction_contact(
     solver: Literal["auto", "nsgs", "newton", "proximal", "admm", "relaxed"] = "auto",
     max_iterations: int = 1000,
     initial: npt.ArrayLike | None = None,
+    budget: int = 300000000,
 ) -> FrictionContactSolution:
     """Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K, for any W (n_c d, n_c d).
 
@@ -966,8 +1022,10 @@ def solve_friction_contact(
             converged.
         max_iterations: Most Newton steps, sweeps or ADMM iterations.
         initial: Warm start (n_c d,), N s.
+        budget: Most work, counted and not timed: one unit is a multiplication with its addition in a product with W.
+            The default takes about 0.3 s. What it does not allow is left undone, and the report says so.
 
     Raises:
         ProblemError: Wrong shapes or entries.
-        OptionError: Unknown solver or dimension, tolerance or max_iterations out of range.
+        OptionError: Unknown solver or dimension; tolerance, max_iterations or budget out of range.
     """

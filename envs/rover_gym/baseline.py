@@ -6,13 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import gymnasium as gym
-import numpy as np
 
 from rover_gym._core import OptionError
 from rover_gym.episodes import Episode, Policy, run_episode
 from rover_gym.policy import PDPolicy
 from rover_gym.trained import TrainedPolicy, find_policy, policy_arguments
-from rover_gym.validation import number, refuse
+from rover_gym.validation import number, refuse, whole
 
 DIFFICULTIES = (0.0, 0.25, 0.5, 0.75, 1.0)
 ENDS = ("goal", "time", "high_centred", "roll_over", "step_failed")
@@ -77,7 +76,7 @@ def measure_baseline(
             number or out of its range.
         BaselineInterrupt: The user interrupted it; the episodes that are done are in it.
     """
-    episodes, seed = _whole("episodes", episodes, 1), _whole("seed", seed, 0)
+    episodes, seed = whole("episodes", episodes, at_least=1), whole("seed", seed)
     difficulties = tuple(number("difficulty", level, at_least=0.0, at_most=1.0) for level in difficulties)
     folder = find_policy(policy, "sphere_field")
     env = gym.make("RoverRocks-v0", **({} if folder is None else policy_arguments(folder)))
@@ -98,12 +97,6 @@ def measure_baseline(
     return rows
 
 
-def _whole(field: str, value: object, at_least: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < at_least:
-        refuse(OptionError, field, value, f"must be a whole number from {at_least}")
-    return int(value)
-
-
 def wilson_interval(successes: int, n: int, z: float = 1.959963984540054) -> tuple[float, float]:
     """Wilson's score interval of a proportion: unlike the normal one it stays within [0, 1] and has width at 0 and 1.
 
@@ -115,7 +108,7 @@ def wilson_interval(successes: int, n: int, z: float = 1.959963984540054) -> tup
     Raises:
         OptionError: There are no trials, or more successes than trials.
     """
-    n = _whole("n", n, 1)
+    n = whole("n", n, at_least=1)
     if not 0 <= successes <= n:
         refuse(OptionError, "successes", successes, f"must be from 0 to {n}, the number of trials")
     share = successes / n

@@ -27,7 +27,7 @@ import numpy.typing as npt
 from rover_gym._core import OptionError, Plane, RoverGymError, RoverModel, Simulation, SphereField, __version__
 from rover_gym.extras import require
 from rover_gym.steady_file import FileInUseError, SteadyFile, lock
-from rover_gym.validation import number, refuse
+from rover_gym.validation import number, refuse, whole
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -199,8 +199,8 @@ class Recorder:
     ) -> None:
         hdf5 = _import_h5py()
         self.path = _path(path)
-        self._rows_per_flush = int(
-            number("rows_per_flush", rows_per_flush, at_least=1.0, at_most=1e6, error=RecordingError)
+        self._rows_per_flush = whole(
+            "rows_per_flush", rows_per_flush, at_least=1, at_most=1_000_000, error=RecordingError
         )
         channels = _checked_channels(channels)
         facts = {**_versions(), **_storable(attributes or {}), "complete": False}

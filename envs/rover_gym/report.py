@@ -88,7 +88,7 @@ def scene(time_step: float = 0.005, **options: Any) -> Simulation:
 def report_model() -> RoverModel:
     """The rover of the report's runs."""
     return RoverModel().replace(
-        wheel_radius=WHEEL_RADIUS,
+        contact_radius=WHEEL_RADIUS,
         masses=MASSES,
         steering_stiffness=STEERING_STIFFNESS,
         steering_damping=STEERING_DAMPING,

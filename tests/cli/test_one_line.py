@@ -10,12 +10,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
 import rover_gym.baseline
+from rover_gym import OptionError
 from rover_gym.cli import app
 from rover_gym.recording import read_trajectory
+from rover_gym.validation import refuse
 
 DRIVE = sys.modules["rover_gym.cli.drive"]  # the command has the module's name
 NO_FILE = "cannot be written"
@@ -213,3 +216,10 @@ def test_results_that_cannot_be_printed_are_one_line() -> None:
     assert child.returncode != 0
     assert "Traceback" not in child.stderr
     assert "No space left" in child.stderr.splitlines()[0]
+
+
+def test_numbers_print_as_numbers() -> None:
+    """A message ended in `got np.float64(0.5)`."""
+    for value in (np.float64(0.5), np.float32(0.5), 0.5):
+        with pytest.raises(OptionError, match=r"speed: must be large, got 0\.5$"):
+            refuse(OptionError, "speed", value, "must be large")
