@@ -32,7 +32,7 @@ def refuse(error: type[RoverGymError], field: str, value: object, reason: str) -
 def shown(value: object) -> str:
     """How a value looks in a message: whatever it is, and not too long."""
     try:
-        text = repr(value)
+        text = repr(value.item() if isinstance(value, np.generic) else value)  # np.float64(0.5) is 0.5 to a reader
     except Exception:  # an integer of thousands of digits, or whatever a class of somebody's raises
         text = f"a {type(value).__name__}"
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
