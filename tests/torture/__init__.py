@@ -1,0 +1,1 @@
+"""The campaign that tries to break everything: `make torture`, see README.md."""
