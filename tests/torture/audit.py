@@ -2,13 +2,13 @@ r"""Energy audit of a rover's steps, from what the public interface shows: it be
 
     gained = T + V + S (after) - T + V + S (before) - sum_j tau_j dphi_j
 
-T and V are kinetic and potential energy, S = sum k (phi - set-point)^2 / 2 what the held steering joints store, tau_j
-the commanded torque about joint j and dphi_j the angle turned. A motor whose torque falls with its speed does less work than the
-commanded torque would, so the difference bounds what the step gained from nowhere. A damper whose joint turns round within the
-step may do work too, by its rate at one end or the other.
+T and V are kinetic and potential energy, S = sum k (phi - set-point)^2 / 2 is stored by the held steering joints,
+tau_j the commanded torque about joint j and dphi_j the angle turned. A motor whose torque falls with its speed does
+less work than the commanded torque would, so the difference bounds what the step gained from nowhere. A damper whose
+joint turns round within the step may do work too, by its rate at one end or the other.
 
-The projection of positions lifts what overlaps, and so adds energy of its own. Where more was gained than rounding, the step is
-taken again from its start without projection, and what differs is entered as `lifted`.
+The projection of positions lifts what overlaps, and so adds energy of its own. Where more was gained than rounding, the
+step is taken again from its start without projection, and what differs is entered as `lifted`.
 """
 
 from __future__ import annotations

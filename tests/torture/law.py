@@ -20,9 +20,10 @@ VIOLATION = 1e-6
 
 
 def violation(W: Array, q: Array, mu: Array, p: Array) -> float:
-    """Largest violation of Signorini's and Coulomb's laws, velocities over the largest free one, impulses over the largest.
+    """Largest violation of Signorini's and Coulomb's laws.
 
-    A slip counts as such where its speed is more than the tolerance; then friction must be at its bound and against it.
+    Velocities are over the largest free one, impulses over the largest. Where rims slip, friction must be at its bound
+    and against the slip.
     """
     u = (W @ p + q).reshape(-1, 3)
     p = p.reshape(-1, 3)

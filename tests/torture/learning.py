@@ -127,7 +127,7 @@ def vector(random: Random, ledger: Ledger) -> None:
 
 
 def fine(random: Random, ledger: Ledger) -> None:
-    """All motors forward at control frequencies of 5 to 200 Hz and steps of 5 to 20 ms, half of them with less torque."""
+    """All motors forward, with some of their torque, at control frequencies of 5 to 200 Hz and steps of 5 to 20 ms."""
     step = float(random.choice([0.005, 0.01, 0.02]))
     env = RoverEnv(
         time_step=step,
