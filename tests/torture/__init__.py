@@ -1,1 +1,1 @@
-"""The campaign that tries to break everything: `make torture`, see README.md."""
+"""The campaign that tries to break everything: random scenes, damaged files and faults, seeded: `make torture`."""
