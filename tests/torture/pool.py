@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import resource
 import signal
 import time
 import traceback
@@ -16,6 +17,8 @@ from torture.ledger import Ledger
 from torture.regimes import BY_NAME
 
 Task = tuple[str, int]
+#: Address space of a worker, bytes.
+MEMORY = 8 * 2**30
 _SPAWN = multiprocessing.get_context("spawn")
 
 
@@ -40,6 +43,7 @@ def play(name: str, case: int) -> Ledger:
 
 def _work(pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent tells when to stop
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))  # what asks for more fails here and not in the machine
     while (task := pipe.recv()) is not None:
         pipe.send(play(*task))
 
