@@ -29,6 +29,7 @@ class Ledger:
         findings: What must never happen, in words.
         worst: Case in which each extreme was reached.
         notes: What happened when, a few of each kind: for those who look at one case.
+        case: Number of the case.
     """
 
     steps: int = 0
@@ -42,6 +43,7 @@ class Ledger:
     findings: list[str] = field(default_factory=list)
     worst: dict[str, int] = field(default_factory=dict)
     notes: dict[str, list[str]] = field(default_factory=dict)
+    case: int = 0
 
     def note(self, kind: str, what: str) -> None:
         """Remembers the first few of a kind."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import resource
 import signal
 import time
@@ -43,6 +44,7 @@ def play(name: str, case: int) -> Ledger:
 
 def _work(pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent tells when to stop
+    os.environ["RUST_BACKTRACE"] = "0"  # a finding is one line
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))  # what asks for more fails here and not in the machine
     while (task := pipe.recv()) is not None:
         pipe.send(play(*task))

@@ -56,7 +56,7 @@ class Regime:
 
     def play(self, case: int) -> Ledger:
         """One case: the same number gives the same case."""
-        ledger = Ledger()
+        ledger = Ledger(case=case)
         random = np.random.default_rng([zlib.crc32(self.name.encode()), case])
         with np.errstate(all="ignore"):
             self.run(random, ledger)

@@ -1,6 +1,7 @@
 """All regimes, by name and in the order of the table."""
 
-from torture import damage, drives, faults, flat, law, learning, on_purpose
+from torture import damage, drives, faults, flat, law, learning, on_purpose, round_trips, sizes
 
-REGIMES = [*learning.REGIMES, *drives.REGIMES, *flat.REGIMES, *law.REGIMES, *damage.REGIMES, *faults.REGIMES]
+PAGES = (learning, drives, flat, law, round_trips, sizes, damage, faults)
+REGIMES = [regime for page in PAGES for regime in page.REGIMES]
 BY_NAME = {regime.name: regime for regime in [*REGIMES, *on_purpose.REGIMES]}

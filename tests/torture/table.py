@@ -37,15 +37,13 @@ class Row:
         """In the order of `COLUMNS`."""
         own = self.ledger
         numbers = (own.gained, own.lifted, own.deepest)
-        small = [f"{value:.0e}" if value else "" for value in numbers]
-        reward = f"{own.reward:.1f}" if own.reward else ""
         return [
             str(own.steps),
             str(own.not_converged or ""),
             str(own.refused or ""),
-            *small,
+            *(f"{value:.0e}" if value else "" for value in numbers),
             f"{1e3 * own.slowest:.1f}",
-            reward,
+            f"{own.reward:.1f}" if own.reward else "",
         ]
 
     def complaints(self) -> Iterator[str]:
@@ -68,9 +66,13 @@ def console_table(rows: Iterable[Row]) -> Table:
 
 
 def markdown(rows: Iterable[Row]) -> str:
-    """For the page."""
+    """For the page; what is beyond its bound is bold, and so is a regime with findings."""
     lines = ["| regime | " + " | ".join(COLUMNS.values()) + " |", "|---" * (1 + len(COLUMNS)) + "|"]
-    lines += [f"| {row.regime.name} | " + " | ".join(row.cells()) + " |" for row in rows]
+    for row in rows:
+        complaints = [what.split()[0] for what in row.regime.broken(row.ledger)]
+        cells = [f"**{cell}**" if name in complaints else cell for name, cell in zip(COLUMNS, row.cells(), strict=True)]
+        name = f"**{row.regime.name}**" if row.ledger.findings else row.regime.name
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 

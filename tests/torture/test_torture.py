@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rover_gym import Simulation, SphereField
-from torture import on_purpose
+from torture import on_purpose, sizes
 from torture.audit import Audit
 from torture.drives import MODEL
 from torture.law import violation
@@ -26,6 +26,14 @@ def test_first_case_of_every_regime_holds(regime: Regime) -> None:
     ledger.merge(play(regime.name, 0), 0)
     assert ledger.steps
     assert not list(Row(regime, ledger).complaints())
+
+
+@pytest.mark.parametrize("what", sizes.FINDS)
+def test_sizes_and_places_that_hung_or_aborted_are_refused_or_done_in_time(what: str) -> None:
+    ledger = Ledger()
+    sizes.play(what, ledger)
+    assert not ledger.findings
+    assert ledger.slowest < sizes.PATIENT.slowest
 
 
 def test_a_case_is_the_same_twice() -> None:
@@ -122,3 +130,9 @@ def test_the_table_is_written_between_its_marks_and_nothing_else_changes(tmp_pat
     assert text.endswith("after\n")
     assert "old" not in text
     assert f"| {REGIMES[0].name} | 12 |" in text
+    assert "**" not in text
+    ledger.merge(Ledger(gained=3.0, findings=["a panic"]), 1)
+    write([Row(REGIMES[0], ledger)], page)
+    text = page.read_text(encoding="utf-8")
+    assert f"| **{REGIMES[0].name}** | 12 |" in text
+    assert "| **3e+00** |" in text
