@@ -1,4 +1,4 @@
-"""What goes through a pickle, a copy, a snapshot or a file comes back exact to the bit, and goes on as it would have."""
+"""What goes through a pickle, a copy, a snapshot or a file comes back to the bit, and goes on as it would have."""
 
 from __future__ import annotations
 

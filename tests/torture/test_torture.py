@@ -9,31 +9,34 @@ import numpy as np
 import pytest
 
 from rover_gym import Simulation, SphereField
-from torture import on_purpose, sizes
+from torture import on_purpose
 from torture.audit import Audit
 from torture.drives import MODEL
 from torture.law import violation
 from torture.ledger import Ledger
 from torture.pool import play, side_by_side
 from torture.regime import Bounds, Regime
-from torture.regimes import REGIMES
+from torture.regimes import BY_NAME, REGIMES
+from torture.sizes import FINDS
 from torture.table import BEGIN, END, Row, write
 
 
-@pytest.mark.parametrize("regime", REGIMES, ids=lambda regime: regime.name)
-def test_first_case_of_every_regime_holds(regime: Regime) -> None:
-    ledger = Ledger()
-    ledger.merge(play(regime.name, 0), 0)
-    assert ledger.steps
-    assert not list(Row(regime, ledger).complaints())
+def complaints(tasks: list[tuple[str, int]]) -> list[str]:
+    """Of cases, each by its regime's bounds, played by two processes with a limit to their memory."""
+    rows = {name: Row(BY_NAME[name], Ledger()) for name, _ in tasks}
+    for (name, case), ledger in side_by_side(tasks, 2):
+        rows[name].ledger.merge(ledger, case)
+    return [line for row in rows.values() for line in row.complaints()]
 
 
-@pytest.mark.parametrize("what", sizes.FINDS)
-def test_sizes_and_places_that_hung_or_aborted_are_refused_or_done_in_time(what: str) -> None:
-    ledger = Ledger()
-    sizes.play(what, ledger)
-    assert not ledger.findings
-    assert ledger.slowest < sizes.PATIENT.slowest
+def test_a_short_round_of_every_regime_holds() -> None:
+    broken = complaints([(regime.name, 0) for regime in REGIMES])
+    assert not broken, "\n".join(broken)
+
+
+def test_sizes_and_places_that_hung_or_aborted_are_refused_or_done_in_time() -> None:
+    broken = complaints([("sizes and places", case) for case in range(len(FINDS))])
+    assert not broken, "\n".join(broken)
 
 
 def test_a_case_is_the_same_twice() -> None:
