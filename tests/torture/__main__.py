@@ -54,16 +54,23 @@ def main() -> int:
                     console.print(f"{name}: {kind}: {note}", markup=False, highlight=False)
     else:
         start = time.monotonic()
-        for (name, case), ledger in side_by_side(_tasks(names, arguments.rounds, arguments.hours), arguments.workers):
-            rows[name].ledger.merge(ledger, case)
-            for finding in ledger.findings:
-                console.print(f"{name}, case {case}: {finding}", markup=False, highlight=False)
+        tasks = _tasks(names, arguments.rounds, arguments.hours)
+        try:
+            with console.status("") as status:
+                for (name, case), ledger in side_by_side(tasks, arguments.workers):
+                    rows[name].ledger.merge(ledger, case)
+                    status.update(f"{name}, case {case}")
+                    for finding in ledger.findings:
+                        console.print(f"{name}, case {case}: {finding}", markup=False, highlight=False)
+        except KeyboardInterrupt:
+            console.print("interrupted: what follows is what was played until then")
+            rows = {name: row for name, row in rows.items() if row.ledger.steps}
         console.print(f"{time.monotonic() - start:.0f} s")
     console.print(console_table(rows.values()))
     broken = [line for row in rows.values() for line in row.complaints()]
     for line in broken:
         console.print(line, markup=False, highlight=False)
-    if arguments.regime is None and arguments.case is None:
+    if len(rows) == len(REGIMES) and arguments.case is None:
         write(rows.values())
     return 1 if broken else 0
 
