@@ -25,11 +25,13 @@ def violation(W: Array, q: Array, mu: Array, p: Array) -> float:
     Velocities are over the largest free one, impulses over the largest. Where rims slip, friction must be at its bound
     and against the slip.
     """
+    if not len(mu):
+        return 0.0
     u = (W @ p + q).reshape(-1, 3)
     p = p.reshape(-1, 3)
-    speed, impulse = np.abs(q).max(initial=0.0), np.abs(p).max(initial=0.0)
+    speed, impulse = np.abs(q).max(), np.abs(p).max()
     if speed == 0.0:
-        return float(np.abs(u).max(initial=0.0))
+        return float(np.abs(u).max())
     u, p = u / speed, p / impulse if impulse > 0.0 else p
     u_T, p_T = np.linalg.norm(u[:, 1:], axis=1), np.linalg.norm(p[:, 1:], axis=1)
     worst = max(-u[:, 0].min(), -p[:, 0].min(), np.minimum(u[:, 0], p[:, 0]).max())
@@ -54,7 +56,7 @@ def check(ledger: Ledger, W: Array, q: Array, mu: Array, **options: Any) -> None
         ledger.find("impulses are not finite")
     elif not report.is_converged:
         ledger.not_converged += 1
-        ledger.note("not converged", f"{len(mu)} contacts, mu {mu.max():.1e}: {report.residual:.1e} by {report.solver}")
+        ledger.note("not converged", f"{len(mu)} contacts, mu {mu[:1]}: {report.residual:.1e} by {report.solver}")
     elif not (worst := violation(W, q, mu, p)) <= VIOLATION:
         ledger.find(f"converged, but the law is violated by {worst:.1e}: {len(mu)} contacts, mu {mu.max():.1e}")
 
@@ -127,10 +129,10 @@ def degenerate(random: Random, ledger: Ledger) -> None:
     check(ledger, W, q, mu, solver=method)
 
 
+# A single method may leave a problem unsolved, and one whose W has no sign may have no solution: it is to be said.
 REGIMES = [
-    # By one method alone a problem may well stay unsolved, and W of another sign has no solution: it is to be said.
-    Regime("solver: scales to 1e12", scales, 20, Bounds(not_converged=1.0, refused=1.0)),
-    Regime("solver: mass ratios to 1e12", ratios, 40, Bounds(not_converged=1.0, refused=1.0)),
-    Regime("solver: friction to 1e16", single, 20, Bounds(not_converged=1.0, refused=1.0)),
-    Regime("solver: degenerate problems", degenerate, 200, Bounds(not_converged=1.0, refused=1.0)),
+    Regime("solver: scales to 1e12", scales, 40, Bounds(not_converged=0.1, refused=1.0)),
+    Regime("solver: mass ratios to 1e12", ratios, 60, Bounds(not_converged=0.05, refused=1.0)),
+    Regime("solver: friction to 1e16", single, 20, Bounds(not_converged=0.5, refused=1.0)),
+    Regime("solver: degenerate problems", degenerate, 200, Bounds(not_converged=0.3, refused=1.0)),
 ]
