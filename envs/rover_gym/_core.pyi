@@ -244,6 +244,18 @@ class StepReport:
     def residual(self) -> float: ...
     @property
     def n_contacts(self) -> int: ...
+    @property
+    def retaken(self) -> int:
+        """Steps taken again: a motor changed its branch, or the energy asked for implicit gyroscopic terms."""
+    @property
+    def energy_gain(self) -> float:
+        """Largest gain in a step beyond the work of gravity and actuators, over the kinetic energy."""
+    @property
+    def energy_removed(self) -> float:
+        """J that the scheme would have gained and that the audit took out, summed over the steps."""
+    @property
+    def energy_lifted(self) -> float:
+        """J that lifting out of penetration gave, summed over the steps."""
 
 @final
 class Contacts:

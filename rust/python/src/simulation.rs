@@ -69,6 +69,26 @@ impl StepReport {
         self.inner.n_contacts
     }
 
+    #[getter]
+    fn retaken(&self) -> usize {
+        self.inner.retaken
+    }
+
+    #[getter]
+    fn energy_gain(&self) -> f64 {
+        self.inner.energy_gain
+    }
+
+    #[getter]
+    fn energy_removed(&self) -> f64 {
+        self.inner.energy_removed
+    }
+
+    #[getter]
+    fn energy_lifted(&self) -> f64 {
+        self.inner.energy_lifted
+    }
+
     fn __repr__(&self) -> String {
         let r = &self.inner;
         format!(

@@ -15,7 +15,8 @@ use rover_core::simulation::Simulation;
 use crate::scenes::{G, VARIANTS, options};
 
 fn planar() -> MirroredRover<7> {
-    MirroredRover::new(&Model::rover()).unwrap()
+    // Its torques do not depend on the speed.
+    MirroredRover::new(&Model::rover().with_motors(None).unwrap()).unwrap()
 }
 
 /// `P`: planar velocities to those of the full model.

@@ -87,7 +87,8 @@ fn an_iterate_that_runs_away_is_reported_and_the_step_is_taken() {
     };
     let mut q = [0.0; 21];
     q[1] = 0.35;
-    let mut spun = simulation(Model::rover(), Plane::ground(), options, &q, &[0.0; 21]);
+    let model = Model::rover().with_motors(None).unwrap();
+    let mut spun = simulation(model, Plane::ground(), options, &q, &[0.0; 21]);
     spun.set_steering(&[0.22, 0.44, -0.33, 0.47, 0.45, -0.58])
         .unwrap();
     let mut n_unsettled = 0;

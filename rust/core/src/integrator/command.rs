@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::multibody::Model;
+use crate::multibody::{Model, Motor};
 
 /// A joint held at a set-point by a PD that is implicit in the step: `τ = −stiffness (q − set_point) − damping q̇`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -15,11 +15,22 @@ pub struct HeldJoint {
     pub damping: f64,
 }
 
-/// Torques and held joints; every joint can be free, driven, held, or both of these.
+/// A driven joint.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Drive {
+    /// Commanded torque about the joint's axis, N m.
+    pub torque: f64,
+    /// Torque–speed line; without one the torque is the command at any speed.
+    pub motor: Option<Motor>,
+}
+
+/// Torques, motors and held joints; every joint can be free, driven, held, or all of these.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Command {
     /// Torque about each joint's axis (n_joints), N m.
     pub torque: Vec<f64>,
+    /// Which joints have a drive (n_joints); its torque comes on top of `torque`.
+    pub drives: Vec<Option<Drive>>,
     /// Which joints are held (n_joints).
     pub held: Vec<Option<HeldJoint>>,
 }
@@ -30,6 +41,7 @@ impl Command {
     pub fn idle(model: &Model) -> Self {
         Self {
             torque: vec![0.0; model.n_joints()],
+            drives: vec![None; model.n_joints()],
             held: vec![None; model.n_joints()],
         }
     }

@@ -17,6 +17,7 @@
 //! `Zᵀ y` at the contacts, and contact impulses p change y by `Z p`, so W never needs a product with M̂⁻¹. Any factor will do (Cholesky's,
 //! the tree's `Lᵀ D L`, the square root of a diagonal).
 
+use super::energy_audit::MechanicalEnergy;
 use super::options::StepOptions;
 use crate::contact::Activation;
 use crate::law::newton_impact::rebound;
@@ -57,7 +58,7 @@ impl<Q> Copy for Start<'_, Q> {}
 /// With d components a contact (2 or 3, `DIMENSION`), local vectors run contact by contact `normal, tangent, (tangent)`.
 pub trait MechanicalSystem {
     /// A point of the configuration space; sizes may be anything, ⊕ is the system's.
-    type Configuration: Clone;
+    type Configuration: Clone + PartialEq;
     /// A contact: what the system needs to find its rows of Hᵀ again.
     type Contact: UnilateralContact;
 
@@ -124,6 +125,63 @@ pub trait MechanicalSystem {
         v_mean: &[f64],
         y: &mut [f64],
     );
+
+    /// Whether gyroscopic terms are too fast for the step to take them explicitly. By default never.
+    fn is_gyroscopic(&self, _options: &StepOptions, _v: &[f64]) -> bool {
+        false
+    }
+
+    /// [`Self::load`] with the gyroscopic terms implicit, and already in factor coordinates.
+    ///
+    /// With `C(q_m, v_mean) v` the gyroscopic part of the bias and J (`impulse`, nv) a forecast of the contacts' generalized impulse
+    ///
+    /// ```text
+    /// (M̂ + θ h C) Δv = h (τ − G − C v) + J,        y = F Δv − F⁻ᵀ J
+    /// ```
+    ///
+    /// so that an impulse J that comes true makes the step implicit as a whole. Only asked of a system that may be [`Self::is_gyroscopic`].
+    fn load_gyroscopic(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Self::Configuration>,
+        v_mean: &[f64],
+        _impulse: &[f64],
+        y: &mut [f64],
+    ) {
+        self.load(options, start, v_mean, y);
+        self.half_solve(y);
+    }
+
+    /// Chooses the branch of each piecewise force anew for a step that ends with `v_end`; true where one has changed and the step must be
+    /// taken again. By default there is none.
+    fn revise(&mut self, _start: Start<'_, Self::Configuration>, _v_end: &[f64]) -> bool {
+        false
+    }
+
+    /// Kinetic and potential energy of a state, J, and what moves as a whole; none where the system is not audited.
+    fn energy(
+        &mut self,
+        _options: &StepOptions,
+        _q: &Self::Configuration,
+        _v: &[f64],
+    ) -> Option<MechanicalEnergy> {
+        None
+    }
+
+    /// Fastest turning of a frame whose pose matters, rad/s. By default 0.
+    fn turning(&self, _v: &[f64]) -> f64 {
+        0.0
+    }
+
+    /// Work of the actuators over a step that ends with `v_end`, J.
+    fn work(
+        &mut self,
+        _options: &StepOptions,
+        _start: Start<'_, Self::Configuration>,
+        _v_end: &[f64],
+    ) -> f64 {
+        0.0
+    }
 
     /// Before the iterations of a Newton variant: what it must remember of the start. By default nothing.
     fn begin_balance(&mut self, _start: Start<'_, Self::Configuration>) {}

@@ -2,19 +2,21 @@
 //!
 //! | scheme | file | order in smooth phases | through impacts |
 //! |---|---|---|---|
-//! | Moreau–Jean, one linearised step | [`moreau_jean`] | 2 in the position, explicit in the gyroscopic terms | 1 |
+//! | Moreau–Jean, one linearised step | [`moreau_jean`] | 2, gyroscopic terms explicit or implicit by the spin | 1 |
 //! | Moreau–Jean, Newton on the end-of-step forces | [`moreau_jean_newton`] | 2 | 1 |
 //!
 //! Both treat impacts and persistent contact by the same law at velocity level and search for no event.
-//! What the velocity law leaves of penetration, [`position_projection`] removes.
+//! What the velocity law leaves of penetration, [`position_projection`] removes. Every step's energy is audited ([`energy_audit`]).
 //!
 //! A scheme is written once, over what a [`MechanicalSystem`] can do: the rover's tree of solids ([`tree_system`]) and the planar
 //! systems ([`crate::planar`]) step through the same code.
 
 pub mod accuracy;
 pub mod command;
+pub mod energy_audit;
 pub mod error;
 pub mod fitted_theta;
+pub mod gyroscopic;
 pub mod mechanical_system;
 pub mod moreau_jean;
 pub mod moreau_jean_newton;
@@ -28,7 +30,8 @@ pub mod warm_start;
 pub mod workspace;
 
 pub use accuracy::Accuracy;
-pub use command::{Command, HeldJoint};
+pub use command::{Command, Drive, HeldJoint};
+pub use energy_audit::MechanicalEnergy;
 pub use error::{OptionsError, StepError};
 pub use mechanical_system::{MechanicalSystem, Start, UnilateralContact};
 pub use options::{Stabilisation, StepOptions, Variant};

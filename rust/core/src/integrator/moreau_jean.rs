@@ -13,11 +13,16 @@
 //! over the step (a correction deferred by one step, so that W stays symmetric). Without the two a turning rover's path is late by
 //! h/2 and its speed decays with h ω²/2: on the flat drive of the tests the error was five times larger.
 //!
+//! Where the spin asks for it ([`MechanicalSystem::is_gyroscopic`]), or the audit of the energy ([`super::energy_audit`]), the gyroscopic terms
+//! are implicit instead: `bias = G + C(q_m, v_m) (v + (1−θ) Δv)` with the impulses of persistent contact inside Δv. Then no spin and no step
+//! make the scheme unstable.
+//!
 //! The PD of a held joint is implicit with an exponentially fitted θ_j ([`super::fitted_theta`]), so no gain and
 //! no step make it unstable. Contacts enter by the forecast `gap + γ h u_N ≤ 0`, measured from q_m.
 //!
 //! Source: Moreau 1988; Jean 1999; Acary, Brogliato 2008, ch. 10.
 
+use super::energy_audit::{Audit, Verdict, count_lift, energy_before};
 use super::error::StepError;
 use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
 use super::options::StepOptions;
@@ -44,67 +49,155 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJean {
         scratch: &mut ScratchOf<S>,
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
-        let (h, theta) = (options.time_step, options.theta);
         let ws = scratch;
         ws.fit(system.nv());
-        system.set_moved(
-            state.configuration,
-            state.v,
-            (1.0 - theta) * h,
-            &mut ws.middle,
-        );
-        system.place_middle(&ws.middle);
-        system.set_moved(state.configuration, state.v, h, &mut ws.end);
-        system.place_end(&ws.end);
-        probe.end(Phase::Kinematics);
-        let activation = activation(options, (1.0 - theta) * h);
-        system.detect(state.v, activation, &mut ws.contacts);
-        system.relocate(&mut ws.contacts);
-        probe.end(Phase::Detection);
-        system.update_mass_matrix(options);
-        probe.end(Phase::MassMatrix);
-        if !system.factorise(options) {
-            return Err(StepError::SingularMassMatrix { time: *state.time });
-        }
-        probe.end(Phase::Factor);
-        ws.v.copy_from_slice(state.v);
-        assemble_contacts(system, options, state.v, warm_start, ws);
-        probe.end(Phase::Delassus);
-        // Forces at v, then at the velocity that they lead to.
-        ws.v_mean.copy_from_slice(state.v);
-        for is_last in [false, true] {
-            let start = Start {
-                configuration: &*state.configuration,
-                v: &*state.v,
-            };
-            system.load(options, start, &ws.v_mean, &mut ws.y);
-            system.half_solve(&mut ws.y);
-            if !is_last {
-                // An impact's impulses say nothing of this step's: with them v_m would be far off, and the bias is quadratic in it.
-                if is_persistent(options, warm_start, &ws.contacts) {
-                    system.add_impulses(&ws.p, &mut ws.y);
-                }
-                system.half_solve_back(&mut ws.y);
-                for (mean, change) in ws.v_mean.iter_mut().zip(&ws.y) {
-                    *mean += (1.0 - theta) * change;
-                }
-            }
-        }
-        add_correction(system, options, warm_start, ws);
-        probe.end(Phase::Bias);
-        let mut report = solve_contacts(system, options, ws, true, probe);
-        system.set_moved(&ws.middle, &ws.v, theta * h, &mut ws.end);
-        ws.gap_end.clear();
-        let d = S::DIMENSION.components();
-        let local = ws.u.chunks_exact(d).zip(ws.u_before.chunks_exact(d));
-        let moved = |(contact, (u, before)): (&S::Contact, (&[f64], &[f64]))| {
-            contact.gap() + theta * h * (u[0] - before[0])
+        let start = Start {
+            configuration: &*state.configuration,
+            v: &*state.v,
         };
-        ws.gap_end.extend(ws.contacts.iter().zip(local).map(moved));
+        let before = energy_before(system, options, start, ws);
+        system.revise(start, start.v);
+        let mut is_gyroscopic = system.is_gyroscopic(options, start.v);
+        let mut retaken = 0;
+        let mut report = loop {
+            let is_last = is_gyroscopic;
+            let attempted = attempt(system, options, start, warm_start, ws, is_gyroscopic, probe);
+            let Some(mut report) = attempted else {
+                return Err(StepError::SingularMassMatrix { time: *state.time });
+            };
+            report.retaken = retaken;
+            retaken += 1;
+            if retaken <= MOST_REVISIONS && system.revise(start, &ws.v) {
+                continue;
+            }
+            let audit = Audit {
+                before,
+                is_last,
+                drift: 0.0,
+            };
+            match audit.judge(system, options, start, ws, &mut report) {
+                Verdict::Sound => break report,
+                Verdict::Coarse => is_gyroscopic = true,
+            }
+        };
         probe.end(Phase::Update);
         report.steps = 1;
         finish(system, options, state, warm_start, ws, report, probe)
     }
+}
+
+/// Most times that a step is taken again because a piecewise force has changed its branch. Each wheel's torque falls with its speed, so the
+/// branches settle; a motor at its line takes one.
+pub(super) const MOST_REVISIONS: usize = 4;
+
+/// Passes over the mean velocity in which implicit gyroscopic terms are frozen: the second makes the step of order 2.
+const GYROSCOPIC_PASSES: usize = 2;
+
+/// One attempt at the step: `ws.v`, `ws.end`, `ws.p` and `ws.gap_end`. None where the mass matrix cannot be factored.
+fn attempt<S: MechanicalSystem>(
+    system: &mut S,
+    options: &StepOptions,
+    start: Start<'_, S::Configuration>,
+    warm_start: &WarmStart<KeyOf<S>>,
+    ws: &mut ScratchOf<S>,
+    is_gyroscopic: bool,
+    probe: &mut dyn Probe,
+) -> Option<StepReport> {
+    let (h, theta) = (options.time_step, options.theta);
+    system.set_moved(
+        start.configuration,
+        start.v,
+        (1.0 - theta) * h,
+        &mut ws.middle,
+    );
+    system.place_middle(&ws.middle);
+    system.set_moved(start.configuration, start.v, h, &mut ws.end);
+    system.place_end(&ws.end);
+    probe.end(Phase::Kinematics);
+    let activation = activation(options, (1.0 - theta) * h);
+    system.detect(start.v, activation, &mut ws.contacts);
+    system.relocate(&mut ws.contacts);
+    probe.end(Phase::Detection);
+    system.update_mass_matrix(options);
+    probe.end(Phase::MassMatrix);
+    if !system.factorise(options) {
+        return None;
+    }
+    probe.end(Phase::Factor);
+    ws.v.copy_from_slice(start.v);
+    assemble_contacts(system, options, start.v, warm_start, ws);
+    probe.end(Phase::Delassus);
+    if is_gyroscopic {
+        load_implicitly(system, options, start, warm_start, ws);
+    } else {
+        load_explicitly(system, options, start, warm_start, ws);
+    }
+    probe.end(Phase::Bias);
+    let report = solve_contacts(system, options, ws, true, probe);
+    system.set_moved(&ws.middle, &ws.v, theta * h, &mut ws.end);
+    ws.gap_end.clear();
+    let d = S::DIMENSION.components();
+    let local = ws.u.chunks_exact(d).zip(ws.u_before.chunks_exact(d));
+    let moved = |(contact, (u, before)): (&S::Contact, (&[f64], &[f64]))| {
+        contact.gap() + theta * h * (u[0] - before[0])
+    };
+    ws.gap_end.extend(ws.contacts.iter().zip(local).map(moved));
+    Some(report)
+}
+
+/// The free change `ws.y` (factor coordinates) by forces at v, then at the velocity that they lead to.
+fn load_explicitly<S: MechanicalSystem>(
+    system: &mut S,
+    options: &StepOptions,
+    start: Start<'_, S::Configuration>,
+    warm_start: &WarmStart<KeyOf<S>>,
+    ws: &mut ScratchOf<S>,
+) {
+    ws.v_mean.copy_from_slice(start.v);
+    for is_last in [false, true] {
+        system.load(options, start, &ws.v_mean, &mut ws.y);
+        system.half_solve(&mut ws.y);
+        if !is_last {
+            // An impact's impulses say nothing of this step's: with them v_m would be far off, and the bias is quadratic in it.
+            if is_persistent(options, warm_start, &ws.contacts) {
+                system.add_impulses(&ws.p, &mut ws.y);
+            }
+            system.half_solve_back(&mut ws.y);
+            for (mean, change) in ws.v_mean.iter_mut().zip(&ws.y) {
+                *mean += (1.0 - options.theta) * change;
+            }
+        }
+    }
+    add_correction(system, options, warm_start, ws);
+}
+
+/// The free change `ws.y` (factor coordinates) with implicit gyroscopic terms; the correction r is part of the forecast impulse.
+fn load_implicitly<S: MechanicalSystem>(
+    system: &mut S,
+    options: &StepOptions,
+    start: Start<'_, S::Configuration>,
+    warm_start: &WarmStart<KeyOf<S>>,
+    ws: &mut ScratchOf<S>,
+) {
+    let is_persistent = is_persistent(options, warm_start, &ws.contacts);
+    ws.forecast.fill(0.0);
+    if is_persistent {
+        system.generalized_impulse(&ws.contacts, &ws.p, &mut ws.forecast);
+    }
+    ws.v_mean.copy_from_slice(start.v);
+    for pass in 0..GYROSCOPIC_PASSES {
+        system.load_gyroscopic(options, start, &ws.v_mean, &ws.forecast, &mut ws.y);
+        if pass + 1 < GYROSCOPIC_PASSES {
+            if is_persistent {
+                system.add_impulses(&ws.p, &mut ws.y);
+            }
+            system.half_solve_back(&mut ws.y);
+            for ((mean, change), v) in ws.v_mean.iter_mut().zip(&ws.y).zip(start.v) {
+                *mean = v + (1.0 - options.theta) * change;
+            }
+        }
+    }
+    add_correction(system, options, warm_start, ws);
 }
 
 /// The contact forecast measured from `q_m`, and how close to rest a contact stays closed.
@@ -264,7 +357,7 @@ pub(super) fn note(report: &mut StepReport, solved: &SolveReport) {
 
 /// Projects the position, checks that all is finite, and only then changes state and warm start.
 pub(super) fn finish<S: MechanicalSystem>(
-    system: &S,
+    system: &mut S,
     options: &StepOptions,
     state: StateMut<'_, S::Configuration>,
     warm_start: &mut WarmStart<KeyOf<S>>,
@@ -278,13 +371,15 @@ pub(super) fn finish<S: MechanicalSystem>(
         time,
     } = state;
     let d = S::DIMENSION.components();
-    position_projection::project(system, options, ws, &mut report);
+    if position_projection::project(system, options, ws, &mut report) {
+        system.normalise(&mut ws.end);
+        count_lift(system, options, ws, &mut report);
+    }
     probe.end(Phase::Projection);
     let is_finite = system.is_finite(&ws.end) && ws.v.iter().chain(&ws.p).all(|x| x.is_finite());
     if !is_finite {
         return Err(StepError::NonFinite { time: *time });
     }
-    system.normalise(&mut ws.end);
     std::mem::swap(configuration, &mut ws.end);
     v.copy_from_slice(&ws.v);
     *time += options.time_step;

@@ -15,15 +15,15 @@ use super::options::{Stabilisation, StepOptions};
 use super::report::StepReport;
 use crate::solver::{SolveReport, SolveStatus};
 
-/// Corrects `ws.end`, where the contacts are predicted to have the gaps `ws.gap_end`.
+/// Corrects `ws.end`, where the contacts are predicted to have the gaps `ws.gap_end`; tells whether it has moved.
 pub(super) fn project<S: MechanicalSystem>(
     system: &S,
     options: &StepOptions,
     ws: &mut ScratchOf<S>,
     report: &mut StepReport,
-) {
+) -> bool {
     if options.stabilisation == Stabilisation::None {
-        return;
+        return false;
     }
     let d = S::DIMENSION.components();
     let stays = |gap: f64, u_N: f64| gap + options.time_step * u_N < 0.0;
@@ -35,7 +35,7 @@ pub(super) fn project<S: MechanicalSystem>(
         deepest = deepest.min(*gap);
     }
     if deepest >= -options.penetration_tolerance {
-        return;
+        return false;
     }
     ws.q_free.fill(0.0);
     for (q, gap) in ws.q_free.chunks_exact_mut(d).zip(&ws.gap_end) {
@@ -55,6 +55,7 @@ pub(super) fn project<S: MechanicalSystem>(
     note(report, &solved);
     let share = (limit / size(system, ws)).min(1.0);
     system.advance(&mut ws.end, &ws.y, share);
+    true
 }
 
 /// Solves for the displacement `ws.y` with the coefficients in `ws.mu`.

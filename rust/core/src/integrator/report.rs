@@ -25,6 +25,14 @@ pub struct StepReport {
     pub residual: f64,
     /// Most contacts in a step.
     pub n_contacts: usize,
+    /// Steps that were taken again: a motor changed its branch, or the energy asked for a safer way.
+    pub retaken: usize,
+    /// Largest gain of energy in a step beyond the work of gravity and actuators, as a part of its kinetic energy.
+    pub energy_gain: f64,
+    /// Energy that the scheme would have gained and that the audit took out, all steps together, J.
+    pub energy_removed: f64,
+    /// Energy that lifting out of penetration gave, all steps together, J.
+    pub energy_lifted: f64,
 }
 
 impl StepReport {
@@ -44,5 +52,9 @@ impl StepReport {
         self.newton_iterations += later.newton_iterations;
         self.residual = self.residual.max(later.residual);
         self.n_contacts = self.n_contacts.max(later.n_contacts);
+        self.retaken += later.retaken;
+        self.energy_gain = self.energy_gain.max(later.energy_gain);
+        self.energy_removed += later.energy_removed;
+        self.energy_lifted += later.energy_lifted;
     }
 }

@@ -1,5 +1,6 @@
 //! Scratch of a step that every system shares: vectors over velocities and over contacts.
 
+use super::energy_audit::Audited;
 use crate::solver::SolverWorkspace;
 
 /// Scratch of a step of configurations `Q` and contacts `C`. Nothing in it is state: a fresh one gives the same bits.
@@ -11,6 +12,7 @@ pub struct Scratch<Q, C> {
     pub(super) end: Q,
     pub(super) y: Vec<f64>,
     pub(super) correction: Vec<f64>,
+    pub(super) forecast: Vec<f64>,
     pub(super) v: Vec<f64>,
     pub(super) v_mean: Vec<f64>,
     pub(super) contacts: Vec<C>,
@@ -24,6 +26,7 @@ pub struct Scratch<Q, C> {
     pub(super) p_position: Vec<f64>,
     pub(super) u_position: Vec<f64>,
     pub(super) solver: SolverWorkspace,
+    pub(super) audited: Audited<Q>,
 }
 
 impl<Q: Clone, C> Scratch<Q, C> {
@@ -36,6 +39,7 @@ impl<Q: Clone, C> Scratch<Q, C> {
             end: q.clone(),
             y: vec![0.0; nv],
             correction: vec![0.0; nv],
+            forecast: vec![0.0; nv],
             v: vec![0.0; nv],
             v_mean: vec![0.0; nv],
             contacts: Vec::with_capacity(n),
@@ -49,6 +53,7 @@ impl<Q: Clone, C> Scratch<Q, C> {
             p_position: room(),
             u_position: room(),
             solver: SolverWorkspace::default(),
+            audited: Audited::new(q.clone(), nv),
         }
     }
 
@@ -57,6 +62,7 @@ impl<Q: Clone, C> Scratch<Q, C> {
         for vector in [
             &mut self.y,
             &mut self.correction,
+            &mut self.forecast,
             &mut self.v,
             &mut self.v_mean,
         ] {

@@ -1,13 +1,15 @@
 //! The tree of solids on a terrain as a mechanical system: the rover.
 //!
 //! `M̂ = M + h θ_j K_d + h² θ_j θ K_p` on held joints: the PD of a held joint is implicit with an exponentially fitted θ_j
-//! ([`super::fitted_theta`]), so no gain and no step make it unstable. `M̂ = Lᵀ D L` along the tree; the contact system keeps `Z` along
+//! ([`super::fitted_theta`]), so no gain and no step make it unstable; a motor at its torque–speed line is taken in the same way. `M̂ = Lᵀ D L` along the tree; the contact system keeps `Z` along
 //! each contact's path.
 
 use nalgebra::Vector3;
 
-use super::command::Command;
+use super::command::{Command, Drive};
+use super::energy_audit::MechanicalEnergy;
 use super::fitted_theta::fitted_theta;
+use super::gyroscopic::{GyroscopicScratch, gravity_load};
 use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
 use super::options::StepOptions;
 use crate::contact::{
@@ -15,9 +17,10 @@ use crate::contact::{
 };
 use crate::geometry::Terrain;
 use crate::multibody::bias::{BiasScratch, bias};
-use crate::multibody::momentum::body_momenta;
+use crate::multibody::momentum::{body_momenta, energy_and_momentum};
 use crate::multibody::{
-    Configuration, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum,
+    Configuration, EnergyScratch, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum,
+    MotorRegime,
 };
 use crate::problem::{Dimension, FrictionContactProblem};
 
@@ -48,6 +51,10 @@ pub struct TreeScratch {
     sums: Vec<Momentum>,
     c_start: Vec<Vector3<f64>>,
     theta_held: Vec<f64>,
+    motors: Vec<MotorRegime>,
+    drive_work: Vec<f64>,
+    energy: EnergyScratch,
+    gyroscopic: GyroscopicScratch,
     force: Vec<f64>,
     system: ContactSystem,
 }
@@ -67,10 +74,20 @@ impl TreeScratch {
             momenta_end: momenta.clone(),
             sums: momenta,
             c_start: vec![Vector3::zeros(); model.bodies().len()],
-            theta_held: vec![0.0; model.n_joints()],
+            theta_held: vec![0.5; model.n_joints()],
+            motors: vec![MotorRegime::Constant(0.0); model.n_joints()],
+            drive_work: vec![0.0; model.n_joints()],
+            energy: EnergyScratch::new(model),
+            gyroscopic: GyroscopicScratch::default(),
             force: vec![0.0; model.nv()],
             system: ContactSystem::with_capacity(model, n),
         }
+    }
+
+    /// Work of each joint's drive in the last step (n_joints), J.
+    #[must_use]
+    pub fn drive_work(&self) -> &[f64] {
+        &self.drive_work
     }
 
     /// Delassus operator of the last step, row-major, 1/kg.
@@ -186,10 +203,11 @@ impl MechanicalSystem for TreeSystem<'_> {
     fn factorise(&mut self, options: &StepOptions) -> bool {
         let (h, theta) = (options.time_step, options.theta);
         let parts = &mut *self.parts;
-        for (j, held) in self.command.held.iter().enumerate() {
-            if let Some(held) = held {
+        for j in 0..self.model.n_joints() {
+            let (damping, stiffness) = feedback(self.command, &parts.motors, j);
+            if damping > 0.0 || stiffness > 0.0 {
                 let theta_j = parts.theta_held[j];
-                let implicit = h * theta_j * (held.damping + h * theta * held.stiffness);
+                let implicit = h * theta_j * (damping + h * theta * stiffness);
                 parts
                     .mass_matrix
                     .add_to_diagonal(self.model, 6 + j, implicit);
@@ -222,16 +240,110 @@ impl MechanicalSystem for TreeSystem<'_> {
         for (y, f) in y.iter_mut().zip(&parts.force) {
             *y = -options.time_step * f;
         }
-        let joints = &start.configuration.joints;
-        add_command(
-            options,
-            self.command,
-            joints,
-            start.v,
-            start.v,
-            &parts.theta_held,
+        add_command(options, self.command, start, start.v, parts, y);
+    }
+
+    #[inline]
+    fn is_gyroscopic(&self, options: &StepOptions, v: &[f64]) -> bool {
+        let spin = (self.model.bodies().iter().zip(&v[5..]))
+            .filter(|(body, _)| body.is_spinner)
+            .fold(0.0_f64, |most, (_, rate)| most.max(rate.abs()));
+        options.time_step * self.turning(v) > MOST_TURN || options.time_step * spin > MOST_SPIN
+    }
+
+    #[inline]
+    fn turning(&self, v: &[f64]) -> f64 {
+        let base = (v[3] * v[3] + v[4] * v[4] + v[5] * v[5]).sqrt();
+        let joints = (self.model.bodies().iter().zip(&v[5..])).skip(1);
+        base + joints
+            .filter(|(body, _)| !body.is_spinner)
+            .fold(0.0_f64, |most, (_, rate)| most.max(rate.abs()))
+    }
+
+    fn load_gyroscopic(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Configuration>,
+        v_mean: &[f64],
+        impulse: &[f64],
+        y: &mut [f64],
+    ) {
+        let parts = &mut *self.parts;
+        let model = self.model;
+        let gravity_impulse = &mut parts.force;
+        gravity_load(model, &parts.kinematics, &options.gravity, gravity_impulse);
+        for (y, f) in y.iter_mut().zip(&*gravity_impulse) {
+            *y = options.time_step * f;
+        }
+        add_command(options, self.command, start, start.v, parts, y);
+        parts.gyroscopic.solve(
+            model,
+            &parts.kinematics,
+            &parts.mass_matrix,
+            (options.time_step, options.theta),
+            (start.v, v_mean),
+            impulse,
             y,
         );
+        parts.factor.half_solve(model, y);
+    }
+
+    fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
+        let parts = &mut *self.parts;
+        let mut is_new = false;
+        for (j, drive) in self.command.drives.iter().enumerate() {
+            let regime = match drive {
+                None => MotorRegime::Constant(0.0),
+                Some(Drive {
+                    torque,
+                    motor: None,
+                }) => MotorRegime::Constant(*torque),
+                Some(Drive {
+                    torque,
+                    motor: Some(motor),
+                }) => {
+                    let (begin, end) = (start.v[6 + j], v_end[6 + j]);
+                    motor.regime(*torque, begin + parts.theta_held[j] * (end - begin))
+                }
+            };
+            is_new |= regime != parts.motors[j];
+            parts.motors[j] = regime;
+        }
+        is_new
+    }
+
+    fn energy(
+        &mut self,
+        options: &StepOptions,
+        q: &Configuration,
+        v: &[f64],
+    ) -> Option<MechanicalEnergy> {
+        let scratch = &mut self.parts.energy;
+        let (energy, momentum) = energy_and_momentum(self.model, q, v, &options.gravity, scratch);
+        Some(MechanicalEnergy {
+            kinetic: energy.kinetic,
+            potential: energy.potential,
+            momentum,
+            mass: self.model.mass(),
+        })
+    }
+
+    fn work(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Configuration>,
+        v_end: &[f64],
+    ) -> f64 {
+        let theta = options.theta;
+        let mut total = 0.0;
+        for j in 0..self.model.n_joints() {
+            let (begin, end) = (start.v[6 + j], v_end[6 + j]);
+            let turned = options.time_step * (theta * end + (1.0 - theta) * begin);
+            let torque = actuation(options, self.command, start, v_end, self.parts, j);
+            self.parts.drive_work[j] = torque.drive * turned;
+            total += (torque.drive + torque.other) * turned;
+        }
+        total
     }
 
     fn begin_balance(&mut self, start: Start<'_, Configuration>) {
@@ -268,16 +380,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             self.parts,
             y,
         );
-        let joints = &start.configuration.joints;
-        add_command(
-            options,
-            self.command,
-            joints,
-            start.v,
-            v_end,
-            &self.parts.theta_held,
-            y,
-        );
+        add_command(options, self.command, start, v_end, self.parts, y);
     }
 
     #[inline]
@@ -345,7 +448,29 @@ impl MechanicalSystem for TreeSystem<'_> {
 /// Arm at which a joint's turn counts, m. A freely steered wheel that is freed of 2 cm turns by 0.4 rad.
 const JOINT_ARM: f64 = 0.05;
 
-/// How implicit each held joint's PD is.
+/// Turn of a frame in a step, rad, beyond which gyroscopic terms are taken implicitly: the explicit ones' error, of third order, is then a
+/// thousandth of the energy.
+const MOST_TURN: f64 = 0.1;
+
+/// Turn of a wheel about its axle in a step, rad, beyond which they are. Its spin couples the motions across the axle with
+/// a frequency of a few per cent of the spin, so that explicit terms would do up to some twenty times more.
+const MOST_SPIN: f64 = 1.0;
+
+/// Damping (N m s/rad) and stiffness (N m/rad) with which a joint's torque answers to its motion.
+#[inline]
+fn feedback(command: &Command, motors: &[MotorRegime], j: usize) -> (f64, f64) {
+    let (mut damping, mut stiffness) = (0.0, 0.0);
+    if let Some(held) = &command.held[j] {
+        damping += held.damping;
+        stiffness += held.stiffness;
+    }
+    if let MotorRegime::Line { slope, .. } = motors[j] {
+        damping += slope;
+    }
+    (damping, stiffness)
+}
+
+/// How implicit each joint's PD and motor are.
 fn set_held_theta(
     model: &Model,
     options: &StepOptions,
@@ -353,35 +478,64 @@ fn set_held_theta(
     parts: &mut TreeScratch,
 ) {
     let h = options.time_step;
-    for (j, held) in command.held.iter().enumerate() {
-        if let Some(held) = held {
+    for j in 0..model.n_joints() {
+        let (damping, stiffness) = feedback(command, &parts.motors, j);
+        parts.theta_held[j] = if damping > 0.0 || stiffness > 0.0 {
             let inertia = parts.mass_matrix.diagonal(model, 6 + j);
-            let z = h * (held.damping + 0.5 * h * held.stiffness) / inertia;
-            parts.theta_held[j] = fitted_theta(z).max(options.theta);
-        }
+            let z = h * (damping + 0.5 * h * stiffness) / inertia;
+            fitted_theta(z).max(options.theta)
+        } else {
+            options.theta
+        };
     }
 }
 
-/// Adds `h τ` to `y`: torques, and the PD at the θ_j-weighted position and velocity of the iterate `v_end`.
+/// Mean torque of a joint over the step, N m.
+struct Actuation {
+    /// Of its drive.
+    drive: f64,
+    /// Of everything else.
+    other: f64,
+}
+
+/// Torques of joint j; the PD and the motor's line at the θ_j-weighted position and velocity of the iterate `v_end`.
+#[inline]
+fn actuation(
+    options: &StepOptions,
+    command: &Command,
+    start: Start<'_, Configuration>,
+    v_end: &[f64],
+    parts: &TreeScratch,
+    j: usize,
+) -> Actuation {
+    let (h, theta, theta_j) = (options.time_step, options.theta, parts.theta_held[j]);
+    let (rate, rate_end) = (start.v[6 + j], v_end[6 + j]);
+    let mut other = command.torque[j];
+    if let Some(held) = &command.held[j] {
+        let mean = theta * rate_end + (1.0 - theta) * rate;
+        other -=
+            held.stiffness * (start.configuration.joints[j] + h * theta_j * mean - held.set_point);
+        other -= held.damping * (rate + theta_j * (rate_end - rate));
+    }
+    let drive = match parts.motors[j] {
+        MotorRegime::Constant(torque) => torque,
+        line @ MotorRegime::Line { .. } => line.torque(rate + theta_j * (rate_end - rate)),
+    };
+    Actuation { drive, other }
+}
+
+/// Adds `h τ` to `y` for a step that ends with the iterate `v_end`.
 fn add_command(
     options: &StepOptions,
     command: &Command,
-    joints: &[f64],
-    v: &[f64],
+    start: Start<'_, Configuration>,
     v_end: &[f64],
-    theta_held: &[f64],
+    parts: &TreeScratch,
     y: &mut [f64],
 ) {
-    let (h, theta) = (options.time_step, options.theta);
-    for (j, (torque, held)) in command.torque.iter().zip(&command.held).enumerate() {
-        let mut tau = *torque;
-        if let Some(held) = held {
-            let (theta_j, rate, rate_end) = (theta_held[j], v[6 + j], v_end[6 + j]);
-            let mean = theta * rate_end + (1.0 - theta) * rate;
-            tau -= held.stiffness * (joints[j] + h * theta_j * mean - held.set_point);
-            tau -= held.damping * (rate + theta_j * (rate_end - rate));
-        }
-        y[6 + j] += h * tau;
+    for j in 0..command.torque.len() {
+        let torque = actuation(options, command, start, v_end, parts, j);
+        y[6 + j] += options.time_step * (torque.other + torque.drive);
     }
 }
 

@@ -5,6 +5,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::error::ModelError;
+use super::motor::Motor;
 
 /// The built-in rover: Table 4.1 and Fig. 4.5 of the report, in SI units.
 const ROVER: &str = include_str!("../../models/rover.toml");
@@ -141,6 +142,9 @@ pub struct WheelDescription {
     pub torque_limit: f64,
     /// 1 or −1: joint torque of a positive (forward) command.
     pub drive_sign: f64,
+    /// Torque–speed line of its motor; without one the torque is the command at any speed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motor: Option<Motor>,
     /// The solid whose joint steers it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steering: Option<String>,

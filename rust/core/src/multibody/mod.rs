@@ -5,6 +5,7 @@
 
 pub mod bias;
 pub mod coordinates;
+pub mod coriolis;
 pub mod description;
 pub mod error;
 pub mod joint;
@@ -12,6 +13,7 @@ pub mod kinematics;
 pub mod mass_matrix;
 pub mod model;
 pub mod momentum;
+pub mod motor;
 pub mod state;
 
 pub use bias::bias;
@@ -23,5 +25,6 @@ pub use joint::JointAxis;
 pub use kinematics::Kinematics;
 pub use mass_matrix::{FactoredMassMatrix, MassMatrix};
 pub use model::{Body, Frame, Model, Wheel};
-pub use momentum::{Energy, Momentum};
+pub use momentum::{Energy, EnergyScratch, Momentum};
+pub use motor::{Motor, MotorRegime};
 pub use state::{Configuration, State};

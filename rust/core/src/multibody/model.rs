@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use super::description::{Hold, ModelDescription, Shape};
 use super::error::ModelError;
 use super::joint::JointAxis;
+use super::motor::Motor;
 use crate::spatial::SymmetricMatrix3;
 
 /// A moving body: one or several solids fixed to each other, under one revolute joint (the base: free).
@@ -71,6 +72,8 @@ pub struct Wheel {
     pub torque_limit: f64,
     /// 1 or −1: joint torque of a positive (forward) command.
     pub drive_sign: f64,
+    /// Torque–speed line of its motor, where it has one.
+    pub motor: Option<Motor>,
     /// Velocity index of the wheel's own joint; none where it is locked.
     pub joint: Option<usize>,
     /// Velocity index of its steering joint; none where there is none or it is locked.
@@ -171,6 +174,18 @@ impl Model {
             locked.push((name.clone(), *angle));
         }
         Self::build(self.description.clone(), locked)
+    }
+
+    /// The same machine with another torque–speed line, or none, on all wheels.
+    ///
+    /// # Errors
+    /// `NotPositive` or `NotFinite` for a torque or a speed that is none.
+    pub fn with_motors(&self, motor: Option<Motor>) -> Result<Self, ModelError> {
+        let mut description = self.description.clone();
+        for wheel in &mut description.wheels {
+            wheel.motor = motor;
+        }
+        Self::build(description, self.locked.clone())
     }
 
     #[allow(clippy::too_many_lines)] // one pass over the solids; its parts share every local
@@ -314,6 +329,7 @@ impl Model {
                 radius: wheel.radius,
                 torque_limit: wheel.torque_limit,
                 drive_sign: wheel.drive_sign,
+                motor: wheel.motor,
                 joint: joint_of(&wheel.solid),
                 steering: wheel.steering.as_deref().and_then(joint_of),
                 steering_limit: wheel.steering_limit.unwrap_or(0.0),
@@ -727,6 +743,10 @@ fn check_wheels(description: &ModelDescription) -> Result<(), ModelError> {
                 field: at("drive_sign"),
                 value: wheel.drive_sign,
             });
+        }
+        if let Some(motor) = wheel.motor {
+            positive(&at("motor.stall_torque"), motor.stall_torque)?;
+            positive(&at("motor.no_load_speed"), motor.no_load_speed)?;
         }
         if let Some(name) = &wheel.steering {
             let Some(steering) = find(name) else {

@@ -1,9 +1,10 @@
 //! Energy and momentum of a state, summed over the bodies.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::kinematics::Kinematics;
 use super::model::Model;
+use super::state::Configuration;
 
 /// Kinetic and potential energy, J.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -97,6 +98,94 @@ pub fn centre_of_mass(model: &Model, kinematics: &Kinematics) -> Vector3<f64> {
     kinematics.base + moment / model.mass()
 }
 
+/// Scratch of [`energy_and_momentum`]: sized once for a model.
+#[derive(Clone, Debug)]
+pub struct EnergyScratch {
+    moving: Vec<Moving>,
+}
+
+impl EnergyScratch {
+    /// Room for a model.
+    #[must_use]
+    pub fn new(model: &Model) -> Self {
+        Self {
+            moving: vec![Moving::default(); model.bodies().len()],
+        }
+    }
+}
+
+/// Pose and velocity of a body's frame, world axes, places relative to the trunk origin.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moving {
+    R: Matrix3<f64>,
+    r: Vector3<f64>,
+    velocity: Vector3<f64>,
+    omega: Vector3<f64>,
+}
+
+/// Energy and linear momentum (kg m/s) of a state in one sweep, without poses that anything else needs: every step is audited with it.
+pub fn energy_and_momentum(
+    model: &Model,
+    q: &Configuration,
+    v: &[f64],
+    gravity: &Vector3<f64>,
+    scratch: &mut EnergyScratch,
+) -> (Energy, Vector3<f64>) {
+    let moving = &mut scratch.moving[..model.bodies().len()];
+    let rates = &v[5..5 + moving.len()];
+    let mut twice_kinetic = 0.0;
+    let mut momentum = Vector3::zeros();
+    let mut moment = Vector3::zeros();
+    for (b, body) in model.bodies().iter().enumerate() {
+        let own = if b == 0 {
+            Moving {
+                R: *q.attitude.to_rotation_matrix().matrix(),
+                r: Vector3::zeros(),
+                velocity: Vector3::new(v[0], v[1], v[2]),
+                omega: Vector3::new(v[3], v[4], v[5]),
+            }
+        } else {
+            let carrier = &moving[body.parent];
+            let lever = carrier.R * body.position;
+            let frame = match &body.rotation {
+                None => carrier.R,
+                Some(fixed) => carrier.R * fixed,
+            };
+            let (R, axis) = if body.is_spinner {
+                (frame, frame * body.axis.direction())
+            } else {
+                body.axis.rotate(&frame, q.joints[b - 1])
+            };
+            Moving {
+                R,
+                r: carrier.r + lever,
+                velocity: carrier.velocity + carrier.omega.cross(&lever),
+                omega: carrier.omega + axis * rates[b],
+            }
+        };
+        let (mut c, mut velocity) = (own.r, own.velocity);
+        if body.centre_of_mass != Vector3::zeros() {
+            let lever = own.R * body.centre_of_mass;
+            c += lever;
+            velocity += own.omega.cross(&lever);
+        }
+        let mut w = own.R.tr_mul(&own.omega);
+        if let Some(P) = &body.principal_axes {
+            w = P.tr_mul(&w);
+        }
+        twice_kinetic +=
+            body.mass * velocity.norm_squared() + body.principal_inertia.dot(&w.component_mul(&w));
+        momentum += velocity * body.mass;
+        moment += c * body.mass;
+        moving[b] = own;
+    }
+    let energy = Energy {
+        kinetic: 0.5 * twice_kinetic,
+        potential: -gravity.dot(&(q.position * model.mass() + moment)),
+    };
+    (energy, momentum)
+}
+
 /// Energy of a state.
 #[must_use]
 pub fn energy(model: &Model, kinematics: &Kinematics, v: &[f64], gravity: &Vector3<f64>) -> Energy {
@@ -116,5 +205,34 @@ pub fn momentum(model: &Model, kinematics: &Kinematics, v: &[f64]) -> Momentum {
     Momentum {
         linear: momenta.iter().map(|m| m.linear).sum(),
         angular: momenta.iter().map(|m| m.angular).sum(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_sweep_gives_the_energy_and_momentum_of_the_poses() {
+        let rover = Model::rover();
+        let joints = [
+            ("right_bogie".to_owned(), 0.3),
+            ("wheel_FL".to_owned(), 0.7),
+        ];
+        let welded = rover.with_locked_joints(&joints).unwrap();
+        for model in [rover, welded] {
+            let mut q = Configuration::zero(&model);
+            let v: Vec<f64> = (0..model.nv()).map(|k| (1.7 * k as f64).sin()).collect();
+            q.advance(&v, 0.8);
+            let gravity = Vector3::new(0.3, -9.81, 1.0);
+            let kinematics = Kinematics::of(&model, &q);
+            let mut scratch = EnergyScratch::new(&model);
+            let (found, linear) = energy_and_momentum(&model, &q, &v, &gravity, &mut scratch);
+            let expected = energy(&model, &kinematics, &v, &gravity);
+            assert!((found.kinetic - expected.kinetic).abs() < 1e-13 * expected.kinetic);
+            assert!((found.potential - expected.potential).abs() < 1e-12 * expected.kinetic);
+            let total = momentum(&model, &kinematics, &v).linear;
+            assert!((linear - total).norm() < 1e-13 * total.norm());
+        }
     }
 }

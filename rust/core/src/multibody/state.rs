@@ -7,7 +7,7 @@ use super::model::Model;
 use crate::spatial::exp_rotation;
 
 /// Where the machine is: trunk origin and attitude, joint angles. A point of R³ × SO(3) × R^n.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct Configuration {
     /// Trunk origin, world, m.
     pub position: Vector3<f64>,
@@ -15,6 +15,23 @@ pub struct Configuration {
     pub attitude: UnitQuaternion<f64>,
     /// Joint angles in the order of the bodies, rad.
     pub joints: Vec<f64>,
+}
+
+impl Clone for Configuration {
+    fn clone(&self) -> Self {
+        Self {
+            position: self.position,
+            attitude: self.attitude,
+            joints: self.joints.clone(),
+        }
+    }
+
+    /// Does not allocate where the sizes agree.
+    fn clone_from(&mut self, other: &Self) {
+        self.position = other.position;
+        self.attitude = other.attitude;
+        self.joints.clone_from(&other.joints);
+    }
 }
 
 impl Configuration {
@@ -47,13 +64,6 @@ impl Configuration {
         for (q, rate) in self.joints.iter_mut().zip(&v[6..]) {
             *q += h * rate;
         }
-    }
-
-    /// Copies without allocating.
-    pub fn copy_from(&mut self, other: &Self) {
-        self.position = other.position;
-        self.attitude = other.attitude;
-        self.joints.copy_from_slice(&other.joints);
     }
 
     /// Whether every entry is finite.

@@ -4,12 +4,14 @@
 //! Frames follow the rover's: n out of the ground, t = n × e_z, forward on level ground; a positive angle turns to the left, so a
 //! disc that rolls forward turns negatively.
 
-use nalgebra::{Cholesky, SMatrix, SVector, Vector2};
+use nalgebra::{Cholesky, SMatrix, SVector, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::ground::{ContactRule, Facing, Ground};
 use crate::contact::Activation;
-use crate::integrator::{MechanicalSystem, Start, StepOptions, UnilateralContact};
+use crate::integrator::{
+    MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
+};
 use crate::problem::{Dimension, FrictionContactProblem};
 
 /// A disc of a machine in the world.
@@ -300,6 +302,45 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
             .machine
             .force(&self.parts.middle, &v, &gravity, self.inputs);
         y.copy_from_slice((force * options.time_step).as_slice());
+    }
+
+    fn energy(
+        &mut self,
+        options: &StepOptions,
+        q: &SVector<f64, NV>,
+        v: &[f64],
+    ) -> Option<MechanicalEnergy> {
+        let v = SVector::<f64, NV>::from_column_slice(v);
+        let momentum = self.machine.mass_matrix(q) * v;
+        // A push along x or y sees the whole mass.
+        let mass = self.machine.mass_matrix(q)[(0, 0)];
+        Some(MechanicalEnergy {
+            kinetic: 0.5 * momentum.dot(&v),
+            potential: self.machine.potential(q, &options.gravity.xy()),
+            momentum: Vector3::new(momentum[0], momentum[1], 0.0),
+            mass,
+        })
+    }
+
+    fn work(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, SVector<f64, NV>>,
+        v_end: &[f64],
+    ) -> f64 {
+        if self.inputs.iter().all(|torque| *torque == 0.0) {
+            return 0.0;
+        }
+        let (still, none) = (SVector::zeros(), Vector2::zeros());
+        let torques = self
+            .machine
+            .force(&self.parts.middle, &still, &none, self.inputs);
+        let mean = start
+            .v
+            .iter()
+            .zip(v_end)
+            .map(|(begin, end)| options.theta * end + (1.0 - options.theta) * begin);
+        options.time_step * torques.iter().zip(mean).map(|(f, v)| f * v).sum::<f64>()
     }
 
     fn half_solve(&self, y: &mut [f64]) {

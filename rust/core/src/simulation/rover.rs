@@ -10,7 +10,7 @@ use super::snapshot::Snapshot;
 use crate::contact::{Activation, Contact, ContactFrame, Part, detect, detection::wheel_contacts};
 use crate::geometry::Terrain;
 use crate::integrator::{
-    ActiveContact, Command, HeldJoint, Integrator, NoProbe, OptionsError, Probe, StateMut,
+    ActiveContact, Command, Drive, HeldJoint, Integrator, NoProbe, OptionsError, Probe, StateMut,
     StepError, StepOptions, StepReport, TreeSystem, WarmStart, Workspace,
     workspace::contact_capacity,
 };
@@ -30,7 +30,8 @@ pub struct Simulation {
     workspace: Workspace,
     active: Vec<ActiveContact>,
     last_call: LastCall,
-    angles_before: Vec<f64>,
+    /// Work of each joint's drive since the last call began (n_joints), J.
+    drive_work: Vec<f64>,
 }
 
 /// What the last call of [`Simulation::step`] came to; not part of the state.
@@ -38,9 +39,9 @@ pub struct Simulation {
 pub struct LastCall {
     /// Report of its steps; empty where one could not be taken.
     pub report: StepReport,
-    /// Work through the wheel motors, Σ |τ_i Δφ_i|, driving or braking, J.
+    /// Work through the wheel motors, Σ |∫ τ_i dφ_i|, driving or braking, J.
     pub work: f64,
-    /// Its driving part, Σ max(τ_i Δφ_i, 0), J.
+    /// Its driving part, Σ max(∫ τ_i dφ_i, 0), J.
     pub positive_work: f64,
 }
 
@@ -57,6 +58,12 @@ impl Simulation {
         options.check()?;
         let mut command = Command::idle(&model);
         for wheel in model.wheels() {
+            if let Some(k) = wheel.joint {
+                command.drives[k - 6] = Some(Drive {
+                    torque: 0.0,
+                    motor: wheel.motor,
+                });
+            }
             if let Some(k) = wheel.steering {
                 let hold = model.bodies()[k - 5].hold;
                 command.held[k - 6] = Some(HeldJoint {
@@ -74,7 +81,7 @@ impl Simulation {
             workspace: Workspace::new(&model),
             active: Vec::with_capacity(contact_capacity(&model)),
             last_call: LastCall::default(),
-            angles_before: Vec::with_capacity(model.wheels().len()),
+            drive_work: vec![0.0; model.n_joints()],
             command,
             model,
             terrain,
@@ -186,9 +193,15 @@ impl Simulation {
 
     fn combine_torques(&mut self) {
         self.command.torque.copy_from_slice(&self.joint_torque);
+        for drive in self.command.drives.iter_mut().flatten() {
+            drive.torque = 0.0;
+        }
         for (wheel, torque) in self.model.wheels().iter().zip(&self.wheel_torque) {
-            if let Some(k) = wheel.joint {
-                self.command.torque[k - 6] += wheel.drive_sign * torque;
+            if let Some(drive) = wheel
+                .joint
+                .and_then(|k| self.command.drives[k - 6].as_mut())
+            {
+                drive.torque += wheel.drive_sign * torque;
             }
         }
     }
@@ -333,29 +346,11 @@ impl Simulation {
     /// # Errors
     /// See [`StepError`]. A solver that did not converge is no error: see the report.
     pub fn step(&mut self, n: usize) -> Result<StepReport, StepError> {
-        self.angles_before.clear();
-        let joints = &self.state.configuration.joints;
-        let angle = |joint: Option<usize>| joint.map_or(0.0, |k| joints[k - 6]);
-        let wheels = self.model.wheels();
-        self.angles_before
-            .extend(wheels.iter().map(|wheel| angle(wheel.joint)));
+        self.drive_work.fill(0.0);
         let result = self.step_probed(n, &mut NoProbe);
-
-        // The torque is constant over the call: its work is exactly torque times angle turned.
-        let (mut work, mut positive_work) = (0.0, 0.0);
-        let joints = &self.state.configuration.joints;
-        for ((wheel, torque), before) in self
-            .model
-            .wheels()
-            .iter()
-            .zip(&self.wheel_torque)
-            .zip(&self.angles_before)
-        {
-            let turned = wheel.joint.map_or(0.0, |k| joints[k - 6] - before);
-            let joules: f64 = torque * wheel.drive_sign * turned;
-            work += joules.abs();
-            positive_work += joules.max(0.0);
-        }
+        // A joint's work over the call counts as driving or as braking.
+        let work = self.drive_work.iter().map(|joules| joules.abs()).sum();
+        let positive_work = self.drive_work.iter().map(|joules| joules.max(0.0)).sum();
         self.last_call = LastCall {
             report: result.clone().unwrap_or_default(),
             work,
@@ -393,6 +388,13 @@ impl Simulation {
                 probe,
             )?;
             total.merge(&report);
+            for (sum, joules) in self
+                .drive_work
+                .iter_mut()
+                .zip(self.workspace.tree.drive_work())
+            {
+                *sum += joules;
+            }
             self.workspace.list_active(&mut self.active);
         }
         Ok(total)
@@ -526,6 +528,12 @@ impl Simulation {
             .iter()
             .flatten()
             .flat_map(|h| [h.set_point, h.stiffness, h.damping]);
+        // A snapshot's motors are the model's.
+        let is_drive = |(theirs, own): (&Option<Drive>, &Option<Drive>)| {
+            theirs.is_some() == own.is_some()
+                && theirs.is_none_or(|d| d.torque.is_finite())
+                && theirs.and_then(|d| d.motor) == own.and_then(|d| d.motor)
+        };
         let torques = command
             .torque
             .iter()
@@ -539,6 +547,12 @@ impl Simulation {
                 .iter()
                 .all(|t| t.len() == expected)
             && command.held.len() == expected
+            && command.drives.len() == expected
+            && command
+                .drives
+                .iter()
+                .zip(&self.command.drives)
+                .all(is_drive)
             && torques.copied().chain(held).all(f64::is_finite)
             && [0, self.model.nv()].contains(&snapshot.warm_start.persistent.len())
             && snapshot.warm_start.persistent.iter().all(|x| x.is_finite())

@@ -1,0 +1,221 @@
+//! The audit of a step's energy: a step may gain what gravity and actuators put in, and nothing else.
+//!
+//! ```text
+//! excess = (K + V)(q⁺, v⁺) − (K + V)(q, v) − W
+//! ```
+//!
+//! W is the work of torques, motors and held joints. Inelastic contact with friction only takes energy away, so a positive excess is
+//! the scheme's own: the linearisation (of third order in the step), a solver that stopped early, or Newton's law of restitution, which
+//! creates energy in some impacts with friction (Kane's paradox).
+//!
+//! - A coarse excess asks for the step to be taken again with implicit gyroscopic terms.
+//! - What is left is taken out by shortening the velocity, `v⁺ ← s v⁺`. Signorini's condition at e = 0 and Coulomb's law are
+//!   homogeneous in the velocity, so both hold as before.
+//! - In free flight energy is neither lost nor gained: there s goes both ways, and acts on the motion relative to the mass centre, which
+//!   keeps its momentum.
+//!
+//! The correction is of the order of the excess, so the scheme keeps its order. Lifting out of penetration happens after the audit and is
+//! counted apart.
+
+use nalgebra::Vector3;
+
+use super::ScratchOf;
+use super::mechanical_system::{MechanicalSystem, Start};
+use super::options::StepOptions;
+use super::report::{StepReport, StepStatus};
+
+/// Energy of a state, and its motion as a whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MechanicalEnergy {
+    /// J.
+    pub kinetic: f64,
+    /// J.
+    pub potential: f64,
+    /// Linear momentum, kg m/s.
+    pub momentum: Vector3<f64>,
+    /// kg.
+    pub mass: f64,
+}
+
+/// Largest gain in a step that is let pass, as a part of the kinetic energy.
+pub const GAIN: f64 = 5e-10;
+
+/// Excess, as a part of the kinetic energy, from which on the step is taken again.
+const COARSE: f64 = 1e-3;
+
+/// Roundings of the energies that are subtracted from each other.
+const ROUNDINGS: f64 = 64.0;
+
+/// Largest part by which the energy of free motion is raised in a step.
+const RAISE: f64 = 1.0;
+
+/// A state whose energy is known: the end of a step is the start of the next.
+#[derive(Clone, Debug)]
+pub(super) struct Audited<Q> {
+    configuration: Q,
+    v: Vec<f64>,
+    energy: Option<MechanicalEnergy>,
+}
+
+impl<Q> Audited<Q> {
+    pub(super) fn new(configuration: Q, nv: usize) -> Self {
+        Self {
+            configuration,
+            v: vec![f64::NAN; nv],
+            energy: None,
+        }
+    }
+}
+
+impl<Q: Clone> Audited<Q> {
+    /// Notes the energy of a state.
+    fn is(&mut self, configuration: &Q, v: &[f64], energy: MechanicalEnergy) {
+        self.configuration.clone_from(configuration);
+        self.v.clear();
+        self.v.extend_from_slice(v);
+        self.energy = Some(energy);
+    }
+}
+
+/// Energy at the start of a step: remembered from the end of the last one, where this is the same state.
+pub(super) fn energy_before<S: MechanicalSystem>(
+    system: &mut S,
+    options: &StepOptions,
+    start: Start<'_, S::Configuration>,
+    ws: &ScratchOf<S>,
+) -> Option<MechanicalEnergy> {
+    let known = &ws.audited;
+    if known.energy.is_some() && known.v == *start.v && known.configuration == *start.configuration
+    {
+        return known.energy;
+    }
+    system.energy(options, start.configuration, start.v)
+}
+
+/// What an audit found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Verdict {
+    /// The step may stand; its velocity may have been corrected.
+    Sound,
+    /// It should be taken again.
+    Coarse,
+}
+
+/// How far an audit may go.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Audit {
+    /// Energy before the step; none where the system is not audited.
+    pub before: Option<MechanicalEnergy>,
+    /// Whether there is no safer way left.
+    pub is_last: bool,
+    /// Part of the kinetic energy that free flight may gain or lose: an error of the scheme's order that does not add up.
+    pub drift: f64,
+}
+
+impl Audit {
+    /// Judges `ws.v` and `ws.end`, before projection, and corrects `ws.v` where there is no safer way.
+    pub(super) fn judge<S: MechanicalSystem>(
+        &self,
+        system: &mut S,
+        options: &StepOptions,
+        start: Start<'_, S::Configuration>,
+        ws: &mut ScratchOf<S>,
+        report: &mut StepReport,
+    ) -> Verdict {
+        system.normalise(&mut ws.end);
+        let Some(before) = self.before else {
+            return Verdict::Sound;
+        };
+        let work = system.work(options, start, &ws.v);
+        let Some(after) = system.energy(options, &ws.end, &ws.v) else {
+            return Verdict::Sound;
+        };
+        ws.audited.energy = None;
+        let excess = (after.kinetic - before.kinetic) + (after.potential - before.potential) - work;
+        if !excess.is_finite() {
+            return if self.is_last {
+                Verdict::Sound // not finite: refused when the step ends
+            } else {
+                Verdict::Coarse
+            };
+        }
+        // A machine at rest has no kinetic energy to measure by: what gravity gives in a step of free fall is the least that counts.
+        let fall = options.gravity.norm() * options.time_step;
+        let least = 0.5 * after.mass * fall * fall;
+        let size = before.kinetic.max(after.kinetic).max(least);
+        let sum = before.kinetic.abs()
+            + after.kinetic.abs()
+            + before.potential.abs()
+            + after.potential.abs()
+            + work.abs();
+        let rounding = ROUNDINGS * f64::EPSILON * sum;
+        let is_free = ws.contacts.is_empty();
+        let is_balanced = if is_free {
+            excess.abs() <= rounding + self.drift * size
+        } else {
+            excess <= rounding + GAIN * size
+        };
+        if is_balanced {
+            report.energy_gain = report.energy_gain.max(relative(excess - rounding, size));
+            ws.audited.is(&ws.end, &ws.v, after);
+            return Verdict::Sound;
+        }
+        let coarse = if is_free { excess.abs() } else { excess };
+        if coarse > COARSE * size && !self.is_last {
+            return Verdict::Coarse;
+        }
+        let whole = after.momentum.norm_squared() / (2.0 * after.mass);
+        let relative_kinetic = after.kinetic - whole;
+        let d = S::DIMENSION.components();
+        if is_free && excess < relative_kinetic {
+            let share = (1.0 - excess / relative_kinetic).min(1.0 + RAISE).sqrt();
+            let translation = after.momentum / after.mass;
+            for (k, v) in ws.v.iter_mut().enumerate() {
+                let common = if k < d { translation[k] } else { 0.0 };
+                *v = common + share * (*v - common);
+            }
+        } else if excess > 0.0 {
+            let share = (1.0 - excess / after.kinetic).max(0.0).sqrt();
+            for x in ws.v.iter_mut().chain(&mut ws.u) {
+                *x *= share;
+            }
+            let left = excess - after.kinetic;
+            if left > rounding + GAIN * size {
+                // Not even standing still gives it back.
+                report.energy_gain = report.energy_gain.max(relative(left, size));
+                report.status = StepStatus::NotConverged;
+            }
+        }
+        report.energy_removed += excess.max(0.0);
+        if let Some(corrected) = system.energy(options, &ws.end, &ws.v) {
+            ws.audited.is(&ws.end, &ws.v, corrected);
+        }
+        Verdict::Sound
+    }
+}
+
+/// Counts what a projection that has moved `ws.end` did to the energy.
+pub(super) fn count_lift<S: MechanicalSystem>(
+    system: &mut S,
+    options: &StepOptions,
+    ws: &mut ScratchOf<S>,
+    report: &mut StepReport,
+) {
+    let Some(before) = ws.audited.energy else {
+        return;
+    };
+    let Some(after) = system.energy(options, &ws.end, &ws.v) else {
+        return;
+    };
+    let lifted = (after.kinetic - before.kinetic) + (after.potential - before.potential);
+    report.energy_lifted += lifted.max(0.0);
+    ws.audited.is(&ws.end, &ws.v, after);
+}
+
+fn relative(excess: f64, size: f64) -> f64 {
+    if excess > 0.0 {
+        excess / size.max(f64::MIN_POSITIVE)
+    } else {
+        0.0
+    }
+}
