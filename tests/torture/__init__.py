@@ -1,1 +1,1 @@
-"""What breaks: random scenes, damaged files and faults, seeded so that every find comes back."""
+"""The campaign that tries to break everything: random scenes, damaged files and faults, seeded: `make torture`."""
