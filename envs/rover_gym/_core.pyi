@@ -946,21 +946,46 @@ def soil_packing(
 @final
 class SolverReport:
     @property
-    def status(self) -> Literal["converged", "relaxed", "not_converged"]:
-        """ "relaxed": the convex relaxation is solved, not Coulomb's law."""
+    def status(self) -> Literal["converged", "relaxed", "not_converged", "budget_exhausted"]:
+        """ "relaxed": the convex relaxation is solved, not Coulomb's law. "budget_exhausted": the work that `budget`
+        allows was done; the answer is the nearest one known by then."""
     @property
     def is_converged(self) -> bool: ...
     @property
     def iterations(self) -> int: ...
     @property
     def residual(self) -> float:
-        """Violation of Coulomb's law relative to the data, computed from the returned impulses."""
+        """Violation of Signorini's and Coulomb's laws relative to the data, computed from the returned impulses."""
     @property
     def velocity_error(self) -> float:
-        """Largest violation of Coulomb's law at one contact, m/s."""
+        """Largest violation of Signorini's and Coulomb's laws at one contact, m/s."""
     @property
     def solver(self) -> str:
         """The method that answered; never "auto"."""
+    @property
+    def stage(
+        self,
+    ) -> Literal[
+        "at_rest",
+        "sweeps",
+        "body_sweeps",
+        "islands",
+        "warm_newton",
+        "pivoting",
+        "guided_newton",
+        "newton",
+        "proximal",
+        "admm",
+        "relaxed",
+    ]:
+        """The stage that answered; "at_rest" where q = 0 left nothing to do."""
+    @property
+    def stages(self) -> list[tuple[str, str, int]]:
+        """Every stage that was tried, in order: its name, why it ended ("converged", "max_iterations", "stalled",
+        "budget_exhausted", "non_finite", "relaxed") and its iterations."""
+    @property
+    def work(self) -> int:
+        """Work done, in the unit of `budget`."""
     @property
     def law(self) -> Literal["coulomb", "relaxed"]:
         """The law that the answer obeys."""
@@ -987,6 +1012,7 @@ def solve_friction_contact(
     solver: Literal["auto", "nsgs", "newton", "proximal", "admm", "relaxed"] = "auto",
     max_iterations: int = 1000,
     initial: npt.ArrayLike | None = None,
+    budget: int = 300000000,
 ) -> FrictionContactSolution:
     """Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K, for any W (n_c d, n_c d).
 
@@ -1004,8 +1030,10 @@ def solve_friction_contact(
             converged.
         max_iterations: Most Newton steps, sweeps or ADMM iterations.
         initial: Warm start (n_c d,), N s.
+        budget: Most work, counted and not timed: one unit is a multiplication with its addition in a product with W.
+            The default takes about 0.3 s. What it does not allow is left undone, and the report says so.
 
     Raises:
         ProblemError: Wrong shapes or entries.
-        OptionError: Unknown solver or dimension, tolerance or max_iterations out of range.
+        OptionError: Unknown solver or dimension; tolerance, max_iterations or budget out of range.
     """

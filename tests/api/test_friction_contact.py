@@ -144,3 +144,103 @@ def test_bad_options_are_refused_by_field():
     with pytest.raises(rover_gym.ProblemError) as caught:
         rover_gym.solve_friction_contact(*problem, initial=[np.nan, 0.0, 0.0])
     assert caught.value.field == "initial"
+
+
+@pytest.mark.parametrize("solver", ["auto", "nsgs", "newton", "proximal"])
+@pytest.mark.parametrize("mu", [1e8, 1e12, 1e16, 1e300])
+def test_a_contact_with_enormous_friction_sticks(solver, mu):
+    # It was answered by p = 0, with the contact approaching at 1 m/s, and called converged.
+    answer = rover_gym.solve_friction_contact(np.eye(3), [-1.0, 1.0, 1.0], [mu], solver=solver)
+    assert answer.report.is_converged
+    np.testing.assert_allclose(answer.impulses, [[1.0, -1.0, -1.0]], atol=1e-12)
+    assert np.abs(answer.velocities).max() < 1e-12
+
+
+def test_a_rover_with_enormous_friction_gains_no_energy():
+    # With friction=1e16 every step was called converged while the energy grew.
+    sim = rover_gym.Simulation(friction=1e16)
+    before = sim.energy().total
+    for _ in range(40):
+        report = sim.step(10)
+        after = sim.energy().total
+        assert report.status != "converged" or after <= before + 1e-6 * abs(before)
+        before = after
+
+
+@pytest.mark.parametrize("solver", ["auto", "nsgs", "newton", "proximal", "admm", "relaxed"])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_problem_without_contacts_has_an_empty_answer(solver, dimension):
+    # ADMM and the relaxation panicked.
+    d = dimension
+    for W in (np.zeros((0, 0)), ([0], [], np.zeros((0, d, d)))):
+        answer = rover_gym.solve_friction_contact(W, [], [], dimension=d, solver=solver)
+        assert answer.impulses.shape == answer.velocities.shape == (0, d)
+        assert answer.report.status == ("relaxed" if solver == "relaxed" else "converged")
+        assert (answer.report.stage, answer.report.iterations) == ("at_rest", 0)
+
+
+def test_the_report_names_its_stages(sim):
+    sim.step()
+    problem = sim.last_problem()
+    cold = rover_gym.solve_friction_contact(*problem)
+    name, end, _ = cold.report.stages[-1]
+    assert (name, end) == (cold.report.stage, "converged")
+    assert sum(iterations for *_, iterations in cold.report.stages) == cold.report.iterations
+    warm = rover_gym.solve_friction_contact(*problem, initial=cold.impulses)
+    assert warm.report.stages == [("warm_newton", "converged", warm.report.iterations)]
+    assert "warm_newton" in repr(warm.report)
+
+
+def test_a_spent_budget_is_said_and_the_work_is_counted(sim):
+    sim.step()
+    problem = sim.last_problem()
+    answer = rover_gym.solve_friction_contact(*problem, budget=1000)
+    assert answer.report.status == "budget_exhausted"
+    assert answer.report.work <= 1000
+    full = rover_gym.solve_friction_contact(*problem)
+    assert full.report.is_converged
+    again = rover_gym.solve_friction_contact(*problem, budget=full.report.work)
+    np.testing.assert_array_equal(again.impulses, full.impulses)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("tolerance", "much"),
+        ("tolerance", 10**400),
+        ("tolerance", float("nan")),
+        ("dimension", -1),
+        ("dimension", 2.5),
+        ("solver", 3),
+        ("max_iterations", -1),
+        ("max_iterations", 10**400),
+        ("budget", -1),
+        ("budget", "all"),
+    ],
+)
+def test_options_of_the_wrong_kind_are_refused_by_field(field, value):
+    with pytest.raises(rover_gym.OptionError) as caught:
+        rover_gym.solve_friction_contact(np.eye(3), np.zeros(3), [0.5], **{field: value})
+    assert caught.value.field == field
+    assert str(caught.value).startswith(field)
+
+
+@pytest.mark.parametrize(
+    ("W", "q", "mu"),
+    [
+        (np.eye(3), [1e308, -1e308, 1e308], [1.0]),
+        (np.eye(3) * 1e308, [-1e308, 1.0, 0.0], [1e308]),
+        (np.eye(3) * 1e-308, [-1e308, 1.0, 0.0], [0.5]),
+        (np.eye(3) * 5e-324, [-1.0, 1.0, 0.0], [0.5]),
+        (np.diag([1e-300, 1e300, 1.0]), [-1.0, 1.0, 0.0], [0.5]),
+        (np.array([[1.0, 1e308, 0], [1e308, 1, 0], [0, 0, 1.0]]), [-1.0, 1.0, 0.0], [1e5]),
+    ],
+)
+@pytest.mark.parametrize("solver", ["auto", "nsgs", "newton", "proximal", "admm", "relaxed"])
+def test_numbers_at_the_end_of_their_range_neither_panic_nor_lie(W, q, mu, solver):
+    answer = rover_gym.solve_friction_contact(W, q, mu, solver=solver, max_iterations=50)
+    p, u = answer.impulses[0], answer.velocities[0]
+    assert np.isfinite(p).all() and np.isfinite(u).all()
+    if answer.report.is_converged:
+        assert u[0] >= -1e-6 * np.abs(q).max()
+        assert p[0] >= 0.0

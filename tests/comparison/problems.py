@@ -1,5 +1,6 @@
 """Recorded friction-contact problems, which are no part of this repository, and how an answer is judged."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -52,7 +53,19 @@ def recorded(folder: Path | None) -> list[Problem]:
     return sorted(found, key=lambda problem: len(problem.q))
 
 
+#: Environment variable that names the folder of the recorded problems.
+SETTING = "ROVER_GYM_CONTACT_PROBLEMS"
+
+
 def problem_folder() -> Path | None:
-    """`shared/reference/contact_problems` beside the repository or above it."""
-    places = [ancestor / "shared" / "reference" / "contact_problems" for ancestor in Path(__file__).resolve().parents]
-    return next((place for place in places if place.is_dir()), None)
+    """The folder that `ROVER_GYM_CONTACT_PROBLEMS` names; None where it is not set.
+
+    Raises:
+        NotADirectoryError: It names something else.
+    """
+    if not os.environ.get(SETTING):
+        return None
+    folder = Path(os.environ[SETTING])
+    if not folder.is_dir():
+        raise NotADirectoryError(f"{SETTING} names no folder: {folder}")
+    return folder

@@ -9,7 +9,8 @@ run that sufficed. The profile at tau is the share of problems that a solver ans
 time (or iterations). Source: Dolan and Moré 2002.
 
 The recorded problems are no part of this repository (Siconos' public collection and synthetic ones as .npz with W, q,
-mu and dimension); without their folder the synthetic families alone are used.
+mu and dimension); their folder is given by --problems or ROVER_GYM_CONTACT_PROBLEMS, and without it the synthetic
+families alone are used.
 """
 
 from __future__ import annotations

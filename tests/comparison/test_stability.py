@@ -7,7 +7,7 @@ import pytest
 
 from comparison.failure import bodies, rover
 from comparison.failure.finding import Finding
-from comparison.problems import problem_folder
+from comparison.problems import SETTING, problem_folder
 from comparison.stability import table
 
 AUTO = {"solver auto": bodies.SOLVERS["solver auto"]}
@@ -26,7 +26,7 @@ def split(findings: Iterator[Finding]) -> tuple[list[Finding], list[Finding]]:
 @pytest.mark.parametrize("scene", bodies.SCENES, ids=lambda scene: scene.__name__)
 def test_law_and_solver_hold(scene: Callable[..., Iterator[Finding]]) -> None:
     if scene is bodies.one_object and problem_folder() is None:
-        pytest.skip("the recorded problem is no part of the repository")
+        pytest.skip(f"{SETTING} is not set: the recorded problem is no part of the repository")
     own, _ = split(scene(AUTO))
     assert own
     assert not [f for f in own if not f.holds]

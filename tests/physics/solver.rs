@@ -4,7 +4,9 @@ mod solver_scenes;
 
 use proptest::prelude::*;
 use rover_core::problem::{Dimension, FrictionContactProblem, evaluate};
-use rover_core::solver::{Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve};
+use rover_core::solver::{
+    Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, Stage, solve,
+};
 use solver_scenes::{Problem, ROVER_NV, Scene, falling, pile, rover, table};
 
 const METHODS: [Method; 5] = [
@@ -581,6 +583,311 @@ proptest! {
             let violation = coulomb_violation(&problem, &p);
             prop_assert!(violation < 1e-8, "{violation:e} with {report:?}");
         }
+    }
+}
+
+/// Sum without rounding to speak of (Neumaier), so that a cancellation in `W p + q` is the answer's and not the test's.
+fn exact_sum(terms: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let (mut sum, mut lost) = (0.0_f64, 0.0_f64);
+    for (a, b) in terms {
+        let product = a * b;
+        lost += a.mul_add(b, -product);
+        let next = sum + product;
+        lost += if sum.abs() >= product.abs() {
+            (sum - next) + product
+        } else {
+            (product - next) + sum
+        };
+        sum = next;
+    }
+    sum + lost
+}
+
+/// The laws that an answer breaks by more than a millionth of the largest free velocity: approach and slip in m/s, adhesion and
+/// friction beyond the cone in N s of the contact's own mass.
+fn broken_laws(problem: &Problem, p: &[f64]) -> Vec<String> {
+    let (n, d) = (problem.q.len(), problem.dimension.components());
+    let speed = 1e-6 * problem.q.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let row = |r: usize| {
+        let terms = (0..n).map(|c| (problem.W[r * n + c], p[c]));
+        exact_sum(terms.chain([(problem.q[r], 1.0)]))
+    };
+    let mut broken = Vec::new();
+    for (i, &mu) in problem.mu.iter().enumerate() {
+        let u: Vec<f64> = (d * i..d * (i + 1)).map(row).collect();
+        let p = &p[d * i..d * (i + 1)];
+        let diagonal = |k: usize| problem.W[(d * i + k) * (n + 1)];
+        let normal = speed / diagonal(0);
+        let tangential = speed * (d - 1) as f64 / (1..d).map(diagonal).sum::<f64>();
+        let (push, slip) = (size(&p[1..]), size(&u[1..]));
+        let limit = mu * p[0].max(0.0);
+        let opposed: Vec<f64> = (1..d).map(|k| p[k] + limit * u[k] / slip).collect();
+        for (law, is_broken) in [
+            ("approach", u[0] < -speed),
+            ("adhesion", p[0] < -normal),
+            ("force at a distance", u[0] > speed && p[0] > normal),
+            (
+                "friction beyond the cone",
+                push > limit * (1.0 + 1e-12) + tangential,
+            ),
+            (
+                "slip without friction against it",
+                slip > speed && size(&opposed) > 1e-6 * limit + tangential,
+            ),
+        ] {
+            if is_broken {
+                broken.push(format!("contact {i}, {law}: p {p:?}, u {u:?}, mu {mu:e}"));
+            }
+        }
+    }
+    broken
+}
+
+/// A random mechanism in other units: W, q and μ times powers of ten, and bodies of very different masses.
+fn scaled_problem() -> impl Strategy<Value = Problem> {
+    let exponent = || prop_oneof![Just(0.0), -12.0..12.0f64];
+    let scales = (exponent(), exponent(), exponent());
+    let masses = prop::collection::vec(prop_oneof![Just(0.0), -6.0..6.0f64], 14);
+    let parts = (1usize..5, 2usize..14, prop::bool::ANY);
+    (parts, scales, masses, 0u64..u64::MAX).prop_map(
+        |((n_c, nv, planar), (w, q, mu), masses, seed)| {
+            let mut state = seed;
+            let mut uniform = move || {
+                state = state
+                    .wrapping_mul(0x5851_f42d_4c95_7f2d)
+                    .wrapping_add(0x1405_7b7e_f767_814f);
+                (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+            };
+            let dimension = if planar {
+                Dimension::Two
+            } else {
+                Dimension::Three
+            };
+            let d = dimension.components();
+            let scene = Scene {
+                dimension,
+                rows: (0..d * n_c)
+                    .map(|_| (0..nv).map(|_| uniform()).collect())
+                    .collect(),
+                inverse_mass: (0..nv).map(|k| 10.0_f64.powf(w + masses[k])).collect(),
+                mu: (0..n_c)
+                    .map(|_| 10.0_f64.powf(mu) * uniform().abs())
+                    .collect(),
+            };
+            let v: Vec<f64> = (0..nv).map(|_| 10.0_f64.powf(q) * uniform()).collect();
+            scene.problem(&v)
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(1500) })]
+
+    #[test]
+    fn converged_means_signorini_and_coulomb_at_every_scale(problem in scaled_problem()) {
+        for method in METHODS {
+            let options = SolverOptions { method, max_sweeps: 300, ..SolverOptions::default() };
+            let mut p = vec![0.0; problem.q.len()];
+            let (u, report) = solve_with(&problem, &options, &mut p);
+            prop_assert!(p.iter().chain(&u).all(|x| x.is_finite()));
+            if report.is_converged() {
+                let broken = broken_laws(&problem, &p);
+                prop_assert!(broken.is_empty(), "{method:?}: {broken:#?} with {report:?}");
+            }
+        }
+    }
+}
+
+/// The story: `W = I`, `q = (-1, 1, 1)` and `mu = 1e12` were answered by `p = 0` and "converged", with the contact approaching at 1 m/s; single
+/// methods did so from `mu = 1e8`, since De Saxcé's `u_N + mu |u_T|` leaves no digit for `u_N`.
+#[test]
+fn no_friction_coefficient_lets_a_contact_approach() {
+    for exponent in -300..=300 {
+        let mu = 10.0_f64.powi(exponent);
+        let problem = Problem {
+            dimension: Dimension::Three,
+            W: vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            q: vec![-1.0, 1.0, 1.0],
+            mu: vec![mu],
+        };
+        for method in METHODS {
+            let options = SolverOptions {
+                method,
+                max_sweeps: 100,
+                ..SolverOptions::default()
+            };
+            let mut p = vec![0.0; 3];
+            let (_, report) = solve_with(&problem, &options, &mut p);
+            assert!(
+                report.is_converged() || method == Method::Admm,
+                "{method:?}, mu {mu:e}: {report:?}"
+            );
+            if report.is_converged() {
+                let push = mu.min(2.0_f64.sqrt()) * 0.5_f64.sqrt();
+                assert!(
+                    distance(&p, &[1.0, -push, -push]) < 1e-9,
+                    "{method:?}, mu {mu:e}: {p:?}"
+                );
+            }
+        }
+    }
+}
+
+/// The unit of mass and of velocity are the caller's: from 1e-300 to 1e300 the answer is the same up to its own unit.
+#[test]
+fn the_answer_does_not_depend_on_the_units() {
+    let sound = parked_rover();
+    let (reference, _, _) = solved(&sound);
+    for stiffness in [
+        2.0_f64.powi(-900),
+        2.0_f64.powi(-40),
+        2.0_f64.powi(40),
+        2.0_f64.powi(900),
+    ] {
+        for speed in [2.0_f64.powi(-100), 1.0, 2.0_f64.powi(100)] {
+            let problem = Problem {
+                W: sound.W.iter().map(|w| w * stiffness).collect(),
+                q: sound.q.iter().map(|q| q * speed).collect(),
+                ..sound.clone()
+            };
+            let mut p = vec![0.0; 18];
+            let options = SolverOptions {
+                velocity_tolerance: 1e-9 * speed,
+                ..SolverOptions::default()
+            };
+            let (_, report) = solve_with(&problem, &options, &mut p);
+            assert!(
+                report.is_converged(),
+                "{stiffness:e}, {speed:e}: {report:?}"
+            );
+            let unit = speed / stiffness;
+            let p: Vec<f64> = p.iter().map(|p| p / unit).collect();
+            assert!(
+                distance(&p, &reference) < 1e-12 * size(&reference),
+                "{stiffness:e}, {speed:e}"
+            );
+        }
+    }
+}
+
+/// The story: ADMM and the relaxation panicked on a problem without contacts.
+#[test]
+fn a_problem_without_contacts_is_solved_by_every_method() {
+    for dimension in [Dimension::Two, Dimension::Three] {
+        let problem = Problem {
+            dimension,
+            W: vec![],
+            q: vec![],
+            mu: vec![],
+        };
+        for method in Method::ALL {
+            let options = SolverOptions {
+                method,
+                ..SolverOptions::default()
+            };
+            let (_, report) = solve_with(&problem, &options, &mut []);
+            let expected = if method == Method::Relaxed {
+                SolveStatus::SolvedRelaxed
+            } else {
+                SolveStatus::Converged
+            };
+            assert_eq!((report.status, report.stage), (expected, Stage::AtRest));
+        }
+    }
+}
+
+/// The story: `report.solver` said "newton" for four different ladders.
+#[test]
+fn the_report_names_the_stage_that_answered_and_those_before_it() {
+    let stages = |report: &SolveReport| -> Vec<(Stage, SolveStatus)> {
+        let rungs = report.rungs.as_slice();
+        let total: usize = rungs.iter().map(|rung| rung.iterations).sum();
+        assert_eq!(total, report.iterations);
+        rungs.iter().map(|rung| (rung.stage, rung.status)).collect()
+    };
+    let problem = parked_rover();
+    let (mut p, _, cold) = solved(&problem);
+    // At rest some mode is a matter of choice, which the guess leaves to Newton.
+    assert_eq!(
+        stages(&cold),
+        [
+            (Stage::GuidedNewton, SolveStatus::Stalled),
+            (Stage::Newton, SolveStatus::Converged)
+        ]
+    );
+    assert_eq!(cold.stage, Stage::Newton);
+    let (_, warm) = solve_with(&problem, &SolverOptions::default(), &mut p);
+    assert_eq!(stages(&warm), [(Stage::WarmNewton, SolveStatus::Converged)]);
+    let column = pile(&[1.0; 12], 0.9).problem(&falling(12, 9.81e-3));
+    let (_, _, many) = solved(&column);
+    assert_eq!(many.rungs.as_slice()[0].stage, Stage::Sweeps);
+    assert_eq!(many.rungs.as_slice()[0].status, SolveStatus::Stalled);
+    assert_eq!(
+        many.rungs.as_slice().last().map(|rung| rung.stage),
+        Some(many.stage)
+    );
+    for method in [
+        Method::GaussSeidel,
+        Method::Newton,
+        Method::ProximalPoint,
+        Method::Admm,
+    ] {
+        let mut p = vec![0.0; 18];
+        let options = SolverOptions {
+            method,
+            ..SolverOptions::default()
+        };
+        let (_, report) = solve_with(&problem, &options, &mut p);
+        assert_eq!(report.rungs.as_slice().len(), 1, "{method:?}");
+        assert_eq!(report.rungs.as_slice()[0].stage, report.stage);
+    }
+}
+
+/// Twelve cubes on each other, of masses from 1 to 1000, pushed every way.
+fn hard_problem() -> Problem {
+    let masses: Vec<f64> = (0..12).map(|k| 10.0_f64.powi(k % 4)).collect();
+    let mut v = falling(12, 9.81e-3);
+    for (k, v) in v.iter_mut().enumerate() {
+        *v += 1e-2 * (1.3 * (k * k) as f64).sin();
+    }
+    pile(&masses, 0.3).problem(&v)
+}
+
+/// The story: a step with 131 contacts took 3.5 s, one with 500 a minute. Work is counted, so that the end is the same on every machine.
+#[test]
+fn a_budget_ends_every_method_with_the_nearest_answer_known() {
+    let problem = hard_problem();
+    let n = problem.q.len();
+    for method in METHODS {
+        let start = evaluate(&problem.view(), &vec![0.0; n]).relative;
+        let mut last = start;
+        let mut ends = 0;
+        for budget in [0, 1 << 16, 1 << 18, 1 << 20, 1 << 22, 1 << 24] {
+            let options = SolverOptions {
+                method,
+                budget,
+                tolerance: 1e-14,
+                velocity_tolerance: 1e-14,
+                ..SolverOptions::default()
+            };
+            let mut p = vec![0.0; n];
+            let (u, report) = solve_with(&problem, &options, &mut p);
+            assert!(report.work <= budget, "{method:?}: {report:?}");
+            assert!(p.iter().chain(&u).all(|x| x.is_finite()));
+            let judged = evaluate(&problem.view(), &p);
+            assert!((judged.relative - report.residual).abs() <= 1e-9 * report.residual + 1e-13);
+            assert!(
+                report.residual <= last,
+                "{method:?}: {report:?} after {last:e}"
+            );
+            last = report.residual;
+            ends += usize::from(report.status == SolveStatus::BudgetExhausted);
+            let mut again = vec![0.0; n];
+            let (_, same) = solve_with(&problem, &options, &mut again);
+            assert_eq!((same, again), (report, p));
+        }
+        assert!(ends >= 2, "{method:?}: the budget never mattered");
+        assert!(last < 0.9 * start, "{method:?}: {last:e} is the best");
     }
 }
 

@@ -1,4 +1,4 @@
-//! Prints one row per recorded friction-contact problem and method: iterations, residual, velocity error, time (best of many).
+//! Prints one row per friction-contact problem, of the shelf and recorded ones, and method: iterations, residual, velocity error, time (best of many).
 //!
 //! `cargo run --release --example solver_table -- [name filter] [auto|nsgs|newton|proximal|admm|relaxed|all] [tolerance]`
 #![allow(clippy::print_stdout)] // its purpose
@@ -35,7 +35,9 @@ fn main() {
         "{:42} {:>4} {:>14} {:>14} {:>6} {:>9} {:>9} {:>12}",
         "problem", "nc", "method", "status", "iter", "residual", "m/s", "time"
     );
-    for recorded in solver_npz::recorded(|name| name.contains(filter)) {
+    let shelf = solver_npz::shelf(|name| name.contains(filter));
+    let outside = solver_npz::recorded(|name| name.contains(filter));
+    for recorded in shelf.into_iter().chain(outside) {
         let problem =
             FrictionContactProblem::new(recorded.dimension, &recorded.W, &recorded.q, &recorded.mu)
                 .expect("a sound problem");

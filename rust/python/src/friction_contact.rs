@@ -25,6 +25,7 @@ impl SolverReport {
         match self.inner.status {
             SolveStatus::Converged => "converged",
             SolveStatus::SolvedRelaxed => "relaxed",
+            SolveStatus::BudgetExhausted => "budget_exhausted",
             _ => "not_converged",
         }
     }
@@ -55,6 +56,24 @@ impl SolverReport {
     }
 
     #[getter]
+    fn stage(&self) -> &'static str {
+        self.inner.stage.name()
+    }
+
+    #[getter]
+    fn stages(&self) -> Vec<(&'static str, &'static str, usize)> {
+        let rungs = self.inner.rungs.as_slice().iter();
+        rungs
+            .map(|rung| (rung.stage.name(), rung.status.name(), rung.iterations))
+            .collect()
+    }
+
+    #[getter]
+    fn work(&self) -> u64 {
+        self.inner.work
+    }
+
+    #[getter]
     fn law(&self) -> &'static str {
         match self.inner.method.law() {
             ContactLaw::Coulomb => "coulomb",
@@ -65,8 +84,10 @@ impl SolverReport {
     fn __repr__(&self) -> String {
         let (status, r) = (self.status(), &self.inner);
         format!(
-            "SolverReport(status={status:?}, iterations={}, residual={:.3e})",
-            r.iterations, r.residual
+            "SolverReport(status={status:?}, stage={:?}, iterations={}, residual={:.3e})",
+            r.stage.name(),
+            r.iterations,
+            r.residual
         )
     }
 }
@@ -207,21 +228,54 @@ fn problem_error(field: &str, message: String, value: Value) -> BorderError {
     }
 }
 
+/// An argument of its type, or the default where it is not given.
+fn given<'py, T: for<'a> FromPyObject<'a, 'py>>(
+    value: Option<&Bound<'py, PyAny>>,
+    field: &str,
+    wanted: &str,
+    default: T,
+) -> PyResult<T> {
+    let Some(value) = value else {
+        return Ok(default);
+    };
+    value.extract().map_err(|_| {
+        let text = value
+            .repr()
+            .map_or_else(|_| String::new(), |r| r.to_string());
+        let message = format!("{field}: must be {wanted}, is {text}");
+        BorderError::option(field, message, Value::Text(text)).into()
+    })
+}
+
 /// Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
-#[pyo3(signature = (W, q, mu, tolerance = 1e-8, *, dimension = 3, solver = "auto", max_iterations = 1000, initial = None))]
+#[pyo3(signature = (
+    W, q, mu, tolerance = None, *, dimension = None, solver = None, max_iterations = None, initial = None, budget = None
+), text_signature = "(W, q, mu, tolerance=1e-08, *, dimension=3, solver='auto', max_iterations=1000, initial=None, budget=300000000)")]
 pub fn solve_friction_contact(
     py: Python<'_>,
     W: &Bound<'_, PyAny>,
     q: &Bound<'_, PyAny>,
     mu: &Bound<'_, PyAny>,
-    tolerance: f64,
-    dimension: usize,
-    solver: &str,
-    max_iterations: usize,
+    tolerance: Option<&Bound<'_, PyAny>>,
+    dimension: Option<&Bound<'_, PyAny>>,
+    solver: Option<&Bound<'_, PyAny>>,
+    max_iterations: Option<&Bound<'_, PyAny>>,
     initial: Option<&Bound<'_, PyAny>>,
+    budget: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<FrictionContactSolution> {
+    let tolerance: f64 = given(tolerance, "tolerance", "a number", 1e-8)?;
+    let dimension: usize = given(dimension, "dimension", "2 or 3", 3)?;
+    let solver = given(solver, "solver", "a name", "auto".to_owned())?;
+    let max_iterations = given(
+        max_iterations,
+        "max_iterations",
+        "a whole number >= 1",
+        1000,
+    )?;
+    let default_budget = SolverOptions::DEFAULT_BUDGET;
+    let budget = given(budget, "budget", "a whole number >= 0", default_budget)?;
     let kind = match dimension {
         2 => Dimension::Two,
         3 => Dimension::Three,
@@ -230,7 +284,10 @@ pub fn solve_friction_contact(
             return Err(BorderError::option("dimension", message, Value::Count(dimension)).into());
         }
     };
-    let options = solver_options(solver, tolerance, max_iterations, &Method::ALL)?;
+    let options = SolverOptions {
+        budget,
+        ..solver_options(&solver, tolerance, max_iterations, &Method::ALL)?
+    };
     let W = Delassus::read(W, kind)?;
     let q = flat(q, "q")?;
     let mu = vector(mu, Kind::Problem, "mu")?;

@@ -317,7 +317,7 @@ fn sleep_leaves_the_motion_as_it_is_and_wakes_what_is_struck() {
     let mean = apart.iter().sum::<f64>() / apart.len() as f64;
     // After an impact that moves disks by several radii: a hundredth of a radius in the mean. Where a single disk falls is chaotic, it moves by
     // 0.4 mm where the struck place is shifted by 1 nm.
-    assert!(mean < 0.00015 && worst < 0.003, "{mean} m, {worst} m");
+    assert!(mean < 0.00015 && worst < 0.005, "{mean} m, {worst} m");
 }
 
 #[test]

@@ -5,7 +5,8 @@
 //! contact would lift off with the velocity `μ|u_T|` (the convex relaxation). Source: De Saxcé and Feng 1998; Acary and
 //! Brogliato 2008, ch. 3.
 
-use crate::cone::{SecondOrderCone, tangential_norm};
+use super::signorini;
+use crate::cone::{SecondOrderCone, project_on_disc, tangential_norm};
 
 /// The three states of a contact with friction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -55,6 +56,39 @@ pub fn natural_map<const D: usize>(
     map
 }
 
+/// Violation of Signorini's condition and of Coulomb's law by one contact, each as a velocity (m/s); zero exactly where both hold.
+///
+/// ```text
+/// normal      min(u_N, p_N/ρ_N)
+/// tangential  (p_T − Π_D(p_T − ρ_T u_T))/ρ_T,   D the disc of radius μ max(p_N, 0)
+/// ```
+///
+/// `p`: impulse, N s. `u`: velocity, m/s. `rho`: `[ρ_N, ρ_T]`, kg, about the inverse diagonal of the contact's block of W. Unlike the
+/// [natural map](natural_map) it has no product of μ and a velocity, which at a large μ leaves no digit for `u_N`: `p = 0` at
+/// `u = (−1, 1)` is a zero of the natural map in floating point from μ = 1e16 on, and nearly one from 1e8 on.
+/// Source: Alart and Curnier 1991.
+#[inline]
+#[must_use]
+pub fn violation<const D: usize>(
+    p: &[f64; D],
+    u: &[f64; D],
+    friction_coefficient: f64,
+    [rho_N, rho_T]: [f64; 2],
+) -> [f64; D] {
+    let mut z = *p;
+    for k in 1..D {
+        z[k] -= rho_T * u[k];
+    }
+    let projected = project_on_disc(&z, friction_coefficient * p[0]);
+    let inverse = 1.0 / rho_T;
+    let mut violation = *u;
+    violation[0] = signorini::violation(u[0], p[0], rho_N);
+    for k in 1..D {
+        violation[k] = (p[k] - projected[k]) * inverse;
+    }
+    violation
+}
+
 /// The mode that the pair `(p, u)` of a solved contact shows.
 ///
 /// `threshold`: impulses below it count as none, N s. Sliding is reported when the impulse reaches the cone's surface
@@ -98,6 +132,30 @@ mod tests {
             length(natural_map(&[2.0, -0.6, -0.8], &[0.0, 3.0, 4.0], mu, 0.7)) < 1e-15,
             "slide"
         );
+    }
+
+    #[test]
+    fn the_three_states_violate_nothing_at_any_friction() {
+        let scales = [0.7, 0.3];
+        for mu in [1e-12, 0.5, 1e12] {
+            for (p, u) in [
+                ([0.0; 3], [0.2, 3.0, -4.0]),
+                ([2.0, 0.6 * mu, 0.8 * mu], [0.0; 3]),
+                ([2.0, -1.2 * mu, -1.6 * mu], [0.0, 3.0, 4.0]),
+            ] {
+                assert!(length(violation(&p, &u, mu, scales)) < 1e-14 * (1.0 + mu));
+            }
+        }
+    }
+
+    #[test]
+    fn no_friction_hides_an_approach_or_a_slip() {
+        for mu in [0.0, 1e-12, 1.0, 1e8, 1e12, 1e300] {
+            let [normal, ..] = violation(&[0.0; 3], &[-1.0, 1.0, 1.0], mu, [1.0; 2]);
+            assert!((normal - 1.0).abs() < 1e-15, "{mu}");
+            let [_, slip] = violation(&[1.0, 0.0], &[0.0, 1e-3], mu, [1.0; 2]);
+            assert!((slip - mu.min(1e-3)).abs() < 1e-15, "{mu}");
+        }
     }
 
     #[test]

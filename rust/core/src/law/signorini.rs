@@ -7,7 +7,13 @@
 #[inline]
 #[must_use]
 pub fn violation(u_N: f64, p_N: f64, rho: f64) -> f64 {
-    u_N.min(p_N / rho).abs()
+    let pressed = p_N / rho;
+    // A velocity that is no number stays one.
+    if pressed <= u_N {
+        pressed.abs()
+    } else {
+        u_N.abs()
+    }
 }
 
 #[cfg(test)]

@@ -146,6 +146,15 @@ impl BlockSparseDelassus {
         part
     }
 
+    /// The same pattern with every entry times `factor`.
+    pub(crate) fn scaled(&self, factor: f64) -> Self {
+        let mut scaled = self.clone();
+        for x in &mut scaled.blocks {
+            *x *= factor;
+        }
+        scaled
+    }
+
     fn clear(&mut self, components: usize) {
         self.components = components;
         for list in [

@@ -18,5 +18,7 @@ mod residual;
 pub use block_sparse::{BlockSparseDelassus, PairContact};
 pub use friction_contact::{Dimension, FrictionContactProblem, ProblemError};
 pub use operator::Operator;
-pub use residual::{Residual, contact_scale, evaluate, evaluate_into, local_velocity};
-pub(crate) use residual::{dot, evaluate_contact};
+pub use residual::{
+    ContactScales, Residual, contact_scales, evaluate, evaluate_into, local_velocity,
+};
+pub(crate) use residual::{Magnitudes, Violations, dot, evaluate_contact, power_of_two};

@@ -1,18 +1,20 @@
-//! How well an impulse solves a problem: the natural map, relative and in m/s.
+//! How well an impulse solves a problem: Signorini's and Coulomb's violations, relative and in m/s.
 //!
-//! `F_i(p) = p_i − Π_K(p_i − ρ_i ũ_i)` vanishes exactly at the solutions. `ρ_i = d / tr W_ii` (kg), the inverse mean
-//! diagonal of the contact's own block, does not depend on the choice of tangents. Two numbers are made of it:
+//! Each contact is judged by [`violation`], a velocity `v_i` in m/s that vanishes exactly where both laws hold; its scales are the contact's own,
+//! `ρ_N = 1/W_NN` and `ρ_T` the inverse mean of the tangential diagonal, so that no other contact's mass and no friction coefficient enters.
+//! With the contact's mass `ρ_i = d / tr W_ii` (none of the three depends on the choice of tangents) two numbers are made of it:
 //!
-//! - `relative = |F| / |(ρ_i q_i)|`: error against the impulses that the free velocity asks for;
-//! - `velocity = max_i |F_i| / ρ_i` in m/s, which a large mass ratio cannot hide.
+//! - `relative`, the larger of `|(ρ_i v_i)| / |(ρ_i q_i)|` (impulses, which a light contact cannot hide) and `|(v_i)| / |(q_i)|` (velocities, which a
+//!   heavy one cannot hide): the error against what the free velocity asks for;
+//! - `velocity = max_i |v_i|` in m/s.
 
 use super::{Dimension, FrictionContactProblem};
-use crate::law::coulomb::natural_map;
+use crate::law::coulomb::violation;
 
 /// Distance of an impulse from the law, see the page above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residual {
-    /// Natural map relative to the data, dimensionless; the plain norm in N s when `q = 0`.
+    /// Violation relative to the data, dimensionless; `|(ρ_i v_i)|` in N s when `q = 0`.
     pub relative: f64,
     /// Largest violation at one contact, m/s.
     pub velocity: f64,
@@ -120,65 +122,170 @@ pub fn local_velocity(problem: &FrictionContactProblem<'_>, p: &[f64], u: &mut [
         .multiply_add(p, problem.free_velocity(), u);
 }
 
-/// The scale `ρ_i = d / tr W_ii` of one contact, kg; 1 where the block has no positive trace.
+/// The scales of one contact, kg.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactScales {
+    /// `ρ = d / tr W_ii`; 1 where the block has no positive trace.
+    pub mass: f64,
+    /// `[ρ_N, ρ_T]`: inverse of `W_NN` and of the mean tangential diagonal; `ρ` where that is not positive.
+    pub modes: [f64; 2],
+}
+
+impl ContactScales {
+    /// From `W_NN` and the sum of the tangential diagonal entries, 1/kg.
+    #[inline]
+    pub(crate) fn new<const D: usize>(normal: f64, tangential: f64) -> Self {
+        let (own, mean) = (normal + tangential, tangential / (D - 1) as f64);
+        let mass = if own > 0.0 { D as f64 / own } else { 1.0 };
+        let inverse = |x: f64| if x > 0.0 { 1.0 / x } else { mass };
+        Self {
+            mass,
+            modes: [inverse(normal), inverse(mean)],
+        }
+    }
+}
+
+/// The scales of contact `contact`, kg.
 #[inline]
 #[must_use]
-pub fn contact_scale(problem: &FrictionContactProblem<'_>, contact: usize) -> f64 {
+pub fn contact_scales(problem: &FrictionContactProblem<'_>, contact: usize) -> ContactScales {
     let (dimension, n, W) = (
         problem.dimension(),
         problem.n_unknowns(),
         problem.operator(),
     );
-    let d = dimension.components();
-    let trace: f64 = (0..d).map(|k| W.diagonal(dimension, n, contact, k)).sum();
-    if trace > 0.0 { d as f64 / trace } else { 1.0 }
+    let entry = |k| W.diagonal(dimension, n, contact, k);
+    match dimension {
+        Dimension::Two => ContactScales::new::<2>(entry(0), entry(1)),
+        Dimension::Three => ContactScales::new::<3>(entry(0), entry(1) + entry(2)),
+    }
 }
 
-/// Natural map of the contact that starts at `offset`: squared norm in (N s)².
+/// Violation of the contact that starts at `offset`: square in (m/s)².
 #[inline]
 pub(crate) fn evaluate_contact<const D: usize>(
     p: &[f64],
     u: &[f64],
     offset: usize,
     mu: f64,
-    rho: f64,
+    scales: [f64; 2],
 ) -> f64 {
     let mut p_i = [0.0; D];
     let mut u_i = [0.0; D];
     p_i.copy_from_slice(&p[offset..offset + D]);
     u_i.copy_from_slice(&u[offset..offset + D]);
-    natural_map(&p_i, &u_i, mu, rho).iter().map(|x| x * x).sum()
+    violation(&p_i, &u_i, mu, scales)
+        .iter()
+        .map(|x| x * x)
+        .sum()
 }
 
+/// Sums over the contacts that the two numbers are made of.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Violations {
+    /// `Σ |v_i|²`, (m/s)².
+    pub squares: f64,
+    /// `Σ |ρ_i v_i|²`, (N s)².
+    pub weighted: f64,
+    /// `max |v_i|²`, (m/s)².
+    pub largest: f64,
+}
+
+impl Violations {
+    /// Adds a contact of mass `mass` (kg) with a violation of `square` (m²/s²).
+    #[inline]
+    pub fn add(&mut self, square: f64, mass: f64) {
+        self.squares += square;
+        self.weighted += (mass * mass) * square;
+        self.largest = self.largest.max(square);
+    }
+
+    /// The residual; `inverse_speed` is `1/|q|` and `inverse_data` is `1/|(ρ_i q_i)|`.
+    #[inline]
+    pub fn residual(&self, inverse_speed: f64, inverse_data: f64) -> Residual {
+        // A NaN is in both sums.
+        if !(self.squares.is_finite() && self.weighted.is_finite()) {
+            return Residual::UNSOLVED;
+        }
+        let (velocity, impulse) = (
+            self.squares.sqrt() * inverse_speed,
+            self.weighted.sqrt() * inverse_data,
+        );
+        Residual {
+            relative: velocity.max(impulse),
+            velocity: self.largest.sqrt(),
+        }
+    }
+}
+
+/// Sums of the data that [`Violations`] are measured against.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Magnitudes {
+    squares: f64,
+    weighted: f64,
+}
+
+impl Magnitudes {
+    /// Adds the free velocity of a contact of mass `mass` (kg).
+    #[inline]
+    pub fn add(&mut self, q: &[f64], mass: f64) {
+        let square: f64 = q.iter().map(|x| x * x).sum();
+        self.squares += square;
+        self.weighted += (mass * mass) * square;
+    }
+
+    /// `1/|q|` and `1/|(ρ_i q_i)|`; 0 and 1 where there is nothing to be measured against.
+    #[inline]
+    pub fn inverses(&self) -> [f64; 2] {
+        if self.squares > 0.0 {
+            [1.0 / self.squares.sqrt(), 1.0 / self.weighted.sqrt()]
+        } else {
+            [0.0, 1.0]
+        }
+    }
+}
+
+/// The largest power of two within `x`, for exact scaling; 1 for what is not positive and finite.
+#[inline]
+pub(crate) fn power_of_two(x: f64) -> f64 {
+    const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
+    if x > 0.0 && x.is_finite() {
+        f64::from_bits(x.to_bits() & EXPONENT).max(f64::MIN_POSITIVE)
+    } else {
+        1.0
+    }
+}
+
+/// In units of the largest free velocity and the largest mass, so that no square overflows or vanishes.
 fn evaluate_in<const D: usize>(
     problem: &FrictionContactProblem<'_>,
     p: &[f64],
     u: &[f64],
 ) -> Residual {
-    let (mut map, mut data, mut velocity) = (0.0, 0.0, 0.0_f64);
-    let mut finite = true;
+    let q = problem.free_velocity();
+    let speed = power_of_two(q.iter().fold(0.0, |m, x| m.max(x.abs())));
+    let masses = (0..problem.n_contacts()).map(|i| contact_scales(problem, i).mass);
+    let mass = power_of_two(masses.fold(0.0, f64::max));
+    let (mut violations, mut data) = (Violations::default(), Magnitudes::default());
     for (contact, &mu) in problem.friction_coefficients().iter().enumerate() {
-        let rho = contact_scale(problem, contact);
-        let offset = D * contact;
-        let square = evaluate_contact::<D>(p, u, offset, mu, rho);
-        finite &= square.is_finite();
-        map += square;
-        velocity = velocity.max(square / (rho * rho));
-        for q in &problem.free_velocity()[offset..offset + D] {
-            data += (rho * q) * (rho * q);
-        }
+        let scales = contact_scales(problem, contact);
+        let at = |k: usize| D * contact + k;
+        let p_i: [f64; D] = std::array::from_fn(|k| p[at(k)] / mass / speed);
+        let u_i: [f64; D] = std::array::from_fn(|k| u[at(k)] / speed);
+        let q_i: [f64; D] = std::array::from_fn(|k| q[at(k)] / speed);
+        let square = evaluate_contact::<D>(&p_i, &u_i, 0, mu, scales.modes.map(|rho| rho / mass));
+        violations.add(square, scales.mass / mass);
+        data.add(&q_i, scales.mass / mass);
     }
-    if !finite {
-        return Residual::UNSOLVED;
-    }
-    let relative = if data > 0.0 {
-        (map / data).sqrt()
-    } else {
-        map.sqrt()
-    };
+    let [inverse_speed, inverse_data] = data.inverses();
+    let Residual { relative, velocity } = violations.residual(inverse_speed, inverse_data);
     Residual {
-        relative,
-        velocity: velocity.sqrt(),
+        relative: if inverse_speed > 0.0 {
+            relative
+        } else {
+            relative * mass * speed
+        },
+        velocity: velocity * speed,
     }
 }
 
@@ -229,6 +336,36 @@ mod tests {
         assert!(solved.relative < 1e-15 && solved.velocity < 1e-15);
         let open = evaluate(&problem, &[0.0; 3]);
         assert!(open.relative > 0.5 && open.velocity > 0.08, "{open:?}");
+    }
+
+    #[test]
+    fn an_approach_is_seen_at_every_scale() {
+        for scale in [1e-300, 1e-12, 1.0, 1e12, 1e300] {
+            for stiffness in [1e-300, 1e-12, 1.0, 1e12, 1e300] {
+                let W = [stiffness, 0.0, 0.0, stiffness];
+                let q = [-scale, scale];
+                let problem =
+                    FrictionContactProblem::new(Dimension::Two, &W, &q, &[1e12]).expect("sound");
+                let found = evaluate(&problem, &[0.0; 2]);
+                assert!((found.relative - 0.5_f64.sqrt()).abs() < 1e-14, "{found:?}");
+                assert!((found.velocity / scale - 1.0).abs() < 1e-14, "{found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn neither_a_heavy_nor_a_light_contact_hides_the_other() {
+        // Two contacts that do not know each other, 1 kg and 1e12 kg; one of them keeps its approach.
+        let mut W = vec![0.0; 16];
+        for (k, w) in [1.0, 1.0, 1e-12, 1e-12].into_iter().enumerate() {
+            W[5 * k] = w;
+        }
+        let q = [-1.0, 0.0, -1.0, 0.0];
+        let problem =
+            FrictionContactProblem::new(Dimension::Two, &W, &q, &[0.5; 2]).expect("sound");
+        assert!(evaluate(&problem, &[1.0, 0.0, 0.0, 0.0]).relative > 0.5);
+        assert!(evaluate(&problem, &[0.0, 0.0, 1e12, 0.0]).relative > 0.5);
+        assert!(evaluate(&problem, &[1.0, 0.0, 1e12, 0.0]).relative < 1e-15);
     }
 
     #[test]

@@ -33,8 +33,6 @@ pub struct Simulation {
     workspace: Workspace,
     active: Vec<ActiveContact>,
     last_call: LastCall,
-    /// Work of each joint's drive since the last call began (n_joints), J.
-    drive_work: Vec<f64>,
 }
 
 /// What the last call of [`Simulation::step`] came to; not part of the state.
@@ -84,7 +82,6 @@ impl Simulation {
             workspace: Workspace::new(&model),
             active: Vec::with_capacity(contact_capacity(&model)),
             last_call: LastCall::default(),
-            drive_work: vec![0.0; model.n_joints()],
             command,
             model,
             terrain,
@@ -377,11 +374,12 @@ impl Simulation {
         n: usize,
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<StepReport, StepError> {
-        self.drive_work.fill(0.0);
+        self.workspace.tree.drive_work().fill(0.0);
         let result = self.step_probed(n, go_on, &mut NoProbe);
         // A joint's work over the call counts as driving or as braking.
-        let work = self.drive_work.iter().map(|joules| joules.abs()).sum();
-        let positive_work = self.drive_work.iter().map(|joules| joules.max(0.0)).sum();
+        let joints = self.workspace.tree.drive_work();
+        let work = joints.iter().map(|joules| joules.abs()).sum();
+        let positive_work = joints.iter().map(|joules| joules.max(0.0)).sum();
         self.last_call = LastCall {
             report: result.clone().unwrap_or_default(),
             work,
@@ -424,13 +422,6 @@ impl Simulation {
                 probe,
             )?;
             total.merge(&report);
-            for (sum, joules) in self
-                .drive_work
-                .iter_mut()
-                .zip(self.workspace.tree.drive_work())
-            {
-                *sum += joules;
-            }
             self.workspace.list_active(&mut self.active);
             if !go_on() {
                 break;

@@ -17,7 +17,7 @@ use super::methods::ContactLaw;
 use super::modes::Linearised;
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
-use super::{SolverOptions, reduced_system};
+use super::{SolverOptions, reduced_system, work};
 use crate::cone::{SecondOrderCone, tangential_norm};
 use crate::law::coulomb::ContactMode;
 use crate::problem::{Operator, Residual};
@@ -35,7 +35,7 @@ const LARGEST_CHANGE: f64 = 10.0;
 /// After so many changes `σ` is kept, so that the iteration cannot chase its own balance.
 const MAX_CHANGES: usize = 40;
 
-/// Factors `W + R`; `false` where that fails.
+/// Factors `W + R`; `false` where that fails, or the budget does not allow it.
 fn factorise<const D: usize>(
     data: &Prepared<'_>,
     sigma: f64,
@@ -47,6 +47,9 @@ fn factorise<const D: usize>(
     match data.W {
         Operator::Dense(W) => {
             let (n, size) = (data.n, dense::chunks(data.n));
+            if !workspace.work.affords(work::dense(n, false)) {
+                return false;
+            }
             for (i, contact) in workspace.contacts.iter_mut().enumerate() {
                 *contact = Linearised {
                     mode: ContactMode::Stick,
@@ -65,6 +68,9 @@ fn factorise<const D: usize>(
             if !workspace.is_analysed {
                 workspace.block_lu.analyse(W);
                 workspace.is_analysed = true;
+            }
+            if !workspace.work.affords(workspace.block_lu.work()) {
+                return false;
             }
             workspace.contacts.fill(Linearised {
                 mode: ContactMode::Stick,
@@ -158,10 +164,7 @@ pub(super) fn solve<const D: usize>(
         }
     }
     if !factorise::<D>(data, sigma, workspace) {
-        return (
-            SolveStatus::Stalled,
-            data.measure::<D>(&workspace.rho, p, u),
-        );
+        return (SolveStatus::Stalled, data.measure::<D>(workspace, p, u));
     }
     let mut best = Residual::UNSOLVED;
     workspace.best.copy_from_slice(p);
@@ -170,7 +173,7 @@ pub(super) fn solve<const D: usize>(
         if step % LOOK == 0 || step == options.max_sweeps {
             data.W.multiply_add(p, data.q, u);
             let residual = if shifts {
-                data.measure::<D>(&workspace.rho, p, u)
+                data.measure::<D>(workspace, p, u)
             } else {
                 relaxed_residual::<D>(data, &workspace.rho, p, u)
             };
@@ -182,7 +185,9 @@ pub(super) fn solve<const D: usize>(
                 workspace.best.copy_from_slice(p);
             }
             let is_solved = Prepared::accepts(options, residual);
-            if is_solved || step >= options.max_sweeps || !residual.is_finite() {
+            // A substitution costs about as much as a product.
+            let is_spent = !workspace.work.affords(LOOK as u64 * 2 * data.product);
+            if is_solved || is_spent || step >= options.max_sweeps || !residual.is_finite() {
                 p.copy_from_slice(&workspace.best);
                 data.W.multiply_add(p, data.q, u);
                 let status = match (is_solved, law) {
@@ -190,7 +195,7 @@ pub(super) fn solve<const D: usize>(
                     (true, ContactLaw::Coulomb) => SolveStatus::Converged,
                     (true, ContactLaw::Relaxed) => SolveStatus::SolvedRelaxed,
                 };
-                return (status, data.measure::<D>(&workspace.rho, p, u));
+                return (status, data.measure::<D>(workspace, p, u));
             }
         }
         let rhs = workspace.rhs.as_flattened_mut();

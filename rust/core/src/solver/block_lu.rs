@@ -70,9 +70,26 @@ fn product<const D: usize>(a: &Block<D>, b: &Block<D>) -> Block<D> {
     std::array::from_fn(|r| std::array::from_fn(|c| (0..D).map(|k| a[r][k] * b[k][c]).sum()))
 }
 
+/// `out -= A B` of one block.
+#[inline]
+fn subtract_block<const D: usize>(a: &Block<D>, b: &[f64], out: &mut [f64]) {
+    // Lengths that the compiler knows.
+    let (b, out) = (&b[..D * D], &mut out[..D * D]);
+    for r in 0..D {
+        for c in 0..D {
+            let mut sum = 0.0;
+            for m in 0..D {
+                sum += a[r][m] * b[D * m + c];
+            }
+            out[D * r + c] -= sum;
+        }
+    }
+}
+
 /// `out -= A x` of one block.
 #[inline]
 fn subtract_product<const D: usize>(block: &[f64], x: &[f64; D], out: &mut [f64; D]) {
+    let block = &block[..D * D];
     for r in 0..D {
         for k in 0..D {
             out[r] -= block[D * r + k] * x[k];
@@ -224,6 +241,19 @@ impl BlockLu {
         self.correction.resize(W.components() * n, 0.0);
     }
 
+    /// Work of a factorisation of the analysed pattern and of the step that it serves.
+    pub fn work(&self) -> u64 {
+        let d = if self.order.is_empty() {
+            0
+        } else {
+            self.rhs.len() / self.order.len()
+        };
+        let rows = (0..self.order.len()).map(|k| self.upper.row(k).len());
+        let products: usize = rows.map(|columns| columns * (columns + 4)).sum();
+        let blocks = self.matrix.len() / (d * d).max(1);
+        (d * d * d * products + 4 * d * d * (blocks + self.order.len())) as u64
+    }
+
     /// Builds and factors `Bᵀ (W + α R) C + γ` of the predicted modes; `weights` is the diagonal of `R`, one number a contact. `false` at a singular pivot.
     pub fn factorise<const D: usize>(
         &mut self,
@@ -287,15 +317,7 @@ impl BlockLu {
                 let target = self.upper.columns[up];
                 let out = &mut self.row[D * D * target..D * D * (target + 1)];
                 let block = &self.upper_blocks[D * D * up..D * D * (up + 1)];
-                for r in 0..D {
-                    for c in 0..D {
-                        let mut sum = 0.0;
-                        for m in 0..D {
-                            sum += factor[r][m] * block[D * m + c];
-                        }
-                        out[D * r + c] -= sum;
-                    }
-                }
+                subtract_block(&factor, block, out);
             }
         }
         for at in self.upper.row(k) {

@@ -7,7 +7,7 @@
 //!
 //! Contacts are visited in four places of the list in turn, so that one need not wait for what the one before it wrote.
 //!
-//! The answer is judged as every solver's: by the natural map of the returned impulse, with the velocities summed anew. It never adds energy:
+//! The answer is judged as every solver's: by the violation of the returned impulse, with the velocities summed anew. It never adds energy:
 //! an approximate answer with `pᵀu > 0` is shortened until pᵀu = 0.
 //!
 //! Source: Jean 1999 and Moreau 1999 (the sweep); Nesterov 1983, O'Donoghue and Candès 2015 (extrapolation with restart).
@@ -16,15 +16,18 @@ use super::body_pairs::{BodyPairs, DiscPair, WIDE};
 use super::one_contact::solve_one_contact;
 use super::options::{Method, SolverOptions};
 use super::passivity::passive_share;
-use super::report::{SolveReport, SolveStatus};
-use crate::law::coulomb::natural_map;
-use crate::problem::Residual;
+use super::report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
+use crate::law::coulomb::violation;
+use crate::problem::{Magnitudes, Residual, Violations};
 
 /// Places of the list that are visited in turn.
 const PLACES: usize = 4;
 
 /// Sweeps after which the answer is measured, whatever their change says.
 const PATIENCE: usize = 50;
+
+/// Work of one visit of a contact, in units of [`SolverOptions::budget`].
+const UNITS: u64 = 30;
 
 /// Scratch of [`solve_body_pairs`].
 #[derive(Clone, Debug, Default)]
@@ -270,21 +273,20 @@ impl BodySweeps {
     /// The residual as [`crate::problem::residual::evaluate_into`] defines it; writes p and u.
     fn measure(&mut self, p: &mut [f64], u: &mut [f64]) -> Measured {
         self.sum();
-        let (mut map, mut data, mut velocity) = (0.0, 0.0, 0.0_f64);
+        let (mut violations, mut data) = (Violations::default(), Magnitudes::default());
         let (mut work, mut free) = (0.0, 0.0);
         let mut judge = |i: usize, row: &Row, own: [f64; 2]| {
             let [i_n, i_t] = row.inverse;
             let sum = i_n + i_t;
-            let rho = if sum > 0.0 {
+            let mass = if sum > 0.0 {
                 2.0 * i_n * i_t / sum
             } else {
                 1.0
             };
-            let [f_n, f_t] = natural_map(&row.p, &own, row.mu, rho);
-            let square = f_n * f_n + f_t * f_t;
-            map += square;
-            velocity = velocity.max(square / (rho * rho));
-            data += rho * rho * (row.q[0] * row.q[0] + row.q[1] * row.q[1]);
+            let scale = |inverse: f64| if inverse > 0.0 { inverse } else { mass };
+            let [v_n, v_t] = violation(&row.p, &own, row.mu, [scale(i_n), scale(i_t)]);
+            violations.add(v_n * v_n + v_t * v_t, mass);
+            data.add(&row.q, mass);
             work += row.p[0] * own[0] + row.p[1] * own[1];
             free += row.p[0] * row.q[0] + row.p[1] * row.q[1];
             p[2 * i..2 * i + 2].copy_from_slice(&row.p);
@@ -296,19 +298,8 @@ impl BodySweeps {
         for (i, row) in (self.rows.len()..).zip(&self.wide) {
             judge(i, &row.disc, row.local(&self.velocity, &self.own));
         }
-        // A NaN anywhere is in the sum.
-        let residual = if f64::is_finite(map) {
-            Residual {
-                relative: if data > 0.0 {
-                    f64::sqrt(map / data)
-                } else {
-                    f64::sqrt(map)
-                },
-                velocity: velocity.sqrt(),
-            }
-        } else {
-            Residual::UNSOLVED
-        };
+        let [inverse_speed, inverse_data] = data.inverses();
+        let residual = violations.residual(inverse_speed, inverse_data);
         Measured {
             residual,
             work,
@@ -328,11 +319,30 @@ impl BodySweeps {
 /// Solves `K_μ* ∋ ũ ⊥ p ∈ K_μ`, `u = Zᵀ Z p + q`, in the plane.
 ///
 /// q (2 n_c), m/s; mu (n_c); p (2 n_c), N s: in, the warm start, out, the impulses inside their cones; u (2 n_c), m/s: out. Only
-/// the tolerances and `max_sweeps` of the options matter. Allocates only when there are more contacts than ever before.
+/// the tolerances and `max_sweeps` of the options matter; the budget does not. Allocates only when there are more contacts than ever before.
 ///
 /// # Panics
 /// If a length does not fit.
 pub fn solve_body_pairs(
+    pairs: &BodyPairs,
+    q: &[f64],
+    mu: &[f64],
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    sweeps: &mut BodySweeps,
+) -> SolveReport {
+    let mut report = sweep_pairs(pairs, q, mu, options, p, u, sweeps);
+    report.work = UNITS * (pairs.len() * report.iterations) as u64;
+    report.rungs.push(Rung {
+        stage: report.stage,
+        status: report.status,
+        iterations: report.iterations,
+    });
+    report
+}
+
+fn sweep_pairs(
     pairs: &BodyPairs,
     q: &[f64],
     mu: &[f64],
@@ -351,7 +361,10 @@ pub fn solve_body_pairs(
         iterations: 0,
         residual: 0.0,
         velocity_error: 0.0,
+        work: 0,
         method: Method::GaussSeidel,
+        stage: Stage::BodySweeps,
+        rungs: Rungs::default(),
     };
     for (p, &mu) in p.chunks_exact_mut(2).zip(mu) {
         // A start outside its cone (another μ, another step) is drawn in.

@@ -136,12 +136,12 @@ pub(super) fn solve<const D: usize>(
         *iterations += 1;
         p.copy_from_slice(&workspace.trial);
         data.W.multiply_add(p, data.q, u);
-        let residual = data.measure::<D>(&workspace.rho, p, u);
+        let residual = data.measure::<D>(workspace, p, u);
         let progress = residual.relative / last;
         let is_solved = Prepared::accepts(options, residual)
             || (progress > LEAST_GAIN
                 && residual.relative < ROUNDING_ASKED
-                && data.is_within_rounding::<D>(&workspace.rho, p, u));
+                && data.is_within_rounding::<D>(workspace, p, u));
         if is_solved {
             return is_decided::<D>(data, &workspace.contacts, u).then_some(residual);
         }

@@ -6,10 +6,12 @@
 
 use super::auto::Prepared;
 use super::methods::{Automatic, Outcome, solve_by};
-use super::report::SolveStatus;
+use super::report::{SolveReport, SolveStatus, Stage};
 use super::workspace::SolverWorkspace;
 use super::{Method, SolverOptions};
-use crate::problem::{BlockSparseDelassus, Dimension, FrictionContactProblem, evaluate_contact};
+use crate::problem::{
+    BlockSparseDelassus, Dimension, FrictionContactProblem, Residual, Violations, evaluate_contact,
+};
 
 /// Most contacts of an island whose `W` is copied as a dense matrix.
 const DENSE_ISLAND: usize = 64;
@@ -99,20 +101,23 @@ pub(super) fn solve<const D: usize>(
     let n_islands = islands.find(W);
     let mut worst = Method::GaussSeidel;
     if n_islands > 1 {
-        for island in 0..n_islands {
+        // The small ones first: a large one may take all that is left of the budget.
+        let mut order: Vec<usize> = (0..n_islands).collect();
+        order.sort_by_key(|&island| islands.starts[island + 1] - islands.starts[island]);
+        for island in order {
             let range = islands.starts[island]..islands.starts[island + 1];
-            if !is_solved::<D>(
-                data,
-                options,
-                &workspace.rho,
-                &islands.contacts[range],
-                p,
-                u,
-            ) {
-                let method =
-                    solve_island::<D>(data, W, options, island, p, &mut islands, iterations);
-                if rank(method) > rank(worst) {
-                    worst = method;
+            let contacts = &islands.contacts[range];
+            if !is_solved::<D>(data, options, workspace, contacts, p, u) {
+                let own = SolverOptions {
+                    budget: workspace.work.budget.saturating_sub(workspace.work.spent),
+                    ..*options
+                };
+                let report = solve_island::<D>(data, W, &own, island, p, &mut islands);
+                *iterations += report.iterations;
+                workspace.work.spent += report.work;
+                workspace.work.is_exhausted |= report.status == SolveStatus::BudgetExhausted;
+                if rank(report.method) > rank(worst) {
+                    worst = report.method;
                 }
             }
         }
@@ -122,15 +127,20 @@ pub(super) fn solve<const D: usize>(
         return None;
     }
     data.W.multiply_add(p, data.q, u);
-    let residual = data.measure::<D>(&workspace.rho, p, u);
+    let residual = data.measure::<D>(workspace, p, u);
     let status = if Prepared::accepts(options, residual)
-        || (residual.relative < 1e-7 && data.is_within_rounding::<D>(&workspace.rho, p, u))
+        || (residual.relative < 1e-7 && data.is_within_rounding::<D>(workspace, p, u))
     {
         SolveStatus::Converged
     } else {
         SolveStatus::Stalled
     };
-    Some((worst, status, residual))
+    Some(Outcome {
+        method: worst,
+        stage: Stage::Islands,
+        status,
+        residual,
+    })
 }
 
 /// How far an answer had to escalate.
@@ -146,21 +156,20 @@ fn rank(method: Method) -> usize {
 fn is_solved<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
-    rho: &[f64],
+    workspace: &SolverWorkspace,
     contacts: &[usize],
     p: &[f64],
     u: &[f64],
 ) -> bool {
     let share = contacts.len() as f64 / data.mu.len() as f64;
-    let mut map = 0.0;
+    let mut violations = Violations::default();
     for &i in contacts {
-        let square = evaluate_contact::<D>(p, u, D * i, data.mu[i], rho[i]);
-        map += square;
-        if square.sqrt() > options.velocity_tolerance * rho[i] {
-            return false;
-        }
+        let square = evaluate_contact::<D>(p, u, D * i, data.mu[i], workspace.rho_modes[i]);
+        violations.add(square, workspace.rho[i]);
     }
-    map.sqrt() * data.inverse_data <= options.tolerance * share.sqrt()
+    let Residual { relative, velocity } =
+        violations.residual(data.inverse_speed, data.inverse_data);
+    velocity <= options.velocity_tolerance && relative <= options.tolerance * share.sqrt()
 }
 
 fn solve_island<const D: usize>(
@@ -170,8 +179,7 @@ fn solve_island<const D: usize>(
     island: usize,
     p: &mut [f64],
     islands: &mut Islands,
-    iterations: &mut usize,
-) -> Method {
+) -> SolveReport {
     let Islands {
         starts,
         contacts,
@@ -219,13 +227,12 @@ fn solve_island<const D: usize>(
         let problem = FrictionContactProblem::from_assembled_sparse(&sparse, q, mu);
         solve_by::<Automatic>(&problem, options, own_p, own_u, workspace)
     };
-    *iterations += report.iterations;
     if report.status != SolveStatus::NonFinite {
         for (k, &i) in contacts.iter().enumerate() {
             p[D * i..D * (i + 1)].copy_from_slice(&own_p[D * k..D * (k + 1)]);
         }
     }
-    report.method
+    report
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::auto::{Prepared, solve_in};
 use super::nsgs::{self, Budget};
-use super::report::{SolveReport, SolveStatus};
+use super::report::{SolveReport, SolveStatus, Stage};
 use super::workspace::SolverWorkspace;
 use super::{Method, SolverOptions, admm, auto, newton, proximal};
 use crate::problem::{Dimension, FrictionContactProblem, Residual};
@@ -46,8 +46,36 @@ pub trait Solver: Sync {
     ) -> SolveReport;
 }
 
-/// What an iteration hands to the judge: the method that answered, why it stopped, and its residual under Coulomb's law.
-pub(super) type Outcome = (Method, SolveStatus, Residual);
+/// What an iteration hands to the judge.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outcome {
+    /// The method that answered.
+    pub method: Method,
+    /// Its stage.
+    pub stage: Stage,
+    /// Why it stopped.
+    pub status: SolveStatus,
+    /// Its residual under Coulomb's law.
+    pub residual: Residual,
+}
+
+impl Outcome {
+    /// Of the only stage of a method, which is entered into the list of stages.
+    fn of_one(
+        (method, stage): (Method, Stage),
+        (status, residual): (SolveStatus, Residual),
+        iterations: usize,
+        workspace: &mut SolverWorkspace,
+    ) -> Self {
+        let status = workspace.list_stage(stage, status, iterations);
+        Self {
+            method,
+            stage,
+            status,
+            residual,
+        }
+    }
+}
 
 /// An iteration in dimension `D`, from `p`; `u` is `W p + q` on return.
 pub(super) trait Algorithm: Sync {
@@ -144,9 +172,8 @@ impl Algorithm for GaussSeidel {
             predict: false,
         };
         workspace.start.copy_from_slice(p);
-        let (status, residual) =
-            nsgs::sweeps::<D>(data, options, budget, p, u, workspace, iterations);
-        (Self::METHOD, status, residual)
+        let found = nsgs::sweeps::<D>(data, options, budget, p, u, workspace, iterations);
+        Outcome::of_one((Self::METHOD, Stage::Sweeps), found, *iterations, workspace)
     }
 }
 
@@ -166,9 +193,8 @@ impl Algorithm for Newton {
         iterations: &mut usize,
     ) -> Outcome {
         let steps = options.max_newton_steps;
-        let (status, residual) =
-            newton::full_steps::<D>(data, options, steps, p, u, workspace, iterations);
-        (Self::METHOD, status, residual)
+        let found = newton::full_steps::<D>(data, options, steps, p, u, workspace, iterations);
+        Outcome::of_one((Self::METHOD, Stage::Newton), found, *iterations, workspace)
     }
 }
 
@@ -188,8 +214,9 @@ impl Algorithm for ProximalPoint {
         iterations: &mut usize,
     ) -> Outcome {
         workspace.start.copy_from_slice(p);
-        let (status, residual) = proximal::solve::<D>(data, options, p, u, workspace, iterations);
-        (Self::METHOD, status, residual)
+        let found = proximal::solve::<D>(data, options, p, u, workspace, iterations);
+        let stage = (Self::METHOD, Stage::ProximalPoint);
+        Outcome::of_one(stage, found, *iterations, workspace)
     }
 }
 
@@ -209,8 +236,8 @@ impl Algorithm for Admm {
         iterations: &mut usize,
     ) -> Outcome {
         let law = ContactLaw::Coulomb;
-        let (status, residual) = admm::solve::<D>(data, options, law, p, u, workspace, iterations);
-        (Self::METHOD, status, residual)
+        let found = admm::solve::<D>(data, options, law, p, u, workspace, iterations);
+        Outcome::of_one((Self::METHOD, Stage::Admm), found, *iterations, workspace)
     }
 }
 
@@ -230,7 +257,12 @@ impl Algorithm for Relaxed {
         iterations: &mut usize,
     ) -> Outcome {
         let law = ContactLaw::Relaxed;
-        let (status, residual) = admm::solve::<D>(data, options, law, p, u, workspace, iterations);
-        (Self::METHOD, status, residual)
+        let found = admm::solve::<D>(data, options, law, p, u, workspace, iterations);
+        Outcome::of_one(
+            (Self::METHOD, Stage::Relaxed),
+            found,
+            *iterations,
+            workspace,
+        )
     }
 }

@@ -34,13 +34,14 @@ mod proximal;
 mod reduced_system;
 mod report;
 mod storage;
+mod work;
 mod workspace;
 
 pub use methods::{
     Admm, Automatic, ContactLaw, GaussSeidel, Newton, ProximalPoint, Relaxed, Solver,
 };
 pub use options::{Method, SolverOptions};
-pub use report::{SolveReport, SolveStatus};
+pub use report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
 pub use workspace::SolverWorkspace;
 
 use crate::problem::FrictionContactProblem;
@@ -54,7 +55,8 @@ use crate::problem::FrictionContactProblem;
 /// From `p = 0` and few contacts the answer is the one next to zero (Tikhonov's limit), so a symmetric problem has a
 /// symmetric answer and the order of the contacts does not matter; from a warm start it is the one next to the warm start.
 ///
-/// Not converged is an answer, see [`SolveStatus`]: then `p` is the best impulse met. Data or warm start that are not finite
+/// Not converged is an answer, see [`SolveStatus`]: then `p` is the best impulse met by any stage. The work is bounded, see
+/// [`SolverOptions::budget`]. Where `q = 0` the answer is zero, whatever the warm start. Data or warm start that are not finite
 /// never come out again: with bad data `p` and `u` are zero and the status is [`SolveStatus::NonFinite`]; a bad warm start
 /// counts as zeros.
 ///

@@ -9,7 +9,7 @@ use super::modes::{self, Prediction, Proximal};
 use super::reduced_system::{self, Factors, System};
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
-use super::{SolverOptions, auto::Prepared, nsgs};
+use super::{SolverOptions, auto::Prepared, nsgs, work};
 use crate::problem::Residual;
 
 /// Most full steps before the safeguarded method takes over. Measured on the recorded problems: modes that full steps find at
@@ -107,7 +107,7 @@ fn predict<const D: usize>(
     // impulses that W cannot see. The modes of the warm start need no such care.
     if !course.exact
         || course.settled > PATIENCE
-        || data.merit::<D>(&workspace.rho, prox, p, u).sqrt() * data.inverse_data <= SOLVED
+        || data.merit::<D>(workspace, course.alpha, p, u).sqrt() * data.inverse_data <= SOLVED
     {
         workspace.centre.copy_from_slice(p);
     }
@@ -155,7 +155,7 @@ pub(super) fn full_steps<const D: usize>(
     let mut step = 0;
     let mut best = Residual::UNSOLVED;
     loop {
-        let residual = data.measure::<D>(&workspace.rho, p, u);
+        let residual = data.measure::<D>(workspace, p, u);
         if residual.relative < best.relative {
             best = residual;
             workspace.best.copy_from_slice(p);
@@ -172,7 +172,7 @@ pub(super) fn full_steps<const D: usize>(
         let progress = residual.relative / course.last;
         if progress > 0.5
             && residual.relative < ROUNDING_ASKED
-            && data.is_within_rounding::<D>(&workspace.rho, p, u)
+            && data.is_within_rounding::<D>(workspace, p, u)
         {
             return (SolveStatus::Converged, residual);
         }
@@ -191,6 +191,12 @@ pub(super) fn full_steps<const D: usize>(
                 alpha: course.alpha,
                 centre: &workspace.centre,
             };
+            if !workspace
+                .work
+                .affords(CYCLE_SWEEPS as u64 * work::sweep(data.product, data.mu.len()))
+            {
+                return give_best(data, best, p, u, workspace);
+            }
             for _ in 0..CYCLE_SWEEPS {
                 nsgs::sweep::<D>(data, prox, p);
             }

@@ -88,15 +88,21 @@ pub(super) fn sweeps<const D: usize>(
     workspace: &mut SolverWorkspace,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
-    let prox = Proximal {
-        alpha: 0.0,
-        centre: &workspace.start,
-    };
     let mut done = 0;
     let mut last = f64::INFINITY;
+    let mut best = Residual::UNSOLVED;
+    let give_best = |status, best, p: &mut [f64], u: &mut [f64], workspace: &SolverWorkspace| {
+        p.copy_from_slice(&workspace.best);
+        data.W.multiply_add(p, data.q, u);
+        (status, best)
+    };
     loop {
         data.W.multiply_add(p, data.q, u);
-        let residual = data.measure::<D>(&workspace.rho, p, u);
+        let residual = data.measure::<D>(workspace, p, u);
+        if residual.relative < best.relative {
+            best = residual;
+            workspace.best.copy_from_slice(p);
+        }
         if Prepared::accepts(options, residual) {
             return (SolveStatus::Converged, residual);
         }
@@ -105,12 +111,12 @@ pub(super) fn sweeps<const D: usize>(
         }
         if residual.relative < 1e-7
             && residual.relative > 0.5 * last
-            && data.is_within_rounding::<D>(&workspace.rho, p, u)
+            && data.is_within_rounding::<D>(workspace, p, u)
         {
             return (SolveStatus::Converged, residual);
         }
         if done >= budget.sweeps {
-            return (SolveStatus::MaxIterations, residual);
+            return give_best(SolveStatus::MaxIterations, best, p, u, workspace);
         }
         // The measure costs a sweep: look often at first, then every tenth sweep.
         let batch = (done / 2).clamp(1, 10).min(budget.sweeps - done);
@@ -118,10 +124,17 @@ pub(super) fn sweeps<const D: usize>(
             let rate = (residual.relative / last).ln() / batch as f64;
             let remaining = (options.tolerance / residual.relative).ln() / rate;
             if rate >= 0.0 || remaining > (budget.sweeps - done) as f64 {
-                return (SolveStatus::Stalled, residual);
+                return give_best(SolveStatus::Stalled, best, p, u, workspace);
             }
         }
+        if !workspace.affords_sweeps(data.product, data.mu.len(), batch) {
+            return give_best(SolveStatus::BudgetExhausted, best, p, u, workspace);
+        }
         last = residual.relative;
+        let prox = Proximal {
+            alpha: 0.0,
+            centre: &workspace.start,
+        };
         for _ in 0..batch {
             sweep::<D>(data, prox, p);
         }

@@ -15,7 +15,7 @@ pub enum Method {
     Newton,
     /// Proximal point outside, damped Newton inside.
     ProximalPoint,
-    /// Alternating directions with De Saxcé's shift renewed at every iteration; for comparison, `Auto` never takes it.
+    /// Alternating directions with De Saxcé's shift renewed at every iteration; `Auto` takes some to bring many contacts near.
     Admm,
     /// The convex relaxation of Coulomb's law, for comparison: its answer obeys another law and never counts as converged.
     Relaxed,
@@ -79,7 +79,7 @@ impl Method {
 pub struct SolverOptions {
     /// Which algorithm; default [`Method::Auto`].
     pub method: Method,
-    /// Largest relative natural map of a converged answer, dimensionless; default 1e-12.
+    /// Largest [relative residual](crate::problem::Residual::relative) of a converged answer, dimensionless; default 1e-12.
     ///
     /// An answer whose violation is within the rounding of `W p + q` counts as converged too: no impulse does better.
     pub tolerance: f64,
@@ -94,8 +94,19 @@ pub struct SolverOptions {
     /// Measured: smaller values let rounding (`ε/α`) leak into the impulses that `W` cannot see, larger ones cost
     /// refinement steps.
     pub regularisation: f64,
+    /// Most work of a solve, counted and not timed, so that equal problems end alike on every machine; default
+    /// [`DEFAULT_BUDGET`](Self::DEFAULT_BUDGET).
+    ///
+    /// The unit is one multiplication with its addition in a product with `W`. What the budget does not allow is left undone, the status is
+    /// [`SolveStatus::BudgetExhausted`](super::SolveStatus::BudgetExhausted), and the best impulse known by then is returned.
+    pub budget: u64,
     /// Most contacts that `Auto` takes to Newton without trying Gauss–Seidel first; default 32.
     pub direct_contacts: usize,
+}
+
+impl SolverOptions {
+    /// About 0.3 s on a processor of 2024.
+    pub const DEFAULT_BUDGET: u64 = 300_000_000;
 }
 
 impl Default for SolverOptions {
@@ -107,6 +118,7 @@ impl Default for SolverOptions {
             max_newton_steps: 500,
             max_sweeps: 10_000,
             regularisation: 1e-6,
+            budget: Self::DEFAULT_BUDGET,
             direct_contacts: 32,
         }
     }

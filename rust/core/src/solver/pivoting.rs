@@ -207,7 +207,7 @@ pub(super) fn pivots<const D: usize>(
     modes::recall::<D>(data.mu, p, u, &mut workspace.contacts);
     let mut alpha = ALPHA * data.mean_diagonal;
     let mut last = f64::INFINITY;
-    let mut residual = data.measure::<D>(&workspace.rho, p, u);
+    let mut residual = data.measure::<D>(workspace, p, u);
     for _ in 0..MAX_PIVOTS.min(options.max_newton_steps) {
         let prediction = linearise::<D>(data.mu, &mut workspace.contacts, p, u);
         workspace.centre.copy_from_slice(p);
@@ -249,7 +249,7 @@ pub(super) fn pivots<const D: usize>(
         }
         p.copy_from_slice(&workspace.trial);
         data.W.multiply_add(p, data.q, u);
-        residual = data.measure::<D>(&workspace.rho, p, u);
+        residual = data.measure::<D>(workspace, p, u);
         if Prepared::accepts(options, residual) {
             return (SolveStatus::Converged, residual);
         }

@@ -12,7 +12,7 @@ use super::modes::{self, Proximal};
 use super::reduced_system::{self, Factors, System};
 use super::report::SolveStatus;
 use super::workspace::SolverWorkspace;
-use super::{SolverOptions, auto::Prepared, nsgs};
+use super::{SolverOptions, auto::Prepared, nsgs, work};
 use crate::problem::Residual;
 
 /// Most Newton steps for one value of `α`.
@@ -151,30 +151,30 @@ fn backtrack<const D: usize>(
     u: &mut [f64],
     workspace: &mut SolverWorkspace,
 ) -> bool {
-    let SolverWorkspace {
-        direction,
-        image,
-        trial,
-        trial_velocity,
-        centre,
-        rho,
-        ..
-    } = workspace;
-    for ((d, t), x) in direction.iter_mut().zip(&*trial).zip(&*p) {
+    for ((d, t), x) in workspace
+        .direction
+        .iter_mut()
+        .zip(&workspace.trial)
+        .zip(&*p)
+    {
         *d = t - x;
     }
-    trial_velocity.fill(0.0);
-    data.W.multiply_add(direction, trial_velocity, image);
-    let prox = Proximal { alpha, centre };
+    workspace.trial_velocity.fill(0.0);
+    data.W.multiply_add(
+        &workspace.direction,
+        &workspace.trial_velocity,
+        &mut workspace.image,
+    );
     let mut t = 1.0;
     for _ in 0..HALVINGS {
         for k in 0..data.n {
-            trial[k] = p[k] + t * direction[k];
-            trial_velocity[k] = u[k] + t * image[k];
+            workspace.trial[k] = p[k] + t * workspace.direction[k];
+            workspace.trial_velocity[k] = u[k] + t * workspace.image[k];
         }
-        if data.merit::<D>(rho, prox, trial, trial_velocity) < (1.0 - 1e-3 * t) * current {
+        let (trial, velocity) = (&workspace.trial, &workspace.trial_velocity);
+        if data.merit::<D>(workspace, alpha, trial, velocity) < (1.0 - 1e-3 * t) * current {
             p.copy_from_slice(trial);
-            u.copy_from_slice(trial_velocity);
+            u.copy_from_slice(velocity);
             return true;
         }
         t *= 0.5;
@@ -206,7 +206,7 @@ fn descend<const D: usize>(
             alpha,
             centre: &workspace.centre,
         };
-        let current = data.merit::<D>(&workspace.rho, prox, p, u);
+        let current = data.merit::<D>(workspace, alpha, p, u);
         if !current.is_finite() || step == steps {
             return current <= threshold;
         }
@@ -245,6 +245,12 @@ fn descend<const D: usize>(
             alpha,
             centre: &workspace.centre,
         };
+        if !workspace
+            .work
+            .affords(SWEEPS as u64 * work::sweep(data.product, data.mu.len()))
+        {
+            return false;
+        }
         for _ in 0..SWEEPS {
             nsgs::sweep::<D>(data, prox, p);
         }
@@ -264,7 +270,7 @@ pub(super) fn solve<const D: usize>(
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     data.W.multiply_add(p, data.q, u);
-    let mut best = data.measure::<D>(&workspace.rho, p, u);
+    let mut best = data.measure::<D>(workspace, p, u);
     if Prepared::accepts(options, best) {
         return (SolveStatus::Converged, best);
     }
@@ -281,7 +287,7 @@ pub(super) fn solve<const D: usize>(
     let mut asked = options.tolerance;
     let limit = *iterations + options.max_newton_steps;
     let mut status = SolveStatus::MaxIterations;
-    while *iterations < limit {
+    while *iterations < limit && !workspace.work.is_exhausted {
         let sprints = course.begins_sprint();
         let task = if sprints {
             let tolerance = 1e-2 * asked;
@@ -310,9 +316,9 @@ pub(super) fn solve<const D: usize>(
         let solved = descend::<D>(data, task, p, u, workspace, iterations);
         // A round counts even where its start was its answer, so that the search ends.
         *iterations = (*iterations).max(before + 1);
-        let residual = data.measure::<D>(&workspace.rho, p, u);
+        let residual = data.measure::<D>(workspace, p, u);
         if Prepared::accepts(options, residual)
-            || (residual.relative < LOOSE && data.is_within_rounding::<D>(&workspace.rho, p, u))
+            || (residual.relative < LOOSE && data.is_within_rounding::<D>(workspace, p, u))
         {
             return (SolveStatus::Converged, residual);
         }
@@ -354,5 +360,5 @@ pub(super) fn solve<const D: usize>(
     }
     p.copy_from_slice(&workspace.best);
     data.W.multiply_add(p, data.q, u);
-    (status, data.measure::<D>(&workspace.rho, p, u))
+    (status, data.measure::<D>(workspace, p, u))
 }

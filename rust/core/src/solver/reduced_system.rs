@@ -9,6 +9,7 @@
 use super::auto::Prepared;
 use super::dense::{self, Chunk, LANES};
 use super::modes::{Linearised, Prediction, Proximal, n_unknowns};
+use super::work;
 use super::workspace::SolverWorkspace;
 use crate::law::coulomb::ContactMode;
 use crate::problem::Operator;
@@ -256,7 +257,7 @@ fn apply<const D: usize>(
     }
 }
 
-/// Factors the reduced system of the predicted modes into the workspace.
+/// Factors the reduced system of the predicted modes into the workspace; none where it is singular, or the budget does not allow it.
 #[inline]
 pub(super) fn factorise<const D: usize>(
     data: &Prepared<'_>,
@@ -273,6 +274,9 @@ pub(super) fn factorise<const D: usize>(
                 workspace.block_lu.analyse(W);
                 workspace.is_analysed = true;
             }
+            if !workspace.work.affords(workspace.block_lu.work()) {
+                return Factors::None;
+            }
             let contacts = &workspace.contacts;
             let is_regular = workspace
                 .block_lu
@@ -284,6 +288,12 @@ pub(super) fn factorise<const D: usize>(
             };
         }
     };
+    let may_be_symmetric = !prediction.slides && allow_symmetric;
+    // A step costs two products and two substitutions beside its factors.
+    let cost = work::dense(m, may_be_symmetric) + 2 * data.product;
+    if !workspace.work.affords(cost) {
+        return Factors::None;
+    }
     let SolverWorkspace {
         contacts,
         matrix,
@@ -292,7 +302,7 @@ pub(super) fn factorise<const D: usize>(
     } = workspace;
     let size = dense::chunks(m);
     let A = &mut matrix[..LANES * size * size];
-    if !prediction.slides && allow_symmetric {
+    if may_be_symmetric {
         if m == data.n {
             assemble_symmetric(W, alpha, m, A);
         } else {

@@ -2,8 +2,8 @@
 
 use super::Method;
 
-/// Why a solve stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// Why a solve, or one of its stages, stopped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum SolveStatus {
     /// Both tolerances hold, or the violation is within the rounding of the data.
@@ -13,9 +13,120 @@ pub enum SolveStatus {
     /// The allowed iterations were used up.
     MaxIterations,
     /// Progress stopped before the tolerance.
+    #[default]
     Stalled,
+    /// The work that [`budget`](super::SolverOptions::budget) allows was done.
+    BudgetExhausted,
     /// The data are not finite, or overflow; the returned `p` and `u` are zero.
     NonFinite,
+}
+
+impl SolveStatus {
+    /// Public name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Converged => "converged",
+            Self::SolvedRelaxed => "relaxed",
+            Self::MaxIterations => "max_iterations",
+            Self::Stalled => "stalled",
+            Self::BudgetExhausted => "budget_exhausted",
+            Self::NonFinite => "non_finite",
+        }
+    }
+}
+
+/// One stage of a solve. [`Method::Auto`] climbs from one to the next until an answer holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Stage {
+    /// `q = 0`: nothing to do.
+    #[default]
+    AtRest,
+    /// Gauss–Seidel sweeps.
+    Sweeps,
+    /// Accelerated sweeps on the velocities of free bodies.
+    BodySweeps,
+    /// Groups of contacts that no body couples, each solved by itself.
+    Islands,
+    /// Newton's steps on the modes of the warm start.
+    WarmNewton,
+    /// From the warm start, one contact changes its mode at a time.
+    Pivoting,
+    /// From rest, Newton's steps on the modes of a few sweeps.
+    GuidedNewton,
+    /// Newton's full steps on predicted modes, from zero or from where the sweeps ended.
+    Newton,
+    /// Proximal point around a damped Newton.
+    ProximalPoint,
+    /// Alternating directions.
+    Admm,
+    /// Alternating directions on the convex relaxation.
+    Relaxed,
+}
+
+impl Stage {
+    /// Public name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::AtRest => "at_rest",
+            Self::Sweeps => "sweeps",
+            Self::BodySweeps => "body_sweeps",
+            Self::Islands => "islands",
+            Self::WarmNewton => "warm_newton",
+            Self::Pivoting => "pivoting",
+            Self::GuidedNewton => "guided_newton",
+            Self::Newton => "newton",
+            Self::ProximalPoint => "proximal",
+            Self::Admm => "admm",
+            Self::Relaxed => "relaxed",
+        }
+    }
+}
+
+/// A stage that was tried.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Rung {
+    /// Which one.
+    pub stage: Stage,
+    /// Why it ended.
+    pub status: SolveStatus,
+    /// Its sweeps and linear solves.
+    pub iterations: usize,
+}
+
+/// The stages that were tried, in their order.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+pub struct Rungs {
+    list: [Rung; Self::MOST],
+    len: usize,
+}
+
+impl Rungs {
+    /// Most stages of one solve; later ones would not be listed.
+    const MOST: usize = 6;
+
+    /// Adds a stage.
+    #[inline]
+    pub(super) fn push(&mut self, rung: Rung) {
+        if let Some(place) = self.list.get_mut(self.len) {
+            *place = rung;
+            self.len += 1;
+        }
+    }
+
+    /// The list.
+    #[must_use]
+    pub fn as_slice(&self) -> &[Rung] {
+        &self.list[..self.len]
+    }
+}
+
+impl std::fmt::Debug for Rungs {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_list().entries(self.as_slice()).finish()
+    }
 }
 
 /// How a solve ended, judged from the returned impulse.
@@ -25,12 +136,18 @@ pub struct SolveReport {
     pub status: SolveStatus,
     /// Sweeps and linear solves together.
     pub iterations: usize,
-    /// Natural map relative to the data, dimensionless, see [`Residual`](crate::problem::Residual).
+    /// Work done, in the unit of [`budget`](super::SolverOptions::budget).
+    pub work: u64,
+    /// Violation of the law relative to the data, dimensionless, see [`Residual`](crate::problem::Residual).
     pub residual: f64,
     /// Largest violation at one contact, m/s.
     pub velocity_error: f64,
     /// The method that produced the answer; never [`Method::Auto`].
     pub method: Method,
+    /// The stage that produced the answer.
+    pub stage: Stage,
+    /// Every stage that was tried.
+    pub rungs: Rungs,
 }
 
 impl SolveReport {

@@ -5,7 +5,9 @@ use super::body_sweeps::BodySweeps;
 use super::dense::{self, Chunk, LANES};
 use super::islands::Islands;
 use super::modes::Linearised;
+use super::report::Rungs;
 use super::storage::Storage;
+use super::work::Work;
 use crate::problem::Operator;
 
 /// Scratch of [`solve`](crate::solver::solve): grows to the largest problem met, carries nothing from one solve to the next.
@@ -45,6 +47,12 @@ pub struct SolverWorkspace {
     /// Factors of the block-sparse system, and whether its pattern is that of the present problem.
     pub(super) block_lu: BlockLu,
     pub(super) is_analysed: bool,
+    /// Work done and allowed.
+    pub(super) work: Work,
+    /// Stages tried.
+    pub(super) rungs: Rungs,
+    /// Nearest answer of the stages so far, N s.
+    pub(super) nearest: Vec<f64>,
     /// `W` in the storage that suits its size.
     pub(super) storage: Storage,
     /// Of the sweeps over pairs of bodies.
@@ -101,6 +109,7 @@ impl SolverWorkspace {
             &mut self.centre,
             &mut self.start,
             &mut self.best,
+            &mut self.nearest,
             &mut self.accepted,
             &mut self.direction,
             &mut self.image,

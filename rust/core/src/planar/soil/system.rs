@@ -214,22 +214,17 @@ impl SoilSystem<'_> {
         let problem = self.problem(q, mu);
         let mut found = solve(&problem, &proximal, p, u, workspace);
         found.iterations += report.iterations;
-        let violation = |relative: f64, velocity: f64| {
-            (relative / options.tolerance).max(velocity / options.velocity_tolerance)
-        };
         if let Some(share) = passive_share(dot(p, u), dot(p, q)) {
             for p in &mut *p {
                 *p *= share;
             }
             let Residual { relative, velocity } = evaluate_into(&problem, p, u);
             (found.residual, found.velocity_error) = (relative, velocity);
-            if violation(relative, velocity) > 1.0 {
+            if excess(options, &found) > 1.0 {
                 found.status = SolveStatus::Stalled;
             }
         }
-        let is_better = violation(found.residual, found.velocity_error)
-            < violation(report.residual, report.velocity_error);
-        if found.is_converged() || is_better {
+        if found.is_converged() || excess(options, &found) < excess(options, &report) {
             return found;
         }
         p.copy_from_slice(&p_swept);
@@ -692,9 +687,20 @@ impl MechanicalSystem for SoilSystem<'_> {
                     if report.is_converged() {
                         break;
                     }
-                    let before = report.iterations;
-                    report = sweep(p, u, workspace);
-                    report.iterations += before;
+                    let (p_before, u_before) = (p.to_vec(), u.to_vec());
+                    let swept = sweep(p, u, workspace);
+                    let iterations = report.iterations + swept.iterations;
+                    if !swept.is_converged() && excess(options, &report) < excess(options, &swept) {
+                        // The sweeps led away from the nearest answer so far, and would again.
+                        p.copy_from_slice(&p_before);
+                        u.copy_from_slice(&u_before);
+                        report.iterations = iterations;
+                        break;
+                    }
+                    report = SolveReport {
+                        iterations,
+                        ..swept
+                    };
                 }
                 report
             }
@@ -710,6 +716,11 @@ impl MechanicalSystem for SoilSystem<'_> {
         let own = self.own(y).iter().zip(&arms);
         own.map(|(y, arm)| (y * arm).abs()).fold(0.0, f64::max)
     }
+}
+
+/// How far an answer is above the tolerances, as a factor.
+fn excess(options: &SolverOptions, report: &SolveReport) -> f64 {
+    (report.residual / options.tolerance).max(report.velocity_error / options.velocity_tolerance)
 }
 
 /// `y ← L⁻¹ y`.

@@ -1,0 +1,78 @@
+//! The shelf's hard problems, `tests/shelf`: piles, stacks, mass ratios, jams, the rover's wheels; always tested.
+
+mod solver_npz;
+
+use std::collections::BTreeMap;
+
+use rover_core::problem::FrictionContactProblem;
+use rover_core::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
+use serde::Deserialize;
+use solver_npz::{Recorded, shelf};
+
+/// `tests/shelf/bounds.json`: the relative residual that every problem is solved to, and larger ones for those that are not.
+#[derive(Deserialize)]
+struct Bounds {
+    aim: f64,
+    not_reached: BTreeMap<String, f64>,
+}
+
+/// How well a problem is solved from rest with the default options but for the tolerance, relative and in m/s.
+fn answer(recorded: &Recorded, tolerance: f64) -> SolveReport {
+    let problem =
+        FrictionContactProblem::new(recorded.dimension, &recorded.W, &recorded.q, &recorded.mu)
+            .expect("a sound problem");
+    let n = problem.n_unknowns();
+    let (mut p, mut u) = (vec![0.0; n], vec![0.0; n]);
+    let options = SolverOptions {
+        tolerance,
+        velocity_tolerance: tolerance.max(1e-9),
+        ..SolverOptions::default()
+    };
+    solve(
+        &problem,
+        &options,
+        &mut p,
+        &mut u,
+        &mut SolverWorkspace::new(),
+    )
+}
+
+#[test]
+fn every_problem_of_the_shelf_within_its_bound() {
+    let bounds: Bounds =
+        serde_json::from_str(include_str!("../shelf/bounds.json")).expect("the bounds' file");
+    let problems = shelf(|_| true);
+    for name in bounds.not_reached.keys() {
+        assert!(
+            problems.iter().any(|problem| problem.name == *name),
+            "{name} is not on the shelf"
+        );
+    }
+    let missed: Vec<String> = problems
+        .iter()
+        .filter_map(|problem| {
+            let report = answer(problem, bounds.aim);
+            let holds = match bounds.not_reached.get(&problem.name) {
+                Some(bound) => report.residual <= *bound,
+                None => report.is_converged() && report.residual <= bounds.aim,
+            };
+            (!holds).then(|| format!("{}: {report:?}", problem.name))
+        })
+        .collect();
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
+}
+
+/// What the rover poses at each step is solved to the tolerance that its simulation uses.
+#[test]
+fn the_rovers_steps_to_the_last_digits() {
+    let problems = shelf(|name| name.starts_with("rover"));
+    assert!(!problems.is_empty());
+    for problem in problems {
+        let report = answer(&problem, 1e-12);
+        assert!(
+            report.is_converged() && report.residual < 1e-12,
+            "{}: {report:?}",
+            problem.name
+        );
+    }
+}

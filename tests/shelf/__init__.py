@@ -1,0 +1,1 @@
+"""Hard friction-contact problems, and how they are made: README.md."""
