@@ -187,7 +187,13 @@ class RoverModel:
 
 @final
 class Plane:
-    """The half-space n.x + offset >= 0 is free; the ground is below. `normal` (default: up) is normalised."""
+    """The half-space n.x + offset >= 0 is free; the ground is below. `normal` (default: up) is normalised.
+
+    A normal of unit length is taken as it is, so a plane's own normal and offset make the same plane, to the bit.
+
+    Raises:
+        TerrainError: A number is not finite, the normal has no direction, the offset is beyond 1e6 m.
+    """
 
     def __new__(cls, normal: npt.ArrayLike | None = None, offset: float = 0.0) -> Plane: ...
     @property
@@ -473,7 +479,7 @@ class Line:
     """The ground y = slope x + offset (m) of a planar scene; x forward, y up.
 
     Raises:
-        TerrainError: A number is not finite.
+        TerrainError: A number is not finite, the slope is beyond 1000 or the offset beyond 1e6 m.
     """
 
     def __new__(cls, slope: float = 0.0, offset: float = 0.0) -> Line: ...
@@ -492,7 +498,8 @@ class Sine:
     """The ground y = amplitude sin(2 pi x / wavelength + phase) + offset, m.
 
     Raises:
-        TerrainError: A number is not finite, or the wavelength is not positive.
+        TerrainError: A number is not finite, the wavelength is below 1e-3 m, the slope 2 pi amplitude / wavelength
+            beyond 1000.
     """
 
     def __new__(cls, amplitude: float, wavelength: float, phase: float = 0.0, offset: float = 0.0) -> Sine: ...
@@ -515,8 +522,8 @@ class Spline:
     """The natural cubic spline through points (m), continued by its tangents: a ground with continuous curvature.
 
     Raises:
-        TerrainError: Fewer than two points, lengths that differ, an entry that is not finite, x that does not
-            increase.
+        TerrainError: Fewer than two points or more than 2 000 000, lengths that differ, an entry that is not finite or
+            beyond 1e6 m, x that does not increase.
     """
 
     def __new__(cls, x: npt.ArrayLike, y: npt.ArrayLike) -> Spline: ...
@@ -535,8 +542,8 @@ class Polyline:
     """Straight pieces between points (m), which may stand above each other: steps, ramps, kerbs, with corners.
 
     Raises:
-        TerrainError: Fewer than two points, lengths that differ, an entry that is not finite, x that decreases, a
-            point twice.
+        TerrainError: Fewer than two points or more than 2 000 000, lengths that differ, an entry that is not finite or
+            beyond 1e6 m, x that decreases, a point twice.
     """
 
     def __new__(cls, x: npt.ArrayLike, y: npt.ArrayLike) -> Polyline: ...
@@ -932,7 +939,8 @@ def soil_packing(
     defaults are the original's soil: three layers of 74.
 
     Raises:
-        ModelError: A number that is not finite or of the wrong sign, radii the wrong way round, no room for a disk.
+        ModelError: No disk or more than 1 000 000, a number that is not finite, of the wrong sign or out of its range,
+            radii the wrong way round, no room for a disk.
     """
 
 @final
