@@ -50,6 +50,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJean {
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
         scratch.fit(system.nv());
+        scratch.grant_work(&options.solver);
         let mut attempts = MOST_ATTEMPTS;
         let whole = Part {
             options,
@@ -104,7 +105,7 @@ impl Part<'_> {
         let mut retaken = 0;
         let mut report = loop {
             *self.attempts = self.attempts.saturating_sub(1);
-            let can_halve = self.depth < MOST_HALVINGS && *self.attempts > 1;
+            let can_halve = self.depth < MOST_HALVINGS && *self.attempts > 1 && ws.work_left > 0;
             let attempted = attempt(system, options, start, warm_start, ws, is_gyroscopic, probe);
             let Some(mut report) = attempted else {
                 if can_halve {
@@ -437,11 +438,12 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
         let solved = system.solve(
             &ws.q_free,
             &ws.mu,
-            &options.solver,
+            &ws.solver_options(&options.solver),
             &mut ws.p,
             &mut ws.u,
             &mut ws.solver,
         );
+        ws.work_left = ws.work_left.saturating_sub(solved.work);
         note(&mut report, &solved);
         // u came with the shift inside: take it out again.
         for (u, shift) in ws.u.chunks_exact_mut(d).zip(shifts()) {
