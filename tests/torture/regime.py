@@ -52,7 +52,7 @@ class Regime:
     run: Case
     cases: int
     bounds: Bounds = field(default_factory=Bounds)
-    limit: float = 60.0
+    limit: float = 120.0
 
     def play(self, case: int) -> Ledger:
         """One case: the same number gives the same case."""

@@ -102,4 +102,4 @@ def finds(_random: Random, ledger: Ledger) -> None:
 #: As long as making a million points or some ten thousand rocks may take.
 PATIENT = Bounds(not_converged=1.0, refused=1.0, slowest=5.0)
 
-REGIMES = [Regime("sizes and places", finds, len(FINDS), PATIENT, limit=30.0)]
+REGIMES = [Regime("sizes and places", finds, len(FINDS), PATIENT, limit=60.0)]
