@@ -12,7 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rover_gym import Plane, RoverGymError, RoverModel, Simulation, SphereField, accuracy_options
+from rover_gym import (
+    Plane,
+    RoverGymError,
+    RoverModel,
+    Simulation,
+    SphereField,
+    accuracy_options,
+    solve_friction_contact,
+)
 from rover_gym._core import SoilSimulation, soil_packing
 from rover_gym.planar import BallSimulation, Line, MirroredRoverSimulation, Polyline, Sine, TwoWheelRoverSimulation
 
@@ -36,6 +44,7 @@ NONSENSE = [
 ]
 
 rocks = (0.1, (-5.0, -5.0, 5.0, 5.0), 0)
+one_contact = (np.eye(3), [-1.0, 0.0, 0.0], [0.5])
 one_disk = ([0.1], [1.0], [[0.0, 0.0]])
 
 NUMBERS: list[tuple[str, Callable[[Any], Any]]] = [
@@ -72,10 +81,14 @@ NUMBERS: list[tuple[str, Callable[[Any], Any]]] = [
     ("width", lambda x: soil_packing(width=x)),
     ("wall_friction", lambda x: SoilSimulation(*one_disk, wall_friction=x)),
     ("sleep_distance", lambda x: SoilSimulation(*one_disk, sleep_distance=x)),
+    ("tolerance", lambda x: solve_friction_contact(*one_contact, x)),
 ]
 
 COUNTS: list[tuple[str, Callable[[Any], Any]]] = [
     ("max_iterations", lambda n: Simulation(max_iterations=n)),
+    ("dimension", lambda n: solve_friction_contact(*one_contact, dimension=n)),
+    ("max_iterations", lambda n: solve_friction_contact(*one_contact, max_iterations=n)),
+    ("budget", lambda n: solve_friction_contact(*one_contact, budget=n)),
     ("n", lambda n: Simulation().step(n)),
     ("n", lambda n: Simulation().profile(n)),
     ("n", lambda n: BallSimulation(Line()).step(n)),

@@ -8,6 +8,7 @@ use rover_core::solver::{
     ContactLaw, Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve,
 };
 
+use crate::arguments::Given;
 use crate::arrays::{array, fresh, vector};
 use crate::errors::{BorderError, Kind, Value};
 
@@ -228,54 +229,31 @@ fn problem_error(field: &str, message: String, value: Value) -> BorderError {
     }
 }
 
-/// An argument of its type, or the default where it is not given.
-fn given<'py, T: for<'a> FromPyObject<'a, 'py>>(
-    value: Option<&Bound<'py, PyAny>>,
-    field: &str,
-    wanted: &str,
-    default: T,
-) -> PyResult<T> {
-    let Some(value) = value else {
-        return Ok(default);
-    };
-    value.extract().map_err(|_| {
-        let text = value
-            .repr()
-            .map_or_else(|_| String::new(), |r| r.to_string());
-        let message = format!("{field}: must be {wanted}, is {text}");
-        BorderError::option(field, message, Value::Text(text)).into()
-    })
-}
-
 /// Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
 #[pyo3(signature = (
-    W, q, mu, tolerance = None, *, dimension = None, solver = None, max_iterations = None, initial = None, budget = None
+    W, q, mu, tolerance = Given::MISSING, *, dimension = Given::MISSING, solver = Given::MISSING, max_iterations = Given::MISSING,
+    initial = None, budget = Given::MISSING
 ), text_signature = "(W, q, mu, tolerance=1e-08, *, dimension=3, solver='auto', max_iterations=1000, initial=None, budget=300000000)")]
 pub fn solve_friction_contact(
     py: Python<'_>,
     W: &Bound<'_, PyAny>,
     q: &Bound<'_, PyAny>,
     mu: &Bound<'_, PyAny>,
-    tolerance: Option<&Bound<'_, PyAny>>,
-    dimension: Option<&Bound<'_, PyAny>>,
-    solver: Option<&Bound<'_, PyAny>>,
-    max_iterations: Option<&Bound<'_, PyAny>>,
+    tolerance: Given<'_>,
+    dimension: Given<'_>,
+    solver: Given<'_>,
+    max_iterations: Given<'_>,
     initial: Option<&Bound<'_, PyAny>>,
-    budget: Option<&Bound<'_, PyAny>>,
+    budget: Given<'_>,
 ) -> PyResult<FrictionContactSolution> {
-    let tolerance: f64 = given(tolerance, "tolerance", "a number", 1e-8)?;
-    let dimension: usize = given(dimension, "dimension", "2 or 3", 3)?;
-    let solver = given(solver, "solver", "a name", "auto".to_owned())?;
-    let max_iterations = given(
-        max_iterations,
-        "max_iterations",
-        "a whole number >= 1",
-        1000,
-    )?;
-    let default_budget = SolverOptions::DEFAULT_BUDGET;
-    let budget = given(budget, "budget", "a whole number >= 0", default_budget)?;
+    let option = Kind::Option;
+    let tolerance = tolerance.number(1e-8, option, "tolerance")?;
+    let dimension = dimension.count(3, option, "dimension")?;
+    let solver = solver.text("auto", option, "solver")?;
+    let max_iterations = max_iterations.count(1000, option, "max_iterations")?;
+    let budget = budget.whole(SolverOptions::DEFAULT_BUDGET, option, "budget")?;
     let kind = match dimension {
         2 => Dimension::Two,
         3 => Dimension::Three,
