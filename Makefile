@@ -14,7 +14,7 @@ UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
 export VIRTUAL_ENV := $(abspath $(VENV))# where maturin installs
 
-.PHONY: help demo test check lint types format test-rust test-python docs bench chart stability validate orders profiles train train-rllib pins clean
+.PHONY: help demo test check lint types deny format test-rust test-python docs bench chart stability torture validate orders profiles train train-rllib pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -27,7 +27,7 @@ demo: $(STAMPS)/demo $(STAMPS)/core $(STAMPS)/debian-demo ## set up, drive Rover
 
 test: check test-rust docs test-python ## set up and run every check and every test (what .ci/run calls)
 
-check: lint types ## lint and type checks, Rust and Python: what the commit hooks call
+check: lint types deny ## lint, types, licences and sources, Rust and Python: what the commit hooks call
 
 lint: $(STAMPS)/test ## formatting and lint, Rust and Python
 	cargo fmt --all --check
@@ -38,6 +38,10 @@ lint: $(STAMPS)/test ## formatting and lint, Rust and Python
 types: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core ## mypy, and the stub against the compiled module
 	$(BIN)/mypy
 	MYPYPATH=envs $(BIN)/stubtest rover_gym._core
+
+deny: ## licences, bans and sources of the crates, without the network, where cargo-deny is installed
+	@if command -v cargo-deny > /dev/null; then cargo deny --offline --log-level error check licenses bans sources; \
+	else echo "NOT CHECKED: licences, bans and sources of the crates; get cargo-deny with: cargo install --locked cargo-deny"; fi
 
 format: $(STAMPS)/test ## rewrite the sources as the linters want them
 	cargo fmt --all
@@ -82,6 +86,9 @@ chart: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CP
 
 stability: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes where methods fail, ours and other engines': docs/stability.md (5 minutes)
 	$(COMPARE).stability
+
+torture: $(STAMPS)/test $(STAMPS)/core ## tries to break everything: docs/stability.md's table (5 minutes on two cores; TORTURE="--hours 2", or --regime NAME --case K)
+	PYTHONPATH=tests $(BIN)/python -m torture $(TORTURE)
 
 profiles: $(STAMPS)/test $(STAMPS)/core ## performance profiles of the contact solvers, with Siconos' where it is installed
 	$(COMPARE).solver_profiles

@@ -111,14 +111,22 @@ def _drive(
 ) -> list[Drive]:
     """The episodes of one policy, from an earlier evaluation where that was the same."""
     scene = json.loads(json.dumps({"environment": arguments, "seeds": [seeds[0], seeds[-1]]}))
-    if path.exists():
-        kept = json.loads(path.read_text(encoding="utf-8"))
-        if kept["scene"] == scene:
-            return [Drive(**drive) for drive in kept["drives"]]
+    kept = _kept(path, scene)
+    if kept is not None:
+        return kept
     drives = drive_all(make_policy, seeds, arguments=arguments, threads=threads, progress=progress)
     plain = {"scene": scene, "drives": [asdict(drive) for drive in drives]}
     path.write_text(json.dumps(plain) + "\n", encoding="utf-8")
     return drives
+
+
+def _kept(path: Path, scene: Any) -> list[Drive] | None:
+    """The episodes of an earlier evaluation; None where that was another one, or its file is damaged."""
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        return [Drive(**drive) for drive in kept["drives"]] if kept["scene"] == scene else None
+    except (OSError, ValueError, LookupError, TypeError, RecursionError):
+        return None
 
 
 def _markdown(rows: Sequence[Summary]) -> str:

@@ -7,6 +7,7 @@ episode), stable-baselines3's log (CSV and TensorBoard), evaluations, checkpoint
 """
 
 import json
+import re
 import time
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,6 +19,7 @@ from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecNormalize
 
+from rover_gym import OptionError
 from rover_gym.cli.console import plain_errors, say_path
 from rover_gym.learning.build import build_env, normalised
 from rover_gym.learning.callbacks import CheckpointCallback, CurriculumCallback, SameFieldsEvalCallback
@@ -25,6 +27,7 @@ from rover_gym.learning.config import PPOConfig, read_config
 from rover_gym.learning.export import export
 from rover_gym.learning.provenance import provenance
 from rover_gym.learning.stopwatch import Stopwatch
+from rover_gym.validation import refuse
 
 # Fields of different seeds and of resumed runs differ; all stay below the evaluations' million.
 SEED_STRIDE = 1000
@@ -46,7 +49,7 @@ def train(
     total_steps = settings.total_steps if steps is None else steps
     folder = output or Path("runs") / "train" / f"{config.stem}-seed{seed}"
     checkpoints = folder / "checkpoints"
-    latest = json.loads((checkpoints / "latest.json").read_text(encoding="utf-8")) if resume else None
+    latest = _latest(checkpoints / "latest.json") if resume else None
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "config.yaml").write_text(settings.to_yaml(), encoding="utf-8")
     origin = provenance()
@@ -115,6 +118,24 @@ def train(
     rovers.close()
     watched.close()
     say_path("policy", folder / "policy")
+
+
+def _latest(path: Path) -> dict[str, Any]:
+    """What a run's last checkpoint says of itself.
+
+    Raises:
+        OptionError: The file is damaged.
+        OSError: There is none.
+    """
+    text = path.read_bytes()
+    try:
+        latest: dict[str, Any] = json.loads(text)
+        found = re.fullmatch("[0-9]{9,15}", latest["name"]) and "hardest" in latest
+    except (ValueError, LookupError, TypeError, RecursionError):
+        found = False
+    if not found:
+        refuse(OptionError, "resume", str(path), "names no checkpoint")
+    return latest
 
 
 def hyperparameters(ppo: PPOConfig) -> dict[str, Any]:

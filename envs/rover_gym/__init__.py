@@ -1,6 +1,7 @@
 """rover-gym: a nonsmooth simulator of a six-wheel Mars rover, with Gymnasium environments."""
 
 from rover_gym._core import (
+    BusyError,
     CommandError,
     ModelError,
     OptionError,
@@ -25,6 +26,7 @@ from rover_gym.registration import register_environments
 register_environments()
 
 __all__ = [
+    "BusyError",
     "CommandError",
     "ModelError",
     "OptionError",

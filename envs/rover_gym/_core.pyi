@@ -17,6 +17,7 @@ _Coordinates: TypeAlias = Literal["report", "state"]
 
 __all__ = [
     "BallSimulation",
+    "BusyError",
     "CommandError",
     "Contacts",
     "Energy",
@@ -83,6 +84,9 @@ class ProblemError(RoverGymError, ValueError):
 class StepError(RoverGymError, RuntimeError):
     """A time step could not be taken; the state is as it was before the call."""
 
+class BusyError(RoverGymError, RuntimeError):
+    """An object was used while another call on it was still going on; nothing has changed."""
+
 @final
 class RoverModel:
     """A tree of solids under a free base, read from data. Immutable."""
@@ -101,14 +105,29 @@ class RoverModel:
         self,
         *,
         wheel_radius: float | None = None,
+        contact_radius: float | None = None,
         masses: Mapping[str, float] | Sequence[float] | None = None,
         steering_stiffness: float | None = None,
         steering_damping: float | None = None,
         wheel_torque_limit: float | None = None,
         mass_scale: float | None = None,
     ) -> RoverModel:
-        """A model that differs in what is given. `mass_scale` multiplies masses and inertias."""
-    def weld(self, joints: Mapping[str, float] | Sequence[str]) -> RoverModel: ...
+        """A model that differs in what is given.
+
+        Args:
+            wheel_radius: Of all wheels, m: shape, inertia and contact change together.
+            contact_radius: Radius at which the wheels touch the ground, m; shape and inertia stay as they are.
+            masses: kg, by solid or one for each. Inertias go with them.
+            steering_stiffness: N m/rad.
+            steering_damping: N m s/rad.
+            wheel_torque_limit: N m.
+            mass_scale: Multiplies masses and inertias.
+
+        Raises:
+            ModelError: A number out of its range, or a wheel radius where a wheel's solid is no disc.
+        """
+    def weld(self, joints: Mapping[str, float] | Sequence[str] | str) -> RoverModel:
+        """The same machine with joints locked at 0, or at the given angles (rad), also in files and dictionaries."""
     @property
     def name(self) -> str: ...
     @property
@@ -138,27 +157,27 @@ class RoverModel:
     @property
     def steering_limit(self) -> float:
         """Largest steering set-point, rad, either way."""
-    def mass_matrix(self, q: npt.ArrayLike, coordinates: _Coordinates = "report") -> _Array: ...
+    def mass_matrix(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> _Array: ...
     def bias(
         self,
         q: npt.ArrayLike,
         qdot: npt.ArrayLike,
         gravity: npt.ArrayLike | None = None,
-        coordinates: _Coordinates = "report",
+        coordinates: _Coordinates = "state",
     ) -> _Array: ...
     def actuation_matrix(self) -> _Array: ...
-    def kinetic_energy(self, q: npt.ArrayLike, qdot: npt.ArrayLike, coordinates: _Coordinates = "report") -> float: ...
-    def tags(self, q: npt.ArrayLike, coordinates: _Coordinates = "report") -> dict[str, _Array]: ...
-    def poses(self, q: npt.ArrayLike, coordinates: _Coordinates = "report") -> dict[str, tuple[_Array, _Array]]:
+    def kinetic_energy(self, q: npt.ArrayLike, qdot: npt.ArrayLike, coordinates: _Coordinates = "state") -> float: ...
+    def tags(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> dict[str, _Array]: ...
+    def poses(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> dict[str, tuple[_Array, _Array]]:
         """Origin (3,) and rotation matrix (3, 3) of every solid, world frame."""
     def wheel_gaps(
-        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "report"
+        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
     ) -> _Array: ...
     def wheel_contact_points(
-        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "report"
+        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
     ) -> _Array: ...
     def wheel_jacobians(
-        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "report"
+        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
     ) -> _Array: ...
     def to_report(self, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[_Array, _Array]:
         """Public q and state velocity -> the report's q and qdot."""
@@ -168,7 +187,13 @@ class RoverModel:
 
 @final
 class Plane:
-    """The half-space n.x + offset >= 0 is free; the ground is below. `normal` (default: up) is normalised."""
+    """The half-space n.x + offset >= 0 is free; the ground is below. `normal` (default: up) is normalised.
+
+    A normal of unit length is taken as it is, so a plane's own normal and offset make the same plane, to the bit.
+
+    Raises:
+        TerrainError: A number is not finite, the normal has no direction, the offset is beyond 1e6 m.
+    """
 
     def __new__(cls, normal: npt.ArrayLike | None = None, offset: float = 0.0) -> Plane: ...
     @property
@@ -387,6 +412,8 @@ class Simulation:
     def steering(self) -> _Array: ...
     def set_steering(self, set_points: npt.ArrayLike) -> None:
         """(6,) rad, held by the implicit PD with the model's gains."""
+    def set_commands(self, torques: npt.ArrayLike, set_points: npt.ArrayLike) -> None:
+        """`set_wheel_torques` and `set_steering` in one: both, or neither where either is refused."""
     def set_joint_torques(self, torques: npt.ArrayLike) -> None:
         """(nv - 6,) N m about the joint axes, added to what set_wheel_torques gives; no limit."""
     def hold(
@@ -401,7 +428,15 @@ class Simulation:
     def release(self, joints: str | Sequence[str]) -> None: ...
     def brake(self) -> None:
         """Holds the six wheels where they are (`hold` on the wheel joints), and zeroes their torques."""
-    def step(self, n: int = 1) -> StepReport: ...
+    def step(self, n: int = 1) -> StepReport:
+        """Takes n steps.
+
+        Other threads run meanwhile; on this object their calls are refused with BusyError. Ctrl-C, or whatever a signal
+        handler raises, ends the call after a whole step, whose state stays.
+
+        Raises:
+            StepError: A step could not be taken; the state before it stays.
+        """
     @property
     def contacts(self) -> Contacts: ...
     @property
@@ -444,7 +479,7 @@ class Line:
     """The ground y = slope x + offset (m) of a planar scene; x forward, y up.
 
     Raises:
-        TerrainError: A number is not finite.
+        TerrainError: A number is not finite, the slope is beyond 1000 or the offset beyond 1e6 m.
     """
 
     def __new__(cls, slope: float = 0.0, offset: float = 0.0) -> Line: ...
@@ -463,7 +498,8 @@ class Sine:
     """The ground y = amplitude sin(2 pi x / wavelength + phase) + offset, m.
 
     Raises:
-        TerrainError: A number is not finite, or the wavelength is not positive.
+        TerrainError: A number is not finite, the wavelength is below 1e-3 m, the slope 2 pi amplitude / wavelength
+            beyond 1000.
     """
 
     def __new__(cls, amplitude: float, wavelength: float, phase: float = 0.0, offset: float = 0.0) -> Sine: ...
@@ -486,8 +522,8 @@ class Spline:
     """The natural cubic spline through points (m), continued by its tangents: a ground with continuous curvature.
 
     Raises:
-        TerrainError: Fewer than two points, lengths that differ, an entry that is not finite, x that does not
-            increase.
+        TerrainError: Fewer than two points or more than 2 000 000, lengths that differ, an entry that is not finite or
+            beyond 1e6 m, x that does not increase.
     """
 
     def __new__(cls, x: npt.ArrayLike, y: npt.ArrayLike) -> Spline: ...
@@ -506,8 +542,8 @@ class Polyline:
     """Straight pieces between points (m), which may stand above each other: steps, ramps, kerbs, with corners.
 
     Raises:
-        TerrainError: Fewer than two points, lengths that differ, an entry that is not finite, x that decreases, a
-            point twice.
+        TerrainError: Fewer than two points or more than 2 000 000, lengths that differ, an entry that is not finite or
+            beyond 1e6 m, x that decreases, a point twice.
     """
 
     def __new__(cls, x: npt.ArrayLike, y: npt.ArrayLike) -> Polyline: ...
@@ -706,7 +742,8 @@ class SimulationBatch:
         """Commands (n_rovers, 6) as `set_wheel_torques` and `set_steering` take them, then n steps.
 
         Rovers that are not `active` keep still. Returns a fresh row of readings a rover, and why a rover could not
-        take a step, by its number; the others have gone on.
+        take a step, by its number; the others have gone on. Ctrl-C ends the call after a whole step of each rover, not
+        the same one for all.
         """
     def readings(self) -> _Array:
         """(n_rovers, size) as the rovers are now."""
@@ -902,7 +939,8 @@ def soil_packing(
     defaults are the original's soil: three layers of 74.
 
     Raises:
-        ModelError: A number that is not finite or of the wrong sign, radii the wrong way round, no room for a disk.
+        ModelError: No disk or more than 1 000 000, a number that is not finite, of the wrong sign or out of its range,
+            radii the wrong way round, no room for a disk.
     """
 
 @final

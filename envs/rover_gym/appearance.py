@@ -139,9 +139,14 @@ def _trunk_marks(name: str, size: tuple[float, ...], centre: Vector) -> Iterator
             yield _box(name, (length - gap * x, PLATE, width - gap * x), place, DECK_COLOUR)
 
 
+def _rim(wheel: Mapping[str, Any]) -> float:
+    """Radius at which a wheel of a description touches the ground, m."""
+    return float(wheel.get("contact_radius", wheel["radius"]))
+
+
 def _wheel_parts(wheel: Mapping[str, Any]) -> Iterator[Part]:
     """Tyre with treads, hub, and spokes of which one arm has the colour of the nose, so that a turn shows."""
-    name, radius = wheel["solid"], wheel["radius"]
+    name, radius = wheel["solid"], _rim(wheel)
     width = WHEEL_WIDTH * radius
     turn = _turn_to(np.array(wheel["axle"], dtype=np.float64))
     centre = (0.0, 0.0, 0.0)
@@ -163,7 +168,7 @@ def _wheel_parts(wheel: Mapping[str, Any]) -> Iterator[Part]:
 def _fork_parts(solid: Mapping[str, Any], wheel: Mapping[str, Any]) -> Iterator[Part]:
     """Two plates and a bridge from the steering column down to the axle, on the wheel's parent."""
     arm = np.array(solid.get("position", (0.0, 0.0, 0.0)), dtype=np.float64)
-    length, radius = float(np.linalg.norm(arm)), wheel["radius"]
+    length, radius = float(np.linalg.norm(arm)), _rim(wheel)
     clearance = length - 1.1 * radius
     if "parent" not in solid or clearance <= 0.0:
         return

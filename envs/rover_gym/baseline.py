@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 import gymnasium as gym
 
+from rover_gym._core import OptionError
 from rover_gym.episodes import Episode, Policy, run_episode
 from rover_gym.policy import PDPolicy
 from rover_gym.trained import TrainedPolicy, find_policy, policy_arguments
+from rover_gym.validation import number, refuse, whole
 
 DIFFICULTIES = (0.0, 0.25, 0.5, 0.75, 1.0)
 ENDS = ("goal", "time", "high_centred", "roll_over", "step_failed")
@@ -40,6 +42,18 @@ class BaselineRow:
     ends: dict[str, int]
 
 
+class BaselineInterrupt(KeyboardInterrupt):
+    """The user ended a measurement.
+
+    Attributes:
+        rows: Of the episodes that are done; the last may have fewer than the others.
+    """
+
+    def __init__(self, rows: list[BaselineRow]) -> None:
+        super().__init__()
+        self.rows = rows
+
+
 def measure_baseline(
     difficulties: Sequence[float] = DIFFICULTIES,
     *,
@@ -58,18 +72,28 @@ def measure_baseline(
         progress: Called with the difficulty and the number of episodes done, after each.
 
     Raises:
-        OptionError: A difficulty is out of its range, or there is no such policy.
+        OptionError: A difficulty is out of its range, there is no such policy, or `episodes` or `seed` is no whole
+            number or out of its range.
+        BaselineInterrupt: The user interrupted it; the episodes that are done are in it.
     """
+    episodes, seed = whole("episodes", episodes, at_least=1), whole("seed", seed)
+    difficulties = tuple(number("difficulty", level, at_least=0.0, at_most=1.0) for level in difficulties)
     folder = find_policy(policy, "sphere_field")
     env = gym.make("RoverRocks-v0", **({} if folder is None else policy_arguments(folder)))
     driver: Policy = PDPolicy(env) if folder is None else TrainedPolicy.load(env, folder)
-    rows = []
-    for difficulty in difficulties:
-        results = []
-        for number in range(seed, seed + episodes):
-            results.append(run_episode(env, driver, number, options={"difficulty": difficulty}))
-            progress(difficulty, len(results))
-        rows.append(_summarise(difficulty, results))
+    rows: list[BaselineRow] = []
+    results: list[Episode] = []
+    try:
+        for difficulty in difficulties:
+            results = []
+            for now in range(seed, seed + episodes):
+                results.append(run_episode(env, driver, now, options={"difficulty": difficulty}))
+                progress(difficulty, len(results))
+            rows.append(_summarise(difficulty, results))
+    except KeyboardInterrupt as interrupt:
+        if len(rows) < len(difficulties) and 0 < len(results) < episodes:
+            rows.append(_summarise(difficulties[len(rows)], results))
+        raise BaselineInterrupt(rows) from interrupt
     return rows
 
 
@@ -80,7 +104,13 @@ def wilson_interval(successes: int, n: int, z: float = 1.959963984540054) -> tup
         successes: How many of the trials succeeded.
         n: How many trials; at least one.
         z: Quantile of the normal distribution; the default makes it a 95% interval.
+
+    Raises:
+        OptionError: There are no trials, or more successes than trials.
     """
+    n = whole("n", n, at_least=1)
+    if not 0 <= successes <= n:
+        refuse(OptionError, "successes", successes, f"must be from 0 to {n}, the number of trials")
     share = successes / n
     centre = (share + z * z / (2 * n)) / (1 + z * z / n)
     half = z / (1 + z * z / n) * math.sqrt(share * (1 - share) / n + z * z / (4 * n * n))

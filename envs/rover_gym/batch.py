@@ -5,27 +5,33 @@ rovers and of threads. The physics is one call of the compiled core a control pe
 the functions that `RoverEnv` calls, over arrays.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
-from gymnasium.utils import seeding
 
-from rover_gym._core import OptionError, Plane, RoverModel, Simulation, SimulationBatch, StateError
+from rover_gym._core import Plane, RoverModel, Simulation, SimulationBatch
+from rover_gym.beginning import Beginning, check_seed, draw_beginning, put_back, seeded
 from rover_gym.env import RoverEnv
 from rover_gym.observation import N_ACTIONS, ObservationLayout
-from rover_gym.progress import Array, Mask, Observations, Outcome, Progress, advance, draw_noise, motor_commands, report
+from rover_gym.progress import Array, Mask, Observations, Outcome, Progress, advance, draw_noise, motor_commands
 from rover_gym.randomisation import Domain
 from rover_gym.rocks import Rocks
-from rover_gym.scene import ResetOptions, Scene, check_difficulty, check_reset_options, draw_scene
+from rover_gym.scene import ResetOptions, Scene, check_difficulty, check_reset_options
 from rover_gym.start import Start
 from rover_gym.task import Task, check_actions
-from rover_gym.validation import Range, refuse
+from rover_gym.validation import Range, whole
 
 if TYPE_CHECKING:
     from rover_gym.rendering import FrameRenderer
+
+
+#: Each rover takes some 100 kB.
+MAX_ROVERS = 100_000
+MAX_THREADS = 4096
 
 
 class RoverBatch:
@@ -45,10 +51,12 @@ class RoverBatch:
     def __init__(
         self, n: int, *, threads: int | None = None, max_episode_steps: int | None = None, **arguments: Any
     ) -> None:
-        self.n = _count("num_envs", n)
-        self.max_episode_steps = None if max_episode_steps is None else _count("max_episode_steps", max_episode_steps)
+        self.n = whole("num_envs", n, at_least=1, at_most=MAX_ROVERS)
+        self.max_episode_steps = (
+            None if max_episode_steps is None else whole("max_episode_steps", max_episode_steps, at_least=1)
+        )
         if threads is not None:
-            _count("threads", threads)
+            threads = whole("threads", threads, at_least=1, at_most=MAX_THREADS)
         self.prototype = RoverEnv(**arguments)
         self.task: Task = self.prototype.task
         simulation = Simulation(self.task.model, Plane(), **self.task.simulation_options)
@@ -75,20 +83,52 @@ class RoverBatch:
         """Starts an episode of rover i and returns its info; the others go on.
 
         Raises:
-            TerrainError: The rover would stand in the ground or in a sphere; the running episode goes on.
+            OptionError: The seed is no whole number from 0; nothing has changed.
+            TerrainError: As `RoverEnv.reset`; nothing has changed.
         """
-        generator = self.generator(i, seed)
-        scene, simulation = draw_scene(self.task, generator, self._difficulties[i], options or ResetOptions())
-        reading = simulation.reading(scene.start.goal, self.task.scan)
-        noise = draw_noise(self.task, (generator,))
-        progress = Progress.begin(self.task, scene, reading, None if noise is None else noise[0])
-        if progress is None:
-            refuse(StateError, "q", None if options is None else options.q, "must be observable in float32")
-        self.simulations.replace(i, simulation, scene.start.goal)
-        self._progress.put(i, progress)
-        self._scenes[i] = scene
+        with self.beginnings([i], [check_seed(seed)], options) as drawn:
+            return self.begin(i, drawn[0])
+
+    @contextmanager
+    def beginnings(
+        self,
+        chosen: Sequence[int],
+        seeds: Sequence[int | None] | None = None,
+        options: ResetOptions | None = None,
+    ) -> Iterator[list["Drawn"]]:
+        """Draws the next episodes of some rovers, which `begin` starts.
+
+        Whatever is raised inside the `with`, too, leaves every random generator as it was.
+
+        Args:
+            chosen: Which rovers.
+            seeds: One a chosen rover, checked; None to go on with the generators that there are.
+            options: What is fixed.
+
+        Raises:
+            TerrainError: As `RoverEnv.reset`; nothing has changed.
+        """
+        given = [None] * len(chosen) if seeds is None else seeds
+        made = [
+            (self.generator(i), self._seeds[i]) if seed is None else seeded(seed)
+            for i, seed in zip(chosen, given, strict=True)
+        ]
+        fixed = ResetOptions() if options is None else options
+        with put_back([generator for generator, _ in made]):
+            yield [
+                Drawn(draw_beginning(self.task, generator, self._difficulties[i], fixed), generator, seed)
+                for i, (generator, seed) in zip(chosen, made, strict=True)
+            ]
+
+    def begin(self, i: int, drawn: "Drawn") -> dict[str, Any]:
+        """Starts a drawn episode of rover i and returns its info."""
+        beginning = drawn.beginning
+        self.simulations.replace(i, beginning.simulation, beginning.scene.start.goal)
+        self._progress.put(i, beginning.progress)
+        self._scenes[i] = beginning.scene
         self._steps[i] = 0
-        return report(self.task, progress, reading).info()
+        self._generators[i], self._seeds[i] = drawn.generator, drawn.seed
+        return beginning.report(self.task).info()
 
     def step(self, actions: object, active: Mask | None = None) -> tuple[Outcome, Mask, Mask]:
         """Applies actions `(n, 12)` for one control period.
@@ -121,12 +161,12 @@ class RoverBatch:
             return outcome, terminated, np.zeros(self.n, np.bool_)
         return outcome, terminated, self._steps >= self.max_episode_steps
 
-    def generator(self, i: int, seed: int | None = None) -> np.random.Generator:
-        """Rover i's random generator, made anew from a seed, as `gymnasium.Env.reset` makes it."""
+    def generator(self, i: int) -> np.random.Generator:
+        """Rover i's random generator; before its first reset one of no known seed, as `gymnasium.Env` has it."""
         made = self._generators[i]
-        if made is None or seed is not None:
-            made, used = seeding.np_random(seed)
-            self._generators[i], self._seeds[i] = made, used
+        if made is None:
+            made, self._seeds[i] = seeded(None)
+            self._generators[i] = made
         return made
 
     def _draw_noise(self, active: Mask | None) -> Array | None:
@@ -136,6 +176,14 @@ class RoverBatch:
             return draw_noise(self.task, self._generators)
         chosen = zip(self._generators, active.tolist(), strict=True)
         return draw_noise(self.task, [generator if moves else None for generator, moves in chosen])
+
+
+class Drawn(NamedTuple):
+    """A rover's next episode, the generator that it was drawn from, and the seed of that."""
+
+    beginning: Beginning
+    generator: np.random.Generator
+    seed: int
 
 
 class Rover:
@@ -243,20 +291,3 @@ class Rover:
         if scene is None:
             raise ResetNeeded("a batch of rovers: call reset() first")
         return scene
-
-
-def spread_seeds(seed: int | Sequence[int | None] | None, n: int) -> list[int | None]:
-    """One seed a rover: a number goes up by one from rover to rover."""
-    if seed is None:
-        return [None] * n
-    if isinstance(seed, (int, np.integer)):
-        return [int(seed) + i for i in range(n)]
-    if len(seed) != n:
-        refuse(OptionError, "seed", seed, f"must be one seed, or {n}")
-    return list(seed)
-
-
-def _count(field: str, value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-        refuse(OptionError, field, value, "must be a whole number from 1")
-    return int(value)

@@ -16,16 +16,17 @@ speed along the circle that is tangential to the heading and meets the goal (pur
 """
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym._core import OptionError
 from rover_gym.env import RoverEnv, drive_signs
 from rover_gym.observation import N_ACTIONS, N_WHEELS
 from rover_gym.start import wheel_centres
-from rover_gym.validation import number
+from rover_gym.validation import flag, number, refuse
 
 Array = npt.NDArray[np.float64]
 
@@ -51,8 +52,8 @@ class CommandLimits:
     response: float = 0.2
 
     def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
-            number(f"command.{name}", value, above=0.0)
+        for name, value in vars(self).items():
+            number(f"command.{name}", value, at_least=1e-3, at_most=180.0 if name == "sideways_deg" else 1e3)
 
 
 class CommandController:
@@ -65,8 +66,10 @@ class CommandController:
     """
 
     def __init__(self, rover: RoverEnv, limits: CommandLimits | None = None, *, guided: bool = True) -> None:
+        if limits is not None and not isinstance(limits, CommandLimits):
+            refuse(OptionError, "limits", limits, "must be CommandLimits")
         self.limits = CommandLimits() if limits is None else limits
-        self.guided = guided
+        self.guided = flag("guided", guided)
         layout, model = rover.observation_layout, rover.model
         q, velocity = layout["q"].start, layout["velocity"].start
         self._pitch = q + 5

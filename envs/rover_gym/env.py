@@ -11,12 +11,13 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from rover_gym._core import Plane, RoverModel, Simulation, Snapshot, SphereField, StateError, StepError
+from rover_gym.beginning import check_seed, draw_beginning, put_back, seeded
 from rover_gym.observation import N_ACTIONS, N_WHEELS, ObservationLayout
-from rover_gym.progress import Progress, advance, draw_noise, motor_commands, report
+from rover_gym.progress import Progress, advance, draw_noise, motor_commands
 from rover_gym.randomisation import Domain
 from rover_gym.render_options import RENDER_MODES, RenderOptions, check_render_mode, check_render_options
 from rover_gym.rocks import Rocks
-from rover_gym.scene import Scene, check_difficulty, check_reset_options, draw_scene
+from rover_gym.scene import Scene, check_difficulty, check_reset_options
 from rover_gym.start import Start
 from rover_gym.task import Task, check_actions, check_task, mapping
 from rover_gym.validation import Range, refuse
@@ -123,6 +124,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     uniformly from `slope_deg` and `uphill_deg`. The rover rests on it at the origin, joints at zero,
     heading drawn from `heading_deg`; the goal lies at a distance from `goal_distance` in a direction
     from `goal_bearing_deg`, seen from the heading. It has no brakes: without torque it rolls downhill.
+    A scene in which the rover would stand in the ground or in a sphere is drawn again; after 100 scenes
+    `reset` raises `TerrainError`. A reset that is refused, for whatever reason, changes nothing.
 
     `reset(options=...)` fixes what it names: `difficulty`, `slope_deg`, `uphill_deg`, `position` (x, z),
     `heading_deg`, `goal` (x, z), or the whole state as `q` (21,) with `v` (21,), as
@@ -338,20 +341,22 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
         """Starts an episode; the class docstring lists the options.
 
+        A reset that is refused changes nothing: the running episode goes on, and the random generator stands where it
+        stood.
+
         Raises:
-            OptionError: An option is unknown or out of its range; nothing has changed.
-            StateError: `q` or `v` has a wrong shape or an entry that is not finite.
-            TerrainError: The rover would stand in the ground or in a sphere; the running episode goes on.
+            OptionError: The seed is no whole number from 0, or an option is unknown or out of its range.
+            StateError: `q` or `v` has a wrong shape or an entry that is not finite, or cannot be observed.
+            TerrainError: The rover would stand in the ground or in a sphere, in each of 100 scenes that were drawn.
         """
         checked = check_reset_options(self.task, options)
-        super().reset(seed=seed)
-        scene, simulation = draw_scene(self.task, self.np_random, self._difficulty, checked)
-        reading = simulation.reading(scene.start.goal, self.task.scan)
-        progress = Progress.begin(self.task, scene, reading, self._draw_noise())
-        if progress is None:
-            refuse(StateError, "q", checked.q, "must be observable in float32")
-        self._simulation, self._scene, self._progress = simulation, scene, progress
-        outcome = report(self.task, progress, reading)
+        chosen = check_seed(seed)
+        generator, used = (self.np_random, self._np_random_seed) if chosen is None else seeded(chosen)
+        with put_back((generator,)):
+            beginning = draw_beginning(self.task, generator, self._difficulty, checked)
+        self._np_random, self._np_random_seed = generator, used
+        self._simulation, self._scene, self._progress = beginning.simulation, beginning.scene, beginning.progress
+        outcome = beginning.report(self.task)
         return outcome.observation, outcome.info()
 
     def step(
@@ -368,20 +373,16 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         simulation = self._simulation
         command = check_actions(action, (N_ACTIONS,))
         torques, set_points = motor_commands(self.task, self._progress, command)
-        simulation.set_wheel_torques(torques)
-        simulation.set_steering(set_points)
+        simulation.set_commands(torques, set_points)
         messages: dict[int, str] = {}
         try:
             simulation.step(self.task.substeps)
         except StepError as error:
             messages[0] = str(error)
         reading = simulation.reading(goal, self.task.scan)
-        outcome = advance(self.task, self._progress, command, reading, messages, self._draw_noise())
-        return outcome.observation, float(outcome.reward), bool(outcome.termination), False, outcome.info()
-
-    def _draw_noise(self) -> npt.NDArray[np.float64] | None:
         noise = draw_noise(self.task, (self.np_random,))
-        return None if noise is None else noise[0]
+        outcome = advance(self.task, self._progress, command, reading, messages, None if noise is None else noise[0])
+        return outcome.observation, float(outcome.reward), bool(outcome.termination), False, outcome.info()
 
     def set_difficulty(self, difficulty: float | Range) -> None:
         """Sets the rocks' difficulty, or the range it is drawn from, from the next reset on.
@@ -433,15 +434,33 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         """Continues from a snapshot, bit for bit, taken from an environment with the same arguments.
 
         Raises:
-            StateError: This is no snapshot; nothing has changed.
+            StateError: This is no snapshot, or a damaged one, or one of other arguments; nothing has changed.
         """
         if not isinstance(snapshot, EnvSnapshot):
             refuse(StateError, "snapshot", snapshot, "must come from RoverEnv.snapshot()")
+        for name, kind in (("scene", Scene), ("progress", Progress), ("simulation", Snapshot)):
+            part = getattr(snapshot, name)
+            if not isinstance(part, kind):
+                refuse(StateError, f"snapshot.{name}", part, f"must be a {kind.__name__}")
+        if not snapshot.progress.is_of(self.task):
+            refuse(StateError, "snapshot.progress", snapshot.progress, "must be of an environment with these arguments")
+        state = self._check_random_state(snapshot.random_state)
+        difficulty = None if snapshot.difficulty is None else check_difficulty(self.task, snapshot.difficulty)
         simulation = self.task.simulate(snapshot.scene.terrain, snapshot.scene.domain)
         simulation.restore(snapshot.simulation)
+        self.np_random.bit_generator.state = state
         self._simulation, self._scene = simulation, snapshot.scene
-        self._progress, self._difficulty = snapshot.progress.copy(), snapshot.difficulty
-        self.np_random.bit_generator.state = copy.deepcopy(dict(snapshot.random_state))
+        self._progress, self._difficulty = snapshot.progress.copy(), difficulty
+
+    def _check_random_state(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """A copy of a random generator's state, once a generator of that kind has taken it."""
+        trial = type(self.np_random.bit_generator)()
+        try:
+            state = copy.deepcopy(dict(given))
+            trial.state = state
+        except (TypeError, ValueError, KeyError, AttributeError, OverflowError) as error:
+            refuse(StateError, "snapshot.random_state", given, f"is no state of {type(trial).__name__} ({error!r})")
+        return state
 
     def _running(self) -> Scene:
         if self._scene is None:

@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym._core import OptionError
 from rover_gym.baseline import ENDS, wilson_interval
 from rover_gym.batch import RoverBatch
 from rover_gym.episodes import Policy
 from rover_gym.progress import tilt_of
 from rover_gym.registration import MAX_EPISODE_STEPS
+from rover_gym.validation import number, refuse
 
 Interval = tuple[float, float]
 
@@ -73,7 +75,13 @@ def drive_all(
         num_envs: Episodes at a time.
         threads: That step them; None for one a core.
         progress: Called with the number of episodes done.
+
+    Raises:
+        OptionError: `num_envs` or `max_episode_steps` is less than one, or an argument is out of its range.
     """
+    number("num_envs", num_envs, at_least=1.0)
+    if max_episode_steps is not None:
+        number("max_episode_steps", max_episode_steps, at_least=1.0)
     waiting = list(reversed(seeds))
     n = min(num_envs, len(waiting))
     if n == 0:
@@ -165,7 +173,13 @@ class Summary:
 
 
 def summarise(policy: str, drives: Sequence[Drive]) -> Summary:
-    """The figures with their intervals: Wilson's for success, the normal one for means, linearised for the ratio."""
+    """The figures with their intervals: Wilson's for success, the normal one for means, linearised for the ratio.
+
+    Raises:
+        OptionError: There are no drives.
+    """
+    if not drives:
+        refuse(OptionError, "drives", len(drives), "must hold an episode or more")
     successes = sum(drive.success for drive in drives)
     counts = Counter(drive.end for drive in drives)
     return Summary(

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from rover_gym._core import OptionError
 from rover_gym.env import RoverEnv
-from rover_gym.validation import refuse
+from rover_gym.validation import refuse, whole
 
 # Entries beyond this are cut: they come from impacts and free wheels.
 LARGEST_FEATURE = 5.0
@@ -29,6 +29,7 @@ class Features:
     """
 
     def __init__(self, rover: RoverEnv, pool: int = 1) -> None:
+        pool = whole("pool", pool, at_least=1)
         layout = rover.observation_layout
         q, velocity = layout["q"].start, layout["velocity"].start
         wheels = set(rover.model.wheel_joint_indices)
@@ -89,7 +90,7 @@ def _cells(offsets: npt.NDArray[np.float64], pool: int) -> npt.NDArray[np.intp]:
         return np.zeros((0, 1), np.intp)
     columns = int(np.count_nonzero(offsets[:, 0] == offsets[0, 0]))
     rows = len(offsets) // columns
-    if pool < 1 or rows % pool or columns % pool:
+    if rows % pool or columns % pool:
         refuse(OptionError, "pool", pool, f"must divide the scan's {rows} rows and {columns} columns")
     points = np.arange(rows * columns).reshape(rows // pool, pool, columns // pool, pool)
     cells = points.transpose(0, 2, 1, 3).reshape(-1, pool * pool)

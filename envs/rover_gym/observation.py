@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym._core import RoverModel, StateError
-from rover_gym.validation import refuse
+from rover_gym.validation import array, refuse
 
 N_WHEELS = 6
 N_ACTIONS = 12
@@ -105,7 +105,7 @@ class ObservationLayout(Mapping[str, slice]):
         Raises:
             StateError: The last axis does not have the layout's size.
         """
-        given = np.asarray(observation, dtype=np.float64)
+        given = array("observation", observation, error=StateError)
         if given.ndim == 0 or given.shape[-1] != self.size:
             refuse(StateError, "observation", given.shape, f"must have {self.size} entries on its last axis")
         values = given * self.scale

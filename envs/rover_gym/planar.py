@@ -36,7 +36,7 @@ from rover_gym._core import (
     TwoWheelRoverSimulation,
     soil_packing,
 )
-from rover_gym.recording import Channel, Recorder
+from rover_gym.recording import Channel, Recorder, row_count
 
 __all__ = [
     "BallSimulation",
@@ -173,12 +173,14 @@ def record(
         How many rows' steps were not solved to the tolerance.
 
     Raises:
+        OptionError: `duration` or `steps_per_row` is not positive, or there would be too many rows.
+        RecordingError: The file is in use, or the disk is full.
         MissingExtraError: h5py is not installed.
         StepError: A step could not be taken; what came before is on the disk.
     """
     sampler = PlanarSampler(sim)
     unconverged = 0
-    rows = round(duration / sim.time_step / steps_per_row)
+    rows = row_count(duration, sim.time_step, steps_per_row)
     with Recorder(path, sampler.channels, attributes) as recorder:
         recorder.append(sampler.row(sim))
         for row in range(1, rows + 1):

@@ -19,8 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym._core import OptionError, SoilSimulation, soil_packing
-from rover_gym.recording import Channel, Recorder
-from rover_gym.validation import number, refuse
+from rover_gym.recording import Channel, Recorder, row_count
+from rover_gym.validation import number, refuse, vector
 
 __all__ = ["Bed", "SoilSampler", "record_soil", "rover_on_soil", "settled_bed", "surface_height"]
 
@@ -30,6 +30,8 @@ DISK_RADIUS, DISK_MASS = 0.01625, 0.7
 WHEEL_RADIUS, HALF_LENGTH = 0.2, 0.4
 SETTLING = 0.2  # s, in which the rover comes to rest, at 9.81 m/s^2
 EARTH = 9.81  # m/s^2
+MOST_DISKS = 1_000_000
+MOST_STEPS = 100_000_000  # of one call: more would not end
 MOST_CHAINS = 2000  # contacts of a row that are kept, the strongest
 
 Array = npt.NDArray[np.float64]
@@ -107,25 +109,41 @@ def settled_bed(
         **options: Of `SoilSimulation`.
 
     Raises:
-        OptionError: `count` or `layers` is no positive whole number, or `settle` is negative.
-        ModelError: A radius or mass cannot be.
+        OptionError: `count` or `layers` is no positive whole number or more than a million, a radius is not positive,
+            or `settle` is negative or takes more than a hundred million steps.
+        ModelError: A mass cannot be.
     """
     count, layers = _whole("count", count), _whole("layers", layers)
+    radius_min = number("radius_min", radius_min, above=0.0)
+    radius_max = number("radius_max", radius_max, at_least=radius_min)
     if mass is None:
         mass = DISK_MASS * (0.5 * (radius_min + radius_max) / DISK_RADIUS) ** 2
-    width = -(-count // layers) * 2.0 * radius_max * 1.004
+    width = bed_width(count, layers, radius_max)
     radius, masses, centres = soil_packing(
         count, radius_min=radius_min, radius_max=radius_max, mass=mass, width=width, seed=seed
     )
     walls = np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [width, 0.0, -1.0, 0.0]])
     sim = SoilSimulation(radius, masses, centres, walls=walls, **options)
     duration = 0.5 * _slowness(sim) if settle is None else number("settle", settle, at_least=0.0)
-    sim.step(round(duration / sim.time_step))
+    sim.step(step_count("settle", duration, sim.time_step))
     return Bed(radius, masses, sim.position, walls, width)
 
 
+def bed_width(count: int, layers: int, radius_max: float) -> float:
+    """Width of the box into which `settled_bed` lets so many disks fall, m."""
+    return -(-count // layers) * 2.0 * radius_max * 1.004
+
+
+def step_count(field: str, duration: float, time_step: float) -> int:
+    """How many steps a time takes; an OptionError that names `field` where they would not end."""
+    steps = duration / time_step
+    if not steps <= MOST_STEPS:
+        refuse(OptionError, field, duration, f"must take at most {MOST_STEPS} steps of {time_step:g} s")
+    return round(steps)
+
+
 def _whole(field: str, value: object) -> int:
-    result = number(field, value, at_least=1.0)
+    result = number(field, value, at_least=1.0, at_most=MOST_DISKS)
     if result != round(result):
         refuse(OptionError, field, value, "must be a whole number")
     return round(result)
@@ -167,9 +185,19 @@ def rover_on_soil(
     if bed is None:
         shared = {name: options[name] for name in ("gravity", "friction", "time_step") if name in options}
         bed = settled_bed(count, layers, seed=seed, **shared)
-    rover = dict(rover or {})
-    radii = np.broadcast_to(rover.get("wheel_radius", WHEEL_RADIUS), 2)
-    axles = np.array([rover.get("axle_a", (-HALF_LENGTH, 0.0)), rover.get("axle_b", (HALF_LENGTH, 0.0))])
+    start = number("start", start)
+    rover = {} if rover is None else rover
+    if not isinstance(rover, Mapping):
+        refuse(OptionError, "rover", rover, "must be a mapping of TwoWheelRoverSimulation's arguments")
+    rover = dict(rover)
+    radius = rover.get("wheel_radius", WHEEL_RADIUS)
+    radii = np.array(vector("rover.wheel_radius", np.resize(radius, 2) if np.ndim(radius) == 0 else radius, 2))
+    axles = np.array(
+        [
+            vector("rover.axle_a", rover.get("axle_a", (-HALF_LENGTH, 0.0)), 2),
+            vector("rover.axle_b", rover.get("axle_b", (HALF_LENGTH, 0.0)), 2),
+        ]
+    )
     places = start + axles[:, 0]
     if (places - radii).min() < 0.0 or (places + radii).max() > bed.width:
         reason = f"puts a wheel out of the bed, which is {bed.width:.2f} m wide"
@@ -184,7 +212,7 @@ def rover_on_soil(
         machine=[start, height + 1e-4, 0.0, 0.0, 0.0],
         **options,
     )
-    sim.step(round(SETTLING * _slowness(sim) / sim.time_step))
+    sim.step(step_count("gravity", SETTLING * _slowness(sim), sim.time_step))
     sim.set_state(sim.position, sim.velocity, sim.machine, sim.machine_rate)
     return sim
 
@@ -339,12 +367,12 @@ def record_soil(
         How many rows' steps were not solved to the tolerance.
 
     Raises:
-        OptionError: `duration` or `steps_per_row` is not positive.
+        OptionError: `duration` or `steps_per_row` is not positive, or there would be too many rows.
+        RecordingError: The file is in use, or the disk is full.
         MissingExtraError: h5py is not installed.
         StepError: A step could not be taken; what came before is on the disk.
     """
-    duration = number("duration", duration, above=0.0)
-    steps_per_row = _whole("steps_per_row", steps_per_row)
+    rows, steps_per_row = row_count(duration, sim.time_step, steps_per_row), int(steps_per_row)
     sampler = SoilSampler(sim)
     scene = {
         "kind": "SoilSimulation",
@@ -360,7 +388,6 @@ def record_soil(
         "solver": sim.settings,
     }
     unconverged = 0
-    rows = round(duration / sim.time_step / steps_per_row)
     with Recorder(path, sampler.channels, attributes) as recorder:
         recorder.append(sampler.row())
         for _ in range(rows):

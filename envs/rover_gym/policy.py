@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym._core import StateError
+from rover_gym._core import OptionError, StateError
 from rover_gym.env import RoverEnv, drive_signs
 from rover_gym.observation import N_ACTIONS, N_WHEELS
 from rover_gym.start import wheel_centres
-from rover_gym.validation import refuse
+from rover_gym.validation import array, number, refuse
 
 _Row = Sequence[float]
 
@@ -44,6 +44,10 @@ class PDGains:
     reverse_cost: float = 1.3
     switch_cost: float = 1.0
 
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            number(f"gains.{name}", value, at_least=1e-3, at_most=1e3)
+
 
 class PDPolicy:
     """Drives `Rover-v0` to its goal; stateless, with stable-baselines3's `predict`.
@@ -60,6 +64,8 @@ class PDPolicy:
 
     def __init__(self, env: Any, gains: PDGains | None = None) -> None:
         rover = rover_env(env)
+        if gains is not None and not isinstance(gains, PDGains):
+            refuse(OptionError, "gains", gains, "must be PDGains")
         self.gains = PDGains() if gains is None else gains
         layout, model = rover.observation_layout, rover.model
         self._size = layout.size
@@ -97,7 +103,7 @@ class PDPolicy:
         Raises:
             StateError: The observation has a wrong shape or an entry that is not finite.
         """
-        given = np.asarray(observation, dtype=np.float64)
+        given = array("observation", observation, error=StateError)
         if given.ndim not in (1, 2) or given.shape[-1] != self._size:
             refuse(StateError, "observation", given.shape, f"must be (..., {self._size})")
         if not np.isfinite(given).all():
@@ -194,9 +200,10 @@ def _clip(value: float) -> float:
 def rover_env(env: Any) -> RoverEnv:
     """The `RoverEnv` inside wrappers, or the first one inside a vector environment."""
     inner = getattr(env, "unwrapped", env)
-    if not isinstance(inner, RoverEnv) and getattr(inner, "envs", None):
-        inner = getattr(inner.envs[0], "unwrapped", inner.envs[0])
+    within = getattr(inner, "envs", None)
+    if not isinstance(inner, RoverEnv) and isinstance(within, (list, tuple)) and within:
+        inner = getattr(within[0], "unwrapped", within[0])
     inner = getattr(inner, "prototype", inner)  # what the rovers of a native batch are made like
     if not isinstance(inner, RoverEnv):
-        raise TypeError(f"PDPolicy drives Rover-v0, not {inner!r}")
+        refuse(OptionError, "env", env, "must be a Rover-v0, wrapped or not, or a vector of them")
     return inner

@@ -135,6 +135,16 @@ class Progress:
         for name, value in vars(self).items():
             value[i] = getattr(one, name)
 
+    def is_of(self, task: Task) -> bool:
+        """Whether this can be the progress of one rover with a task: its shapes and that all of it is finite."""
+        shapes = {"previous_action": (N_ACTIONS,), "domain": (len(DOMAIN),), "observation": (task.layout.size,)}
+        return all(
+            isinstance(value, np.ndarray if name in shapes else (float, int))
+            and np.shape(value) == shapes.get(name, ())
+            and bool(np.isfinite(value).all())
+            for name, value in vars(self).items()
+        )
+
     def copy(self) -> "Progress":
         """A deep copy."""
         return copy.deepcopy(self)
@@ -306,7 +316,13 @@ def advance(
         noise: `(..., size)` of the observations, or None.
     """
     dt, w = task.dt, task.reward_weights
+    broken = ~np.isfinite(readings).all(axis=-1)
+    if broken.any():
+        readings = np.where(np.isfinite(readings), readings, 0.0)
     now = Scalars.of(task, readings)
+    if broken.any():
+        distance: Quantity = np.where(broken, progress.distance, now.distance)
+        now = now._replace(distance=distance[()])
     torque_change, steering_change = _squares(commands - progress.previous_action)
     distance_before, observation_before = progress.distance, progress.observation
 
@@ -318,6 +334,7 @@ def advance(
     progress.stuck_time = (progress.stuck_time + dt) * stuck
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite ends the episode
         observation, finite = observe(task, readings, commands, progress.stuck_time, noise)
+    finite = finite & ~broken
 
     reasons = (
         (now.distance <= task.goal_tolerance)
@@ -348,7 +365,7 @@ def advance(
     if not sound:
         # Where the physics failed its numbers earn nothing, and the last finite observation stays.
         terms = {name: term if name == "failure" else np.where(failed, 0.0, term)[()] for name, term in terms.items()}
-        observation = np.where(finite[..., None], observation, observation_before)
+        observation = np.where(failed[..., None], observation_before, observation)
     progress.observation = observation
     reward: Quantity = 0.0
     for term in terms.values():

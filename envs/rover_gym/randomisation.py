@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from rover_gym.validation import Range, number, span
+from rover_gym.validation import Range
 
 
 @dataclass(frozen=True)
@@ -55,16 +55,3 @@ class DomainDistribution:
             actuator_gain=draw(self.actuator_gain),
             gravity_scale=draw(self.gravity_scale),
         )
-
-
-def check_domain(
-    mass_scale: object, friction: object, actuator_gain: object, gravity_scale: object, observation_noise: object
-) -> DomainDistribution:
-    """The distribution that arguments ask for."""
-    return DomainDistribution(
-        mass_scale=span("mass_scale", mass_scale, above=0.0),
-        friction=span("friction", friction, at_least=0.0),
-        actuator_gain=span("actuator_gain", actuator_gain, at_least=0.0),
-        gravity_scale=span("gravity_scale", gravity_scale, above=0.0),
-        observation_noise=number("observation_noise", observation_noise, at_least=0.0),
-    )

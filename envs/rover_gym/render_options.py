@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 
 from rover_gym._core import OptionError
 from rover_gym.extras import MissingExtraError
-from rover_gym.validation import known_keys, number, refuse, vector
+from rover_gym.validation import known_keys, refuse, vector, whole
 
 RENDER_MODES = ("rgb_array",)
 CAMERAS = ("follow", "side", "top")
@@ -54,10 +54,10 @@ def check_render_options(field: str, given: Mapping[str, Any]) -> RenderOptions:
     prefix = f"{field}." if field else ""
     for name in ("width", "height"):
         if name in options:
-            size = number(prefix + name, options[name], at_least=SMALLEST, at_most=LARGEST)
+            size = whole(prefix + name, options[name], at_least=SMALLEST, at_most=LARGEST)
             if size % 2:
                 refuse(OptionError, prefix + name, options[name], "must be an even whole number")
-            options[name] = int(size)
+            options[name] = size
     if "camera" in options:
         options["camera"] = _check_camera(prefix + "camera", options["camera"])
     for name in ("show_forces", "antialiasing"):
@@ -66,7 +66,7 @@ def check_render_options(field: str, given: Mapping[str, Any]) -> RenderOptions:
     return RenderOptions(**options)
 
 
-def check_render_mode(render_mode: str | None) -> None:
+def check_render_mode(render_mode: object) -> None:
     """Refuses a mode that the environment cannot render, or whose packages are missing.
 
     Raises:
@@ -75,7 +75,7 @@ def check_render_mode(render_mode: str | None) -> None:
     """
     if render_mode is None:
         return
-    if render_mode not in RENDER_MODES:
+    if not (isinstance(render_mode, str) and render_mode in RENDER_MODES):
         reason = f"unknown; known is {', '.join(RENDER_MODES)}, and gymnasium.make adds 'human', a window"
         refuse(OptionError, "render_mode", render_mode, reason)
     if importlib.util.find_spec("vtkmodules") is None:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from rover_gym._core import Plane, RoverModel, Simulation
-from rover_gym.recording import Recorder, Sampler, Trajectory, describe
+from rover_gym.recording import Recorder, Sampler, Trajectory, describe, row_count
 
 #: The 880 kg table of the plane run, kg, in the order of Table 4.1.
 MASSES = (700.0, 20.0, 6.0, 6.0, 14.0, 14.0, 20.0, 6.0, 6.0, 14.0, 14.0, 20.0, 6.0, 6.0, 14.0, 14.0)
@@ -88,7 +88,7 @@ def scene(time_step: float = 0.005, **options: Any) -> Simulation:
 def report_model() -> RoverModel:
     """The rover of the report's runs."""
     return RoverModel().replace(
-        wheel_radius=WHEEL_RADIUS,
+        contact_radius=WHEEL_RADIUS,
         masses=MASSES,
         steering_stiffness=STEERING_STIFFNESS,
         steering_damping=STEERING_DAMPING,
@@ -155,10 +155,12 @@ def record(
         progress: Called with the simulated time now and then.
 
     Raises:
+        OptionError: `duration` is not positive, or there would be too many rows.
+        RecordingError: The file is in use, or the disk is full.
         MissingExtraError: h5py is not installed.
         StepError: A step could not be taken; what came before is on the disk.
     """
-    steps = round(duration / sim.time_step)
+    steps = row_count(duration, sim.time_step)
     first_contact: float | None = None
     smallest_gap = float(sim.wheel_gaps.min())
     unconverged, worst = 0, 0.0

@@ -35,6 +35,8 @@ ROCK_RADII = (0.3, 10.0)
 MARGIN = 4.0
 #: No goal is farther from its start, m: a field between them would not fit.
 MAX_GOAL_DISTANCE = 100.0
+#: Of a height scan's points, m.
+SPACINGS = (1e-3, 10.0)
 #: Room that the clearings leave around the rover, m.
 CLEARANCE = 0.1
 
@@ -163,4 +165,6 @@ def check_scan(value: object) -> HeightScan | None:
     for i, count in enumerate((rows, columns)):
         if not (count.is_integer() and 1.0 <= count <= 200.0):
             refuse(OptionError, f"height_scan[{i}]", count, "must be a whole number from 1 to 200")
-    return HeightScan(int(rows), int(columns), number("height_scan[2]", spacing, above=0.0))
+    return HeightScan(
+        int(rows), int(columns), number("height_scan[2]", spacing, at_least=SPACINGS[0], at_most=SPACINGS[1])
+    )

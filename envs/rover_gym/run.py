@@ -14,11 +14,17 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym._core import Plane, RoverModel, SphereField
-from rover_gym.recording import RecordingError, Trajectory, read_trajectory
-from rover_gym.validation import number, refuse
+from rover_gym.recording import RecordingError, Sampler, Trajectory, read_trajectory, sound
+from rover_gym.validation import number, refuse, vector
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
+
+LARGEST = 1e9  # m, rad or s: what is drawn and written in single precision must have places left
+LONGEST_TITLE = 200
+#: What `rover drive` records besides the simulation, and the shape of its rows.
+OF_EPISODES: Mapping[str, tuple[int, ...]] = {"distance_to_goal": (), "slip_ratio": (), "motor_energy": ()}
 
 
 @dataclass(frozen=True)
@@ -96,17 +102,18 @@ def film_rows(time: npt.NDArray[np.float64], fps: float) -> npt.NDArray[np.int64
     """
     fps = number("fps", fps, above=0.0)
     frames = np.floor((time[-1] - time[0]) * fps + 1e-6)  # a run of 2 s that ends at 1.999999999 s has its last
-    wanted = time[0] + np.arange(int(frames) + 1) / fps
-    between = 0.5 * (time[1:] + time[:-1])
-    return np.unique(np.searchsorted(between, wanted))
+    # How many of the frames' times k / fps lie before the middle between a sample and the next: no frame is counted
+    # one by one, as a damaged run may last for ages.
+    before = np.floor((0.5 * (time[1:] + time[:-1]) - time[0]) * fps) + 1.0
+    before = np.append(np.minimum(before, frames + 1.0), frames + 1.0)
+    return np.flatnonzero(np.diff(before, prepend=0.0) > 0.0)
 
 
 def read_run(path: str | Path) -> Run:
     """Reads a run that `rover drive --output` or `rover report` saved, complete or not.
 
     Raises:
-        RecordingError: The file is no trajectory, or holds no samples, rover or ground.
-        ModelError: The rover in the file is not one.
+        RecordingError: The file is no sound trajectory, or holds no samples, rover or ground.
         OSError: The file is not there or cannot be read.
         MissingExtraError: h5py is not installed.
     """
@@ -117,21 +124,89 @@ def run_of(trajectory: Trajectory, path: str | Path) -> Run:
     """The run in a trajectory that was read from `path`.
 
     Raises:
-        RecordingError: It holds no samples, rover or ground.
-        ModelError: The rover in it is not one.
+        RecordingError: It holds no samples, rover or ground, or what it holds does not fit together.
     """
-    scene = trajectory.attributes.get("scene", {})
-    if "q" not in trajectory.data or "model" not in scene:
+    scene = trajectory.attributes.get("scene")
+    if "q" not in trajectory.data or not isinstance(scene, dict) or not isinstance(scene.get("model"), dict):
         refuse(RecordingError, "path", str(path), "holds no rover: neither `q` nor `scene.model` may be missing")
     if trajectory.terrain is None:
         refuse(RecordingError, "path", str(path), "holds no ground: the group `terrain` is missing")
-    if len(trajectory["time"]) == 0:
-        refuse(RecordingError, "path", str(path), "holds no samples: the run was killed before the first were written")
-    goal = scene.get("goal")
+    check_time(trajectory, path)
+    with sound(path, "scene.model"):
+        model = RoverModel.from_dict(scene["model"])
+    _check_solver(trajectory.attributes.get("solver", {}), path)
+    shapes = {channel.name: channel.shape for channel in Sampler(model).channels}
+    check_rows(trajectory, path, {**shapes, **OF_EPISODES}, bounded=("q", "wheel_centres"))
     return Run(
         trajectory=trajectory,
-        model=RoverModel.from_dict(scene["model"]),
+        model=model,
         terrain=trajectory.terrain,
-        goal=None if goal is None else (float(goal[0]), float(goal[1])),
-        title=str(trajectory.attributes.get("title", "a run")),
+        goal=_goal(scene.get("goal"), path),
+        title=title_of(trajectory),
     )
+
+
+def title_of(trajectory: Trajectory) -> str:
+    """What was run, in words: one line that can be printed."""
+    title = str(trajectory.attributes.get("title", "a run"))[:LONGEST_TITLE]
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in title).split())
+
+
+def check_time(trajectory: Trajectory, path: str | Path) -> None:
+    """Refuses a trajectory without samples, or whose time does not run forward.
+
+    Raises:
+        RecordingError: It is such a one.
+    """
+    if "time" not in trajectory.data or len(trajectory["time"]) == 0:
+        refuse(RecordingError, "path", str(path), "holds no samples: the run was killed before the first were written")
+    check_rows(trajectory, path, {"time": ()}, bounded=("time",))
+    backward = np.flatnonzero(np.diff(trajectory["time"]) < 0.0)
+    if len(backward):
+        row = int(backward[0]) + 1
+        refuse(RecordingError, f"{path}: time[{row}]", float(trajectory["time"][row]), "must not run backward")
+
+
+def check_rows(
+    trajectory: Trajectory, path: str | Path, shapes: Mapping[str, tuple[int, ...]], *, bounded: tuple[str, ...]
+) -> None:
+    """Refuses data sets whose rows have other shapes, or whose values cannot be drawn.
+
+    Args:
+        trajectory: The data sets; those that it lacks are not looked for.
+        path: The file, for the message.
+        shapes: Shape of a row, by data set.
+        bounded: Those whose values must be finite and within `LARGEST`.
+
+    Raises:
+        RecordingError: A data set is not as it must be.
+    """
+    for name, shape in shapes.items():
+        values = trajectory.data.get(name)
+        if values is None:
+            continue
+        if values.shape[1:] != shape:
+            refuse(RecordingError, f"{path}: {name}", values.shape[1:], f"must have rows of shape {shape}")
+        if name in bounded and not (np.abs(values) <= LARGEST).all():
+            worst = float(values[~(np.abs(values) <= LARGEST)][0])
+            refuse(RecordingError, f"{path}: {name}", worst, f"must be finite and within {LARGEST:g}")
+
+
+def _check_solver(solver: object, path: str | Path) -> None:
+    """Refuses settings that the figures cannot show."""
+    if not isinstance(solver, dict):
+        refuse(RecordingError, f"{path}: solver", solver, "must be an object")
+    for name in ("time_step", "tolerance"):
+        if name in solver:
+            number(f"{path}: solver.{name}", solver[name], above=0.0, at_most=LARGEST, error=RecordingError)
+    if "gravity" in solver:
+        vector(f"{path}: solver.gravity", solver["gravity"], 3, error=RecordingError)
+
+
+def _goal(goal: object, path: str | Path) -> tuple[float, float] | None:
+    if goal is None:
+        return None
+    x, z = vector(f"{path}: scene.goal", goal, 2, error=RecordingError)
+    if max(abs(x), abs(z)) > LARGEST:
+        refuse(RecordingError, f"{path}: scene.goal", goal, f"must lie within {LARGEST:g} m")
+    return (x, z)

@@ -6,18 +6,23 @@ venv = RoverVecEnv(64, terrain="sphere_field", height_scan=True)
 model = stable_baselines3.PPO("MlpPolicy", VecMonitor(venv))
 """
 
+import copy
 from collections.abc import Sequence
+from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym._core import OptionError, RoverGymError
 from rover_gym.batch import Rover, RoverBatch
+from rover_gym.beginning import check_seed
 from rover_gym.env import RoverEnv
 from rover_gym.extras import MissingExtraError
 from rover_gym.observation import LARGEST, N_ACTIONS
 from rover_gym.registration import MAX_EPISODE_STEPS
 from rover_gym.task import check_actions
+from rover_gym.validation import refuse
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
@@ -55,6 +60,8 @@ class RoverVecEnv(VecEnv):
     ) -> None:
         self.batch = RoverBatch(n_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments)
         self._actions: npt.NDArray[np.float64] | None = None
+        #: Rovers whose next episode was refused when the last one ended.
+        self._waiting: list[int] = []
         prototype = self.prototype
         super().__init__(self.batch.n, prototype.observation_space, prototype.action_space)
 
@@ -64,13 +71,46 @@ class RoverVecEnv(VecEnv):
         return self.batch.prototype
 
     def reset(self) -> VecEnvObs:
-        """Starts an episode of every rover, with the seeds and options that were set for this once."""
+        """Starts an episode of every rover, with the seeds and options that were set for this once.
+
+        Raises:
+            StateError: As `RoverEnv.reset`; nothing has changed.
+            TerrainError: As `RoverEnv.reset`; nothing has changed.
+        """
         options = [self.batch.check_options(given) for given in self._options]
-        for i, (seed, fixed) in enumerate(zip(self._seeds, options, strict=True)):
-            self.reset_infos[i] = self.batch.reset(i, seed, fixed)
+        with ExitStack() as stack:
+            drawn = [
+                stack.enter_context(self.batch.beginnings([i], [seed], fixed))[0]
+                for i, (seed, fixed) in enumerate(zip(self._seeds, options, strict=True))
+            ]
+            for i, one in enumerate(drawn):
+                self.reset_infos[i] = self.batch.begin(i, one)
+        self._waiting = []
         self._reset_seeds()
         self._reset_options()
         return self.batch.observation
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Sets the seeds of the next reset: of the first rover, then one more from rover to rover.
+
+        Raises:
+            OptionError: It is neither None nor a whole number from 0; nothing has changed.
+        """
+        return super().seed(check_seed(seed))
+
+    def set_options(self, options: list[dict[str, Any]] | dict[str, Any] | None = None) -> None:
+        """Sets the options of the next reset: those of `RoverEnv.reset`, for every rover, or one mapping a rover.
+
+        Raises:
+            OptionError: They are neither, or one is unknown or out of its range; nothing has changed.
+            StateError: As `RoverEnv.reset`.
+        """
+        given = options if isinstance(options, list) else [options] * self.num_envs
+        if len(given) != self.num_envs:
+            refuse(OptionError, "options", options, f"must be one mapping, or a list of {self.num_envs}")
+        for one in given:
+            self.batch.check_options(one)
+        self._options = [copy.deepcopy(dict(one or {})) for one in given]
 
     def step_async(self, actions: npt.NDArray[np.float32]) -> None:
         """Takes the actions `(n_envs, 12)`.
@@ -81,7 +121,17 @@ class RoverVecEnv(VecEnv):
         self._actions = check_actions(actions, (self.num_envs, N_ACTIONS))
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Applies them for one control period; rovers whose episode ends start the next."""
+        """Applies them for one control period; rovers whose episode ends start the next.
+
+        A next episode that cannot begin is refused by the step after, before anything moves.
+
+        Raises:
+            TerrainError: A rover's next episode cannot begin, as `RoverEnv.reset` says; nothing has changed. A reset
+                with another seed or other options helps.
+        """
+        if self._waiting:
+            self._restart(self._waiting)
+            self._waiting = []
         outcome, terminated, timed_out = self.batch.step(self._actions)
         observation = outcome.observation
         dones = terminated | timed_out
@@ -93,12 +143,20 @@ class RoverVecEnv(VecEnv):
                 last["TimeLimit.truncated"] = bool(timed_out[i] and not terminated[i])
                 last["terminal_observation"] = observation[i].copy()
                 infos[i] = last
-            for i in ended:
-                self.reset_infos[i] = self.batch.reset(i)
-            observation[ended] = self.batch.observation[ended]
+            try:
+                self._restart(ended)
+            except RoverGymError:
+                self._waiting = ended
+            else:
+                observation[ended] = self.batch.observation[ended]
         # Only a rover that flies off with 1e37 m/s earns what float32 cannot hold.
         reward = np.clip(outcome.reward, -LARGEST, LARGEST).astype(np.float32)
         return observation, reward, dones, infos
+
+    def _restart(self, chosen: list[int]) -> None:
+        with self.batch.beginnings(chosen) as drawn:
+            for i, one in zip(chosen, drawn, strict=True):
+                self.reset_infos[i] = self.batch.begin(i, one)
 
     def close(self) -> None:
         """Frees the renderers, if there are any."""

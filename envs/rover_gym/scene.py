@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym._core import OptionError, Plane, Simulation, SphereField, StateError, TerrainError
+from rover_gym._core import OptionError, Plane, Simulation, SphereField, StateError
 from rover_gym.randomisation import Domain
 from rover_gym.rocks import MAX_GOAL_DISTANCE, Rocks
 from rover_gym.start import Start, resting_pose, sample_start, tilted_plane
@@ -16,6 +16,9 @@ from rover_gym.task import MAX_SLOPE_DEG, Task, mapping
 from rover_gym.validation import Range, known_keys, number, refuse, span, vector
 
 RESET_OPTIONS = ("difficulty", "slope_deg", "uphill_deg", "position", "heading_deg", "goal", "q", "v")
+
+#: No place on the map is farther from the origin along x or z, m.
+MAX_PLACE = 1e6
 
 # A rover that stands deeper than this in the ground at its start, m, stands wrong.
 START_OVERLAP = 0.01
@@ -50,16 +53,13 @@ class ResetOptions:
 def draw_scene(
     task: Task, rng: np.random.Generator, difficulty: Range | None, options: ResetOptions
 ) -> tuple[Scene, Simulation]:
-    """Draws a scene and puts the rover into it.
+    """Draws a scene and puts the rover into it, be there room for it or not.
 
     Args:
         task: The task.
         rng: Every draw is made, whatever the options fix.
         difficulty: Range of the rocks' difficulty; None for the task's own.
         options: What is fixed.
-
-    Raises:
-        TerrainError: The rover would stand in the ground or in a sphere.
     """
     distribution, rocks = task.start, None
     if task.rocks is not None:
@@ -80,9 +80,6 @@ def draw_scene(
     if q is None:
         q = resting_pose(task.model, plane, start.position, start.heading)
     simulation.set_state(q, options.v)
-    if simulation.deepest_overlap < -START_OVERLAP:
-        reason = "is how deep (m) the rover stands in the ground or in a sphere at its start"
-        refuse(TerrainError, "terrain", simulation.deepest_overlap, reason)
     return Scene(start=start, plane=plane, terrain=terrain, rocks=rocks, domain=domain), simulation
 
 
@@ -115,6 +112,8 @@ def check_reset_options(task: Task, options: Mapping[str, Any] | None) -> ResetO
     for name in ("position", "goal"):
         if name in given:
             fixed[name] = vector(f"options.{name}", given[name], 2)
+            for i, value in enumerate(fixed[name]):
+                number(f"options.{name}[{i}]", value, at_least=-MAX_PLACE, at_most=MAX_PLACE)
 
     q = v = None
     if "v" in given and "q" not in given:

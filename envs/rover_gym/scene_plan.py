@@ -38,7 +38,7 @@ from rover_gym._core import (
     accuracy_options,
 )
 from rover_gym.start import resting_pose
-from rover_gym.validation import number, refuse, vector
+from rover_gym.validation import flag, known_keys, number, refuse, vector
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Accuracy: TypeAlias = Literal["fast", "balanced", "reference"] | float
@@ -58,6 +58,19 @@ COST: dict[Kind, float] = {"full": 1.0, "welded": 0.75, "planar": 0.3}
 RESTING = 1e-6
 #: The planar model's trunk does not touch the ground; this far from parallel to it (rad) it might.
 LARGEST_TILT = 0.2
+
+#: Keyword arguments of `Simulation` that a scene may hold: all but those that the plan chooses.
+OPTIONS = (
+    "gravity",
+    "friction",
+    "restitution",
+    "theta",
+    "forecast",
+    "solver",
+    "max_iterations",
+    "stabilisation",
+    "warm_start",
+)
 
 _STRAIGHT = 1e-12  # rad or m: what counts as symmetric, a few roundings away from it
 
@@ -269,10 +282,12 @@ def plan(scene: Scene, accuracy: Accuracy = "balanced", *, planar: bool = True) 
         planar: Whether a planar model is welcome; without, the tree is built.
 
     Raises:
-        OptionError: The accuracy, reach or heading is out of its range; a scene that contradicts itself.
+        OptionError: The accuracy, reach or heading is out of its range; a scene that contradicts itself, or is none.
         StateError: The start has a wrong shape or an entry that is not finite.
         TerrainError: No start was given, and the terrain has no plane to stand on.
     """
+    _check(scene)
+    planar = flag("planar", planar)
     terrain, terrain_decision = _ground(scene)
     start = _start(scene)
     chosen = accuracy_options(accuracy)
@@ -316,6 +331,21 @@ def plan(scene: Scene, accuracy: Accuracy = "balanced", *, planar: bool = True) 
         ),
     )
     return ScenePlan(scene, kind, model, terrain, start, options, decisions)
+
+
+def _check(scene: Scene) -> None:
+    """Refuses a scene whose parts are not what they must be."""
+    if not isinstance(scene, Scene):
+        refuse(OptionError, "scene", scene, "must be a Scene")
+    if not isinstance(scene.terrain, (Plane, SphereField)):
+        refuse(TerrainError, "terrain", scene.terrain, "must be a Plane or a SphereField")
+    if not isinstance(scene.model, RoverModel):
+        refuse(ModelError, "model", scene.model, "must be a RoverModel")
+    for name in ("steered", "equal_torques", "held", "tumbles"):
+        flag(name, getattr(scene, name))
+    if not isinstance(scene.options, dict):
+        refuse(OptionError, "options", scene.options, "must be a dict")
+    known_keys("options", scene.options, OPTIONS)
 
 
 def _steering_joints(model: RoverModel) -> list[str]:

@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.planar_soil import surface_height
-from rover_gym.recording import RecordingError, Trajectory, read_trajectory
-from rover_gym.run import film_rows
+from rover_gym.recording import RecordingError, Trajectory, read_trajectory, sound
+from rover_gym.run import LARGEST, check_rows, check_time, film_rows, title_of
 from rover_gym.validation import refuse
 
 __all__ = ["SoilRun", "is_soil", "read_soil_run", "soil_run_of"]
@@ -110,7 +110,8 @@ class SoilRun:
 
 def is_soil(trajectory: Trajectory) -> bool:
     """Whether a trajectory is one of a soil."""
-    return bool(trajectory.attributes.get("scene", {}).get("kind") == "SoilSimulation")
+    scene = trajectory.attributes.get("scene")
+    return isinstance(scene, dict) and scene.get("kind") == "SoilSimulation"
 
 
 def read_soil_run(path: str | Path) -> SoilRun:
@@ -132,14 +133,39 @@ def soil_run_of(trajectory: Trajectory, path: str | Path) -> SoilRun:
     """
     if not is_soil(trajectory) or "force_chains" not in trajectory.data:
         refuse(RecordingError, "path", str(path), "holds no soil: `rover planar soil` writes one")
-    if len(trajectory["time"]) == 0:
-        refuse(RecordingError, "path", str(path), "holds no samples: the run was killed before the first were written")
+    check_time(trajectory, path)
     scene = trajectory.attributes["scene"]
-    radius = np.array(scene["radius"])
+    with sound(path, "scene"):
+        radius = np.array(scene["radius"], dtype=np.float64).reshape(-1)
+        walls = np.array(scene["walls"], dtype=np.float64).reshape(-1, 4)
+    if not len(radius) or not ((radius > 0.0) & (radius <= LARGEST)).all():
+        refuse(RecordingError, f"{path}: scene.radius", len(radius), "must be a positive radius for each of the disks")
+    if not (np.abs(walls) <= LARGEST).all() or not np.hypot(*walls[:, 2:].T).all():
+        refuse(RecordingError, f"{path}: scene.walls", len(walls), "must be points with normals, for each of the walls")
+    check_rows(trajectory, path, _shapes(trajectory, path, len(radius)), bounded=("position", "wheels", "machine"))
     return SoilRun(
         trajectory=trajectory,
         radius=radius,
-        walls=np.array(scene["walls"]).reshape(-1, 4),
+        walls=walls,
         surface=surface_height(radius, trajectory["position"][0]),
-        title=str(trajectory.attributes.get("title", "a run")),
+        title=title_of(trajectory),
     )
+
+
+def _shapes(trajectory: Trajectory, path: str | Path, disks: int) -> dict[str, tuple[int, ...]]:
+    """What the rows of a soil's data sets must be."""
+    wheels, machine = (trajectory[name].shape[1] if trajectory[name].ndim > 1 else 0 for name in ("wheels", "machine"))
+    if wheels > 2 or machine < 3 * bool(wheels) + wheels:
+        refuse(RecordingError, f"{path}: wheels", wheels, "must be none, one or two, with their machine's coordinates")
+    chains = trajectory["force_chains"]
+    return {
+        "position": (disks, 3),
+        "velocity": (disks, 3),
+        "asleep": (disks,),
+        "machine": (machine,),
+        "machine_rate": (machine,),
+        "wheels": (wheels, 3),
+        "wheel_forces": (wheels, 2),
+        "force_chains": (chains.shape[1] if chains.ndim == 3 else 0, 5),
+        **dict.fromkeys(("kinetic_energy", "potential_energy", "n_contacts", "penetration", "solver_residual"), ()),
+    }

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rover_gym._core import OptionError, SoilSimulation
-from rover_gym.planar_soil import WHEEL_RADIUS, Bed, rover_on_soil
+from rover_gym.planar_soil import WHEEL_RADIUS, Bed, rover_on_soil, step_count
 from rover_gym.validation import number, refuse
 
 __all__ = ["Drive", "Pull", "drawbar_pull", "drive_on_soil", "over_beds"]
@@ -85,6 +85,7 @@ def drive_on_soil(bed: Bed, torque: float, *, run_in: float = 0.5, duration: flo
     """
     run_in, duration = number("run_in", run_in, at_least=0.0), number("duration", duration, above=0.0)
     sim = rover_on_soil(bed, **options)
+    step_count("duration", run_in + duration, sim.time_step)  # without a torque no other end comes
     sim.set_torques([torque, torque])
     surface = bed.surface
     depths: list[float] = []
@@ -152,6 +153,7 @@ def drawbar_pull(
     if slip >= 1.0:
         refuse(OptionError, "slip", slip, "must be below 1: the wheel travels")
     run_in, distance = number("run_in", run_in, at_least=0.0), number("distance", distance, above=0.0)
+    radius = number("radius", radius, above=0.0)
     start = CLEAR_OF_WALLS * radius
     needed = run_in + distance + 2.0 * start
     if needed > bed.width:
@@ -168,10 +170,10 @@ def drawbar_pull(
     )
     speed = rim_speed * (1.0 - slip)
     sim.set_state(sim.position, None, sim.machine, [speed, 0.0, 0.0, -rim_speed / radius, 0.0])
-    sim.step(round(run_in / speed / sim.time_step))
+    sim.step(step_count("slip", run_in / speed, sim.time_step))
     begin = float(sim.machine[0])
     surface, depths, impulse = bed.surface, [], np.zeros(2)
-    steps = max(1, round(distance / speed / sim.time_step))
+    steps = max(1, step_count("slip", distance / speed, sim.time_step))
     for _ in range(steps):
         sim.step()
         impulse += sim.impulse_on_wheels()
@@ -201,8 +203,13 @@ def over_beds(
 
     Returns:
         For each value a list with what `trial` returned on each bed.
+
+    Raises:
+        OptionError: `workers` is less than one.
     """
-    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+    if workers is not None:
+        number("workers", workers, at_least=1.0)
+    with ThreadPoolExecutor(os.cpu_count() if workers is None else int(workers)) as pool:
         jobs = [[pool.submit(trial, bed, value) for bed in beds] for value in values]
         try:
             for done, _ in enumerate(as_completed([job for row in jobs for job in row]), 1):

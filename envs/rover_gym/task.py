@@ -19,11 +19,11 @@ from rover_gym._core import (
     SphereField,
     TerrainError,
 )
-from rover_gym.observation import N_ACTIONS, N_WHEELS, ObservationLayout, build_layout
-from rover_gym.randomisation import Domain, DomainDistribution, check_domain
+from rover_gym.observation import N_WHEELS, ObservationLayout, build_layout
+from rover_gym.randomisation import Domain, DomainDistribution
 from rover_gym.rocks import MAX_GOAL_DISTANCE, RockDistribution, check_rocks, check_scan
 from rover_gym.start import StartDistribution, slope_of
-from rover_gym.validation import Range, known_keys, number, refuse, span, vector
+from rover_gym.validation import Range, array, known_keys, number, refuse, span, vector
 
 TERRAINS = ("plane", "sphere_field")
 SOLVER_OPTIONS = (
@@ -39,6 +39,16 @@ SOLVER_OPTIONS = (
 
 #: Steeper ground than this is a wall to a wheel.
 MAX_SLOPE_DEG = 60.0
+
+#: Ranges far beyond any rover, within which all sums stay finite: m, m/s2, factors, and the rest as named.
+MAX_DISTANCE = 1e6
+MAX_FRICTION = 1e3
+GRAVITIES = (1e-3, 1e3)
+SCALES = (1e-3, 1e3)
+MAX_WEIGHT = 1e6
+MIN_TIME_STEP = 1e-6  # s
+MAX_SUBSTEPS = 10_000
+MIN_STEERING_DEG = 0.01
 
 #: High-centring: the trunk carries this share of the weight.
 TRUNK_LOAD = 0.1
@@ -143,10 +153,10 @@ def check_task(
 ) -> Task:
     """The task of `RoverEnv`'s arguments, or the first that is refused, by name."""
     field = terrain if isinstance(terrain, SphereField) else None
-    if field is None and terrain not in TERRAINS:
+    if field is None and not (isinstance(terrain, str) and terrain in TERRAINS):
         refuse(TerrainError, "terrain", terrain, f"unknown; known are {', '.join(TERRAINS)} and a SphereField")
     rocks: RockDistribution | None = None
-    if terrain == "sphere_field":
+    if field is None and terrain == "sphere_field":
         rocks = check_rocks(difficulty, rock_abundance, max_rock_radius)
     else:
         for name, value in (
@@ -157,13 +167,12 @@ def check_task(
             if value is not None:
                 refuse(OptionError, name, value, "needs terrain 'sphere_field'")
     scan = check_scan(height_scan)
+    farthest = MAX_DISTANCE if rocks is None else MAX_GOAL_DISTANCE
     start = StartDistribution(
         slope=_radians(span("slope_deg", 0.0 if slope_deg is None else slope_deg, at_least=0.0, at_most=MAX_SLOPE_DEG)),
         uphill=_radians(span("uphill_deg", uphill_deg)),
         heading=_radians(span("heading_deg", heading_deg)),
-        goal_distance=span(
-            "goal_distance", goal_distance, above=0.0, at_most=None if rocks is None else MAX_GOAL_DISTANCE
-        ),
+        goal_distance=span("goal_distance", goal_distance, above=0.0, at_most=farthest),
         goal_bearing=_radians(span("goal_bearing_deg", goal_bearing_deg)),
     )
     if field is not None:
@@ -171,17 +180,28 @@ def check_task(
             refuse(OptionError, "slope_deg", slope_deg, "is the given field's own")
         slope, uphill = slope_of(field)
         start = replace(start, slope=(slope, slope), uphill=(uphill, uphill))
-    tolerance = number("goal_tolerance", goal_tolerance, above=0.0)
+    tolerance = number("goal_tolerance", goal_tolerance, above=0.0, at_most=farthest)
     max_tilt = math.radians(number("max_tilt_deg", max_tilt_deg, above=0.0, at_most=180.0))
-    stuck = number("stuck_time", stuck_time, above=0.0)
+    stuck = number("stuck_time", stuck_time, at_least=MIN_TIME_STEP)
     g = vector("gravity", gravity, 3)
     magnitude = math.hypot(*g)
     if not magnitude > 0.0:
         refuse(OptionError, "gravity", gravity, "must not vanish: it says where up is")
-    domain = check_domain(mass_scale, friction, actuator_gain, gravity_scale, observation_noise)
+    if not GRAVITIES[0] <= magnitude <= GRAVITIES[1]:
+        refuse(OptionError, "gravity", gravity, "must have a magnitude of {:g} to {:g} m/s2".format(*GRAVITIES))
+    domain = DomainDistribution(
+        mass_scale=span("mass_scale", mass_scale, at_least=SCALES[0], at_most=SCALES[1]),
+        friction=span("friction", friction, at_least=0.0, at_most=MAX_FRICTION),
+        actuator_gain=span("actuator_gain", actuator_gain, at_least=0.0, at_most=SCALES[1]),
+        gravity_scale=span("gravity_scale", gravity_scale, at_least=SCALES[0], at_most=SCALES[1]),
+        observation_noise=number("observation_noise", observation_noise, at_least=0.0, at_most=MAX_DISTANCE),
+    )
 
     frequency = number("control_frequency", control_frequency, above=0.0)
-    step = number("time_step", time_step, above=0.0)
+    step = number("time_step", time_step, at_least=MIN_TIME_STEP, at_most=1.0)
+    if frequency * step < (1.0 - 1e-9) / MAX_SUBSTEPS:
+        reason = f"must give at most {MAX_SUBSTEPS} physics steps of {step:g} s a period"
+        refuse(OptionError, "control_frequency", control_frequency, reason)
     substeps = round(1.0 / (frequency * step))
     if substeps < 1 or not math.isclose(substeps * frequency * step, 1.0, rel_tol=1e-9):
         reason = f"must give a whole number of physics steps of {step:g} s a period"
@@ -190,7 +210,7 @@ def check_task(
     weights = dict(rewards.WEIGHTS)
     for name, weight in mapping("reward_weights", reward_weights).items():
         known_keys("reward_weights", (name,), rewards.WEIGHTS)
-        weights[name] = number(f"reward_weights.{name}", weight)
+        weights[name] = number(f"reward_weights.{name}", weight, at_least=-MAX_WEIGHT, at_most=MAX_WEIGHT)
 
     rover = _six_wheels(RoverModel() if model is None else model)
     further = mapping("solver_options", solver_options)
@@ -199,9 +219,10 @@ def check_task(
     # The core validates what it takes.
     places = Simulation(rover, Plane(), **options).reading_layout(0 if scan is None else len(scan.offsets))
 
-    limit = rover.steering_limit
+    # What one stands for must be within every wheel's limit.
+    limit = min(wheel["steering_limit"] for wheel in rover.to_dict()["wheels"])
     if max_steering_deg is not None:
-        asked = number("max_steering_deg", max_steering_deg, above=0.0)
+        asked = number("max_steering_deg", max_steering_deg, at_least=MIN_STEERING_DEG)
         if math.radians(asked) > limit * (1.0 + 1e-12):
             reason = f"must be at most the model's limit, {math.degrees(limit):g}"
             refuse(OptionError, "max_steering_deg", max_steering_deg, reason)
@@ -237,16 +258,9 @@ def check_task(
 
 def check_actions(actions: object, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
     """The actions `(12,)` or `(n, 12)` as floats of their own, within [-1, 1]."""
-    what = f"{N_ACTIONS} numbers"
-    try:
-        given = np.asarray(actions)
-    except ValueError:  # a ragged sequence
-        refuse(CommandError, "action", actions, f"must be {what}")
-    if given.dtype.kind not in "fiu":
-        refuse(CommandError, "action", actions, f"must be {what}")
-    if given.shape != shape:
-        refuse(CommandError, "action", given.shape, f"must have shape {shape}")
-    commands = given.astype(np.float64)
+    commands = array("action", actions, error=CommandError)
+    if commands.shape != shape:
+        refuse(CommandError, "action", commands.shape, f"must have shape {shape}")
     # Written so that a NaN fails too.
     if not np.abs(commands).max() <= 1.0:
         for index, entry in np.ndenumerate(commands):

@@ -5,20 +5,37 @@ the errors of the package, with `field` and `value` set.
 """
 
 import math
-from collections.abc import Iterable
+import numbers
+from collections.abc import Iterable, Mapping, Set, Sized
+from decimal import Decimal
 from typing import NoReturn, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
 
 from rover_gym._core import OptionError, RoverGymError
 
 Range: TypeAlias = tuple[float, float]
 
+#: Longest piece of a value that a message shows.
+SHOWN = 200
+
 
 def refuse(error: type[RoverGymError], field: str, value: object, reason: str) -> NoReturn:
     """Raises `error`, which names the field and carries the value."""
-    exception = error(f"{field}: {reason}, got {value!r}")
+    exception = error(f"{field}: {reason}, got {shown(value)}")
     exception.field = field
     exception.value = value
     raise exception
+
+
+def shown(value: object) -> str:
+    """How a value looks in a message: whatever it is, and not too long."""
+    try:
+        text = repr(value.item() if isinstance(value, np.generic) else value)  # np.float64(0.5) is 0.5 to a reader
+    except Exception:  # an integer of thousands of digits, or whatever a class of somebody's raises
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
 
 def number(
@@ -31,9 +48,12 @@ def number(
     error: type[RoverGymError] = OptionError,
 ) -> float:
     """A finite number within bounds, as a float."""
-    if isinstance(value, bool) or not _is_number(value):
+    if not _is_number(value):
         refuse(error, field, value, "must be a number")
-    result = float(value)  # type: ignore[arg-type]
+    try:
+        result = float(value)  # type: ignore[arg-type]
+    except (OverflowError, ValueError):  # an integer or a fraction beyond all floats, a signalling Decimal
+        result = math.inf
     if not math.isfinite(result):
         refuse(error, field, value, "must be finite")
     if above is not None and not result > above:
@@ -45,12 +65,49 @@ def number(
     return result
 
 
+def whole(
+    field: str,
+    value: object,
+    *,
+    at_least: int = 0,
+    at_most: int | None = None,
+    error: type[RoverGymError] = OptionError,
+) -> int:
+    """A whole number within bounds, as an int; 2.0 is none."""
+    if isinstance(value, (bool, np.timedelta64)) or not isinstance(value, (int, np.integer)) or value < at_least:
+        refuse(error, field, value, f"must be a whole number from {at_least}")
+    if at_most is not None and value > at_most:
+        refuse(error, field, value, f"must be at most {at_most}")
+    return int(value)
+
+
+def flag(field: str, value: object) -> bool:
+    """True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        refuse(OptionError, field, value, "must be True or False")
+    return bool(value)
+
+
 def vector(field: str, value: object, size: int, *, error: type[RoverGymError] = OptionError) -> tuple[float, ...]:
     """`size` finite numbers, as a tuple of floats."""
-    entries = _entries(value)
+    entries = _entries(value, size)
     if entries is None or len(entries) != size:
         refuse(error, field, value, f"must be {size} numbers")
     return tuple(number(f"{field}[{i}]", entry, error=error) for i, entry in enumerate(entries))
+
+
+def array(field: str, value: object, *, error: type[RoverGymError]) -> npt.NDArray[np.float64]:
+    """Numbers of any shape, finite or not, as an array of their own."""
+    if isinstance(value, range):  # short to write, and as long as can be
+        refuse(error, field, value, "must be numbers")
+    try:
+        given = np.asarray(value)
+    except Exception:  # a ragged sequence, or whatever a class of somebody's raises
+        refuse(error, field, value, "must be numbers")
+    if given.dtype.kind not in "fiu":
+        refuse(error, field, value, "must be numbers")
+    with np.errstate(over="ignore"):  # long doubles beyond all floats become infinite
+        return given.astype(np.float64)
 
 
 def span(
@@ -65,7 +122,7 @@ def span(
     if _is_number(value):
         single = number(field, value, above=above, at_least=at_least, at_most=at_most)
         return (single, single)
-    match _entries(value):
+    match _entries(value, 2):
         case [first, last]:
             low = number(f"{field}[0]", first, above=above, at_least=at_least, at_most=at_most)
             high = number(f"{field}[1]", last, above=above, at_least=at_least, at_most=at_most)
@@ -76,23 +133,31 @@ def span(
     return (low, high)
 
 
-def known_keys(field: str, value: Iterable[str], known: Iterable[str]) -> None:
+def known_keys(field: str, value: Iterable[object], known: Iterable[str]) -> None:
     """Refuses the first key that is not known."""
     names = tuple(known)
     for key in value:
-        if key not in names:
-            refuse(OptionError, f"{field}.{key}", key, f"unknown; known are {', '.join(names)}")
+        if not isinstance(key, str) or key not in names:
+            name = key if isinstance(key, str) and len(key) <= SHOWN else shown(key)
+            refuse(OptionError, f"{field}.{name}", key, f"unknown; known are {', '.join(names)}")
 
 
 def _is_number(value: object) -> bool:
-    # Covers int, float and numpy scalars, not strings, arrays or None.
-    return not isinstance(value, (str, bytes)) and hasattr(value, "__float__") and not hasattr(value, "__len__")
+    """Whether it is a real number: no truth value, time, complex number, text, array or None."""
+    if isinstance(value, (float, int)):
+        return not isinstance(value, bool)
+    if isinstance(value, np.generic):
+        return value.dtype.kind in "fiu"
+    return isinstance(value, (numbers.Real, Decimal))
 
 
-def _entries(value: object) -> list[object] | None:
-    if isinstance(value, (str, bytes, dict)) or not isinstance(value, Iterable):
+def _entries(value: object, most: int) -> list[object] | None:
+    """The entries of something that has an order and at most so many of them."""
+    if isinstance(value, (str, bytes, bytearray, memoryview, Mapping, Set)):
+        return None
+    if not isinstance(value, Iterable) or not isinstance(value, Sized):
         return None
     try:
-        return list(value)
+        return list(value) if len(value) <= most else None
     except TypeError:  # a numpy array without dimensions
         return None

@@ -1,6 +1,7 @@
 """`RoverVectorEnv`: many rovers as one vector environment of Gymnasium, what `gymnasium.make_vec` makes."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,13 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from rover_gym._core import OptionError
-from rover_gym.batch import RoverBatch, spread_seeds
+from rover_gym._core import OptionError, RoverGymError
+from rover_gym.batch import RoverBatch
+from rover_gym.beginning import spread_seeds
+from rover_gym.observation import N_ACTIONS
 from rover_gym.progress import Array, Mask, Observations
 from rover_gym.registration import MAX_EPISODE_STEPS
+from rover_gym.task import check_actions, mapping
 from rover_gym.validation import refuse
 
 _Info = dict[str, Any]
@@ -42,11 +46,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         **arguments: Any,
     ) -> None:
         super().__init__()
-        try:
-            self.autoreset_mode = AutoresetMode(autoreset_mode)
-        except ValueError:
-            names = ", ".join(mode.value for mode in AutoresetMode)
-            refuse(OptionError, "autoreset_mode", autoreset_mode, f"must be one of {names}")
+        self.autoreset_mode = _check_mode(autoreset_mode)
         self.batch = RoverBatch(num_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments)
         self.prototype = self.batch.prototype
         self.num_envs = self.batch.n
@@ -82,52 +82,62 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
             options: Those of `RoverEnv.reset`, for every rover, and `reset_mask`, `(num_envs,)` bool: the rovers to
                 reset, where it is not all; the others go on.
 
+        A reset that is refused changes nothing, of no rover.
+
         Raises:
-            OptionError: An option is unknown or out of its range; nothing has changed.
+            OptionError: A seed is no whole number from 0, or an option is unknown or out of its range.
+            StateError: As `RoverEnv.reset`.
+            TerrainError: As `RoverEnv.reset`.
         """
         seeds = spread_seeds(seed, self.num_envs)
-        given = dict(options or {})
-        chosen = self._check_mask(given.pop("reset_mask")) if "reset_mask" in given else range(self.num_envs)
+        given = dict(mapping("options", options))
+        chosen = self._check_mask(given.pop("reset_mask")) if "reset_mask" in given else list(range(self.num_envs))
         fixed = self.batch.check_options(given)
         infos: _Info = {}
-        for i in chosen:
-            infos = self._add_info(infos, self.batch.reset(i, seeds[i], fixed), i)
-            self._ended[i] = False
+        with self.batch.beginnings(chosen, [seeds[i] for i in chosen], fixed) as drawn:
+            for i, one in zip(chosen, drawn, strict=True):
+                infos = self._add_info(infos, self.batch.begin(i, one), i)
+                self._ended[i] = False
         return self.batch.observation, infos
 
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observations, Array, Mask, Mask, _Info]:
         """Applies actions `(num_envs, 12)` for one control period.
 
+        An episode that cannot begin is refused before anything moves; with autoreset in the same step, that is by the
+        step after.
+
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite or outside [-1, 1]; nothing
                 has changed.
+            TerrainError: A rover's next episode cannot begin, as `RoverEnv.reset` says; nothing has changed. A reset
+                with another seed or other options helps.
             ResetNeeded: A rover has not been reset, or, where autoreset is disabled, its episode has ended.
         """
-        if not self._ended.any():
-            outcome, terminated, timed_out = self.batch.step(actions)
-            starting: list[int] = []
-        elif self.autoreset_mode == AutoresetMode.DISABLED:
-            raise ResetNeeded(f"rovers {np.flatnonzero(self._ended).tolist()}: call reset() with reset_mask first")
-        else:
-            # These do not move: their episode starts in this step.
-            starting = np.flatnonzero(self._ended).tolist()
-            outcome, terminated, timed_out = self.batch.step(actions, ~self._ended)
-        observation, reward, infos = outcome.observation, outcome.reward, outcome.vector_info()
-        truncated = timed_out
-        for i in starting:
-            reward[i], terminated[i], truncated[i] = 0.0, False, False
-        ended = terminated | truncated
-        if self.autoreset_mode == AutoresetMode.SAME_STEP and ended.any():
-            starting = np.flatnonzero(ended).tolist()
-            last = [outcome.info(i) for i in starting]
-            for i, info in zip(starting, last, strict=True):
+        commands = check_actions(actions, (self.num_envs, N_ACTIONS))
+        # These do not move: their episode starts in this step.
+        starting: list[int] = np.flatnonzero(self._ended).tolist()
+        if starting and self.autoreset_mode == AutoresetMode.DISABLED:
+            raise ResetNeeded(f"rovers {starting}: call reset() with reset_mask first")
+        with self.batch.beginnings(starting) as drawn:
+            outcome, terminated, truncated = self.batch.step(commands, ~self._ended if starting else None)
+            observation, reward, infos = outcome.observation, outcome.reward, outcome.vector_info()
+            for i, one in zip(starting, drawn, strict=True):
+                reward[i], terminated[i], truncated[i] = 0.0, False, False
+                self._add_info(infos, self.batch.begin(i, one), i)
+        self._ended = terminated | truncated
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
+            ended: list[int] = np.flatnonzero(self._ended).tolist()
+            last = [outcome.info(i) for i in ended]
+            for i, info in zip(ended, last, strict=True):
                 self._add_info(infos, {"final_obs": observation[i].copy(), "final_info": info}, i)
-            ended = np.zeros(self.num_envs, np.bool_)
-        for i in starting:
-            self._add_info(infos, self.batch.reset(i), i)
+            # What is refused here stays ended, and the next step raises it.
+            with suppress(RoverGymError), self.batch.beginnings(ended) as drawn:
+                for i, one in zip(ended, drawn, strict=True):
+                    self._add_info(infos, self.batch.begin(i, one), i)
+                self._ended = np.zeros(self.num_envs, np.bool_)
+                starting += ended
         if starting:
             observation[starting] = self.batch.observation[starting]
-        self._ended = ended
         return observation, reward, terminated, truncated, infos
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
@@ -153,3 +163,12 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
             refuse(OptionError, "options.reset_mask", mask, f"must be an array of {self.num_envs} bool")
         return [int(i) for i in np.flatnonzero(mask)]
+
+
+def _check_mode(mode: object) -> AutoresetMode:
+    if isinstance(mode, AutoresetMode):
+        return mode
+    modes = {known.value: known for known in AutoresetMode}
+    if not (isinstance(mode, str) and mode in modes):
+        refuse(OptionError, "autoreset_mode", mode, f"must be one of {', '.join(modes)}")
+    return modes[mode]

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
+from rover_gym._core import OptionError
 from rover_gym.extras import MissingExtraError
+from rover_gym.validation import refuse
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -25,6 +27,7 @@ class VideoWriter:
         fps: Frames per second.
 
     Raises:
+        OptionError: The file's name has another ending.
         MissingExtraError: imageio-ffmpeg is not installed.
     """
 
@@ -34,6 +37,8 @@ class VideoWriter:
         except ModuleNotFoundError as error:
             raise MissingExtraError("imageio-ffmpeg", "render") from error
         self.path = Path(path)
+        if self.path.suffix.lower() != ".mp4":
+            refuse(OptionError, "video", str(path), "must be a file's name that ends in .mp4")
         self._fps = fps
         self._write_frames: Any = imageio_ffmpeg.write_frames
         self._writer: Generator[None, npt.NDArray[np.uint8] | None, None] | None = None

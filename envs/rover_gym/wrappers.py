@@ -1,17 +1,22 @@
 """`Rover-v0` driven by commands and seen through features, as one Gymnasium environment."""
 
+from dataclasses import fields
 from typing import Any, SupportsFloat
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym._core import CommandError
 from rover_gym.command import N_COMMANDS, CommandController, CommandLimits
 from rover_gym.features import LARGEST_FEATURE, Features
 from rover_gym.policy import rover_env
-from rover_gym.validation import number
+from rover_gym.validation import known_keys, vector, whole
 
 Array = npt.NDArray[np.float32]
+
+#: Steps for which a command may hold, some minutes.
+MAX_REPEAT = 10_000
 
 
 class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
@@ -24,14 +29,19 @@ class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
         repeat: Steps for which a command holds.
         guided: Whether actions are offsets to the guide's command.
         pool: Cells of the height scan are so many points long and wide.
+        **limits: Those of `CommandLimits`.
+
+    Raises:
+        OptionError: An argument is out of its range.
     """
 
     def __init__(
         self, env: gym.Env[Array, Array], repeat: int = 4, guided: bool = False, pool: int = 1, **limits: float
     ) -> None:
-        super().__init__(env)
-        number("repeat", repeat, at_least=1)
+        repeat = whole("repeat", repeat, at_least=1, at_most=MAX_REPEAT)
+        known_keys("limits", limits, [field.name for field in fields(CommandLimits)])
         rover = rover_env(env)
+        super().__init__(env)
         self._features = Features(rover, pool)
         self._controller = CommandController(rover, CommandLimits(**limits), guided=guided)
         self._repeat = repeat
@@ -46,9 +56,14 @@ class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
         return self._features(self._seen)[0], info
 
     def step(self, action: Array) -> tuple[Array, SupportsFloat, bool, bool, dict[str, Any]]:
-        """Holds a command until its time or the episode is over."""
+        """Holds a command until its time or the episode is over; beyond [-1, 1] it is cut.
+
+        Raises:
+            CommandError: The command is not three finite numbers; nothing has changed.
+            ResetNeeded: The environment has not been reset.
+        """
         total = 0.0
-        command = np.asarray(action)[None]
+        command = np.array(vector("action", action, N_COMMANDS, error=CommandError))[None]
         terminated = truncated = False
         info: dict[str, Any] = {}
         for _ in range(self._repeat):

@@ -23,19 +23,20 @@ def test_dynamics_agree_with_the_reference(reference, table):
         assert close(model.mass_matrix(q, coordinates="report"), expected["M"])
         gravity = (0.0, -0.0981, 0.0)
         assert close(model.bias(q, qdot, gravity=gravity, coordinates="report"), expected["bias"])
-        assert close(model.bias(q, np.zeros(21), gravity=gravity), expected["gravity"])
-        assert model.kinetic_energy(q, qdot) == pytest.approx(expected["kinetic_energy"], rel=1e-10)
+        assert close(model.bias(q, np.zeros(21), gravity=gravity, coordinates="report"), expected["gravity"])
+        energy = model.kinetic_energy(q, qdot, coordinates="report")
+        assert energy == pytest.approx(expected["kinetic_energy"], rel=1e-10)
 
 
 def test_places_and_contacts_agree_with_the_reference(reference):
-    model = rover_gym.RoverModel().replace(wheel_radius=0.30)
+    model = rover_gym.RoverModel().replace(contact_radius=0.30)
     plane = rover_gym.Plane(reference["meta"]["plane_normal"])
     for case in reference["cases"]:
-        tags = model.tags(case["q"])
+        tags = model.tags(case["q"], "report")
         assert close([tags[name] for name in model.solid_names], case["tags"])
         assert close(tags["centre_of_mass"], case["centre_of_mass_960"])
-        assert close(model.wheel_gaps(case["q"], plane), case["plane"]["gap"])
-        assert close(model.wheel_contact_points(case["q"], plane), case["plane"]["contact_point"])
+        assert close(model.wheel_gaps(case["q"], plane, "report"), case["plane"]["gap"])
+        assert close(model.wheel_contact_points(case["q"], plane, "report"), case["plane"]["contact_point"])
         assert close(model.wheel_jacobians(case["q"], plane, coordinates="report"), case["plane"]["jacobian"])
 
 
@@ -64,12 +65,59 @@ def test_both_coordinates_tell_one_motion(reference):
     model = rover_gym.RoverModel()
     case = reference["cases"][5]
     q, v = model.from_report(case["q"], case["qdot"])
-    energy = model.kinetic_energy(case["q"], case["qdot"])
-    assert model.kinetic_energy(q, v, coordinates="state") == pytest.approx(energy, rel=1e-12)
-    assert 0.5 * v @ model.mass_matrix(q, coordinates="state") @ v == pytest.approx(energy, rel=1e-12)
+    energy = model.kinetic_energy(case["q"], case["qdot"], coordinates="report")
+    assert model.kinetic_energy(q, v) == pytest.approx(energy, rel=1e-12)
+    assert 0.5 * v @ model.mass_matrix(q) @ v == pytest.approx(energy, rel=1e-12)
     again = model.to_report(q, v)
     np.testing.assert_allclose(model.from_report(*again)[1], v, atol=1e-10)
-    np.testing.assert_allclose(model.tags(q, "state")["wheel_BR"], model.tags(case["q"])["wheel_BR"], atol=1e-12)
+    same = model.tags(case["q"], "report")["wheel_BR"]
+    np.testing.assert_allclose(model.tags(q)["wheel_BR"], same, atol=1e-12)
+
+
+def test_what_the_simulation_says_is_what_the_model_takes():
+    """`mass_matrix(sim.q)` read the state's coordinates as the report's: entries wrong by 90 without a word."""
+    model = rover_gym.RoverModel()
+    sim = rover_gym.Simulation(model)
+    q = np.zeros(21)
+    q[:6] = 0.3, 1.0, -0.2, 0.8, -0.9, 0.5
+    sim.set_state(q, np.linspace(-1.0, 1.0, 21))
+    assert 0.5 * sim.v @ model.mass_matrix(sim.q) @ sim.v == pytest.approx(sim.energy().kinetic, rel=1e-12)
+    assert model.kinetic_energy(sim.q, sim.v) == pytest.approx(sim.energy().kinetic, rel=1e-12)
+    for name, place in sim.tags().items():
+        np.testing.assert_allclose(model.tags(sim.q)[name], place, atol=1e-12)
+    for name, (origin, rotation) in sim.poses().items():
+        np.testing.assert_allclose(model.poses(sim.q)[name][0], origin, atol=1e-12)
+        np.testing.assert_allclose(model.poses(sim.q)[name][1], rotation, atol=1e-12)
+    np.testing.assert_allclose(model.wheel_gaps(sim.q, sim.terrain), sim.wheel_gaps, atol=1e-12)
+    assert np.abs(model.mass_matrix(sim.q) - model.mass_matrix(sim.q, coordinates="report")).max() > 1.0
+
+
+def test_another_wheel_radius_is_another_wheel():
+    """`wheel_radius` kept the inertia of a disc of 0.10 m: which of both is meant is now said in the argument."""
+    model = rover_gym.RoverModel()
+    wheel = model.wheel_joint_indices[0]
+    inertia = [m.mass_matrix(np.zeros(21))[wheel, wheel] for m in (model, model.replace(wheel_radius=0.25))]
+    np.testing.assert_allclose(inertia, [0.5 * 30.0 * 0.1**2, 0.5 * 30.0 * 0.25**2])
+    touching = model.replace(contact_radius=0.25)
+    assert touching.mass_matrix(np.zeros(21))[wheel, wheel] == inertia[0]
+    for other in (model.replace(wheel_radius=0.25), touching):
+        assert other.wheel_radii.tolist() == [0.25] * 6
+    assert touching.replace(wheel_radius=0.25) == model.replace(wheel_radius=0.25)
+    both = model.replace(wheel_radius=0.25, contact_radius=0.26)
+    assert both.wheel_radii[0] == 0.26
+    assert both.to_dict()["wheels"][0]["radius"] == 0.25
+    contradiction = corrupted(lambda d: d["wheels"][2].update(radius=0.3))
+    with pytest.raises(rover_gym.ModelError, match="contact_radius") as caught:
+        rover_gym.RoverModel.from_dict(contradiction)
+    assert caught.value.field == "wheels[2].radius"
+
+
+def test_a_stated_inertia_goes_with_the_mass():
+    description = rover_gym.RoverModel().to_dict()
+    description["solids"][0]["inertia"] = [40.0, 60.0, 50.0, 1.0, 0.0, 0.0]
+    model = rover_gym.RoverModel.from_dict(description)
+    double = model.replace(masses={"trunk": 1200.0}).to_dict()["solids"][0]
+    assert double["inertia"] == [80.0, 120.0, 100.0, 2.0, 0.0, 0.0]
 
 
 def test_the_reports_coordinates_are_singular_at_a_right_angle_and_say_so():

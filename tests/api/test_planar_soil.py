@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rover_gym import OptionError
 from rover_gym.figures.soil import draw_soil
 from rover_gym.figures.soil_run import draw_soil_run
 from rover_gym.planar import BallSimulation, Line, SoilSimulation, SoilSnapshot, describe, record, soil_packing
@@ -284,3 +285,41 @@ def test_removed_disks_leave_the_others_as_they_are() -> None:
         with pytest.raises(ValueError, match=field):
             far.remove(which)
     np.testing.assert_array_equal(far.radius, radius)
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda _: settled_bed(10**11), "count"),
+        (lambda _: settled_bed(30, 2.5), "layers"),
+        (lambda _: settled_bed(30, radius_min=0.0), "radius_min"),
+        (lambda _: settled_bed(30, radius_min=0.02, radius_max=0.01), "radius_max"),
+        (lambda _: settled_bed(30, settle=1e300), "settle"),
+        (lambda bed: rover_on_soil(bed, start=np.nan), "start"),
+        (lambda bed: rover_on_soil(bed, rover=[1]), "rover"),
+        (lambda bed: rover_on_soil(bed, rover={"wheel_radius": "big"}), "rover.wheel_radius[0]"),
+        (lambda bed: rover_on_soil(bed, rover={"axle_a": 3.0}), "rover.axle_a"),
+        (lambda bed: drive_on_soil(bed, 0.0, duration=1e300, start=0.61), "duration"),
+        (lambda bed: drawbar_pull(bed, 1.0 - 1e-12, run_in=0.1, distance=0.1, radius=0.1), "slip"),
+        (lambda bed: drawbar_pull(bed, 0.5, radius=-1.0), "radius"),
+        (lambda bed: over_beds(lambda *_: 0, [1.0], [bed], workers=-1), "workers"),
+        (lambda bed: record_soil(rover_on_soil(bed, start=0.61), "no.h5", "", duration=1e300), "duration"),
+        (
+            lambda bed: record_soil(rover_on_soil(bed, start=0.61), "no.h5", "", duration=1, steps_per_row=0.5),
+            "steps",
+        ),
+    ],
+)
+def test_soils_that_would_not_end_or_cannot_be_are_refused_by_name(
+    call: Callable[[Bed], object], field: str, narrow_bed: Bed
+) -> None:
+    with pytest.raises(OptionError) as caught:
+        call(narrow_bed)
+    assert str(caught.value.field).startswith(field)
+    assert "np.float64" not in str(caught.value)
+
+
+@pytest.fixture(scope="module")
+def narrow_bed() -> Bed:
+    """As wide as the rover."""
+    return settled_bed(90, 2, settle=0.02)

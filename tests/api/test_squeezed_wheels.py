@@ -12,7 +12,7 @@ from rover_gym import RoverModel, Simulation, SphereField
 def test_squeezed_wheels_take_few_iterations() -> None:
     """7 s over the rocks of seed 1, of which the last seconds are on the flat beyond."""
     field = SphereField.rocks(0.05, (-2.0, -2.0, 8.0, 2.0), 1, max_diameter=0.15, burial=0.5)
-    simulation = Simulation(RoverModel().replace(wheel_radius=0.20), field, time_step=1e-3)
+    simulation = Simulation(RoverModel().replace(contact_radius=0.20), field, time_step=1e-3)
     q = np.zeros(21)
     q[1] = 0.45
     simulation.set_state(q, np.zeros(21))

@@ -73,14 +73,14 @@ def test_a_short_time_limit_ends_the_episode_without_success() -> None:
     ("arguments", "culprit"),
     [
         (["--terrain", "sea"], "terrain"),
-        (["--slope", "-3"], "slope_deg"),
+        (["--slope", "-3"], "--slope: "),
         (["--difficulty", "0.5"], "difficulty"),
         (["--terrain", "sphere_field", "--difficulty", "1.5"], "difficulty"),
-        (["--slope", "nan"], "slope_deg"),
-        (["--friction", "-1"], "friction"),
-        (["--time-step", "0"], "time_step"),
-        (["--time-step", "0.007"], "control_frequency"),
-        (["--goal", "inf", "0"], "goal"),
+        (["--slope", "nan"], "--slope: must be finite, got nan"),
+        (["--friction", "-1"], "--friction"),
+        (["--time-step", "0"], "--time-step: must be at least 1e-05"),
+        (["--time-step", "0.007"], "--time-step: must divide the control period of 0.05 s"),
+        (["--goal", "inf", "0"], "--goal"),
     ],
 )
 def test_bad_input_is_one_line_that_names_the_culprit(arguments: list[str], culprit: str) -> None:

@@ -335,7 +335,7 @@ def test_a_file_that_is_no_run_is_refused_by_name(content: bytes | str | None, r
 def test_an_unknown_format_is_refused_before_anything_is_written(recordings: dict[str, Path], tmp_path: Path) -> None:
     result = rover("plot", str(recordings["flat"]), "--format", "bmp", "--output", str(tmp_path / "plots"))
     assert result.exit_code == 2
-    assert result.stderr == "error: format: must be one of png, svg, pdf, got 'bmp'\n"
+    assert result.stderr == "error: --format: must be one of png, svg, pdf, got 'bmp'\n"
     assert not (tmp_path / "plots").exists()
     with pytest.raises(OptionError) as error:
         draw_run(read_run(recordings["flat"]), tmp_path / "plots", file_format="bmp")

@@ -5,7 +5,7 @@ import json
 import re
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,11 @@ from typer.testing import CliRunner, Result
 from rover_gym import Plane, RoverModel, SphereField
 from rover_gym.appearance import rover_parts
 from rover_gym.cli import app
-from rover_gym.recording import Trajectory
+from rover_gym.figures import draw_run
+from rover_gym.recording import RecordingError, Trajectory
 from rover_gym.replay import write_gltf, write_page, write_vrml
 from rover_gym.replay.rotation import axis_angles, continuous, quaternions
-from rover_gym.replay.scenery import ground_tiles, sphere_mesh
+from rover_gym.replay.scenery import ground_tiles, identifiers, sphere_mesh
 from rover_gym.run import Run, read_run
 
 SLOPE = Plane((-0.1, 1.0, 0.05), 0.2)
@@ -377,6 +378,100 @@ def test_the_page_holds_the_curves_of_the_run(tmp_path: Path) -> None:
 def test_a_page_of_a_thousand_frames_stays_small(tmp_path: Path) -> None:
     run = turning_run(FIELD, n=1000)
     assert write_page(run, tmp_path / "out.html").stat().st_size < 2_500_000
+
+
+# --- Names and titles of a file that means harm
+
+UNKIND = (
+    '" } ] DEF Evil Script { url "javascript:alert(1)" }',
+    "</script><img src=x onerror=alert(1)>",
+    "a b",
+    "a_b",
+    "Clock",
+    "ü",
+    "",
+)
+
+
+def renamed_run(title: str) -> Run:
+    """A run whose solids, wheels and title are what no format must read as its own."""
+    plain = RoverModel().to_dict()
+    old = [solid["name"] for solid in plain["solids"]]
+    names = dict(zip(old, (*UNKIND, *(f"{UNKIND[0]}{i}" for i in range(len(old)))), strict=False))
+
+    def rename(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: rename(entry) for key, entry in value.items()}
+        if isinstance(value, list):
+            return [rename(entry) for entry in value]
+        return names.get(value, value) if isinstance(value, str) else value
+
+    return replace(turning_run(), model=RoverModel.from_dict(rename(plain)), title=title)
+
+
+def test_names_and_titles_reach_vrml_escaped(tmp_path: Path) -> None:
+    """A solid's name went into the file as it was, and could add nodes and scripts."""
+    run = renamed_run('a "} Script { url "x\n')
+    text = write_vrml(run, tmp_path / "out.wrl").read_text(encoding="utf-8")
+    assert "Evil Script" not in text
+    assert "javascript" not in text.replace("javascript_alert", "")
+    vrml = Vrml(text)
+    assert {node.kind for node in vrml.named.values()} <= {
+        *("Transform", "PositionInterpolator", "OrientationInterpolator", "TimeSensor", "Shape", "Group"),
+        "Appearance",
+    }
+    assert vrml.named["Clock"].kind == "TimeSensor"
+    assert sum(node.kind == "PositionInterpolator" for node in vrml.named.values()) == len(run.model.solid_names)
+    assert 'title "a \\"} Script { url \\"x "' in text
+
+
+def test_names_and_titles_reach_the_page_as_text_only(tmp_path: Path) -> None:
+    run = renamed_run("</title></script><script>alert(1)</script>")
+    page = write_page(run, tmp_path / "out.html")
+    text = page.read_text(encoding="utf-8")
+    assert "<script>alert(1)" not in text
+    assert "onerror" not in text
+    assert curves(page)["title"] == run.title
+
+
+def test_names_and_titles_reach_gltf_as_text(tmp_path: Path) -> None:
+    run = renamed_run('"}], "x": [{"')
+    gltf = pygltflib.GLTF2().load_binary(str(write_gltf(run, tmp_path / "out.glb")))
+    assert [node.name or "" for node in gltf.nodes[: len(UNKIND)]] == list(UNKIND)
+    assert gltf.animations[0].name == run.title
+
+
+def test_names_become_identifiers_that_are_their_own() -> None:
+    names = identifiers(["trunk", "a b", "a_b", "a b_place", "1", "", "Clock", "x" * 500], {"Clock"}, ("_place",))
+    assert names["trunk"] == "trunk"
+    forms = [name + ending for name in names.values() for ending in ("", "_place")]
+    assert len(set(forms)) == len(forms)
+    assert all(re.fullmatch(r"[A-Za-z]\w{0,79}", name, flags=re.ASCII) for name in names.values())
+    assert "Clock" not in names.values()
+
+
+def test_a_run_over_thousands_of_kilometres_has_a_ground_of_few_squares() -> None:
+    """A square of half a metre each, they took all memory."""
+    run = turning_run(Plane())
+    run.trajectory["q"][-1, :3] = 5e8
+    tiles = ground_tiles(run)
+    assert tiles is not None
+    assert len(tiles[0]) < 4 * 50_000
+    assert np.isfinite(tiles[0]).all()
+
+
+def test_a_title_with_dollars_is_no_formula(tmp_path: Path) -> None:
+    """The gaps of this run are infinite besides, and its rover has no weight: neither ended an axis."""
+    run = replace(turning_run(), title=r"$\frac{")
+    weightless = replace(run.trajectory, attributes={"solver": {"gravity": [0.0, 0.0, 0.0]}})
+    assert len(draw_run(replace(run, trajectory=weightless), tmp_path)) >= 2
+
+
+def test_a_page_of_a_run_without_its_forces_names_them(tmp_path: Path) -> None:
+    run = turning_run()
+    del run.trajectory.data["wheel_forces"]
+    with pytest.raises(RecordingError, match="holds no such data set"):
+        write_page(run, tmp_path / "out.html")
 
 
 # --- The command

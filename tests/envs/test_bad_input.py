@@ -175,8 +175,9 @@ def test_policy_refuses_what_is_not_finite(env: RoverEnv) -> None:
 
 
 def test_policy_refuses_other_environments() -> None:
-    with pytest.raises(TypeError):
+    with pytest.raises(OptionError) as caught:
         PDPolicy(gym.make("CartPole-v1"))
+    assert caught.value.field == "env"
 
 
 @given(st.floats() | st.integers() | st.text() | st.none() | st.booleans() | st.lists(st.floats()))

@@ -18,6 +18,8 @@ mod orders;
 mod parked;
 #[path = "rover/reference_model.rs"]
 mod reference_model;
+#[path = "rover/round_trips.rs"]
+mod round_trips;
 #[path = "rover/stability.rs"]
 mod stability;
 #[path = "rover/symmetry.rs"]

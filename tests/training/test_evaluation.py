@@ -1,13 +1,14 @@
 """The evaluation's figures against closed forms, its episodes against single ones."""
 
 import math
+from collections.abc import Callable
 
 import gymnasium as gym
 import numpy as np
 import pytest
 
-from rover_gym import PDPolicy
-from rover_gym.baseline import wilson_interval
+from rover_gym import OptionError, PDPolicy
+from rover_gym.baseline import measure_baseline, wilson_interval
 from rover_gym.episodes import run_episode
 from rover_gym.evaluation import Drive, drive_all, mean_estimate, ratio_estimate, summarise
 
@@ -78,3 +79,23 @@ def test_an_episode_is_cut_at_its_limit() -> None:
     (drive,) = drive_all(PDPolicy, [1], arguments={}, max_episode_steps=10)
     assert (drive.end, drive.success) == ("time", False)
     assert drive.time == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("call", "field"),
+    [
+        (lambda: drive_all(PDPolicy, [1], arguments={}, num_envs=0), "num_envs"),
+        (lambda: drive_all(PDPolicy, [1], arguments={}, max_episode_steps=0), "max_episode_steps"),
+        (lambda: summarise("nobody", []), "drives"),
+        (lambda: wilson_interval(0, 0), "n"),
+        (lambda: wilson_interval(3, 2), "successes"),
+        (lambda: measure_baseline(episodes=0), "episodes"),
+        (lambda: measure_baseline(seed=-1), "seed"),
+        (lambda: measure_baseline([math.nan]), "difficulty"),
+    ],
+)
+def test_what_cannot_be_evaluated_is_refused_by_name(call: Callable[[], object], field: str) -> None:
+    """Some divided by zero, and some returned nothing without a word."""
+    with pytest.raises(OptionError) as caught:
+        call()
+    assert caught.value.field == field

@@ -73,7 +73,7 @@ def test_drive_runs_the_trained_policy(tmp_path: Path) -> None:
 def test_a_policy_that_is_not_there_is_one_line(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["drive", "--policy", str(tmp_path)])
     assert result.exit_code == 2
-    assert result.stderr.startswith("error: policy: ")
+    assert result.stderr.startswith("error: --policy: ")
 
 
 def test_no_policy_was_trained_for_other_ground() -> None:

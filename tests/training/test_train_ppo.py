@@ -123,6 +123,20 @@ def test_a_stopped_training_goes_on(run: Path, train: Script, tmp_path: Path) ->
     assert (tmp_path / "run" / "curve-1024.monitor.csv").exists()
 
 
+@pytest.mark.parametrize(
+    "text", ["", "[]", '{"name": "../../000000001", "hardest": null}', '{"name": 3}', "[" * 100_000]
+)
+def test_a_damaged_checkpoint_is_one_line(text: str, train: Script, tmp_path: Path) -> None:
+    folder = tmp_path / "run" / "checkpoints"
+    folder.mkdir(parents=True)
+    (folder / "latest.json").write_text(text, encoding="utf-8")
+    config = Path(__file__).parents[2] / "training" / "configs" / "plane.yaml"
+    result = train("--config", config, "--output", tmp_path / "run", "--resume")
+    assert result.exit_code == 2
+    assert result.stderr.startswith("error: --resume: names no checkpoint")
+    assert len(result.stderr.splitlines()) == 1
+
+
 def test_the_curriculum_rises_with_success(run: Path) -> None:
     with (run / "log" / "progress.csv").open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row.get("curriculum/hardest")]

@@ -1,11 +1,13 @@
 """The console command `rover`."""
 
+import sys
 from typing import Annotated
 
 import typer
 
 from rover_gym._core import __version__
 from rover_gym.cli.baseline import baseline
+from rover_gym.cli.console import DEBUG, one_line
 from rover_gym.cli.drive import drive
 from rover_gym.cli.planar import planar
 from rover_gym.cli.plot import plot
@@ -19,6 +21,7 @@ app = typer.Typer(
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
+    epilog=f"Errors are one line; with {DEBUG}=1 in the environment they tell where they came from.",
 )
 app.command()(drive)
 app.command()(baseline)
@@ -47,4 +50,8 @@ def rover(
 
 def main() -> None:
     """Entry point of the console command."""
-    app()
+    try:
+        with one_line({}):
+            app()
+    except typer.Exit as end:
+        sys.exit(end.exit_code)

@@ -10,8 +10,8 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from rover_gym.baseline import DIFFICULTIES, BaselineRow, measure_baseline
-from rover_gym.cli.console import console, plain_errors, progress_bar
+from rover_gym.baseline import DIFFICULTIES, BaselineInterrupt, BaselineRow, measure_baseline
+from rover_gym.cli.console import INTERRUPTED, LARGEST_SEED, MOST_EPISODES, console, plain_errors, progress_bar
 
 CAUSES = {"time": "time limit", "high_centred": "high centred", "roll_over": "roll over", "step_failed": "step failed"}
 
@@ -22,8 +22,12 @@ def baseline(
         list[float] | None,
         typer.Option(help="A difficulty from 0 to 1; may be given several times. Five, if not given."),
     ] = None,
-    episodes: Annotated[int, typer.Option(min=1, help="How many episodes at each difficulty.")] = 200,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode; the next ones count up.")] = 0,
+    episodes: Annotated[
+        int, typer.Option(min=1, max=MOST_EPISODES, help="How many episodes at each difficulty.")
+    ] = 200,
+    seed: Annotated[
+        int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the first episode; the next ones count up.")
+    ] = 0,
     policy: Annotated[
         str,
         typer.Option(help="'pd' for the baseline, 'trained' for the package's trained one, or such a one's folder."),
@@ -33,20 +37,24 @@ def baseline(
     """Drive RoverRocks-v0 with the PD baseline or a trained policy and print how often it reached the goal.
 
     The interval is Wilson's, 95%. Time is the mean of the episodes that reached the goal; energy the work through
-    the wheel motors over the way driven.
+    the wheel motors over the way driven. Ctrl-C ends the measurement: what is done is printed.
     """
     difficulties = tuple(difficulty) if difficulty else DIFFICULTIES
     with progress_bar() as bar:
         task = bar.add_task("baseline", total=episodes * len(difficulties), state="")
-        rows = measure_baseline(
-            difficulties,
-            episodes=episodes,
-            seed=seed,
-            policy=policy,
-            progress=lambda level, done: bar.update(
-                task, advance=1, state=f"difficulty {level:g}, {done} of {episodes}"
-            ),
-        )
+        interrupted = False
+        try:
+            rows = measure_baseline(
+                difficulties,
+                episodes=episodes,
+                seed=seed,
+                policy=policy,
+                progress=lambda level, done: bar.update(
+                    task, advance=1, state=f"difficulty {level:g}, {done} of {episodes}"
+                ),
+            )
+        except BaselineInterrupt as interrupt:
+            interrupted, rows = True, interrupt.rows
     if as_json:
         # JSON knows no NaN: where no episode reached the goal, its time is null.
         plain = [
@@ -59,8 +67,12 @@ def baseline(
         typer.echo(
             json.dumps({"environment": "RoverRocks-v0", "policy": policy, "seed": seed, "rows": plain}, indent=2)
         )
-    else:
+    elif rows:
         console().print(_table(rows, seed, policy))
+    if interrupted:
+        done = sum(row.episodes for row in rows)
+        typer.echo(f"interrupted: {done} of {episodes * len(difficulties)} episodes are done", err=True)
+        raise typer.Exit(INTERRUPTED)
 
 
 def _table(rows: Sequence[BaselineRow], seed: int, policy: str) -> Table:

@@ -1,19 +1,42 @@
-"""What the commands share: where they print, their progress bars and how they fail."""
+"""What the commands share: where they print, their progress bars, where they may write, and how they fail."""
 
+import errno
 import functools
-from collections.abc import Callable
+import inspect
+import math
+import os
+import stat
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import NoReturn, ParamSpec, TypeVar
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from rover_gym._core import RoverGymError
+from rover_gym._core import OptionError, RoverGymError
 from rover_gym.extras import MissingExtraError
+from rover_gym.validation import refuse
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+#: Arguments that an option of another name sets: the command's parameter, and the option.
+SET_BY = {
+    "slope_deg": ("slope", "--slope"),
+    "uphill_deg": ("uphill", "--uphill"),
+    "heading_deg": ("heading", "--heading"),
+    "format": ("file_format", "--format"),
+    "torques": ("torque", "--torque"),
+}
+#: Set to anything, the commands show where an error came from.
+DEBUG = "ROVER_DEBUG"
+
+MENDABLE, UNFORESEEN, INTERRUPTED = 2, 1, 130  # exit codes
+LONGEST_LINE = 600
+LARGEST_SEED = 2**63 - 1
+MOST_EPISODES = 1_000_000
 
 
 def console() -> Console:
@@ -37,19 +60,136 @@ def progress_bar() -> Progress:
 
 def say_path(what: str, path: Path) -> None:
     """Prints where something was written, on a line of its own that no terminal width breaks."""
-    typer.echo(f"{what}: {path}")
+    typer.echo(_printable(f"{what}: {path}"))
+
+
+@contextmanager
+def keeping(what: str, *paths: Path) -> Iterator[None]:
+    """Prints, where the user interrupts what stands below, which files hold what was done until then."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        for path in paths:
+            if path.exists():
+                say_path(f"{what}, incomplete", path)
+        raise
+
+
+def check_file(option: str, path: Path | None) -> None:
+    """Refuses a file that cannot be written, before the work is done whose result it takes. Leaves nothing behind.
+
+    Raises:
+        OptionError: It cannot be written.
+    """
+    if path is None:
+        return
+    with _tried(option, path, path.parent):
+        is_new = not path.exists()
+        if not is_new and not stat.S_ISREG(path.stat().st_mode):
+            raise OSError(errno.EINVAL, "no regular file")
+        with path.open("ab"):
+            pass
+        if is_new:
+            path.unlink()
+
+
+def check_folder(option: str, path: Path | None) -> None:
+    """Refuses a folder that cannot be written into, before the work is done whose results it takes. Leaves nothing.
+
+    Raises:
+        OptionError: It cannot be written into.
+    """
+    if path is None:
+        return
+    with _tried(option, path, path):
+        probe = path / f".rover-{os.getpid()}"
+        probe.touch()
+        probe.unlink()
+
+
+@contextmanager
+def _tried(option: str, path: Path, folder: Path) -> Iterator[None]:
+    """Makes a folder for what stands below, and takes away what was not there."""
+    try:
+        missing = [place for place in (folder, *folder.parents) if not place.exists()]
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            yield
+        finally:
+            for place in missing:
+                if place.exists():
+                    place.rmdir()
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        refuse(OptionError, option, str(path), f"cannot be written ({reason})")
 
 
 def plain_errors(command: Callable[P, R]) -> Callable[P, R]:
-    """Turns the errors that a user can mend into one line on standard error and exit code 2."""
+    """Turns every error of a command into one line on standard error and an exit code.
+
+    2 is for what the user can mend, 1 for what nobody foresaw, 130 for an interruption. Numbers that are not finite are
+    refused here, for all options. An error that names an argument of ours names the option that sets it.
+    """
+    parameters = inspect.signature(command).parameters
+    options = {name: f"--{name.replace('_', '-')}" for name in parameters}
+    options |= {name: option for name, (parameter, option) in SET_BY.items() if parameter in parameters}
 
     @functools.wraps(command)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
-        try:
+        with one_line(options):
+            for name, value in kwargs.items():
+                _check_finite(name, value)
             return command(*args, **kwargs)
-        except (RoverGymError, MissingExtraError, OSError) as error:
-            line = " ".join(str(error).split())
-            typer.echo(f"error: {line}", err=True)
-            raise typer.Exit(2) from error
 
     return guarded
+
+
+@contextmanager
+def one_line(options: Mapping[str, str]) -> Iterator[None]:
+    """Ends the program with one line where what stands below raises.
+
+    Args:
+        options: Names of the command's options by those of arguments, as errors have them.
+    """
+    try:
+        yield
+    except (typer.Exit, typer.Abort, BrokenPipeError):
+        raise  # these have their own ways
+    except KeyboardInterrupt:
+        _end("interrupted", INTERRUPTED)
+    except (RoverGymError, MissingExtraError, OSError) as error:
+        if os.environ.get(DEBUG):
+            raise
+        _end(f"error: {_with_option(error, options)}", MENDABLE)
+    except Exception as error:
+        if os.environ.get(DEBUG):
+            raise
+        _end(f"error: unforeseen {type(error).__name__}: {error} (to see where, set {DEBUG}=1)", UNFORESEEN)
+
+
+def _with_option(error: Exception, options: Mapping[str, str]) -> str:
+    """The error's message, with the option's name in the place of the argument's."""
+    text, field = str(error), getattr(error, "field", None)
+    if isinstance(field, str) and text.startswith(f"{field}:"):
+        name = field.partition("[")[0]
+        if name in options:
+            return f"{options[name]}{text[len(field) :]}"
+    return text
+
+
+def _end(line: str, code: int) -> NoReturn:
+    line = " ".join(line.split())
+    typer.echo(_printable(line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..."), err=True)
+    raise typer.Exit(code)
+
+
+def _printable(text: str) -> str:
+    """Text that every terminal takes: bytes of a file's name that are no Unicode are written as escapes."""
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
+def _check_finite(name: str, value: object) -> None:
+    entries = value if isinstance(value, (list, tuple)) else (value,)
+    for entry in entries:
+        if isinstance(entry, float) and not math.isfinite(entry):
+            refuse(OptionError, name, entry, "must be finite")

@@ -1,6 +1,7 @@
 """`rover drive`: episodes of `Rover-v0` with the PD baseline or a trained policy."""
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict
@@ -13,16 +14,29 @@ import typer
 from rich.progress import Progress
 from rich.table import Table
 
-from rover_gym.cli.console import console, plain_errors, progress_bar, say_path
+from rover_gym._core import OptionError
+from rover_gym.cli.console import (
+    INTERRUPTED,
+    LARGEST_SEED,
+    MOST_EPISODES,
+    check_file,
+    check_folder,
+    console,
+    plain_errors,
+    progress_bar,
+    say_path,
+)
 from rover_gym.env import RoverEnv
 from rover_gym.episodes import Episode, Policy, run_episode
 from rover_gym.policy import PDPolicy
 from rover_gym.recording import Channel, Recorder, Sampler, describe
 from rover_gym.rewards import WEIGHTS
 from rover_gym.trained import TrainedPolicy, find_policy, policy_arguments
+from rover_gym.validation import number, refuse
 from rover_gym.video import VideoWriter
 
 CONTROL_PERIOD = 0.05  # s, of Rover-v0
+SHORTEST_STEP = 1e-5  # s: a shorter one makes no episode end
 
 
 @plain_errors
@@ -48,9 +62,11 @@ def drive(
     ] = "pd",
     friction: Annotated[float, typer.Option(help="Coulomb's coefficient.")] = 0.7,
     time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
-    time_limit: Annotated[float, typer.Option(min=CONTROL_PERIOD, help="Time limit of an episode, s.")] = 60.0,
-    episodes: Annotated[int, typer.Option(min=1, help="How many episodes.")] = 1,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the first episode; the next ones count up.")] = 0,
+    time_limit: Annotated[float, typer.Option(min=CONTROL_PERIOD, max=1e6, help="Time limit of an episode, s.")] = 60.0,
+    episodes: Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="How many episodes.")] = 1,
+    seed: Annotated[
+        int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the first episode; the next ones count up.")
+    ] = 0,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -61,7 +77,13 @@ def drive(
         Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes, one after the other.")
     ] = None,
 ) -> None:
-    """Drive Rover-v0 to its goal with the PD baseline or a trained policy and print what the episodes came to."""
+    """Drive Rover-v0 to its goal with the PD baseline or a trained policy and print what the episodes came to.
+
+    Ctrl-C ends the drive: the episodes that are done are printed, and what was recorded and filmed is kept.
+    """
+    _check_time_step(time_step)
+    check_folder("output", output)
+    check_file("video", video)
     arguments: dict[str, Any] = {
         "terrain": terrain,
         "friction": friction,
@@ -81,16 +103,22 @@ def drive(
     driver: Policy = PDPolicy(env) if folder is None else TrainedPolicy.load(env, folder)
     name = "the PD baseline" if folder is None else "a trained policy"
 
-    results, paths = [], []
+    results: list[Episode] = []
+    paths: list[Path] = []
+    interrupted = False
     with progress_bar() as bar, ExitStack() as stack:
         stack.callback(env.close)
         film = None if video is None else stack.enter_context(VideoWriter(video, env.metadata["render_fps"]))
-        for number in range(seed, seed + episodes):
-            path = None if output is None else output / f"episode-{number}.h5"
-            results.append(_drive_one(env, driver, name, number, arguments, options, path, bar, film))
-            paths += [path] if path else []
+        try:
+            for now in range(seed, seed + episodes):
+                path = None if output is None else output / f"episode-{now}.h5"
+                paths += [path] if path else []
+                results.append(_drive_one(env, driver, name, now, arguments, options, path, bar, film))
+        except KeyboardInterrupt:
+            interrupted = True
 
-    console().print(_table(results, name))
+    if results:
+        console().print(_table(results, name))
     if output is not None:
         summary = {
             "policy": policy,
@@ -101,7 +129,20 @@ def drive(
         paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     paths += [] if video is None else [video]
     for path in paths:
-        say_path("written", path)
+        if path.exists():
+            say_path("written", path)
+    if interrupted:
+        typer.echo(f"interrupted: {len(results)} of {episodes} episodes are done", err=True)
+        raise typer.Exit(INTERRUPTED)
+
+
+def _check_time_step(time_step: float) -> None:
+    """Refuses a step of which no whole number makes a control period."""
+    number("time_step", time_step, at_least=SHORTEST_STEP)
+    steps = CONTROL_PERIOD / time_step
+    if not (round(steps) >= 1 and math.isclose(steps, round(steps), rel_tol=1e-9)):
+        reason = f"must divide the control period of {CONTROL_PERIOD:g} s into a whole number of steps"
+        refuse(OptionError, "time_step", time_step, reason)
 
 
 def _drive_one(

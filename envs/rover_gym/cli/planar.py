@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from rover_gym._core import OptionError
-from rover_gym.cli.console import console, plain_errors, progress_bar, say_path
+from rover_gym.cli.console import check_folder, console, keeping, plain_errors, progress_bar, say_path
 from rover_gym.cli.soil import soil
 from rover_gym.planar import (
     BallSimulation,
@@ -24,10 +24,15 @@ from rover_gym.planar import (
     record,
 )
 from rover_gym.recording import read_trajectory
+from rover_gym.validation import number, refuse
 
 planar = typer.Typer(
     help="Planar systems of the report's chapter 3: a ball, a two-wheel rover, granular soil.", no_args_is_help=True
 )
+
+
+STEEPEST = 89.0  # degrees: an upright line is no ground
+LARGEST_TABLE = 1 << 26  # bytes
 
 
 class GroundKind(StrEnum):
@@ -51,7 +56,7 @@ Friction = Annotated[float, typer.Option(help="Coulomb's coefficient.")]
 Restitution = Annotated[float, typer.Option(help="Newton's coefficient.")]
 TimeStep = Annotated[float, typer.Option(help="Time step, s.")]
 Duration = Annotated[float, typer.Option(min=0.01, max=1000.0, help="Time to simulate, s.")]
-Speed = Annotated[float, typer.Option(help="Forward speed at the start, m/s.")]
+Speed = Annotated[float, typer.Option(min=-1e4, max=1e4, help="Forward speed at the start, m/s.")]
 Output = Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)]
 
 
@@ -76,6 +81,7 @@ def ball(
     output: Output = Path("runs/planar"),
 ) -> None:
     """Drop a ball on a line, a sine, a step or a table of points; record and draw its way."""
+    check_folder("output", output)
     sim = BallSimulation(
         _ground(ground, slope, amplitude, wavelength, height, table),
         mass=mass,
@@ -108,6 +114,7 @@ def rover(
     output: Output = Path("runs/planar"),
 ) -> None:
     """Drive the two-wheel rover over a line, a sine, a step or a table of points; record and draw its way."""
+    check_folder("output", output)
     sim = TwoWheelRoverSimulation(
         _ground(ground, slope, amplitude, wavelength, height, table),
         friction=friction,
@@ -130,25 +137,21 @@ def _ground(
     kind: GroundKind, slope: float, amplitude: float, wavelength: float, height: float, table: Path | None
 ) -> Ground:
     if kind is GroundKind.line:
-        return Line(float(np.tan(np.radians(slope))))
+        return Line(float(np.tan(np.radians(number("slope", slope, at_least=-STEEPEST, at_most=STEEPEST)))))
     if kind is GroundKind.sine:
         return Sine(amplitude, wavelength)
     if kind is GroundKind.step:
         return Polyline.step(2.0, height)
     if table is None:
-        raise _missing_table()
+        refuse(OptionError, "table", None, "the ground 'table' needs a file")
+    if not table.is_file() or table.stat().st_size > LARGEST_TABLE:  # a device has no end
+        refuse(OptionError, "table", str(table), f"must be a regular file of at most {LARGEST_TABLE} bytes")
     try:
         points = np.loadtxt(table, ndmin=2)
         x, y = points[:, 0], points[:, 1]
-    except (ValueError, IndexError) as error:
-        raise _missing_table(f"{table} does not hold two columns of numbers") from error
+    except (ValueError, IndexError):
+        refuse(OptionError, "table", str(table), "does not hold two columns of numbers")
     return Spline(x, y)
-
-
-def _missing_table(why: str = "the ground 'table' needs a file") -> OptionError:
-    error = OptionError(f"table: {why}")
-    error.field = "table"
-    return error
 
 
 def _lift(sim: PlanarSimulation, clearance: float) -> None:
@@ -172,7 +175,7 @@ def _words(ground: Ground) -> str:
 
 def _run(sim: PlanarSimulation, who: str, duration: float, path: Path) -> None:
     title = f"{who} on {_words(sim.ground)}"
-    with progress_bar() as bar:
+    with keeping("trajectory", path), progress_bar() as bar:
         task = bar.add_task(who, total=duration, state="")
         rows = record(
             sim,

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from rover_gym.cli.console import plain_errors, say_path
+from rover_gym.cli.console import check_folder, plain_errors, say_path
 from rover_gym.recording import read_trajectory
 from rover_gym.run import run_of
 from rover_gym.soil_run import is_soil, soil_run_of
@@ -31,6 +31,7 @@ def plot(
     """
     folder = recording.with_name(f"{recording.stem}-plots") if output is None else output
     trajectory = read_trajectory(recording)
+    check_folder("output", folder)
     if is_soil(trajectory):
         soil_run = soil_run_of(trajectory, recording)
         from rover_gym.figures.soil_run import draw_soil_run  # noqa: PLC0415 - as below

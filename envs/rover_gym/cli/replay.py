@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from rover_gym._core import OptionError
-from rover_gym.cli.console import plain_errors, say_path
+from rover_gym.cli.console import check_file, plain_errors, say_path
 from rover_gym.extras import require
 from rover_gym.recording import Trajectory, read_trajectory
 from rover_gym.replay import write_gltf, write_page, write_soil_page, write_vrml
@@ -35,6 +35,10 @@ def replay(
         if wanted is not None:
             require(package, "replay")  # before the first file is written
     trajectory = read_trajectory(run)
+    for name, path in (("html", html), ("vrml", vrml), ("gltf", gltf)):
+        if path is not None and path.exists() and path.samefile(run):
+            refuse(OptionError, name, str(path), "would replace the run itself")
+        check_file(name, path)
     if is_soil(trajectory):
         _replay_soil(trajectory, run, html, {"vrml": vrml, "gltf": gltf}, fps, follow=follow)
         return

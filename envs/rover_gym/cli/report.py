@@ -9,7 +9,7 @@ from rich.table import Table
 
 from rover_gym import report as scene
 from rover_gym import rug
-from rover_gym.cli.console import console, plain_errors, progress_bar, say_path
+from rover_gym.cli.console import check_folder, console, keeping, plain_errors, progress_bar, say_path
 from rover_gym.recording import Trajectory, read_trajectory
 
 
@@ -32,14 +32,16 @@ def report(
     Siconos 4.4, which ran the same scene.
     """
     options: dict[str, Any] = {"time_step": time_step, "variant": variant, "stabilisation": stabilisation}
-    with progress_bar() as bar:
+    check_folder("output", output)
+    paths = (output / "trajectory.h5", output / "rug.h5")
+    with keeping("trajectory", *paths), progress_bar() as bar:
 
         def follow(section: str) -> Callable[[float], None]:
             task = bar.add_task(f"section {section}", total=duration, state="")
             return lambda time: bar.update(task, completed=time, state=f"{time:.1f} s")
 
-        result = scene.run(output / "trajectory.h5", duration=duration, progress=follow("6.1"), **options)
-        rug_result = rug.run(output / "rug.h5", duration=duration, progress=follow("6.2"), **options)
+        result = scene.run(paths[0], duration=duration, progress=follow("6.1"), **options)
+        rug_result = rug.run(paths[1], duration=duration, progress=follow("6.2"), **options)
     settings = f"step {1e3 * time_step:g} ms, {variant}, stabilisation {stabilisation}"
 
     trajectory = read_trajectory(result.path)

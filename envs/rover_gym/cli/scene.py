@@ -13,7 +13,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from rover_gym._core import OptionError, Plane, RoverModel, SphereField
-from rover_gym.cli.console import console, plain_errors, progress_bar
+from rover_gym.cli.console import LARGEST_SEED, console, plain_errors, progress_bar
 from rover_gym.economy import Economy, measure_economies
 from rover_gym.rocks import clear_radius
 from rover_gym.rug import START
@@ -45,7 +45,7 @@ def scene(
     held: Annotated[bool, typer.Option("--held", help="Wheels may be braked and joints held.")] = False,
     tumbles: Annotated[bool, typer.Option("--tumbles", help="The rover may turn over in free flight.")] = False,
     reach: Annotated[float | None, typer.Option(help="The rover stays within this distance of its start, m.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the rocks.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Of the rocks.")] = 1,
     accuracy: Annotated[
         str, typer.Option(help="fast, balanced, reference, or the error allowed on 20 m of flat ground, m.")
     ] = "balanced",
@@ -100,9 +100,10 @@ def _accuracy(text: str) -> Accuracy:
     if text in ("fast", "balanced", "reference"):
         return text  # type: ignore[return-value]
     try:
-        return float(text)
+        metres = float(text)
     except ValueError:
         refuse(OptionError, "accuracy", text, "must be fast, balanced, reference or a number of metres")
+    return number("accuracy", metres, above=0.0)
 
 
 def _scene(

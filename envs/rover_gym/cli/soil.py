@@ -1,6 +1,7 @@
 """`rover planar soil`: the two-wheel rover on granular soil, a crossing or a sweep of trials."""
 
 import json
+import math
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -10,7 +11,18 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from rover_gym.cli.console import console, plain_errors, progress_bar, say_path
+from rover_gym._core import OptionError
+from rover_gym.cli.console import (
+    INTERRUPTED,
+    LARGEST_SEED,
+    check_folder,
+    console,
+    keeping,
+    plain_errors,
+    progress_bar,
+    say_path,
+)
+from rover_gym.validation import refuse
 
 if TYPE_CHECKING:
     from rover_gym.traction import Traction
@@ -18,6 +30,9 @@ if TYPE_CHECKING:
 EARTH = 9.81  # m/s^2
 FRAMES = 25.0  # of the video, a second at EARTH
 END = 0.02  # m between front wheel and wall at which a crossing ends
+
+#: Width of a bed on which the rover, and the pulling wheel on its way, have room, m.
+CROSSING, PULLING = 1.3, 2.1
 
 #: Sweeps: torques of each wheel (N m, at EARTH); slips, loads (kg) and rim's speed (m/s, at EARTH) of a pulling wheel.
 TORQUES = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 65.0, 80.0, 100.0)
@@ -36,7 +51,9 @@ def soil(
     ] = None,
     layers: Annotated[int, typer.Option(min=1, max=100, help="Layers of disks.")] = 3,
     torque: Annotated[float, typer.Option(help="Torque of each wheel, N m, positive forward.")] = 50.0,
-    gravity: Annotated[float, typer.Option(min=1e-3, help="Gravity, m/s^2; the original run had 0.0981.")] = EARTH,
+    gravity: Annotated[
+        float, typer.Option(min=1e-3, max=1e3, help="Gravity, m/s^2; the original run had 0.0981.")
+    ] = EARTH,
     friction: Annotated[float, typer.Option(help="Coulomb's coefficient between disks.")] = 0.5,
     wheel_friction: Annotated[float, typer.Option(help="Coulomb's coefficient at the wheels.")] = 0.9,
     time_step: Annotated[
@@ -54,7 +71,9 @@ def soil(
             "It ends earlier where the soil does.",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the disks' radii and places; a sweep's first.")] = 0,
+    seed: Annotated[
+        int, typer.Option(min=0, max=LARGEST_SEED - 100, help="Of the disks' radii and places; a sweep's first.")
+    ] = 0,
     video: Annotated[bool, typer.Option(help="Write a video, soil.mp4.")] = True,
     sweep: Annotated[
         bool,
@@ -69,6 +88,7 @@ def soil(
     output: Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)] = Path("runs/planar"),
 ) -> None:
     """Drive the two-wheel rover over granular soil of disks; record, draw and film it."""
+    check_folder("output", output)
     slowness = float(np.sqrt(EARTH / gravity))
     options: dict[str, Any] = {
         "gravity": (0.0, -gravity),
@@ -99,13 +119,14 @@ def _cross(
     from rover_gym.planar_soil import record_soil, rover_on_soil, settled_bed  # noqa: PLC0415 - h5py is slow to load
     from rover_gym.soil_run import read_soil_run  # noqa: PLC0415 - as above
 
+    _check_width("disks", disks, layers, CROSSING)
     bed = settled_bed(disks, layers, seed=seed, **options)
     sim = rover_on_soil(bed, wheel_friction=wheel_friction, **options)
     sim.set_torques([torque, torque])
     title = f"the two-wheel rover on a soil of {disks} disks"
     path = output / "soil.h5"
     rate = FRAMES * float(np.sqrt(-options["gravity"][1] / EARTH))
-    with progress_bar() as bar:
+    with keeping("trajectory", path), progress_bar() as bar:
         task = bar.add_task("soil", total=duration, state="")
         rows = record_soil(
             sim,
@@ -140,6 +161,17 @@ def _cross(
         say_path("video", film)
 
 
+def _check_width(option: str, disks: int, layers: int, needed: float, radius_max: float = 0.0165) -> None:
+    """Refuses a bed that is too narrow, m, before it is settled."""
+    from rover_gym.planar_soil import bed_width  # noqa: PLC0415 - h5py is slow to load
+
+    width = bed_width(disks, layers, radius_max)
+    if width < needed:
+        enough = layers * math.ceil(needed / bed_width(1, 1, radius_max))
+        reason = f"in {layers} layers make a bed {width:.2f} m wide, and the machine needs {needed:g} m:"
+        refuse(OptionError, option, disks, f"{reason} take at least {enough}")
+
+
 def _sweep(
     disks: int,
     layers: int,
@@ -155,6 +187,8 @@ def _sweep(
     from rover_gym.soil_trials import drawbar_pull, drive_on_soil, over_beds  # noqa: PLC0415 - as above
     from rover_gym.traction import fit_traction  # noqa: PLC0415 - as above
 
+    _check_width("disks", disks, layers, CROSSING)
+    _check_width("pull_disks", pull_disks, pull_layers, PULLING, UNEQUAL["radius_max"])
     scale = -options["gravity"][1] / EARTH
     slowness = float(scale**-0.5)
     # Means over seconds and beds need no closer solution, and most of a bed lies still.
@@ -177,11 +211,16 @@ def _sweep(
             advance(1)
             pull_beds.append(settled_bed(pull_disks, pull_layers, seed=seed, **UNEQUAL, **options))
             advance(1)
-        pulls = {}
-        for load in LOADS:
-            pull = partial(drawbar_pull, load=load, rim_speed=RIM_SPEED / slowness, **rest)
-            pulls[load] = over_beds(pull, SLIPS, pull_beds, progress=advance)
-        drives = over_beds(drive, [scale * torque for torque in TORQUES], beds, progress=advance)
+        pulls, drives, interrupted = {}, [], False
+        try:
+            for load in LOADS:
+                pull = partial(drawbar_pull, load=load, rim_speed=RIM_SPEED / slowness, **rest)
+                pulls[load] = over_beds(pull, SLIPS, pull_beds, progress=advance)
+            drives = over_beds(drive, [scale * torque for torque in TORQUES], beds, progress=advance)
+        except KeyboardInterrupt:
+            interrupted = True
+    if interrupted and not pulls:
+        raise KeyboardInterrupt
     fits = {load: fit_traction(rows) for load, rows in pulls.items()}
     _say_fits(fits)
     output.mkdir(parents=True, exist_ok=True)
@@ -194,6 +233,9 @@ def _sweep(
     # JSON knows no nan: the slip of wheels that stood is null, and so is the standard error of one bed.
     path.write_text(json.dumps(numbers, indent=1).replace("NaN", "null") + "\n", encoding="utf-8")
     say_path("numbers", path)
+    if interrupted:
+        typer.echo("interrupted: the pulls are done, the drives are not", err=True)
+        raise typer.Exit(INTERRUPTED)
     say_path("curves", draw_curves(drives, pulls, fits, output / "soil-curves.png"))
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rover_gym.figures.derived import Array, contact_velocities, motor_work, slip_ratios, smooth
-from rover_gym.figures.signals import SMOOTHED, WINDOW, linear_then_log, plot_raw_and_smooth, round_up
+from rover_gym.figures.signals import SMOOTHED, WINDOW, extremes, finite, linear_then_log, plot_raw_and_smooth, round_up
 from rover_gym.figures.style import (
     DARK,
     QUANTITY_COLOURS,
@@ -28,19 +28,21 @@ if TYPE_CHECKING:
     from rover_gym.figures.style import Sheet
     from rover_gym.run import Run
 
+#: A load at which the axis ends at the least, N: without weight there is no other.
+LEAST_LOAD = 1.0
+
 SET_POINT: dict[str, Any] = {"linestyle": (0, (1, 1.5)), "linewidth": 1.0}
 
 
 def wheel_gaps(figure: Sheet, run: Run) -> None:
     """The distance of each wheel from the ground, left and right wheels apart."""
     panels = figure.subplots(2, 1, sharex=True, sharey=True)
-    gaps = 1e3 * run.trajectory["wheel_gaps"]
+    gaps = 1e3 * finite(run.trajectory["wheel_gaps"])
     for axes, wheels, name in zip(panels, SIDES, ("left", "right"), strict=True):
         axes.axhline(0.0, color=DARK, linewidth=0.6)
         plot_wheels(axes, run.time, gaps, wheels, nested=True)
         axes.set(ylabel=f"gap, {name} wheels (mm)")
-    largest, smallest = float(np.nanmax(gaps)), float(np.nanmin(gaps))
-    linear_then_log(panels[0], 10.0, min(smallest, -1.0), max(largest, 1.0))
+    linear_then_log(panels[0], 10.0, *extremes(gaps, -1.0, 1.0))
     panels[1].set(xlabel="time (s)")
     title(figure, "Gaps between wheels and ground, negative where they overlap", run)
     wheel_legend(figure)
@@ -49,14 +51,15 @@ def wheel_gaps(figure: Sheet, run: Run) -> None:
 def wheel_loads(figure: Sheet, run: Run) -> None:
     """The normal force on each wheel, left and right wheels apart."""
     panels = figure.subplots(2, 1, sharex=True, sharey=True)
-    forces = run.trajectory["wheel_forces"][:, :, 0]
+    forces = finite(run.trajectory["wheel_forces"][:, :, 0])
     gravity = run.trajectory.attributes.get("solver", {}).get("gravity", (0.0, -9.81, 0.0))
     share = run.model.mass * float(np.linalg.norm(gravity)) / len(WHEELS)
     for axes, wheels, name in zip(panels, SIDES, ("left", "right"), strict=True):
         axes.axhline(share, color=DARK, linewidth=0.8, linestyle=(0, (4, 3)))
         plot_raw_and_smooth(axes, run.time, forces, wheels)
         axes.set(ylabel=f"load, {name} wheels (N)")
-    linear_then_log(panels[0], round_up(1.8 * share), 0.0, float(np.nanmax(forces)))
+    _, largest = extremes(forces, 0.0, 0.0)
+    linear_then_log(panels[0], round_up(max(1.8 * share, LEAST_LOAD)), 0.0, largest)
     panels[1].set(xlabel="time (s)")
     title(figure, f"Normal force on the wheels, mean over {_averaged(run)}", run)
     wheel_legend(figure, {f"a sixth of the weight, {share:.4g} N": {"color": DARK, "linestyle": (0, (4, 3))}}, SMOOTHED)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.figures.saving import save_figures
-from rover_gym.figures.style import circle
+from rover_gym.figures.style import circle, plain
 from rover_gym.planar import PlanarSimulation, Polyline
 from rover_gym.recording import Trajectory, read_trajectory
 
@@ -62,7 +62,7 @@ def _run(figure: Figure, sim: PlanarSimulation, trajectory: Trajectory) -> None:
             circle(way, centres[row, i, 0], centres[row, i, 1], radius, color=colours[i])
         if len(radii) > 1:
             way.plot(*centres[row].T, color="0.3", linewidth=2.0)
-    way.set(xlabel="x (m)", ylabel="y (m)", title=f"{trajectory.attributes['title']}, {time[-1]:g} s")
+    way.set(xlabel="x (m)", ylabel="y (m)", title=f"{plain(str(trajectory.attributes['title']))}, {time[-1]:g} s")
     way.set_aspect("equal", adjustable="datalim")
     way.legend(loc="upper right")
     speed.plot(time, speed_of(trajectory), color=OURS)

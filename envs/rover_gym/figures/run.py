@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, NamedTuple
 from rover_gym.figures import curves
 from rover_gym.figures.path import path_from_above
 from rover_gym.figures.saving import check_format, save_figures
-from rover_gym.figures.style import WIDTH
+from rover_gym.figures.style import WHEELS, WIDTH
+from rover_gym.recording import RecordingError
+from rover_gym.validation import refuse
 
 if TYPE_CHECKING:
     from rover_gym.figures.style import Sheet
@@ -63,9 +65,12 @@ def draw_run(run: Run, folder: str | Path, *, file_format: str = "png", with_ove
 
     Raises:
         OptionError: There is no such file format.
+        RecordingError: The rover's wheels are not those that the figures show.
         MissingExtraError: matplotlib is not installed.
     """
     check_format(file_format)
+    if sorted(run.model.wheel_names) != sorted(WHEELS):
+        refuse(RecordingError, "wheels", run.model.wheel_names, f"figures are drawn of {', '.join(WHEELS)} only")
     paths = []
     for name, drawing in drawable(run).items():
         one = {name: partial(_fill, draw=drawing.draw, run=run)}

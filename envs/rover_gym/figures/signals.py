@@ -27,6 +27,17 @@ def plot_raw_and_smooth(axes: Axes, time: Array, values: Array, wheels: tuple[st
     plot_wheels(axes, time, smoothed, wheels)
 
 
+def finite(values: Array) -> Array:
+    """Values with holes where they are not finite: what is not known is not drawn."""
+    return np.where(np.isfinite(values), values, np.nan)
+
+
+def extremes(values: Array, low: float, high: float) -> tuple[float, float]:
+    """The least and the largest of finite values with holes, and of two more."""
+    known = values[np.isfinite(values)]
+    return float(known.min(initial=low)), float(known.max(initial=high))
+
+
 def linear_then_log(axes: Axes, threshold: float, low: float, high: float) -> None:
     """A linear axis, or, where the values go far beyond the threshold, one that is logarithmic from there on."""
     if high <= 2.0 * threshold and low >= -2.0 * threshold:

@@ -15,7 +15,7 @@ from rover_gym.env import SLIP_SPEED
 from rover_gym.figures.derived import Array, smooth
 from rover_gym.figures.saving import check_format, save_figures
 from rover_gym.figures.signals import WINDOW
-from rover_gym.figures.style import DARK, QUANTITY_COLOURS, panel_legend
+from rover_gym.figures.style import DARK, QUANTITY_COLOURS, panel_legend, plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -145,7 +145,7 @@ def _finish(figure: Sheet, panels: tuple[Axes, ...], what: str, run: SoilRun) ->
     for axes in panels:
         panel_legend(axes)
     broken_off = "" if run.trajectory.attributes.get("complete", True) else " (the recording was broken off)"
-    figure.suptitle(f"{what}\n{run.title}{broken_off}")
+    figure.suptitle(f"{what}\n{plain(run.title)}{broken_off}")
 
 
 def _overview(figure: Sheet, draws: list[Callable[[Sheet, SoilRun], None]], run: SoilRun) -> None:

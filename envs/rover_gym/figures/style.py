@@ -57,10 +57,15 @@ STYLE: dict[str, Any] = {
 }
 
 
+def plain(text: str) -> str:
+    """Text of a file, whose dollars begin no formula."""
+    return text.replace("$", r"\$")
+
+
 def title(figure: Sheet, what: str, run: Run) -> None:
     """Writes over a figure what it shows, and of which run."""
     broken_off = "" if run.trajectory.attributes.get("complete", True) else " (the recording was broken off)"
-    figure.suptitle(f"{what}\n{run.title}{broken_off}")
+    figure.suptitle(f"{what}\n{plain(run.title)}{broken_off}")
 
 
 def wheel_legend(figure: Sheet, others: Mapping[str, Mapping[str, Any]] | None = None, note: str | None = None) -> None:

@@ -176,7 +176,7 @@ def read_config(path: str | Path) -> TrainingConfig:
     """
     try:
         given = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
         refuse(OptionError, "config", str(path), f"is not YAML: {error}")
     return parse_config(given)
 

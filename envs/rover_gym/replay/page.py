@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,13 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR
-from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, shortened, with_panel
+from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, rounded, shortened, with_panel
 from rover_gym.replay.rotation import continuous, quaternions
 from rover_gym.replay.scenery import (
     coloured_meshes,
     first_view,
     goal_parts,
     ground_tiles,
+    identifiers,
     parts_by_solid,
     sphere_mesh,
     spheres,
@@ -73,9 +75,12 @@ def _build(run: Run, scene: Any) -> tuple[Any, list[Any]]:
     add_surroundings(scene)
     world = scene.add_frame("/world", show_axes=False)
     solids = []
-    for name, parts in parts_by_solid(run).items():
-        solids.append(scene.add_frame(f"/world/{name}", show_axes=False))
-        add_meshes(scene, f"/world/{name}", coloured_meshes(parts))
+    named = parts_by_solid(run)
+    nodes = identifiers(named)
+    for name, parts in named.items():
+        # In a folder of their own: a solid may be called as the ground is.
+        solids.append(scene.add_frame(f"/world/solids/{nodes[name]}", show_axes=False))
+        add_meshes(scene, f"/world/solids/{nodes[name]}", coloured_meshes(parts))
     tiles = ground_tiles(run)
     if tiles is not None:
         vertices, light, dark = tiles
@@ -113,7 +118,7 @@ def _followed(run: Run) -> Array:
 
 def _curves(run: Run) -> dict[str, Any]:
     """What the panel draws: its title, the time, and for each chart a curve a wheel."""
-    data, wheels = run.trajectory.data, run.model.wheel_names
+    data, wheels = run.trajectory, run.model.wheel_names
     charts = [
         ("wheel load", "N", data["wheel_forces"][:, :, 0], 1),
         ("wheel gap", "mm", 1e3 * data["wheel_gaps"], 2),
@@ -121,16 +126,14 @@ def _curves(run: Run) -> dict[str, Any]:
     return {
         "title": run.title,
         "time": [round(float(time - run.time[0]), 4) for time in run.time],
-        "wheels": [{"name": name, "colour": colour} for name, colour in zip(wheels, WHEEL_COLOURS, strict=True)],
+        "wheels": [
+            {"name": name, "colour": colour} for name, colour in zip(wheels, cycle(WHEEL_COLOURS), strict=False)
+        ],
         "charts": [
             {
                 "title": title,
                 "unit": unit,
-                # JSON knows neither nan nor infinity: where a gap is not known, the curve has a hole.
-                "values": [
-                    [round(float(value), digits) if np.isfinite(value) else None for value in column]
-                    for column in values.T
-                ],
+                "values": [rounded(column, digits) for column in values.T],
             }
             for title, unit, values, digits in charts
         ],

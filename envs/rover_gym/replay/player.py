@@ -75,6 +75,11 @@ def shortened(values: Array, bits: int = 18) -> Array:
     return result
 
 
+def rounded(values: Array, digits: int) -> list[float | None]:
+    """Values for JSON, which knows neither nan nor infinity: where one is not known, the curve has a hole."""
+    return [round(float(value), digits) if np.isfinite(value) else None for value in values]
+
+
 def with_panel(page: str, title: str, curves: Mapping[str, Any]) -> str:
     """Viser's page with our panel beside its scene."""
     files = resources.files("rover_gym.replay")

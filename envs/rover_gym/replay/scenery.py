@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,12 +13,14 @@ from rover_gym._core import Plane, SphereField
 from rover_gym.appearance import GOAL_COLOUR, Colour, Part, part_mesh, rover_parts
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
     from rover_gym.run import Run
 
-TILE = 0.5  # m, edge of the ground's squares
+TILE = 0.5  # m, edge of the ground's squares, doubled until the ground has not too many
+MOST_TILES = 20_000
 MARGIN = 5.0  # m of ground about the path
+LONGEST_NAME = 60
 GOAL_POLE = 0.8  # m, height
 
 Array = npt.NDArray[np.float64]
@@ -31,6 +34,29 @@ class View:
     eye: Array
     target: Array
     field_of_view: float = np.pi / 4
+
+
+def identifiers(names: Iterable[str], taken: Iterable[str] = (), endings: Iterable[str] = ()) -> dict[str, str]:
+    """A name for each name that needs no escape in any format: letters, digits and underscores, a letter first.
+
+    Names that are so already stay; others get underscores, and a number where two would be one.
+
+    Args:
+        names: As a file gives them: any text.
+        taken: Names that are used for something else.
+        endings: With each of these added, a name must be free too.
+    """
+    used, result, forms = set(taken), {}, ("", *endings)
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9_]", "_", name[:LONGEST_NAME])
+        stem = plain if plain[:1].isalpha() else f"solid_{plain}"
+        chosen, n = stem, 1
+        while any(chosen + form in used for form in forms):
+            n += 1
+            chosen = f"{stem}_{n}"
+        used |= {chosen + form for form in forms}
+        result[name] = chosen
+    return result
 
 
 def trunk_path(run: Run) -> Array:
@@ -69,12 +95,15 @@ def ground_tiles(run: Run) -> tuple[Array, Triangles, Triangles] | None:
         x, z = run.goal
         places = np.vstack((places, (x, plane.height(x, z), z)))
     places = places @ tangents.T
-    low = np.floor((places.min(axis=0) - MARGIN) / TILE).astype(int)
-    high = np.ceil((places.max(axis=0) + MARGIN) / TILE).astype(int)
+    near, far = places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN
+    tile = TILE
+    while np.prod((far - near) / tile) > MOST_TILES:
+        tile *= 2.0
+    low, high = np.floor(near / tile).astype(int), np.ceil(far / tile).astype(int)
     i, k = (grid.ravel() for grid in np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1])))
     corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
     squares = np.stack((i, k), axis=1)[:, None] + corners
-    vertices = (TILE * squares @ tangents).reshape(-1, 3) - plane.offset * n
+    vertices = (tile * squares @ tangents).reshape(-1, 3) - plane.offset * n
     triangles = (4 * np.arange(len(i))[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])).astype(np.int32)
     dark = (i + k) % 2 == 1
     return vertices, triangles[~dark].reshape(-1, 3), triangles[dark].reshape(-1, 3)

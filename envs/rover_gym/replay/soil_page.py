@@ -20,7 +20,7 @@ from rover_gym.appearance import (
     part_mesh,
 )
 from rover_gym.extras import require
-from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, shortened, with_panel
+from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, rounded, shortened, with_panel
 
 if TYPE_CHECKING:
     from rover_gym.soil_run import SoilRun
@@ -282,7 +282,7 @@ def _curves(run: SoilRun) -> dict[str, Any]:
             {
                 "title": title,
                 "unit": unit,
-                "values": [[round(float(value), digits) for value in column] for column in values.T],
+                "values": [rounded(column, digits) for column in values.T],
             }
             for title, unit, values, digits in charts
         ],

@@ -14,12 +14,18 @@ import numpy.typing as npt
 
 from rover_gym.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR, SKY_COLOUR, SKY_COLOUR_2, Colour, Part
 from rover_gym.replay.rotation import axis_angles, continuous, quaternions
-from rover_gym.replay.scenery import first_view, goal_parts, ground_tiles, parts_by_solid, spheres
+from rover_gym.replay.scenery import first_view, goal_parts, ground_tiles, identifiers, parts_by_solid, spheres
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from rover_gym.run import Run
+
+#: Words that name no node: VRML's own, and what is defined below.
+TAKEN = (
+    *("DEF", "EXTERNPROTO", "FALSE", "IS", "NULL", "PROTO", "ROUTE", "TO", "TRUE", "USE"),
+    *("eventIn", "eventOut", "exposedField", "field", "Clock", "Ground", "Rock", "Spheres"),
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -61,7 +67,10 @@ def _lines(run: Run) -> Iterator[str]:
     fractions = (run.time - run.time[0]) / duration if duration > 0.0 else np.zeros(run.n_frames)
     keys = _numbers(fractions)
     turns = axis_angles(continuous(quaternions(run.rotations)))
-    for i, (solid, parts) in enumerate(parts_by_solid(run).items()):
+    named = parts_by_solid(run)
+    nodes = identifiers(named, TAKEN, ("_place", "_turn"))
+    for i, (name, parts) in enumerate(named.items()):
+        solid = nodes[name]
         yield (
             f"DEF {solid} Transform {{ translation {_numbers(run.positions[0, i])}"
             f" rotation {_numbers(turns[0, i])} children ["
@@ -135,5 +144,7 @@ def _numbers(values: Iterable[float]) -> str:
 
 
 def _string(text: str) -> str:
+    # A string may hold any character but an unescaped quote; what cannot be printed says nothing to a reader.
+    text = "".join(letter if letter.isprintable() else " " for letter in text)
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'

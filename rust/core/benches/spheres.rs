@@ -118,7 +118,7 @@ fn report_machine() -> Model {
         }
     }
     for wheel in &mut description.wheels {
-        wheel.radius = 0.30;
+        wheel.contact_radius = Some(0.30);
     }
     Model::from_description(description).unwrap()
 }

@@ -85,7 +85,7 @@ fn main() -> Result<(), StepError> {
         }
     }
     if let Some(simulation) = profiled {
-        let parts = simulation.profile(20_000)?.microseconds();
+        let parts = simulation.profile(20_000, &mut || true)?.microseconds();
         let total: f64 = parts.iter().map(|(_, t)| t).sum();
         println!("\nwhere a step of the curve goes ({total:.2} us with the clock):");
         for (phase, time) in parts {

@@ -4,7 +4,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::integrator::Accuracy;
 
-use crate::errors::{BorderError, Value};
+use crate::arguments::{number, refused};
+use crate::errors::Kind;
 use crate::simulation::{VARIANTS, name_of};
 
 const PRESETS: [(&str, Accuracy); 3] = [
@@ -13,30 +14,25 @@ const PRESETS: [(&str, Accuracy); 3] = [
     ("reference", Accuracy::REFERENCE),
 ];
 
+/// What an accuracy is, in words.
+const WHAT: &str = "\"fast\", \"balanced\", \"reference\" or an error in metres";
+
 /// Reads a preset's name or a target error in metres.
-pub fn parse(given: &Bound<'_, PyAny>) -> Result<Accuracy, BorderError> {
-    let refused = |message: String, value| BorderError::option("accuracy", message, value);
+pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<Accuracy> {
     if let Ok(name) = given.extract::<String>() {
         let found = PRESETS.iter().find(|(known, _)| *known == name);
-        return found.map(|(_, preset)| *preset).ok_or_else(|| {
-            let message = format!(
-                "accuracy: must be \"fast\", \"balanced\", \"reference\" or an error in metres, is {name:?}"
-            );
-            refused(message, Value::Text(name))
-        });
+        let unknown = || refused(given, Kind::Option, "accuracy", WHAT);
+        return Ok(found.map(|(_, preset)| *preset).ok_or_else(unknown)?);
     }
-    let Ok(metres) = given.extract::<f64>() else {
-        let message =
-            "accuracy: must be \"fast\", \"balanced\", \"reference\" or an error in metres";
-        return Err(refused(message.to_owned(), Value::Nothing));
+    let Ok(metres) = number(given, Kind::Option, "accuracy") else {
+        return Err(refused(given, Kind::Option, "accuracy", WHAT).into());
     };
-    Accuracy::for_error(metres).ok_or_else(|| {
-        let message = format!(
-            "accuracy: an error must be a number of metres not below {:.1e}, is {metres}",
-            Accuracy::FINEST
-        );
-        refused(message, Value::Number(metres))
-    })
+    let too_fine = || {
+        let least = Accuracy::FINEST;
+        let what = format!("a number of metres not below {least:.1e}");
+        refused(given, Kind::Option, "accuracy", &what)
+    };
+    Ok(Accuracy::for_error(metres).ok_or_else(too_fine)?)
 }
 
 /// The keyword arguments `time_step`, `variant` and `tolerance` of `Simulation` that an accuracy stands for.

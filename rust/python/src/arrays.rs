@@ -4,8 +4,8 @@ use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn,
 };
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
+use crate::arguments::{number, refused, shown};
 use crate::errors::{BorderError, Kind, Value};
 
 /// Any array-like as float64 of any shape.
@@ -19,19 +19,31 @@ pub fn array<'py>(
         kind,
         message: format!("{field}: must be an array of numbers ({})", e.value(py)),
         field: Some(field.to_owned()),
-        value: Value::Text(
-            value
-                .repr()
-                .map_or_else(|_| String::new(), |r| r.to_string()),
-        ),
+        value: Value::Text(shown(value)),
     };
-    let options = PyDict::new(py);
-    options.set_item("dtype", "float64")?;
-    let converted = py
-        .import("numpy")?
-        .call_method("asarray", (value,), Some(&options))
+    let numpy = py.import("numpy")?;
+    let found = numpy
+        .call_method1("asarray", (value,))
         .map_err(|e| refuse(&e))?;
-    let typed = converted.cast_into::<PyArrayDyn<f64>>()?;
+    // numpy would also take truth values, texts, times, and the real part of a complex number. Python objects, such as
+    // fractions, are converted one by one.
+    let letter: char = found.getattr("dtype")?.getattr("kind")?.extract()?;
+    let is_empty = found.len().unwrap_or(1) == 0;
+    let converted = if "fiu".contains(letter) || is_empty {
+        numpy.call_method1("asarray", (&found, "float64"))
+    } else if letter == 'O' {
+        let numbers: Vec<f64> = found
+            .getattr("flat")?
+            .try_iter()?
+            .map(|entry| number(&entry?, kind, field))
+            .collect::<PyResult<_>>()?;
+        PyArray1::from_vec(py, numbers).call_method1("reshape", (found.getattr("shape")?,))
+    } else {
+        return Err(refused(value, kind, field, "an array of numbers").into());
+    };
+    let typed = converted
+        .map_err(|e| refuse(&e))?
+        .cast_into::<PyArrayDyn<f64>>()?;
     Ok(typed.readonly())
 }
 

@@ -5,16 +5,33 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::simulation::{Batch, Simulation as CoreSimulation};
 
+use crate::arguments::{Given, count, flags, refused};
 use crate::arrays::array;
 use crate::errors::{BorderError, Kind, Value};
 use crate::reading::{place, scan_points, slices};
+use crate::shared::{Shared, Watch};
 use crate::simulation::{Origin, Simulation};
 
 /// Many rovers stepped side by side on several threads.
-#[pyclass(module = "rover_gym._core")]
-pub struct SimulationBatch {
+#[pyclass(module = "rover_gym._core", frozen)]
+pub struct SimulationBatch(Shared<Inner>);
+
+struct Inner {
     inner: Batch,
     origins: Vec<Origin>,
+}
+
+/// (n,) truth values: which rovers move.
+fn mask(value: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<bool>> {
+    let active = match value.extract::<PyReadonlyArray1<'_, bool>>() {
+        Ok(ready) => ready.as_array().to_vec(),
+        Err(_) => flags(value, Kind::Option, "active")?,
+    };
+    if active.len() == n {
+        return Ok(active);
+    }
+    let what = format!("{n} truth values");
+    Err(refused(value, Kind::Option, "active", &what).into())
 }
 
 /// (n, wheels) commands in row-major order.
@@ -43,71 +60,99 @@ fn commands(
     Ok(view.iter().copied().collect())
 }
 
+impl SimulationBatch {
+    fn index(index: &Bound<'_, PyAny>, rovers: &[CoreSimulation]) -> PyResult<usize> {
+        let i = count(index, Kind::Option, "index")?;
+        if i < rovers.len() {
+            return Ok(i);
+        }
+        let len = rovers.len();
+        Err(refused(index, Kind::Option, "index", &format!("below {len}")).into())
+    }
+}
+
+/// A simulation of the border.
+fn simulation<'a, 'py>(
+    value: &'a Bound<'py, PyAny>,
+    field: &str,
+) -> PyResult<&'a Bound<'py, Simulation>> {
+    let cast = value.cast();
+    cast.map_err(|_| refused(value, Kind::Option, field, "a Simulation").into())
+}
+
 #[pymethods]
 impl SimulationBatch {
     #[new]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     #[pyo3(signature = (simulations, *, scan = None, threads = None))]
     fn new(
-        simulations: Vec<Py<Simulation>>,
+        simulations: &Bound<'_, PyAny>,
         scan: Option<&Bound<'_, PyAny>>,
-        threads: Option<usize>,
-        py: Python<'_>,
+        threads: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        if threads == Some(0) {
-            let message = "threads: must be at least 1, is 0".to_owned();
-            return Err(BorderError::option("threads", message, Value::Count(0)).into());
+        let field = "simulations";
+        let items: Vec<Bound<'_, PyAny>> = simulations
+            .extract()
+            .map_err(|_| refused(simulations, Kind::Option, field, "simulations"))?;
+        let (mut rovers, mut origins) = (Vec::new(), Vec::new());
+        for (i, item) in items.iter().enumerate() {
+            let one = simulation(item, &format!("{field}[{i}]"))?.get();
+            rovers.push(one.open()?.clone());
+            origins.push(one.origin().clone());
         }
-        let rovers: Vec<CoreSimulation> = simulations
-            .iter()
-            .map(|simulation| simulation.borrow(py).inner.clone())
-            .collect();
-        let origins = simulations
-            .iter()
-            .map(|simulation| simulation.borrow(py).origin.clone())
-            .collect();
+        let at_least_one = |given: &Bound<'_, PyAny>| -> PyResult<usize> {
+            let threads = count(given, Kind::Option, "threads")?;
+            if threads == 0 {
+                return Err(refused(given, Kind::Option, "threads", "at least 1").into());
+            }
+            Ok(threads)
+        };
+        let threads = threads.map(at_least_one).transpose()?;
         let inner = Batch::new(rovers, scan_points(scan)?, threads).map_err(BorderError::from)?;
-        Ok(Self { inner, origins })
+        Ok(Self(Shared::new(Inner { inner, origins })))
     }
 
     #[getter]
-    fn threads(&self) -> usize {
-        self.inner.threads()
+    fn threads(&self) -> PyResult<usize> {
+        Ok(self.0.open()?.inner.threads())
     }
 
     #[getter]
     fn reading_layout<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        slices(py, self.inner.layout())
+        slices(py, self.0.open()?.inner.layout())
     }
 
-    #[pyo3(signature = (torques, set_points, n = 1, *, active = None))]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
+    #[pyo3(signature = (torques, set_points, n = Given::MISSING, *, active = None),
+        text_signature = "($self, torques, set_points, n=1, *, active=None)")]
     fn step<'py>(
-        &mut self,
+        &self,
         py: Python<'py>,
         torques: &Bound<'_, PyAny>,
         set_points: &Bound<'_, PyAny>,
-        n: usize,
-        active: Option<PyReadonlyArray1<'_, bool>>,
+        n: Given<'_>,
+        active: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyDict>)> {
-        let n_rovers = self.inner.rovers().len();
-        let shape = [n_rovers, self.inner.rovers()[0].model().wheels().len()];
+        let mut held = self.0.open()?;
+        let inner = &mut held.inner;
+        let n_rovers = inner.rovers().len();
+        let shape = [n_rovers, inner.rovers()[0].model().wheels().len()];
         let torques = commands(torques, "torques", shape)?;
         let set_points = commands(set_points, "set_points", shape)?;
-        let active: Option<Vec<bool>> = active.map(|a| a.as_array().to_vec());
-        if let Some(active) = active.as_ref().filter(|active| active.len() != n_rovers) {
-            let message = format!("active: needs {n_rovers} entries, has {}", active.len());
-            return Err(BorderError::option("active", message, Value::Count(active.len())).into());
-        }
-        let rows = PyArray2::zeros(py, [n_rovers, self.inner.layout().size()], false);
+        let n = n.count(1, Kind::Option, "n")?;
+        let active = active.map(|given| mask(given, n_rovers)).transpose()?;
+        let rows = PyArray2::zeros(py, [n_rovers, inner.layout().size()], false);
         {
             let mut writable = rows.readwrite();
             let out = writable.as_slice_mut()?;
-            let inner = &mut self.inner;
-            py.detach(|| inner.step(&torques, &set_points, n, active.as_deref(), out))
-                .map_err(BorderError::from)?;
+            let mut watch = Watch::new();
+            let active = active.as_deref();
+            let done = py.detach(|| {
+                inner.step_while(&torques, &set_points, n, active, out, &mut || watch.go_on())
+            });
+            watch.result(done)?;
         }
         let errors = PyDict::new(py);
-        for (index, error) in self.inner.errors().iter().enumerate() {
+        for (index, error) in inner.errors().iter().enumerate() {
             if let Some(error) = error {
                 errors.set_item(index, error.to_string())?;
             }
@@ -116,45 +161,51 @@ impl SimulationBatch {
     }
 
     fn readings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let shape = [self.inner.rovers().len(), self.inner.layout().size()];
+        let held = self.0.open()?;
+        let shape = [held.inner.rovers().len(), held.inner.layout().size()];
         let rows = PyArray2::zeros(py, shape, false);
-        self.inner.read(rows.readwrite().as_slice_mut()?);
+        held.inner.read(rows.readwrite().as_slice_mut()?);
         Ok(rows)
     }
 
     #[pyo3(signature = (index, simulation, target = None))]
     fn replace(
-        &mut self,
-        index: usize,
-        simulation: &Simulation,
-        target: Option<[f64; 2]>,
+        &self,
+        index: &Bound<'_, PyAny>,
+        simulation: &Bound<'_, PyAny>,
+        target: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        self.inner
-            .replace(index, simulation.inner.clone(), place(target)?)
-            .map_err(BorderError::from)?;
-        self.origins[index] = simulation.origin.clone();
+        let one = self::simulation(simulation, "simulation")?.get();
+        let target = place(target)?;
+        let rover = one.open()?.clone();
+        let mut held = self.0.open()?;
+        let index = Self::index(index, held.inner.rovers())?;
+        let replaced = held.inner.replace(index, rover, target);
+        replaced.map_err(BorderError::from)?;
+        held.origins[index] = one.origin().clone();
         Ok(())
     }
 
     /// A copy of one rover, to look at.
-    fn simulation(&self, index: usize) -> PyResult<Simulation> {
-        let rovers = self.inner.rovers();
-        let Some(rover) = rovers.get(index) else {
-            let message = format!("index: must be below {}, is {index}", rovers.len());
-            return Err(BorderError::option("index", message, Value::Count(index)).into());
-        };
-        Ok(Simulation {
-            inner: rover.clone(),
-            origin: self.origins[index].clone(),
-        })
+    fn simulation(&self, index: &Bound<'_, PyAny>) -> PyResult<Simulation> {
+        let held = self.0.open()?;
+        let rovers = held.inner.rovers();
+        let index = Self::index(index, rovers)?;
+        Ok(Simulation::of(
+            rovers[index].clone(),
+            held.origins[index].clone(),
+        ))
     }
 
-    fn __len__(&self) -> usize {
-        self.inner.rovers().len()
+    fn __len__(&self) -> PyResult<usize> {
+        Ok(self.0.open()?.inner.rovers().len())
     }
 
     fn __repr__(&self) -> String {
-        let (n, threads) = (self.inner.rovers().len(), self.inner.threads());
+        let Ok(held) = self.0.open() else {
+            return "SimulationBatch(stepping)".to_owned();
+        };
+        let (n, threads) = (held.inner.rovers().len(), held.inner.threads());
         format!("SimulationBatch({n} rovers, {threads} threads)")
     }
 }

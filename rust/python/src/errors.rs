@@ -10,6 +10,9 @@ use rover_core::multibody::{ModelError, StateError};
 use rover_core::problem::ProblemError;
 use rover_core::simulation::{BatchError, CommandError, SnapshotError};
 
+/// Characters of an exception's message.
+const LONGEST_MESSAGE: usize = 1000;
+
 /// Which exception.
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {
@@ -20,6 +23,7 @@ pub enum Kind {
     Command,
     Problem,
     Step,
+    Busy,
 }
 
 /// What was given where something else was needed.
@@ -30,6 +34,7 @@ pub enum Value {
     Numbers(Vec<f64>),
     Count(usize),
     Text(String),
+    Object(Py<PyAny>),
 }
 
 /// An error on its way to Python. A newtype, since neither crate owns both `ModelError` and `PyErr`.
@@ -49,6 +54,7 @@ struct Classes {
     command: Py<PyType>,
     problem: Py<PyType>,
     step: Py<PyType>,
+    busy: Py<PyType>,
 }
 
 static CLASSES: PyOnceLock<Classes> = PyOnceLock::new();
@@ -113,6 +119,11 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
             PyTuple::new(py, [root.clone(), py.get_type::<PyRuntimeError>()])?,
             "A time step could not be taken; the state is as it was before the call's failing step.",
         )?,
+        busy: make(
+            "BusyError",
+            PyTuple::new(py, [root.clone(), py.get_type::<PyRuntimeError>()])?,
+            "An object was used while another call on it was still going on; nothing has changed.",
+        )?,
     };
     let _ = CLASSES.set(py, classes);
     Ok(())
@@ -132,9 +143,10 @@ impl From<BorderError> for PyErr {
                 Kind::Command => &classes.command,
                 Kind::Problem => &classes.problem,
                 Kind::Step => &classes.step,
+                Kind::Busy => &classes.busy,
             };
             let raise = || -> PyResult<PyErr> {
-                let instance = class.bind(py).call1((error.message,))?;
+                let instance = class.bind(py).call1((shortened(error.message),))?;
                 instance.setattr("field", error.field)?;
                 match error.value {
                     Value::Nothing => instance.setattr("value", py.None())?,
@@ -142,12 +154,22 @@ impl From<BorderError> for PyErr {
                     Value::Numbers(x) => instance.setattr("value", x)?,
                     Value::Count(x) => instance.setattr("value", x)?,
                     Value::Text(x) => instance.setattr("value", x)?,
+                    Value::Object(x) => instance.setattr("value", x)?,
                 }
                 Ok(PyErr::from_value(instance))
             };
             raise().unwrap_or_else(|e| e)
         })
     }
+}
+
+/// A message that may hold a long text that was given.
+fn shortened(message: String) -> String {
+    if message.chars().count() <= LONGEST_MESSAGE {
+        return message;
+    }
+    let start = message.chars().take(LONGEST_MESSAGE);
+    start.chain("…".chars()).collect()
 }
 
 impl BorderError {
@@ -173,11 +195,15 @@ impl From<ModelError> for BorderError {
             ModelError::DuplicateName { name, .. }
             | ModelError::UnknownParent { name, .. }
             | ModelError::UnknownName { name, .. }
+            | ModelError::NotADisc { solid: name, .. }
             | ModelError::SteeringNotAbove { name, .. } => Value::Text(name.clone()),
             ModelError::NotFinite { value, .. }
             | ModelError::NotPositive { value, .. }
             | ModelError::Negative { value, .. }
+            | ModelError::OutOfRange { value, .. }
+            | ModelError::RadiusContradictsShape { value, .. }
             | ModelError::NotASign { value, .. } => Value::Number(*value),
+            ModelError::TooMany { count, .. } => Value::Count(*count),
             ModelError::NoDirection { value, .. } => Value::Numbers(value.to_vec()),
             ModelError::ImpossibleInertia { principal, .. } => Value::Numbers(principal.to_vec()),
         };

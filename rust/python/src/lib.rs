@@ -2,10 +2,12 @@
 #![forbid(unsafe_code)]
 
 mod accuracy;
+mod arguments;
 mod arrays;
 mod batch;
 mod contacts;
 mod errors;
+mod files;
 mod friction_contact;
 mod model;
 mod planar;
@@ -13,6 +15,7 @@ mod planar_ground;
 mod planar_soil;
 mod plane;
 mod reading;
+mod shared;
 mod simulation;
 mod snapshot;
 mod sphere_field;

@@ -1,7 +1,6 @@
 //! `RoverModel`: what the report had Maple generate, from data.
 
-use std::collections::HashMap;
-use std::path::PathBuf;
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyArray3};
@@ -10,13 +9,15 @@ use pyo3::types::{PyDict, PyMapping};
 use rover_core::contact::{Contact, detection::wheel_contacts};
 use rover_core::multibody::bias::BiasScratch;
 use rover_core::multibody::{
-    Configuration, Kinematics, MassMatrix, Model, ModelDescription, ModelError, bias, coordinates,
-    momentum,
+    Configuration, Kinematics, MassMatrix, Model, ModelDescription, ModelError, SolidDescription,
+    bias, coordinates, description::MAX_TEXT, momentum,
 };
 use rover_core::nalgebra::{DMatrix, DVector, Vector3};
 
+use crate::arguments::{self, Given, number};
 use crate::arrays::{fresh, fresh_blocks, fresh_matrix, fresh_rows, triple, vector};
 use crate::errors::{BorderError, Kind, Value};
+use crate::files::{self, in_file, read_text, write_text};
 use crate::sphere_field::Ground;
 
 /// A pair of fresh vectors.
@@ -51,6 +52,15 @@ impl Coordinates {
         }
     }
 
+    /// Those that a caller named; the state's by default, everywhere.
+    pub fn given(name: Given<'_>) -> PyResult<Self> {
+        Ok(Self::parse(&name.text(
+            "state",
+            Kind::Option,
+            "coordinates",
+        )?)?)
+    }
+
     pub fn configuration(self, model: &Model, q: &[f64]) -> Result<Configuration, BorderError> {
         Ok(match self {
             Self::Report => coordinates::from_report(model, q)?,
@@ -76,9 +86,9 @@ impl RoverModel {
     fn placed(
         &self,
         q: &Bound<'_, PyAny>,
-        coordinates: &str,
+        coordinates: Given<'_>,
     ) -> PyResult<(Vec<f64>, Coordinates, Kinematics)> {
-        let kind = Coordinates::parse(coordinates)?;
+        let kind = Coordinates::given(coordinates)?;
         let q = vector(q, Kind::State, "q")?;
         let configuration = kind.configuration(&self.inner, &q)?;
         Ok((q, kind, Kinematics::of(&self.inner, &configuration)))
@@ -88,7 +98,7 @@ impl RoverModel {
         &self,
         q: &Bound<'_, PyAny>,
         terrain: &Bound<'_, PyAny>,
-        coordinates: &str,
+        coordinates: Given<'_>,
     ) -> PyResult<(Vec<f64>, Coordinates, Kinematics, Vec<Contact>)> {
         let (q, kind, kinematics) = self.placed(q, coordinates)?;
         let contacts = wheel_contacts(
@@ -99,10 +109,8 @@ impl RoverModel {
         Ok((q, kind, kinematics, contacts))
     }
 
-    fn rover_from_json(text: &str, locked: &[(String, f64)]) -> PyResult<Self> {
-        let description = ModelDescription::from_json(text).map_err(BorderError::from)?;
-        let model = Model::from_description(description).and_then(|m| m.with_locked_joints(locked));
-        Self::wrap(model)
+    fn from_json(text: &str) -> PyResult<Self> {
+        Self::wrap(ModelDescription::from_json(text).and_then(Model::from_description))
     }
 }
 
@@ -161,35 +169,23 @@ impl RoverModel {
         }
     }
 
-    /// Reads a model file (TOML). Raises ModelError, or OSError where there is no such file.
+    /// Reads a model file (TOML). Raises ModelError, or OSError where there is no such file; both name the path.
     #[staticmethod]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
-    fn from_file(path: PathBuf) -> PyResult<Self> {
-        let bytes = std::fs::read(&path)?;
-        let unreadable = || {
-            let message = format!(
-                "the model description cannot be read: {} is not UTF-8 text",
-                path.display()
-            );
-            let (field, value) = (
-                Some("text".to_owned()),
-                Value::Text(path.display().to_string()),
-            );
-            BorderError {
-                kind: Kind::Model,
-                message,
-                field,
-                value,
-            }
-        };
-        let text = String::from_utf8(bytes).map_err(|_| unreadable())?;
-        Self::from_text(&text)
+    fn from_file(path: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let py = path.py();
+        let path = files::path(path, Kind::Model)?;
+        let text = read_text(py, &path, Kind::Model, MAX_TEXT)?;
+        let model = ModelDescription::from_toml(&text).and_then(Model::from_description);
+        Ok(Self {
+            inner: Arc::new(model.map_err(|e| in_file(e.into(), &path))?),
+        })
     }
 
     /// Reads a model from TOML text.
     #[staticmethod]
-    fn from_text(text: &str) -> PyResult<Self> {
-        Self::wrap(ModelDescription::from_toml(text).and_then(Model::from_description))
+    fn from_text(text: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let text = arguments::text(text, Kind::Model, "text")?;
+        Self::wrap(ModelDescription::from_toml(&text).and_then(Model::from_description))
     }
 
     /// Reads a model from nested dictionaries and lists, as `to_dict` gives them.
@@ -212,12 +208,13 @@ impl RoverModel {
             .call_method("dumps", (description,), Some(&options))
             .map_err(|e| refuse(&e))?
             .extract()?;
-        Self::rover_from_json(&text, &[])
+        Self::from_json(&text)
     }
 
-    /// Writes a model file (TOML). Locked joints are not part of a description.
-    fn to_file(&self, path: PathBuf) -> PyResult<()> {
-        Ok(std::fs::write(path, self.to_text()?)?)
+    /// Writes a model file (TOML), locked joints and all.
+    fn to_file(&self, path: &Bound<'_, PyAny>) -> PyResult<()> {
+        let py = path.py();
+        write_text(py, &files::path(path, Kind::Model)?, &self.to_text()?)
     }
 
     /// The description as TOML text.
@@ -240,92 +237,74 @@ impl RoverModel {
     }
 
     /// The same machine with some of its data changed.
-    #[pyo3(signature = (*, wheel_radius = None, masses = None, steering_stiffness = None, steering_damping = None, wheel_torque_limit = None, mass_scale = None))]
+    #[pyo3(signature = (*, wheel_radius = None, contact_radius = None, masses = None, steering_stiffness = None, steering_damping = None,
+        wheel_torque_limit = None, mass_scale = None))]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python method
     fn replace(
         &self,
-        wheel_radius: Option<f64>,
+        wheel_radius: Option<&Bound<'_, PyAny>>,
+        contact_radius: Option<&Bound<'_, PyAny>>,
         masses: Option<&Bound<'_, PyAny>>,
-        steering_stiffness: Option<f64>,
-        steering_damping: Option<f64>,
-        wheel_torque_limit: Option<f64>,
-        mass_scale: Option<f64>,
+        steering_stiffness: Option<&Bound<'_, PyAny>>,
+        steering_damping: Option<&Bound<'_, PyAny>>,
+        wheel_torque_limit: Option<&Bound<'_, PyAny>>,
+        mass_scale: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let read = |given: Option<&Bound<'_, PyAny>>, field| {
+            given.map(|x| number(x, Kind::Model, field)).transpose()
+        };
         let mut description = self.inner.description().clone();
-        for wheel in &mut description.wheels {
-            wheel.radius = wheel_radius.unwrap_or(wheel.radius);
-            wheel.torque_limit = wheel_torque_limit.unwrap_or(wheel.torque_limit);
+        if let Some(limit) = read(wheel_torque_limit, "wheel_torque_limit")? {
+            for wheel in &mut description.wheels {
+                wheel.torque_limit = limit;
+            }
         }
         if let Some(masses) = masses {
-            if masses.cast::<PyMapping>().is_ok() {
-                for (name, mass) in masses.extract::<HashMap<String, f64>>()? {
-                    let Some(solid) = description.solids.iter_mut().find(|s| s.name == name) else {
-                        return Err(BorderError::from(ModelError::UnknownName {
-                            field: "masses".to_owned(),
-                            name,
-                        })
-                        .into());
-                    };
-                    solid.mass = mass;
-                }
-            } else {
-                let masses = vector(masses, Kind::Model, "masses")?;
-                if masses.len() != description.solids.len() {
-                    let message = format!(
-                        "masses: needs {} entries, has {}",
-                        description.solids.len(),
-                        masses.len()
-                    );
-                    let (field, value) = (Some("masses".to_owned()), Value::Count(masses.len()));
-                    return Err(BorderError {
-                        kind: Kind::Model,
-                        message,
-                        field,
-                        value,
-                    }
-                    .into());
-                }
-                for (solid, mass) in description.solids.iter_mut().zip(masses) {
-                    solid.mass = mass;
-                }
-            }
+            replace_masses(&mut description, masses)?;
         }
-        if let Some(scale) = mass_scale {
+        if let Some(scale) = read(mass_scale, "mass_scale")? {
             for solid in &mut description.solids {
-                solid.mass *= scale;
-                for entry in solid.inertia.iter_mut().flatten() {
-                    *entry *= scale;
-                }
+                set_mass(solid, solid.mass * scale);
             }
         }
-        let steering: Vec<String> = description
+        let stiffness = read(steering_stiffness, "steering_stiffness")?;
+        let damping = read(steering_damping, "steering_damping")?;
+        let steering: HashSet<String> = description
             .wheels
             .iter()
             .filter_map(|w| w.steering.clone())
             .collect();
         for solid in &mut description.solids {
             if let (Some(hold), true) = (&mut solid.hold, steering.contains(&solid.name)) {
-                hold.stiffness = steering_stiffness.unwrap_or(hold.stiffness);
-                hold.damping = steering_damping.unwrap_or(hold.damping);
+                hold.stiffness = stiffness.unwrap_or(hold.stiffness);
+                hold.damping = damping.unwrap_or(hold.damping);
             }
         }
-        let locked = self.inner.locked_joints();
-        Self::wrap(Model::from_description(description).and_then(|m| m.with_locked_joints(locked)))
+        let mut model = Model::from_description(description).map_err(BorderError::from)?;
+        if let Some(radius) = read(wheel_radius, "wheel_radius")? {
+            model = model.with_wheel_radius(radius).map_err(BorderError::from)?;
+        }
+        if let Some(radius) = read(contact_radius, "contact_radius")? {
+            model = model
+                .with_contact_radius(radius)
+                .map_err(BorderError::from)?;
+        }
+        Self::wrap(Ok(model))
     }
 
     /// The same machine with joints locked (at 0, or at the given angles in rad): their coordinates are gone.
     fn weld(&self, joints: &Bound<'_, PyAny>) -> PyResult<Self> {
         let joints: Vec<(String, f64)> = if let Ok(map) = joints.cast::<PyMapping>() {
-            map.items()?
-                .iter()
-                .map(|item| item.extract())
-                .collect::<PyResult<_>>()?
+            let angle = |item: Bound<'_, PyAny>| -> PyResult<(String, f64)> {
+                let (name, angle): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
+                let name = arguments::text(&name, Kind::Model, "joints")?;
+                let angle = number(&angle, Kind::Model, &format!("joints[{name}]"))?;
+                Ok((name, angle))
+            };
+            map.items()?.iter().map(angle).collect::<PyResult<_>>()?
         } else {
-            joints
-                .extract::<Vec<String>>()?
-                .into_iter()
-                .map(|name| (name, 0.0))
-                .collect()
+            let names = arguments::texts(joints, Kind::Model, "joints")?;
+            names.into_iter().map(|name| (name, 0.0)).collect()
         };
         Self::wrap(self.inner.with_locked_joints(&joints))
     }
@@ -414,12 +393,12 @@ impl RoverModel {
     }
 
     /// M(q), (nv, nv). Source: Featherstone 2008, ch. 6.
-    #[pyo3(signature = (q, coordinates = "report"))]
+    #[pyo3(signature = (q, coordinates = Given::MISSING), text_signature = "($self, q, coordinates='state')")]
     fn mass_matrix<'py>(
         &self,
         py: Python<'py>,
         q: &Bound<'_, PyAny>,
-        coordinates: &str,
+        coordinates: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (q, kind, kinematics) = self.placed(q, coordinates)?;
         let dense = dense_mass_matrix(&self.inner, &kinematics);
@@ -433,14 +412,14 @@ impl RoverModel {
     }
 
     /// N(q, v) v + G(q), (nv,): M q̈ + bias = generalized forces.
-    #[pyo3(signature = (q, qdot, gravity = None, coordinates = "report"))]
+    #[pyo3(signature = (q, qdot, gravity = None, coordinates = Given::MISSING), text_signature = "($self, q, qdot, gravity=None, coordinates='state')")]
     fn bias<'py>(
         &self,
         py: Python<'py>,
         q: &Bound<'_, PyAny>,
         qdot: &Bound<'_, PyAny>,
         gravity: Option<&Bound<'_, PyAny>>,
-        coordinates: &str,
+        coordinates: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (q, kind, kinematics) = self.placed(q, coordinates)?;
         let qdot = vector(qdot, Kind::State, "qdot")?;
@@ -481,12 +460,12 @@ impl RoverModel {
     }
 
     /// ½ vᵀ M v, J.
-    #[pyo3(signature = (q, qdot, coordinates = "report"))]
+    #[pyo3(signature = (q, qdot, coordinates = Given::MISSING), text_signature = "($self, q, qdot, coordinates='state')")]
     fn kinetic_energy(
         &self,
         q: &Bound<'_, PyAny>,
         qdot: &Bound<'_, PyAny>,
-        coordinates: &str,
+        coordinates: Given<'_>,
     ) -> PyResult<f64> {
         let (q, kind, kinematics) = self.placed(q, coordinates)?;
         let v = kind.velocity(&self.inner, &q, &vector(qdot, Kind::State, "qdot")?)?;
@@ -494,48 +473,48 @@ impl RoverModel {
     }
 
     /// {name: (3,)}: origins of the solids and the model's tags (m), unit axles `axle_FL`, ..., and `centre_of_mass`, world.
-    #[pyo3(signature = (q, coordinates = "report"))]
+    #[pyo3(signature = (q, coordinates = Given::MISSING), text_signature = "($self, q, coordinates='state')")]
     fn tags<'py>(
         &self,
         py: Python<'py>,
         q: &Bound<'_, PyAny>,
-        coordinates: &str,
+        coordinates: Given<'py>,
     ) -> PyResult<Bound<'py, PyDict>> {
         tags(py, &self.inner, &self.placed(q, coordinates)?.2)
     }
 
     /// {name: ((3,), (3, 3))}: origin and rotation matrix of every solid, world.
-    #[pyo3(signature = (q, coordinates = "report"))]
+    #[pyo3(signature = (q, coordinates = Given::MISSING), text_signature = "($self, q, coordinates='state')")]
     fn poses<'py>(
         &self,
         py: Python<'py>,
         q: &Bound<'_, PyAny>,
-        coordinates: &str,
+        coordinates: Given<'py>,
     ) -> PyResult<Bound<'py, PyDict>> {
         poses(py, &self.inner, &self.placed(q, coordinates)?.2)
     }
 
     /// (n_wheels,) m, positive when apart.
-    #[pyo3(signature = (q, terrain, coordinates = "report"))]
+    #[pyo3(signature = (q, terrain, coordinates = Given::MISSING), text_signature = "($self, q, terrain, coordinates='state')")]
     fn wheel_gaps<'py>(
         &self,
         py: Python<'py>,
         q: &Bound<'_, PyAny>,
         terrain: &Bound<'_, PyAny>,
-        coordinates: &str,
+        coordinates: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let contacts = self.contacts(q, terrain, coordinates)?.3;
         Ok(PyArray1::from_iter(py, contacts.iter().map(|c| c.gap)))
     }
 
     /// (n_wheels, 3) m: the rim point nearest to the terrain, world.
-    #[pyo3(signature = (q, terrain, coordinates = "report"))]
+    #[pyo3(signature = (q, terrain, coordinates = Given::MISSING), text_signature = "($self, q, terrain, coordinates='state')")]
     fn wheel_contact_points<'py>(
         &self,
         py: Python<'py>,
         q: &Bound<'_, PyAny>,
         terrain: &Bound<'_, PyAny>,
-        coordinates: &str,
+        coordinates: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (_, _, kinematics, contacts) = self.contacts(q, terrain, coordinates)?;
         let rows: Vec<[f64; 3]> = contacts
@@ -546,13 +525,13 @@ impl RoverModel {
     }
 
     /// (n_wheels, 3, nv): rows n, t, b of the contact point's velocity per unit of each velocity.
-    #[pyo3(signature = (q, terrain, coordinates = "report"))]
+    #[pyo3(signature = (q, terrain, coordinates = Given::MISSING), text_signature = "($self, q, terrain, coordinates='state')")]
     fn wheel_jacobians<'py>(
         &self,
         py: Python<'py>,
         q: &Bound<'_, PyAny>,
         terrain: &Bound<'_, PyAny>,
-        coordinates: &str,
+        coordinates: Given<'py>,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let (q, kind, kinematics, contacts) = self.contacts(q, terrain, coordinates)?;
         let nv = self.inner.nv();
@@ -619,11 +598,9 @@ impl RoverModel {
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|o| {
-            let o = &o.get().inner;
-            o.description() == self.inner.description()
-                && o.locked_joints() == self.inner.locked_joints()
-        })
+        other
+            .cast::<Self>()
+            .is_ok_and(|o| o.get().inner.description() == self.inner.description())
     }
 
     fn __hash__(&self) -> PyResult<u64> {
@@ -638,22 +615,60 @@ impl RoverModel {
     }
 
     #[staticmethod]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
-    fn _restore(text: &str, locked: Vec<(String, f64)>) -> PyResult<Self> {
-        Self::rover_from_json(text, &locked)
+    fn _restore(text: &str) -> PyResult<Self> {
+        Self::from_json(text)
     }
 
-    #[allow(clippy::type_complexity)]
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, (String, Vec<(String, f64)>))> {
-        let model = &slf.get().inner;
-        let text = model.description().to_json().map_err(BorderError::from)?;
-        Ok((
-            slf.get_type().getattr("_restore")?,
-            (text, model.locked_joints().to_vec()),
-        ))
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        let description = slf.get().inner.description();
+        let text = description.to_json().map_err(BorderError::from)?;
+        Ok((slf.get_type().getattr("_restore")?, (text,)))
     }
+}
+
+/// Changes a mass; an inertia that the description states goes with it.
+fn set_mass(solid: &mut SolidDescription, mass: f64) {
+    let scale = mass / solid.mass;
+    for entry in solid.inertia.iter_mut().flatten() {
+        *entry *= scale;
+    }
+    solid.mass = mass;
+}
+
+/// Masses by name, or one for each solid.
+fn replace_masses(description: &mut ModelDescription, masses: &Bound<'_, PyAny>) -> PyResult<()> {
+    if let Ok(map) = masses.cast::<PyMapping>() {
+        for item in map.items()?.iter() {
+            let (name, mass): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
+            let name = arguments::text(&name, Kind::Model, "masses")?;
+            let mass = number(&mass, Kind::Model, &format!("masses[{name}]"))?;
+            let Some(solid) = description.solids.iter_mut().find(|s| s.name == name) else {
+                let field = "masses".to_owned();
+                return Err(BorderError::from(ModelError::UnknownName { field, name }).into());
+            };
+            set_mass(solid, mass);
+        }
+        return Ok(());
+    }
+    let values = vector(masses, Kind::Model, "masses")?;
+    if values.len() != description.solids.len() {
+        let message = format!(
+            "masses: needs {} entries, has {}",
+            description.solids.len(),
+            values.len()
+        );
+        return Err(BorderError {
+            kind: Kind::Model,
+            message,
+            field: Some("masses".to_owned()),
+            value: Value::Count(values.len()),
+        }
+        .into());
+    }
+    for (solid, mass) in description.solids.iter_mut().zip(values) {
+        set_mass(solid, mass);
+    }
+    Ok(())
 }
 
 fn signed(index: Option<usize>) -> i64 {

@@ -11,17 +11,17 @@ use rover_core::planar::{
     PlanarSimulation as Core, PlanarSnapshot as CoreSnapshot, PlanarWheel, TwoWheelRover,
 };
 use rover_core::simulation::{CommandError, SnapshotError};
-use std::sync::Arc;
+use std::sync::{Arc, MutexGuard};
 
+use crate::arguments::{Given, count, flag, number, text};
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
 use crate::model::RoverModel;
 use crate::planar_ground::{border, parse};
-use crate::simulation::{
-    Energy, Problem, STABILISATIONS, StepReport, VARIANTS, choice, name_of, step_count,
-};
-use crate::snapshot::damaged;
+use crate::shared::{Shared, Watch};
+use crate::simulation::{Energy, Problem, STABILISATIONS, StepReport, VARIANTS, choice, name_of};
+use crate::snapshot::{belonging, damaged, read};
 
 const RULES: [(&str, ContactRule); 2] = [
     ("nearest", ContactRule::Nearest),
@@ -44,7 +44,11 @@ trait Run: Send + Sync {
     fn last_problem(&self) -> (&[f64], &[f64], &[f64]);
     fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), StateError>;
     fn set_inputs(&mut self, inputs: &[f64]) -> Result<(), CommandError>;
-    fn step(&mut self, n: usize) -> Result<CoreReport, StepError>;
+    fn step_while(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<CoreReport, StepError>;
     fn snapshot(&self) -> CoreSnapshot;
     fn restore(&mut self, snapshot: &CoreSnapshot) -> Result<(), SnapshotError>;
 }
@@ -95,8 +99,12 @@ impl<const NV: usize, M: PlanarMachine<NV>> Run for Core<NV, M> {
     fn set_inputs(&mut self, inputs: &[f64]) -> Result<(), CommandError> {
         self.set_inputs(inputs)
     }
-    fn step(&mut self, n: usize) -> Result<CoreReport, StepError> {
-        self.step(n)
+    fn step_while(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<CoreReport, StepError> {
+        self.step_while(n, go_on)
     }
     fn snapshot(&self) -> CoreSnapshot {
         self.snapshot()
@@ -115,10 +123,8 @@ pub struct PlanarSnapshot {
 #[pymethods]
 impl PlanarSnapshot {
     #[staticmethod]
-    fn from_bytes(data: &[u8]) -> PyResult<Self> {
-        Ok(Self {
-            inner: postcard::from_bytes(data).map_err(|e| damaged(&e))?,
-        })
+    fn from_bytes(data: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Ok(Self { inner: read(data)? })
     }
 
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
@@ -208,9 +214,9 @@ impl PlanarContacts {
 }
 
 /// A planar machine on a ground, stepped through time by the rover's own schemes.
-#[pyclass(module = "rover_gym._core", subclass)]
+#[pyclass(module = "rover_gym._core", subclass, frozen)]
 pub struct PlanarSimulation {
-    inner: Box<dyn Run>,
+    inner: Shared<Box<dyn Run>>,
     ground: Py<PyAny>,
     parameters: Py<PyDict>,
     solver: String,
@@ -232,26 +238,23 @@ fn options(given: Option<&Bound<'_, PyDict>>) -> PyResult<Options> {
     let (mut solver, mut tolerance, mut max_iterations) = ("auto".to_owned(), 1e-12, 1000_usize);
     for (key, value) in given.into_iter().flatten() {
         let key: String = key.extract()?;
-        match key.as_str() {
-            "gravity" => step.gravity = pair(&value, Kind::Option, "gravity")?.push(0.0),
-            "friction" => step.friction_coefficient = value.extract()?,
-            "restitution" => step.restitution = value.extract()?,
-            "time_step" => step.time_step = value.extract()?,
-            "variant" => step.variant = choice("variant", &value.extract::<String>()?, &VARIANTS)?,
-            "theta" => step.theta = value.extract()?,
-            "forecast" => step.forecast = value.extract()?,
-            "stabilisation" => {
-                step.stabilisation = choice(
-                    "stabilisation",
-                    &value.extract::<String>()?,
-                    &STABILISATIONS,
-                )?;
-            }
-            "warm_start" => step.warm_start = value.extract()?,
-            "contact" => rule = choice("contact", &value.extract::<String>()?, &RULES)?,
-            "solver" => solver = value.extract()?,
-            "tolerance" => tolerance = value.extract()?,
-            "max_iterations" => max_iterations = value.extract()?,
+        let field = key.as_str();
+        let number = || number(&value, Kind::Option, field);
+        let text = || text(&value, Kind::Option, field);
+        match field {
+            "gravity" => step.gravity = pair(&value, Kind::Option, field)?.push(0.0),
+            "friction" => step.friction_coefficient = number()?,
+            "restitution" => step.restitution = number()?,
+            "time_step" => step.time_step = number()?,
+            "variant" => step.variant = choice(field, &text()?, &VARIANTS)?,
+            "theta" => step.theta = number()?,
+            "forecast" => step.forecast = number()?,
+            "stabilisation" => step.stabilisation = choice(field, &text()?, &STABILISATIONS)?,
+            "warm_start" => step.warm_start = flag(&value, Kind::Option, field)?,
+            "contact" => rule = choice(field, &text()?, &RULES)?,
+            "solver" => solver = text()?,
+            "tolerance" => tolerance = number()?,
+            "max_iterations" => max_iterations = count(&value, Kind::Option, field)?,
             _ => {
                 let message = format!("{key}: is no option of a planar simulation");
                 return Err(pyo3::exceptions::PyTypeError::new_err(message));
@@ -283,6 +286,10 @@ pub fn pair(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vecto
 }
 
 impl PlanarSimulation {
+    fn open(&self) -> Result<MutexGuard<'_, Box<dyn Run>>, BorderError> {
+        self.inner.open()
+    }
+
     fn build<const NV: usize, M: PlanarMachine<NV> + 'static>(
         machine: M,
         ground: &Bound<'_, PyAny>,
@@ -294,7 +301,7 @@ impl PlanarSimulation {
         let inner =
             Core::new(machine, terrain, options.rule, options.step).map_err(BorderError::from)?;
         Ok(Self {
-            inner: Box::new(inner),
+            inner: Shared::new(Box::new(inner)),
             ground: ground.clone().unbind(),
             parameters: parameters.unbind(),
             solver: options.solver,
@@ -311,39 +318,46 @@ impl PlanarSimulation {
     }
 
     #[getter]
-    fn time(&self) -> f64 {
-        self.inner.time()
+    fn time(&self) -> PyResult<f64> {
+        let inner = self.open()?;
+        Ok(inner.time())
     }
 
     #[getter]
-    fn time_step(&self) -> f64 {
-        self.inner.options().time_step
+    fn time_step(&self) -> PyResult<f64> {
+        let inner = self.open()?;
+        Ok(inner.options().time_step)
     }
 
     #[getter]
-    fn q<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.q())
+    fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, inner.q()))
     }
 
     #[getter]
-    fn v<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.v())
+    fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, inner.v()))
     }
 
     /// Centres of the discs that touch the ground.
     #[getter]
     fn centres<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        fresh_rows(py, &self.inner.centres())
+        let inner = self.open()?;
+        fresh_rows(py, &inner.centres())
     }
 
     #[getter]
-    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, &self.inner.gaps())
+    fn gaps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, &inner.gaps()))
     }
 
     #[getter]
-    fn torques<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.inputs())
+    fn torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, inner.inputs()))
     }
 
     /// The keyword arguments that describe the machine.
@@ -355,7 +369,8 @@ impl PlanarSimulation {
     /// The keyword arguments that make a simulation with these options.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let o = self.inner.options();
+        let inner = self.open()?;
+        let o = inner.options();
         let settings = PyDict::new(py);
         settings.set_item("gravity", (o.gravity.x, o.gravity.y))?;
         settings.set_item("friction", o.friction_coefficient)?;
@@ -369,81 +384,92 @@ impl PlanarSimulation {
         settings.set_item("max_iterations", self.max_iterations)?;
         settings.set_item("stabilisation", name_of(o.stabilisation, &STABILISATIONS))?;
         settings.set_item("warm_start", o.warm_start)?;
-        settings.set_item("contact", name_of(self.inner.rule(), &RULES))?;
+        settings.set_item("contact", name_of(inner.rule(), &RULES))?;
         Ok(settings)
     }
 
     #[pyo3(signature = (q, v = None))]
-    fn set_state(&mut self, q: &Bound<'_, PyAny>, v: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+    fn set_state(&self, q: &Bound<'_, PyAny>, v: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let mut inner = self.open()?;
         let q = vector(q, Kind::State, "q")?;
-        let rest = || Ok(vec![0.0; self.inner.v().len()]);
+        let rest = || Ok(vec![0.0; inner.v().len()]);
         let v = v.map_or_else(rest, |v| vector(v, Kind::State, "v"))?;
-        Ok(self.inner.set_state(&q, &v).map_err(BorderError::from)?)
+        Ok(inner.set_state(&q, &v).map_err(BorderError::from)?)
     }
 
-    fn set_torques(&mut self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut inner = self.open()?;
         let torques = vector(torques, Kind::Command, "torques")?;
-        Ok(self.inner.set_inputs(&torques).map_err(BorderError::from)?)
+        Ok(inner.set_inputs(&torques).map_err(BorderError::from)?)
     }
 
-    #[pyo3(signature = (n = 1))]
-    fn step(&mut self, py: Python<'_>, n: i64) -> PyResult<StepReport> {
-        let steps = step_count(n)?;
-        let inner = &mut self.inner;
-        let report = py.detach(|| inner.step(steps)).map_err(BorderError::from)?;
-        Ok(report.into())
+    #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
+    fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
+        let steps = n.count(1, Kind::Option, "n")?;
+        let mut held = self.open()?;
+        let (inner, mut watch) = (&mut *held, Watch::new());
+        let report = py.detach(|| inner.step_while(steps, &mut || watch.go_on()));
+        Ok(watch.result(report)?.into())
     }
 
     #[getter]
-    fn contacts(&self) -> PlanarContacts {
-        PlanarContacts {
-            active: self.inner.contacts().to_vec(),
-        }
+    fn contacts(&self) -> PyResult<PlanarContacts> {
+        let inner = self.open()?;
+        Ok(PlanarContacts {
+            active: inner.contacts().to_vec(),
+        })
     }
 
-    fn energy(&self) -> Energy {
-        self.inner.energy().into()
+    fn energy(&self) -> PyResult<Energy> {
+        let inner = self.open()?;
+        Ok(inner.energy().into())
     }
 
     fn mass_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        fresh_matrix(py, &self.inner.mass_matrix())
+        let inner = self.open()?;
+        fresh_matrix(py, &inner.mass_matrix())
     }
 
     /// W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem.
     fn last_problem<'py>(&self, py: Python<'py>) -> PyResult<Problem<'py>> {
-        let (W, q, mu) = self.inner.last_problem();
+        let inner = self.open()?;
+        let (W, q, mu) = inner.last_problem();
         let size = 2 * mu.len();
         let q = if size == 0 { &q[..0] } else { q };
         let W = DMatrix::from_row_slice(size, size, &W[..size * size]);
         Ok((fresh_matrix(py, &W)?, fresh(py, q), fresh(py, mu)))
     }
 
-    fn snapshot(&self) -> PlanarSnapshot {
-        PlanarSnapshot {
-            inner: self.inner.snapshot(),
-        }
+    fn snapshot(&self) -> PyResult<PlanarSnapshot> {
+        let inner = self.open()?;
+        Ok(PlanarSnapshot {
+            inner: inner.snapshot(),
+        })
     }
 
-    fn restore(&mut self, snapshot: &PlanarSnapshot) -> PyResult<()> {
-        Ok(self
-            .inner
-            .restore(&snapshot.inner)
-            .map_err(BorderError::from)?)
+    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut inner = self.open()?;
+        let snapshot = belonging::<PlanarSnapshot>(snapshot, "a PlanarSnapshot")?;
+        let restored = inner.restore(&snapshot.get().inner);
+        Ok(restored.map_err(BorderError::from)?)
     }
 
     fn __repr__(slf: &Bound<'_, Self>) -> PyResult<String> {
-        let own = slf.borrow();
+        let own = slf.get();
         let (kind, ground) = (slf.get_type().name()?, own.ground.bind(slf.py()).repr()?);
-        Ok(format!("{kind}({ground}, time={})", own.time()))
+        Ok(match own.time() {
+            Ok(time) => format!("{kind}({ground}, time={time})"),
+            Err(_) => format!("{kind}({ground}, stepping)"),
+        })
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let py = slf.py();
-        let own = slf.borrow();
+        let own = slf.get();
         let settings = own.settings(py)?;
         settings.update(own.parameters.bind(py).as_mapping())?;
         let rebuild = slf.get_type().getattr("_rebuild")?;
-        let arguments = (slf.get_type(), own.ground(py), settings, own.snapshot());
+        let arguments = (slf.get_type(), own.ground(py), settings, own.snapshot()?);
         (rebuild, arguments).into_pyobject(py)
     }
 
@@ -452,29 +478,33 @@ impl PlanarSimulation {
         kind: &Bound<'py, PyAny>,
         ground: &Bound<'py, PyAny>,
         settings: &Bound<'py, PyDict>,
-        snapshot: &PlanarSnapshot,
+        snapshot: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let made = kind.call((ground,), Some(settings))?;
-        made.cast::<Self>()?.borrow_mut().restore(snapshot)?;
+        made.cast::<Self>()?.get().restore(snapshot)?;
         Ok(made)
     }
 }
 
 /// The ball of the report's section 3.1: coordinates x, y, theta.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation)]
+#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
 pub struct BallSimulation;
 
 #[pymethods]
 impl BallSimulation {
     #[new]
-    #[pyo3(signature = (ground, *, mass = 3.0, radius = 1.5, inertia = None, **options))]
+    #[pyo3(signature = (ground, *, mass = Given::MISSING, radius = Given::MISSING, inertia = Given::MISSING, **options),
+        text_signature = "(ground, *, mass=3.0, radius=1.5, inertia=None, **options)")]
     fn new(
         ground: &Bound<'_, PyAny>,
-        mass: f64,
-        radius: f64,
-        inertia: Option<f64>,
+        mass: Given<'_>,
+        radius: Given<'_>,
+        inertia: Given<'_>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyClassInitializer<Self>> {
+        let mass = mass.number(3.0, Kind::Model, "mass")?;
+        let radius = radius.number(1.5, Kind::Model, "radius")?;
+        let inertia = inertia.maybe(Kind::Model, "inertia")?;
         let inertia = inertia.unwrap_or(0.5 * mass * radius * radius);
         let ball = Ball::new(mass, radius, inertia).map_err(|e| border(Kind::Model, &e))?;
         let parameters = PyDict::new(ground.py());
@@ -487,7 +517,7 @@ impl BallSimulation {
 }
 
 /// The two-wheel rover of the report's section 3.1: coordinates x, y, theta, theta_A, theta_B.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation)]
+#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
 pub struct TwoWheelRoverSimulation;
 
 /// One number for both wheels, or one for each.
@@ -495,8 +525,13 @@ fn both(value: Option<&Bound<'_, PyAny>>, field: &str, default: [f64; 2]) -> PyR
     let Some(value) = value else {
         return Ok(default);
     };
-    if let Ok(x) = value.extract::<f64>() {
-        return Ok([x, x]);
+    one_or_two(value, field)
+}
+
+/// One number for both, or two.
+pub fn one_or_two(value: &Bound<'_, PyAny>, field: &str) -> PyResult<[f64; 2]> {
+    if value.len().is_err() {
+        return Ok([number(value, Kind::Model, field)?; 2]);
     }
     Ok(pair(value, Kind::Model, field)?.into())
 }
@@ -505,12 +540,13 @@ fn both(value: Option<&Bound<'_, PyAny>>, field: &str, default: [f64; 2]) -> PyR
 impl TwoWheelRoverSimulation {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (ground, *, mass = 130.0, inertia = None, wheel_mass = None, wheel_radius = None, wheel_inertia = None,
-        axle_a = None, axle_b = None, **options))]
+    #[pyo3(signature = (ground, *, mass = Given::MISSING, inertia = Given::MISSING, wheel_mass = None, wheel_radius = None,
+        wheel_inertia = None, axle_a = None, axle_b = None, **options),
+        text_signature = "(ground, *, mass=130.0, inertia=None, wheel_mass=None, wheel_radius=None, wheel_inertia=None, axle_a=None, axle_b=None, **options)")]
     fn new(
         ground: &Bound<'_, PyAny>,
-        mass: f64,
-        inertia: Option<f64>,
+        mass: Given<'_>,
+        inertia: Given<'_>,
         wheel_mass: Option<&Bound<'_, PyAny>>,
         wheel_radius: Option<&Bound<'_, PyAny>>,
         wheel_inertia: Option<&Bound<'_, PyAny>>,
@@ -518,6 +554,8 @@ impl TwoWheelRoverSimulation {
         axle_b: Option<&Bound<'_, PyAny>>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyClassInitializer<Self>> {
+        let mass = mass.number(130.0, Kind::Model, "mass")?;
+        let inertia = inertia.maybe(Kind::Model, "inertia")?;
         let masses = both(wheel_mass, "wheel_mass", [60.0; 2])?;
         let radii = both(wheel_radius, "wheel_radius", [0.2; 2])?;
         // Discs, unless told otherwise.
@@ -551,7 +589,7 @@ impl TwoWheelRoverSimulation {
 }
 
 /// The six-wheel rover driven straight: coordinates x, y, theta and one angle a pair of joints.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation)]
+#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
 pub struct MirroredRoverSimulation {
     joints: Vec<Vec<String>>,
     wheels: Vec<Vec<String>>,
@@ -560,12 +598,13 @@ pub struct MirroredRoverSimulation {
 #[pymethods]
 impl MirroredRoverSimulation {
     #[new]
-    #[pyo3(signature = (ground, *, model = None, **options))]
+    #[pyo3(signature = (ground, *, model = Given::MISSING, **options), text_signature = "(ground, *, model=None, **options)")]
     fn new(
         ground: &Bound<'_, PyAny>,
-        model: Option<RoverModel>,
+        model: Given<'_>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<PyClassInitializer<Self>> {
+        let model = model.object::<RoverModel>(Kind::Model, "model", "a RoverModel")?;
         let inner = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
         let rover = MirroredRover::<7>::new(&inner).map_err(|e| border(Kind::Model, &e))?;
         let own = Self {

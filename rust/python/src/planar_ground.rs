@@ -8,6 +8,7 @@ use rover_core::planar::{
 };
 use std::sync::Arc;
 
+use crate::arguments::{Given, number, shown};
 use crate::arrays::{fresh, vector};
 use crate::errors::{BorderError, Kind, Value};
 
@@ -17,10 +18,12 @@ pub fn border(kind: Kind, e: &PlanarError) -> BorderError {
         PlanarError::NotFinite { value, .. }
         | PlanarError::NotPositive { value, .. }
         | PlanarError::Negative { value, .. }
+        | PlanarError::OutOfRange { value, .. }
         | PlanarError::WheelsOverlap { value, .. }
         | PlanarError::NotAFunction { value, .. }
         | PlanarError::RepeatedPoint { value, .. } => Value::Number(*value),
         PlanarError::TooFewPoints { count, .. }
+        | PlanarError::TooManyPoints { count, .. }
         | PlanarError::MismatchedLengths { count, .. }
         | PlanarError::CoordinateCount { count, .. } => Value::Count(*count),
         PlanarError::NotMirrored { body } => Value::Text(body.clone()),
@@ -41,7 +44,8 @@ fn terrain<T>(made: Result<T, PlanarError>) -> Result<T, BorderError> {
 /// Height at one place or at many.
 fn heights<'py>(ground: &dyn Ground, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let py = x.py();
-    if let Ok(x) = x.extract::<f64>() {
+    if x.len().is_err() {
+        let x = number(x, Kind::Option, "x")?;
         return Ok(ground.height(x).into_pyobject(py)?.into_any());
     }
     let places = vector(x, Kind::Option, "x")?;
@@ -58,8 +62,10 @@ pub struct Line {
 #[pymethods]
 impl Line {
     #[new]
-    #[pyo3(signature = (slope = 0.0, offset = 0.0))]
-    fn new(slope: f64, offset: f64) -> PyResult<Self> {
+    #[pyo3(signature = (slope = Given::MISSING, offset = Given::MISSING), text_signature = "(slope=0.0, offset=0.0)")]
+    fn new(slope: Given<'_>, offset: Given<'_>) -> PyResult<Self> {
+        let slope = slope.number(0.0, Kind::Terrain, "slope")?;
+        let offset = offset.number(0.0, Kind::Terrain, "offset")?;
         Ok(Self {
             inner: terrain(CoreLine::new(slope, offset))?,
         })
@@ -98,8 +104,18 @@ pub struct Sine {
 #[pymethods]
 impl Sine {
     #[new]
-    #[pyo3(signature = (amplitude, wavelength, phase = 0.0, offset = 0.0))]
-    fn new(amplitude: f64, wavelength: f64, phase: f64, offset: f64) -> PyResult<Self> {
+    #[pyo3(signature = (amplitude, wavelength, phase = Given::MISSING, offset = Given::MISSING),
+        text_signature = "(amplitude, wavelength, phase=0.0, offset=0.0)")]
+    fn new(
+        amplitude: &Bound<'_, PyAny>,
+        wavelength: &Bound<'_, PyAny>,
+        phase: Given<'_>,
+        offset: Given<'_>,
+    ) -> PyResult<Self> {
+        let amplitude = number(amplitude, Kind::Terrain, "amplitude")?;
+        let wavelength = number(wavelength, Kind::Terrain, "wavelength")?;
+        let phase = phase.number(0.0, Kind::Terrain, "phase")?;
+        let offset = offset.number(0.0, Kind::Terrain, "offset")?;
         Ok(Self {
             inner: terrain(CoreSine::new(amplitude, wavelength, phase, offset))?,
         })
@@ -211,7 +227,9 @@ impl Polyline {
 
     /// Level ground with a step up (or down) at x.
     #[staticmethod]
-    fn step(x: f64, height: f64) -> PyResult<Self> {
+    fn step(x: &Bound<'_, PyAny>, height: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let x = number(x, Kind::Terrain, "x")?;
+        let height = number(height, Kind::Terrain, "height")?;
         Ok(Self {
             inner: terrain(CorePolyline::step(x, height))?,
         })
@@ -260,9 +278,7 @@ pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<Arc<dyn Ground>> {
     if let Ok(polyline) = given.cast::<Polyline>() {
         return Ok(Arc::new(polyline.get().inner.clone()));
     }
-    let shown = given
-        .repr()
-        .map_or_else(|_| String::new(), |r| r.to_string());
+    let shown = shown(given);
     let message = format!("ground: must be a Line, Sine, Spline or Polyline, is {shown}");
     Err(BorderError {
         kind: Kind::Terrain,

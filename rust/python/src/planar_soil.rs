@@ -11,14 +11,16 @@ use rover_core::planar::soil::{
     soil_options,
 };
 use rover_core::planar::{Ground, PlanarWheel, TwoWheelRover};
-use std::sync::Arc;
+use std::sync::{Arc, MutexGuard};
 
+use crate::arguments::{Given, flags, number, text};
 use crate::arrays::{array, fresh, fresh_rows, vector};
 use crate::errors::{BorderError, Kind, Value};
-use crate::planar::pair;
+use crate::planar::{one_or_two, pair};
 use crate::planar_ground::{border, parse};
-use crate::simulation::{Energy, STABILISATIONS, StepReport, choice, name_of, step_count};
-use crate::snapshot::damaged;
+use crate::shared::{Shared, Watch};
+use crate::simulation::{Energy, STABILISATIONS, StepReport, choice, name_of};
+use crate::snapshot::{belonging, damaged, read};
 
 /// Radii, masses and centres of a packing.
 type Packed<'py> = (
@@ -37,7 +39,7 @@ fn soil_error(e: &SoilError) -> BorderError {
     };
     let value = match e {
         SoilError::Number(number) => return border(kind, number),
-        SoilError::Length { count, .. } => Value::Count(*count),
+        SoilError::Length { count, .. } | SoilError::TooMany { count, .. } => Value::Count(*count),
         SoilError::Overlap { value, .. }
         | SoilError::InWall { value, .. }
         | SoilError::WheelIn { value, .. }
@@ -82,19 +84,16 @@ fn rows(value: &Bound<'_, PyAny>, kind: Kind, field: &str, width: usize) -> PyRe
 fn both(given: &Bound<'_, PyDict>, field: &str, default: [f64; 2]) -> PyResult<[f64; 2]> {
     match given.get_item(field)? {
         None => Ok(default),
-        Some(value) => value
-            .extract::<f64>()
-            .map(|x| [x, x])
-            .or_else(|_| Ok(pair(&value, Kind::Model, field)?.into())),
+        Some(value) => one_or_two(&value, field),
     }
 }
 
 /// The two-wheel rover of the keyword arguments that `TwoWheelRoverSimulation` takes.
 fn rover(given: &Bound<'_, PyDict>) -> PyResult<TwoWheelRover> {
-    let number = |field: &str| -> PyResult<Option<f64>> {
+    let optional = |field: &str| -> PyResult<Option<f64>> {
         given
             .get_item(field)?
-            .map(|x| x.extract::<f64>())
+            .map(|x| number(&x, Kind::Model, field))
             .transpose()
     };
     let masses = both(given, "wheel_mass", [60.0; 2])?;
@@ -106,7 +105,7 @@ fn rover(given: &Bound<'_, PyDict>) -> PyResult<TwoWheelRover> {
         both(given, "axle_b", [0.4, 0.0])?,
     ]
     .map(Vector2::from);
-    let mass = number("mass")?.unwrap_or(130.0);
+    let mass = optional("mass")?.unwrap_or(130.0);
     let rod = mass * (axles[1] - axles[0]).norm_squared() / 12.0;
     let wheel = |i: usize| PlanarWheel {
         mass: masses[i],
@@ -114,7 +113,7 @@ fn rover(given: &Bound<'_, PyDict>) -> PyResult<TwoWheelRover> {
         inertia: inertias[i],
         axle: axles[i],
     };
-    let inertia = number("inertia")?.unwrap_or(rod);
+    let inertia = optional("inertia")?.unwrap_or(rod);
     let made = TwoWheelRover::new(mass, inertia, wheel(0), wheel(1));
     Ok(made.map_err(|e| border(Kind::Model, &e))?)
 }
@@ -202,10 +201,8 @@ pub struct SoilSnapshot {
 #[pymethods]
 impl SoilSnapshot {
     #[staticmethod]
-    fn from_bytes(data: &[u8]) -> PyResult<Self> {
-        Ok(Self {
-            inner: postcard::from_bytes(data).map_err(|e| damaged(&e))?,
-        })
+    fn from_bytes(data: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Ok(Self { inner: read(data)? })
     }
 
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
@@ -222,20 +219,24 @@ impl SoilSnapshot {
 }
 
 /// A soil of free disks, with walls, a ground and perhaps a machine on it.
-#[pyclass(module = "rover_gym._core")]
+#[pyclass(module = "rover_gym._core", frozen)]
 pub struct SoilSimulation {
-    inner: Core,
+    inner: Shared<Core>,
 }
 
 impl SoilSimulation {
-    fn n(&self) -> usize {
-        self.inner.scene().disks.len()
+    fn open(&self) -> Result<MutexGuard<'_, Core>, BorderError> {
+        self.inner.open()
     }
 
     fn disks(values: &[f64], n: usize) -> Vec<[f64; 3]> {
         let rows = values.chunks_exact(3).take(n);
         rows.map(|row| [row[0], row[1], row[2]]).collect()
     }
+}
+
+fn n_disks(inner: &Core) -> usize {
+    inner.scene().disks.len()
 }
 
 /// Positions with an angle where none was given.
@@ -276,39 +277,45 @@ fn speed_scale(gravity: f64, usual: f64) -> f64 {
 #[pymethods]
 impl SoilSimulation {
     #[new]
-    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (radius, mass, position, *, kinematic = None, walls = None, ground = None, rover = None, rig = None, machine = None,
-        friction = 0.5, wall_friction = 0.5, wheel_friction = 0.9, restitution = 0.0, gravity = None, time_step = 1e-3,
-        tolerance = 1e-4, max_iterations = 2000, stabilisation = None, penetration_tolerance = None,
-        sleep = false, sleep_speed = None, sleep_distance = None))]
+    #[allow(clippy::too_many_arguments, clippy::too_many_lines)] // keyword arguments of a Python class
+    #[pyo3(signature = (radius, mass, position, *, kinematic = Given::MISSING, walls = None, ground = None, rover = Given::MISSING, rig = None, machine = None,
+        friction = Given::MISSING, wall_friction = Given::MISSING, wheel_friction = Given::MISSING, restitution = Given::MISSING,
+        gravity = None, time_step = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING,
+        stabilisation = Given::MISSING, penetration_tolerance = Given::MISSING,
+        sleep = Given::MISSING, sleep_speed = Given::MISSING, sleep_distance = Given::MISSING),
+        text_signature = "(radius, mass, position, *, kinematic=None, walls=None, ground=None, rover=None, rig=None, machine=None, friction=0.5, wall_friction=0.5, wheel_friction=0.9, restitution=0.0, gravity=None, time_step=0.001, tolerance=0.0001, max_iterations=2000, stabilisation=None, penetration_tolerance=None, sleep=False, sleep_speed=None, sleep_distance=None)")]
     fn new(
         radius: &Bound<'_, PyAny>,
         mass: &Bound<'_, PyAny>,
         position: &Bound<'_, PyAny>,
-        kinematic: Option<Vec<bool>>,
+        kinematic: Given<'_>,
         walls: Option<&Bound<'_, PyAny>>,
         ground: Option<&Bound<'_, PyAny>>,
-        rover: Option<&Bound<'_, PyDict>>,
+        rover: Given<'_>,
         rig: Option<&Bound<'_, PyAny>>,
         machine: Option<&Bound<'_, PyAny>>,
-        friction: f64,
-        wall_friction: f64,
-        wheel_friction: f64,
-        restitution: f64,
+        friction: Given<'_>,
+        wall_friction: Given<'_>,
+        wheel_friction: Given<'_>,
+        restitution: Given<'_>,
         gravity: Option<&Bound<'_, PyAny>>,
-        time_step: f64,
-        tolerance: f64,
-        max_iterations: usize,
-        stabilisation: Option<&str>,
-        penetration_tolerance: Option<f64>,
-        sleep: bool,
-        sleep_speed: Option<f64>,
-        sleep_distance: Option<f64>,
+        time_step: Given<'_>,
+        tolerance: Given<'_>,
+        max_iterations: Given<'_>,
+        stabilisation: Given<'_>,
+        penetration_tolerance: Given<'_>,
+        sleep: Given<'_>,
+        sleep_speed: Given<'_>,
+        sleep_distance: Given<'_>,
     ) -> PyResult<Self> {
+        let option = Kind::Option;
+        let restitution = restitution.number(0.0, option, "restitution")?;
+        let tolerance = tolerance.number(1e-4, option, "tolerance")?;
         let radius = vector(radius, Kind::Model, "radius")?;
         let mass = vector(mass, Kind::Model, "mass")?;
         let mut disks = Disks::new(radius, mass).map_err(|e| soil_error(&e))?;
-        if let Some(kinematic) = kinematic {
+        if let Some(kinematic) = kinematic.some() {
+            let kinematic = flags(&kinematic, Kind::Model, "kinematic")?;
             disks = disks
                 .with_kinematic(kinematic)
                 .map_err(|e| soil_error(&e))?;
@@ -333,16 +340,19 @@ impl SoilSimulation {
         if let Some(gravity) = gravity {
             options.gravity = pair(gravity, Kind::Option, "gravity")?.push(0.0);
         }
-        (options.time_step, options.restitution) = (time_step, restitution);
-        (options.solver.tolerance, options.solver.max_sweeps) = (tolerance, max_iterations);
-        options.stabilisation = choice::<Stabilisation>(
-            "stabilisation",
-            stabilisation.unwrap_or(usual_stabilisation(restitution)),
-            &STABILISATIONS,
-        )?;
+        options.time_step = time_step.number(1e-3, option, "time_step")?;
+        options.restitution = restitution;
+        options.solver.tolerance = tolerance;
+        options.solver.max_sweeps = max_iterations.count(2000, option, "max_iterations")?;
+        let stabilisation = match stabilisation.some() {
+            Some(given) => text(&given, option, "stabilisation")?,
+            None => usual_stabilisation(restitution).to_owned(),
+        };
+        options.stabilisation =
+            choice::<Stabilisation>("stabilisation", &stabilisation, &STABILISATIONS)?;
         options.solver.velocity_tolerance =
             10.0 * tolerance * speed_scale(options.gravity.norm(), usual_weight);
-        if let Some(depth) = penetration_tolerance {
+        if let Some(depth) = penetration_tolerance.maybe(option, "penetration_tolerance")? {
             options.penetration_tolerance = depth;
         }
         let mut lines = Vec::new();
@@ -353,7 +363,8 @@ impl SoilSimulation {
             }
         }
         let ground: Option<Arc<dyn Ground>> = ground.map(parse).transpose()?;
-        let who: Option<Arc<Machine>> = match (rover, rig) {
+        let rover = rover.object::<Bound<'_, PyDict>>(Kind::Model, "rover", "a dict")?;
+        let who: Option<Arc<Machine>> = match (&rover, rig) {
             (Some(given), None) => Some(Arc::new(self::rover(given)?)),
             (None, Some(given)) => {
                 let given = pair(given, Kind::Model, "rig")?;
@@ -375,89 +386,95 @@ impl SoilSimulation {
             ground,
             machine: who,
             friction: SoilFriction {
-                disks: friction,
-                walls: wall_friction,
-                wheels: wheel_friction,
+                disks: friction.number(0.5, option, "friction")?,
+                walls: wall_friction.number(0.5, option, "wall_friction")?,
+                wheels: wheel_friction.number(0.9, option, "wheel_friction")?,
             },
         };
         let mut rest = SleepOptions::default();
-        if let Some(speed) = sleep_speed {
+        if let Some(speed) = sleep_speed.maybe(option, "sleep_speed")? {
             rest.speed = speed;
         }
-        if let Some(distance) = sleep_distance {
+        if let Some(distance) = sleep_distance.maybe(option, "sleep_distance")? {
             rest.distance = distance;
         }
-        for (field, value) in [
-            ("sleep_speed", rest.speed),
-            ("sleep_distance", rest.distance),
-        ] {
-            if !(value.is_finite() && value > 0.0) {
-                let message = format!("{field}: must be finite and positive, is {value}");
-                return Err(BorderError::option(field, message, Value::Number(value)).into());
-            }
-        }
+        rest.check().map_err(BorderError::from)?;
+        let sleep = sleep.flag(false, option, "sleep")?;
         let inner =
             Core::new(Arc::new(scene), options, sleep.then_some(rest), q).map_err(setup_error)?;
-        Ok(Self { inner })
+        Ok(Self {
+            inner: Shared::new(inner),
+        })
     }
 
     #[getter]
-    fn time(&self) -> f64 {
-        self.inner.time()
+    fn time(&self) -> PyResult<f64> {
+        let inner = self.open()?;
+        Ok(inner.time())
     }
 
     #[getter]
-    fn time_step(&self) -> f64 {
-        self.inner.options().time_step
+    fn time_step(&self) -> PyResult<f64> {
+        let inner = self.open()?;
+        Ok(inner.options().time_step)
     }
 
     #[getter]
-    fn radius<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.scene().disks.radius())
+    fn radius<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, inner.scene().disks.radius()))
     }
 
     #[getter]
-    fn mass<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.scene().disks.mass())
+    fn mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, inner.scene().disks.mass()))
     }
 
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        fresh_rows(py, &Self::disks(self.inner.q(), self.n()))
+        let inner = self.open()?;
+        fresh_rows(py, &Self::disks(inner.q(), n_disks(&inner)))
     }
 
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        fresh_rows(py, &Self::disks(self.inner.v(), self.n()))
+        let inner = self.open()?;
+        fresh_rows(py, &Self::disks(inner.v(), n_disks(&inner)))
     }
 
     #[getter]
-    fn kinematic<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
-        PyArray1::from_slice(py, self.inner.scene().disks.kinematic())
+    fn kinematic<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let inner = self.open()?;
+        Ok(PyArray1::from_slice(py, inner.scene().disks.kinematic()))
     }
 
     #[getter]
-    fn asleep<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
-        PyArray1::from_slice(py, self.inner.asleep())
+    fn asleep<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let inner = self.open()?;
+        Ok(PyArray1::from_slice(py, inner.asleep()))
     }
 
     #[getter]
-    fn machine<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, &self.inner.q()[3 * self.n()..])
+    fn machine<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, &inner.q()[3 * n_disks(&inner)..]))
     }
 
     #[getter]
-    fn machine_rate<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, &self.inner.v()[3 * self.n()..])
+    fn machine_rate<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, &inner.v()[3 * n_disks(&inner)..]))
     }
 
     /// Centre (x, y) and radius of each wheel.
     #[getter]
     fn wheels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let Some(machine) = &self.inner.scene().machine else {
+        let inner = self.open()?;
+        let Some(machine) = &inner.scene().machine else {
             return fresh_rows::<3>(py, &[]);
         };
-        let own = &self.inner.q()[3 * self.n()..];
+        let own = &inner.q()[3 * n_disks(&inner)..];
         let pose = rover_core::nalgebra::SVector::<f64, 5>::from_column_slice(own);
         let row = |k| {
             let disc = machine.disc(k, &pose);
@@ -467,20 +484,23 @@ impl SoilSimulation {
     }
 
     #[getter]
-    fn torques<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.inputs())
+    fn torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, inner.inputs()))
     }
 
     #[getter]
-    fn pull(&self) -> (f64, f64) {
-        let pull = self.inner.pull();
-        (pull.x, pull.y)
+    fn pull(&self) -> PyResult<(f64, f64)> {
+        let inner = self.open()?;
+        let pull = inner.pull();
+        Ok((pull.x, pull.y))
     }
 
     /// Numbers and names of the options.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let (o, friction) = (self.inner.options(), &self.inner.scene().friction);
+        let inner = self.open()?;
+        let (o, friction) = (inner.options(), &inner.scene().friction);
         let settings = PyDict::new(py);
         settings.set_item("friction", friction.disks)?;
         settings.set_item("wall_friction", friction.walls)?;
@@ -497,13 +517,14 @@ impl SoilSimulation {
 
     #[pyo3(signature = (position, velocity = None, machine = None, machine_rate = None))]
     fn set_state(
-        &mut self,
+        &self,
         position: &Bound<'_, PyAny>,
         velocity: Option<&Bound<'_, PyAny>>,
         machine: Option<&Bound<'_, PyAny>>,
         machine_rate: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let n = self.n();
+        let mut inner = self.open()?;
+        let n = n_disks(&inner);
         let mut q = with_angles(position, "position")?;
         let mut v = match velocity {
             Some(velocity) => with_angles(velocity, "velocity")?,
@@ -511,127 +532,139 @@ impl SoilSimulation {
         };
         match machine {
             Some(machine) => q.extend(vector(machine, Kind::State, "machine")?),
-            None => q.extend(&self.inner.q()[3 * n..]),
+            None => q.extend(&inner.q()[3 * n..]),
         }
         match machine_rate {
             Some(rate) => v.extend(vector(rate, Kind::State, "machine_rate")?),
-            None => v.resize(v.len() + self.inner.v().len() - 3 * n, 0.0),
+            None => v.resize(v.len() + inner.v().len() - 3 * n, 0.0),
         }
-        Ok(self.inner.set_state(&q, &v).map_err(|e| soil_error(&e))?)
+        Ok(inner.set_state(&q, &v).map_err(|e| soil_error(&e))?)
     }
 
-    #[allow(clippy::needless_pass_by_value)] // made for this call
-    fn remove(&mut self, which: Vec<bool>) -> PyResult<()> {
-        Ok(self.inner.remove(&which).map_err(|e| soil_error(&e))?)
+    fn remove(&self, which: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut inner = self.open()?;
+        let which = flags(which, Kind::Model, "which")?;
+        Ok(inner.remove(&which).map_err(|e| soil_error(&e))?)
     }
 
-    fn set_torques(&mut self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
         let torques = vector(torques, Kind::Command, "torques")?;
         Ok(self
-            .inner
+            .open()?
             .set_inputs(&torques)
             .map_err(|e| soil_error(&e))?)
     }
 
-    fn set_pull(&mut self, pull: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_pull(&self, pull: &Bound<'_, PyAny>) -> PyResult<()> {
         let pull = pair(pull, Kind::Command, "pull")?;
         Ok(self
-            .inner
+            .open()?
             .set_pull(pull.into())
             .map_err(|e| soil_error(&e))?)
     }
 
-    #[pyo3(signature = (n = 1))]
-    fn step(&mut self, py: Python<'_>, n: i64) -> PyResult<StepReport> {
-        let steps = step_count(n)?;
-        let inner = &mut self.inner;
-        let report = py.detach(|| inner.step(steps)).map_err(BorderError::from)?;
-        Ok(report.into())
+    #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
+    fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
+        let steps = n.count(1, Kind::Option, "n")?;
+        let mut held = self.open()?;
+        let (inner, mut watch) = (&mut *held, Watch::new());
+        let report = py.detach(|| inner.step_while(steps, &mut || watch.go_on()));
+        Ok(watch.result(report)?.into())
     }
 
     #[getter]
-    fn contacts(&self) -> SoilContacts {
-        let n = self.n();
-        let wheels = self
-            .inner
-            .scene()
-            .machine
-            .as_ref()
-            .map_or(0, |m| m.n_discs());
-        SoilContacts {
-            active: self.inner.contacts().collect(),
+    fn contacts(&self) -> PyResult<SoilContacts> {
+        let inner = self.open()?;
+        let n = n_disks(&inner);
+        let wheels = inner.scene().machine.as_ref().map_or(0, |m| m.n_discs());
+        Ok(SoilContacts {
+            active: inner.contacts().collect(),
             counts: [n, n + wheels],
-        }
+        })
     }
 
-    fn energy(&self) -> Energy {
-        self.inner.energy().into()
+    fn energy(&self) -> PyResult<Energy> {
+        let inner = self.open()?;
+        Ok(inner.energy().into())
     }
 
     /// Momentum of the disks (x, y) and their moment of momentum about the origin.
-    fn momentum<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, &self.inner.momentum())
+    fn momentum<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, &inner.momentum()))
     }
 
     /// Impulse of the last step's contacts on the wheels.
-    fn impulse_on_wheels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, &self.inner.impulse_on_wheels())
+    fn impulse_on_wheels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let inner = self.open()?;
+        Ok(fresh(py, &inner.impulse_on_wheels()))
     }
 
     /// Deepest overlap now.
-    fn penetration(&self) -> f64 {
-        self.inner.penetration()
+    fn penetration(&self) -> PyResult<f64> {
+        let inner = self.open()?;
+        Ok(inner.penetration())
     }
 
-    fn wake(&mut self) {
-        self.inner.wake();
+    fn wake(&self) -> PyResult<()> {
+        let mut inner = self.open()?;
+        inner.wake();
+        Ok(())
     }
 
-    fn snapshot(&self) -> SoilSnapshot {
-        SoilSnapshot {
-            inner: self.inner.snapshot(),
-        }
+    fn snapshot(&self) -> PyResult<SoilSnapshot> {
+        let inner = self.open()?;
+        Ok(SoilSnapshot {
+            inner: inner.snapshot(),
+        })
     }
 
-    fn restore(&mut self, snapshot: &SoilSnapshot) -> PyResult<()> {
-        Ok(self
-            .inner
-            .restore(&snapshot.inner)
-            .map_err(BorderError::from)?)
+    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut inner = self.open()?;
+        let snapshot = belonging::<SoilSnapshot>(snapshot, "a SoilSnapshot")?;
+        let restored = inner.restore(&snapshot.get().inner);
+        Ok(restored.map_err(BorderError::from)?)
     }
 
     fn __repr__(&self) -> String {
-        let (n, time) = (self.n(), self.inner.time());
+        let Ok(inner) = self.open() else {
+            return "SoilSimulation(stepping)".to_owned();
+        };
+        let (n, time) = (n_disks(&inner), inner.time());
         format!("SoilSimulation({n} disks, time={time} s)")
     }
 }
 
 /// Radii, masses and centres of disks in rows, without overlap.
 #[pyfunction]
-#[pyo3(signature = (count = 222, *, radius_min = 0.016, radius_max = 0.0165, mass = 0.7, left = 0.0, width = 2.4494, bottom = 0.0, seed = 0))]
+#[pyo3(signature = (count = Given::MISSING, *, radius_min = Given::MISSING, radius_max = Given::MISSING, mass = Given::MISSING,
+    left = Given::MISSING, width = Given::MISSING, bottom = Given::MISSING, seed = Given::MISSING),
+    text_signature = "(count=222, *, radius_min=0.016, radius_max=0.0165, mass=0.7, left=0.0, width=2.4494, bottom=0.0, seed=0)")]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
-pub fn soil_packing(
-    py: Python<'_>,
-    count: usize,
-    radius_min: f64,
-    radius_max: f64,
-    mass: f64,
-    left: f64,
-    width: f64,
-    bottom: f64,
-    seed: u64,
-) -> PyResult<Packed<'_>> {
+pub fn soil_packing<'py>(
+    py: Python<'py>,
+    count: Given<'_>,
+    radius_min: Given<'_>,
+    radius_max: Given<'_>,
+    mass: Given<'_>,
+    left: Given<'_>,
+    width: Given<'_>,
+    bottom: Given<'_>,
+    seed: Given<'_>,
+) -> PyResult<Packed<'py>> {
+    let kind = Kind::Model;
     let packing = Packing {
-        count,
-        radius_min,
-        radius_max,
-        mass,
-        left,
-        width,
-        bottom,
-        seed,
+        count: count.count(222, kind, "count")?,
+        radius_min: radius_min.number(0.016, kind, "radius_min")?,
+        radius_max: radius_max.number(0.0165, kind, "radius_max")?,
+        mass: mass.number(0.7, kind, "mass")?,
+        left: left.number(0.0, kind, "left")?,
+        width: width.number(2.4494, kind, "width")?,
+        bottom: bottom.number(0.0, kind, "bottom")?,
+        seed: seed.whole(0, kind, "seed")?,
     };
-    let (disks, q) = packing.build().map_err(|e| soil_error(&e))?;
+    let built = py.detach(|| packing.build());
+    let (disks, q) = built.map_err(|e| soil_error(&e))?;
     let centres: Vec<[f64; 2]> = q.chunks_exact(3).map(|c| [c[0], c[1]]).collect();
     Ok((
         fresh(py, disks.radius()),

@@ -4,6 +4,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use rover_core::geometry::Plane as CorePlane;
 
+use crate::arguments::{Given, number};
 use crate::arrays::{fresh, triple};
 use crate::errors::{BorderError, Kind, Value};
 
@@ -19,8 +20,9 @@ pub struct Plane {
 #[pymethods]
 impl Plane {
     #[new]
-    #[pyo3(signature = (normal = None, offset = 0.0))]
-    fn new(normal: Option<&Bound<'_, PyAny>>, offset: f64) -> PyResult<Self> {
+    #[pyo3(signature = (normal = None, offset = Given::MISSING), text_signature = "(normal=None, offset=0.0)")]
+    fn new(normal: Option<&Bound<'_, PyAny>>, offset: Given<'_>) -> PyResult<Self> {
+        let offset = offset.number(0.0, Kind::Terrain, "offset")?;
         let normal = normal.map_or(Ok([0.0, 1.0, 0.0]), |n| triple(n, Kind::Terrain, "normal"))?;
         Ok(Self {
             inner: CorePlane::new(normal, offset).map_err(BorderError::from)?,
@@ -38,7 +40,9 @@ impl Plane {
     }
 
     /// Height y of the plane at (x, z), m.
-    fn height(&self, x: f64, z: f64) -> PyResult<f64> {
+    fn height(&self, x: &Bound<'_, PyAny>, z: &Bound<'_, PyAny>) -> PyResult<f64> {
+        let x = number(x, Kind::Terrain, "x")?;
+        let z = number(z, Kind::Terrain, "z")?;
         let n = self.inner.normal();
         if n.y.abs() < 1e-12 {
             let message = "normal: a vertical plane has no height".to_owned();

@@ -4,7 +4,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice};
 use rover_core::simulation::ReadingLayout;
 
-use crate::arrays::array;
+use crate::arguments::refused;
+use crate::arrays::{array, vector};
 use crate::errors::{BorderError, Kind, Value};
 
 /// Names with their slices.
@@ -35,8 +36,13 @@ pub fn scan_points(given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<[f64; 2]>> 
 }
 
 /// A finite place on the map; the origin where nothing is given.
-pub fn place(target: Option<[f64; 2]>) -> PyResult<[f64; 2]> {
-    let target = target.unwrap_or_default();
+pub fn place(target: Option<&Bound<'_, PyAny>>) -> PyResult<[f64; 2]> {
+    let Some(given) = target else {
+        return Ok([0.0; 2]);
+    };
+    let Ok(target) = <[f64; 2]>::try_from(vector(given, Kind::Option, "target")?) else {
+        return Err(refused(given, Kind::Option, "target", "two numbers").into());
+    };
     match target.iter().position(|x| !x.is_finite()) {
         None => Ok(target),
         Some(index) => {

@@ -9,9 +9,10 @@ use rover_core::integrator::{
 use rover_core::multibody::{Energy as CoreEnergy, Model, coordinates};
 use rover_core::nalgebra::DMatrix;
 use rover_core::simulation::{Look, ReadingLayout, Simulation as CoreSimulation};
-use std::sync::Arc;
+use std::sync::{Arc, MutexGuard};
 
 use crate::accuracy;
+use crate::arguments::{Given, number, text, texts};
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Value};
@@ -19,7 +20,8 @@ use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::plane::Plane;
 use crate::reading::{place, scan_points, slices};
-use crate::snapshot::Snapshot;
+use crate::shared::{Shared, Watch};
+use crate::snapshot::{Snapshot, belonging};
 use crate::sphere_field::Ground;
 
 /// What the solver says of the steps just taken (worst over the steps of one call).
@@ -134,10 +136,12 @@ impl Energy {
 }
 
 /// A rover on a terrain, stepped through time.
-#[pyclass(module = "rover_gym._core")]
+#[pyclass(module = "rover_gym._core", frozen)]
 pub struct Simulation {
-    pub inner: CoreSimulation,
-    pub origin: Origin,
+    inner: Shared<CoreSimulation>,
+    model: Arc<Model>,
+    options: StepOptions,
+    origin: Origin,
 }
 
 /// What a simulation was made with and the core does not keep, for pickling.
@@ -156,18 +160,11 @@ pub type Problem<'py> = (
 );
 
 fn names(joints: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
-    joints
-        .extract::<String>()
-        .map(|name| vec![name])
-        .or_else(|_| joints.extract())
+    texts(joints, Kind::Command, "joints")
 }
 
 /// The value that a word stands for.
-pub fn choice<T: Copy>(
-    field: &'static str,
-    given: &str,
-    choices: &[(&str, T)],
-) -> Result<T, BorderError> {
+pub fn choice<T: Copy>(field: &str, given: &str, choices: &[(&str, T)]) -> Result<T, BorderError> {
     let found = choices
         .iter()
         .find(|(name, _)| *name == given)
@@ -201,14 +198,6 @@ pub fn name_of<T: PartialEq + Copy>(value: T, choices: &[(&'static str, T)]) -> 
         .map_or("", |(name, _)| name)
 }
 
-/// A number of steps.
-pub fn step_count(n: i64) -> Result<usize, BorderError> {
-    usize::try_from(n).map_err(|_| {
-        let message = format!("n: must not be negative, is {n}");
-        BorderError::option("n", message, Value::Number(n as f64))
-    })
-}
-
 impl From<CoreReport> for StepReport {
     fn from(inner: CoreReport) -> Self {
         Self { inner }
@@ -222,8 +211,24 @@ impl From<CoreEnergy> for Energy {
 }
 
 impl Simulation {
-    fn model_ref(&self) -> &Model {
-        self.inner.model()
+    /// A simulation, and what it was made with.
+    pub fn of(inner: CoreSimulation, origin: Origin) -> Self {
+        Self {
+            model: inner.model().clone(),
+            options: inner.options().clone(),
+            inner: Shared::new(inner),
+            origin,
+        }
+    }
+
+    /// The simulation, for one call.
+    pub fn open(&self) -> Result<MutexGuard<'_, CoreSimulation>, BorderError> {
+        self.inner.open()
+    }
+
+    /// What it was made with and the core does not keep.
+    pub fn origin(&self) -> &Origin {
+        &self.origin
     }
 }
 
@@ -231,26 +236,40 @@ impl Simulation {
 impl Simulation {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (model = None, terrain = None, *, gravity = None, friction = 0.7, restitution = 0.0, time_step = None,
-        variant = None, theta = 0.5, forecast = 0.5, solver = "auto", tolerance = None, max_iterations = 1000,
-        stabilisation = "projection", warm_start = true, accuracy = None))]
+    #[pyo3(signature = (model = Given::MISSING, terrain = None, *, gravity = None, friction = Given::MISSING, restitution = Given::MISSING,
+        time_step = Given::MISSING, variant = Given::MISSING, theta = Given::MISSING, forecast = Given::MISSING,
+        solver = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING,
+        stabilisation = Given::MISSING, warm_start = Given::MISSING, accuracy = None),
+        text_signature = "(model=None, terrain=None, *, gravity=None, friction=0.7, restitution=0.0, time_step=None, variant=None, theta=0.5, forecast=0.5, solver='auto', tolerance=None, max_iterations=1000, stabilisation='projection', warm_start=True, accuracy=None)")]
     fn new(
-        model: Option<RoverModel>,
+        model: Given<'_>,
         terrain: Option<&Bound<'_, PyAny>>,
         gravity: Option<&Bound<'_, PyAny>>,
-        friction: f64,
-        restitution: f64,
-        time_step: Option<f64>,
-        variant: Option<&str>,
-        theta: f64,
-        forecast: f64,
-        solver: &str,
-        tolerance: Option<f64>,
-        max_iterations: usize,
-        stabilisation: &str,
-        warm_start: bool,
+        friction: Given<'_>,
+        restitution: Given<'_>,
+        time_step: Given<'_>,
+        variant: Given<'_>,
+        theta: Given<'_>,
+        forecast: Given<'_>,
+        solver: Given<'_>,
+        tolerance: Given<'_>,
+        max_iterations: Given<'_>,
+        stabilisation: Given<'_>,
+        warm_start: Given<'_>,
         accuracy: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let option = Kind::Option;
+        let time_step = time_step.maybe(option, "time_step")?;
+        let tolerance = tolerance.maybe(option, "tolerance")?;
+        let variant = (variant.some())
+            .map(|v| {
+                choice("variant", &text(&v, option, "variant")?, &VARIANTS).map_err(PyErr::from)
+            })
+            .transpose()?;
+        let solver = solver.text("auto", option, "solver")?;
+        let max_iterations = max_iterations.count(1000, option, "max_iterations")?;
+        let stabilisation = stabilisation.text("projection", option, "stabilisation")?;
+        let model = model.object::<RoverModel>(Kind::Model, "model", "a RoverModel")?;
         let model = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
         let terrain = match terrain {
             None => Ground::Plane(Plane {
@@ -278,31 +297,31 @@ impl Simulation {
         let tolerance = tolerance.unwrap_or(chosen.tolerance);
         let options = StepOptions {
             gravity: checked_gravity(gravity)?,
-            friction_coefficient: friction,
-            restitution,
+            friction_coefficient: friction.number(0.7, option, "friction")?,
+            restitution: restitution.number(0.0, option, "restitution")?,
             time_step: time_step.unwrap_or(chosen.time_step),
-            theta,
-            forecast,
-            variant: variant.map_or(Ok(chosen.variant), |v| choice("variant", v, &VARIANTS))?,
-            stabilisation: choice("stabilisation", stabilisation, &STABILISATIONS)?,
-            warm_start,
-            solver: solver_options(solver, tolerance, max_iterations, &SIMULATION_SOLVERS)?,
+            theta: theta.number(0.5, option, "theta")?,
+            forecast: forecast.number(0.5, option, "forecast")?,
+            variant: variant.unwrap_or(chosen.variant),
+            stabilisation: choice("stabilisation", &stabilisation, &STABILISATIONS)?,
+            warm_start: warm_start.flag(true, option, "warm_start")?,
+            solver: solver_options(&solver, tolerance, max_iterations, &SIMULATION_SOLVERS)?,
             ..StepOptions::default()
         };
         let inner =
             CoreSimulation::new(model, terrain.terrain(), options).map_err(BorderError::from)?;
         let origin = Origin {
             terrain,
-            solver: solver.to_owned(),
+            solver,
             max_iterations,
         };
-        Ok(Self { inner, origin })
+        Ok(Self::of(inner, origin))
     }
 
     #[getter]
     fn model(&self) -> RoverModel {
         RoverModel {
-            inner: self.inner.model().clone(),
+            inner: self.model.clone(),
         }
     }
 
@@ -312,34 +331,34 @@ impl Simulation {
     }
 
     #[getter]
-    fn time(&self) -> f64 {
-        self.inner.state().time
+    fn time(&self) -> PyResult<f64> {
+        Ok(self.open()?.state().time)
     }
 
     #[getter]
     fn time_step(&self) -> f64 {
-        self.inner.options().time_step
+        self.options.time_step
     }
 
     #[getter]
     fn gravity<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.options().gravity.as_slice())
+        fresh(py, self.options.gravity.as_slice())
     }
 
     #[getter]
     fn friction(&self) -> f64 {
-        self.inner.options().friction_coefficient
+        self.options.friction_coefficient
     }
 
     #[getter]
     fn restitution(&self) -> f64 {
-        self.inner.options().restitution
+        self.options.restitution
     }
 
     /// The keyword arguments that make a simulation with these options.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let o = self.inner.options();
+        let o = &self.options;
         let settings = PyDict::new(py);
         settings.set_item("gravity", (o.gravity.x, o.gravity.y, o.gravity.z))?;
         settings.set_item("friction", o.friction_coefficient)?;
@@ -357,22 +376,20 @@ impl Simulation {
     }
 
     #[getter]
-    fn q<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(
-            py,
-            &coordinates::to_public(&self.inner.state().configuration),
-        )
+    fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let q = coordinates::to_public(&self.open()?.state().configuration);
+        Ok(fresh(py, &q))
     }
 
     #[getter]
-    fn v<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, &self.inner.state().v)
+    fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(fresh(py, &self.open()?.state().v))
     }
 
     #[getter]
     fn rotation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let R = self
-            .inner
+            .open()?
             .state()
             .configuration
             .attitude
@@ -383,136 +400,154 @@ impl Simulation {
         )
     }
 
-    #[pyo3(signature = (q, qdot = None, *, coordinates = "state"))]
+    #[pyo3(signature = (q, qdot = None, *, coordinates = Given::MISSING), text_signature = "($self, q, qdot=None, *, coordinates='state')")]
     fn set_state(
-        &mut self,
+        &self,
         q: &Bound<'_, PyAny>,
         qdot: Option<&Bound<'_, PyAny>>,
-        coordinates: &str,
+        coordinates: Given<'_>,
     ) -> PyResult<()> {
-        let kind = Coordinates::parse(coordinates)?;
+        let kind = Coordinates::given(coordinates)?;
         let q = vector(q, Kind::State, "q")?;
-        let configuration = kind.configuration(self.model_ref(), &q)?;
+        let configuration = kind.configuration(&self.model, &q)?;
         let qdot = qdot.map_or_else(
-            || Ok(vec![0.0; self.model_ref().nv()]),
+            || Ok(vec![0.0; self.model.nv()]),
             |v| vector(v, Kind::State, "qdot"),
         )?;
-        let v = kind.velocity(self.model_ref(), &q, &qdot)?;
-        self.inner.set_state(configuration, v);
+        let v = kind.velocity(&self.model, &q, &qdot)?;
+        self.open()?.set_state(configuration, v);
         Ok(())
     }
 
     fn report_state<'py>(&self, py: Python<'py>) -> PyResult<Pair<'py>> {
-        let state = self.inner.state();
+        let held = self.open()?;
+        let state = held.state();
         let (q, qdot) =
             coordinates::to_report(&state.configuration, &state.v).map_err(BorderError::from)?;
         Ok((fresh(py, &q), fresh(py, &qdot)))
     }
 
     #[getter]
-    fn wheel_torques<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.wheel_torques())
+    fn wheel_torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(fresh(py, self.open()?.wheel_torques()))
     }
 
-    fn set_wheel_torques(&mut self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_wheel_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
         let torques = vector(torques, Kind::Command, "torques")?;
         Ok(self
-            .inner
+            .open()?
             .set_wheel_torques(&torques)
             .map_err(BorderError::from)?)
     }
 
     #[getter]
-    fn steering<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, &self.inner.steering())
+    fn steering<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(fresh(py, &self.open()?.steering()))
     }
 
-    fn set_steering(&mut self, set_points: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_steering(&self, set_points: &Bound<'_, PyAny>) -> PyResult<()> {
         let set_points = vector(set_points, Kind::Command, "set_points")?;
         Ok(self
-            .inner
+            .open()?
             .set_steering(&set_points)
             .map_err(BorderError::from)?)
     }
 
-    fn set_joint_torques(&mut self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn set_commands(
+        &self,
+        torques: &Bound<'_, PyAny>,
+        set_points: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let torques = vector(torques, Kind::Command, "torques")?;
+        let set_points = vector(set_points, Kind::Command, "set_points")?;
+        Ok(self
+            .open()?
+            .set_commands(&torques, &set_points)
+            .map_err(BorderError::from)?)
+    }
+
+    fn set_joint_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
         let torques = vector(torques, Kind::Command, "torques")?;
         Ok(self
-            .inner
+            .open()?
             .set_joint_torques(&torques)
             .map_err(BorderError::from)?)
     }
 
     #[pyo3(signature = (joints, set_points = None, *, stiffness = None, damping = None))]
     fn hold(
-        &mut self,
+        &self,
         joints: &Bound<'_, PyAny>,
         set_points: Option<&Bound<'_, PyAny>>,
-        stiffness: Option<f64>,
-        damping: Option<f64>,
+        stiffness: Option<&Bound<'_, PyAny>>,
+        damping: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let set_points = set_points
-            .map(|s| {
-                s.extract::<f64>()
-                    .map(|x| vec![x])
-                    .or_else(|_| vector(s, Kind::Command, "set_points"))
-            })
-            .transpose()?;
-        let held = self
-            .inner
-            .hold(&names(joints)?, set_points.as_deref(), stiffness, damping);
+        let one = |x: &Bound<'_, PyAny>, field| number(x, Kind::Command, field);
+        let read = |s: &Bound<'_, PyAny>| match s.len() {
+            Ok(_) => vector(s, Kind::Command, "set_points"),
+            Err(_) => one(s, "set_points").map(|x| vec![x]),
+        };
+        let set_points = set_points.map(read).transpose()?;
+        let stiffness = stiffness.map(|x| one(x, "stiffness")).transpose()?;
+        let damping = damping.map(|x| one(x, "damping")).transpose()?;
+        let joints = names(joints)?;
+        let mut inner = self.open()?;
+        let held = inner.hold(&joints, set_points.as_deref(), stiffness, damping);
         Ok(held.map_err(BorderError::from)?)
     }
 
-    fn release(&mut self, joints: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn release(&self, joints: &Bound<'_, PyAny>) -> PyResult<()> {
         Ok(self
-            .inner
+            .open()?
             .release(&names(joints)?)
             .map_err(BorderError::from)?)
     }
 
-    fn brake(&mut self) {
-        self.inner.brake();
+    fn brake(&self) -> PyResult<()> {
+        self.open()?.brake();
+        Ok(())
     }
 
-    #[pyo3(signature = (n = 1))]
-    fn step(&mut self, py: Python<'_>, n: i64) -> PyResult<StepReport> {
-        let steps = step_count(n)?;
-        let inner = &mut self.inner;
-        let report = py.detach(|| inner.step(steps)).map_err(BorderError::from)?;
-        Ok(StepReport { inner: report })
-    }
-
-    #[getter]
-    fn contacts(&self) -> Contacts {
-        Contacts::new(self.model_ref(), self.inner.contacts())
+    #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
+    fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
+        let steps = n.count(1, Kind::Option, "n")?;
+        let mut held = self.open()?;
+        let (inner, mut watch) = (&mut *held, Watch::new());
+        let report = py.detach(|| inner.step_while(steps, &mut || watch.go_on()));
+        Ok(watch.result(report)?.into())
     }
 
     #[getter]
-    fn wheel_gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_iter(py, self.inner.wheel_contacts().iter().map(|c| c.gap))
+    fn contacts(&self) -> PyResult<Contacts> {
+        Ok(Contacts::new(&self.model, self.open()?.contacts()))
+    }
+
+    #[getter]
+    fn wheel_gaps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let contacts = self.open()?.wheel_contacts();
+        Ok(PyArray1::from_iter(py, contacts.iter().map(|c| c.gap)))
     }
 
     #[getter]
     fn wheel_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        fresh_rows(py, &self.inner.wheel_forces())
+        fresh_rows(py, &self.open()?.wheel_forces())
     }
 
     #[getter]
-    fn trunk_force(&self) -> f64 {
-        self.inner.body_force()
+    fn trunk_force(&self) -> PyResult<f64> {
+        Ok(self.open()?.body_force())
     }
 
     #[getter]
-    fn deepest_overlap(&self) -> f64 {
-        self.inner.deepest_overlap()
+    fn deepest_overlap(&self) -> PyResult<f64> {
+        Ok(self.open()?.deepest_overlap())
     }
 
     #[pyo3(signature = (target = None, scan = None))]
     fn reading<'py>(
         &self,
         py: Python<'py>,
-        target: Option<[f64; 2]>,
+        target: Option<&Bound<'_, PyAny>>,
         scan: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let scan = scan_points(scan)?;
@@ -520,67 +555,75 @@ impl Simulation {
             target: place(target)?,
             scan: &scan,
         };
-        let mut row = vec![0.0; ReadingLayout::new(self.model_ref(), scan.len()).size()];
-        self.inner.read(&look, &mut row);
+        let mut row = vec![0.0; ReadingLayout::new(&self.model, scan.len()).size()];
+        self.open()?.read(&look, &mut row);
         Ok(PyArray1::from_vec(py, row))
     }
 
-    #[pyo3(signature = (n_scan = 0))]
-    fn reading_layout<'py>(&self, py: Python<'py>, n_scan: usize) -> PyResult<Bound<'py, PyDict>> {
-        slices(py, &ReadingLayout::new(self.model_ref(), n_scan))
+    #[pyo3(signature = (n_scan = Given::MISSING), text_signature = "($self, n_scan=0)")]
+    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
+    fn reading_layout<'py>(
+        &self,
+        py: Python<'py>,
+        n_scan: Given<'_>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let n_scan = n_scan.count(0, Kind::Option, "n_scan")?;
+        slices(py, &ReadingLayout::new(&self.model, n_scan))
     }
 
-    fn energy(&self) -> Energy {
-        Energy {
-            inner: self.inner.energy(),
-        }
+    fn energy(&self) -> PyResult<Energy> {
+        Ok(self.open()?.energy().into())
     }
 
-    fn momentum<'py>(&self, py: Python<'py>) -> Pair<'py> {
-        let momentum = self.inner.momentum();
-        (
+    fn momentum<'py>(&self, py: Python<'py>) -> PyResult<Pair<'py>> {
+        let momentum = self.open()?.momentum();
+        Ok((
             fresh(py, momentum.linear.as_slice()),
             fresh(py, momentum.angular.as_slice()),
-        )
+        ))
     }
 
-    fn centre_of_mass<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        fresh(py, self.inner.centre_of_mass().as_slice())
+    fn centre_of_mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(fresh(py, self.open()?.centre_of_mass().as_slice()))
     }
 
     fn tags<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        tags(py, self.model_ref(), &self.inner.kinematics())
+        tags(py, &self.model, &self.open()?.kinematics())
     }
 
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        poses(py, self.model_ref(), &self.inner.kinematics())
+        poses(py, &self.model, &self.open()?.kinematics())
     }
 
-    fn snapshot(&self) -> Snapshot {
-        Snapshot {
-            inner: self.inner.snapshot(),
-        }
+    fn snapshot(&self) -> PyResult<Snapshot> {
+        Ok(Snapshot {
+            inner: self.open()?.snapshot(),
+        })
     }
 
-    fn restore(&mut self, snapshot: &Snapshot) -> PyResult<()> {
-        Ok(self
-            .inner
-            .restore(&snapshot.inner)
-            .map_err(BorderError::from)?)
+    fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
+        let snapshot = belonging::<Snapshot>(snapshot, "a Snapshot")?;
+        let restored = self.open()?.restore(&snapshot.get().inner);
+        Ok(restored.map_err(BorderError::from)?)
     }
 
     /// W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem.
     fn last_problem<'py>(&self, py: Python<'py>) -> PyResult<Problem<'py>> {
-        let (W, q, mu) = self.inner.last_problem();
+        let held = self.open()?;
+        let (W, q, mu) = held.last_problem();
         let (n, size) = (mu.len(), 3 * mu.len());
         let q = if n == 0 { &q[..0] } else { q };
         let W = DMatrix::from_row_slice(size, size, &W[..size * size]);
         Ok((fresh_matrix(py, &W)?, fresh(py, q), fresh(py, mu)))
     }
 
-    #[pyo3(signature = (n = 1000))]
-    fn profile<'py>(&self, py: Python<'py>, n: usize) -> PyResult<Bound<'py, PyDict>> {
-        let stopwatch = self.inner.profile(n).map_err(BorderError::from)?;
+    #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1000)")]
+    fn profile<'py>(&self, py: Python<'py>, n: Given<'_>) -> PyResult<Bound<'py, PyDict>> {
+        let steps = n.count(1000, Kind::Option, "n")?;
+        let (held, mut watch) = (self.open()?, Watch::new());
+        let inner = &*held;
+        let stopwatch = py.detach(|| inner.profile(steps, &mut || watch.go_on()));
+        let stopwatch = watch.result(stopwatch)?;
         let parts = PyDict::new(py);
         for (phase, microseconds) in stopwatch.microseconds() {
             parts.set_item(snake_case(&format!("{phase:?}")), microseconds)?;
@@ -589,24 +632,22 @@ impl Simulation {
     }
 
     fn __repr__(&self) -> String {
-        let model = self.model_ref();
-        format!(
-            "Simulation({:?}, nv={}, time={})",
-            model.description().name,
-            model.nv(),
-            self.time()
-        )
+        let (name, nv) = (&self.model.description().name, self.model.nv());
+        match self.open() {
+            Ok(inner) => format!("Simulation({name:?}, nv={nv}, time={})", inner.state().time),
+            Err(_) => format!("Simulation({name:?}, nv={nv}, stepping)"),
+        }
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
         let py = slf.py();
-        let own = slf.borrow();
+        let own = slf.get();
         let rebuild = slf.get_type().getattr("_rebuild")?;
         let arguments = (
             own.model(),
             own.terrain(py)?,
             own.settings(py)?,
-            own.snapshot(),
+            own.snapshot()?,
         );
         (rebuild, arguments).into_pyobject(py)
     }
@@ -617,12 +658,12 @@ impl Simulation {
         model: &Bound<'py, PyAny>,
         terrain: &Bound<'py, PyAny>,
         settings: &Bound<'py, PyDict>,
-        snapshot: &Snapshot,
+        snapshot: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let made = py
             .get_type::<Self>()
             .call((model, terrain), Some(settings))?;
-        made.cast::<Self>()?.borrow_mut().restore(snapshot)?;
+        made.cast::<Self>()?.get().restore(snapshot)?;
         Ok(made)
     }
 }

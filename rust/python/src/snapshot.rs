@@ -1,9 +1,12 @@
 //! `Snapshot`.
 
+use pyo3::PyTypeInfo;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use rover_core::simulation::Snapshot as CoreSnapshot;
+use serde::de::DeserializeOwned;
 
+use crate::arguments;
 use crate::errors::{BorderError, Kind, Value};
 
 /// Everything that a simulation needs to continue bit for bit; picklable.
@@ -18,9 +21,34 @@ impl Snapshot {
     }
 }
 
+/// A snapshot of the class that a simulation takes. `what`: the class with its article.
+pub fn belonging<'a, 'py, T: PyTypeInfo>(
+    given: &'a Bound<'py, PyAny>,
+    what: &str,
+) -> Result<&'a Bound<'py, T>, BorderError> {
+    let found = given.cast::<T>();
+    found.map_err(|_| arguments::refused(given, Kind::State, "snapshot", what))
+}
+
+/// Reads a snapshot from exactly these bytes.
+pub fn read<T: DeserializeOwned>(data: &Bound<'_, PyAny>) -> Result<T, BorderError> {
+    let data: &[u8] = data
+        .extract()
+        .map_err(|_| arguments::refused(data, Kind::State, "data", "bytes"))?;
+    let (snapshot, rest) = postcard::take_from_bytes(data).map_err(|e| damaged(&e))?;
+    if rest.is_empty() {
+        return Ok(snapshot);
+    }
+    Err(refused(&format!("{} bytes follow its end", rest.len())))
+}
+
 /// A snapshot whose bytes cannot be read.
 pub fn damaged(e: &postcard::Error) -> BorderError {
-    let message = format!("snapshot: its bytes are damaged ({e})");
+    refused(&e.to_string())
+}
+
+fn refused(reason: &str) -> BorderError {
+    let message = format!("snapshot: its bytes are damaged ({reason})");
     BorderError {
         kind: Kind::State,
         message,
@@ -32,10 +60,8 @@ pub fn damaged(e: &postcard::Error) -> BorderError {
 #[pymethods]
 impl Snapshot {
     #[staticmethod]
-    fn from_bytes(data: &[u8]) -> PyResult<Self> {
-        Ok(Self {
-            inner: postcard::from_bytes(data).map_err(|e| damaged(&e))?,
-        })
+    fn from_bytes(data: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Ok(Self { inner: read(data)? })
     }
 
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {

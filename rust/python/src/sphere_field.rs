@@ -1,15 +1,19 @@
 //! `SphereField`, and the terrain that a simulation takes: a plane or a field.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use rover_core::geometry::{Clearing, Rocks, SphereField as CoreField, Terrain};
 
+use crate::arguments::{Given, number, refused, shown, whole};
 use crate::arrays::{array, fresh, fresh_rows, vector};
 use crate::errors::{BorderError, Kind, Value};
+use crate::files::{self, in_file, read_text};
 use crate::plane::Plane;
+
+/// Longest file of spheres, bytes.
+const MAX_FILE: usize = 1 << 28;
 
 /// Fixed spheres, with or without a plane under them. Immutable.
 #[pyclass(module = "rover_gym._core", frozen, from_py_object)]
@@ -39,9 +43,7 @@ impl Ground {
     /// Any object as ground, or a `TerrainError`.
     pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<Self> {
         given.extract::<Self>().map_err(|_| {
-            let shown = given
-                .repr()
-                .map_or_else(|_| String::new(), |r| r.to_string());
+            let shown = shown(given);
             let message = format!("terrain: must be a Plane or a SphereField, is {shown}");
             let (field, value) = (Some("terrain".to_owned()), Value::Text(shown));
             BorderError {
@@ -86,12 +88,36 @@ fn rows<const N: usize>(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<[
         .collect())
 }
 
-fn build(centres: &[[f64; 3]], radii: &[f64], ground: Option<Plane>) -> PyResult<SphereField> {
-    let field = CoreField::new(centres, radii, ground.map(|plane| plane.inner))
-        .map_err(BorderError::from)?;
+fn build(
+    py: Python<'_>,
+    centres: &[[f64; 3]],
+    radii: &[f64],
+    ground: Option<Plane>,
+) -> Result<SphereField, BorderError> {
+    let ground = ground.map(|plane| plane.inner);
+    let field = py.detach(|| CoreField::new(centres, radii, ground))?;
     Ok(SphereField {
         inner: Arc::new(field),
     })
+}
+
+/// A plane, or none.
+fn plane(given: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Plane>> {
+    let read = |given: &Bound<'_, PyAny>| {
+        let found = given.extract::<Plane>();
+        found.map_err(|_| refused(given, Kind::Terrain, "ground", "a Plane").into())
+    };
+    given.map(read).transpose()
+}
+
+/// One number for both ends of a range, or two.
+fn range(given: &Bound<'_, PyAny>, field: &str) -> PyResult<[f64; 2]> {
+    if given.len().is_err() {
+        return Ok([number(given, Kind::Terrain, field)?; 2]);
+    }
+    let values = vector(given, Kind::Terrain, field)?;
+    let wrong = || refused(given, Kind::Terrain, field, "one number or two");
+    Ok(<[f64; 2]>::try_from(values).map_err(|_| wrong())?)
 }
 
 #[pymethods]
@@ -99,23 +125,27 @@ impl SphereField {
     #[new]
     #[pyo3(signature = (centres, radii, ground = None))]
     fn new(
+        py: Python<'_>,
         centres: &Bound<'_, PyAny>,
         radii: &Bound<'_, PyAny>,
-        ground: Option<Plane>,
+        ground: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        build(
-            &rows::<3>(centres, "centres")?,
-            &vector(radii, Kind::Terrain, "radii")?,
-            ground,
-        )
+        let centres = rows::<3>(centres, "centres")?;
+        let radii = vector(radii, Kind::Terrain, "radii")?;
+        Ok(build(py, &centres, &radii, plane(ground)?)?)
     }
 
     /// Reads a CSV file with the header x,y,z,radius (m).
     #[staticmethod]
     #[pyo3(signature = (path, ground = None))]
-    #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
-    fn from_file(py: Python<'_>, path: PathBuf, ground: Option<Plane>) -> PyResult<Self> {
-        let bytes = std::fs::read(&path)?;
+    fn from_file(
+        py: Python<'_>,
+        path: &Bound<'_, PyAny>,
+        ground: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let ground = plane(ground)?;
+        let path = files::path(path, Kind::Terrain)?;
+        let text = read_text(py, &path, Kind::Terrain, MAX_FILE)?;
         let refuse = |message: String| {
             let (field, value) = (
                 Some("path".to_owned()),
@@ -128,8 +158,6 @@ impl SphereField {
                 value,
             })
         };
-        let text = String::from_utf8(bytes)
-            .map_err(|_| refuse(format!("path: {} is not text", path.display())))?;
         let mut lines = text.lines();
         let header: Vec<String> = lines
             .next()
@@ -160,7 +188,7 @@ impl SphereField {
         let table = rows::<4>(&table, "path")?;
         let centres: Vec<[f64; 3]> = table.iter().map(|r| [r[0], r[1], r[2]]).collect();
         let radii: Vec<f64> = table.iter().map(|r| r[3]).collect();
-        build(&centres, &radii, ground)
+        build(py, &centres, &radii, ground).map_err(|e| in_file(e, &path).into())
     }
 
     /// The report's Fig. 6.6: 50 x 25 spheres of radius 0.5 m on a wave, without a plane.
@@ -174,42 +202,45 @@ impl SphereField {
     /// Rocks with the size-frequency distribution of Mars (Golombek and Rapp 1997) on a plane.
     #[staticmethod]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
-    #[pyo3(signature = (abundance, area, seed, *, max_diameter = 0.5, min_diameter = 0.05, burial = None, ground = None, clear = None))]
+    #[pyo3(signature = (abundance, area, seed, *, max_diameter = Given::MISSING, min_diameter = Given::MISSING, burial = None, ground = None,
+        clear = None),
+        text_signature = "(abundance, area, seed, *, max_diameter=0.5, min_diameter=0.05, burial=None, ground=None, clear=None)")]
     fn rocks(
-        abundance: f64,
-        area: [f64; 4],
-        seed: u64,
-        max_diameter: f64,
-        min_diameter: f64,
+        py: Python<'_>,
+        abundance: &Bound<'_, PyAny>,
+        area: &Bound<'_, PyAny>,
+        seed: &Bound<'_, PyAny>,
+        max_diameter: Given<'_>,
+        min_diameter: Given<'_>,
         burial: Option<&Bound<'_, PyAny>>,
-        ground: Option<Plane>,
+        ground: Option<&Bound<'_, PyAny>>,
         clear: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let burial = match burial {
-            None => [0.5; 2],
-            Some(given) => given
-                .extract::<f64>()
-                .map(|x| [x; 2])
-                .or_else(|_| given.extract::<[f64; 2]>())?,
+        let burial = burial.map_or(Ok([0.5; 2]), |given| range(given, "burial"))?;
+        let corners = vector(area, Kind::Terrain, "area")?;
+        let [x_min, z_min, x_max, z_max] = corners[..] else {
+            let what = "the four numbers x_min, z_min, x_max, z_max";
+            return Err(refused(area, Kind::Terrain, "area", what).into());
         };
-        let [x_min, z_min, x_max, z_max] = area;
         let clear = clear.map_or_else(|| Ok(Vec::new()), |c| rows::<3>(c, "clear"))?;
         let rocks = Rocks {
-            abundance,
+            abundance: number(abundance, Kind::Terrain, "abundance")?,
             area: [x_max - x_min, z_max - z_min],
             middle: [0.5 * (x_min + x_max), 0.5 * (z_min + z_max)],
-            seed,
-            max_diameter,
-            min_diameter,
+            seed: whole(seed, Kind::Terrain, "seed")?,
+            max_diameter: max_diameter.number(0.5, Kind::Terrain, "max_diameter")?,
+            min_diameter: min_diameter.number(0.05, Kind::Terrain, "min_diameter")?,
             burial,
             clearings: clear
                 .iter()
                 .map(|&[x, z, radius]| Clearing { x, z, radius })
                 .collect(),
-            ground: ground.map_or_else(rover_core::geometry::Plane::ground, |plane| plane.inner),
+            ground: plane(ground)?
+                .map_or_else(rover_core::geometry::Plane::ground, |plane| plane.inner),
         };
+        let field = py.detach(|| CoreField::rocks(&rocks));
         Ok(Self {
-            inner: Arc::new(CoreField::rocks(&rocks).map_err(BorderError::from)?),
+            inner: Arc::new(field.map_err(BorderError::from)?),
         })
     }
 

@@ -263,7 +263,7 @@ def mirror() -> Iterator[Finding]:
     x, z, r = rng.uniform(0.8, 4.0, 12), rng.uniform(0.3, 0.9, 12), rng.uniform(0.03, 0.08, 12)
     centres = np.concatenate([np.column_stack([x, 0.0 * x, s * z]) for s in (-1.0, 1.0)])
     for name, options in VARIANTS.items():
-        description = RoverModel().replace(wheel_radius=0.20).to_dict()
+        description = RoverModel().replace(contact_radius=0.20).to_dict()
         simulation = start(description, q={1: 0.45}, terrain=SphereField(centres, np.tile(r, 2), Plane()), **options)
         simulation.set_wheel_torques(np.full(6, 40.0))
         simulation.step(400)

@@ -97,6 +97,11 @@ def principal_inertia(solid: dict[str, Any]) -> Array:
     return np.array([across, m * r * r / 2.0, across])
 
 
+def contact_radius(wheel: dict[str, Any]) -> float:
+    """Radius at which a wheel of a description touches the ground, m."""
+    return wheel.get("contact_radius", wheel["radius"])
+
+
 def bodies(machine: dict[str, Any]) -> list[Body]:
     """The solids in the order of the coordinates: body i > 0 has joint coordinate 5 + i."""
     names = [solid["name"] for solid in machine["solids"]]
@@ -117,7 +122,7 @@ def bodies(machine: dict[str, Any]) -> list[Body]:
                 inertia=principal_inertia(solid),
                 hold=(hold["stiffness"], hold["damping"]),
                 wheel=wheel,
-                radius=machine["wheels"][wheel]["radius"] if wheel >= 0 else 0.0,
+                radius=contact_radius(machine["wheels"][wheel]) if wheel >= 0 else 0.0,
                 drive_sign=machine["wheels"][wheel]["drive_sign"] if wheel >= 0 else 0.0,
                 steers=steered.get(solid["name"], -1),
             )

@@ -159,6 +159,35 @@ fn a_bad_command_moves_nobody() {
 }
 
 #[test]
+fn a_call_that_is_told_to_stop_stops_after_a_whole_step() {
+    let model = Arc::new(Model::rover());
+    let (mut stopped, mut twin) = (rover(&model, 1), rover(&model, 1));
+    let mut asked = 0;
+    let report = stopped.step_while(100, &mut || {
+        asked += 1;
+        asked < 7
+    });
+    assert_eq!(report.unwrap().steps, 7);
+    twin.step(7).unwrap();
+    assert_eq!(stopped.snapshot(), twin.snapshot());
+    assert_eq!(stopped.last_call(), twin.last_call());
+}
+
+#[test]
+fn torques_stay_where_the_steering_is_refused() {
+    let mut rover = rover(&Arc::new(Model::rover()), 0);
+    let mut far = [0.1; 6];
+    far[4] = 9.0;
+    let refused = rover.set_commands(&[5.0; 6], &far);
+    assert!(matches!(
+        refused,
+        Err(CommandError::BeyondLimit { index: 4, .. })
+    ));
+    assert_eq!(rover.wheel_torques(), [0.0; 6]);
+    assert_eq!(rover.steering(), [0.0; 6]);
+}
+
+#[test]
 fn batches_that_make_no_sense_are_refused() {
     assert!(matches!(
         Batch::new(vec![], vec![], None),

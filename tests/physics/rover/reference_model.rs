@@ -8,7 +8,7 @@ use rover_core::multibody::{
     Kinematics, MassMatrix, Model, ModelDescription, bias, coordinates, momentum,
 };
 
-use crate::scenes::{golden, numbers, set_wheel_radius};
+use crate::scenes::{golden, numbers, set_contact_radius};
 
 fn assert_close(what: &str, actual: &[f64], expected: &[f64]) {
     let scale = expected.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -20,7 +20,7 @@ fn assert_close(what: &str, actual: &[f64], expected: &[f64]) {
 
 fn machine(masses: &[f64]) -> Model {
     let mut description = ModelDescription::rover();
-    set_wheel_radius(&mut description, 0.30);
+    set_contact_radius(&mut description, 0.30);
     for (solid, mass) in description.solids.iter_mut().zip(masses) {
         solid.mass = *mass;
     }

@@ -63,7 +63,7 @@ pub fn slope(degrees: f64) -> Plane {
     Plane::new([-a.sin(), a.cos(), 0.0], 0.0).unwrap()
 }
 
-/// The machine of the report's plane run: 880 kg table, wheel radius 0.30 m, gains of 1.5.
+/// The machine of the report's plane run: 880 kg table, contact radius 0.30 m, gains of 1.5.
 pub fn report_machine() -> Model {
     let masses = numbers(&golden("rover_model.json")["meta"]["masses_880"]);
     let mut description = ModelDescription::rover();
@@ -71,15 +71,15 @@ pub fn report_machine() -> Model {
         solid.mass = mass;
     }
     set_steering_gains(&mut description, 1.5, 1.5);
-    set_wheel_radius(&mut description, 0.30);
+    set_contact_radius(&mut description, 0.30);
     Model::from_description(description).unwrap()
 }
 
-/// The machine of the independent check: radius 0.20 m, gains of 15000, steering mass centres 7.5 cm low.
+/// The machine of the independent check: contact radius 0.20 m, gains of 15000, steering mass centres 7.5 cm low.
 pub fn check_machine() -> Model {
     let mut description = ModelDescription::rover();
     set_steering_gains(&mut description, 15_000.0, 15_000.0);
-    set_wheel_radius(&mut description, 0.20);
+    set_contact_radius(&mut description, 0.20);
     for solid in &mut description.solids {
         if solid.name.starts_with("steering") {
             solid.centre_of_mass = Some([0.0, -0.075, 0.0]);
@@ -88,9 +88,10 @@ pub fn check_machine() -> Model {
     Model::from_description(description).unwrap()
 }
 
-pub fn set_wheel_radius(description: &mut ModelDescription, radius: f64) {
+/// The radius at which the wheels touch; their discs stay.
+pub fn set_contact_radius(description: &mut ModelDescription, radius: f64) {
     for wheel in &mut description.wheels {
-        wheel.radius = radius;
+        wheel.contact_radius = Some(radius);
     }
 }
 

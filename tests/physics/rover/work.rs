@@ -152,7 +152,7 @@ fn a_snapshot_of_another_machine_is_refused() {
     );
     // the same size, another wheel
     let mut description = ModelDescription::rover();
-    description.wheels[0].radius = 0.2;
+    description.wheels[0].contact_radius = Some(0.2);
     let model = Arc::new(Model::from_description(description).unwrap());
     let other = Simulation::new(model, Arc::new(Plane::ground()), StepOptions::default()).unwrap();
     assert_eq!(

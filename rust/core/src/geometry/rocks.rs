@@ -79,6 +79,9 @@ const CELLS: usize = 2048;
 /// How often a rock that fell into a clearing is thrown again before it is left out.
 const THROWS: usize = 100;
 
+/// Most clearings of a field: each throw of a rock looks at all.
+const MAX_CLEARINGS: usize = 1000;
+
 impl Rocks {
     /// F_k(D): fraction of the ground that rocks of diameter `diameter` (m) or more cover, without upper limit.
     #[must_use]
@@ -108,10 +111,11 @@ impl Rocks {
         let (low, step) = self.grid();
         let mut sum = 0.0;
         let mut table = vec![0.0];
-        if self.abundance <= 0.0 {
+        let (k, q) = (self.abundance, self.decay());
+        // So few rocks that their law has no number has none at all.
+        if k <= 0.0 || !q.is_finite() {
             return table;
         }
-        let (k, q) = (self.abundance, self.decay());
         for i in 0..CELLS {
             let y = low + (i as f64 + 0.5) * step;
             sum += 4.0 * k * q / PI * (-q / y).exp() * step;
@@ -151,13 +155,22 @@ impl Rocks {
                 "positive and at most 1e6 m",
             )?;
         }
+        for (middle, side) in self.middle.iter().zip(self.area) {
+            let end = middle.abs() + 0.5 * side;
+            demand("area", end, end <= MAX_SIZE, "within 1e6 m of the origin")?;
+        }
         let (largest, smallest) = (self.max_diameter, self.min_diameter);
-        demand("max_diameter", largest, largest > 0.0, "positive")?;
+        demand(
+            "max_diameter",
+            largest,
+            largest > 0.0 && largest <= MAX_SIZE,
+            "positive and at most 1e6 m",
+        )?;
         demand(
             "min_diameter",
             smallest,
-            smallest > 0.0 && smallest <= largest,
-            "positive and at most max_diameter",
+            smallest >= 1e-4 && smallest <= largest,
+            "from 1e-4 m to max_diameter",
         )?;
         let [burial, deepest] = self.burial;
         demand(
@@ -172,12 +185,21 @@ impl Rocks {
             (burial..=0.5).contains(&deepest),
             "in [0, 0.5], and not below where the range begins",
         )?;
+        let count = self.clearings.len() as f64;
+        let few = MAX_CLEARINGS as f64;
+        demand("clear", count, count <= few, "at most 1000 circles")?;
         for clearing in &self.clearings {
             for value in [clearing.x, clearing.z] {
-                demand("clearings", value, true, "finite")?;
+                let is_near = value.abs() <= MAX_SIZE;
+                demand("clear", value, is_near, "within 1e6 m of the origin")?;
             }
             let radius = clearing.radius;
-            demand("clearings", radius, radius >= 0.0, "of positive radius")?;
+            demand(
+                "clear",
+                radius,
+                radius >= 0.0,
+                "of a radius that is not negative",
+            )?;
         }
         let up = self.ground.normal().y;
         demand("ground", up, up > 1e-3, "a plane whose normal points up")
@@ -195,7 +217,7 @@ impl Rocks {
         self.check()?;
         let table = self.table();
         let expected = self.expected_count();
-        check_count(expected.min(1e15) as usize)?;
+        check_count(expected.min(1e15).ceil() as usize)?;
         let mut random = Random::new(self.seed);
         let count = (expected + random.uniform()) as usize;
         let mut spheres = Vec::with_capacity(count);

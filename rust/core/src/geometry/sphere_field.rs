@@ -9,8 +9,8 @@ use super::rocks::Rocks;
 use super::sphere::Sphere;
 use super::terrain::{Primitive, Terrain};
 
-/// Most spheres of a field: about a gigabyte.
-pub const MAX_SPHERES: usize = 10_000_000;
+/// Most spheres of a field: some hundred megabytes, and a second to sort them.
+pub const MAX_SPHERES: usize = 2_000_000;
 
 /// Largest coordinate and radius of a sphere, m: there a double still resolves a nanometre.
 pub const MAX_SIZE: f64 = 1e6;
@@ -95,6 +95,9 @@ impl SphereField {
     /// A number out of its range; `TooMany`.
     pub fn rocks(rocks: &Rocks) -> Result<Self, TerrainError> {
         let spheres = rocks.sample()?;
+        for (index, sphere) in spheres.iter().enumerate() {
+            (sphere.centre.iter()).try_for_each(|&x| check_entry("centres", index, x))?;
+        }
         let tree = BallTree::new(&spheres);
         Ok(Self {
             spheres,

@@ -183,6 +183,9 @@ pub trait MechanicalSystem {
         0.0
     }
 
+    /// The step, or the part of one, that was asked for its work last becomes the state. By default nothing is kept of it.
+    fn accept(&mut self) {}
+
     /// Before the iterations of a Newton variant: what it must remember of the start. By default nothing.
     fn begin_balance(&mut self, _start: Start<'_, Self::Configuration>) {}
 

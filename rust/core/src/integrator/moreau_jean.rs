@@ -49,20 +49,68 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJean {
         scratch: &mut ScratchOf<S>,
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
-        let ws = scratch;
-        ws.fit(system.nv());
+        scratch.fit(system.nv());
+        scratch.grant_work(&options.solver);
+        let mut attempts = MOST_ATTEMPTS;
+        let whole = Part {
+            options,
+            depth: 0,
+            attempts: &mut attempts,
+        };
+        whole.advance(system, state, warm_start, scratch, probe)
+    }
+}
+
+/// Most attempts at a step with all its parts, beyond the parts that fast turning asks for.
+const MOST_ATTEMPTS: usize = 16;
+
+/// Most times that a step is halved.
+const MOST_HALVINGS: usize = 3;
+
+/// Turn of a frame in a step, rad, beyond which it is taken in parts.
+const MOST_TURN: f64 = 0.5;
+
+/// Most parts that fast turning is given; what turns faster is not resolved, and its energy is the audit's.
+const MOST_PARTS: f64 = 64.0;
+
+/// A step or a part of one: what did not come out is taken again in halves, which are other and mostly easier problems.
+struct Part<'a> {
+    options: &'a StepOptions,
+    depth: usize,
+    attempts: &'a mut usize,
+}
+
+impl Part<'_> {
+    fn advance<S: MechanicalSystem>(
+        self,
+        system: &mut S,
+        state: StateMut<'_, S::Configuration>,
+        warm_start: &mut WarmStart<KeyOf<S>>,
+        ws: &mut ScratchOf<S>,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError> {
+        let options = self.options;
         let start = Start {
             configuration: &*state.configuration,
             v: &*state.v,
         };
+        let turn = options.time_step * system.turning(start.v);
+        if self.depth == 0 && turn > MOST_TURN {
+            let n = (turn / MOST_TURN).min(MOST_PARTS).ceil();
+            return self.divide(n, system, state, warm_start, ws, probe);
+        }
         let before = energy_before(system, options, start, ws);
         system.revise(start, start.v);
         let mut is_gyroscopic = system.is_gyroscopic(options, start.v);
         let mut retaken = 0;
         let mut report = loop {
-            let is_last = is_gyroscopic;
+            *self.attempts = self.attempts.saturating_sub(1);
+            let can_halve = self.depth < MOST_HALVINGS && *self.attempts > 1 && ws.work_left > 0;
             let attempted = attempt(system, options, start, warm_start, ws, is_gyroscopic, probe);
             let Some(mut report) = attempted else {
+                if can_halve {
+                    return self.divide(2.0, system, state, warm_start, ws, probe);
+                }
                 return Err(StepError::SingularMassMatrix { time: *state.time });
             };
             report.retaken = retaken;
@@ -70,19 +118,77 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJean {
             if retaken <= MOST_REVISIONS && system.revise(start, &ws.v) {
                 continue;
             }
+            let is_solved = report.is_converged();
             let audit = Audit {
                 before,
-                is_last,
+                // Newton's law of restitution itself creates energy in some impacts: a smaller step would not help.
+                is_last: is_gyroscopic
+                    && (!can_halve || options.restitution > 0.0 && !ws.contacts.is_empty()),
                 drift: 0.0,
             };
-            match audit.judge(system, options, start, ws, &mut report) {
-                Verdict::Sound => break report,
-                Verdict::Coarse => is_gyroscopic = true,
+            let verdict = audit.judge(system, options, start, ws, &mut report);
+            if verdict == Verdict::Coarse && !is_gyroscopic {
+                is_gyroscopic = true;
+            } else if can_halve && (verdict == Verdict::Coarse || !is_solved) {
+                return self.divide(2.0, system, state, warm_start, ws, probe);
+            } else {
+                break report;
             }
         };
         probe.end(Phase::Update);
         report.steps = 1;
         finish(system, options, state, warm_start, ws, report, probe)
+    }
+
+    /// Takes the step in `n` equal parts, or leaves everything as it was.
+    fn divide<S: MechanicalSystem>(
+        self,
+        n: f64,
+        system: &mut S,
+        state: StateMut<'_, S::Configuration>,
+        warm_start: &mut WarmStart<KeyOf<S>>,
+        ws: &mut ScratchOf<S>,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError> {
+        let StateMut {
+            configuration,
+            v,
+            time,
+        } = state;
+        let kept = (configuration.clone(), v.to_vec(), *time, warm_start.clone());
+        let options = StepOptions {
+            time_step: self.options.time_step / n,
+            ..self.options.clone()
+        };
+        let mut total = StepReport::default();
+        let mut k = 0.0;
+        while k < n {
+            let part = Part {
+                options: &options,
+                depth: self.depth + 1,
+                attempts: &mut *self.attempts,
+            };
+            let state = StateMut {
+                configuration: &mut *configuration,
+                v: &mut *v,
+                time: &mut *time,
+            };
+            match part.advance(system, state, warm_start, ws, probe) {
+                Ok(report) => total.merge(&report),
+                Err(error) => {
+                    configuration.clone_from(&kept.0);
+                    v.copy_from_slice(&kept.1);
+                    *time = kept.2;
+                    *warm_start = kept.3;
+                    return Err(error);
+                }
+            }
+            k += 1.0;
+        }
+        *time = kept.2 + self.options.time_step;
+        total.steps = 1;
+        total.retaken += 1;
+        Ok(total)
     }
 }
 
@@ -134,15 +240,21 @@ fn attempt<S: MechanicalSystem>(
     }
     probe.end(Phase::Bias);
     let report = solve_contacts(system, options, ws, true, probe);
-    system.set_moved(&ws.middle, &ws.v, theta * h, &mut ws.end);
+    place(system, options, ws);
+    Some(report)
+}
+
+/// `q⁺ = q_m ⊕ θ h v⁺` and the gaps there, of the velocity `ws.v`.
+pub(super) fn place<S: MechanicalSystem>(system: &S, options: &StepOptions, ws: &mut ScratchOf<S>) {
+    let share = options.theta * options.time_step;
+    system.set_moved(&ws.middle, &ws.v, share, &mut ws.end);
     ws.gap_end.clear();
     let d = S::DIMENSION.components();
     let local = ws.u.chunks_exact(d).zip(ws.u_before.chunks_exact(d));
     let moved = |(contact, (u, before)): (&S::Contact, (&[f64], &[f64]))| {
-        contact.gap() + theta * h * (u[0] - before[0])
+        contact.gap() + share * (u[0] - before[0])
     };
     ws.gap_end.extend(ws.contacts.iter().zip(local).map(moved));
-    Some(report)
 }
 
 /// The free change `ws.y` (factor coordinates) by forces at v, then at the velocity that they lead to.
@@ -326,11 +438,12 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
         let solved = system.solve(
             &ws.q_free,
             &ws.mu,
-            &options.solver,
+            &ws.solver_options(&options.solver),
             &mut ws.p,
             &mut ws.u,
             &mut ws.solver,
         );
+        ws.work_left = ws.work_left.saturating_sub(solved.work);
         note(&mut report, &solved);
         // u came with the shift inside: take it out again.
         for (u, shift) in ws.u.chunks_exact_mut(d).zip(shifts()) {
@@ -380,6 +493,7 @@ pub(super) fn finish<S: MechanicalSystem>(
     if !is_finite {
         return Err(StepError::NonFinite { time: *time });
     }
+    system.accept();
     std::mem::swap(configuration, &mut ws.end);
     v.copy_from_slice(&ws.v);
     *time += options.time_step;

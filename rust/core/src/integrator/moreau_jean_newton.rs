@@ -52,6 +52,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         let (h, theta) = (options.time_step, options.theta);
         let ws = scratch;
         ws.fit(system.nv());
+        ws.grant_work(&options.solver);
         let start = Start {
             configuration: &*state.configuration,
             v: &*state.v,
@@ -104,7 +105,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
             let taken = MoreauJean.step(system, options, state, warm_start, ws, probe)?;
             return Ok(StepReport {
                 newton_iterations: report.newton_iterations,
-                status: StepStatus::NotConverged,
+                retaken: taken.retaken + 1,
                 ..taken
             });
         }
@@ -112,13 +113,16 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
             *mean = theta * end + (1.0 - theta) * begin;
         }
         system.set_moved(start.configuration, &ws.v_mean, h, &mut ws.end);
-        let turn = (options.time_step * system.turning(start.v)).min(MOST_TURN);
+        let turn = options.time_step * system.turning(start.v);
+        let drift = if turn <= MOST_TURN { turn.powi(3) } else { 0.0 };
         let audit = Audit {
             before,
             is_last: false,
-            drift: turn.powi(3),
+            drift,
         };
-        if audit.judge(system, options, start, ws, &mut report) == Verdict::Coarse {
+        let is_solved = report.is_converged();
+        let verdict = audit.judge(system, options, start, ws, &mut report);
+        if verdict == Verdict::Coarse || !is_solved {
             let taken = MoreauJean.step(system, options, state, warm_start, ws, probe)?;
             return Ok(StepReport {
                 newton_iterations: report.newton_iterations,

@@ -94,12 +94,19 @@ impl StepOptions {
             }
         };
         for value in self.gravity.iter() {
-            demand("gravity", *value, true, "finite")?;
+            let is_moderate = value.abs() <= 1e6;
+            demand(
+                "gravity",
+                *value,
+                is_moderate,
+                "at most 1e6 m/s² either way",
+            )?;
         }
         let (mu, e, h) = (self.friction_coefficient, self.restitution, self.time_step);
         demand("friction", mu, mu >= 0.0, "finite and not negative")?;
         demand("restitution", e, (0.0..=1.0).contains(&e), "in [0, 1]")?;
-        demand("time_step", h, h > 0.0, "finite and positive")?;
+        let is_step = (1e-9..=1e3).contains(&h);
+        demand("time_step", h, is_step, "from 1e-9 to 1e3 s")?;
         demand(
             "theta",
             self.theta,

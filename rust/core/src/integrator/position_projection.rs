@@ -68,11 +68,12 @@ fn displace<S: MechanicalSystem>(
     let solved = system.solve(
         &ws.q_free,
         &ws.mu,
-        &options.solver,
+        &ws.solver_options(&options.solver),
         &mut ws.p_position,
         &mut ws.u_position,
         &mut ws.solver,
     );
+    ws.work_left = ws.work_left.saturating_sub(solved.work);
     ws.y.fill(0.0);
     system.add_impulses(&ws.p_position, &mut ws.y);
     system.half_solve_back(&mut ws.y);

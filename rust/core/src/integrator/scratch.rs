@@ -1,7 +1,7 @@
 //! Scratch of a step that every system shares: vectors over velocities and over contacts.
 
 use super::energy_audit::Audited;
-use crate::solver::SolverWorkspace;
+use crate::solver::{SolverOptions, SolverWorkspace};
 
 /// Scratch of a step of configurations `Q` and contacts `C`. Nothing in it is state: a fresh one gives the same bits.
 ///
@@ -27,7 +27,13 @@ pub struct Scratch<Q, C> {
     pub(super) u_position: Vec<f64>,
     pub(super) solver: SolverWorkspace,
     pub(super) audited: Audited<Q>,
+    /// Work that the step's solves may still do, in the solver's unit.
+    pub(super) work_left: u64,
 }
+
+/// Share of the solver's budget that all solves of a step have together, and the share that each has in any case.
+const STEP_SHARE: u64 = 2;
+const SOLVE_SHARE: u64 = 64;
 
 impl<Q: Clone, C> Scratch<Q, C> {
     /// Room for nv velocities and n contacts of d components; `q` is any configuration of the right size.
@@ -54,6 +60,7 @@ impl<Q: Clone, C> Scratch<Q, C> {
             u_position: room(),
             solver: SolverWorkspace::default(),
             audited: Audited::new(q.clone(), nv),
+            work_left: 0,
         }
     }
 
@@ -67,6 +74,19 @@ impl<Q: Clone, C> Scratch<Q, C> {
             &mut self.v_mean,
         ] {
             vector.resize(nv, 0.0);
+        }
+    }
+
+    /// Grants a new step its work.
+    pub(super) fn grant_work(&mut self, options: &SolverOptions) {
+        self.work_left = options.budget / STEP_SHARE;
+    }
+
+    /// The options of the step's next solve.
+    pub(super) fn solver_options(&self, options: &SolverOptions) -> SolverOptions {
+        SolverOptions {
+            budget: self.work_left.max(options.budget / SOLVE_SHARE),
+            ..*options
         }
     }
 

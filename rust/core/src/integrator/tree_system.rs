@@ -53,6 +53,7 @@ pub struct TreeScratch {
     theta_held: Vec<f64>,
     motors: Vec<MotorRegime>,
     drive_work: Vec<f64>,
+    drive_work_done: Vec<f64>,
     energy: EnergyScratch,
     gyroscopic: GyroscopicScratch,
     force: Vec<f64>,
@@ -77,6 +78,7 @@ impl TreeScratch {
             theta_held: vec![0.5; model.n_joints()],
             motors: vec![MotorRegime::Constant(0.0); model.n_joints()],
             drive_work: vec![0.0; model.n_joints()],
+            drive_work_done: vec![0.0; model.n_joints()],
             energy: EnergyScratch::new(model),
             gyroscopic: GyroscopicScratch::default(),
             force: vec![0.0; model.nv()],
@@ -84,10 +86,9 @@ impl TreeScratch {
         }
     }
 
-    /// Work of each joint's drive in the last step (n_joints), J.
-    #[must_use]
-    pub fn drive_work(&self) -> &[f64] {
-        &self.drive_work
+    /// Work of each joint's drive since it was last set to zero (n_joints), J.
+    pub fn drive_work(&mut self) -> &mut [f64] {
+        &mut self.drive_work_done
     }
 
     /// Delassus operator of the last step, row-major, 1/kg.
@@ -344,6 +345,14 @@ impl MechanicalSystem for TreeSystem<'_> {
             total += (torque.drive + torque.other) * turned;
         }
         total
+    }
+
+    #[inline]
+    fn accept(&mut self) {
+        let parts = &mut *self.parts;
+        for (done, joules) in parts.drive_work_done.iter_mut().zip(&parts.drive_work) {
+            *done += joules;
+        }
     }
 
     fn begin_balance(&mut self, start: Start<'_, Configuration>) {

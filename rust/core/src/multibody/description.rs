@@ -69,6 +69,9 @@ pub struct SolidDescription {
     /// Gains with which the joint is held at a set-point.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hold: Option<Hold>,
+    /// Angle at which the joint is locked (welded), rad: its coordinate is gone. Free by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub locked: Option<f64>,
 }
 
 /// Gains of a joint held at a set-point: `τ = −stiffness (q − q*) − damping q̇`.
@@ -136,8 +139,11 @@ pub struct WheelDescription {
     pub solid: String,
     /// Direction of the axle in the solid's frame.
     pub axle: [f64; 3],
-    /// Contact radius, m.
+    /// Its radius, m; where the solid's shape is a disc, that disc's.
     pub radius: f64,
+    /// Radius at which it touches the ground, m, where that is meant to be another than the disc's; `radius` by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact_radius: Option<f64>,
     /// Largest driving torque, N m.
     pub torque_limit: f64,
     /// 1 or −1: joint torque of a positive (forward) command.
@@ -151,6 +157,21 @@ pub struct WheelDescription {
     /// Largest steering set-point either way, rad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steering_limit: Option<f64>,
+}
+
+/// Longest text of a description, bytes: a model of [`MAX_SOLIDS`](super::model::MAX_SOLIDS) solids takes a twentieth.
+pub const MAX_TEXT: usize = 16 << 20;
+
+fn check_length(text: &str) -> Result<(), ModelError> {
+    if text.len() > MAX_TEXT {
+        return Err(ModelError::TooMany {
+            field: "text",
+            what: "bytes",
+            count: text.len(),
+            limit: MAX_TEXT,
+        });
+    }
+    Ok(())
 }
 
 impl ModelDescription {
@@ -173,8 +194,9 @@ impl ModelDescription {
     /// Reads TOML.
     ///
     /// # Errors
-    /// [`ModelError::Unreadable`] with line and column.
+    /// [`ModelError::Unreadable`] with line and column; [`ModelError::TooMany`] beyond [`MAX_TEXT`].
     pub fn from_toml(text: &str) -> Result<Self, ModelError> {
+        check_length(text)?;
         toml::from_str(text).map_err(|e| ModelError::Unreadable {
             message: e.to_string(),
         })
@@ -193,8 +215,9 @@ impl ModelDescription {
     /// Reads JSON.
     ///
     /// # Errors
-    /// [`ModelError::Unreadable`] with line and column.
+    /// [`ModelError::Unreadable`] with line and column; [`ModelError::TooMany`] beyond [`MAX_TEXT`].
     pub fn from_json(text: &str) -> Result<Self, ModelError> {
+        check_length(text)?;
         serde_json::from_str(text).map_err(|e| ModelError::Unreadable {
             message: e.to_string(),
         })

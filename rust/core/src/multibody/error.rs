@@ -108,6 +108,50 @@ pub enum ModelError {
         /// Path of the field.
         field: String,
     },
+    /// A number so large or so small that the mechanics would overflow or vanish.
+    #[error("{field}: must be {range}, is {value}")]
+    OutOfRange {
+        /// Path of the field.
+        field: String,
+        /// Admissible values, in words.
+        range: &'static str,
+        /// What was given.
+        value: f64,
+    },
+    /// More than a model may have.
+    #[error("{field}: at most {limit} {what}, are {count}")]
+    TooMany {
+        /// Path of the field.
+        field: &'static str,
+        /// What is counted.
+        what: &'static str,
+        /// How many there are.
+        count: usize,
+        /// How many there may be.
+        limit: usize,
+    },
+    /// A wheel of another radius than the disc that it is.
+    #[error(
+        "{field}: {value} m contradicts the shape of {solid:?}, a disc of {shape} m; a wheel that touches the ground at another radius has a contact_radius"
+    )]
+    RadiusContradictsShape {
+        /// Path of the field.
+        field: String,
+        /// What was given, m.
+        value: f64,
+        /// The wheel's solid.
+        solid: String,
+        /// Radius of its disc, m.
+        shape: f64,
+    },
+    /// A wheel whose solid is no disc has no shape that a radius could change.
+    #[error("{field}: the shape of {solid:?} is no disc; give contact_radius instead")]
+    NotADisc {
+        /// Path of the field.
+        field: &'static str,
+        /// The wheel's solid.
+        solid: String,
+    },
     /// A steering limit of a wheel that has no steering joint.
     #[error("{field}: the steering solid {name:?} is not an ancestor of the wheel")]
     SteeringNotAbove {
@@ -137,7 +181,10 @@ impl ModelError {
             | Self::NotASign { field, .. }
             | Self::ImpossibleInertia { field, .. }
             | Self::CollidesWithoutBox { field }
+            | Self::OutOfRange { field, .. }
+            | Self::RadiusContradictsShape { field, .. }
             | Self::SteeringNotAbove { field, .. } => field,
+            Self::TooMany { field, .. } | Self::NotADisc { field, .. } => field,
         }
     }
 }

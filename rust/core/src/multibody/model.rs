@@ -4,13 +4,21 @@
 //! joint leaves no trace: the inertia of its solid is merged into the body that carries it and its
 //! coordinate is gone from every matrix.
 
+use std::collections::{HashMap, HashSet};
+
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
-use super::description::{Hold, ModelDescription, Shape};
+use super::description::{Hold, ModelDescription, Shape, SolidDescription};
 use super::error::ModelError;
 use super::joint::JointAxis;
 use super::motor::Motor;
 use crate::spatial::SymmetricMatrix3;
+
+/// Most solids of a model, and most wheels and tags: beyond it a step costs seconds and matrices gigabytes.
+pub const MAX_SOLIDS: usize = 1000;
+
+/// Largest length of a description either way, m.
+const MAX_LENGTH: f64 = 1e6;
 
 /// A moving body: one or several solids fixed to each other, under one revolute joint (the base: free).
 #[derive(Clone, Debug)]
@@ -101,7 +109,6 @@ pub struct CollisionBox {
 #[derive(Clone, Debug)]
 pub struct Model {
     description: ModelDescription,
-    locked: Vec<(String, f64)>,
     bodies: Vec<Body>,
     frames: Vec<Frame>,
     wheels: Vec<Wheel>,
@@ -125,12 +132,13 @@ struct Lump {
 }
 
 impl Model {
-    /// Checks a description and builds the tree with all joints free.
+    /// Checks a description and builds the tree; joints that it locks have no coordinate.
     ///
     /// # Errors
     /// The first thing found wrong, naming its field.
     pub fn from_description(description: ModelDescription) -> Result<Self, ModelError> {
-        Self::build(description, Vec::new())
+        check(&description)?;
+        Ok(Self::build(description))
     }
 
     /// The built-in rover of the report, 21 degrees of freedom.
@@ -150,30 +158,62 @@ impl Model {
     /// # Errors
     /// `UnknownName` for a joint that is not there, `NotFinite` for an angle that is not finite.
     pub fn with_locked_joints(&self, joints: &[(String, f64)]) -> Result<Self, ModelError> {
-        let mut locked = self.locked.clone();
+        let mut description = self.description.clone();
         for (i, (name, angle)) in joints.iter().enumerate() {
-            let is_joint = self
-                .description
-                .solids
-                .iter()
-                .skip(1)
-                .any(|s| &s.name == name);
-            if !is_joint {
+            let mut solids = description.solids.iter_mut().skip(1);
+            let Some(solid) = solids.find(|s| &s.name == name) else {
                 return Err(ModelError::UnknownName {
                     field: format!("joints[{i}]"),
                     name: name.clone(),
                 });
-            }
-            if !angle.is_finite() {
-                return Err(ModelError::NotFinite {
-                    field: format!("joints[{name}]"),
-                    value: *angle,
-                });
-            }
-            locked.retain(|(n, _)| n != name);
-            locked.push((name.clone(), *angle));
+            };
+            in_range(&format!("joints[{name}]"), *angle, 1e9, "at most 1e9 rad")?;
+            solid.locked = Some(*angle);
         }
-        Self::build(self.description.clone(), locked)
+        Ok(Self::build(description))
+    }
+
+    /// The same machine with wheels of another radius (m): the shape, its inertia and the contact change together. An
+    /// inertia that the description states is scaled by the square of the radius.
+    ///
+    /// # Errors
+    /// `NotADisc` for a wheel whose solid has another shape; a radius out of its range.
+    pub fn with_wheel_radius(&self, radius: f64) -> Result<Self, ModelError> {
+        let mut description = self.description.clone();
+        length("wheel_radius", radius)?;
+        for wheel in &mut description.wheels {
+            let mut solids = description.solids.iter_mut();
+            let solid = solids.find(|s| s.name == wheel.solid);
+            if let Some(solid) = solid {
+                let Shape::Disc { radius: before } = &mut solid.shape else {
+                    return Err(ModelError::NotADisc {
+                        field: "wheel_radius",
+                        solid: wheel.solid.clone(),
+                    });
+                };
+                let scale = (radius / *before).powi(2);
+                *before = radius;
+                for entry in solid.inertia.iter_mut().flatten() {
+                    *entry *= scale;
+                }
+            }
+            wheel.radius = radius;
+            wheel.contact_radius = None;
+        }
+        Self::from_description(description)
+    }
+
+    /// The same machine whose wheels touch the ground at another radius (m) than their discs': masses, inertias and looks stay.
+    ///
+    /// # Errors
+    /// A radius out of its range.
+    pub fn with_contact_radius(&self, radius: f64) -> Result<Self, ModelError> {
+        let mut description = self.description.clone();
+        length("contact_radius", radius)?;
+        for wheel in &mut description.wheels {
+            wheel.contact_radius = Some(radius);
+        }
+        Self::from_description(description)
     }
 
     /// The same machine with another torque–speed line, or none, on all wheels.
@@ -185,35 +225,32 @@ impl Model {
         for wheel in &mut description.wheels {
             wheel.motor = motor;
         }
-        Self::build(description, self.locked.clone())
+        Self::from_description(description)
     }
 
     #[allow(clippy::too_many_lines)] // one pass over the solids; its parts share every local
-    fn build(
-        description: ModelDescription,
-        locked: Vec<(String, f64)>,
-    ) -> Result<Self, ModelError> {
-        check(&description)?;
+    fn build(description: ModelDescription) -> Self {
         let mut bodies: Vec<Body> = Vec::new();
         let mut lumps: Vec<Lump> = Vec::new();
         let mut frames: Vec<Frame> = Vec::new();
         let mut boxes = Vec::new();
-        let index_of = |frames: &[Frame], name: &str| frames.iter().position(|f| f.name == name);
+        let index_of: HashMap<&str, usize> = (description.solids.iter().map(|s| s.name.as_str()))
+            .zip(0..)
+            .collect();
         for (i, solid) in description.solids.iter().enumerate() {
             let axis = solid
                 .axis
                 .and_then(|a| JointAxis::from_direction(&a.into()))
                 .unwrap_or(JointAxis::X);
-            let lock = locked
-                .iter()
-                .find(|(n, _)| *n == solid.name)
-                .map(|(_, angle)| *angle);
-            let parent = solid.parent.as_deref().and_then(|p| index_of(&frames, p));
+            let parent = solid
+                .parent
+                .as_deref()
+                .and_then(|p| index_of.get(p).copied());
             let frame = if let (Some(p), true) = (parent, i > 0) {
                 let carrier: Frame = frames[p].clone();
                 let position = carrier.position
                     + carrier.rotation * Vector3::from(solid.position.unwrap_or_default());
-                if let Some(angle) = lock {
+                if let Some(angle) = solid.locked {
                     let (rotation, _) = axis.rotate(&carrier.rotation, angle);
                     Frame {
                         name: solid.name.clone(),
@@ -307,17 +344,17 @@ impl Model {
                 body.principal_axes = Some(eigen.eigenvectors);
             }
         }
+        let joints: HashMap<&str, usize> = (bodies.iter().skip(1).map(|b| b.name.as_str()))
+            .zip(6..)
+            .collect();
+        let joint_of = |name: &str| joints.get(name).copied();
         let mut wheels = Vec::new();
         for wheel in &description.wheels {
-            let Some(frame) = index_of(&frames, &wheel.solid).map(|k| frames[k].clone()) else {
+            let Some(frame) = index_of
+                .get(wheel.solid.as_str())
+                .map(|&k| frames[k].clone())
+            else {
                 continue;
-            };
-            let joint_of = |name: &str| {
-                bodies
-                    .iter()
-                    .skip(1)
-                    .position(|b| b.name == name)
-                    .map(|k| k + 6)
             };
             let axle = frame.rotation * Vector3::from(wheel.axle).normalize();
             wheels.push(Wheel {
@@ -326,7 +363,7 @@ impl Model {
                 centre: frame.position,
                 axle,
                 spoke: perpendicular(&axle),
-                radius: wheel.radius,
+                radius: wheel.contact_radius.unwrap_or(wheel.radius),
                 torque_limit: wheel.torque_limit,
                 drive_sign: wheel.drive_sign,
                 motor: wheel.motor,
@@ -336,19 +373,11 @@ impl Model {
             });
         }
         mark_spinners(&mut bodies, &wheels, &boxes);
-        Ok(Self::with_tree(
-            description,
-            locked,
-            bodies,
-            frames,
-            wheels,
-            boxes,
-        ))
+        Self::with_tree(description, bodies, frames, wheels, boxes)
     }
 
     fn with_tree(
         description: ModelDescription,
-        locked: Vec<(String, f64)>,
         bodies: Vec<Body>,
         frames: Vec<Frame>,
         wheels: Vec<Wheel>,
@@ -366,21 +395,22 @@ impl Model {
         for (b, path) in path_of.iter().enumerate() {
             paths[b * path_stride..][..path.len()].copy_from_slice(path);
         }
-        let mut common = vec![0; bodies.len() * bodies.len()];
-        for (a, path_a) in path_of.iter().enumerate() {
-            for (b, path_b) in path_of.iter().enumerate() {
-                common[a * bodies.len() + b] = path_a
-                    .iter()
-                    .zip(path_b)
-                    .take_while(|(i, j)| i == j)
-                    .count();
+        // A path ends with its own body, which no path of a body before it has: what both share is what the parent shares.
+        let n = bodies.len();
+        let mut common = vec![0; n * n];
+        for a in 0..n {
+            common[a * n + a] = path_lengths[a];
+            for b in 0..a {
+                let shared = common[bodies[a].parent * n + b];
+                common[a * n + b] = shared;
+                common[b * n + a] = shared;
             }
         }
         let mass = bodies.iter().map(|b| b.mass).sum();
-        let fingerprint = fingerprint(&description, &locked);
+        let text = description.to_json().unwrap_or_default();
+        let fingerprint = fingerprint(text.bytes());
         Self {
             description,
-            locked,
             bodies,
             frames,
             wheels,
@@ -398,12 +428,6 @@ impl Model {
     #[must_use]
     pub fn description(&self) -> &ModelDescription {
         &self.description
-    }
-
-    /// Locked joints with their angles (rad).
-    #[must_use]
-    pub fn locked_joints(&self) -> &[(String, f64)] {
-        &self.locked
     }
 
     /// Moving bodies; the first is the base, body `b > 0` has velocity index `5 + b`.
@@ -487,20 +511,21 @@ impl Model {
 }
 
 /// FNV-1a over what tells models apart; the same on every machine and in every version.
-fn fingerprint(description: &ModelDescription, locked: &[(String, f64)]) -> u64 {
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    let text = description.to_json().unwrap_or_default();
-    let angles = locked
-        .iter()
-        .flat_map(|(name, angle)| name.bytes().chain(angle.to_bits().to_le_bytes()));
-    for byte in text.bytes().chain(angles) {
-        hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
-    }
-    hash
+pub(crate) fn fingerprint(bytes: impl IntoIterator<Item = u8>) -> u64 {
+    bytes.into_iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
 }
 
 /// Finds the bodies whose own rotation is only looks.
 fn mark_spinners(bodies: &mut [Body], wheels: &[Wheel], boxes: &[CollisionBox]) {
+    let carriers: HashSet<usize> = (bodies.iter().skip(1).map(|b| b.parent))
+        .chain(boxes.iter().map(|x| x.body))
+        .collect();
+    let mut wheels_of: HashMap<usize, Vec<&Wheel>> = HashMap::new();
+    for wheel in wheels {
+        wheels_of.entry(wheel.body).or_default().push(wheel);
+    }
     for b in 1..bodies.len() {
         let body = &bodies[b];
         let along = |x: &Vector3<f64>| x.cross(&body.axis.direction()).norm() < 1e-12;
@@ -513,12 +538,9 @@ fn mark_spinners(bodies: &mut [Body], wheels: &[Wheel], boxes: &[CollisionBox]) 
         };
         let is_symmetric =
             body.principal_axes.is_none() && (across[0] - across[1]).abs() <= 1e-14 * I.sum();
-        let is_leaf = bodies.iter().skip(1).all(|other| other.parent != b)
-            && boxes.iter().all(|x| x.body != b);
-        let wheels_spin = wheels
-            .iter()
-            .filter(|w| w.body == b)
-            .all(|w| along(&w.centre) && along(&w.axle));
+        let is_leaf = !carriers.contains(&b);
+        let wheels_spin =
+            (wheels_of.get(&b).into_iter().flatten()).all(|w| along(&w.centre) && along(&w.axle));
         let is_spinner = is_leaf
             && is_symmetric
             && wheels_spin
@@ -552,6 +574,43 @@ fn perpendicular(axle: &Vector3<f64>) -> Vector3<f64> {
         Vector3::y()
     };
     Rotation3::face_towards(axle, &e) * -Vector3::x()
+}
+
+/// Finite, and at most `limit` either way.
+fn in_range(field: &str, value: f64, limit: f64, range: &'static str) -> Result<(), ModelError> {
+    finite(field, &[value])?;
+    if value.abs() <= limit {
+        return Ok(());
+    }
+    Err(ModelError::OutOfRange {
+        field: field.to_owned(),
+        range,
+        value,
+    })
+}
+
+/// A length that is positive, m.
+fn length(field: &str, value: f64) -> Result<(), ModelError> {
+    positive(field, value)?;
+    if (1e-6..=MAX_LENGTH).contains(&value) {
+        return Ok(());
+    }
+    Err(ModelError::OutOfRange {
+        field: field.to_owned(),
+        range: "from 1e-6 to 1e6 m",
+        value,
+    })
+}
+
+/// A place, m.
+fn place(field: &str, values: &[f64; 3]) -> Result<(), ModelError> {
+    (values.iter()).try_for_each(|&x| in_range(field, x, MAX_LENGTH, "at most 1e6 m either way"))
+}
+
+/// A gain, a torque or an inertia: not negative, and no larger than a double can carry through a step.
+fn moderate(field: &str, value: f64) -> Result<(), ModelError> {
+    not_negative(field, value)?;
+    in_range(field, value, 1e18, "at most 1e18")
 }
 
 fn finite(field: &str, values: &[f64]) -> Result<(), ModelError> {
@@ -608,135 +667,185 @@ fn check(description: &ModelDescription) -> Result<(), ModelError> {
     if description.solids.is_empty() {
         return Err(ModelError::NoSolids);
     }
-    for (i, solid) in description.solids.iter().enumerate() {
-        let at = |what: &str| format!("solids[{i}].{what}");
-        let before = &description.solids[..i];
-        if before.iter().any(|s| s.name == solid.name) {
-            return Err(ModelError::DuplicateName {
-                field: at("name"),
-                name: solid.name.clone(),
-            });
-        }
-        if i == 0 {
-            for (is_given, what) in [
-                (solid.parent.is_some(), "parent"),
-                (solid.position.is_some(), "position"),
-                (solid.axis.is_some(), "axis"),
-                (solid.hold.is_some(), "hold"),
-            ] {
-                if is_given {
-                    return Err(ModelError::NotForBase {
-                        field: at(what),
-                        what,
-                    });
-                }
-            }
-        } else {
-            let Some(parent) = &solid.parent else {
-                return Err(ModelError::Missing {
-                    field: at("parent"),
-                });
-            };
-            if !before.iter().any(|s| s.name == *parent) {
-                return Err(ModelError::UnknownParent {
-                    field: at("parent"),
-                    name: parent.clone(),
-                });
-            }
-            let Some(axis) = solid.axis else {
-                return Err(ModelError::Missing { field: at("axis") });
-            };
-            direction(&at("axis"), axis)?;
-            let Some(position) = solid.position else {
-                return Err(ModelError::Missing {
-                    field: at("position"),
-                });
-            };
-            finite(&at("position"), &position)?;
-        }
-        positive(&at("mass"), solid.mass)?;
-        match solid.shape {
-            Shape::Box { size } => size
-                .iter()
-                .try_for_each(|&s| positive(&at("shape.size"), s))?,
-            Shape::Cylinder { radius, height } => {
-                positive(&at("shape.radius"), radius)?;
-                positive(&at("shape.height"), height)?;
-            }
-            Shape::Disc { radius } => positive(&at("shape.radius"), radius)?,
-        }
-        finite(
-            &at("centre_of_mass"),
-            &solid.centre_of_mass.unwrap_or_default(),
-        )?;
-        if let Some(inertia) = solid.inertia {
-            finite(&at("inertia"), &inertia)?;
-        }
-        let principal =
-            solid_inertia(solid.mass, &solid.shape, solid.inertia).symmetric_eigenvalues();
-        let (sum, largest) = (principal.sum(), principal.max());
-        if principal.min() <= 0.0 || largest > (sum - largest) * (1.0 + 1e-9) {
-            return Err(ModelError::ImpossibleInertia {
-                field: at("inertia"),
-                principal: principal.into(),
-            });
-        }
-        if let Some(hold) = solid.hold {
-            not_negative(&at("hold.stiffness"), hold.stiffness)?;
-            not_negative(&at("hold.damping"), hold.damping)?;
-        }
-        if solid.collides && !matches!(solid.shape, Shape::Box { .. }) {
-            return Err(ModelError::CollidesWithoutBox {
-                field: at("collides"),
+    for (field, count) in [
+        ("solids", description.solids.len()),
+        ("wheels", description.wheels.len()),
+        ("tags", description.tags.len()),
+    ] {
+        if count > MAX_SOLIDS {
+            return Err(ModelError::TooMany {
+                field,
+                what: field,
+                count,
+                limit: MAX_SOLIDS,
             });
         }
     }
-    check_wheels(description)?;
-    check_tags(description)
+    let mut solids: HashMap<&str, usize> = HashMap::new();
+    for (i, solid) in description.solids.iter().enumerate() {
+        if solids.contains_key(solid.name.as_str()) {
+            return Err(ModelError::DuplicateName {
+                field: format!("solids[{i}].name"),
+                name: solid.name.clone(),
+            });
+        }
+        check_joint(i, solid, &solids)?;
+        check_body(i, solid)?;
+        solids.insert(&solid.name, i);
+    }
+    check_wheels(description, &solids)?;
+    check_tags(description, &solids)
 }
 
-fn check_tags(description: &ModelDescription) -> Result<(), ModelError> {
+/// What carries a solid. `before`: the solids listed before it.
+fn check_joint(
+    i: usize,
+    solid: &SolidDescription,
+    before: &HashMap<&str, usize>,
+) -> Result<(), ModelError> {
+    let at = |what: &str| format!("solids[{i}].{what}");
+    if i == 0 {
+        let given = [
+            (solid.parent.is_some(), "parent"),
+            (solid.position.is_some(), "position"),
+            (solid.axis.is_some(), "axis"),
+            (solid.hold.is_some(), "hold"),
+            (solid.locked.is_some(), "locked"),
+        ];
+        return match given.iter().find(|(is_given, _)| *is_given) {
+            Some((_, what)) => Err(ModelError::NotForBase {
+                field: at(what),
+                what,
+            }),
+            None => Ok(()),
+        };
+    }
+    let missing = |what: &str| ModelError::Missing { field: at(what) };
+    let parent = solid.parent.as_ref().ok_or_else(|| missing("parent"))?;
+    if !before.contains_key(parent.as_str()) {
+        return Err(ModelError::UnknownParent {
+            field: at("parent"),
+            name: parent.clone(),
+        });
+    }
+    direction(&at("axis"), solid.axis.ok_or_else(|| missing("axis"))?)?;
+    let position = solid.position.ok_or_else(|| missing("position"))?;
+    place(&at("position"), &position)?;
+    if let Some(angle) = solid.locked {
+        in_range(&at("locked"), angle, 1e9, "at most 1e9 rad")?;
+    }
+    if let Some(hold) = solid.hold {
+        moderate(&at("hold.stiffness"), hold.stiffness)?;
+        moderate(&at("hold.damping"), hold.damping)?;
+    }
+    Ok(())
+}
+
+/// Mass, shape and inertia of a solid.
+fn check_body(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
+    let at = |what: &str| format!("solids[{i}].{what}");
+    positive(&at("mass"), solid.mass)?;
+    if !(1e-9..=1e12).contains(&solid.mass) {
+        return Err(ModelError::OutOfRange {
+            field: at("mass"),
+            range: "from 1e-9 to 1e12 kg",
+            value: solid.mass,
+        });
+    }
+    match solid.shape {
+        Shape::Box { size } => size
+            .iter()
+            .try_for_each(|&s| length(&at("shape.size"), s))?,
+        Shape::Cylinder { radius, height } => {
+            length(&at("shape.radius"), radius)?;
+            length(&at("shape.height"), height)?;
+        }
+        Shape::Disc { radius } => length(&at("shape.radius"), radius)?,
+    }
+    place(
+        &at("centre_of_mass"),
+        &solid.centre_of_mass.unwrap_or_default(),
+    )?;
+    for entry in solid.inertia.iter().flatten() {
+        in_range(&at("inertia"), *entry, 1e24, "at most 1e24 kg m²")?;
+    }
+    let principal = solid_inertia(solid.mass, &solid.shape, solid.inertia).symmetric_eigenvalues();
+    let (sum, largest) = (principal.sum(), principal.max());
+    if principal.min() <= 0.0 || largest > (sum - largest) * (1.0 + 1e-9) {
+        return Err(ModelError::ImpossibleInertia {
+            field: at("inertia"),
+            principal: principal.into(),
+        });
+    }
+    if solid.collides && !matches!(solid.shape, Shape::Box { .. }) {
+        return Err(ModelError::CollidesWithoutBox {
+            field: at("collides"),
+        });
+    }
+    Ok(())
+}
+
+fn check_tags(
+    description: &ModelDescription,
+    solids: &HashMap<&str, usize>,
+) -> Result<(), ModelError> {
+    let mut names = HashSet::new();
     for (i, tag) in description.tags.iter().enumerate() {
         let at = |what: &str| format!("tags[{i}].{what}");
-        let is_taken = description.tags[..i].iter().any(|t| t.name == tag.name)
-            || description.solids.iter().any(|s| s.name == tag.name);
-        if is_taken {
+        if solids.contains_key(tag.name.as_str()) || !names.insert(tag.name.as_str()) {
             return Err(ModelError::DuplicateName {
                 field: at("name"),
                 name: tag.name.clone(),
             });
         }
-        if !description.solids.iter().any(|s| s.name == tag.solid) {
+        if !solids.contains_key(tag.solid.as_str()) {
             return Err(ModelError::UnknownName {
                 field: at("solid"),
                 name: tag.solid.clone(),
             });
         }
-        finite(&at("position"), &tag.position)?;
+        place(&at("position"), &tag.position)?;
     }
     Ok(())
 }
 
-fn check_wheels(description: &ModelDescription) -> Result<(), ModelError> {
-    let solids = &description.solids;
+fn check_wheels(
+    description: &ModelDescription,
+    solids: &HashMap<&str, usize>,
+) -> Result<(), ModelError> {
+    let mut names = HashSet::new();
     for (i, wheel) in description.wheels.iter().enumerate() {
         let at = |what: &str| format!("wheels[{i}].{what}");
-        if description.wheels[..i].iter().any(|w| w.name == wheel.name) {
+        if !names.insert(wheel.name.as_str()) {
             return Err(ModelError::DuplicateName {
                 field: at("name"),
                 name: wheel.name.clone(),
             });
         }
-        let find = |name: &str| solids.iter().position(|s| s.name == name);
-        let Some(mut solid) = find(&wheel.solid) else {
-            return Err(ModelError::UnknownName {
-                field: at("solid"),
-                name: wheel.solid.clone(),
-            });
+        let find = |field: &str, name: &String| {
+            let found = solids.get(name.as_str()).copied();
+            found.ok_or_else(|| ModelError::UnknownName {
+                field: at(field),
+                name: name.clone(),
+            })
         };
+        let mut solid = find("solid", &wheel.solid)?;
         direction(&at("axle"), wheel.axle)?;
-        positive(&at("radius"), wheel.radius)?;
-        not_negative(&at("torque_limit"), wheel.torque_limit)?;
+        length(&at("radius"), wheel.radius)?;
+        if let Some(radius) = wheel.contact_radius {
+            length(&at("contact_radius"), radius)?;
+        }
+        if let Shape::Disc { radius } = description.solids[solid].shape
+            && (radius - wheel.radius).abs() > 1e-9 * radius
+        {
+            return Err(ModelError::RadiusContradictsShape {
+                field: at("radius"),
+                value: wheel.radius,
+                solid: wheel.solid.clone(),
+                shape: radius,
+            });
+        }
+        moderate(&at("torque_limit"), wheel.torque_limit)?;
         finite(&at("drive_sign"), &[wheel.drive_sign])?;
         if (wheel.drive_sign.abs() - 1.0).abs() > 0.0 {
             return Err(ModelError::NotASign {
@@ -746,17 +855,22 @@ fn check_wheels(description: &ModelDescription) -> Result<(), ModelError> {
         }
         if let Some(motor) = wheel.motor {
             positive(&at("motor.stall_torque"), motor.stall_torque)?;
+            moderate(&at("motor.stall_torque"), motor.stall_torque)?;
             positive(&at("motor.no_load_speed"), motor.no_load_speed)?;
+            if !(1e-6..=1e9).contains(&motor.no_load_speed) {
+                return Err(ModelError::OutOfRange {
+                    field: at("motor.no_load_speed"),
+                    range: "from 1e-6 to 1e9 rad/s",
+                    value: motor.no_load_speed,
+                });
+            }
         }
         if let Some(name) = &wheel.steering {
-            let Some(steering) = find(name) else {
-                return Err(ModelError::UnknownName {
-                    field: at("steering"),
-                    name: name.clone(),
-                });
-            };
-            while let (Some(parent), true) = (&solids[solid].parent, solid != steering) {
-                solid = find(parent).unwrap_or(0);
+            let steering = find("steering", name)?;
+            // Parents come before their children, so the way up ends.
+            while solid > steering {
+                let parent = description.solids[solid].parent.as_deref();
+                solid = parent.and_then(|p| solids.get(p).copied()).unwrap_or(0);
             }
             if solid != steering || steering == 0 {
                 return Err(ModelError::SteeringNotAbove {
@@ -769,7 +883,7 @@ fn check_wheels(description: &ModelDescription) -> Result<(), ModelError> {
                     field: at("steering_limit"),
                 });
             };
-            not_negative(&at("steering_limit"), limit)?;
+            moderate(&at("steering_limit"), limit)?;
         }
     }
     Ok(())

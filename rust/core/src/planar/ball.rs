@@ -9,8 +9,8 @@
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
-use super::error::{PlanarError, positive};
-use super::machine::{Disc, PlanarMachine};
+use super::error::{INERTIAS, LENGTHS, MASSES, PlanarError, within};
+use super::machine::{Disc, PlanarMachine, fingerprint};
 
 /// A disc.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,12 +24,12 @@ impl Ball {
     /// `mass` in kg, `radius` in m, `inertia` about the centre in kg m².
     ///
     /// # Errors
-    /// A number that is not finite and positive.
+    /// A number that is not finite and positive, or out of its range.
     pub fn new(mass: f64, radius: f64, inertia: f64) -> Result<Self, PlanarError> {
         Ok(Self {
-            mass: positive("mass", mass)?,
-            radius: positive("radius", radius)?,
-            inertia: positive("inertia", inertia)?,
+            mass: within(|| "mass".to_owned(), mass, MASSES)?,
+            radius: within(|| "radius".to_owned(), radius, LENGTHS)?,
+            inertia: within(|| "inertia".to_owned(), inertia, INERTIAS)?,
         })
     }
 
@@ -103,5 +103,9 @@ impl PlanarMachine<3> for Ball {
 
     fn arms(&self) -> SVector<f64, 3> {
         SVector::from([1.0, 1.0, self.radius])
+    }
+
+    fn fingerprint(&self) -> u64 {
+        fingerprint("ball", [self.mass, self.radius, self.inertia])
     }
 }

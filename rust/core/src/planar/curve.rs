@@ -3,14 +3,39 @@
 //! With the centre c and `D(x) = ½ |(x, f(x)) − c|²` the points sought are the minima of D, roots of
 //! `g(x) = (x − c_x) + (f(x) − c_y) f'(x)` where g rises. On a cell [a, b] with the bounds |f''| ≤ B₂ etc. a centre value that
 //! |g'|'s bound cannot bring to zero excludes roots, a derivative that |g''|'s bound cannot bring to zero leaves one at most, and any
-//! other cell is halved: no root is missed, however many there are. A root pair closer than 1e-9 of the cell is none.
+//! other cell is halved: no root is missed. Cells are looked at in the order of the least distance that their curve can have, so the search ends
+//! with the reach, from inside the ground with the nearest root, and with the [`MAX_FACING`] nearest where there are more. A root pair closer than
+//! 1e-9 of the window, or of a metre, is none.
 
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 use std::sync::Arc;
 
 use nalgebra::Vector2;
 
-use super::error::{PlanarError, finite, positive};
-use super::ground::{Facing, Ground};
+use super::error::{PLACES, PlanarError, Range, finite, within};
+use super::ground::{Facing, Ground, MAX_FACING};
+
+/// Slopes, m/m.
+const SLOPES: Range = Range {
+    ends: [-1e3, 1e3],
+    words: "at most 1000 either way",
+};
+
+/// Wavelengths, m: a disc rolls over shorter ones as over roughness.
+const WAVELENGTHS: Range = Range {
+    ends: [1e-3, 1e9],
+    words: "from 1e-3 to 1e9 m",
+};
+
+/// Phases, rad.
+const PHASES: Range = Range {
+    ends: [-1e6, 1e6],
+    words: "at most 1e6 rad either way",
+};
+
+/// Most points of a curve.
+pub const MAX_POINTS: usize = 2_000_000;
 
 /// Value and derivatives at a place: `[f, f', f'', f''']`.
 pub type Jet = [f64; 4];
@@ -22,6 +47,9 @@ pub trait Curve: std::fmt::Debug + Send + Sync {
 
     /// Bounds of `|f'|`, `|f''|`, `|f'''|` on [a, b].
     fn bounds(&self, a: f64, b: f64) -> [f64; 3];
+
+    /// Bounds of f on [a, b], below and above, m.
+    fn range(&self, a: f64, b: f64) -> [f64; 2];
 }
 
 /// `y = slope x + offset`.
@@ -33,11 +61,11 @@ pub struct Line {
 
 impl Line {
     /// # Errors
-    /// A number that is not finite.
+    /// A number that is not finite or out of its range.
     pub fn new(slope: f64, offset: f64) -> Result<Self, PlanarError> {
         Ok(Self {
-            slope: finite("slope", slope)?,
-            offset: finite("offset", offset)?,
+            slope: within(|| "slope".to_owned(), slope, SLOPES)?,
+            offset: within(|| "offset".to_owned(), offset, PLACES)?,
         })
     }
 
@@ -97,19 +125,30 @@ pub struct Sine {
 
 impl Sine {
     /// # Errors
-    /// A number that is not finite, or a wavelength that is not positive.
+    /// A number that is not finite or out of its range: wavelengths from a millimetre, slopes `2π amplitude/wavelength` up to 1000.
     pub fn new(
         amplitude: f64,
         wavelength: f64,
         phase: f64,
         offset: f64,
     ) -> Result<Self, PlanarError> {
+        let wavelength = within(|| "wavelength".to_owned(), wavelength, WAVELENGTHS)?;
+        let k = std::f64::consts::TAU / wavelength;
+        let steepest = SLOPES.ends[1] / k;
+        within(|| "amplitude".to_owned(), amplitude, PLACES)?;
+        if amplitude.abs() > steepest {
+            return Err(PlanarError::OutOfRange {
+                field: "amplitude".to_owned(),
+                range: "at most 1000/2π of the wavelength either way",
+                value: amplitude,
+            });
+        }
         Ok(Self {
-            amplitude: finite("amplitude", amplitude)?,
-            wavelength: positive("wavelength", wavelength)?,
-            phase: finite("phase", phase)?,
-            offset: finite("offset", offset)?,
-            k: std::f64::consts::TAU / wavelength,
+            amplitude,
+            wavelength,
+            phase: within(|| "phase".to_owned(), phase, PHASES)?,
+            offset: within(|| "offset".to_owned(), offset, PLACES)?,
+            k,
         })
     }
 
@@ -135,6 +174,11 @@ impl Curve for Sine {
     fn bounds(&self, _a: f64, _b: f64) -> [f64; 3] {
         let (a, k) = (self.amplitude.abs(), self.k);
         [a * k, a * k * k, a * k * k * k]
+    }
+
+    fn range(&self, _a: f64, _b: f64) -> [f64; 2] {
+        let a = self.amplitude.abs();
+        [self.offset - a, self.offset + a]
     }
 }
 
@@ -179,8 +223,8 @@ impl Spline {
         for i in (1..n - 1).rev() {
             m[i] -= upper[i] * m[i + 1];
         }
-        for (index, value) in m.iter().enumerate() {
-            finite(&format!("y[{index}]"), *value)?;
+        if let Some(index) = m.iter().position(|x| !x.is_finite()) {
+            finite(&format!("y[{index}]"), m[index])?;
         }
         Ok(Self {
             x: x.to_vec(),
@@ -242,6 +286,22 @@ impl Curve for Spline {
         bounds[0] += bounds[1] * (b - a);
         bounds
     }
+
+    fn range(&self, a: f64, b: f64) -> [f64; 2] {
+        // Beyond the table the curve is straight, so its ends bound it; within a piece it leaves the chord by max|f''| h²/8 at most.
+        let ends = [self.jet(a)[0], self.jet(b)[0]];
+        let mut range = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        let (first, last) = (self.x[0], self.x[self.x.len() - 1]);
+        let (a, b) = (a.clamp(first, last), b.clamp(first, last));
+        for i in self.piece(a)..=self.piece(b) {
+            let h = self.x[i + 1] - self.x[i];
+            let bulge = self.m[i].abs().max(self.m[i + 1].abs()) * h * h / 8.0;
+            let (y0, y1) = (self.y[i], self.y[i + 1]);
+            range[0] = range[0].min(y0.min(y1) - bulge);
+            range[1] = range[1].max(y0.max(y1) + bulge);
+        }
+        range
+    }
 }
 
 pub(super) fn check_points(x: &[f64], y: &[f64]) -> Result<(), PlanarError> {
@@ -249,6 +309,12 @@ pub(super) fn check_points(x: &[f64], y: &[f64]) -> Result<(), PlanarError> {
         return Err(PlanarError::TooFewPoints {
             needed: 2,
             count: x.len(),
+        });
+    }
+    if x.len() > MAX_POINTS {
+        return Err(PlanarError::TooManyPoints {
+            count: x.len(),
+            limit: MAX_POINTS,
         });
     }
     if y.len() != x.len() {
@@ -259,7 +325,7 @@ pub(super) fn check_points(x: &[f64], y: &[f64]) -> Result<(), PlanarError> {
     }
     for (name, values) in [("x", x), ("y", y)] {
         for (index, value) in values.iter().enumerate() {
-            finite(&format!("{name}[{index}]"), *value)?;
+            within(|| format!("{name}[{index}]"), *value, PLACES)?;
         }
     }
     Ok(())
@@ -322,14 +388,14 @@ fn facing(curve: &dyn Curve, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Fa
         centre.x - half * (1.0 + 1e-6),
         centre.x + half * (1.0 + 1e-6),
     );
-    minima(curve, centre, a, b, &mut |x| {
+    let limit = if is_inside { f64::INFINITY } else { reach };
+    minima(curve, centre, a, b, limit, &mut |x| {
         let [y, slope, ..] = curve.jet(x);
         let length = slope.hypot(1.0);
         let n = Vector2::new(-slope, 1.0) / length;
         let away = centre - Vector2::new(x, y);
         let distance = away.norm();
         let side = away.dot(&n);
-        let limit = if is_inside { f64::INFINITY } else { reach };
         if distance <= limit && (side < 0.0) == is_inside {
             out.push(Facing {
                 foot: Vector2::new(x, y),
@@ -337,9 +403,22 @@ fn facing(curve: &dyn Curve, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Fa
                 distance: side,
             });
         }
+        let is_enough = out.len() - begin >= MAX_FACING;
+        // From inside only the nearest counts: nothing farther is looked for.
+        match (is_enough, is_inside) {
+            (true, _) => 0.0,
+            (false, true) => distance,
+            (false, false) => limit,
+        }
     });
+    out[begin..].sort_by(|a, b| a.foot.x.total_cmp(&b.foot.x));
     if is_inside {
         keep_nearest(out, begin);
+        if out.len() == begin {
+            // So deep that its nearest points are all alike to a double: straight up.
+            let [y, slope, ..] = curve.jet(centre.x);
+            out.push(tangent_facing(centre, y, slope));
+        }
     }
 }
 
@@ -360,19 +439,91 @@ fn gradient(curve: &dyn Curve, centre: &Vector2<f64>, x: f64) -> (f64, f64) {
     (x - centre.x + above * d1, 1.0 + d1 * d1 + above * d2)
 }
 
-/// Cells narrower than this share of the window are not halved any more.
+/// Cells narrower than this share of the window, or of a metre, are not halved any more.
 const NARROWEST: f64 = 1e-9;
 
-/// Calls `found` with every minimum of the distance in [a, b], in the order of x.
-fn minima(curve: &dyn Curve, centre: &Vector2<f64>, a: f64, b: f64, found: &mut dyn FnMut(f64)) {
-    let narrowest = NARROWEST * (b - a);
-    // A minimum: g is below zero before and not after. Cells come in the order of x.
-    let mut cells = vec![(a, b)];
-    while let Some((a, b)) = cells.pop() {
+/// Most cells of one search. A disc that meets 64 points takes some thousand.
+const MAX_CELLS: usize = 100_000;
+
+/// A cell of x and the least distance that the curve over it can have from the centre.
+struct Cell {
+    a: f64,
+    b: f64,
+    /// Bounds of the derivatives.
+    bounds: [f64; 3],
+    /// Size of f's height over the centre, at the middle.
+    above: f64,
+    /// How far the middle is from the centre, along x.
+    aside: f64,
+    least: f64,
+}
+
+impl Cell {
+    fn new(curve: &dyn Curve, centre: &Vector2<f64>, a: f64, b: f64) -> Self {
+        let across = (a - centre.x).max(centre.x - b).max(0.0);
+        let [low, high] = curve.range(a, b);
+        let beside = (low - centre.y).max(centre.y - high).max(0.0);
+        let bounds = curve.bounds(a, b);
+        let above = (curve.jet(0.5 * (a + b))[0] - centre.y).abs();
+        let beside = beside.max(above - bounds[0] * 0.5 * (b - a));
+        Self {
+            a,
+            b,
+            bounds,
+            above,
+            aside: (0.5 * (a + b) - centre.x).abs(),
+            // Less than what rounding could add.
+            least: across.hypot(beside) * (1.0 - 1e-9),
+        }
+    }
+}
+
+/// The nearest comes first out of a heap.
+impl Ord for Cell {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let by_distance = other.least.total_cmp(&self.least);
+        by_distance.then_with(|| other.aside.total_cmp(&self.aside))
+    }
+}
+
+impl PartialOrd for Cell {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Cell {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Cell {}
+
+/// Calls `found` with every minimum of the distance in [a, b], nearer cells first, up to a distance of `limit` (m) and then of the least that
+/// `found` returned.
+fn minima(
+    curve: &dyn Curve,
+    centre: &Vector2<f64>,
+    a: f64,
+    b: f64,
+    mut limit: f64,
+    found: &mut dyn FnMut(f64) -> f64,
+) {
+    let narrowest = NARROWEST * (b - a).min(1.0);
+    // A minimum: g is below zero before and not after.
+    let mut cells = BinaryHeap::from([Cell::new(curve, centre, a, b)]);
+    for _ in 0..MAX_CELLS {
+        let Some(cell) = cells.pop() else {
+            return;
+        };
+        if cell.least > limit {
+            return;
+        }
+        let (a, b, [b1, b2, b3]) = (cell.a, cell.b, cell.bounds);
         let (mid, half) = (0.5 * (a + b), 0.5 * (b - a));
         let (value, rate) = gradient(curve, centre, mid);
-        let [b1, b2, b3] = curve.bounds(a, b);
-        let above = (curve.jet(mid)[0] - centre.y).abs() + b1 * half;
+        let above = cell.above + b1 * half;
         let steepest = 1.0 + b1 * b1 + above * b2;
         if value.abs() > steepest * half {
             continue;
@@ -380,14 +531,14 @@ fn minima(curve: &dyn Curve, centre: &Vector2<f64>, a: f64, b: f64, found: &mut 
         // g'' = 3 f' f'' + (f − c_y) f'''.
         let bend = 3.0 * b1 * b2 + above * b3;
         let is_monotone = rate.abs() > bend * half;
-        if !is_monotone && b - a > narrowest {
-            cells.push((mid, b));
-            cells.push((a, mid));
+        if !is_monotone && b - a > narrowest && a < mid && mid < b {
+            cells.push(Cell::new(curve, centre, a, mid));
+            cells.push(Cell::new(curve, centre, mid, b));
             continue;
         }
         let (low, high) = (gradient(curve, centre, a).0, gradient(curve, centre, b).0);
         if low < 0.0 && high >= 0.0 {
-            found(root(curve, centre, a, b));
+            limit = limit.min(found(root(curve, centre, a, b)));
         }
     }
 }
@@ -502,6 +653,58 @@ mod tests {
         // A spline through points of a line is the line, also beyond them.
         let line = Spline::new(&[0.0, 1.0, 5.0], &[1.0, 3.0, 11.0]).expect("sound");
         assert!((line.height(-2.0) + 3.0).abs() < 1e-12 && (line.height(9.0) - 19.0).abs() < 1e-12);
+    }
+
+    /// A ball at y = −1e9 looked for its nearest point in every wavelength of two million kilometres and never came back.
+    #[test]
+    fn a_ball_a_million_kilometres_deep_finds_its_way_out_at_once() {
+        let sine = Sine::new(1.0, 0.1, 0.0, 0.0).expect("sound");
+        let knots: Vec<f64> = (0..20_000).map(|i| 0.01 * f64::from(i)).collect();
+        let heights: Vec<f64> = knots.iter().map(|x| (13.0 * x).sin()).collect();
+        let spline = Spline::new(&knots, &heights).expect("sound");
+        for depth in [1e3, 1e6, 1e9, 1e300] {
+            let found = all(&sine, [17.3, -depth], 1.0);
+            assert_eq!(found.len(), 1);
+            // The nearest trough.
+            assert!(
+                (-found[0].distance / (depth - 1.0) - 1.0).abs() < 1e-7,
+                "{found:?}"
+            );
+            // The spline goes on steeply downwards beyond its ends, and its side is nearer than its top.
+            let found = all(&spline, [17.3, -depth], 1.0);
+            assert_eq!(found.len(), 1);
+            assert!(
+                (-depth..-0.05 * depth).contains(&found[0].distance),
+                "{found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn of_very_many_crests_within_reach_the_nearest_are_kept() {
+        let sine = Sine::new(0.1, 1e-3, 0.0, 0.0).expect("sound");
+        for reach in [1.0, 1e3, 1e30] {
+            let found = all(&sine, [0.0, 0.3], reach);
+            assert!(found.len() <= MAX_FACING, "{}", found.len());
+            assert!(found.is_sorted_by_key(|f| f.foot.x));
+            let nearest = found
+                .iter()
+                .map(|f| f.distance)
+                .fold(f64::INFINITY, f64::min);
+            assert!((nearest - 0.2).abs() < 1e-6, "{nearest}");
+        }
+    }
+
+    #[test]
+    fn grounds_too_rough_to_search_are_refused_by_field() {
+        let field = |made: Result<Sine, PlanarError>| made.expect_err("refused").field();
+        assert_eq!(field(Sine::new(0.01, 1e-6, 0.0, 0.0)), "wavelength");
+        assert_eq!(field(Sine::new(1e308, 1.0, 0.0, 0.0)), "amplitude");
+        assert_eq!(field(Sine::new(1.0, 1e-3, 0.0, 0.0)), "amplitude");
+        assert_eq!(field(Sine::new(1.0, 1.0, 1e300, 0.0)), "phase");
+        let many = vec![0.0; MAX_POINTS + 1];
+        let refused = Spline::new(&many, &[]).expect_err("refused");
+        assert_eq!(refused.field(), "x");
     }
 
     #[test]

@@ -30,6 +30,24 @@ pub enum PlanarError {
         /// What was given.
         value: f64,
     },
+    /// So large or so small that the mechanics would overflow or vanish.
+    #[error("{field}: must be {range}, is {value}")]
+    OutOfRange {
+        /// Name of the argument.
+        field: String,
+        /// Admissible values, in words.
+        range: &'static str,
+        /// What was given.
+        value: f64,
+    },
+    /// More points than a curve may have.
+    #[error("x: at most {limit} points, has {count}")]
+    TooManyPoints {
+        /// How many there are.
+        count: usize,
+        /// How many there may be.
+        limit: usize,
+    },
     /// Two wheels in one place.
     #[error(
         "axle_b: the wheels overlap: their axles are {value} m apart, their radii add up to {needed} m"
@@ -99,10 +117,11 @@ impl PlanarError {
         match self {
             Self::NotFinite { field, .. }
             | Self::NotPositive { field, .. }
-            | Self::Negative { field, .. } => field.clone(),
+            | Self::Negative { field, .. }
+            | Self::OutOfRange { field, .. } => field.clone(),
             Self::WheelsOverlap { .. } => "axle_b".to_owned(),
             Self::NotMirrored { .. } | Self::CoordinateCount { .. } => "model".to_owned(),
-            Self::TooFewPoints { .. } => "x".to_owned(),
+            Self::TooFewPoints { .. } | Self::TooManyPoints { .. } => "x".to_owned(),
             Self::MismatchedLengths { .. } => "y".to_owned(),
             Self::NotAFunction { index, .. } => format!("x[{index}]"),
             Self::RepeatedPoint { index, .. } => format!("y[{index}]"),
@@ -138,4 +157,60 @@ pub fn positive(field: &str, value: f64) -> Result<f64, PlanarError> {
             value,
         })
     }
+}
+
+/// Numbers that an argument may have, with words for them.
+#[derive(Clone, Copy, Debug)]
+pub struct Range {
+    /// Smallest and largest size; either sign where the smallest is negative.
+    pub ends: [f64; 2],
+    /// In words.
+    pub words: &'static str,
+}
+
+/// Masses, kg.
+pub const MASSES: Range = Range {
+    ends: [1e-9, 1e12],
+    words: "from 1e-9 to 1e12 kg",
+};
+
+/// Lengths, m.
+pub const LENGTHS: Range = Range {
+    ends: [1e-6, 1e6],
+    words: "from 1e-6 to 1e6 m",
+};
+
+/// Inertias, kg m².
+pub const INERTIAS: Range = Range {
+    ends: [1e-24, 1e24],
+    words: "from 1e-24 to 1e24 kg m²",
+};
+
+/// Places, m.
+pub const PLACES: Range = Range {
+    ends: [-1e6, 1e6],
+    words: "at most 1e6 m either way",
+};
+
+/// `value`, if it is within a range; positive where the range is. `field`: its name.
+///
+/// # Errors
+/// [`PlanarError::NotFinite`], [`PlanarError::NotPositive`] or [`PlanarError::OutOfRange`].
+pub fn within(field: impl Fn() -> String, value: f64, range: Range) -> Result<f64, PlanarError> {
+    let Range {
+        ends: [low, high],
+        words,
+    } = range;
+    if (low..=high).contains(&value) {
+        return Ok(value);
+    }
+    finite(&field(), value)?;
+    if low > 0.0 {
+        positive(&field(), value)?;
+    }
+    Err(PlanarError::OutOfRange {
+        field: field(),
+        range: words,
+        value,
+    })
 }

@@ -19,6 +19,33 @@ pub struct Facing {
     pub distance: f64,
 }
 
+/// Most points of the ground that face one disc: the nearest of more.
+pub const MAX_FACING: usize = 64;
+
+/// Of what was appended since `begin`, keeps what is wanted, in its order.
+pub(super) fn keep_if(out: &mut Vec<Facing>, begin: usize, is_wanted: impl Fn(&Facing) -> bool) {
+    let mut kept = begin;
+    for k in begin..out.len() {
+        if is_wanted(&out[k]) {
+            out[kept] = out[k];
+            kept += 1;
+        }
+    }
+    out.truncate(kept);
+}
+
+/// Of what was appended since `begin`, keeps the [`MAX_FACING`] nearest, in their order.
+pub(super) fn keep_few(out: &mut Vec<Facing>, begin: usize) {
+    if out.len() - begin <= MAX_FACING {
+        return;
+    }
+    let mut distances: Vec<f64> = out[begin..].iter().map(|f| f.distance).collect();
+    let (_, farthest, _) = distances.select_nth_unstable_by(MAX_FACING - 1, f64::total_cmp);
+    let farthest = *farthest;
+    keep_if(out, begin, |f| f.distance <= farthest);
+    out.truncate(begin + MAX_FACING);
+}
+
 /// What planar machines stand on. Immutable, shared between threads.
 pub trait Ground: Debug + Send + Sync {
     /// Height of the ground at x, m; the upper one at a vertical face.
@@ -26,7 +53,8 @@ pub trait Ground: Debug + Send + Sync {
 
     /// Appends the points that face `centre` at a distance of at most `reach` (m), in the order of x.
     ///
-    /// Those whose distance is smallest among their neighbours; from inside the ground the nearest of all, at any depth.
+    /// Those whose distance is smallest among their neighbours, the [`MAX_FACING`] nearest of more; from inside the ground the nearest of
+    /// all, at any depth.
     fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>);
 
     /// The report's own rule: the point straight below the centre counts as nearest; its normal is the curve's there.

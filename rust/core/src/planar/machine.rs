@@ -61,6 +61,15 @@ pub trait PlanarMachine<const NV: usize>: std::fmt::Debug + Send + Sync {
 
     /// Lengths by which a coordinate's change is measured, m: 1 for places, an arm for angles.
     fn arms(&self) -> SVector<f64, NV>;
+
+    /// A number that two machines share only if they are of one kind, with the same masses, inertias and lengths.
+    fn fingerprint(&self) -> u64;
+}
+
+/// Fingerprint of a kind of machine with the numbers that describe it.
+pub(super) fn fingerprint(kind: &str, numbers: impl IntoIterator<Item = f64>) -> u64 {
+    let numbers = numbers.into_iter().flat_map(|x| x.to_bits().to_le_bytes());
+    crate::multibody::fingerprint(kind.bytes().chain(numbers))
 }
 
 /// Names a contact of a disc with the ground.

@@ -408,4 +408,8 @@ impl<const NV: usize> PlanarMachine<NV> for MirroredRover<NV> {
         }
         arms
     }
+
+    fn fingerprint(&self) -> u64 {
+        self.model.fingerprint()
+    }
 }

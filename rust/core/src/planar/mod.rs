@@ -23,7 +23,7 @@ pub mod two_wheel_rover;
 pub use ball::Ball;
 pub use curve::{Curve, Line, Sine, Spline};
 pub use error::PlanarError;
-pub use ground::{ContactRule, Facing, Ground};
+pub use ground::{ContactRule, Facing, Ground, MAX_FACING};
 pub use machine::{
     Disc, PlanarContact, PlanarKey, PlanarMachine, PlanarScratch, PlanarSystem, contact_rows,
 };

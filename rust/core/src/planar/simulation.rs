@@ -28,6 +28,8 @@ pub struct PlanarActiveContact {
 /// All that a planar simulation needs to continue bit for bit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanarSnapshot {
+    /// [`PlanarMachine::fingerprint`] of the machine.
+    pub machine: u64,
     /// Coordinates (nv), m and rad.
     pub q: Vec<f64>,
     /// Their rates (nv).
@@ -186,8 +188,22 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSimulation<NV, M> {
     /// # Errors
     /// See [`StepError`]. A solver that did not converge is no error: see the report.
     pub fn step(&mut self, n: usize) -> Result<StepReport, StepError> {
+        self.step_while(n, &mut || true)
+    }
+
+    /// The same, but stops after a whole step once `go_on`, which is asked after each, says no.
+    ///
+    /// The report's `steps` says how many were taken.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_while(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<StepReport, StepError> {
         let variant = self.options.variant;
-        self.step_with(&variant, n)
+        self.steps_of(&variant, n, go_on)
     }
 
     /// Takes `n` steps of another scheme, with the same options.
@@ -195,6 +211,18 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSimulation<NV, M> {
     /// # Errors
     /// As [`Self::step`].
     pub fn step_with<I>(&mut self, integrator: &I, n: usize) -> Result<StepReport, StepError>
+    where
+        I: for<'a> Integrator<PlanarSystem<'a, NV, M>>,
+    {
+        self.steps_of(integrator, n, &mut || true)
+    }
+
+    fn steps_of<I>(
+        &mut self,
+        integrator: &I,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<StepReport, StepError>
     where
         I: for<'a> Integrator<PlanarSystem<'a, NV, M>>,
     {
@@ -222,6 +250,9 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSimulation<NV, M> {
             )?;
             total.merge(&report);
             self.list_active();
+            if !go_on() {
+                break;
+            }
         }
         Ok(total)
     }
@@ -278,6 +309,7 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSimulation<NV, M> {
     /// Everything that is needed to continue bit for bit.
     pub fn snapshot(&self) -> PlanarSnapshot {
         PlanarSnapshot {
+            machine: self.machine.fingerprint(),
             q: self.q.as_slice().to_vec(),
             v: self.v.as_slice().to_vec(),
             time: self.time,
@@ -292,7 +324,7 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSimulation<NV, M> {
     /// # Errors
     /// A snapshot of another kind of machine or with damaged contents; nothing is changed then.
     pub fn restore(&mut self, snapshot: &PlanarSnapshot) -> Result<(), SnapshotError> {
-        if snapshot.q.len() != NV || snapshot.inputs.len() != self.inputs.len() {
+        if snapshot.machine != self.machine.fingerprint() {
             return Err(SnapshotError::OtherModel);
         }
         let warm = &snapshot.warm_start;
@@ -303,7 +335,16 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSimulation<NV, M> {
             .chain(&snapshot.inputs)
             .chain(&warm.persistent)
             .chain(warm.impulses.iter().flat_map(|(_, p)| p));
-        let is_sound = snapshot.v.len() == NV
+        let active = |a: &PlanarActiveContact| {
+            let numbers = [a.contact.point, a.contact.foot, a.contact.n];
+            (a.contact.key.disc as usize) < self.machine.n_discs()
+                && numbers.iter().flatten().all(|x| x.is_finite())
+                && a.impulse.iter().chain(&a.velocity).all(|x| x.is_finite())
+                && a.contact.gap.is_finite()
+        };
+        let is_sound = [snapshot.q.len(), snapshot.v.len()] == [NV; 2]
+            && snapshot.inputs.len() == self.inputs.len()
+            && snapshot.active.iter().all(active)
             && [0, NV].contains(&warm.persistent.len())
             && snapshot.time.is_finite()
             && numbers.copied().all(f64::is_finite);

@@ -21,8 +21,8 @@
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
-use super::error::{PlanarError, finite, positive};
-use super::machine::{Disc, PlanarMachine};
+use super::error::{INERTIAS, LENGTHS, MASSES, PLACES, PlanarError, within};
+use super::machine::{Disc, PlanarMachine, fingerprint};
 
 /// A wheel and where its axle sits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,16 +56,16 @@ impl TwoWheelRover {
         wheel_a: PlanarWheel,
         wheel_b: PlanarWheel,
     ) -> Result<Self, PlanarError> {
-        positive("mass", mass)?;
+        within(|| "mass".to_owned(), mass, MASSES)?;
         for (name, wheel) in [("a", &wheel_a), ("b", &wheel_b)] {
-            positive(&format!("wheel_mass_{name}"), wheel.mass)?;
-            positive(&format!("radius_{name}"), wheel.radius)?;
-            positive(&format!("wheel_inertia_{name}"), wheel.inertia)?;
+            within(|| format!("wheel_mass_{name}"), wheel.mass, MASSES)?;
+            within(|| format!("radius_{name}"), wheel.radius, LENGTHS)?;
+            within(|| format!("wheel_inertia_{name}"), wheel.inertia, INERTIAS)?;
             for (k, value) in wheel.axle.iter().enumerate() {
-                finite(&format!("axle_{name}[{k}]"), *value)?;
+                within(|| format!("axle_{name}[{k}]"), *value, PLACES)?;
             }
         }
-        positive("inertia", inertia)?;
+        within(|| "inertia".to_owned(), inertia, INERTIAS)?;
         let apart = (wheel_b.axle - wheel_a.axle).norm();
         let needed = wheel_a.radius + wheel_b.radius;
         if apart <= needed {
@@ -201,5 +201,14 @@ impl PlanarMachine<5> for TwoWheelRover {
         let [a, b] = &self.wheels;
         let arm = a.axle.norm().max(b.axle.norm());
         SVector::from([1.0, 1.0, arm, a.radius, b.radius])
+    }
+
+    fn fingerprint(&self) -> u64 {
+        let of_wheel = |w: &PlanarWheel| [w.mass, w.radius, w.inertia, w.axle.x, w.axle.y];
+        let wheels = self.wheels.iter().flat_map(of_wheel);
+        fingerprint(
+            "two wheels",
+            [self.mass, self.inertia].into_iter().chain(wheels),
+        )
     }
 }

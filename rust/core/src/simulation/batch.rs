@@ -3,14 +3,21 @@
 //! Models and terrains are shared, everything else is each rover's own, so rovers never wait for each other and their
 //! motion does not depend on how many there are nor on how many threads move them.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
 use rayon::iter::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 use rayon::slice::ParallelSliceMut;
-use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::error::BatchError;
+use super::pool::Pool;
 use super::reading::{Look, ReadingLayout};
 use super::rover::Simulation;
 use crate::integrator::StepError;
+
+/// How often the calling thread asks whether to go on while others step.
+const ASKING: Duration = Duration::from_millis(20);
 
 /// One rover with the places for its error and its reading.
 type Place<'a> = (
@@ -29,7 +36,7 @@ pub struct Batch {
     layout: ReadingLayout,
     errors: Vec<Option<StepError>>,
     /// None: the caller's thread does it all.
-    pool: Option<ThreadPool>,
+    pool: Option<Pool>,
     threads: usize,
 }
 
@@ -52,17 +59,10 @@ impl Batch {
         let cores = || std::thread::available_parallelism().map_or(1, usize::from);
         // More threads than rovers would have nothing to do.
         let threads = threads.unwrap_or_else(cores).clamp(1, rovers.len());
-        let start = |count| {
-            let built = ThreadPoolBuilder::new().num_threads(count).build();
-            built.map_err(|error| BatchError::Threads {
-                count,
-                reason: error.to_string(),
-            })
-        };
         let batch = Self {
             errors: vec![None; rovers.len()],
             targets: vec![[0.0; 2]; rovers.len()],
-            pool: (threads > 1).then(|| start(threads)).transpose()?,
+            pool: (threads > 1).then(|| Pool::start(threads)).transpose()?,
             rovers,
             scan,
             layout,
@@ -131,7 +131,8 @@ impl Batch {
     /// A step that a rover cannot take is that rover's own: see [`Self::errors`].
     ///
     /// # Errors
-    /// `Command`: the first command that a rover refuses; no rover has moved then.
+    /// `Command`: the first command that a rover refuses; `Threads`: in a process forked from the one that made the
+    /// batch, its threads could not be started anew. No rover has moved then.
     ///
     /// # Panics
     /// If a slice has a wrong length.
@@ -143,43 +144,37 @@ impl Batch {
         active: Option<&[bool]>,
         rows: &mut [f64],
     ) -> Result<(), BatchError> {
+        self.step_while(torques, set_points, n, active, rows, &mut || true)
+    }
+
+    /// The same, but asks `go_on` now and then; once it says no, each rover stops after a whole step of its own.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    ///
+    /// # Panics
+    /// As [`Self::step`].
+    pub fn step_while(
+        &mut self,
+        torques: &[f64],
+        set_points: &[f64],
+        n: usize,
+        active: Option<&[bool]>,
+        rows: &mut [f64],
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<(), BatchError> {
         let n_rovers = self.rovers.len();
-        let n_wheels = self.rovers[0].model().wheels().len();
         let width = self.layout.size();
-        assert_eq!(torques.len(), n_rovers * n_wheels, "one torque a wheel");
-        assert_eq!(
-            set_points.len(),
-            n_rovers * n_wheels,
-            "one set-point a wheel"
-        );
         assert_eq!(rows.len(), n_rovers * width, "one row a rover");
         let is_active = |index: usize| active.is_none_or(|active| active[index]);
-
-        // All commands are looked at before any is given.
-        let own = |index: usize| index * n_wheels..(index + 1) * n_wheels;
-        let refused = |index| move |error| BatchError::Command { index, error };
-        for (index, rover) in self.rovers.iter().enumerate() {
-            if is_active(index) {
-                rover
-                    .check_commands(&torques[own(index)], &set_points[own(index)])
-                    .map_err(refused(index))?;
-            }
-        }
-        for (index, rover) in self.rovers.iter_mut().enumerate() {
-            if is_active(index) {
-                rover
-                    .set_wheel_torques(&torques[own(index)])
-                    .map_err(refused(index))?;
-                rover
-                    .set_steering(&set_points[own(index)])
-                    .map_err(refused(index))?;
-            }
-        }
+        let pool = self.pool.as_mut().map(Pool::of_this_process).transpose()?;
+        give_commands(&mut self.rovers, torques, set_points, is_active)?;
 
         let scan = &self.scan;
-        let move_one = |(index, (((rover, error), target), row)): (usize, Place<'_>)| {
-            *error = if is_active(index) {
-                rover.step(n).err()
+        let move_one = |(index, (((rover, error), target), row)): (usize, Place<'_>),
+                        go_on: &mut dyn FnMut() -> bool| {
+            *error = if is_active(index) && go_on() {
+                rover.step_while(n, go_on).err()
             } else {
                 None
             };
@@ -190,15 +185,19 @@ impl Batch {
             rover.read(&look, row);
         };
         let (rovers, errors, targets) = (&mut self.rovers, &mut self.errors, &self.targets);
-        match &self.pool {
-            None => rovers
-                .iter_mut()
-                .zip(errors)
-                .zip(targets)
-                .zip(rows.chunks_exact_mut(width))
-                .enumerate()
-                .for_each(move_one),
-            Some(pool) => pool.install(|| {
+        let Some(pool) = pool else {
+            let rovers = rovers.iter_mut().zip(errors).zip(targets);
+            for place in rovers.zip(rows.chunks_exact_mut(width)).enumerate() {
+                move_one(place, go_on);
+            }
+            return Ok(());
+        };
+        // The pool's threads step, this one asks.
+        let stop = AtomicBool::new(false);
+        pool.in_place_scope(|scope| {
+            let (done, is_done) = channel::<()>();
+            let stop = &stop;
+            scope.spawn(move |_| {
                 rovers
                     .par_iter_mut()
                     .zip(errors)
@@ -206,9 +205,16 @@ impl Batch {
                     .zip(rows.par_chunks_exact_mut(width))
                     .enumerate()
                     .with_max_len(1) // rovers differ in cost, and a task costs little beside one
-                    .for_each(move_one);
-            }),
-        }
+                    .for_each(|place| move_one(place, &mut || !stop.load(Ordering::Relaxed)));
+                drop(done); // tells the asking thread, also where a rover panics
+            });
+            while is_done.recv_timeout(ASKING) == Err(RecvTimeoutError::Timeout) {
+                if !go_on() {
+                    stop.store(true, Ordering::Relaxed);
+                    break;
+                }
+            }
+        });
         Ok(())
     }
 
@@ -234,4 +240,34 @@ impl Batch {
     pub fn errors(&self) -> &[Option<StepError>] {
         &self.errors
     }
+}
+
+/// All commands are looked at before any is given.
+fn give_commands(
+    rovers: &mut [Simulation],
+    torques: &[f64],
+    set_points: &[f64],
+    is_active: impl Fn(usize) -> bool,
+) -> Result<(), BatchError> {
+    let n_wheels = rovers[0].model().wheels().len();
+    let n = rovers.len() * n_wheels;
+    assert_eq!(torques.len(), n, "one torque a wheel");
+    assert_eq!(set_points.len(), n, "one set-point a wheel");
+    let own = |index: usize| index * n_wheels..(index + 1) * n_wheels;
+    let refused = |index| move |error| BatchError::Command { index, error };
+    for (index, rover) in rovers.iter().enumerate() {
+        if is_active(index) {
+            rover
+                .check_commands(&torques[own(index)], &set_points[own(index)])
+                .map_err(refused(index))?;
+        }
+    }
+    for (index, rover) in rovers.iter_mut().enumerate() {
+        if is_active(index) {
+            rover
+                .set_commands(&torques[own(index)], &set_points[own(index)])
+                .map_err(refused(index))?;
+        }
+    }
+    Ok(())
 }

@@ -2,6 +2,7 @@
 
 pub mod batch;
 pub mod error;
+mod pool;
 pub mod profile;
 pub mod reading;
 pub mod rover;

@@ -16,6 +16,9 @@ use crate::integrator::{
 };
 use crate::multibody::{Configuration, Energy, Kinematics, Model, Momentum, State, momentum};
 
+/// How far the squared length of a snapshot's quaternion may be from 1: the steps keep it within rounding.
+const UNIT: f64 = 1e-12;
+
 /// A machine on a terrain. Model and terrain are shared; everything else is its own.
 #[derive(Clone)]
 pub struct Simulation {
@@ -30,8 +33,6 @@ pub struct Simulation {
     workspace: Workspace,
     active: Vec<ActiveContact>,
     last_call: LastCall,
-    /// Work of each joint's drive since the last call began (n_joints), J.
-    drive_work: Vec<f64>,
 }
 
 /// What the last call of [`Simulation::step`] came to; not part of the state.
@@ -81,7 +82,6 @@ impl Simulation {
             workspace: Workspace::new(&model),
             active: Vec::with_capacity(contact_capacity(&model)),
             last_call: LastCall::default(),
-            drive_work: vec![0.0; model.n_joints()],
             command,
             model,
             terrain,
@@ -259,6 +259,20 @@ impl Simulation {
         Ok(())
     }
 
+    /// [`Self::set_wheel_torques`] and [`Self::set_steering`] in one: both or neither.
+    ///
+    /// # Errors
+    /// As these two; nothing is changed then.
+    pub fn set_commands(
+        &mut self,
+        torques: &[f64],
+        set_points: &[f64],
+    ) -> Result<(), CommandError> {
+        self.check_commands(torques, set_points)?;
+        self.set_wheel_torques(torques)?;
+        self.set_steering(set_points)
+    }
+
     /// Whether [`Self::set_wheel_torques`] and [`Self::set_steering`] would take these.
     ///
     /// # Errors
@@ -346,11 +360,26 @@ impl Simulation {
     /// # Errors
     /// See [`StepError`]. A solver that did not converge is no error: see the report.
     pub fn step(&mut self, n: usize) -> Result<StepReport, StepError> {
-        self.drive_work.fill(0.0);
-        let result = self.step_probed(n, &mut NoProbe);
+        self.step_while(n, &mut || true)
+    }
+
+    /// The same, but stops after a whole step once `go_on`, which is asked after each, says no.
+    ///
+    /// The report's `steps` says how many were taken.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_while(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<StepReport, StepError> {
+        self.workspace.tree.drive_work().fill(0.0);
+        let result = self.step_probed(n, go_on, &mut NoProbe);
         // A joint's work over the call counts as driving or as braking.
-        let work = self.drive_work.iter().map(|joules| joules.abs()).sum();
-        let positive_work = self.drive_work.iter().map(|joules| joules.max(0.0)).sum();
+        let joints = self.workspace.tree.drive_work();
+        let work = joints.iter().map(|joules| joules.abs()).sum();
+        let positive_work = joints.iter().map(|joules| joules.max(0.0)).sum();
         self.last_call = LastCall {
             report: result.clone().unwrap_or_default(),
             work,
@@ -365,7 +394,12 @@ impl Simulation {
         &self.last_call
     }
 
-    fn step_probed(&mut self, n: usize, probe: &mut dyn Probe) -> Result<StepReport, StepError> {
+    fn step_probed(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError> {
         let mut total = StepReport::default();
         for _ in 0..n {
             let mut system = TreeSystem {
@@ -388,28 +422,28 @@ impl Simulation {
                 probe,
             )?;
             total.merge(&report);
-            for (sum, joules) in self
-                .drive_work
-                .iter_mut()
-                .zip(self.workspace.tree.drive_work())
-            {
-                *sum += joules;
-            }
             self.workspace.list_active(&mut self.active);
+            if !go_on() {
+                break;
+            }
         }
         Ok(total)
     }
 
-    /// Takes `n` steps of a copy and says where their time went.
+    /// Takes `n` steps of a copy and says where their time went; `go_on` as for [`Self::step_while`].
     ///
     /// # Errors
     /// As [`Self::step`].
-    pub fn profile(&self, n: usize) -> Result<Stopwatch, StepError> {
+    pub fn profile(
+        &self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<Stopwatch, StepError> {
         let mut copy = self.clone();
-        copy.step(n.min(10))?;
+        copy.step_while(n.min(10), go_on)?;
         let mut stopwatch = Stopwatch::start();
-        copy.step_probed(n, &mut stopwatch)?;
-        stopwatch.finish(n);
+        let report = copy.step_probed(n, go_on, &mut stopwatch)?;
+        stopwatch.finish(report.steps);
         Ok(stopwatch)
     }
 
@@ -539,7 +573,9 @@ impl Simulation {
             .iter()
             .chain(&snapshot.wheel_torque)
             .chain(&snapshot.joint_torque);
+        let attitude = snapshot.state.configuration.attitude.norm_squared();
         let is_sound = snapshot.state.is_finite()
+            && (attitude - 1.0).abs() <= UNIT
             && snapshot.state.configuration.joints.len() == expected
             && snapshot.wheel_torque.len() == self.model.wheels().len()
             && snapshot.state.v.len() == self.model.nv()
@@ -561,10 +597,7 @@ impl Simulation {
                 .impulses
                 .iter()
                 .all(|(_, p)| p.iter().all(|x| x.is_finite()))
-            && snapshot.active.iter().all(|a| match a.contact.part {
-                Part::Wheel(i) => i < self.model.wheels().len(),
-                Part::Box(i) => i < self.model.boxes().len(),
-            });
+            && snapshot.active.iter().all(|a| is_sound(&self.model, a));
         if !is_sound {
             return Err(SnapshotError::Damaged);
         }
@@ -577,6 +610,24 @@ impl Simulation {
         self.last_call = LastCall::default();
         Ok(())
     }
+}
+
+/// Whether a contact is one of finite numbers, of a part that a model has.
+fn is_sound(model: &Model, active: &ActiveContact) -> bool {
+    let contact = &active.contact;
+    let is_part = match contact.part {
+        Part::Wheel(i) => i < model.wheels().len(),
+        Part::Box(i) => i < model.boxes().len(),
+    };
+    is_part
+        && contact.body < model.bodies().len()
+        && contact.frame.rows().iter().flatten().all(|x| x.is_finite())
+        && (contact.point.iter())
+            .chain(&active.position)
+            .chain(&active.impulse)
+            .chain(&active.velocity)
+            .all(|x| x.is_finite())
+        && contact.gap.is_finite()
 }
 
 /// A command of `expected` finite entries.

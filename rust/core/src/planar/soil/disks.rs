@@ -1,8 +1,22 @@
 //! The disks: radii and masses, and the factors of their diagonal mass matrix.
 
-use super::super::error::positive;
+use super::super::error::{LENGTHS, MASSES, within};
 use super::error::SoilError;
 use super::removal::Renumbering;
+
+/// Most disks of a soil: some hundred megabytes.
+pub const MAX_DISKS: usize = 1_000_000;
+
+/// Refuses more disks than a soil may have, before anything is allocated for them.
+pub(super) fn check_count(count: usize) -> Result<(), SoilError> {
+    if count > MAX_DISKS {
+        return Err(SoilError::TooMany {
+            count,
+            limit: MAX_DISKS,
+        });
+    }
+    Ok(())
+}
 
 /// Solid disks, immutable: `J = m r²/2`. Some may be kinematic: nothing changes their velocity, as grains
 /// glued to a rough floor or a piston.
@@ -37,9 +51,10 @@ impl Disks {
                 count: mass.len(),
             });
         }
-        for (name, values) in [("radius", &radius), ("mass", &mass)] {
+        check_count(radius.len())?;
+        for (name, values, range) in [("radius", &radius, LENGTHS), ("mass", &mass, MASSES)] {
             for (i, value) in values.iter().enumerate() {
-                positive(&format!("{name}[{i}]"), *value)?;
+                within(|| format!("{name}[{i}]"), *value, range)?;
             }
         }
         let roots = radius.iter().zip(&mass);

@@ -14,6 +14,14 @@ pub enum SoilError {
     /// No disk at all.
     #[error("radius: needs at least one disk")]
     Empty,
+    /// More disks than a soil may have.
+    #[error("count: at most {limit} disks, are {count}")]
+    TooMany {
+        /// How many there are, or would be.
+        count: usize,
+        /// How many there may be.
+        limit: usize,
+    },
     /// Lists of different lengths.
     #[error("{field}: needs {expected} entries, has {count}")]
     Length {
@@ -80,6 +88,7 @@ impl SoilError {
         match self {
             Self::Number(number) => number.field(),
             Self::Empty => "radius".to_owned(),
+            Self::TooMany { .. } => "count".to_owned(),
             Self::Length { field, .. } => (*field).to_owned(),
             Self::Overlap { second, .. } => format!("position[{second}]"),
             Self::InWall { disk, .. } => format!("position[{disk}]"),

@@ -98,8 +98,9 @@ impl Grid {
     pub fn near(&self, x: f64, y: f64, reach: f64, mut visit: impl FnMut(&Item)) {
         let (column_0, row_0) = self.cell(x - reach, y - reach);
         let (column_1, row_1) = self.cell(x + reach, y + reach);
-        let cells = (column_1 - column_0 + 1).saturating_mul(row_1 - row_0 + 1);
-        if column_1 - column_0 + 1 > self.stride || cells > self.mask {
+        let columns = column_1.saturating_sub(column_0).saturating_add(1);
+        let rows = row_1.saturating_sub(row_0).saturating_add(1);
+        if columns > self.stride || columns.saturating_mul(rows) > self.mask {
             // So far that cells would repeat: all disks, each once.
             self.items.iter().for_each(visit);
             return;

@@ -1,7 +1,7 @@
 //! Seeded packings without overlap: a loose square array, shaken; gravity does the rest.
 
-use super::super::error::{finite, positive};
-use super::disks::Disks;
+use super::super::error::{LENGTHS, MASSES, PLACES, within};
+use super::disks::{Disks, check_count};
 use super::error::SoilError;
 use crate::geometry::rocks::Random;
 
@@ -52,14 +52,16 @@ impl Packing {
     /// The disks, and (x, y, θ) of each (3n), m and rad.
     ///
     /// # Errors
-    /// A number that is not finite or of the wrong sign; radii the wrong way round; a width without room for one disk.
+    /// No disk, or more than [`MAX_DISKS`](super::disks::MAX_DISKS); a number that is not finite, of the wrong sign or out of its range; radii the wrong
+    /// way round; a width without room for one disk.
     pub fn build(&self) -> Result<(Disks, Vec<f64>), SoilError> {
-        positive("radius_min", self.radius_min)?;
-        positive("radius_max", self.radius_max)?;
-        positive("mass", self.mass)?;
-        positive("width", self.width)?;
-        finite("left", self.left)?;
-        finite("bottom", self.bottom)?;
+        within(|| "radius_min".to_owned(), self.radius_min, LENGTHS)?;
+        within(|| "radius_max".to_owned(), self.radius_max, LENGTHS)?;
+        within(|| "mass".to_owned(), self.mass, MASSES)?;
+        within(|| "width".to_owned(), self.width, LENGTHS)?;
+        within(|| "left".to_owned(), self.left, PLACES)?;
+        within(|| "bottom".to_owned(), self.bottom, PLACES)?;
+        check_count(self.count)?;
         if self.radius_max < self.radius_min {
             return Err(SoilError::Range {
                 value: self.radius_max,
@@ -79,6 +81,9 @@ impl Packing {
         // The array is spread over the whole width.
         let across = self.width / columns as f64;
         let (mut radius, mut mass, mut q) = (Vec::new(), Vec::new(), Vec::new());
+        if self.count == 0 {
+            return Err(SoilError::Empty);
+        }
         for i in 0..self.count {
             let r = self.radius_min + (self.radius_max - self.radius_min) * random.uniform();
             let (column, row) = ((i % columns) as f64, (i / columns) as f64);

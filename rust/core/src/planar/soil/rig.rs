@@ -6,8 +6,8 @@
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
-use super::super::error::{PlanarError, positive};
-use super::super::machine::{Disc, PlanarMachine};
+use super::super::error::{LENGTHS, MASSES, PlanarError, within};
+use super::super::machine::{Disc, PlanarMachine, fingerprint};
 
 /// A wheel of the test rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,8 +26,8 @@ impl WheelRig {
     /// A number that is not finite and positive.
     pub fn new(mass: f64, radius: f64) -> Result<Self, PlanarError> {
         Ok(Self {
-            mass: positive("mass", mass)?,
-            radius: positive("radius", radius)?,
+            mass: within(|| "mass".to_owned(), mass, MASSES)?,
+            radius: within(|| "radius".to_owned(), radius, LENGTHS)?,
         })
     }
 
@@ -99,5 +99,9 @@ impl PlanarMachine<5> for WheelRig {
 
     fn arms(&self) -> SVector<f64, 5> {
         SVector::from([1.0, 1.0, 0.0, self.radius, 0.0])
+    }
+
+    fn fingerprint(&self) -> u64 {
+        fingerprint("rig", [self.mass, self.radius])
     }
 }

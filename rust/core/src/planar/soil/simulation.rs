@@ -45,6 +45,9 @@ pub fn soil_options(disks: &Disks) -> StepOptions {
     }
 }
 
+/// Most steps that a snapshot may have behind it.
+const MAX_STEPS: usize = 1 << 53;
+
 /// A contact of the last step with what it did.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SoilActiveContact {
@@ -59,6 +62,8 @@ pub struct SoilActiveContact {
 /// All that a soil needs to continue bit for bit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SoilSnapshot {
+    /// [`SoilScene::fingerprint`] of what moves.
+    pub scene: u64,
     /// (x, y, θ) of each disk, then the machine's coordinates, m and rad.
     pub q: Vec<f64>,
     /// Their rates.
@@ -309,7 +314,21 @@ impl SoilSimulation {
     /// # Errors
     /// See [`StepError`]. A solver that did not converge is no error: see the report.
     pub fn step(&mut self, n: usize) -> Result<StepReport, StepError> {
-        self.step_probed(n, &mut NoProbe)
+        self.step_while(n, &mut || true)
+    }
+
+    /// The same, but stops after a whole step once `go_on`, which is asked after each, says no.
+    ///
+    /// The report's `steps` says how many were taken.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_while(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<StepReport, StepError> {
+        self.steps(n, go_on, &mut NoProbe)
     }
 
     /// The same, telling `probe` of the phases.
@@ -319,6 +338,15 @@ impl SoilSimulation {
     pub fn step_probed(
         &mut self,
         n: usize,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError> {
+        self.steps(n, &mut || true, probe)
+    }
+
+    fn steps(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
         let variant = self.options.variant;
@@ -358,6 +386,9 @@ impl SoilSimulation {
                     count: self.count,
                 };
                 self.sleep.update(options, taken, &mut self.warm_start);
+            }
+            if !go_on() {
+                break;
             }
         }
         Ok(total)
@@ -471,6 +502,7 @@ impl SoilSimulation {
     #[must_use]
     pub fn snapshot(&self) -> SoilSnapshot {
         SoilSnapshot {
+            scene: self.scene.fingerprint(),
             q: self.q.clone(),
             v: self.v.clone(),
             time: self.time,
@@ -488,7 +520,7 @@ impl SoilSimulation {
     /// A snapshot of another scene or with damaged contents; nothing is changed then.
     pub fn restore(&mut self, snapshot: &SoilSnapshot) -> Result<(), SnapshotError> {
         let nv = self.scene.nv();
-        if snapshot.q.len() != nv || snapshot.inputs.len() != self.inputs.len() {
+        if snapshot.scene != self.scene.fingerprint() {
             return Err(SnapshotError::OtherModel);
         }
         let warm = &snapshot.warm_start;
@@ -497,7 +529,9 @@ impl SoilSimulation {
             .flatten()
             .chain(&snapshot.pull)
             .chain(warm.impulses.iter().flat_map(|(_, p)| p));
-        let is_sound = snapshot.v.len() == nv
+        let is_sound = [snapshot.q.len(), snapshot.v.len()] == [nv; 2]
+            && snapshot.inputs.len() == self.inputs.len()
+            && snapshot.count <= MAX_STEPS
             && [0, nv].contains(&warm.persistent.len())
             && snapshot.time.is_finite()
             && snapshot.sleep.is_of(self.scene.disks.kinematic())

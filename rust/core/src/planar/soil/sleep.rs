@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::contact::{SoilContact, SoilKey};
 use super::removal::Renumbering;
 use super::scene::SoilScene;
-use crate::integrator::WarmStart;
+use crate::integrator::{OptionsError, WarmStart};
 
 /// When disks sleep.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +36,38 @@ impl Default for SleepOptions {
     }
 }
 
+impl SleepOptions {
+    /// Checks every range.
+    ///
+    /// # Errors
+    /// The first option out of its range.
+    pub fn check(&self) -> Result<(), OptionsError> {
+        for (field, value, range, is_in) in [
+            (
+                "sleep_speed",
+                self.speed,
+                "finite and positive",
+                self.speed > 0.0,
+            ),
+            (
+                "sleep_distance",
+                self.distance,
+                "from 1e-3 m to 1e6 m",
+                (1e-3..=1e6).contains(&self.distance),
+            ),
+        ] {
+            if !(value.is_finite() && is_in) {
+                return Err(OptionsError::OutOfRange {
+                    field,
+                    range,
+                    value,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Who sleeps, and under what load.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sleep {
@@ -46,6 +78,9 @@ pub struct Sleep {
     /// Impulses of the contacts of those that sleep, in the order of the keys, N s.
     dormant: Vec<(SoilKey, [f64; 3])>,
 }
+
+/// Most cells that a wheel marks either way.
+const MOST_CELLS: i64 = 1000;
 
 /// Steps between two looks at who may sleep: nothing crosses the distance in them.
 const EVERY: usize = 5;
@@ -231,11 +266,8 @@ impl Sleep {
                 let speed = (machine.point_jacobian(k, &pose, &disc.centre) * rate).norm();
                 let turning = (machine.point_jacobian(k, &pose, &below) * rate).norm();
                 if speed.max(turning) >= options.speed {
-                    mark(
-                        disc.centre.x,
-                        disc.centre.y,
-                        1 + cell(disc.radius + options.distance),
-                    );
+                    let cells = 1 + cell(disc.radius + options.distance);
+                    mark(disc.centre.x, disc.centre.y, cells.min(MOST_CELLS));
                 }
             }
         }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector2;
 
-use super::super::error::{PlanarError, finite};
+use super::super::error::{PLACES, PlanarError, within};
 
 /// The half-plane `n · x ≥ offset` is free.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +19,7 @@ impl Wall {
     pub fn new(point: Vector2<f64>, normal: Vector2<f64>) -> Result<Self, PlanarError> {
         for (name, vector) in [("point", &point), ("normal", &normal)] {
             for (k, value) in vector.iter().enumerate() {
-                finite(&format!("{name}[{k}]"), *value)?;
+                within(|| format!("{name}[{k}]"), *value, PLACES)?;
             }
         }
         let length = normal.norm();

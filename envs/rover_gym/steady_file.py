@@ -1,0 +1,176 @@
+"""A file that a library writes piece by piece and that changes on the disk only as a whole, at `commit`.
+
+HDF5 cannot close a file that it failed to write: on a full disk it ends the process. So it writes into memory here, and
+`commit` brings that to the disk: first it reserves the room that is missing, then it writes what is new, then what is
+changed. Where there is no room the file stays as the last commit left it. The file is locked as long as it is open.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+import sys
+from typing import TYPE_CHECKING
+
+if sys.platform != "win32":
+    import fcntl
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PAGE = 1 << 16  # bytes that are kept, and written, together
+NO_LOCKS = frozenset({errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS})  # of a file system that has none
+
+
+class FileInUseError(OSError):
+    """A file is locked by someone who writes it, or who reads it while it is to be written."""
+
+
+def lock(descriptor: int, *, shared: bool = False) -> None:
+    """Locks an open file, without waiting.
+
+    Raises:
+        FileInUseError: Someone else holds a lock.
+    """
+    if sys.platform == "win32":  # it has no such locks
+        return
+    try:
+        fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno in NO_LOCKS:
+            return
+        raise FileInUseError(error.errno, "is in use") from error
+
+
+class SteadyFile:
+    """A new file; what it held before is gone. It has the methods that h5py asks of a file.
+
+    Args:
+        path: Where it is made, or replaced where it is there and free.
+
+    Raises:
+        FileInUseError: It is locked; it was not changed.
+        OSError: It cannot be made, or is no regular file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        if path.exists() and not stat.S_ISREG(path.stat().st_mode):  # to open a pipe would wait for its reader
+            raise OSError(errno.EINVAL, "is no regular file")
+        self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666)
+        try:
+            lock(self._descriptor)
+            os.ftruncate(self._descriptor, 0)
+        except OSError:
+            os.close(self._descriptor)
+            raise
+        self._pages: dict[int, bytearray] = {}  # what changed since the last commit
+        self._place = self._size = self._committed = 0
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Goes to a place."""
+        self._place = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._place, os.SEEK_END: self._size}[whence]
+        return self._place
+
+    def tell(self) -> int:
+        """The place."""
+        return self._place
+
+    def readinto(self, buffer: memoryview) -> int:
+        """Reads from the place on."""
+        view = memoryview(buffer).cast("B")
+        wanted = max(0, min(len(view), self._size - self._place))
+        done = 0
+        while done < wanted:
+            number, start = divmod(self._place, PAGE)
+            length = min(wanted - done, PAGE - start)
+            view[done : done + length] = self._page(number)[start : start + length]
+            self._place += length
+            done += length
+        return wanted
+
+    def read(self, size: int = -1) -> bytes:
+        """Bytes from the place on."""
+        data = bytearray(self._size - self._place if size < 0 else size)
+        return bytes(data[: self.readinto(memoryview(data))])
+
+    def write(self, data: bytes) -> int:
+        """Writes at the place, in memory."""
+        view = memoryview(data).cast("B")
+        done = 0
+        while done < len(view):
+            number, start = divmod(self._place, PAGE)
+            length = min(len(view) - done, PAGE - start)
+            page = self._pages.setdefault(number, self._page(number))
+            page[start : start + length] = view[done : done + length]
+            self._place += length
+            done += length
+        self._size = max(self._size, self._place)
+        return len(view)
+
+    def truncate(self, size: int | None = None) -> int:
+        """Gives the file a size, in memory."""
+        self._size = self._place if size is None else size
+        return self._size
+
+    def flush(self) -> None:
+        """Nothing: `commit` writes."""
+
+    def commit(self) -> None:
+        """Brings everything to the disk.
+
+        Raises:
+            OSError: There is no room, and then the file is as it was; or the disk fails.
+        """
+        if self._size > self._committed:
+            try:
+                self._reserve(self._size - self._committed)
+            except OSError:
+                os.ftruncate(self._descriptor, self._committed)
+                raise
+        # What is new before what is changed, which may tell of it: a kill between two pages does the least harm.
+        for number in sorted(self._pages, reverse=True):
+            page = memoryview(self._pages[number])[: max(0, self._size - number * PAGE)]
+            _write_all(self._descriptor, page, number * PAGE)
+        os.ftruncate(self._descriptor, self._size)
+        self._committed = self._size
+        self._pages.clear()
+
+    def close(self) -> None:
+        """Frees the file as the last commit left it."""
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+            self._descriptor = -1
+            self._pages.clear()
+
+    def _page(self, number: int) -> bytearray:
+        """A page as it is now; a changed one is the one that is kept."""
+        if number in self._pages:
+            return self._pages[number]
+        page = bytearray(PAGE)
+        known = max(0, min(PAGE, self._committed - number * PAGE))
+        if known and self._descriptor >= 0:
+            os.lseek(self._descriptor, number * PAGE, os.SEEK_SET)
+            data = os.read(self._descriptor, known)
+            page[: len(data)] = data
+        return page
+
+    def _reserve(self, length: int) -> None:
+        """Makes sure that the disk has room for so many bytes more."""
+        if hasattr(os, "posix_fallocate"):
+            try:
+                os.posix_fallocate(self._descriptor, self._committed, length)
+            except OSError as error:
+                if error.errno not in {errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS}:
+                    raise
+            else:
+                return
+        for start in range(self._committed, self._committed + length, PAGE):
+            zeros = bytes(min(PAGE, self._committed + length - start))
+            _write_all(self._descriptor, memoryview(zeros), start)
+
+
+def _write_all(descriptor: int, data: memoryview, place: int) -> None:
+    os.lseek(descriptor, place, os.SEEK_SET)
+    while data:
+        data = data[os.write(descriptor, data) :]

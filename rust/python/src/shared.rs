@@ -1,0 +1,72 @@
+//! What several Python threads may hold, and long calls that leave the interpreter free and still hear Ctrl-C.
+
+use std::sync::{Mutex, MutexGuard, TryLockError};
+use std::time::{Duration, Instant};
+
+use pyo3::prelude::*;
+
+use crate::errors::{BorderError, Kind, Value};
+
+/// How often a long call looks for signals.
+const LOOKING: Duration = Duration::from_millis(20);
+
+/// One call at a time; a second one is refused, not kept waiting: it may come from a signal handler inside the first.
+pub struct Shared<T>(Mutex<T>);
+
+impl<T> Shared<T> {
+    pub fn new(inner: T) -> Self {
+        Self(Mutex::new(inner))
+    }
+
+    /// The inside, for one call.
+    ///
+    /// # Errors
+    /// Another call is going on.
+    pub fn open(&self) -> Result<MutexGuard<'_, T>, BorderError> {
+        match self.0.try_lock() {
+            Ok(inner) => Ok(inner),
+            Err(TryLockError::Poisoned(inner)) => Ok(inner.into_inner()),
+            Err(TryLockError::WouldBlock) => Err(BorderError {
+                kind: Kind::Busy,
+                message: "another call on this object is still going on, in another thread or under a signal \
+                          handler: give each thread an object of its own, or wait for the call's end"
+                    .to_owned(),
+                field: None,
+                value: Value::Nothing,
+            }),
+        }
+    }
+}
+
+/// Runs Python's signal handlers now and then during a call that has released the interpreter lock.
+pub struct Watch {
+    next: Instant,
+    raised: Option<PyErr>,
+}
+
+impl Watch {
+    pub fn new() -> Self {
+        Self {
+            next: Instant::now() + LOOKING,
+            raised: None,
+        }
+    }
+
+    /// Whether the call may go on: no, once a handler has raised, as that of Ctrl-C does.
+    pub fn go_on(&mut self) -> bool {
+        if self.raised.is_none() && Instant::now() >= self.next {
+            // Nothing to attach to: the interpreter is shutting down.
+            self.raised = Python::try_attach(|py| py.check_signals().err()).flatten();
+            self.next = Instant::now() + LOOKING;
+        }
+        self.raised.is_none()
+    }
+
+    /// The call's result, or what a handler raised.
+    pub fn result<T>(self, result: Result<T, impl Into<BorderError>>) -> PyResult<T> {
+        match self.raised {
+            Some(raised) => Err(raised),
+            None => Ok(result.map_err(Into::into)?),
+        }
+    }
+}

@@ -1,0 +1,237 @@
+"""The border takes numbers for numbers, and refuses the rest under its name.
+
+A `timedelta64`, a complex number and a truth value passed as floats; a text, an integer of 400 digits and a wrong
+object came back as `TypeError` or `OverflowError` from somewhere in the conversion.
+"""
+
+import datetime
+import fractions
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rover_gym import Plane, RoverGymError, RoverModel, Simulation, SphereField, accuracy_options
+from rover_gym._core import SoilSimulation, soil_packing
+from rover_gym.planar import BallSimulation, Line, MirroredRoverSimulation, Polyline, Sine, TwoWheelRoverSimulation
+
+NONSENSE = [
+    datetime.timedelta(seconds=1),
+    np.timedelta64(1, "s"),
+    np.datetime64("2010-01-01"),
+    1.0 + 0.0j,
+    np.complex128(1.0),
+    np.array(1.0 + 0.0j),
+    True,
+    np.bool_(True),
+    "1.0",
+    b"1",
+    10**400,
+    [1.0],
+    {},
+    object(),
+    np.ones(1),
+    SphereField,
+]
+
+rocks = (0.1, (-5.0, -5.0, 5.0, 5.0), 0)
+one_disk = ([0.1], [1.0], [[0.0, 0.0]])
+
+NUMBERS: list[tuple[str, Callable[[Any], Any]]] = [
+    ("friction", lambda x: Simulation(friction=x)),
+    ("restitution", lambda x: Simulation(restitution=x)),
+    ("time_step", lambda x: Simulation(time_step=x)),
+    ("theta", lambda x: Simulation(theta=x)),
+    ("forecast", lambda x: Simulation(forecast=x)),
+    ("tolerance", lambda x: Simulation(tolerance=x)),
+    ("stiffness", lambda x: Simulation().hold("front_axle", stiffness=x)),
+    ("damping", lambda x: Simulation().hold("front_axle", damping=x)),
+    ("offset", lambda x: Plane(offset=x)),
+    ("x", lambda x: Plane().height(x, 0.0)),
+    ("abundance", lambda x: SphereField.rocks(x, *rocks[1:])),
+    ("max_diameter", lambda x: SphereField.rocks(*rocks, max_diameter=x)),
+    ("min_diameter", lambda x: SphereField.rocks(*rocks, min_diameter=x)),
+    ("wheel_radius", lambda x: RoverModel().replace(wheel_radius=x)),
+    ("contact_radius", lambda x: RoverModel().replace(contact_radius=x)),
+    ("mass_scale", lambda x: RoverModel().replace(mass_scale=x)),
+    ("wheel_torque_limit", lambda x: RoverModel().replace(wheel_torque_limit=x)),
+    ("steering_stiffness", lambda x: RoverModel().replace(steering_stiffness=x)),
+    ("masses[trunk]", lambda x: RoverModel().replace(masses={"trunk": x})),
+    ("joints[front_axle]", lambda x: RoverModel().weld({"front_axle": x})),
+    ("slope", lambda x: Line(slope=x)),
+    ("amplitude", lambda x: Sine(x, 1.0)),
+    ("wavelength", lambda x: Sine(1.0, x)),
+    ("phase", lambda x: Sine(1.0, 1.0, phase=x)),
+    ("height", lambda x: Polyline.step(0.0, x)),
+    ("mass", lambda x: BallSimulation(Line(), mass=x)),
+    ("inertia", lambda x: TwoWheelRoverSimulation(Line(), inertia=x)),
+    ("time_step", lambda x: BallSimulation(Line(), time_step=x)),
+    ("friction", lambda x: TwoWheelRoverSimulation(Line(), friction=x)),
+    ("radius_min", lambda x: soil_packing(radius_min=x)),
+    ("width", lambda x: soil_packing(width=x)),
+    ("wall_friction", lambda x: SoilSimulation(*one_disk, wall_friction=x)),
+    ("sleep_distance", lambda x: SoilSimulation(*one_disk, sleep_distance=x)),
+]
+
+COUNTS: list[tuple[str, Callable[[Any], Any]]] = [
+    ("max_iterations", lambda n: Simulation(max_iterations=n)),
+    ("n", lambda n: Simulation().step(n)),
+    ("n", lambda n: Simulation().profile(n)),
+    ("n", lambda n: BallSimulation(Line()).step(n)),
+    ("n", lambda n: SoilSimulation(*one_disk).step(n)),
+    ("seed", lambda n: SphereField.rocks(0.1, rocks[1], n)),
+    ("count", soil_packing),
+    ("seed", lambda n: soil_packing(seed=n)),
+]
+
+OTHERS: list[tuple[str, Callable[[], Any]]] = [
+    ("model", lambda: Simulation(3)),  # type: ignore[arg-type]
+    ("model", lambda: MirroredRoverSimulation(Line(), model="rover")),  # type: ignore[arg-type]
+    ("terrain", lambda: Simulation(terrain=3)),  # type: ignore[arg-type]
+    ("ground", lambda: SphereField([[0.0] * 3], [1.0], 3)),  # type: ignore[arg-type]
+    ("variant", lambda: Simulation(variant=3)),  # type: ignore[arg-type]
+    ("solver", lambda: Simulation(solver=3)),  # type: ignore[arg-type]
+    ("stabilisation", lambda: Simulation(stabilisation=None)),  # type: ignore[arg-type]
+    ("warm_start", lambda: Simulation(warm_start=1)),  # type: ignore[arg-type]
+    ("coordinates", lambda: Simulation().set_state(np.zeros(21), coordinates=1)),  # type: ignore[arg-type]
+    ("coordinates", lambda: RoverModel().tags(np.zeros(21), 1)),  # type: ignore[arg-type]
+    ("joints", lambda: Simulation().hold(3)),  # type: ignore[arg-type]
+    ("joints[1]", lambda: Simulation().release(["front_axle", 3])),  # type: ignore[list-item]
+    ("joints", lambda: RoverModel().weld(3)),  # type: ignore[arg-type]
+    ("path", lambda: RoverModel.from_file(3)),
+    ("path", lambda: RoverModel().to_file(3)),
+    ("path", lambda: SphereField.from_file(3)),  # type: ignore[arg-type]
+    ("text", lambda: RoverModel.from_text(3)),  # type: ignore[arg-type]
+    ("area", lambda: SphereField.rocks(0.1, (0.0, 1.0), 0)),
+    ("burial", lambda: SphereField.rocks(*rocks, burial=(0.1, 0.2, 0.3))),  # type: ignore[arg-type]
+    ("kinematic[0]", lambda: SoilSimulation(*one_disk, kinematic=[1.0])),  # type: ignore[list-item]
+    ("which", lambda: SoilSimulation(*one_disk).remove(3)),  # type: ignore[arg-type]
+    ("rover", lambda: SoilSimulation(*one_disk, rover=3)),  # type: ignore[arg-type]
+    ("accuracy", lambda: accuracy_options(10**400)),  # type: ignore[arg-type]
+    ("accuracy", lambda: accuracy_options(True)),
+    ("accuracy", lambda: accuracy_options(np.timedelta64(1, "s"))),  # type: ignore[arg-type]
+    ("accuracy", lambda: accuracy_options(1e-300)),
+]
+
+VECTORS: list[tuple[str, Callable[[Any], Any]]] = [
+    ("q", lambda x: Simulation().set_state(x)),
+    ("torques", lambda x: Simulation().set_wheel_torques(x)),
+    ("gravity", lambda x: Simulation(gravity=x)),
+    ("normal", Plane),
+    ("radii", lambda x: SphereField(np.zeros((3, 3)), x)),
+    ("masses", lambda x: RoverModel().replace(masses=x)),
+    ("x", lambda x: Polyline(x, [0.0, 1.0, 2.0])),
+]
+
+
+def refused(field: str, call: Callable[[], Any]) -> None:
+    with pytest.raises(RoverGymError) as caught:
+        call()
+    assert isinstance(caught.value, ValueError)
+    assert getattr(caught.value, "field", None) == field, caught.value
+    assert field.split("[", maxsplit=1)[0] in str(caught.value)
+    assert len(str(caught.value)) < 400
+
+
+@pytest.mark.parametrize(("field", "call"), NUMBERS)
+def test_what_is_no_number_is_refused_by_name(field: str, call: Callable[[Any], Any]) -> None:
+    for value in NONSENSE:
+        refused(field, lambda value=value: call(value))
+
+
+@pytest.mark.parametrize(("field", "call"), COUNTS)
+def test_what_is_no_count_is_refused_by_name(field: str, call: Callable[[Any], Any]) -> None:
+    for value in [*NONSENSE, 1.0, 1.5, -1, np.float64(2.0), np.int64(-3), 2**64, None]:
+        refused(field, lambda value=value: call(value))
+
+
+@pytest.mark.parametrize(("field", "call"), OTHERS)
+def test_other_wrong_types_are_refused_by_name(field: str, call: Callable[[], Any]) -> None:
+    refused(field, call)
+
+
+@pytest.mark.parametrize(("field", "call"), VECTORS)
+@pytest.mark.parametrize(
+    "value",
+    [
+        np.ones(3, dtype="timedelta64[s]"),
+        np.ones(3, dtype="datetime64[s]"),
+        np.ones(3, dtype=complex),
+        np.ones(3, dtype=bool),
+        ["1", "2", "3"],
+        [1.0, None, 2.0],
+        [1.0, 10**400, 2.0],
+        [datetime.timedelta(1)] * 3,
+        [[1.0], [1.0, 2.0]],
+        "text",
+        object(),
+    ],
+    ids=repr,
+)
+def test_arrays_of_what_are_no_numbers_are_refused_by_name(field: str, call: Callable[[Any], Any], value: Any) -> None:
+    refused(field, lambda: call(value))
+
+
+def test_the_value_that_was_given_stands_in_the_error() -> None:
+    given = datetime.timedelta(seconds=1)
+    with pytest.raises(RoverGymError, match=r"must be a number, is datetime\.timedelta") as caught:
+        Simulation(friction=given)  # type: ignore[arg-type]
+    assert caught.value.value is given
+
+
+def test_whatever_is_a_number_is_taken() -> None:
+    numbers = [1, np.float32(1.0), np.int8(1), np.array(1.0), fractions.Fraction(1), np.uint64(1)]
+    for one in numbers:
+        assert Simulation(friction=one).friction == 1.0  # type: ignore[arg-type]
+        assert Plane((0, one, 0), one).offset == 1.0  # type: ignore[arg-type]
+        assert Line(one).slope == 1.0  # type: ignore[arg-type]
+    assert Simulation().step(np.int64(3)).steps == 3  # type: ignore[arg-type]
+    assert Simulation(warm_start=np.bool_(False)).settings["warm_start"] is False  # type: ignore[arg-type]
+    ones = [fractions.Fraction(1, 2)] * 6
+    sim = Simulation()
+    sim.set_wheel_torques(ones)  # type: ignore[arg-type]
+    assert sim.wheel_torques.tolist() == [0.5] * 6
+    sim.set_wheel_torques(np.ones(6, dtype=np.float32))
+    assert sim.wheel_torques.tolist() == [1.0] * 6
+
+
+@pytest.mark.parametrize(
+    ("field", "call"),
+    [
+        ("time_step", lambda: Simulation(time_step=1e-300)),
+        ("time_step", lambda: Simulation(time_step=1e300)),
+        ("gravity", lambda: Simulation(gravity=(0.0, -1e300, 0.0))),
+        ("offset", lambda: Plane(offset=1e300)),
+        ("offset", lambda: Line(0.0, 1e300)),
+        ("slope", lambda: Line(1e300)),
+        ("mass", lambda: BallSimulation(Line(), mass=1e300)),
+        ("radius", lambda: BallSimulation(Line(), radius=1e-300)),
+        ("inertia", lambda: BallSimulation(Line(), inertia=1e300)),
+        ("wheel_radius", lambda: RoverModel().replace(wheel_radius=1e300)),
+        ("contact_radius", lambda: RoverModel().replace(contact_radius=1e-300)),
+        ("solids[0].mass", lambda: RoverModel().replace(mass_scale=1e300)),
+        ("solids[0].mass", lambda: RoverModel().replace(masses={"trunk": 1e-300})),
+        ("joints[front_axle]", lambda: RoverModel().weld({"front_axle": 1e300})),
+        ("wheels[0].torque_limit", lambda: RoverModel().replace(wheel_torque_limit=1e300)),
+        ("area", lambda: SphereField.rocks(0.1, (1e15, 0.0, 1e15 + 2.0, 1.0), 0)),
+        ("max_diameter", lambda: SphereField.rocks(*rocks, max_diameter=1e300)),
+        ("min_diameter", lambda: SphereField.rocks(*rocks, min_diameter=5e-324)),
+        ("clear", lambda: SphereField.rocks(*rocks, clear=[(1e300, 0.0, 1.0)])),
+        ("sleep_distance", lambda: SoilSimulation(*one_disk, sleep_distance=1e-300)),
+        ("mass[0]", lambda: SoilSimulation([0.1], [1e300], [[0.0, 0.0]])),
+    ],
+)
+def test_absurd_magnitudes_are_refused_by_name(field: str, call: Callable[[], Any]) -> None:
+    refused(field, call)
+
+
+def test_a_plane_of_a_huge_normal_is_still_ground() -> None:
+    """The normal overflowed to zero: the solver converged, and there was no ground."""
+    plane = Plane([1e308] * 3)
+    np.testing.assert_allclose(plane.normal, np.sqrt(1.0 / 3.0), rtol=1e-15)
+    sim = Simulation(terrain=Plane([0.0, 1e308, 0.0]))
+    q = np.zeros(21)
+    q[1] = 0.35
+    sim.set_state(q)
+    assert sim.step().n_contacts == 6

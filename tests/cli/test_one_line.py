@@ -1,0 +1,225 @@
+"""Whatever happens to a command, the user sees one line and an exit code, and keeps what was finished."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+import rover_gym.baseline
+from rover_gym import OptionError
+from rover_gym.cli import app
+from rover_gym.recording import read_trajectory
+from rover_gym.validation import refuse
+
+DRIVE = sys.modules["rover_gym.cli.drive"]  # the command has the module's name
+NO_FILE = "cannot be written"
+
+
+def rover(*arguments: str, **environment: str) -> Result:
+    return CliRunner(env={"COLUMNS": "160", "NO_COLOR": "1", **environment}).invoke(app, list(arguments))
+
+
+def one_line(result: Result, code: int = 2) -> str:
+    assert result.exit_code == code, result.output
+    assert len(result.stderr.splitlines()) == 1
+    assert "Traceback" not in result.output
+    return result.stderr
+
+
+def raising(error: BaseException) -> Callable[..., NoReturn]:
+    def fail(*_: Any, **__: Any) -> NoReturn:
+        raise error
+
+    return fail
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError("by zero"), KeyError("q"), MemoryError(), RecursionError("a\nb")])
+def test_an_error_that_nobody_foresaw_is_one_line_too(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(DRIVE, "find_policy", raising(error))
+    line = one_line(rover("drive"), code=1)
+    assert line.startswith(f"error: unforeseen {type(error).__name__}: ")
+    assert "ROVER_DEBUG=1" in line
+    assert rover("drive", ROVER_DEBUG="1").exception is error  # and this way it can be found
+
+
+def test_bytes_of_a_name_that_are_no_text_are_printed(tmp_path: Path) -> None:
+    """The message itself raised UnicodeEncodeError."""
+    name = os.fsdecode(bytes(tmp_path / "run-") + b"\xff.h5")
+    assert "run-\\udcff.h5" in one_line(rover("replay", name, "--vrml", str(tmp_path / "a.wrl")))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["drive", "--time-step", "0.003"], "--time-step: must divide the control period of 0.05 s"),
+        (["drive", "--time-step", "1e-300"], "--time-step: must be at least 1e-05, got 1e-300"),
+        (["drive", "--slope", "1" + 400 * "0"], "--slope: must be finite, got inf"),
+        (["drive", "--heading", "inf"], "--heading: must be finite"),
+        (["baseline", "--difficulty", "nan"], "--difficulty: must be finite"),
+        (["planar", "ball", "--slope", "90"], "--slope: must be at most 89, got 90.0"),
+        (["planar", "ball", "--ground", "table", "--table", "/dev/zero"], "--table: must be a regular file"),
+        (["planar", "rover", "--time-step", "1e-9"], "makes more than 10000000 rows"),
+        (
+            ["planar", "soil", "--disks", "100"],
+            "--disks: in 3 layers make a bed 1.13 m wide, and the machine needs 1.3 m",
+        ),
+        (["scene", "--accuracy", "nan"], "--accuracy: must be finite"),
+        (["scene", "--reach", "nan"], "--reach: must be finite"),
+        (["planar", "soil", "--torque", "nan"], "--torque: must be finite"),
+    ],
+)
+def test_a_message_names_the_option_that_the_user_can_set(arguments: list[str], message: str, tmp_path: Path) -> None:
+    """`--time-step` was answered with `control_frequency`, `--disks` with `start`."""
+    output = ["--output", str(tmp_path / "runs")] if arguments[0] in ("drive", "planar", "report") else []
+    line = one_line(rover(*arguments, *output))
+    assert message in line
+    assert "np.float64" not in line
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["drive", "--seed", "-1"],
+        ["drive", "--seed", "1" + 400 * "0"],
+        ["drive", "--episodes", "1" + 30 * "0"],
+        ["drive", "--episodes", "0"],
+        ["baseline", "--episodes", "1" + 30 * "0"],
+        ["planar", "soil", "--seed", "-1"],
+        ["scene", "--seed", "1" + 30 * "0"],
+        ["speed", "--num-envs", "1000000000"],
+        ["drive", "--time-limit", "nan"],
+        ["planar", "rover", "--speed", "1e9"],
+        ["planar", "soil", "--duration", "nan"],
+        ["report", "--time-step", "nan"],
+    ],
+)
+def test_numbers_beyond_reason_are_refused_before_the_work(arguments: list[str]) -> None:
+    result = rover(*arguments)
+    assert result.exit_code == 2
+    assert arguments[-2] in result.stderr
+
+
+@pytest.mark.parametrize("option", ["--video", "--output"])
+def test_a_place_that_cannot_be_written_is_told_before_driving(
+    option: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(DRIVE, "run_episode", raising(AssertionError("it drove")))
+    (tmp_path / "taken").write_text("a file", encoding="utf-8")
+    for name in ("taken/below/film.mp4", "taken" if option == "--output" else "."):
+        result = rover("drive", option, str(tmp_path / name))
+        assert result.exit_code == 2
+        assert option in result.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["taken"]
+
+
+def test_a_film_of_another_kind_is_refused_before_driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(DRIVE, "run_episode", raising(AssertionError("it drove")))
+    assert "--video: must be a file's name that ends in .mp4" in one_line(
+        rover("drive", "--video", str(tmp_path / "film.txt"))
+    )
+
+
+@pytest.mark.parametrize("option", ["--html", "--vrml", "--gltf"])
+def test_a_replay_is_not_made_for_a_place_that_cannot_be_written(option: str, tmp_path: Path) -> None:
+    assert rover("drive", "--time-limit", "0.1", "--output", str(tmp_path)).exit_code == 0
+    run, taken = tmp_path / "episode-0.h5", tmp_path / "taken"
+    taken.write_text("a file", encoding="utf-8")
+    line = one_line(rover("replay", str(run), "--vrml", str(tmp_path / "first.wrl"), option, str(taken / "run.out")))
+    assert f"{option}: {NO_FILE}" in line
+    assert not (tmp_path / "first.wrl").exists()
+    assert "would replace the run itself" in one_line(rover("replay", str(run), option, str(run)))
+    assert len(read_trajectory(run)["time"]) == 3
+    assert f"--output: {NO_FILE}" in one_line(rover("plot", str(run), "--output", str(taken / "plots")))
+
+
+def test_an_interrupted_drive_keeps_and_prints_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drive, started = DRIVE.run_episode, []
+
+    def interrupted(*args: Any, on_step: Callable[..., None], **kwargs: Any) -> Any:
+        started.append(1)
+        steps = []
+
+        def step(*given: Any) -> None:
+            on_step(*given)
+            steps.append(1)
+            if len(started) == 2 and len(steps) == 5:
+                raise KeyboardInterrupt
+
+        return drive(*args, on_step=step, **kwargs)
+
+    monkeypatch.setattr(DRIVE, "run_episode", interrupted)
+    video = tmp_path / "film.mp4"
+    result = rover("drive", "--episodes", "3", "--time-limit", "0.5", "--output", str(tmp_path), "--video", str(video))
+    assert one_line(result, 130) == "interrupted: 1 of 3 episodes are done\n"
+    assert "no: time" in result.stdout
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert [episode["seed"] for episode in summary["episodes"]] == [0]
+    assert len(read_trajectory(tmp_path / "episode-0.h5")["time"]) == 11
+    half = read_trajectory(tmp_path / "episode-1.h5")
+    assert len(half["time"]) == 5
+    assert not half.attributes["complete"]
+    assert video.stat().st_size > 0
+
+
+def test_an_interrupted_baseline_prints_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    drive, driven = rover_gym.baseline.run_episode, []
+
+    def interrupted(*args: Any, **kwargs: Any) -> Any:
+        if len(driven) == 3:
+            raise KeyboardInterrupt
+        driven.append(1)
+        return drive(*args, **kwargs)
+
+    monkeypatch.setattr(rover_gym.baseline, "run_episode", interrupted)
+    options = ["--episodes", "2", "--difficulty", "0", "--difficulty", "0.25", "--difficulty", "0.5"]
+    result = rover("baseline", *options, "--json")
+    assert one_line(result, 130) == "interrupted: 3 of 6 episodes are done\n"
+    assert [(row["difficulty"], row["episodes"]) for row in json.loads(result.stdout)["rows"]] == [(0.0, 2), (0.25, 1)]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are others there")
+def test_ctrl_c_at_a_terminal_ends_a_long_run_with_its_recording(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", "from rover_gym.cli import main; main()", "planar", "rover"]
+    child = subprocess.Popen(
+        [*command, "--time-step", "1e-4", "--duration", "500", "--output", str(tmp_path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    path = tmp_path / "rover.h5"
+    for _ in range(600):
+        if path.exists() and path.stat().st_size > 100_000:
+            break
+        time.sleep(0.05)
+    child.send_signal(signal.SIGINT)
+    stdout, stderr = child.communicate(timeout=30)
+    assert (child.returncode, stderr) == (130, "interrupted\n")
+    assert stdout == f"trajectory, incomplete: {path}\n"
+    assert len(read_trajectory(path)["time"]) > 100
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+def test_results_that_cannot_be_printed_are_one_line() -> None:
+    command = [sys.executable, "-c", "from rover_gym.cli import main; main()", "scene"]
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        child = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert child.returncode != 0
+    assert "Traceback" not in child.stderr
+    assert "No space left" in child.stderr.splitlines()[0]
+
+
+def test_numbers_print_as_numbers() -> None:
+    """A message ended in `got np.float64(0.5)`."""
+    for value in (np.float64(0.5), np.float32(0.5), 0.5):
+        with pytest.raises(OptionError, match=r"speed: must be large, got 0\.5$"):
+            refuse(OptionError, "speed", value, "must be large")

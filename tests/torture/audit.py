@@ -1,0 +1,169 @@
+r"""Energy audit of a rover's steps, from what the public interface shows: it believes no report.
+
+    gained = T + V + S (after) - T + V + S (before) - sum_j tau_j dphi_j
+
+T and V are kinetic and potential energy, S = sum k (phi - set-point)^2 / 2 is stored by the held steering joints,
+tau_j the commanded torque about joint j and dphi_j the angle turned. A motor whose torque falls with its speed does
+less work than the commanded torque would, so the difference bounds what the step gained from nowhere. A damper whose
+joint turns round within the step may do work too, by its rate at one end or the other.
+
+The projection of positions lifts what overlaps, and so adds energy of its own. Where more was gained than rounding, the
+step is taken again from its start without projection, and what differs is entered as `lifted`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym import RoverModel, Simulation, StepError
+from torture.ledger import Ledger
+
+Array = npt.NDArray[np.float64]
+
+#: A step may gain so much of the energy at hand: the project's claim.
+GAIN = 1e-9
+#: A case ends with a step that gained more: what follows says nothing.
+BLOWN_UP = 1.0
+
+
+class Audit:
+    """Steps a simulation and enters into a ledger what its steps come to.
+
+    Args:
+        sim: Its commands may be changed between steps; joints are held by `set_steering` only.
+        ledger: Of the case.
+        deep: Whether it starts overlapping the ground, so that `deepest` is entered only once it is out.
+    """
+
+    def __init__(self, sim: Simulation, ledger: Ledger, *, deep: bool = False) -> None:
+        self.sim, self.ledger, self._deep = sim, ledger, deep
+        self.joint_torques: Array = np.zeros(sim.model.nv - 6)
+        model, description = sim.model, sim.model.to_dict()
+        self._stiffness = _gains(model, description, "stiffness")
+        self._damping = _gains(model, description, "damping")
+        self._steering = np.array(model.steering_joint_indices)
+        self._signs = model.actuation_matrix()[:, :6]
+        self._weight = model.mass * float(np.linalg.norm(sim.gravity))
+        self._twin: Simulation | None = None
+
+    def push(self, torques: Array) -> None:
+        """Sets torques about the joint axes (nv - 6,) N m, which have no limit."""
+        self.sim.set_joint_torques(torques)
+        self.joint_torques = torques
+
+    def run(self, steps: int) -> bool:
+        """Takes steps one by one; False where one was refused or went wrong."""
+        return all(self.step() for _ in range(steps))
+
+    def step(self) -> bool:
+        """Takes one step; False where it was refused or went wrong."""
+        self.begin()
+        try:
+            with self.ledger.timed():
+                report = self.sim.step()
+        except StepError as error:
+            if self.sim.snapshot() != self._start:
+                self.ledger.find("a refused step changed the state")
+            return self.end(1, "failed", str(error))
+        return self.end(1, report.status, f"residual {report.residual:.1e}, {report.n_contacts} contacts")
+
+    def begin(self) -> None:
+        """Before steps that somebody else takes, after the commands are given."""
+        sim = self.sim
+        self._start, self._q, self._v, self._before = sim.snapshot(), sim.q, sim.v, sim.energy()
+
+    def end(self, steps: int, status: str, what: str = "") -> bool:
+        """After them: enters what they came to.
+
+        Args:
+            steps: How many.
+            status: "converged", "not_converged" or "failed".
+            what: More of it, for the notes.
+        """
+        sim, ledger, q = self.sim, self.ledger, self._q
+        ledger.steps += steps
+        if status == "failed":
+            ledger.refused += 1
+            self._note("refused", what)
+        if status == "not_converged":
+            ledger.not_converged += 1
+            self._note("not converged", what)
+        after = sim.q
+        if not (np.isfinite(after).all() and np.isfinite(sim.v).all()):
+            ledger.find("not finite")
+            return False
+        stored, work = self._stored(q), self._work(after - q)
+        at_hand = self._before.kinetic + self._weight + abs(work) + stored
+        gained = self._energy(sim) - self._before.total - stored - work - self._damped(after - q)
+        if gained > GAIN * at_hand:
+            lifted = self._lifted(steps)
+            if lifted is not None:
+                ledger.raise_to("lifted", lifted / at_hand)
+                gained -= lifted
+        share = gained / at_hand if at_hand > 0.0 else 0.0
+        ledger.raise_to("gained", share)
+        if share > GAIN:
+            self._note("gained", f"{share:.1e} of {at_hand:.3g} J; {what}")
+        overlap = -sim.deepest_overlap
+        self._deep = self._deep and overlap > 1e-3
+        if not self._deep:
+            ledger.raise_to("deepest", overlap)
+        return share < BLOWN_UP and status != "failed"
+
+    def _note(self, kind: str, what: str) -> None:
+        v = self.sim.v
+        rates = (
+            f"{np.abs(v[:3]).max():.3g} m/s, trunk {np.abs(v[3:6]).max():.3g}, joints {np.abs(v[6:]).max():.3g} rad/s"
+        )
+        self.ledger.note(kind, f"step {self.ledger.steps}: {what}; {rates}")
+
+    def _energy(self, sim: Simulation) -> float:
+        return sim.energy().total + self._stored(sim.q)
+
+    def _stored(self, q: Array) -> float:
+        off = q[self._steering] - self.sim.steering
+        return 0.5 * float(self._stiffness @ (off * off))
+
+    def _work(self, turned: Array) -> float:
+        torques = self._signs @ self.sim.wheel_torques
+        torques[6:] += self.joint_torques
+        return float(torques[6:] @ turned[6:])
+
+    def _damped(self, turned: Array) -> float:
+        """Most work, J, that the steering's dampers can do where the rate changes its sign within the step."""
+        angle, rates = turned[self._steering], np.stack((self._v, self.sim.v))[:, self._steering]
+        return float(np.maximum(-self._damping * angle * rates, 0.0).max(axis=0).sum())
+
+    def _lifted(self, steps: int) -> float | None:
+        """What the projection added over the steps, J; None where a step without it is refused."""
+        sim = self.sim
+        if self._twin is None:
+            self._twin = Simulation(sim.model, sim.terrain, **(sim.settings | {"stabilisation": "none"}))
+            self._again = Simulation(sim.model, sim.terrain, **sim.settings)
+        twin, again, lifted = self._twin, self._again, 0.0
+        again.restore(self._start)
+        # An environment gives its commands after `begin`.
+        again.set_wheel_torques(sim.wheel_torques)
+        again.set_steering(sim.steering)
+        for _ in range(steps):
+            start, q = again.snapshot(), again.q
+            twin.restore(start)
+            try:
+                twin.step()
+                again.step()
+            except StepError:
+                return None
+            # Each by its own motors' work: the projection turns joints too.
+            own = self._energy(again) - self._work(again.q - q)
+            lifted += max(own - (self._energy(twin) - self._work(twin.q - q)), 0.0)
+        return lifted
+
+
+def _gains(model: RoverModel, description: dict[str, Any], name: str) -> Array:
+    """(6,) stiffness, N m/rad, or damping, N m s/rad, with which the steering joints are held."""
+    solids = {solid["name"]: solid for solid in description["solids"]}
+    names = model.dof_names
+    return np.array([solids[names[i]]["hold"][name] for i in model.steering_joint_indices])

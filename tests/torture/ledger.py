@@ -1,0 +1,87 @@
+"""What the cases of a regime came to: counts, extremes and findings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from time import thread_time
+
+#: Columns whose largest value counts, and with it the case that reached it.
+EXTREMES = ("gained", "lifted", "deepest", "slowest", "reward")
+#: Notes of a kind that are kept.
+NOTES = 5
+
+
+@dataclass
+class Ledger:
+    """Counts and extremes of one case, or of many.
+
+    Attributes:
+        steps: Taken, or problems solved, or inputs given.
+        not_converged: Steps whose report says so.
+        refused: Steps that ended in a `StepError`, or inputs that were refused.
+        gained: Most energy gained in one step beyond the work of motors, over the energy at hand.
+        lifted: Most energy that the projection of positions added in one step, over the energy at hand.
+        deepest: Deepest overlap with the ground after a step, m.
+        slowest: Longest CPU time of one call, s.
+        reward: Largest reward of one step, either way.
+        findings: What must never happen, in words.
+        worst: Case in which each extreme was reached.
+        notes: What happened when, a few of each kind: for those who look at one case.
+        case: Number of the case.
+    """
+
+    steps: int = 0
+    not_converged: int = 0
+    refused: int = 0
+    gained: float = 0.0
+    lifted: float = 0.0
+    deepest: float = 0.0
+    slowest: float = 0.0
+    reward: float = 0.0
+    findings: list[str] = field(default_factory=list)
+    worst: dict[str, int] = field(default_factory=dict)
+    notes: dict[str, list[str]] = field(default_factory=dict)
+    case: int = 0
+
+    def note(self, kind: str, what: str) -> None:
+        """Remembers the first few of a kind."""
+        kept = self.notes.setdefault(kind, [])
+        if len(kept) < NOTES:
+            kept.append(what)
+
+    def raise_to(self, column: str, value: float) -> None:
+        """Keeps the larger value; what is no number is a finding."""
+        if value != value:
+            self.find(f"{column} is not a number")
+        elif value > getattr(self, column):
+            setattr(self, column, value)
+
+    def find(self, what: str) -> None:
+        """Enters a finding, once."""
+        if what not in self.findings:
+            self.findings.append(what)
+
+    @contextmanager
+    def timed(self) -> Iterator[None]:
+        """Times a call by its thread's CPU clock, which other processes do not slow down."""
+        start = thread_time()
+        yield
+        self.raise_to("slowest", thread_time() - start)
+
+    def merge(self, other: Ledger, case: int) -> None:
+        """Adds what another case came to."""
+        self.steps += other.steps
+        self.not_converged += other.not_converged
+        self.refused += other.refused
+        for column in EXTREMES:
+            value = getattr(other, column)
+            if value > getattr(self, column) or (column not in self.worst and value > 0.0):
+                setattr(self, column, value)
+                self.worst[column] = case
+        for finding in other.findings:
+            self.find(f"case {case}: {finding}")
+        for column in ("not_converged", "refused"):
+            if getattr(other, column):
+                self.worst.setdefault(column, case)

@@ -1,0 +1,105 @@
+"""Sizes and places that took all memory, aborted or hung: refused, or done in time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from rover_gym import Plane, RoverEnv, RoverModel, Simulation, SphereField, solve_friction_contact
+from rover_gym.planar import BallSimulation, Line, Polyline, Sine, SoilSimulation, soil_packing
+from torture.damage import attempt, use
+from torture.ledger import Ledger
+from torture.regime import Bounds, Regime
+
+Random = np.random.Generator
+
+
+def _chain(n: int) -> RoverModel:
+    """The rover with a chain of solids on its trunk."""
+    description = RoverModel().to_dict()
+    link: dict[str, Any] = {"mass": 1.0, "position": [0.0, 0.1, 0.0], "axis": [0.0, 0.0, 1.0]}
+    shape = {"kind": "box", "size": [0.1, 0.1, 0.1]}
+    for i in range(n):
+        parent = f"link_{i - 1}" if i else "trunk"
+        description["solids"].append({**link, "name": f"link_{i}", "parent": parent, "shape": shape})
+    return RoverModel.from_dict(description)
+
+
+def _ball(ground: Any, height: float) -> BallSimulation:
+    """A ball over a ground."""
+    ball = BallSimulation(ground, radius=0.3)
+    ball.set_state([0.0, height, 0.0])
+    return ball
+
+
+def _reach(n: int) -> Polyline:
+    """A polyline of many points."""
+    x = np.arange(n) * 1e-3
+    return Polyline(x, 0.1 * np.sin(x))
+
+
+def _placed(x: float) -> Simulation:
+    """A rover far away."""
+    sim = Simulation()
+    q = np.zeros(sim.model.nq)
+    q[:3] = x, 0.5, x
+    sim.set_state(q)
+    return sim
+
+
+def _disks(n: int) -> SoilSimulation:
+    """Many disks, all in one place."""
+    return SoilSimulation(np.full(n, 0.01), np.ones(n), np.zeros((n, 2)))
+
+
+FINDS: dict[str, Callable[[], Any]] = {
+    "a soil of 1e11 disks": lambda: soil_packing(10**11),
+    "a soil of 2e19 disks": lambda: soil_packing(2 * 10**19),
+    "a chain of 300 solids": lambda: Simulation(_chain(300)),
+    "a chain of 3000 solids": lambda: Simulation(_chain(3000)),
+    "20 000 solids": lambda: Simulation(_chain(20_000)),
+    "a ball on a sine of a micrometre": lambda: _ball(Sine(0.01, 1e-6), 0.5),
+    "a ball on a sine of 1e308 m": lambda: _ball(Sine(1e308, 1.0), 0.5),
+    "a ball a thousand kilometres deep": lambda: _ball(Sine(0.1, 3.0), -1e9),
+    "a ball deep under a line": lambda: _ball(Line(0.3), -1e9),
+    "a ball on a steep line": lambda: _ball(Line(1e12), 0.5),
+    "a ball on a polyline of 1e6 points": lambda: _ball(_reach(1_000_000), 0.5),
+    "a rover 1e15 m away": lambda: _placed(1e15),
+    "a rover 1e300 m away": lambda: _placed(1e300),
+    "disks all in one place": lambda: _disks(500),
+    "friction of 1e16": lambda: Simulation(friction=1e16),
+    "a step of 1e-300 s": lambda: Simulation(time_step=1e-300),
+    "a step of 1e9 s": lambda: Simulation(time_step=1e9),
+    "gravity of 1e200": lambda: Simulation(gravity=(0.0, -1e200, 0.0)),
+    "a plane of normal 1e308": lambda: Simulation(terrain=Plane([1e308] * 3)),
+    "a sphere of radius 1e300": lambda: Simulation(terrain=SphereField([[0.0, -1e300, 0.0]], [1e300])),
+    "rocks over a continent": lambda: SphereField.rocks(0.5, (-1e7, -1e7, 1e7, 1e7), 1),
+    "rocks of a micrometre": lambda: SphereField.rocks(0.5, (-5.0, -5.0, 5.0, 5.0), 1, min_diameter=1e-6),
+    "an empty problem by ADMM": lambda: solve_friction_contact(np.zeros((0, 0)), [], [], solver="admm"),
+    "an empty problem, relaxed": lambda: solve_friction_contact(np.zeros((0, 0)), [], [], solver="relaxed"),
+    "a control period of 2e323 s": lambda: RoverEnv(control_frequency=5e-324),
+    "a slope of 1e400 degrees": lambda: RoverEnv(slope_deg=10**400),
+    "a goal 1e300 m away": lambda: RoverEnv(goal_distance=1e300).reset(seed=1),
+    "a height scan of 1e12 points": lambda: RoverEnv(height_scan=(10**6, 10**6, 0.1)),
+}
+
+
+def play(what: str, ledger: Ledger) -> None:
+    """Makes one of them, steps it if it is made, and takes it back to where it is."""
+    made = attempt(ledger, what, FINDS[what])
+    if isinstance(made, Simulation | BallSimulation | SoilSimulation):
+        use(ledger, what, made)
+        attempt(ledger, what, lambda: made.restore(made.snapshot()))
+
+
+def finds(_random: Random, ledger: Ledger) -> None:
+    """One after the other."""
+    play(sorted(FINDS)[ledger.case % len(FINDS)], ledger)
+
+
+#: As long as making a million points or some ten thousand rocks may take.
+PATIENT = Bounds(not_converged=1.0, refused=1.0, slowest=5.0)
+
+REGIMES = [Regime("sizes and places", finds, len(FINDS), PATIENT, limit=60.0)]
