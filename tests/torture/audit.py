@@ -125,7 +125,7 @@ class Audit:
         joints[np.array(sim.model.wheel_joint_indices) - 6] = False
         turning = float(np.linalg.norm(self._v[3:6]) + np.abs(self._v[6:][joints]).max(initial=0.0))
         turn = sim.time_step * turning
-        flies = sim.variant == "newton" and turn <= 0.1 and len(sim.contacts.gaps) == 0
+        flies = sim.settings["variant"] == "newton" and turn <= 0.1 and len(sim.contacts.gaps) == 0
         return turn**3 * max(self._before.kinetic, sim.energy().kinetic) if flies else 0.0
 
     def _note(self, kind: str, what: str) -> None:
