@@ -189,6 +189,18 @@ pub trait MechanicalSystem {
     /// Before the iterations of a Newton variant: what it must remember of the start. By default nothing.
     fn begin_balance(&mut self, _start: Start<'_, Self::Configuration>) {}
 
+    /// [`Self::load`] for the iterate `v_end`: forces taken implicitly enter with their value there. By default there are none.
+    fn load_at_end(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Self::Configuration>,
+        _v_end: &[f64],
+        v_mean: &[f64],
+        y: &mut [f64],
+    ) {
+        self.load(options, start, v_mean, y);
+    }
+
     /// `y = h F − Δ(M v)` (nv): what the iterate `v_end` leaves of the balance over the step without contacts.
     ///
     /// The default is the rule at the middle, `h F(q_m, v_mean) − M(q_m) (v_end − v)`, of order 2 for θ = ½.
@@ -206,7 +218,7 @@ pub trait MechanicalSystem {
             *change = end - begin;
         }
         self.multiply_mass(y, scratch);
-        self.load(options, start, v_mean, y);
+        self.load_at_end(options, start, v_end, v_mean, y);
         for (y, momentum) in y.iter_mut().zip(&*scratch) {
             *y -= momentum;
         }

@@ -271,6 +271,8 @@ impl SoilSystem<'_> {
     }
 }
 
+/// Its energy is not audited: frames stay where the step begins and disks have no gyroscopic terms, so that a step with θ ≥ ½ is passive by
+/// construction.
 impl MechanicalSystem for SoilSystem<'_> {
     /// (x, y, θ) of each disk, then the machine's coordinates, m and rad.
     type Configuration = Vec<f64>;
