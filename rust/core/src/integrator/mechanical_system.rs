@@ -173,6 +173,12 @@ pub trait MechanicalSystem {
         0.0
     }
 
+    /// Whether [`Self::balance`] keeps the momenta of free flight whatever the step, which no correction of the energy may touch. By default
+    /// it does not.
+    fn conserves_momenta(&self) -> bool {
+        false
+    }
+
     /// Work of the actuators over a step that ends with `v_end`, J.
     fn work(
         &mut self,

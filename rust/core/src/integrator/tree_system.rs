@@ -258,6 +258,10 @@ impl MechanicalSystem for TreeSystem<'_> {
             .fold(0.0_f64, |most, (_, rate)| most.max(rate.abs()))
     }
 
+    fn conserves_momenta(&self) -> bool {
+        true
+    }
+
     fn load_gyroscopic(
         &mut self,
         options: &StepOptions,
