@@ -266,6 +266,11 @@ pub trait MechanicalSystem {
         rebound(options.restitution, u_N_before)
     }
 
+    /// Whether a solve that does not converge speaks for a problem without an answer. By default it does; not where sweeps end early.
+    fn solves_to_the_end(&self) -> bool {
+        true
+    }
+
     /// Solves [`Self::problem`]: p (d n_c), N s, in and out, and u (d n_c), m/s, out, as [`solve`] takes them.
     ///
     /// A system of very many bodies has its own way, which needs no W.

@@ -664,6 +664,11 @@ impl MechanicalSystem for SoilSystem<'_> {
         }
     }
 
+    /// Its sweeps end at a loose tolerance, and a pile that bounces needs many.
+    fn solves_to_the_end(&self) -> bool {
+        false
+    }
+
     fn solve(
         &self,
         q: &[f64],
