@@ -89,4 +89,20 @@ impl MotorBranch {
     pub(crate) fn torque(&self, begin: f64, end: f64) -> f64 {
         self.regime.torque(self.rate(begin, end))
     }
+
+    /// Work (J) that the motor is credited with in a step between two rates (rad/s) that turns it by `turned` (rad).
+    ///
+    /// A line only takes away from what the command does, `(τ − command) ω ≤ 0`. Where a step turns the rate round, the implicit torque and
+    /// the mean rate may say otherwise; that surplus is nobody's work.
+    #[inline]
+    pub(crate) fn work(&self, drive: Option<&Drive>, begin: f64, end: f64, turned: f64) -> f64 {
+        let work = self.torque(begin, end) * turned;
+        match drive {
+            Some(Drive {
+                torque,
+                motor: Some(motor),
+            }) => work.min(motor.limited(*torque) * turned),
+            _ => work,
+        }
+    }
 }

@@ -327,8 +327,10 @@ impl MechanicalSystem for TreeSystem<'_> {
             let (begin, end) = (start.v[6 + j], v_end[6 + j]);
             let turned = options.time_step * (theta * end + (1.0 - theta) * begin);
             let torque = actuation(options, self.command, start, v_end, self.parts, j);
-            self.parts.drive_work[j] = torque.drive * turned;
-            total += (torque.drive + torque.other) * turned;
+            let drive = self.command.drives[j].as_ref();
+            let work = self.parts.motors[j].work(drive, begin, end, turned);
+            self.parts.drive_work[j] = work;
+            total += work + torque.other * turned;
         }
         total
     }

@@ -36,6 +36,16 @@ pub struct PlanarMotor {
     pub gain: f64,
 }
 
+impl PlanarMotor {
+    /// One of them under a command, N m.
+    fn drive(&self, torque: f64) -> Drive {
+        Drive {
+            torque,
+            motor: Some(self.motor),
+        }
+    }
+}
+
 /// A machine with `NV` coordinates whose velocities are their rates.
 ///
 /// The first two coordinates are a place in the world, m; the others angles, rad, positive to the left.
@@ -405,10 +415,7 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
         for (i, (branch, torque)) in parts.motors.iter_mut().zip(self.inputs).enumerate() {
             if let Some(motor) = self.machine.motor(i) {
                 let (begin, end) = motor_rates(&motor, start.v, v_end);
-                let drive = Drive {
-                    torque: *torque,
-                    motor: Some(motor.motor),
-                };
+                let drive = motor.drive(*torque);
                 is_new |= branch.revise(Some(&drive), begin, end);
             }
         }
@@ -460,12 +467,21 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
         let torques = self
             .machine
             .force(&parts.middle, &still, &none, &parts.torques);
-        let mean = start
-            .v
-            .iter()
-            .zip(v_end)
-            .map(|(begin, end)| options.theta * end + (1.0 - options.theta) * begin);
-        options.time_step * torques.iter().zip(mean).map(|(f, v)| f * v).sum::<f64>()
+        let (h, theta) = (options.time_step, options.theta);
+        let mean = |k: usize| theta * v_end[k] + (1.0 - theta) * start.v[k];
+        let power: f64 = torques.iter().enumerate().map(|(k, f)| f * mean(k)).sum();
+        let mut work = h * power;
+        for (i, branch) in parts.motors.iter().enumerate() {
+            if let Some(motor) = self.machine.motor(i) {
+                let (begin, end) = motor_rates(&motor, start.v, v_end);
+                let turned = h * motor.gain.signum() * mean(motor.coordinate);
+                let drive = motor.drive(self.inputs[i]);
+                let surplus =
+                    parts.torques[i] * turned - branch.work(Some(&drive), begin, end, turned);
+                work -= motor.gain.abs() * surplus;
+            }
+        }
+        work
     }
 
     fn half_solve(&self, y: &mut [f64]) {
