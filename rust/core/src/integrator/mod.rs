@@ -20,6 +20,7 @@ pub mod gyroscopic;
 pub mod mechanical_system;
 pub mod moreau_jean;
 pub mod moreau_jean_newton;
+pub(crate) mod motor_branch;
 pub mod options;
 pub mod position_projection;
 pub mod probe;

@@ -114,7 +114,11 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         }
         system.set_moved(start.configuration, &ws.v_mean, h, &mut ws.end);
         let turn = options.time_step * system.turning(start.v);
-        let drift = if turn <= MOST_TURN { turn.powi(3) } else { 0.0 };
+        let drift = if system.conserves_momenta() && turn <= MOST_TURN {
+            turn.powi(3)
+        } else {
+            0.0
+        };
         let audit = Audit {
             before,
             is_last: false,

@@ -6,11 +6,11 @@
 
 use nalgebra::Vector3;
 
-use super::command::{Command, Drive};
+use super::command::Command;
 use super::energy_audit::MechanicalEnergy;
-use super::fitted_theta::fitted_theta;
 use super::gyroscopic::{GyroscopicScratch, gravity_load};
 use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
+use super::motor_branch::MotorBranch;
 use super::options::StepOptions;
 use crate::contact::{
     Activation, Contact, ContactKey, ContactSystem, detect, generalized_impulse, relocate,
@@ -20,7 +20,6 @@ use crate::multibody::bias::{BiasScratch, bias};
 use crate::multibody::momentum::{body_momenta, energy_and_momentum};
 use crate::multibody::{
     Configuration, EnergyScratch, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum,
-    MotorRegime,
 };
 use crate::problem::{Dimension, FrictionContactProblem};
 
@@ -50,8 +49,7 @@ pub struct TreeScratch {
     momenta_end: Vec<Momentum>,
     sums: Vec<Momentum>,
     c_start: Vec<Vector3<f64>>,
-    theta_held: Vec<f64>,
-    motors: Vec<MotorRegime>,
+    motors: Vec<MotorBranch>,
     drive_work: Vec<f64>,
     drive_work_done: Vec<f64>,
     energy: EnergyScratch,
@@ -75,8 +73,7 @@ impl TreeScratch {
             momenta_end: momenta.clone(),
             sums: momenta,
             c_start: vec![Vector3::zeros(); model.bodies().len()],
-            theta_held: vec![0.5; model.n_joints()],
-            motors: vec![MotorRegime::Constant(0.0); model.n_joints()],
+            motors: vec![MotorBranch::default(); model.n_joints()],
             drive_work: vec![0.0; model.n_joints()],
             drive_work_done: vec![0.0; model.n_joints()],
             energy: EnergyScratch::new(model),
@@ -207,7 +204,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         for j in 0..self.model.n_joints() {
             let (damping, stiffness) = feedback(self.command, &parts.motors, j);
             if damping > 0.0 || stiffness > 0.0 {
-                let theta_j = parts.theta_held[j];
+                let theta_j = parts.motors[j].theta();
                 let implicit = h * theta_j * (damping + h * theta * stiffness);
                 parts
                     .mass_matrix
@@ -261,6 +258,10 @@ impl MechanicalSystem for TreeSystem<'_> {
             .fold(0.0_f64, |most, (_, rate)| most.max(rate.abs()))
     }
 
+    fn conserves_momenta(&self) -> bool {
+        true
+    }
+
     fn load_gyroscopic(
         &mut self,
         options: &StepOptions,
@@ -293,22 +294,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         let parts = &mut *self.parts;
         let mut is_new = false;
         for (j, drive) in self.command.drives.iter().enumerate() {
-            let regime = match drive {
-                None => MotorRegime::Constant(0.0),
-                Some(Drive {
-                    torque,
-                    motor: None,
-                }) => MotorRegime::Constant(*torque),
-                Some(Drive {
-                    torque,
-                    motor: Some(motor),
-                }) => {
-                    let (begin, end) = (start.v[6 + j], v_end[6 + j]);
-                    motor.regime(*torque, begin + parts.theta_held[j] * (end - begin))
-                }
-            };
-            is_new |= regime != parts.motors[j];
-            parts.motors[j] = regime;
+            is_new |= parts.motors[j].revise(drive.as_ref(), start.v[6 + j], v_end[6 + j]);
         }
         is_new
     }
@@ -341,9 +327,11 @@ impl MechanicalSystem for TreeSystem<'_> {
             let (begin, end) = (start.v[6 + j], v_end[6 + j]);
             let turned = options.time_step * (theta * end + (1.0 - theta) * begin);
             let torque = actuation(options, self.command, start, v_end, self.parts, j);
-            self.parts.drive_work[j] = torque.drive * turned;
+            let drive = self.command.drives[j].as_ref();
+            let work = self.parts.motors[j].work(drive, begin, end, turned);
+            self.parts.drive_work[j] = work;
             // A damper never drives: where the rate changes its sign within the step, its torque at one time and the way at another may say so.
-            total += (torque.drive + torque.other) * turned + (torque.damper * turned).min(0.0);
+            total += work + torque.other * turned + (torque.damper * turned).min(0.0);
         }
         total
     }
@@ -468,14 +456,11 @@ const MOST_SPIN: f64 = 1.0;
 
 /// Damping (N m s/rad) and stiffness (N m/rad) with which a joint's torque answers to its motion.
 #[inline]
-fn feedback(command: &Command, motors: &[MotorRegime], j: usize) -> (f64, f64) {
-    let (mut damping, mut stiffness) = (0.0, 0.0);
+fn feedback(command: &Command, motors: &[MotorBranch], j: usize) -> (f64, f64) {
+    let (mut damping, mut stiffness) = (motors[j].damping(), 0.0);
     if let Some(held) = &command.held[j] {
         damping += held.damping;
         stiffness += held.stiffness;
-    }
-    if let MotorRegime::Line { slope, .. } = motors[j] {
-        damping += slope;
     }
     (damping, stiffness)
 }
@@ -487,16 +472,10 @@ fn set_held_theta(
     command: &Command,
     parts: &mut TreeScratch,
 ) {
-    let h = options.time_step;
     for j in 0..model.n_joints() {
-        let (damping, stiffness) = feedback(command, &parts.motors, j);
-        parts.theta_held[j] = if damping > 0.0 || stiffness > 0.0 {
-            let inertia = parts.mass_matrix.diagonal(model, 6 + j);
-            let z = h * (damping + 0.5 * h * stiffness) / inertia;
-            fitted_theta(z).max(options.theta)
-        } else {
-            options.theta
-        };
+        let feedback = feedback(command, &parts.motors, j);
+        let inertia = parts.mass_matrix.diagonal(model, 6 + j);
+        parts.motors[j].set_theta((options.time_step, options.theta), feedback, inertia);
     }
 }
 
@@ -520,19 +499,17 @@ fn actuation(
     parts: &TreeScratch,
     j: usize,
 ) -> Actuation {
-    let (h, theta, theta_j) = (options.time_step, options.theta, parts.theta_held[j]);
+    let (h, theta) = (options.time_step, options.theta);
+    let motor = &parts.motors[j];
     let (rate, rate_end) = (start.v[6 + j], v_end[6 + j]);
     let (mut other, mut damper) = (command.torque[j], 0.0);
     if let Some(held) = &command.held[j] {
         let mean = theta * rate_end + (1.0 - theta) * rate;
-        other -=
-            held.stiffness * (start.configuration.joints[j] + h * theta_j * mean - held.set_point);
-        damper = -held.damping * (rate + theta_j * (rate_end - rate));
+        other -= held.stiffness
+            * (start.configuration.joints[j] + h * motor.theta() * mean - held.set_point);
+        damper = -held.damping * motor.rate(rate, rate_end);
     }
-    let drive = match parts.motors[j] {
-        MotorRegime::Constant(torque) => torque,
-        line @ MotorRegime::Line { .. } => line.torque(rate + theta_j * (rate_end - rate)),
-    };
+    let drive = motor.torque(rate, rate_end);
     Actuation {
         drive,
         damper,

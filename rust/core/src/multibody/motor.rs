@@ -50,11 +50,19 @@ impl Motor {
         self.stall_torque / self.no_load_speed
     }
 
+    /// The command (N m) as far as the motor has the torque for it.
+    #[inline]
+    #[must_use]
+    pub fn limited(&self, command: f64) -> f64 {
+        command.clamp(-self.stall_torque, self.stall_torque)
+    }
+
     /// The branch that holds for a command (N m) at a rate (rad/s), both about the joint's axis.
     #[inline]
     #[must_use]
     pub fn regime(&self, command: f64, rate: f64) -> MotorRegime {
         let (stall, slope) = (self.stall_torque, self.slope());
+        let command = self.limited(command);
         let (upper, lower) = (stall - slope * rate, -stall - slope * rate);
         // Beyond the no-load speed: how far the line is followed.
         let end = |towards: f64| {
@@ -82,7 +90,7 @@ impl Motor {
                 slope,
             };
         }
-        MotorRegime::Constant(command.clamp(-stall, stall))
+        MotorRegime::Constant(command)
     }
 
     /// Torque for a command (N m) at a rate (rad/s), N m.
@@ -125,6 +133,8 @@ mod tests {
             (150.0, 1e6, -300.0),   // never beyond the stall torque
             (-150.0, -20.0, -100.0),
             (0.0, -33.0, 30.0),
+            (350.0, -1.0, 300.0), // it has no more, also turning backward
+            (-350.0, 1.0, -300.0),
         ];
         for (command, rate, torque) in expected {
             let given = motor.torque(command, rate);
