@@ -38,6 +38,15 @@ impl UnilateralContact for Contact {
     }
 }
 
+/// What a joint's drive did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DriveAction {
+    /// Integral of its torque over time, N m s.
+    pub impulse: f64,
+    /// J.
+    pub work: f64,
+}
+
 /// Poses, matrices and momenta of a tree: scratch, sized once.
 #[derive(Clone, Debug)]
 pub struct TreeScratch {
@@ -52,8 +61,8 @@ pub struct TreeScratch {
     c_start: Vec<Vector3<f64>>,
     theta_held: Vec<f64>,
     motors: Vec<MotorRegime>,
-    drive_work: Vec<f64>,
-    drive_work_done: Vec<f64>,
+    drives_tried: Vec<DriveAction>,
+    drives: Vec<DriveAction>,
     energy: EnergyScratch,
     gyroscopic: GyroscopicScratch,
     force: Vec<f64>,
@@ -77,8 +86,8 @@ impl TreeScratch {
             c_start: vec![Vector3::zeros(); model.bodies().len()],
             theta_held: vec![0.5; model.n_joints()],
             motors: vec![MotorRegime::Constant(0.0); model.n_joints()],
-            drive_work: vec![0.0; model.n_joints()],
-            drive_work_done: vec![0.0; model.n_joints()],
+            drives_tried: vec![DriveAction::default(); model.n_joints()],
+            drives: vec![DriveAction::default(); model.n_joints()],
             energy: EnergyScratch::new(model),
             gyroscopic: GyroscopicScratch::default(),
             force: vec![0.0; model.nv()],
@@ -86,9 +95,15 @@ impl TreeScratch {
         }
     }
 
-    /// Work of each joint's drive since it was last set to zero (n_joints), J.
-    pub fn drive_work(&mut self) -> &mut [f64] {
-        &mut self.drive_work_done
+    /// Forgets what the drives did: a step begins.
+    pub fn begin_step(&mut self) {
+        self.drives.fill(DriveAction::default());
+    }
+
+    /// What each joint's drive has done since [`Self::begin_step`] (n_joints), in all parts of a step that became the state.
+    #[must_use]
+    pub fn drives(&self) -> &[DriveAction] {
+        &self.drives
     }
 
     /// Delassus operator of the last step, row-major, 1/kg.
@@ -341,7 +356,10 @@ impl MechanicalSystem for TreeSystem<'_> {
             let (begin, end) = (start.v[6 + j], v_end[6 + j]);
             let turned = options.time_step * (theta * end + (1.0 - theta) * begin);
             let torque = actuation(options, self.command, start, v_end, self.parts, j);
-            self.parts.drive_work[j] = torque.drive * turned;
+            self.parts.drives_tried[j] = DriveAction {
+                impulse: torque.drive * options.time_step,
+                work: torque.drive * turned,
+            };
             total += (torque.drive + torque.other) * turned;
         }
         total
@@ -350,8 +368,9 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn accept(&mut self) {
         let parts = &mut *self.parts;
-        for (done, joules) in parts.drive_work_done.iter_mut().zip(&parts.drive_work) {
-            *done += joules;
+        for (done, tried) in parts.drives.iter_mut().zip(&parts.drives_tried) {
+            done.impulse += tried.impulse;
+            done.work += tried.work;
         }
     }
 

@@ -6,11 +6,13 @@
 //!
 //! Below the line the torque is the command. On it the torque falls linearly with the speed and reaches zero at the no-load speed ω₀, where
 //! the back-EMF equals the supply. A motor that regenerates brakes when it is driven faster, by the line and at most by the stall torque; one
-//! that does not turns freely, and brakes by command alone.
+//! that does not turns freely, and brakes by command alone. With an infinite ω₀ the torque is the command within ± stall, at any speed.
 //!
 //! Source: the permanent-magnet DC motor at its supply voltage, e.g. Siciliano et al. 2009, *Robotics*, ch. 5.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
+
+use super::error::ModelError;
 
 /// A torque–speed line.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -18,7 +20,8 @@ use serde::{Deserialize, Serialize};
 pub struct Motor {
     /// Torque of the line at rest, N m.
     pub stall_torque: f64,
-    /// ω₀, where the line reaches zero, rad/s.
+    /// ω₀, where the line reaches zero, rad/s; may be infinite (in JSON, which has no infinity: null).
+    #[serde(deserialize_with = "speed")]
     pub no_load_speed: f64,
     /// Whether it brakes when it is driven faster than ω₀.
     #[serde(default = "regenerates")]
@@ -28,6 +31,20 @@ pub struct Motor {
 fn regenerates() -> bool {
     true
 }
+
+fn speed<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    if deserializer.is_human_readable() {
+        let written = Option::<f64>::deserialize(deserializer)?;
+        return Ok(written.unwrap_or(f64::INFINITY));
+    }
+    f64::deserialize(deserializer)
+}
+
+/// Range of torques, N m.
+const TORQUES: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
+
+/// Range of finite no-load speeds, rad/s.
+const SPEEDS: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
 
 /// How the torque depends on the speed nearby.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +61,29 @@ pub enum MotorRegime {
 }
 
 impl Motor {
+    /// Checks the ranges; `at` makes a field's full name.
+    ///
+    /// # Errors
+    /// The first number out of its range.
+    pub fn check(&self, at: impl Fn(&str) -> String) -> Result<(), ModelError> {
+        if !TORQUES.contains(&self.stall_torque) {
+            return Err(ModelError::OutOfRange {
+                field: at("stall_torque"),
+                range: "from 1e-9 to 1e9 N m",
+                value: self.stall_torque,
+            });
+        }
+        let speed = self.no_load_speed;
+        if !(SPEEDS.contains(&speed) || speed.is_infinite() && speed > 0.0) {
+            return Err(ModelError::OutOfRange {
+                field: at("no_load_speed"),
+                range: "from 1e-6 to 1e9 rad/s, or infinite",
+                value: speed,
+            });
+        }
+        Ok(())
+    }
+
     /// Slope of the line, N m s/rad.
     #[must_use]
     pub fn slope(&self) -> f64 {
