@@ -15,8 +15,7 @@ use rover_core::simulation::Simulation;
 use crate::scenes::{G, VARIANTS, options};
 
 fn planar() -> MirroredRover<7> {
-    // Its torques do not depend on the speed.
-    MirroredRover::new(&Model::rover().with_motors(None).unwrap()).unwrap()
+    MirroredRover::new(&Model::rover()).unwrap()
 }
 
 /// `P`: planar velocities to those of the full model.
@@ -85,7 +84,7 @@ fn point_jacobians_are_the_discs_rates() {
 }
 
 /// Six coordinates of the base and free pairs against the planar image: dropped from a hand's breadth, driven for ten seconds.
-fn largest_distance(slope: f64, options: &StepOptions) -> f64 {
+fn largest_distance(slope: f64, torque: f64, options: &StepOptions) -> f64 {
     let planar = planar();
     let P = injection(&planar);
     let model = Arc::new(planar.model().clone());
@@ -103,12 +102,12 @@ fn largest_distance(slope: f64, options: &StepOptions) -> f64 {
     let configuration = coordinates::from_public(full.model(), start.as_slice()).unwrap();
     let zero = vec![0.0; start.len()];
     full.set_state(configuration, zero);
-    full.set_wheel_torques(&[15.0; 6]).unwrap();
+    full.set_wheel_torques(&[torque; 6]).unwrap();
     let line = Arc::new(Line::new(slope, 0.0).unwrap());
     let mut reduced =
         MirroredRoverSimulation::new(planar, line, ContactRule::Nearest, options.clone()).unwrap();
     reduced.set_state(q.as_slice(), &[0.0; 7]).unwrap();
-    reduced.set_inputs(&[15.0; 3]).unwrap();
+    reduced.set_inputs(&[torque; 3]).unwrap();
     let mut largest = 0.0_f64;
     for _ in 0..200 {
         assert!(full.step(10).unwrap().is_converged());
@@ -133,7 +132,22 @@ fn ten_seconds_straight_ahead_are_those_of_the_full_rover() {
                 variant,
                 ..options(G, 0.7, 0.0, 0.005)
             };
-            let distance = largest_distance(slope, &options);
+            let distance = largest_distance(slope, 15.0, &options);
+            assert!(distance < bound, "{variant:?}, slope {slope}: {distance:e}");
+        }
+    }
+}
+
+#[test]
+fn at_the_motors_line_the_planar_rover_is_as_fast_as_the_full_one() {
+    // 60 N m come to their line at 24 rad/s within four seconds; downhill the motors brake at 30 rad/s.
+    for (variant, bound) in VARIANTS.into_iter().zip([1e-8, 5e-4]) {
+        for (slope, torque) in [(0.0, 60.0), (-0.2, 0.0)] {
+            let options = StepOptions {
+                variant,
+                ..options(G, 0.7, 0.0, 0.005)
+            };
+            let distance = largest_distance(slope, torque, &options);
             assert!(distance < bound, "{variant:?}, slope {slope}: {distance:e}");
         }
     }

@@ -210,6 +210,18 @@ pub trait MechanicalSystem {
         for (y, momentum) in y.iter_mut().zip(&*scratch) {
             *y -= momentum;
         }
+        self.add_feedback(options, start, v_end, y);
+    }
+
+    /// Adds to `y` what forces taken implicitly change with the velocity's way from the start to `v_end`: asked by the default of
+    /// [`Self::balance`]. By default nothing.
+    fn add_feedback(
+        &mut self,
+        _options: &StepOptions,
+        _start: Start<'_, Self::Configuration>,
+        _v_end: &[f64],
+        _y: &mut [f64],
+    ) {
     }
 
     /// `y ← F⁻ᵀ y`: an impulse into factor coordinates.

@@ -11,7 +11,9 @@ use super::ground::{ContactRule, Facing, Ground};
 use crate::contact::Activation;
 use crate::integrator::{
     MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
+    fitted_theta::fitted_theta,
 };
+use crate::multibody::{Motor, MotorRegime};
 use crate::problem::{Dimension, FrictionContactProblem};
 
 /// A disc of a machine in the world.
@@ -21,6 +23,19 @@ pub struct Disc {
     pub centre: Vector2<f64>,
     /// m.
     pub radius: f64,
+}
+
+/// A motor behind one of a machine's torques, perhaps one of several alike.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlanarMotor {
+    /// The coordinate about which it turns.
+    pub coordinate: usize,
+    /// Force on that coordinate of a unit of torque: the number of motors, negative where forward is a negative turn.
+    pub gain: f64,
+    /// Largest command, N m.
+    pub torque_limit: f64,
+    /// Torque–speed line of each.
+    pub line: Motor,
 }
 
 /// A machine with `NV` coordinates whose velocities are their rates.
@@ -44,6 +59,11 @@ pub trait PlanarMachine<const NV: usize>: std::fmt::Debug + Send + Sync {
 
     /// Number of torques that can be set.
     fn n_inputs(&self) -> usize;
+
+    /// The motor of input i, whose torque then is what the motor gives. By default there is none: the torque is the command.
+    fn motor(&self, _i: usize) -> Option<PlanarMotor> {
+        None
+    }
 
     /// Number of discs.
     fn n_discs(&self) -> usize;
@@ -139,6 +159,34 @@ pub struct PlanarScratch<const NV: usize> {
     Z: Vec<SMatrix<f64, NV, 2>>,
     W: Vec<f64>,
     facing: Vec<Facing>,
+    motors: Vec<DrivenInput>,
+    torques: Vec<f64>,
+}
+
+/// A motor during a step.
+#[derive(Clone, Copy, Debug)]
+struct DrivenInput {
+    input: usize,
+    motor: PlanarMotor,
+    regime: MotorRegime,
+    /// How implicit it is.
+    theta: f64,
+}
+
+impl DrivenInput {
+    /// Speed of the motor, positive forward, at the θ-weighted velocity of a step, rad/s.
+    fn rate(&self, v: &[f64], v_end: &[f64]) -> f64 {
+        let k = self.motor.coordinate;
+        self.motor.gain.signum() * (v[k] + self.theta * (v_end[k] - v[k]))
+    }
+
+    /// Damping of its coordinate, N m s/rad.
+    fn damping(&self) -> f64 {
+        match self.regime {
+            MotorRegime::Constant(_) => 0.0,
+            MotorRegime::Line { slope, .. } => self.motor.gain.abs() * slope,
+        }
+    }
 }
 
 impl<const NV: usize> Default for PlanarScratch<NV> {
@@ -152,6 +200,8 @@ impl<const NV: usize> Default for PlanarScratch<NV> {
             Z: Vec::new(),
             W: Vec::new(),
             facing: Vec::new(),
+            motors: Vec::new(),
+            torques: Vec::new(),
         }
     }
 }
@@ -177,6 +227,18 @@ pub struct PlanarSystem<'a, const NV: usize, M> {
     pub inputs: &'a [f64],
     /// Its scratch.
     pub parts: &'a mut PlanarScratch<NV>,
+}
+
+impl<const NV: usize, M: PlanarMachine<NV>> PlanarSystem<'_, NV, M> {
+    /// `parts.torques`: the inputs, but where there is a motor what it gives in a step that ends with `v_end`.
+    fn set_torques(&mut self, v: &[f64], v_end: &[f64]) {
+        let parts = &mut *self.parts;
+        parts.torques.clear();
+        parts.torques.extend_from_slice(self.inputs);
+        for driven in &parts.motors {
+            parts.torques[driven.input] = driven.regime.torque(driven.rate(v, v_end));
+        }
+    }
 }
 
 /// The points of the ground that face a disc, with their contact's number.
@@ -279,12 +341,23 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
         }
     }
 
-    fn update_mass_matrix(&mut self, _options: &StepOptions) {
-        self.parts.mass = self.machine.mass_matrix(&self.parts.middle);
+    fn update_mass_matrix(&mut self, options: &StepOptions) {
+        let parts = &mut *self.parts;
+        parts.mass = self.machine.mass_matrix(&parts.middle);
+        for driven in &mut parts.motors {
+            let k = driven.motor.coordinate;
+            let z = options.time_step * driven.damping() / parts.mass[(k, k)];
+            driven.theta = fitted_theta(z).max(options.theta);
+        }
     }
 
-    fn factorise(&mut self, _options: &StepOptions) -> bool {
-        match Cholesky::new(self.parts.mass) {
+    fn factorise(&mut self, options: &StepOptions) -> bool {
+        let mut mass = self.parts.mass;
+        for driven in &self.parts.motors {
+            let k = driven.motor.coordinate;
+            mass[(k, k)] += options.time_step * driven.theta * driven.damping();
+        }
+        match Cholesky::new(mass) {
             Some(factor) => {
                 self.parts.L = factor.l();
                 true
@@ -301,16 +374,54 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
     fn load(
         &mut self,
         options: &StepOptions,
-        _start: Start<'_, SVector<f64, NV>>,
+        start: Start<'_, SVector<f64, NV>>,
         v_mean: &[f64],
         y: &mut [f64],
     ) {
         let v = SVector::<f64, NV>::from_column_slice(v_mean);
         let gravity = options.gravity.xy();
-        let force = self
-            .machine
-            .force(&self.parts.middle, &v, &gravity, self.inputs);
+        self.set_torques(start.v, start.v);
+        let parts = &*self.parts;
+        let force = (self.machine).force(&parts.middle, &v, &gravity, &parts.torques);
         y.copy_from_slice((force * options.time_step).as_slice());
+    }
+
+    fn add_feedback(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, SVector<f64, NV>>,
+        v_end: &[f64],
+        y: &mut [f64],
+    ) {
+        for driven in &self.parts.motors {
+            let k = driven.motor.coordinate;
+            let change = driven.theta * (v_end[k] - start.v[k]);
+            y[k] -= options.time_step * driven.damping() * change;
+        }
+    }
+
+    fn revise(&mut self, start: Start<'_, SVector<f64, NV>>, v_end: &[f64]) -> bool {
+        let parts = &mut *self.parts;
+        if parts.motors.is_empty() {
+            let motors = (0..self.inputs.len()).filter_map(|input| {
+                Some(DrivenInput {
+                    input,
+                    motor: self.machine.motor(input)?,
+                    regime: MotorRegime::Constant(0.0),
+                    theta: 0.5,
+                })
+            });
+            parts.motors.extend(motors);
+        }
+        let mut is_new = false;
+        for driven in &mut parts.motors {
+            let limit = driven.motor.torque_limit;
+            let command = self.inputs[driven.input].clamp(-limit, limit);
+            let regime = (driven.motor.line).regime(command, driven.rate(start.v, v_end));
+            is_new |= regime != driven.regime;
+            driven.regime = regime;
+        }
+        is_new
     }
 
     fn energy(
@@ -337,13 +448,13 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
         start: Start<'_, SVector<f64, NV>>,
         v_end: &[f64],
     ) -> f64 {
-        if self.inputs.iter().all(|torque| *torque == 0.0) {
+        self.set_torques(start.v, v_end);
+        let parts = &*self.parts;
+        if parts.torques.iter().all(|torque| *torque == 0.0) {
             return 0.0;
         }
         let (still, none) = (SVector::zeros(), Vector2::zeros());
-        let torques = self
-            .machine
-            .force(&self.parts.middle, &still, &none, self.inputs);
+        let torques = (self.machine).force(&parts.middle, &still, &none, &parts.torques);
         let mean = start
             .v
             .iter()
