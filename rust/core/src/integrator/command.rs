@@ -45,4 +45,11 @@ impl Command {
             held: vec![None; model.n_joints()],
         }
     }
+
+    /// Commanded torque (N m) and motor of joint j's drive; nothing where there is none.
+    #[inline]
+    #[must_use]
+    pub fn drive(&self, j: usize) -> (f64, Option<&Motor>) {
+        (self.drives[j].as_ref()).map_or((0.0, None), |drive| (drive.torque, drive.motor.as_ref()))
+    }
 }

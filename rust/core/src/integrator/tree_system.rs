@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use super::command::{Command, Drive};
+use super::command::Command;
 use super::energy_audit::MechanicalEnergy;
 use super::fitted_theta::fitted_theta;
 use super::gyroscopic::{GyroscopicScratch, gravity_load};
@@ -19,8 +19,8 @@ use crate::geometry::Terrain;
 use crate::multibody::bias::{BiasScratch, bias};
 use crate::multibody::momentum::{body_momenta, energy_and_momentum};
 use crate::multibody::{
-    Configuration, EnergyScratch, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum,
-    MotorRegime,
+    Configuration, DriveTrial, EnergyScratch, FactoredMassMatrix, Kinematics, MassMatrix, Model,
+    Momentum, MotorRegime,
 };
 use crate::problem::{Dimension, FrictionContactProblem};
 
@@ -60,7 +60,7 @@ pub struct TreeScratch {
     sums: Vec<Momentum>,
     c_start: Vec<Vector3<f64>>,
     theta_held: Vec<f64>,
-    motors: Vec<MotorRegime>,
+    motors: Vec<DriveTrial>,
     drives_tried: Vec<DriveAction>,
     drives: Vec<DriveAction>,
     energy: EnergyScratch,
@@ -85,7 +85,7 @@ impl TreeScratch {
             sums: momenta,
             c_start: vec![Vector3::zeros(); model.bodies().len()],
             theta_held: vec![0.5; model.n_joints()],
-            motors: vec![MotorRegime::Constant(0.0); model.n_joints()],
+            motors: vec![DriveTrial::default(); model.n_joints()],
             drives_tried: vec![DriveAction::default(); model.n_joints()],
             drives: vec![DriveAction::default(); model.n_joints()],
             energy: EnergyScratch::new(model),
@@ -304,26 +304,22 @@ impl MechanicalSystem for TreeSystem<'_> {
         parts.factor.half_solve(model, y);
     }
 
+    #[inline]
+    fn choose_branches(&mut self, start: Start<'_, Configuration>) {
+        for (j, trial) in self.parts.motors.iter_mut().enumerate() {
+            let (command, motor) = self.command.drive(j);
+            *trial = DriveTrial::at(motor, command, start.v[6 + j]);
+        }
+    }
+
     fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
         let parts = &mut *self.parts;
         let mut is_new = false;
-        for (j, drive) in self.command.drives.iter().enumerate() {
-            let regime = match drive {
-                None => MotorRegime::Constant(0.0),
-                Some(Drive {
-                    torque,
-                    motor: None,
-                }) => MotorRegime::Constant(*torque),
-                Some(Drive {
-                    torque,
-                    motor: Some(motor),
-                }) => {
-                    let (begin, end) = (start.v[6 + j], v_end[6 + j]);
-                    motor.regime(*torque, begin + parts.theta_held[j] * (end - begin))
-                }
-            };
-            is_new |= regime != parts.motors[j];
-            parts.motors[j] = regime;
+        for (j, trial) in parts.motors.iter_mut().enumerate() {
+            let (command, motor) = self.command.drive(j);
+            let (begin, end) = (start.v[6 + j], v_end[6 + j]);
+            let rate = begin + parts.theta_held[j] * (end - begin);
+            is_new |= trial.revise(motor, command, rate);
         }
         is_new
     }
@@ -486,13 +482,13 @@ const MOST_SPIN: f64 = 1.0;
 
 /// Damping (N m s/rad) and stiffness (N m/rad) with which a joint's torque answers to its motion.
 #[inline]
-fn feedback(command: &Command, motors: &[MotorRegime], j: usize) -> (f64, f64) {
+fn feedback(command: &Command, motors: &[DriveTrial], j: usize) -> (f64, f64) {
     let (mut damping, mut stiffness) = (0.0, 0.0);
     if let Some(held) = &command.held[j] {
         damping += held.damping;
         stiffness += held.stiffness;
     }
-    if let MotorRegime::Line { slope, .. } = motors[j] {
+    if let MotorRegime::Line { slope, .. } = motors[j].regime() {
         damping += slope;
     }
     (damping, stiffness)
@@ -545,7 +541,7 @@ fn actuation(
             held.stiffness * (start.configuration.joints[j] + h * theta_j * mean - held.set_point);
         other -= held.damping * (rate + theta_j * (rate_end - rate));
     }
-    let drive = match parts.motors[j] {
+    let drive = match parts.motors[j].regime() {
         MotorRegime::Constant(torque) => torque,
         line @ MotorRegime::Line { .. } => line.torque(rate + theta_j * (rate_end - rate)),
     };

@@ -13,7 +13,7 @@ use crate::integrator::{
     MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
     fitted_theta::fitted_theta,
 };
-use crate::multibody::{Motor, MotorRegime};
+use crate::multibody::{DriveTrial, Motor, MotorRegime};
 use crate::problem::{Dimension, FrictionContactProblem};
 
 /// A disc of a machine in the world.
@@ -168,7 +168,7 @@ pub struct PlanarScratch<const NV: usize> {
 struct DrivenInput {
     input: usize,
     motor: PlanarMotor,
-    regime: MotorRegime,
+    trial: DriveTrial,
     /// How implicit it is.
     theta: f64,
 }
@@ -180,9 +180,15 @@ impl DrivenInput {
         self.motor.gain.signum() * (v[k] + self.theta * (v_end[k] - v[k]))
     }
 
+    /// Commanded torque within the limit, N m.
+    fn command(&self, inputs: &[f64]) -> f64 {
+        let limit = self.motor.torque_limit;
+        inputs[self.input].clamp(-limit, limit)
+    }
+
     /// Damping of its coordinate, N m s/rad.
     fn damping(&self) -> f64 {
-        match self.regime {
+        match self.trial.regime() {
             MotorRegime::Constant(_) => 0.0,
             MotorRegime::Line { slope, .. } => self.motor.gain.abs() * slope,
         }
@@ -236,7 +242,7 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSystem<'_, NV, M> {
         parts.torques.clear();
         parts.torques.extend_from_slice(self.inputs);
         for driven in &parts.motors {
-            parts.torques[driven.input] = driven.regime.torque(driven.rate(v, v_end));
+            parts.torques[driven.input] = driven.trial.regime().torque(driven.rate(v, v_end));
         }
     }
 }
@@ -400,26 +406,32 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
         }
     }
 
-    fn revise(&mut self, start: Start<'_, SVector<f64, NV>>, v_end: &[f64]) -> bool {
+    fn choose_branches(&mut self, start: Start<'_, SVector<f64, NV>>) {
         let parts = &mut *self.parts;
         if parts.motors.is_empty() {
             let motors = (0..self.inputs.len()).filter_map(|input| {
                 Some(DrivenInput {
                     input,
                     motor: self.machine.motor(input)?,
-                    regime: MotorRegime::Constant(0.0),
+                    trial: DriveTrial::default(),
                     theta: 0.5,
                 })
             });
             parts.motors.extend(motors);
         }
-        let mut is_new = false;
         for driven in &mut parts.motors {
-            let limit = driven.motor.torque_limit;
-            let command = self.inputs[driven.input].clamp(-limit, limit);
-            let regime = (driven.motor.line).regime(command, driven.rate(start.v, v_end));
-            is_new |= regime != driven.regime;
-            driven.regime = regime;
+            let command = driven.command(self.inputs);
+            let rate = driven.rate(start.v, start.v);
+            driven.trial = DriveTrial::at(Some(&driven.motor.line), command, rate);
+        }
+    }
+
+    fn revise(&mut self, start: Start<'_, SVector<f64, NV>>, v_end: &[f64]) -> bool {
+        let mut is_new = false;
+        for driven in &mut self.parts.motors {
+            let command = driven.command(self.inputs);
+            let rate = driven.rate(start.v, v_end);
+            is_new |= (driven.trial).revise(Some(&driven.motor.line), command, rate);
         }
         is_new
     }
