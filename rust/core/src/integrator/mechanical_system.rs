@@ -152,8 +152,11 @@ pub trait MechanicalSystem {
         self.half_solve(y);
     }
 
-    /// Chooses the branch of each piecewise force anew for a step that ends with `v_end`; true where one has changed and the step must be
-    /// taken again. By default there is none.
+    /// Chooses the branch of each piecewise force for a step that begins here. By default there is none.
+    fn choose_branches(&mut self, _start: Start<'_, Self::Configuration>) {}
+
+    /// Goes on to the next branch of each piecewise force towards that of a step that ends with `v_end`; true where one has changed and
+    /// the step must be taken again. By default there is none.
     fn revise(&mut self, _start: Start<'_, Self::Configuration>, _v_end: &[f64]) -> bool {
         false
     }

@@ -39,7 +39,7 @@ pub use options::{Stabilisation, StepOptions, Variant};
 pub use probe::{NoProbe, Phase, Probe};
 pub use report::{StepReport, StepStatus};
 pub use scratch::Scratch;
-pub use tree_system::{TreeScratch, TreeSystem};
+pub use tree_system::{DriveAction, TreeScratch, TreeSystem};
 pub use warm_start::WarmStart;
 pub use workspace::{ActiveContact, Workspace};
 

@@ -100,7 +100,7 @@ impl Part<'_> {
             return self.divide(n, system, state, warm_start, ws, probe);
         }
         let before = energy_before(system, options, start, ws);
-        system.revise(start, start.v);
+        system.choose_branches(start);
         let mut is_gyroscopic = system.is_gyroscopic(options, start.v);
         let mut retaken = 0;
         let mut report = loop {
@@ -190,9 +190,9 @@ impl Part<'_> {
     }
 }
 
-/// Most times that a step is taken again because a piecewise force has changed its branch. Each wheel's torque falls with its speed, so the
-/// branches settle; a motor at its line takes one.
-pub(super) const MOST_REVISIONS: usize = 4;
+/// Most times that a step is taken again because a piecewise force has changed its branch. A motor that comes to its line takes one, a
+/// wheel alone at most four.
+pub(super) const MOST_REVISIONS: usize = 6;
 
 /// Passes over the mean velocity in which implicit gyroscopic terms are frozen: the second makes the step of order 2.
 const GYROSCOPIC_PASSES: usize = 2;

@@ -58,7 +58,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
             v: &*state.v,
         };
         let before = energy_before(system, options, start, ws);
-        system.revise(start, start.v);
+        system.choose_branches(start);
         system.begin_balance(start);
         ws.v.copy_from_slice(start.v);
         let mut report = StepReport {

@@ -9,19 +9,19 @@
 
 use super::command::Drive;
 use super::fitted_theta::fitted_theta;
-use crate::multibody::MotorRegime;
+use crate::multibody::{DriveTrial, Motor, MotorRegime};
 
 /// Branch and θ_j of a coordinate that a motor may turn.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MotorBranch {
-    regime: MotorRegime,
+    trial: DriveTrial,
     theta: f64,
 }
 
 impl Default for MotorBranch {
     fn default() -> Self {
         Self {
-            regime: MotorRegime::Constant(0.0),
+            trial: DriveTrial::default(),
             theta: 0.5,
         }
     }
@@ -37,7 +37,7 @@ impl MotorBranch {
     /// Damping of the branch, N m s/rad.
     #[inline]
     pub(crate) fn damping(&self) -> f64 {
-        match self.regime {
+        match self.trial.regime() {
             MotorRegime::Constant(_) => 0.0,
             MotorRegime::Line { slope, .. } => slope,
         }
@@ -65,29 +65,25 @@ impl MotorBranch {
         begin + self.theta * (end - begin)
     }
 
-    /// Chooses the branch for a step between two rates, rad/s; true where it is another one.
+    /// Chooses the branch for a step that begins at a rate, rad/s.
+    #[inline]
+    pub(crate) fn choose(&mut self, drive: Option<&Drive>, rate: f64) {
+        let (command, motor) = parts(drive);
+        self.trial = DriveTrial::at(motor, command, rate);
+    }
+
+    /// Goes on towards the branch of a step between two rates, rad/s; true where it is another one.
     #[inline]
     pub(crate) fn revise(&mut self, drive: Option<&Drive>, begin: f64, end: f64) -> bool {
-        let regime = match drive {
-            None => MotorRegime::Constant(0.0),
-            Some(Drive {
-                torque,
-                motor: None,
-            }) => MotorRegime::Constant(*torque),
-            Some(Drive {
-                torque,
-                motor: Some(motor),
-            }) => motor.regime(*torque, self.rate(begin, end)),
-        };
-        let is_new = regime != self.regime;
-        self.regime = regime;
-        is_new
+        let (command, motor) = parts(drive);
+        let rate = self.rate(begin, end);
+        self.trial.revise(motor, command, rate)
     }
 
     /// Mean torque of a step between two rates (rad/s), N m.
     #[inline]
     pub(crate) fn torque(&self, begin: f64, end: f64) -> f64 {
-        self.regime.torque(self.rate(begin, end))
+        self.trial.regime().torque(self.rate(begin, end))
     }
 
     /// Work (J) that the motor is credited with in a step between two rates (rad/s) that turns it by `turned` (rad).
@@ -105,4 +101,10 @@ impl MotorBranch {
             _ => work,
         }
     }
+}
+
+/// Command (N m) and line of a drive; nothing where there is none.
+#[inline]
+fn parts(drive: Option<&Drive>) -> (f64, Option<&Motor>) {
+    drive.map_or((0.0, None), |drive| (drive.torque, drive.motor.as_ref()))
 }

@@ -37,6 +37,15 @@ impl UnilateralContact for Contact {
     }
 }
 
+/// What a joint's drive did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DriveAction {
+    /// Integral of its torque over time, N m s.
+    pub impulse: f64,
+    /// J.
+    pub work: f64,
+}
+
 /// Poses, matrices and momenta of a tree: scratch, sized once.
 #[derive(Clone, Debug)]
 pub struct TreeScratch {
@@ -50,8 +59,8 @@ pub struct TreeScratch {
     sums: Vec<Momentum>,
     c_start: Vec<Vector3<f64>>,
     motors: Vec<MotorBranch>,
-    drive_work: Vec<f64>,
-    drive_work_done: Vec<f64>,
+    drives_tried: Vec<DriveAction>,
+    drives: Vec<DriveAction>,
     energy: EnergyScratch,
     gyroscopic: GyroscopicScratch,
     force: Vec<f64>,
@@ -74,8 +83,8 @@ impl TreeScratch {
             sums: momenta,
             c_start: vec![Vector3::zeros(); model.bodies().len()],
             motors: vec![MotorBranch::default(); model.n_joints()],
-            drive_work: vec![0.0; model.n_joints()],
-            drive_work_done: vec![0.0; model.n_joints()],
+            drives_tried: vec![DriveAction::default(); model.n_joints()],
+            drives: vec![DriveAction::default(); model.n_joints()],
             energy: EnergyScratch::new(model),
             gyroscopic: GyroscopicScratch::default(),
             force: vec![0.0; model.nv()],
@@ -83,9 +92,15 @@ impl TreeScratch {
         }
     }
 
-    /// Work of each joint's drive since it was last set to zero (n_joints), J.
-    pub fn drive_work(&mut self) -> &mut [f64] {
-        &mut self.drive_work_done
+    /// Forgets what the drives did: a step begins.
+    pub fn begin_step(&mut self) {
+        self.drives.fill(DriveAction::default());
+    }
+
+    /// What each joint's drive has done since [`Self::begin_step`] (n_joints), in all parts of a step that became the state.
+    #[must_use]
+    pub fn drives(&self) -> &[DriveAction] {
+        &self.drives
     }
 
     /// Delassus operator of the last step, row-major, 1/kg.
@@ -290,6 +305,13 @@ impl MechanicalSystem for TreeSystem<'_> {
         parts.factor.half_solve(model, y);
     }
 
+    #[inline]
+    fn choose_branches(&mut self, start: Start<'_, Configuration>) {
+        for (j, motor) in self.parts.motors.iter_mut().enumerate() {
+            motor.choose(self.command.drives[j].as_ref(), start.v[6 + j]);
+        }
+    }
+
     fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
         let parts = &mut *self.parts;
         let mut is_new = false;
@@ -329,7 +351,10 @@ impl MechanicalSystem for TreeSystem<'_> {
             let torque = actuation(options, self.command, start, v_end, self.parts, j);
             let drive = self.command.drives[j].as_ref();
             let work = self.parts.motors[j].work(drive, begin, end, turned);
-            self.parts.drive_work[j] = work;
+            self.parts.drives_tried[j] = DriveAction {
+                impulse: torque.drive * options.time_step,
+                work,
+            };
             // A damper never drives: where the rate changes its sign within the step, its torque at one time and the way at another may say so.
             total += work + torque.other * turned + (torque.damper * turned).min(0.0);
         }
@@ -339,8 +364,9 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn accept(&mut self) {
         let parts = &mut *self.parts;
-        for (done, joules) in parts.drive_work_done.iter_mut().zip(&parts.drive_work) {
-            *done += joules;
+        for (done, tried) in parts.drives.iter_mut().zip(&parts.drives_tried) {
+            done.impulse += tried.impulse;
+            done.work += tried.work;
         }
     }
 

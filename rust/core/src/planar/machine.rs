@@ -406,11 +406,21 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
         self.impulse(options, (start.v, start.v), v_mean, y);
     }
 
-    fn revise(&mut self, start: Start<'_, SVector<f64, NV>>, v_end: &[f64]) -> bool {
+    fn choose_branches(&mut self, start: Start<'_, SVector<f64, NV>>) {
         let parts = &mut *self.parts;
         parts
             .motors
             .resize(self.inputs.len(), MotorBranch::default());
+        for (i, (branch, torque)) in parts.motors.iter_mut().zip(self.inputs).enumerate() {
+            if let Some(motor) = self.machine.motor(i) {
+                let (rate, _) = motor_rates(&motor, start.v, start.v);
+                branch.choose(Some(&motor.drive(*torque)), rate);
+            }
+        }
+    }
+
+    fn revise(&mut self, start: Start<'_, SVector<f64, NV>>, v_end: &[f64]) -> bool {
+        let parts = &mut *self.parts;
         let mut is_new = false;
         for (i, (branch, torque)) in parts.motors.iter_mut().zip(self.inputs).enumerate() {
             if let Some(motor) = self.machine.motor(i) {
