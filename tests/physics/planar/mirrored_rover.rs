@@ -162,8 +162,8 @@ fn ten_seconds_straight_ahead_are_those_of_the_full_rover() {
 /// The motors reach their lines, are driven beyond their no-load speed downhill, and brake; the image once ignored them and was 90 m ahead.
 #[test]
 fn full_throttle_is_that_of_the_full_rover_to_the_motors_line_and_beyond() {
-    // Downhill in either direction, two seconds full ahead and two full astern.
-    let swinging = |t: f64| if t % 4.0 < 2.0 { 60.0 } else { -60.0 };
+    // Downhill in either direction, five seconds full ahead and five full astern.
+    let swinging = |t: f64| if t % 10.0 < 5.0 { 60.0 } else { -60.0 };
     let options = options(G, 0.7, 0.0, 0.005);
     for slope in [0.05, -0.05] {
         for planar in with_and_without_motors() {

@@ -183,7 +183,10 @@ impl Audit {
             return Verdict::Sound;
         }
         let coarse = if is_free { excess.abs() } else { excess };
-        if coarse > COARSE * size && !self.is_last {
+        // What not even standing still gives back.
+        let left = excess - after.kinetic;
+        let is_left = left > rounding + GAIN * size;
+        if (coarse > COARSE * size || is_left) && !self.is_last {
             return Verdict::Coarse;
         }
         let whole = after.momentum.norm_squared() / (2.0 * after.mass);
@@ -199,9 +202,7 @@ impl Audit {
         } else if excess > 0.0 {
             let share = (1.0 - excess / after.kinetic).max(0.0).sqrt();
             shorten(ws, share);
-            let left = excess - after.kinetic;
-            if left > rounding + GAIN * size {
-                // Not even standing still gives it back.
+            if is_left {
                 report.energy_gain = report.energy_gain.max(relative(left, size));
                 report.status = StepStatus::NotConverged;
             }
