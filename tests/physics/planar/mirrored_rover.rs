@@ -10,7 +10,7 @@ use rover_core::multibody::{
     Kinematics, MassMatrix, Model, ModelDescription, Motor, bias, coordinates,
 };
 use rover_core::planar::{
-    ContactRule, Line, MirroredRover, MirroredRoverSimulation, PlanarError, PlanarMachine,
+    ContactRule, Line, MirroredRover, MirroredRoverSimulation, PlanarError, PlanarMachine, Sine,
 };
 use rover_core::simulation::Simulation;
 
@@ -181,6 +181,44 @@ fn a_pair_of_unlike_motors_is_refused_by_name() {
     let refused = MirroredRover::<7>::new(&model).unwrap_err();
     let name = model.wheels()[1].name.clone();
     assert_eq!(refused, PlanarError::NotMirrored { body: name });
+}
+
+#[test]
+fn the_torques_are_those_that_the_motors_can_give() {
+    let ground = Arc::new(Line::new(0.0, 0.0).unwrap());
+    let rule = ContactRule::Nearest;
+    let mut rover =
+        MirroredRoverSimulation::new(planar(), ground, rule, options(G, 0.7, 0.0, 0.005)).unwrap();
+    rover.set_inputs(&[1e3, -1e3, 10.0]).unwrap();
+    // Once they stood there as they were given, and what acted was another torque.
+    assert_eq!(rover.inputs(), [150.0, -150.0, 10.0]);
+}
+
+/// Wheels in the valleys of a steep wave, held by friction, were to bounce off both slopes at once: no velocity does, and thousands of
+/// iterations looked for one.
+#[test]
+fn where_restitution_has_no_answer_the_impact_is_inelastic() {
+    for variant in VARIANTS {
+        let options = StepOptions {
+            variant,
+            ..options(G, 1.9, 0.5, 0.005)
+        };
+        let wave = Arc::new(Sine::new(0.2, 14.0, 0.0, 0.0).unwrap());
+        let rule = ContactRule::Nearest;
+        let mut rover = MirroredRoverSimulation::new(planar(), wave, rule, options).unwrap();
+        let mut q = [0.0; 7];
+        q[1] = 0.9;
+        rover
+            .set_state(&q, &[0.5, -1.0, 0.3, 0.0, 0.0, 0.0, 0.0])
+            .unwrap();
+        let mut retaken = 0;
+        for k in 0..400 {
+            let report = rover.step(1).unwrap();
+            retaken += report.retaken;
+            assert!(report.is_converged(), "{variant:?}, step {k}: {report:?}");
+        }
+        assert!(retaken > 0);
+    }
 }
 
 #[test]
