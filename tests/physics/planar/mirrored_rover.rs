@@ -1,6 +1,5 @@
 //! The six-wheel rover in its plane of symmetry: the full rover, with less of it.
 
-use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, SVector, Vector2, Vector3};
@@ -204,7 +203,7 @@ fn where_restitution_has_no_answer_the_impact_is_inelastic() {
             variant,
             ..options(G, 1.9, 0.5, 0.005)
         };
-        let wave = Arc::new(Sine::new(0.43, TAU / 0.366, 0.0, 0.0).unwrap());
+        let wave = Arc::new(Sine::new(0.43, 0.366, 0.0, 0.0).unwrap());
         let rule = ContactRule::Nearest;
         let mut rover = MirroredRoverSimulation::new(planar(), wave, rule, options).unwrap();
         let q = [0.119, 0.49, -0.29, 0.0, -0.25, 0.0, 0.0];
