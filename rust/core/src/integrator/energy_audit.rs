@@ -22,7 +22,7 @@
 use nalgebra::Vector3;
 
 use super::ScratchOf;
-use super::mechanical_system::{MechanicalSystem, Start};
+use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
 use super::moreau_jean::place;
 use super::options::StepOptions;
 use super::report::StepReport;
@@ -192,7 +192,10 @@ impl Audit {
             return Verdict::Sound;
         }
         let coarse = if is_free { excess.abs() } else { excess };
-        if coarse > COARSE * size && !self.is_last {
+        // What not even standing still gives back.
+        let left = excess - after.kinetic;
+        let is_left = left > rounding + GAIN * size;
+        if (coarse > COARSE * size || is_left) && !self.is_last {
             return Verdict::Coarse;
         }
         let whole = after.momentum.norm_squared() / (2.0 * after.mass);
@@ -208,7 +211,7 @@ impl Audit {
         } else if excess > 0.0 {
             let share = (1.0 - excess / after.kinetic).max(0.0).sqrt();
             shorten(ws, share);
-            if excess > after.kinetic {
+            if is_left {
                 self.hold_back(system, options, start, ws);
             }
         }
