@@ -19,8 +19,8 @@ use crate::geometry::Terrain;
 use crate::multibody::bias::{BiasScratch, bias};
 use crate::multibody::momentum::{body_momenta, energy_and_momentum};
 use crate::multibody::{
-    Configuration, EnergyScratch, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum,
-    MotorRegime,
+    BASE, Configuration, EnergyScratch, FactoredMassMatrix, Kinematics, MassMatrix, Model,
+    Momentum, MotorRegime,
 };
 use crate::problem::{Dimension, FrictionContactProblem};
 
@@ -50,8 +50,7 @@ pub struct TreeScratch {
     momenta_end: Vec<Momentum>,
     sums: Vec<Momentum>,
     c_start: Vec<Vector3<f64>>,
-    theta_held: Vec<f64>,
-    motors: Vec<MotorRegime>,
+    laws: Vec<JointLaw>,
     drive_work: Vec<f64>,
     drive_work_done: Vec<f64>,
     energy: EnergyScratch,
@@ -75,8 +74,7 @@ impl TreeScratch {
             momenta_end: momenta.clone(),
             sums: momenta,
             c_start: vec![Vector3::zeros(); model.bodies().len()],
-            theta_held: vec![0.5; model.n_joints()],
-            motors: vec![MotorRegime::Constant(0.0); model.n_joints()],
+            laws: vec![JointLaw::default(); model.n_joints()],
             drive_work: vec![0.0; model.n_joints()],
             drive_work_done: vec![0.0; model.n_joints()],
             energy: EnergyScratch::new(model),
@@ -159,13 +157,7 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn detect(&mut self, v: &[f64], mut activation: Activation, out: &mut Vec<Contact>) {
-        let reach: f64 = self
-            .model
-            .bodies()
-            .iter()
-            .map(|b| b.position.norm())
-            .sum::<f64>()
-            + 1.0;
+        let reach = self.model.reach() + 1.0;
         let linear = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
         let turning: f64 = v[3..].iter().map(|w| w.abs()).sum();
         activation.margin = activation.lead.abs() * (linear + turning * reach);
@@ -197,21 +189,17 @@ impl MechanicalSystem for TreeSystem<'_> {
         self.parts
             .mass_matrix
             .update(self.model, &self.parts.kinematics);
-        set_held_theta(self.model, options, self.command, self.parts);
+        settle_laws(self.model, options, self.command, self.parts);
     }
 
     #[inline]
-    fn factorise(&mut self, options: &StepOptions) -> bool {
-        let (h, theta) = (options.time_step, options.theta);
+    fn factorise(&mut self, _options: &StepOptions) -> bool {
         let parts = &mut *self.parts;
-        for j in 0..self.model.n_joints() {
-            let (damping, stiffness) = feedback(self.command, &parts.motors, j);
-            if damping > 0.0 || stiffness > 0.0 {
-                let theta_j = parts.theta_held[j];
-                let implicit = h * theta_j * (damping + h * theta * stiffness);
+        for (j, law) in parts.laws.iter().enumerate() {
+            if law.implicit > 0.0 {
                 parts
                     .mass_matrix
-                    .add_to_diagonal(self.model, 6 + j, implicit);
+                    .add_to_diagonal(self.model, BASE + j, law.implicit);
             }
         }
         parts.mass_matrix.factorise(self.model, &mut parts.factor)
@@ -241,24 +229,19 @@ impl MechanicalSystem for TreeSystem<'_> {
         for (y, f) in y.iter_mut().zip(&parts.force) {
             *y = -options.time_step * f;
         }
-        add_command(options, self.command, start, start.v, parts, y);
+        add_command(options, self.command, start, start.v, &parts.laws, y);
     }
 
     #[inline]
     fn is_gyroscopic(&self, options: &StepOptions, v: &[f64]) -> bool {
-        let spin = (self.model.bodies().iter().zip(&v[5..]))
-            .filter(|(body, _)| body.is_spinner)
-            .fold(0.0_f64, |most, (_, rate)| most.max(rate.abs()));
+        let spin = fastest(self.model.spinning_joints(), v);
         options.time_step * self.turning(v) > MOST_TURN || options.time_step * spin > MOST_SPIN
     }
 
     #[inline]
     fn turning(&self, v: &[f64]) -> f64 {
         let base = (v[3] * v[3] + v[4] * v[4] + v[5] * v[5]).sqrt();
-        let joints = (self.model.bodies().iter().zip(&v[5..])).skip(1);
-        base + joints
-            .filter(|(body, _)| !body.is_spinner)
-            .fold(0.0_f64, |most, (_, rate)| most.max(rate.abs()))
+        base + fastest(self.model.turning_joints(), v)
     }
 
     fn load_gyroscopic(
@@ -276,7 +259,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         for (y, f) in y.iter_mut().zip(&*gravity_impulse) {
             *y = options.time_step * f;
         }
-        add_command(options, self.command, start, start.v, parts, y);
+        add_command(options, self.command, start, start.v, &parts.laws, y);
         parts.gyroscopic.solve(
             model,
             &parts.kinematics,
@@ -290,9 +273,10 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 
     fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
-        let parts = &mut *self.parts;
+        let laws = self.command.drives.iter().zip(&mut self.parts.laws);
+        let rates = start.v[BASE..].iter().zip(&v_end[BASE..]);
         let mut is_new = false;
-        for (j, drive) in self.command.drives.iter().enumerate() {
+        for ((drive, law), (begin, end)) in laws.zip(rates) {
             let regime = match drive {
                 None => MotorRegime::Constant(0.0),
                 Some(Drive {
@@ -302,13 +286,12 @@ impl MechanicalSystem for TreeSystem<'_> {
                 Some(Drive {
                     torque,
                     motor: Some(motor),
-                }) => {
-                    let (begin, end) = (start.v[6 + j], v_end[6 + j]);
-                    motor.regime(*torque, begin + parts.theta_held[j] * (end - begin))
-                }
+                }) => motor.regime(*torque, begin + law.theta * (end - begin)),
             };
-            is_new |= regime != parts.motors[j];
-            parts.motors[j] = regime;
+            if regime != law.motor {
+                is_new = true;
+                law.motor = regime;
+            }
         }
         is_new
     }
@@ -335,13 +318,14 @@ impl MechanicalSystem for TreeSystem<'_> {
         start: Start<'_, Configuration>,
         v_end: &[f64],
     ) -> f64 {
-        let theta = options.theta;
+        let TreeScratch {
+            laws, drive_work, ..
+        } = &mut *self.parts;
         let mut total = 0.0;
-        for j in 0..self.model.n_joints() {
-            let (begin, end) = (start.v[6 + j], v_end[6 + j]);
-            let turned = options.time_step * (theta * end + (1.0 - theta) * begin);
-            let torque = actuation(options, self.command, start, v_end, self.parts, j);
-            self.parts.drive_work[j] = torque.drive * turned;
+        let actuation = actuation(options, self.command, start, v_end, laws);
+        for (work, torque) in drive_work.iter_mut().zip(actuation) {
+            let turned = options.time_step * torque.rate;
+            *work = torque.drive * turned;
             total += (torque.drive + torque.other) * turned;
         }
         total
@@ -389,7 +373,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             self.parts,
             y,
         );
-        add_command(options, self.command, start, v_end, self.parts, y);
+        add_command(options, self.command, start, v_end, &self.parts.laws, y);
     }
 
     #[inline]
@@ -465,72 +449,91 @@ const MOST_TURN: f64 = 0.1;
 /// a frequency of a few per cent of the spin, so that explicit terms would do up to some twenty times more.
 const MOST_SPIN: f64 = 1.0;
 
-/// Damping (N m s/rad) and stiffness (N m/rad) with which a joint's torque answers to its motion.
+/// Fastest of some joints, rad/s.
 #[inline]
-fn feedback(command: &Command, motors: &[MotorRegime], j: usize) -> (f64, f64) {
-    let (mut damping, mut stiffness) = (0.0, 0.0);
-    if let Some(held) = &command.held[j] {
-        damping += held.damping;
-        stiffness += held.stiffness;
-    }
-    if let MotorRegime::Line { slope, .. } = motors[j] {
-        damping += slope;
-    }
-    (damping, stiffness)
+fn fastest(joints: &[usize], v: &[f64]) -> f64 {
+    joints.iter().fold(0.0, |most, &k| most.max(v[k].abs()))
 }
 
-/// How implicit each joint's PD and motor are.
-fn set_held_theta(
-    model: &Model,
-    options: &StepOptions,
-    command: &Command,
-    parts: &mut TreeScratch,
-) {
-    let h = options.time_step;
-    for j in 0..model.n_joints() {
-        let (damping, stiffness) = feedback(command, &parts.motors, j);
-        parts.theta_held[j] = if damping > 0.0 || stiffness > 0.0 {
-            let inertia = parts.mass_matrix.diagonal(model, 6 + j);
+/// How a joint's torque answers to its motion in a step.
+#[derive(Clone, Copy, Debug)]
+struct JointLaw {
+    /// How implicit its PD and its motor's line are.
+    theta: f64,
+    /// What they add to the mass matrix, kg m².
+    implicit: f64,
+    /// Branch of its drive.
+    motor: MotorRegime,
+}
+
+impl Default for JointLaw {
+    fn default() -> Self {
+        Self {
+            theta: 0.5,
+            implicit: 0.0,
+            motor: MotorRegime::Constant(0.0),
+        }
+    }
+}
+
+/// How implicit each joint's PD and motor are, at a new mass matrix.
+fn settle_laws(model: &Model, options: &StepOptions, command: &Command, parts: &mut TreeScratch) {
+    let (h, theta) = (options.time_step, options.theta);
+    for (j, (law, held)) in parts.laws.iter_mut().zip(&command.held).enumerate() {
+        // Damping and stiffness, N m s/rad and N m/rad.
+        let (mut damping, stiffness) = held.map_or((0.0, 0.0), |x| (x.damping, x.stiffness));
+        if let MotorRegime::Line { slope, .. } = law.motor {
+            damping += slope;
+        }
+        (law.theta, law.implicit) = (theta, 0.0);
+        if damping > 0.0 || stiffness > 0.0 {
+            let inertia = parts.mass_matrix.diagonal(model, BASE + j);
             let z = h * (damping + 0.5 * h * stiffness) / inertia;
-            fitted_theta(z).max(options.theta)
-        } else {
-            options.theta
-        };
+            law.theta = fitted_theta(z).max(theta);
+            law.implicit = h * law.theta * (damping + h * theta * stiffness);
+        }
     }
 }
 
-/// Mean torque of a joint over the step, N m.
+/// Mean torque of a joint over the step, N m, and its mean rate, rad/s.
 struct Actuation {
     /// Of its drive.
     drive: f64,
     /// Of everything else.
     other: f64,
+    rate: f64,
 }
 
-/// Torques of joint j; the PD and the motor's line at the θ_j-weighted position and velocity of the iterate `v_end`.
+/// Torques of all joints; the PD and the motor's line at the θ_j-weighted position and velocity of the iterate `v_end`.
 #[inline]
-fn actuation(
+fn actuation<'a>(
     options: &StepOptions,
-    command: &Command,
-    start: Start<'_, Configuration>,
-    v_end: &[f64],
-    parts: &TreeScratch,
-    j: usize,
-) -> Actuation {
-    let (h, theta, theta_j) = (options.time_step, options.theta, parts.theta_held[j]);
-    let (rate, rate_end) = (start.v[6 + j], v_end[6 + j]);
-    let mut other = command.torque[j];
-    if let Some(held) = &command.held[j] {
-        let mean = theta * rate_end + (1.0 - theta) * rate;
-        other -=
-            held.stiffness * (start.configuration.joints[j] + h * theta_j * mean - held.set_point);
-        other -= held.damping * (rate + theta_j * (rate_end - rate));
-    }
-    let drive = match parts.motors[j] {
-        MotorRegime::Constant(torque) => torque,
-        line @ MotorRegime::Line { .. } => line.torque(rate + theta_j * (rate_end - rate)),
-    };
-    Actuation { drive, other }
+    command: &'a Command,
+    start: Start<'a, Configuration>,
+    v_end: &'a [f64],
+    laws: &'a [JointLaw],
+) -> impl Iterator<Item = Actuation> + 'a {
+    let (h, theta) = (options.time_step, options.theta);
+    let motion = (start.configuration.joints.iter())
+        .zip(&start.v[BASE..])
+        .zip(&v_end[BASE..]);
+    let torques = command.torque.iter().zip(&command.held).zip(laws);
+    motion
+        .zip(torques)
+        .map(move |(((angle, begin), end), ((torque, held), law))| {
+            let rate = theta * end + (1.0 - theta) * begin;
+            let rate_implicit = begin + law.theta * (end - begin);
+            let mut other = *torque;
+            if let Some(held) = held {
+                other -= held.stiffness * (angle + h * law.theta * rate - held.set_point);
+                other -= held.damping * rate_implicit;
+            }
+            Actuation {
+                drive: law.motor.torque(rate_implicit),
+                other,
+                rate,
+            }
+        })
 }
 
 /// Adds `h τ` to `y` for a step that ends with the iterate `v_end`.
@@ -539,12 +542,12 @@ fn add_command(
     command: &Command,
     start: Start<'_, Configuration>,
     v_end: &[f64],
-    parts: &TreeScratch,
+    laws: &[JointLaw],
     y: &mut [f64],
 ) {
-    for j in 0..command.torque.len() {
-        let torque = actuation(options, command, start, v_end, parts, j);
-        y[6 + j] += options.time_step * (torque.other + torque.drive);
+    let actuation = actuation(options, command, start, v_end, laws);
+    for (y, torque) in y[BASE..].iter_mut().zip(actuation) {
+        *y += options.time_step * (torque.other + torque.drive);
     }
 }
 
