@@ -25,6 +25,7 @@ __all__ = [
     "Line",
     "MirroredRoverSimulation",
     "ModelError",
+    "Motor",
     "OptionError",
     "PlanarContacts",
     "PlanarSimulation",
@@ -88,6 +89,37 @@ class BusyError(RoverGymError, RuntimeError):
     """An object was used while another call on it was still going on; nothing has changed."""
 
 @final
+class Motor:
+    """The torque-speed line of a wheel's motor. Immutable.
+
+    The torque is the command, but within `stall (1 - speed / no_load_speed)` forwards, `-stall (1 + speed /
+    no_load_speed)` backwards, and `stall` either way.
+
+    Args:
+        stall_torque: Of the line at rest, N m.
+        no_load_speed: Where the line reaches zero, rad/s; may be infinite: then the speed does not matter.
+        regenerating: Whether it brakes when it is driven faster than that, by the line and at most by the stall torque;
+            if not, it turns freely there.
+
+    Raises:
+        ModelError: `stall_torque` is not from 1e-9 to 1e9 N m, or `no_load_speed` neither from 1e-6 to 1e9 rad/s nor
+            infinite.
+    """
+
+    def __new__(cls, stall_torque: float, no_load_speed: float, regenerating: bool = True) -> Motor: ...
+    @property
+    def stall_torque(self) -> float: ...
+    @property
+    def no_load_speed(self) -> float: ...
+    @property
+    def regenerating(self) -> bool: ...
+    def torque(self, command: float, speed: float) -> float:
+        """N m that a command (N m) gives at a speed (rad/s). Raises CommandError for what is not finite."""
+    def __getnewargs__(self) -> tuple[float, float, bool]: ...
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+
+@final
 class RoverModel:
     """A tree of solids under a free base, read from data. Immutable."""
 
@@ -111,6 +143,7 @@ class RoverModel:
         steering_damping: float | None = None,
         wheel_torque_limit: float | None = None,
         mass_scale: float | None = None,
+        motor: Motor | Mapping[str, Any] | None = ...,
     ) -> RoverModel:
         """A model that differs in what is given.
 
@@ -122,6 +155,8 @@ class RoverModel:
             steering_damping: N m s/rad.
             wheel_torque_limit: N m.
             mass_scale: Multiplies masses and inertias.
+            motor: Of all wheels: a `Motor`, or its fields by name; None for none: each wheel gives its command at any
+                speed. If it is not given, the motors stay.
 
         Raises:
             ModelError: A number out of its range, or a wheel radius where a wheel's solid is no disc.
@@ -148,6 +183,9 @@ class RoverModel:
     def wheel_radii(self) -> _Array: ...
     @property
     def wheel_torque_limits(self) -> _Array: ...
+    @property
+    def motors(self) -> list[Motor | None]:
+        """The motor of each wheel; None where the torque is the command at any speed."""
     @property
     def wheel_joint_indices(self) -> list[int]:
         """Index in q of each wheel's rotation (-1 where welded)."""
@@ -405,7 +443,14 @@ class Simulation:
         """Sets q and velocity ("state": as `q` and `v` return them). Time goes to 0, warm start is dropped."""
     def report_state(self) -> tuple[_Array, _Array]: ...
     @property
-    def wheel_torques(self) -> _Array: ...
+    def wheel_torques(self) -> _Array:
+        """(6,) N m, positive drives forward: the commands, within the model's limits."""
+    @property
+    def motor_torques(self) -> _Array:
+        """(6,) N m, positive drives forward: mean torque that each drive gave in the last step; 0 before any.
+
+        It is the command, within the line of the wheel's `Motor`.
+        """
     def set_wheel_torques(self, torques: npt.ArrayLike) -> None:
         """(6,) N m, positive drives forward; saturates at the model's limits."""
     @property

@@ -49,7 +49,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     The world has x forward, y up and z to the right; heading is the angle about +y, positive to the
     left. Wheels are listed FL, FR, ML, BL, MR, BR (front, middle, back; left, right). Units are SI
     and radians, except for arguments and options whose name ends in `_deg`. The motors hold their
-    torque and the steering PD, inside the physics, its set-point over one control period.
+    command and the steering PD, inside the physics, its set-point over one control period.
 
     ## Action
 
@@ -70,6 +70,23 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | 9     | steering set-point of BL, positive turns the wheel left | [-1, 1] | max_steering_deg | rad  |
     | 10    | steering set-point of MR, positive turns the wheel left | [-1, 1] | max_steering_deg | rad  |
     | 11    | steering set-point of BR, positive turns the wheel left | [-1, 1] | max_steering_deg | rad  |
+
+    ## Motors
+
+    A motor gives its command, but no more than its torque-speed line: at the speed omega of its wheel, forwards at most
+    `stall_torque (1 - omega / no_load_speed)`, backwards at most `stall_torque (1 + omega / no_load_speed)`, and `stall_torque`
+    either way. Driven faster than `no_load_speed` it brakes by its line if it is `regenerating`, and else turns freely.
+    The rover's six motors are alike:
+
+    | quantity       | value | unit  | meaning                                                |
+    |----------------|-------|-------|--------------------------------------------------------|
+    | torque limit   | 150   | N m   | of the command: an action of 1                         |
+    | stall_torque   | 300   | N m   | of the line, at rest                                   |
+    | no_load_speed  | 30    | rad/s | where the line reaches zero: 3 m/s of the rim          |
+    | regenerating   | True  |       | whether it brakes when it is driven faster             |
+
+    So the full command is given up to half the no-load speed, and level ground is driven at 3 m/s at most.
+    `model=RoverModel().replace(motor=Motor(...))` changes them; with `motor=None` a wheel gives its command at any speed.
 
     ## Observation
 
@@ -108,7 +125,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     |-----------------|----------------------------------------------------------------|----------|
     | progress        | w (d_before - d_after), d the horizontal distance to the goal  | 1        |
     | time            | w dt                                                           | -0.05    |
-    | energy          | w sum_i abs(tau_i dphi_i), wheel torque times angle turned     | -5e-05   |
+    | energy          | w sum_i abs(tau_i dphi_i), torque given times angle turned     | -5e-05   |
     | slip            | w s dt, s the mean slip ratio                                  | -0.1     |
     | tilt            | w (1 - cos(tilt)) dt                                           | -0.1     |
     | torque_change   | w sum_i (a_i - a_i_before)^2 / 6, i in 0-5                     | -0.02    |
@@ -116,7 +133,9 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | success         | w on the step that reaches the goal                            | 10       |
     | failure         | w on a step that ends in failure                               | -10      |
 
-    On a step that the physics could not take, only `failure` counts.
+    On a step that the physics could not take, only `failure` counts. What one step counts is bounded, whatever the
+    physics did: 30 m of progress either way, 4e5 J of work, 60 s of `dt`, a slip ratio of 2. So no step is worth more
+    than 90 either way with these weights.
 
     ## Start
 

@@ -86,12 +86,13 @@ def scene(time_step: float = 0.005, **options: Any) -> Simulation:
 
 
 def report_model() -> RoverModel:
-    """The rover of the report's runs."""
+    """The rover of the report's runs, whose wheels give their torque at any speed."""
     return RoverModel().replace(
         contact_radius=WHEEL_RADIUS,
         masses=MASSES,
         steering_stiffness=STEERING_STIFFNESS,
         steering_damping=STEERING_DAMPING,
+        motor=None,
     )
 
 

@@ -39,7 +39,7 @@ class RoverScene:
     Attributes:
         name: Key in the results.
         title: For the chart.
-        machine: `RoverModel.to_dict()` of the rover.
+        machine: `RoverModel.to_dict()` of the rover. Every engine gives the torques at any speed: there are no motors.
         q: (nq,) start, as `Simulation.q`; at rest.
         phases: Commands, one after the other.
         normal: Of the plane through the origin, or None where there is none.

@@ -31,6 +31,13 @@ def test_action_table_has_a_row_an_entry(env: RoverEnv) -> None:
         assert (stands_for, unit) == (("wheel torque limit", "N m") if i < 6 else ("max_steering_deg", "rad"))
 
 
+def test_motor_table_is_the_model(env: RoverEnv) -> None:
+    rows = {name: ast.literal_eval(value) for name, value, _, _ in table("Motors")}
+    for motor, limit in zip(env.model.motors, env.model.wheel_torque_limits, strict=True):
+        assert rows.pop("torque limit", limit) == limit
+        assert rows == {name: getattr(motor, name) for name in ("stall_torque", "no_load_speed", "regenerating")}
+
+
 def test_observation_table_is_the_layout(env: RoverEnv) -> None:
     rows = table("Observation")
     layout = env.observation_layout

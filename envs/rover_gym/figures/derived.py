@@ -41,11 +41,11 @@ def slip_ratios(run: Run) -> Array:
 def motor_work(run: Run) -> Array:
     """(n, 6) work of the wheel motors since the start, J, positive where they drove.
 
-    The torque of a row held since the row before.
+    The torque that a drive gave in the last step before a row counts for the time since the row before.
     """
     angles = _of_wheels(run, "q")
     turned = np.diff(angles, axis=0, prepend=angles[:1])
-    return np.cumsum(run.trajectory["wheel_torques"] * turned, axis=0)
+    return np.cumsum(run.trajectory["motor_torques"] * turned, axis=0)
 
 
 def smooth(time: Array, values: Array, window: float) -> Array:

@@ -41,7 +41,7 @@ DRAWINGS = {
     "slip": Drawing(curves.slip, 6.5, ("q", "v", "wheel_forces")),
     "attitude": Drawing(curves.attitude, 6.0, ("q", "v")),
     "torques-and-steering": Drawing(curves.torques, 5.5, ("q", "wheel_torques", "steering_set_points")),
-    "energy": Drawing(curves.energy, 5.5, ("q", "kinetic_energy", "potential_energy", "wheel_torques")),
+    "energy": Drawing(curves.energy, 5.5, ("q", "kinetic_energy", "potential_energy", "motor_torques")),
     "contact-solver": Drawing(curves.contact_solver, 5.0, ("solver_residual", "solver_iterations")),
 }
 

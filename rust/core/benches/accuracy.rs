@@ -110,7 +110,9 @@ fn largest_gain(options: StepOptions, height: f64, roll: f64, v: &[f64], seconds
     let mut q = [0.0; 21];
     (q[1], q[3]) = (height, roll);
     let steps = count(seconds, options.time_step);
-    let mut simulation = simulation(Model::rover(), Plane::ground(), options, &q, v);
+    // A motor that brakes would take energy out.
+    let model = Model::rover().with_motors(None).unwrap();
+    let mut simulation = simulation(model, Plane::ground(), options, &q, v);
     let start = simulation.energy().total();
     (0..steps).fold(0.0_f64, |worst, _| {
         simulation.step(1).unwrap();

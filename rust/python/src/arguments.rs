@@ -31,6 +31,11 @@ impl<'py> Given<'py> {
         self.0.filter(|given| !given.is_none())
     }
 
+    /// What was given, be it `None`; nothing where it is missing.
+    pub fn given(self) -> Option<Bound<'py, PyAny>> {
+        self.0
+    }
+
     /// A number.
     pub fn number(self, default: f64, kind: Kind, field: &str) -> PyResult<f64> {
         self.0

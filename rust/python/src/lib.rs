@@ -10,6 +10,7 @@ mod errors;
 mod files;
 mod friction_contact;
 mod model;
+mod motor;
 mod planar;
 mod planar_ground;
 mod planar_soil;
@@ -28,6 +29,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     errors::register(module)?;
     module.add_class::<model::RoverModel>()?;
+    module.add_class::<motor::Motor>()?;
     module.add_class::<plane::Plane>()?;
     module.add_class::<sphere_field::SphereField>()?;
     module.add_class::<contacts::Contacts>()?;

@@ -18,6 +18,7 @@ use crate::arguments::{self, Given, number};
 use crate::arrays::{fresh, fresh_blocks, fresh_matrix, fresh_rows, triple, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::files::{self, in_file, read_text, write_text};
+use crate::motor::{self, Motor};
 use crate::sphere_field::Ground;
 
 /// A pair of fresh vectors.
@@ -238,7 +239,9 @@ impl RoverModel {
 
     /// The same machine with some of its data changed.
     #[pyo3(signature = (*, wheel_radius = None, contact_radius = None, masses = None, steering_stiffness = None, steering_damping = None,
-        wheel_torque_limit = None, mass_scale = None))]
+        wheel_torque_limit = None, mass_scale = None, motor = Given::MISSING),
+        text_signature = "($self, *, wheel_radius=None, contact_radius=None, masses=None, steering_stiffness=None, steering_damping=None, \
+        wheel_torque_limit=None, mass_scale=None, motor=...)")]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python method
     fn replace(
         &self,
@@ -249,6 +252,7 @@ impl RoverModel {
         steering_damping: Option<&Bound<'_, PyAny>>,
         wheel_torque_limit: Option<&Bound<'_, PyAny>>,
         mass_scale: Option<&Bound<'_, PyAny>>,
+        motor: Given<'_>,
     ) -> PyResult<Self> {
         let read = |given: Option<&Bound<'_, PyAny>>, field| {
             given.map(|x| number(x, Kind::Model, field)).transpose()
@@ -257,6 +261,12 @@ impl RoverModel {
         if let Some(limit) = read(wheel_torque_limit, "wheel_torque_limit")? {
             for wheel in &mut description.wheels {
                 wheel.torque_limit = limit;
+            }
+        }
+        if let Some(motor) = motor.given() {
+            let motor = motor::parse(&motor)?;
+            for wheel in &mut description.wheels {
+                wheel.motor = motor;
             }
         }
         if let Some(masses) = masses {
@@ -363,6 +373,12 @@ impl RoverModel {
     #[getter]
     fn wheel_torque_limits<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_iter(py, self.inner.wheels().iter().map(|w| w.torque_limit))
+    }
+
+    #[getter]
+    fn motors(&self) -> Vec<Option<Motor>> {
+        let wheels = self.inner.wheels().iter();
+        wheels.map(|wheel| wheel.motor.map(Motor::from)).collect()
     }
 
     #[getter]

@@ -432,6 +432,11 @@ impl Simulation {
         Ok(fresh(py, self.open()?.wheel_torques()))
     }
 
+    #[getter]
+    fn motor_torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(fresh(py, self.open()?.motor_torques()))
+    }
+
     fn set_wheel_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
         let torques = vector(torques, Kind::Command, "torques")?;
         Ok(self

@@ -30,8 +30,11 @@ def start(
     terrain: Plane | SphereField | None = None,
     **options: Any,
 ) -> Simulation:
-    """The built-in rover, or a description of one, standing on flat ground unless told otherwise."""
-    model = RoverModel() if description is None else RoverModel.from_dict(description)
+    """The built-in rover, or a description of one, standing on flat ground unless told otherwise.
+
+    Its wheels give their torque at any speed, as those of the engines beside it.
+    """
+    model = (RoverModel() if description is None else RoverModel.from_dict(description)).replace(motor=None)
     place, velocity = np.zeros(model.nq), np.zeros(model.nv)
     place[1] = 0.35
     for index, value in (q or {}).items():

@@ -14,7 +14,7 @@ class OurRunner:
     """`Simulation` behind the common interface."""
 
     def __init__(self, scene: RoverScene, time_step: float, **options: Any) -> None:
-        model = RoverModel.from_dict(scene.machine)
+        model = RoverModel.from_dict(scene.machine).replace(motor=None)
         plane = None if scene.normal is None else Plane(scene.normal)
         terrain = SphereField(scene.spheres[:, :3], scene.spheres[:, 3], plane) if len(scene.spheres) else plane
         self.simulation = Simulation(

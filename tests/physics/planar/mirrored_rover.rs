@@ -6,7 +6,9 @@ use nalgebra::{DMatrix, DVector, SVector, Vector2, Vector3};
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::bias::BiasScratch;
-use rover_core::multibody::{Kinematics, MassMatrix, Model, ModelDescription, bias, coordinates};
+use rover_core::multibody::{
+    Kinematics, MassMatrix, Model, ModelDescription, Motor, bias, coordinates,
+};
 use rover_core::planar::{
     ContactRule, Line, MirroredRover, MirroredRoverSimulation, PlanarError, PlanarMachine,
 };
@@ -15,8 +17,18 @@ use rover_core::simulation::Simulation;
 use crate::scenes::{G, VARIANTS, options};
 
 fn planar() -> MirroredRover<7> {
-    // Its torques do not depend on the speed.
-    MirroredRover::new(&Model::rover().with_motors(None).unwrap()).unwrap()
+    MirroredRover::new(&Model::rover()).unwrap()
+}
+
+/// Without motors, whose torques do not depend on the speed, and with motors weak enough to reach their line in a second.
+fn with_and_without_motors() -> [MirroredRover<7>; 3] {
+    let weak = |regenerating| Motor {
+        stall_torque: 120.0,
+        no_load_speed: 6.0,
+        regenerating,
+    };
+    [None, Some(weak(true)), Some(weak(false))]
+        .map(|motor| MirroredRover::new(&Model::rover().with_motors(motor).unwrap()).unwrap())
 }
 
 /// `P`: planar velocities to those of the full model.
@@ -85,8 +97,12 @@ fn point_jacobians_are_the_discs_rates() {
 }
 
 /// Six coordinates of the base and free pairs against the planar image: dropped from a hand's breadth, driven for ten seconds.
-fn largest_distance(slope: f64, options: &StepOptions) -> f64 {
-    let planar = planar();
+fn largest_distance(
+    planar: MirroredRover<7>,
+    slope: f64,
+    torques: impl Fn(f64) -> f64,
+    options: &StepOptions,
+) -> f64 {
     let P = injection(&planar);
     let model = Arc::new(planar.model().clone());
     let normal = Vector3::new(-slope, 1.0, 0.0).normalize();
@@ -103,20 +119,22 @@ fn largest_distance(slope: f64, options: &StepOptions) -> f64 {
     let configuration = coordinates::from_public(full.model(), start.as_slice()).unwrap();
     let zero = vec![0.0; start.len()];
     full.set_state(configuration, zero);
-    full.set_wheel_torques(&[15.0; 6]).unwrap();
     let line = Arc::new(Line::new(slope, 0.0).unwrap());
     let mut reduced =
         MirroredRoverSimulation::new(planar, line, ContactRule::Nearest, options.clone()).unwrap();
     reduced.set_state(q.as_slice(), &[0.0; 7]).unwrap();
-    reduced.set_inputs(&[15.0; 3]).unwrap();
-    let mut largest = 0.0_f64;
+    let (mut largest, mut way) = (0.0_f64, 0.0_f64);
     for _ in 0..200 {
+        let torque = torques(full.state().time);
+        full.set_wheel_torques(&[torque; 6]).unwrap();
+        reduced.set_inputs(&[torque; 3]).unwrap();
         assert!(full.step(10).unwrap().is_converged());
         assert!(reduced.step(10).unwrap().is_converged());
         let full_q = coordinates::to_public(&full.state().configuration);
+        way = way.max(reduced.q()[0].abs());
         largest = largest.max((DVector::from_vec(full_q) - &P * reduced.q()).amax());
     }
-    assert!(reduced.q()[0].abs() > 2.0, "it drives: {}", reduced.q()[0]);
+    assert!(way > 2.0, "it drives: {way}");
     largest
 }
 
@@ -133,10 +151,36 @@ fn ten_seconds_straight_ahead_are_those_of_the_full_rover() {
                 variant,
                 ..options(G, 0.7, 0.0, 0.005)
             };
-            let distance = largest_distance(slope, &options);
-            assert!(distance < bound, "{variant:?}, slope {slope}: {distance:e}");
+            for planar in with_and_without_motors() {
+                let distance = largest_distance(planar, slope, |_| 15.0, &options);
+                assert!(distance < bound, "{variant:?}, slope {slope}: {distance:e}");
+            }
         }
     }
+}
+
+/// The motors reach their lines, are driven beyond their no-load speed downhill, and brake; the image once ignored them and was 90 m ahead.
+#[test]
+fn full_throttle_is_that_of_the_full_rover_to_the_motors_line_and_beyond() {
+    // Downhill in either direction, two seconds full ahead and two full astern.
+    let swinging = |t: f64| if t % 4.0 < 2.0 { 60.0 } else { -60.0 };
+    let options = options(G, 0.7, 0.0, 0.005);
+    for slope in [0.05, -0.05] {
+        for planar in with_and_without_motors() {
+            let distance = largest_distance(planar, slope, swinging, &options);
+            assert!(distance < 1e-8, "slope {slope}: {distance:e}");
+        }
+    }
+}
+
+#[test]
+fn a_pair_of_unlike_motors_is_refused_by_name() {
+    let mut description = ModelDescription::rover();
+    description.wheels[0].motor = None;
+    let model = Model::from_description(description).unwrap();
+    let refused = MirroredRover::<7>::new(&model).unwrap_err();
+    let name = model.wheels()[1].name.clone();
+    assert_eq!(refused, PlanarError::NotMirrored { body: name });
 }
 
 #[test]

@@ -63,7 +63,7 @@ pub fn slope(degrees: f64) -> Plane {
     Plane::new([-a.sin(), a.cos(), 0.0], 0.0).unwrap()
 }
 
-/// The machine of the report's plane run: 880 kg table, contact radius 0.30 m, gains of 1.5.
+/// The machine of the report's plane run: 880 kg table, contact radius 0.30 m, gains of 1.5, torques that no speed changes.
 pub fn report_machine() -> Model {
     let masses = numbers(&golden("rover_model.json")["meta"]["masses_880"]);
     let mut description = ModelDescription::rover();
@@ -72,10 +72,11 @@ pub fn report_machine() -> Model {
     }
     set_steering_gains(&mut description, 1.5, 1.5);
     set_contact_radius(&mut description, 0.30);
-    Model::from_description(description).unwrap()
+    without_motors(description)
 }
 
-/// The machine of the independent check: contact radius 0.20 m, gains of 15000, steering mass centres 7.5 cm low.
+/// The machine of the independent check: contact radius 0.20 m, gains of 15000, steering mass centres 7.5 cm low, torques that no speed
+/// changes.
 pub fn check_machine() -> Model {
     let mut description = ModelDescription::rover();
     set_steering_gains(&mut description, 15_000.0, 15_000.0);
@@ -85,7 +86,12 @@ pub fn check_machine() -> Model {
             solid.centre_of_mass = Some([0.0, -0.075, 0.0]);
         }
     }
-    Model::from_description(description).unwrap()
+    without_motors(description)
+}
+
+fn without_motors(description: ModelDescription) -> Model {
+    let model = Model::from_description(description).unwrap();
+    model.with_motors(None).unwrap()
 }
 
 /// The radius at which the wheels touch; their discs stay.

@@ -152,8 +152,11 @@ pub trait MechanicalSystem {
         self.half_solve(y);
     }
 
-    /// Chooses the branch of each piecewise force anew for a step that ends with `v_end`; true where one has changed and the step must be
-    /// taken again. By default there is none.
+    /// Chooses the branch of each piecewise force for a step that begins here. By default there is none.
+    fn choose_branches(&mut self, _start: Start<'_, Self::Configuration>) {}
+
+    /// Goes on to the next branch of each piecewise force towards that of a step that ends with `v_end`; true where one has changed and
+    /// the step must be taken again. By default there is none.
     fn revise(&mut self, _start: Start<'_, Self::Configuration>, _v_end: &[f64]) -> bool {
         false
     }
@@ -173,6 +176,12 @@ pub trait MechanicalSystem {
         0.0
     }
 
+    /// Whether [`Self::balance`] keeps the momenta of free flight whatever the step, which no correction of the energy may touch. By default
+    /// it does not.
+    fn conserves_momenta(&self) -> bool {
+        false
+    }
+
     /// Work of the actuators over a step that ends with `v_end`, J.
     fn work(
         &mut self,
@@ -188,6 +197,18 @@ pub trait MechanicalSystem {
 
     /// Before the iterations of a Newton variant: what it must remember of the start. By default nothing.
     fn begin_balance(&mut self, _start: Start<'_, Self::Configuration>) {}
+
+    /// [`Self::load`] for the iterate `v_end`: forces taken implicitly enter with their value there. By default there are none.
+    fn load_at_end(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, Self::Configuration>,
+        _v_end: &[f64],
+        v_mean: &[f64],
+        y: &mut [f64],
+    ) {
+        self.load(options, start, v_mean, y);
+    }
 
     /// `y = h F − Δ(M v)` (nv): what the iterate `v_end` leaves of the balance over the step without contacts.
     ///
@@ -206,7 +227,7 @@ pub trait MechanicalSystem {
             *change = end - begin;
         }
         self.multiply_mass(y, scratch);
-        self.load(options, start, v_mean, y);
+        self.load_at_end(options, start, v_end, v_mean, y);
         for (y, momentum) in y.iter_mut().zip(&*scratch) {
             *y -= momentum;
         }
@@ -246,6 +267,11 @@ pub trait MechanicalSystem {
         u_N_before: f64,
     ) -> f64 {
         rebound(options.restitution, u_N_before)
+    }
+
+    /// Whether a solve that does not converge speaks for a problem without an answer. By default it does; not where sweeps end early.
+    fn solves_to_the_end(&self) -> bool {
+        true
     }
 
     /// Solves [`Self::problem`]: p (d n_c), N s, in and out, and u (d n_c), m/s, out, as [`solve`] takes them.

@@ -20,6 +20,7 @@ pub mod gyroscopic;
 pub mod mechanical_system;
 pub mod moreau_jean;
 pub mod moreau_jean_newton;
+pub(crate) mod motor_branch;
 pub mod options;
 pub mod position_projection;
 pub mod probe;
@@ -38,7 +39,7 @@ pub use options::{Stabilisation, StepOptions, Variant};
 pub use probe::{NoProbe, Phase, Probe};
 pub use report::{StepReport, StepStatus};
 pub use scratch::Scratch;
-pub use tree_system::{TreeScratch, TreeSystem};
+pub use tree_system::{DriveAction, TreeScratch, TreeSystem};
 pub use warm_start::WarmStart;
 pub use workspace::{ActiveContact, Workspace};
 

@@ -58,7 +58,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
             v: &*state.v,
         };
         let before = energy_before(system, options, start, ws);
-        system.revise(start, start.v);
+        system.choose_branches(start);
         system.begin_balance(start);
         ws.v.copy_from_slice(start.v);
         let mut report = StepReport {
@@ -114,7 +114,11 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         }
         system.set_moved(start.configuration, &ws.v_mean, h, &mut ws.end);
         let turn = options.time_step * system.turning(start.v);
-        let drift = if turn <= MOST_TURN { turn.powi(3) } else { 0.0 };
+        let drift = if system.conserves_momenta() && turn <= MOST_TURN {
+            turn.powi(3)
+        } else {
+            0.0
+        };
         let audit = Audit {
             before,
             is_last: false,

@@ -25,7 +25,7 @@ pub struct StepReport {
     pub residual: f64,
     /// Most contacts in a step.
     pub n_contacts: usize,
-    /// Steps that were taken again: a motor changed its branch, or the energy asked for a safer way.
+    /// Steps that were taken again: a motor changed its branch, the energy asked for a safer way, or Newton's law of restitution had no answer.
     pub retaken: usize,
     /// Largest gain of energy in a step beyond the work of gravity and actuators, as a part of its kinetic energy.
     pub energy_gain: f64,

@@ -6,11 +6,11 @@
 
 use nalgebra::Vector3;
 
-use super::command::{Command, Drive};
+use super::command::{Command, HeldJoint};
 use super::energy_audit::MechanicalEnergy;
-use super::fitted_theta::fitted_theta;
 use super::gyroscopic::{GyroscopicScratch, gravity_load};
 use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
+use super::motor_branch::MotorBranch;
 use super::options::StepOptions;
 use crate::contact::{
     Activation, Contact, ContactKey, ContactSystem, detect, generalized_impulse, relocate,
@@ -19,8 +19,7 @@ use crate::geometry::Terrain;
 use crate::multibody::bias::{BiasScratch, bias};
 use crate::multibody::momentum::{body_momenta, energy_and_momentum};
 use crate::multibody::{
-    BASE, Configuration, EnergyScratch, FactoredMassMatrix, Kinematics, MassMatrix, Model,
-    Momentum, MotorRegime,
+    BASE, Configuration, EnergyScratch, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum,
 };
 use crate::problem::{Dimension, FrictionContactProblem};
 
@@ -38,6 +37,15 @@ impl UnilateralContact for Contact {
     }
 }
 
+/// What a joint's drive did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DriveAction {
+    /// Integral of its torque over time, N m s.
+    pub impulse: f64,
+    /// J.
+    pub work: f64,
+}
+
 /// Poses, matrices and momenta of a tree: scratch, sized once.
 #[derive(Clone, Debug)]
 pub struct TreeScratch {
@@ -50,9 +58,9 @@ pub struct TreeScratch {
     momenta_end: Vec<Momentum>,
     sums: Vec<Momentum>,
     c_start: Vec<Vector3<f64>>,
-    laws: Vec<JointLaw>,
-    drive_work: Vec<f64>,
-    drive_work_done: Vec<f64>,
+    motors: Vec<MotorBranch>,
+    drives_tried: Vec<DriveAction>,
+    drives: Vec<DriveAction>,
     energy: EnergyScratch,
     gyroscopic: GyroscopicScratch,
     force: Vec<f64>,
@@ -74,9 +82,9 @@ impl TreeScratch {
             momenta_end: momenta.clone(),
             sums: momenta,
             c_start: vec![Vector3::zeros(); model.bodies().len()],
-            laws: vec![JointLaw::default(); model.n_joints()],
-            drive_work: vec![0.0; model.n_joints()],
-            drive_work_done: vec![0.0; model.n_joints()],
+            motors: vec![MotorBranch::default(); model.n_joints()],
+            drives_tried: vec![DriveAction::default(); model.n_joints()],
+            drives: vec![DriveAction::default(); model.n_joints()],
             energy: EnergyScratch::new(model),
             gyroscopic: GyroscopicScratch::default(),
             force: vec![0.0; model.nv()],
@@ -84,9 +92,15 @@ impl TreeScratch {
         }
     }
 
-    /// Work of each joint's drive since it was last set to zero (n_joints), J.
-    pub fn drive_work(&mut self) -> &mut [f64] {
-        &mut self.drive_work_done
+    /// Forgets what the drives did: a step begins.
+    pub fn begin_step(&mut self) {
+        self.drives.fill(DriveAction::default());
+    }
+
+    /// What each joint's drive has done since [`Self::begin_step`] (n_joints), in all parts of a step that became the state.
+    #[must_use]
+    pub fn drives(&self) -> &[DriveAction] {
+        &self.drives
     }
 
     /// Delassus operator of the last step, row-major, 1/kg.
@@ -189,17 +203,20 @@ impl MechanicalSystem for TreeSystem<'_> {
         self.parts
             .mass_matrix
             .update(self.model, &self.parts.kinematics);
-        settle_laws(self.model, options, self.command, self.parts);
+        set_held_theta(self.model, options, self.command, self.parts);
     }
 
     #[inline]
-    fn factorise(&mut self, _options: &StepOptions) -> bool {
+    fn factorise(&mut self, options: &StepOptions) -> bool {
+        let (h, theta) = (options.time_step, options.theta);
         let parts = &mut *self.parts;
-        for (j, law) in parts.laws.iter().enumerate() {
-            if law.implicit > 0.0 {
+        for (j, (motor, held)) in parts.motors.iter().zip(&self.command.held).enumerate() {
+            let (damping, stiffness) = feedback(motor, held.as_ref());
+            if damping > 0.0 || stiffness > 0.0 {
+                let implicit = h * motor.theta() * (damping + h * theta * stiffness);
                 parts
                     .mass_matrix
-                    .add_to_diagonal(self.model, BASE + j, law.implicit);
+                    .add_to_diagonal(self.model, BASE + j, implicit);
             }
         }
         parts.mass_matrix.factorise(self.model, &mut parts.factor)
@@ -229,7 +246,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         for (y, f) in y.iter_mut().zip(&parts.force) {
             *y = -options.time_step * f;
         }
-        add_command(options, self.command, start, start.v, &parts.laws, y);
+        add_command(options, self.command, start, start.v, &parts.motors, y);
     }
 
     #[inline]
@@ -242,6 +259,10 @@ impl MechanicalSystem for TreeSystem<'_> {
     fn turning(&self, v: &[f64]) -> f64 {
         let base = (v[3] * v[3] + v[4] * v[4] + v[5] * v[5]).sqrt();
         base + fastest(self.model.turning_joints(), v)
+    }
+
+    fn conserves_momenta(&self) -> bool {
+        true
     }
 
     fn load_gyroscopic(
@@ -259,7 +280,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         for (y, f) in y.iter_mut().zip(&*gravity_impulse) {
             *y = options.time_step * f;
         }
-        add_command(options, self.command, start, start.v, &parts.laws, y);
+        add_command(options, self.command, start, start.v, &parts.motors, y);
         parts.gyroscopic.solve(
             model,
             &parts.kinematics,
@@ -272,26 +293,20 @@ impl MechanicalSystem for TreeSystem<'_> {
         parts.factor.half_solve(model, y);
     }
 
+    #[inline]
+    fn choose_branches(&mut self, start: Start<'_, Configuration>) {
+        let drives = self.parts.motors.iter_mut().zip(&self.command.drives);
+        for ((motor, drive), rate) in drives.zip(&start.v[BASE..]) {
+            motor.choose(drive.as_ref(), *rate);
+        }
+    }
+
     fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
-        let laws = self.command.drives.iter().zip(&mut self.parts.laws);
+        let drives = self.parts.motors.iter_mut().zip(&self.command.drives);
         let rates = start.v[BASE..].iter().zip(&v_end[BASE..]);
         let mut is_new = false;
-        for ((drive, law), (begin, end)) in laws.zip(rates) {
-            let regime = match drive {
-                None => MotorRegime::Constant(0.0),
-                Some(Drive {
-                    torque,
-                    motor: None,
-                }) => MotorRegime::Constant(*torque),
-                Some(Drive {
-                    torque,
-                    motor: Some(motor),
-                }) => motor.regime(*torque, begin + law.theta * (end - begin)),
-            };
-            if regime != law.motor {
-                is_new = true;
-                law.motor = regime;
-            }
+        for ((motor, drive), (begin, end)) in drives.zip(rates) {
+            is_new |= motor.revise(drive.as_ref(), *begin, *end);
         }
         is_new
     }
@@ -318,15 +333,29 @@ impl MechanicalSystem for TreeSystem<'_> {
         start: Start<'_, Configuration>,
         v_end: &[f64],
     ) -> f64 {
+        let h = options.time_step;
         let TreeScratch {
-            laws, drive_work, ..
+            motors,
+            drives_tried,
+            ..
         } = &mut *self.parts;
+        let drives = motors.iter().zip(&self.command.drives);
+        let rates = start.v[BASE..].iter().zip(&v_end[BASE..]);
+        let actuation = actuation(options, self.command, start, v_end, motors);
         let mut total = 0.0;
-        let actuation = actuation(options, self.command, start, v_end, laws);
-        for (work, torque) in drive_work.iter_mut().zip(actuation) {
-            let turned = options.time_step * torque.rate;
-            *work = torque.drive * turned;
-            total += (torque.drive + torque.other) * turned;
+        for (((tried, torque), (motor, drive)), (begin, end)) in
+            (drives_tried.iter_mut().zip(actuation))
+                .zip(drives)
+                .zip(rates)
+        {
+            let turned = h * torque.rate;
+            let work = motor.work(drive.as_ref(), *begin, *end, turned);
+            *tried = DriveAction {
+                impulse: torque.drive * h,
+                work,
+            };
+            // A damper never drives: where the rate changes its sign within the step, its torque at one time and the way at another may say so.
+            total += work + torque.other * turned + (torque.damper * turned).min(0.0);
         }
         total
     }
@@ -334,8 +363,9 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn accept(&mut self) {
         let parts = &mut *self.parts;
-        for (done, joules) in parts.drive_work_done.iter_mut().zip(&parts.drive_work) {
-            *done += joules;
+        for (done, tried) in parts.drives.iter_mut().zip(&parts.drives_tried) {
+            done.impulse += tried.impulse;
+            done.work += tried.work;
         }
     }
 
@@ -373,7 +403,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             self.parts,
             y,
         );
-        add_command(options, self.command, start, v_end, &self.parts.laws, y);
+        add_command(options, self.command, start, v_end, &self.parts.motors, y);
     }
 
     #[inline]
@@ -455,43 +485,28 @@ fn fastest(joints: &[usize], v: &[f64]) -> f64 {
     joints.iter().fold(0.0, |most, &k| most.max(v[k].abs()))
 }
 
-/// How a joint's torque answers to its motion in a step.
-#[derive(Clone, Copy, Debug)]
-struct JointLaw {
-    /// How implicit its PD and its motor's line are.
-    theta: f64,
-    /// What they add to the mass matrix, kg m².
-    implicit: f64,
-    /// Branch of its drive.
-    motor: MotorRegime,
-}
-
-impl Default for JointLaw {
-    fn default() -> Self {
-        Self {
-            theta: 0.5,
-            implicit: 0.0,
-            motor: MotorRegime::Constant(0.0),
-        }
+/// Damping (N m s/rad) and stiffness (N m/rad) with which a joint's torque answers to its motion.
+#[inline]
+fn feedback(motor: &MotorBranch, held: Option<&HeldJoint>) -> (f64, f64) {
+    let (mut damping, mut stiffness) = (motor.damping(), 0.0);
+    if let Some(held) = held {
+        damping += held.damping;
+        stiffness += held.stiffness;
     }
+    (damping, stiffness)
 }
 
-/// How implicit each joint's PD and motor are, at a new mass matrix.
-fn settle_laws(model: &Model, options: &StepOptions, command: &Command, parts: &mut TreeScratch) {
-    let (h, theta) = (options.time_step, options.theta);
-    for (j, (law, held)) in parts.laws.iter_mut().zip(&command.held).enumerate() {
-        // Damping and stiffness, N m s/rad and N m/rad.
-        let (mut damping, stiffness) = held.map_or((0.0, 0.0), |x| (x.damping, x.stiffness));
-        if let MotorRegime::Line { slope, .. } = law.motor {
-            damping += slope;
-        }
-        (law.theta, law.implicit) = (theta, 0.0);
-        if damping > 0.0 || stiffness > 0.0 {
-            let inertia = parts.mass_matrix.diagonal(model, BASE + j);
-            let z = h * (damping + 0.5 * h * stiffness) / inertia;
-            law.theta = fitted_theta(z).max(theta);
-            law.implicit = h * law.theta * (damping + h * theta * stiffness);
-        }
+/// How implicit each joint's PD and motor are.
+fn set_held_theta(
+    model: &Model,
+    options: &StepOptions,
+    command: &Command,
+    parts: &mut TreeScratch,
+) {
+    for (j, (motor, held)) in parts.motors.iter_mut().zip(&command.held).enumerate() {
+        let feedback = feedback(motor, held.as_ref());
+        let inertia = parts.mass_matrix.diagonal(model, BASE + j);
+        motor.set_theta((options.time_step, options.theta), feedback, inertia);
     }
 }
 
@@ -499,6 +514,8 @@ fn settle_laws(model: &Model, options: &StepOptions, command: &Command, parts: &
 struct Actuation {
     /// Of its drive.
     drive: f64,
+    /// Of the damper that holds it.
+    damper: f64,
     /// Of everything else.
     other: f64,
     rate: f64,
@@ -511,25 +528,25 @@ fn actuation<'a>(
     command: &'a Command,
     start: Start<'a, Configuration>,
     v_end: &'a [f64],
-    laws: &'a [JointLaw],
+    motors: &'a [MotorBranch],
 ) -> impl Iterator<Item = Actuation> + 'a {
     let (h, theta) = (options.time_step, options.theta);
     let motion = (start.configuration.joints.iter())
         .zip(&start.v[BASE..])
         .zip(&v_end[BASE..]);
-    let torques = command.torque.iter().zip(&command.held).zip(laws);
+    let torques = command.torque.iter().zip(&command.held).zip(motors);
     motion
         .zip(torques)
-        .map(move |(((angle, begin), end), ((torque, held), law))| {
+        .map(move |(((angle, &begin), &end), ((torque, held), motor))| {
             let rate = theta * end + (1.0 - theta) * begin;
-            let rate_implicit = begin + law.theta * (end - begin);
-            let mut other = *torque;
+            let (mut other, mut damper) = (*torque, 0.0);
             if let Some(held) = held {
-                other -= held.stiffness * (angle + h * law.theta * rate - held.set_point);
-                other -= held.damping * rate_implicit;
+                other -= held.stiffness * (angle + h * motor.theta() * rate - held.set_point);
+                damper = -held.damping * motor.rate(begin, end);
             }
             Actuation {
-                drive: law.motor.torque(rate_implicit),
+                drive: motor.torque(begin, end),
+                damper,
                 other,
                 rate,
             }
@@ -542,12 +559,12 @@ fn add_command(
     command: &Command,
     start: Start<'_, Configuration>,
     v_end: &[f64],
-    laws: &[JointLaw],
+    motors: &[MotorBranch],
     y: &mut [f64],
 ) {
-    let actuation = actuation(options, command, start, v_end, laws);
+    let actuation = actuation(options, command, start, v_end, motors);
     for (y, torque) in y[BASE..].iter_mut().zip(actuation) {
-        *y += options.time_step * (torque.other + torque.drive);
+        *y += options.time_step * (torque.other + torque.damper + torque.drive);
     }
 }
 

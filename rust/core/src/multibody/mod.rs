@@ -27,5 +27,5 @@ pub use mass_matrix::{FactoredMassMatrix, MassMatrix};
 pub(crate) use model::{BASE, fingerprint};
 pub use model::{Body, Frame, MAX_SOLIDS, Model, Wheel};
 pub use momentum::{Energy, EnergyScratch, Momentum};
-pub use motor::{Motor, MotorRegime};
+pub use motor::{DriveTrial, Motor, MotorRegime};
 pub use state::{Configuration, State};

@@ -893,16 +893,7 @@ fn check_wheels(
             });
         }
         if let Some(motor) = wheel.motor {
-            positive(&at("motor.stall_torque"), motor.stall_torque)?;
-            moderate(&at("motor.stall_torque"), motor.stall_torque)?;
-            positive(&at("motor.no_load_speed"), motor.no_load_speed)?;
-            if !(1e-6..=1e9).contains(&motor.no_load_speed) {
-                return Err(ModelError::OutOfRange {
-                    field: at("motor.no_load_speed"),
-                    range: "from 1e-6 to 1e9 rad/s",
-                    value: motor.no_load_speed,
-                });
-            }
+            motor.check(|field| at(&format!("motor.{field}")))?;
         }
         if let Some(name) = &wheel.steering {
             let steering = find("steering", name)?;

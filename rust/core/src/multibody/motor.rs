@@ -6,11 +6,13 @@
 //!
 //! Below the line the torque is the command. On it the torque falls linearly with the speed and reaches zero at the no-load speed ω₀, where
 //! the back-EMF equals the supply. A motor that regenerates brakes when it is driven faster, by the line and at most by the stall torque; one
-//! that does not turns freely, and brakes by command alone.
+//! that does not turns freely, and brakes by command alone. With an infinite ω₀ the torque is the command within ± stall, at any speed.
 //!
 //! Source: the permanent-magnet DC motor at its supply voltage, e.g. Siciliano et al. 2009, *Robotics*, ch. 5.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
+
+use super::error::ModelError;
 
 /// A torque–speed line.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -18,7 +20,8 @@ use serde::{Deserialize, Serialize};
 pub struct Motor {
     /// Torque of the line at rest, N m.
     pub stall_torque: f64,
-    /// ω₀, where the line reaches zero, rad/s.
+    /// ω₀, where the line reaches zero, rad/s; may be infinite (in JSON, which has no infinity: null).
+    #[serde(deserialize_with = "speed")]
     pub no_load_speed: f64,
     /// Whether it brakes when it is driven faster than ω₀.
     #[serde(default = "regenerates")]
@@ -28,6 +31,20 @@ pub struct Motor {
 fn regenerates() -> bool {
     true
 }
+
+fn speed<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    if deserializer.is_human_readable() {
+        let written = Option::<f64>::deserialize(deserializer)?;
+        return Ok(written.unwrap_or(f64::INFINITY));
+    }
+    f64::deserialize(deserializer)
+}
+
+/// Range of torques, N m.
+const TORQUES: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
+
+/// Range of finite no-load speeds, rad/s.
+const SPEEDS: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
 
 /// How the torque depends on the speed nearby.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,51 +61,143 @@ pub enum MotorRegime {
 }
 
 impl Motor {
+    /// Checks the ranges; `at` makes a field's full name.
+    ///
+    /// # Errors
+    /// The first number out of its range.
+    pub fn check(&self, at: impl Fn(&str) -> String) -> Result<(), ModelError> {
+        if !TORQUES.contains(&self.stall_torque) {
+            return Err(ModelError::OutOfRange {
+                field: at("stall_torque"),
+                range: "from 1e-9 to 1e9 N m",
+                value: self.stall_torque,
+            });
+        }
+        let speed = self.no_load_speed;
+        if !(SPEEDS.contains(&speed) || speed.is_infinite() && speed > 0.0) {
+            return Err(ModelError::OutOfRange {
+                field: at("no_load_speed"),
+                range: "from 1e-6 to 1e9 rad/s, or infinite",
+                value: speed,
+            });
+        }
+        Ok(())
+    }
+
     /// Slope of the line, N m s/rad.
     #[must_use]
     pub fn slope(&self) -> f64 {
         self.stall_torque / self.no_load_speed
     }
 
-    /// The branch that holds for a command (N m) at a rate (rad/s), both about the joint's axis.
+    /// The command (N m) as far as the motor has the torque for it.
     #[inline]
     #[must_use]
-    pub fn regime(&self, command: f64, rate: f64) -> MotorRegime {
-        let (stall, slope) = (self.stall_torque, self.slope());
-        let (upper, lower) = (stall - slope * rate, -stall - slope * rate);
-        // Beyond the no-load speed: how far the line is followed.
-        let end = |towards: f64| {
-            if self.regenerating {
-                stall
-            } else {
-                towards.max(0.0)
-            }
-        };
+    pub fn limited(&self, command: f64) -> f64 {
+        command.clamp(-self.stall_torque, self.stall_torque)
+    }
+
+    /// Number of the branch that holds for a command (N m) at a rate (rad/s), both about the joint's axis; they are in the order of the rate.
+    #[inline]
+    fn branch(&self, command: f64, rate: f64) -> usize {
+        let command = self.limited(command);
+        let drop = self.slope() * rate;
+        let (upper, lower) = (self.stall_torque - drop, -self.stall_torque - drop);
         if command > upper {
-            if upper < -end(-command) {
-                return MotorRegime::Constant(-end(-command));
-            }
-            return MotorRegime::Line {
-                at_rest: stall,
-                slope,
-            };
+            if upper < -self.end(-command) { 4 } else { 3 }
+        } else if command < lower {
+            if lower > self.end(command) { 0 } else { 1 }
+        } else {
+            2
         }
-        if command < lower {
-            if lower > end(command) {
-                return MotorRegime::Constant(end(command));
-            }
-            return MotorRegime::Line {
-                at_rest: -stall,
-                slope,
-            };
+    }
+
+    /// How far the line is followed beyond the no-load speed, N m.
+    fn end(&self, towards: f64) -> f64 {
+        if self.regenerating {
+            self.stall_torque
+        } else {
+            towards.max(0.0)
         }
-        MotorRegime::Constant(command.clamp(-stall, stall))
+    }
+
+    /// The torque of a branch.
+    #[inline]
+    fn on_branch(&self, branch: usize, command: f64) -> MotorRegime {
+        let command = self.limited(command);
+        let line = |at_rest| MotorRegime::Line {
+            at_rest,
+            slope: self.slope(),
+        };
+        match branch {
+            0 => MotorRegime::Constant(self.end(command)),
+            1 => line(-self.stall_torque),
+            2 => MotorRegime::Constant(command),
+            3 => line(self.stall_torque),
+            _ => MotorRegime::Constant(-self.end(-command)),
+        }
     }
 
     /// Torque for a command (N m) at a rate (rad/s), N m.
     #[must_use]
     pub fn torque(&self, command: f64, rate: f64) -> f64 {
-        self.regime(command, rate).torque(rate)
+        self.on_branch(self.branch(command, rate), command)
+            .torque(rate)
+    }
+}
+
+/// A drive in a step: the branch of its torque that is tried.
+///
+/// A step with one branch tells at which rate it ends, and so on which side of the branch the motor works. Going there one branch at a time
+/// ends after at most four steps for a wheel alone, since the torque falls with the rate; going at once to the branch of that rate may
+/// go to and fro for ever.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriveTrial {
+    branch: usize,
+    regime: MotorRegime,
+}
+
+impl Default for DriveTrial {
+    fn default() -> Self {
+        Self {
+            branch: 2,
+            regime: MotorRegime::Constant(0.0),
+        }
+    }
+}
+
+impl DriveTrial {
+    /// The branch that holds for a command (N m) at a rate (rad/s); without a motor the torque is the command.
+    #[inline]
+    #[must_use]
+    pub fn at(motor: Option<&Motor>, command: f64, rate: f64) -> Self {
+        let branch = motor.map_or(2, |motor| motor.branch(command, rate));
+        Self::on(motor, command, branch)
+    }
+
+    #[inline]
+    fn on(motor: Option<&Motor>, command: f64, branch: usize) -> Self {
+        let constant = MotorRegime::Constant(command);
+        let regime = motor.map_or(constant, |motor| motor.on_branch(branch, command));
+        Self { branch, regime }
+    }
+
+    /// Goes one branch towards that of a rate (rad/s); true where the torque is another now.
+    #[inline]
+    pub fn revise(&mut self, motor: Option<&Motor>, command: f64, rate: f64) -> bool {
+        let wanted = motor.map_or(2, |motor| motor.branch(command, rate));
+        let branch = wanted.clamp(self.branch.saturating_sub(1), self.branch + 1);
+        let revised = Self::on(motor, command, branch);
+        let is_new = revised.regime != self.regime;
+        *self = revised;
+        is_new
+    }
+
+    /// The torque.
+    #[inline]
+    #[must_use]
+    pub fn regime(&self) -> MotorRegime {
+        self.regime
     }
 }
 
@@ -123,8 +232,11 @@ mod tests {
             (0.0, 33.0, -30.0),     // regenerating
             (-150.0, 20.0, -150.0), // braking
             (150.0, 1e6, -300.0),   // never beyond the stall torque
+            (400.0, -3.0, 300.0),
             (-150.0, -20.0, -100.0),
             (0.0, -33.0, 30.0),
+            (350.0, -1.0, 300.0), // it has no more, also turning backward
+            (-350.0, 1.0, -300.0),
         ];
         for (command, rate, torque) in expected {
             let given = motor.torque(command, rate);
@@ -134,6 +246,33 @@ mod tests {
         assert!(motor.torque(150.0, 33.0).abs() < 1e-12);
         assert!(motor.torque(0.0, 33.0).abs() < 1e-12);
         assert!((motor.torque(-150.0, 33.0) + 150.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_hard_brake_finds_its_branch() {
+        // A free wheel of 0.15 kg m² that braking with all that the motor has would turn back four times as fast, in a step of 50 ms.
+        let motor = Motor {
+            stall_torque: 300.0,
+            no_load_speed: 0.5,
+            regenerating: true,
+        };
+        let (h, inertia, begin) = (0.05, 0.15, 20.0);
+        let mut drive = DriveTrial::at(Some(&motor), 0.0, begin);
+        let mut trials = 0;
+        loop {
+            let end = match drive.regime() {
+                MotorRegime::Constant(torque) => begin + h * torque / inertia,
+                MotorRegime::Line { at_rest, slope } => {
+                    (inertia * begin + h * at_rest) / (inertia + h * slope)
+                }
+            };
+            if !drive.revise(Some(&motor), 0.0, end) {
+                assert!((0.0..1.0).contains(&end), "{end}");
+                return;
+            }
+            trials += 1;
+            assert!(trials < 5);
+        }
     }
 
     #[test]

@@ -62,13 +62,13 @@ impl PlanarMachine<3> for Ball {
         _q: &SVector<f64, 3>,
         _v: &SVector<f64, 3>,
         gravity: &Vector2<f64>,
-        inputs: &[f64],
+        torques: &[f64],
     ) -> SVector<f64, 3> {
         SVector::from([
             self.mass * gravity.x,
             self.mass * gravity.y,
             // A positive torque drives forward.
-            -inputs[0],
+            -torques[0],
         ])
     }
 
@@ -78,6 +78,11 @@ impl PlanarMachine<3> for Ball {
 
     fn n_inputs(&self) -> usize {
         1
+    }
+
+    /// It looks alike from all sides.
+    fn turning(&self, _v: &SVector<f64, 3>) -> f64 {
+        0.0
     }
 
     fn n_discs(&self) -> usize {

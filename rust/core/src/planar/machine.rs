@@ -9,9 +9,11 @@ use serde::{Deserialize, Serialize};
 
 use super::ground::{ContactRule, Facing, Ground};
 use crate::contact::Activation;
+use crate::integrator::motor_branch::MotorBranch;
 use crate::integrator::{
-    MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
+    Drive, MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
 };
+use crate::multibody::Motor;
 use crate::problem::{Dimension, FrictionContactProblem};
 
 /// A disc of a machine in the world.
@@ -23,6 +25,27 @@ pub struct Disc {
     pub radius: f64,
 }
 
+/// The motors behind a torque: alike, and with one angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlanarMotor {
+    /// Torque–speed line of each.
+    pub motor: Motor,
+    /// The coordinate that they turn, relative to what carries them.
+    pub coordinate: usize,
+    /// Torque about that coordinate of a unit forward: their number and their sign.
+    pub gain: f64,
+}
+
+impl PlanarMotor {
+    /// One of them under a command, N m.
+    fn drive(&self, torque: f64) -> Drive {
+        Drive {
+            torque,
+            motor: Some(self.motor),
+        }
+    }
+}
+
 /// A machine with `NV` coordinates whose velocities are their rates.
 ///
 /// The first two coordinates are a place in the world, m; the others angles, rad, positive to the left.
@@ -30,13 +53,14 @@ pub trait PlanarMachine<const NV: usize>: std::fmt::Debug + Send + Sync {
     /// `M(q)`, kg, kg m, kg m².
     fn mass_matrix(&self, q: &SVector<f64, NV>) -> SMatrix<f64, NV, NV>;
 
-    /// `F(q, v)`, N and N m: gravity (m/s²), torques (`inputs`, N m) and what is quadratic in v, so that `M v̇ = F` without contacts.
+    /// `F(q, v)`, N and N m: gravity (m/s²), torques (`torques`, N m, positive forward) and what is quadratic in v, so that `M v̇ = F` without
+    /// contacts.
     fn force(
         &self,
         q: &SVector<f64, NV>,
         v: &SVector<f64, NV>,
         gravity: &Vector2<f64>,
-        inputs: &[f64],
+        torques: &[f64],
     ) -> SVector<f64, NV>;
 
     /// Potential energy `−Σ m g · x`, J.
@@ -44,6 +68,19 @@ pub trait PlanarMachine<const NV: usize>: std::fmt::Debug + Send + Sync {
 
     /// Number of torques that can be set.
     fn n_inputs(&self) -> usize;
+
+    /// Largest torque i, either way, N m. By default there is no limit.
+    fn torque_limit(&self, _i: usize) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Motors behind torque i; by default none, and the torque is the command at any speed.
+    fn motor(&self, _i: usize) -> Option<PlanarMotor> {
+        None
+    }
+
+    /// Fastest turning of a frame whose pose matters, rad/s.
+    fn turning(&self, v: &SVector<f64, NV>) -> f64;
 
     /// Number of discs.
     fn n_discs(&self) -> usize;
@@ -139,6 +176,9 @@ pub struct PlanarScratch<const NV: usize> {
     Z: Vec<SMatrix<f64, NV, 2>>,
     W: Vec<f64>,
     facing: Vec<Facing>,
+    /// Of each input.
+    motors: Vec<MotorBranch>,
+    torques: Vec<f64>,
 }
 
 impl<const NV: usize> Default for PlanarScratch<NV> {
@@ -152,6 +192,8 @@ impl<const NV: usize> Default for PlanarScratch<NV> {
             Z: Vec::new(),
             W: Vec::new(),
             facing: Vec::new(),
+            motors: Vec::new(),
+            torques: Vec::new(),
         }
     }
 }
@@ -164,7 +206,7 @@ impl<const NV: usize> PlanarScratch<NV> {
     }
 }
 
-/// A machine on a ground, driven by torques.
+/// A machine on a ground, driven by torques. Motors at their torque–speed line are implicit as in the rover's tree.
 #[derive(Debug)]
 pub struct PlanarSystem<'a, const NV: usize, M> {
     /// The machine.
@@ -173,7 +215,7 @@ pub struct PlanarSystem<'a, const NV: usize, M> {
     pub ground: &'a dyn Ground,
     /// How discs meet it.
     pub rule: ContactRule,
-    /// Torques, N m.
+    /// Commanded torques, N m, positive forward.
     pub inputs: &'a [f64],
     /// Its scratch.
     pub parts: &'a mut PlanarScratch<NV>,
@@ -185,6 +227,45 @@ fn facing(ground: &dyn Ground, rule: ContactRule, disc: &Disc, reach: f64, out: 
     match rule {
         ContactRule::Nearest => ground.facing(&disc.centre, disc.radius + reach, out),
         ContactRule::CentreHeight => out.push(ground.below(&disc.centre)),
+    }
+}
+
+/// Rates before and after a step with which the motors of input i turn, forward, rad/s.
+fn motor_rates(motor: &PlanarMotor, begin: &[f64], end: &[f64]) -> (f64, f64) {
+    let (k, sign) = (motor.coordinate, motor.gain.signum());
+    (sign * begin[k], sign * end[k])
+}
+
+impl<const NV: usize, M: PlanarMachine<NV>> PlanarSystem<'_, NV, M> {
+    /// Mean torques of a step that ends with the iterate `v_end`, into `parts.torques`.
+    fn set_torques(&mut self, start: &[f64], v_end: &[f64]) {
+        let parts = &mut *self.parts;
+        parts.torques.clear();
+        parts.torques.extend_from_slice(self.inputs);
+        for (i, (torque, branch)) in parts.torques.iter_mut().zip(&parts.motors).enumerate() {
+            if let Some(motor) = self.machine.motor(i) {
+                let (begin, end) = motor_rates(&motor, start, v_end);
+                *torque = branch.torque(begin, end);
+            }
+        }
+    }
+
+    /// `y = h F(q_m, v_mean)` with the torques of a step that ends with the iterate `v_end`.
+    fn impulse(
+        &mut self,
+        options: &StepOptions,
+        (start, v_end): (&[f64], &[f64]),
+        v_mean: &[f64],
+        y: &mut [f64],
+    ) {
+        self.set_torques(start, v_end);
+        let parts = &*self.parts;
+        let v = SVector::<f64, NV>::from_column_slice(v_mean);
+        let gravity = options.gravity.xy();
+        let force = self
+            .machine
+            .force(&parts.middle, &v, &gravity, &parts.torques);
+        y.copy_from_slice((force * options.time_step).as_slice());
     }
 }
 
@@ -279,11 +360,28 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
         }
     }
 
-    fn update_mass_matrix(&mut self, _options: &StepOptions) {
-        self.parts.mass = self.machine.mass_matrix(&self.parts.middle);
+    fn update_mass_matrix(&mut self, options: &StepOptions) {
+        let parts = &mut *self.parts;
+        parts.mass = self.machine.mass_matrix(&parts.middle);
+        let step = (options.time_step, options.theta);
+        for (i, branch) in parts.motors.iter_mut().enumerate() {
+            if let Some(motor) = self.machine.motor(i) {
+                let k = motor.coordinate;
+                let inertia = parts.mass[(k, k)] / motor.gain.abs();
+                branch.set_theta(step, (branch.damping(), 0.0), inertia);
+            }
+        }
     }
 
-    fn factorise(&mut self, _options: &StepOptions) -> bool {
+    fn factorise(&mut self, options: &StepOptions) -> bool {
+        let parts = &mut *self.parts;
+        for (i, branch) in parts.motors.iter().enumerate() {
+            if let Some(motor) = self.machine.motor(i) {
+                let damping = motor.gain.abs() * branch.damping();
+                let k = motor.coordinate;
+                parts.mass[(k, k)] += options.time_step * branch.theta() * damping;
+            }
+        }
         match Cholesky::new(self.parts.mass) {
             Some(factor) => {
                 self.parts.L = factor.l();
@@ -301,16 +399,52 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
     fn load(
         &mut self,
         options: &StepOptions,
-        _start: Start<'_, SVector<f64, NV>>,
+        start: Start<'_, SVector<f64, NV>>,
         v_mean: &[f64],
         y: &mut [f64],
     ) {
-        let v = SVector::<f64, NV>::from_column_slice(v_mean);
-        let gravity = options.gravity.xy();
-        let force = self
-            .machine
-            .force(&self.parts.middle, &v, &gravity, self.inputs);
-        y.copy_from_slice((force * options.time_step).as_slice());
+        self.impulse(options, (start.v, start.v), v_mean, y);
+    }
+
+    fn choose_branches(&mut self, start: Start<'_, SVector<f64, NV>>) {
+        let parts = &mut *self.parts;
+        parts
+            .motors
+            .resize(self.inputs.len(), MotorBranch::default());
+        for (i, (branch, torque)) in parts.motors.iter_mut().zip(self.inputs).enumerate() {
+            if let Some(motor) = self.machine.motor(i) {
+                let (rate, _) = motor_rates(&motor, start.v, start.v);
+                branch.choose(Some(&motor.drive(*torque)), rate);
+            }
+        }
+    }
+
+    fn revise(&mut self, start: Start<'_, SVector<f64, NV>>, v_end: &[f64]) -> bool {
+        let parts = &mut *self.parts;
+        let mut is_new = false;
+        for (i, (branch, torque)) in parts.motors.iter_mut().zip(self.inputs).enumerate() {
+            if let Some(motor) = self.machine.motor(i) {
+                let (begin, end) = motor_rates(&motor, start.v, v_end);
+                let drive = motor.drive(*torque);
+                is_new |= branch.revise(Some(&drive), begin, end);
+            }
+        }
+        is_new
+    }
+
+    fn turning(&self, v: &[f64]) -> f64 {
+        self.machine.turning(&SVector::from_column_slice(v))
+    }
+
+    fn load_at_end(
+        &mut self,
+        options: &StepOptions,
+        start: Start<'_, SVector<f64, NV>>,
+        v_end: &[f64],
+        v_mean: &[f64],
+        y: &mut [f64],
+    ) {
+        self.impulse(options, (start.v, v_end), v_mean, y);
     }
 
     fn energy(
@@ -337,19 +471,27 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
         start: Start<'_, SVector<f64, NV>>,
         v_end: &[f64],
     ) -> f64 {
-        if self.inputs.iter().all(|torque| *torque == 0.0) {
-            return 0.0;
-        }
         let (still, none) = (SVector::zeros(), Vector2::zeros());
+        self.set_torques(start.v, v_end);
+        let parts = &*self.parts;
         let torques = self
             .machine
-            .force(&self.parts.middle, &still, &none, self.inputs);
-        let mean = start
-            .v
-            .iter()
-            .zip(v_end)
-            .map(|(begin, end)| options.theta * end + (1.0 - options.theta) * begin);
-        options.time_step * torques.iter().zip(mean).map(|(f, v)| f * v).sum::<f64>()
+            .force(&parts.middle, &still, &none, &parts.torques);
+        let (h, theta) = (options.time_step, options.theta);
+        let mean = |k: usize| theta * v_end[k] + (1.0 - theta) * start.v[k];
+        let power: f64 = torques.iter().enumerate().map(|(k, f)| f * mean(k)).sum();
+        let mut work = h * power;
+        for (i, branch) in parts.motors.iter().enumerate() {
+            if let Some(motor) = self.machine.motor(i) {
+                let (begin, end) = motor_rates(&motor, start.v, v_end);
+                let turned = h * motor.gain.signum() * mean(motor.coordinate);
+                let drive = motor.drive(self.inputs[i]);
+                let surplus =
+                    parts.torques[i] * turned - branch.work(Some(&drive), begin, end, turned);
+                work -= motor.gain.abs() * surplus;
+            }
+        }
+        work
     }
 
     fn half_solve(&self, y: &mut [f64]) {

@@ -17,8 +17,8 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 use super::error::PlanarError;
-use super::machine::{Disc, PlanarMachine};
-use crate::multibody::{Body, JointAxis, Model};
+use super::machine::{Disc, PlanarMachine, PlanarMotor};
+use crate::multibody::{Body, JointAxis, Model, Motor};
 
 /// Relative difference up to which two sides count as mirror images.
 const ALIKE: f64 = 1e-9;
@@ -55,6 +55,8 @@ struct WheelPair {
     torque_limit: f64,
     /// Joint torque of a unit of command: the number of wheels and their sign; 0 where the joint is locked.
     gain: f64,
+    /// Torque–speed line of each wheel's motor.
+    motor: Option<Motor>,
 }
 
 /// The planar image of a mirrored rover, with `NV` coordinates: 3 of the base, one for each pair of joints.
@@ -270,6 +272,7 @@ fn pair_wheels(model: &Model, parts: &[Part]) -> Result<Vec<WheelPair>, PlanarEr
             if differs(pair.radius, wheel.radius)
                 || differs(pair.torque_limit, wheel.torque_limit)
                 || differs(*sign, gain)
+                || pair.motor != wheel.motor
             {
                 return Err(refused());
             }
@@ -283,6 +286,7 @@ fn pair_wheels(model: &Model, parts: &[Part]) -> Result<Vec<WheelPair>, PlanarEr
                 radius: wheel.radius,
                 torque_limit: wheel.torque_limit,
                 gain,
+                motor: wheel.motor,
             };
             pairs.push((pair, gain));
         }
@@ -324,7 +328,7 @@ impl<const NV: usize> PlanarMachine<NV> for MirroredRover<NV> {
         q: &SVector<f64, NV>,
         v: &SVector<f64, NV>,
         gravity: &Vector2<f64>,
-        inputs: &[f64],
+        torques: &[f64],
     ) -> SVector<f64, NV> {
         let placed = self.place(q);
         let mut omega = [0.0; NV];
@@ -344,8 +348,7 @@ impl<const NV: usize> PlanarMachine<NV> for MirroredRover<NV> {
             F[1] += f.y;
             self.for_path(b, |i| F[2 + i] += left(&(c - placed.origin[i])).dot(&f));
         }
-        for (wheel, input) in self.wheels.iter().zip(inputs) {
-            let torque = input.clamp(-wheel.torque_limit, wheel.torque_limit);
+        for (wheel, torque) in self.wheels.iter().zip(torques) {
             F[2 + wheel.part] += wheel.gain * torque;
         }
         F
@@ -360,6 +363,26 @@ impl<const NV: usize> PlanarMachine<NV> for MirroredRover<NV> {
 
     fn n_inputs(&self) -> usize {
         self.wheels.len()
+    }
+
+    fn torque_limit(&self, i: usize) -> f64 {
+        self.wheels[i].torque_limit
+    }
+
+    fn motor(&self, i: usize) -> Option<PlanarMotor> {
+        let wheel = &self.wheels[i];
+        let motor = wheel.motor.filter(|_| wheel.gain != 0.0)?;
+        Some(PlanarMotor {
+            motor,
+            coordinate: 2 + wheel.part,
+            gain: wheel.gain,
+        })
+    }
+
+    fn turning(&self, v: &SVector<f64, NV>) -> f64 {
+        let turns = self.parts.iter().enumerate().skip(1);
+        let joints = turns.filter(|(_, part)| !part.is_spinner);
+        v[2].abs() + joints.fold(0.0_f64, |most, (b, _)| most.max(v[2 + b].abs()))
     }
 
     fn n_discs(&self) -> usize {

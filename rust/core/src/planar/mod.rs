@@ -25,7 +25,8 @@ pub use curve::{Curve, Line, Sine, Spline};
 pub use error::PlanarError;
 pub use ground::{ContactRule, Facing, Ground, MAX_FACING};
 pub use machine::{
-    Disc, PlanarContact, PlanarKey, PlanarMachine, PlanarScratch, PlanarSystem, contact_rows,
+    Disc, PlanarContact, PlanarKey, PlanarMachine, PlanarMotor, PlanarScratch, PlanarSystem,
+    contact_rows,
 };
 pub use mirrored_rover::MirroredRover;
 pub use polyline::Polyline;

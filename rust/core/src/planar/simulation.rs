@@ -173,13 +173,16 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSimulation<NV, M> {
         Ok(())
     }
 
-    /// Sets the torques, N m, positive forward.
+    /// Sets the torques, N m, positive forward; each saturates at its limit ([`PlanarMachine::torque_limit`]).
     ///
     /// # Errors
     /// Wrong length or an entry that is not finite; nothing is changed then.
     pub fn set_inputs(&mut self, inputs: &[f64]) -> Result<(), CommandError> {
         check_command("torques", inputs, self.machine.n_inputs())?;
-        self.inputs.copy_from_slice(inputs);
+        for (i, (own, input)) in self.inputs.iter_mut().zip(inputs).enumerate() {
+            let limit = self.machine.torque_limit(i);
+            *own = input.clamp(-limit, limit);
+        }
         Ok(())
     }
 

@@ -149,16 +149,16 @@ impl PlanarMachine<5> for TwoWheelRover {
         q: &SVector<f64, 5>,
         v: &SVector<f64, 5>,
         gravity: &Vector2<f64>,
-        inputs: &[f64],
+        torques: &[f64],
     ) -> SVector<f64, 5> {
         let s = self.moment(q);
         let linear = gravity * self.total_mass() + s * (v[2] * v[2]);
         SVector::from([
             linear.x,
             linear.y,
-            s.perp(gravity) + inputs[0] + inputs[1],
-            -inputs[0],
-            -inputs[1],
+            s.perp(gravity) + torques[0] + torques[1],
+            -torques[0],
+            -torques[1],
         ])
     }
 
@@ -168,6 +168,10 @@ impl PlanarMachine<5> for TwoWheelRover {
 
     fn n_inputs(&self) -> usize {
         2
+    }
+
+    fn turning(&self, v: &SVector<f64, 5>) -> f64 {
+        v[2].abs()
     }
 
     fn n_discs(&self) -> usize {

@@ -29,6 +29,8 @@ pub struct Simulation {
     command: Command,
     wheel_torque: Vec<f64>,
     joint_torque: Vec<f64>,
+    motor_torque: Vec<f64>,
+    drive_work: Vec<f64>,
     warm_start: WarmStart,
     workspace: Workspace,
     active: Vec<ActiveContact>,
@@ -78,6 +80,8 @@ impl Simulation {
             state: State::zero(&model),
             wheel_torque: vec![0.0; model.wheels().len()],
             joint_torque: vec![0.0; model.n_joints()],
+            motor_torque: vec![0.0; model.wheels().len()],
+            drive_work: vec![0.0; model.n_joints()],
             warm_start: WarmStart::with_capacity(contact_capacity(&model), model.nv()),
             workspace: Workspace::new(&model),
             active: Vec::with_capacity(contact_capacity(&model)),
@@ -153,13 +157,22 @@ impl Simulation {
         };
         self.warm_start.clear();
         self.active.clear();
+        self.motor_torque.fill(0.0);
         self.last_call = LastCall::default();
     }
 
-    /// Driving torque of each wheel, positive forward, as it acts (N m).
+    /// Commanded driving torque of each wheel, positive forward, within its limit (N m).
     #[must_use]
     pub fn wheel_torques(&self) -> &[f64] {
         &self.wheel_torque
+    }
+
+    /// Mean torque that the drive of each wheel gave in the last step, positive forward (N m): the command, within the motor's line.
+    ///
+    /// Zero before any step and where the wheel is locked.
+    #[must_use]
+    pub fn motor_torques(&self) -> &[f64] {
+        &self.motor_torque
     }
 
     /// Sets the driving torques (N m, positive forward); each saturates at its wheel's limit.
@@ -374,12 +387,11 @@ impl Simulation {
         n: usize,
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<StepReport, StepError> {
-        self.workspace.tree.drive_work().fill(0.0);
+        self.drive_work.fill(0.0);
         let result = self.step_probed(n, go_on, &mut NoProbe);
         // A joint's work over the call counts as driving or as braking.
-        let joints = self.workspace.tree.drive_work();
-        let work = joints.iter().map(|joules| joules.abs()).sum();
-        let positive_work = joints.iter().map(|joules| joules.max(0.0)).sum();
+        let work = self.drive_work.iter().map(|joules| joules.abs()).sum();
+        let positive_work = (self.drive_work.iter().map(|joules| joules.max(0.0))).sum();
         self.last_call = LastCall {
             report: result.clone().unwrap_or_default(),
             work,
@@ -402,6 +414,7 @@ impl Simulation {
     ) -> Result<StepReport, StepError> {
         let mut total = StepReport::default();
         for _ in 0..n {
+            self.workspace.tree.begin_step();
             let mut system = TreeSystem {
                 model: &self.model,
                 terrain: &*self.terrain,
@@ -423,11 +436,24 @@ impl Simulation {
             )?;
             total.merge(&report);
             self.workspace.list_active(&mut self.active);
+            self.book_drives();
             if !go_on() {
                 break;
             }
         }
         Ok(total)
+    }
+
+    /// Torques and work of the drives in the step that has just become the state.
+    fn book_drives(&mut self) {
+        let drives = self.workspace.tree.drives();
+        for (work, drive) in self.drive_work.iter_mut().zip(drives) {
+            *work += drive.work;
+        }
+        for (torque, wheel) in self.motor_torque.iter_mut().zip(self.model.wheels()) {
+            let impulse = wheel.joint.map_or(0.0, |k| drives[k - 6].impulse);
+            *torque = wheel.drive_sign * impulse / self.options.time_step;
+        }
     }
 
     /// Takes `n` steps of a copy and says where their time went; `go_on` as for [`Self::step_while`].
@@ -542,6 +568,7 @@ impl Simulation {
             command: self.command.clone(),
             wheel_torque: self.wheel_torque.clone(),
             joint_torque: self.joint_torque.clone(),
+            motor_torque: self.motor_torque.clone(),
             warm_start: self.warm_start.clone(),
             active: self.active.clone(),
         }
@@ -572,12 +599,15 @@ impl Simulation {
             .torque
             .iter()
             .chain(&snapshot.wheel_torque)
-            .chain(&snapshot.joint_torque);
+            .chain(&snapshot.joint_torque)
+            .chain(&snapshot.motor_torque);
         let attitude = snapshot.state.configuration.attitude.norm_squared();
         let is_sound = snapshot.state.is_finite()
             && (attitude - 1.0).abs() <= UNIT
             && snapshot.state.configuration.joints.len() == expected
-            && snapshot.wheel_torque.len() == self.model.wheels().len()
+            && [&snapshot.wheel_torque, &snapshot.motor_torque]
+                .iter()
+                .all(|t| t.len() == self.model.wheels().len())
             && snapshot.state.v.len() == self.model.nv()
             && [&command.torque, &snapshot.joint_torque]
                 .iter()
@@ -605,6 +635,7 @@ impl Simulation {
         self.command.clone_from(&snapshot.command);
         self.wheel_torque.clone_from(&snapshot.wheel_torque);
         self.joint_torque.clone_from(&snapshot.joint_torque);
+        self.motor_torque.clone_from(&snapshot.motor_torque);
         self.warm_start.clone_from(&snapshot.warm_start);
         self.active.clone_from(&snapshot.active);
         self.last_call = LastCall::default();

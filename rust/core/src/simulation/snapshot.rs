@@ -18,6 +18,8 @@ pub struct Snapshot {
     pub wheel_torque: Vec<f64>,
     /// Torque about each joint's axis that comes on top, N m.
     pub joint_torque: Vec<f64>,
+    /// Mean torque of each wheel's drive in the last step, positive forward, N m.
+    pub motor_torque: Vec<f64>,
     /// Where the next solve starts.
     pub warm_start: WarmStart,
     /// Contacts of the last step.

@@ -59,7 +59,7 @@ impl PlanarMachine<5> for WheelRig {
         _q: &SVector<f64, 5>,
         _v: &SVector<f64, 5>,
         gravity: &Vector2<f64>,
-        _inputs: &[f64],
+        _torques: &[f64],
     ) -> SVector<f64, 5> {
         SVector::from([0.0, self.mass * gravity.y, 0.0, 0.0, 0.0])
     }
@@ -70,6 +70,10 @@ impl PlanarMachine<5> for WheelRig {
 
     fn n_inputs(&self) -> usize {
         0
+    }
+
+    fn turning(&self, _v: &SVector<f64, 5>) -> f64 {
+        0.0
     }
 
     fn n_discs(&self) -> usize {

@@ -271,6 +271,8 @@ impl SoilSystem<'_> {
     }
 }
 
+/// Its energy is not audited: frames stay where the step begins and disks have no gyroscopic terms, so that a step with θ ≥ ½ is passive by
+/// construction.
 impl MechanicalSystem for SoilSystem<'_> {
     /// (x, y, θ) of each disk, then the machine's coordinates, m and rad.
     type Configuration = Vec<f64>;
@@ -660,6 +662,11 @@ impl MechanicalSystem for SoilSystem<'_> {
         } else {
             gap / h + rebound.max(0.0)
         }
+    }
+
+    /// Its sweeps end at a loose tolerance, and a pile that bounces needs many.
+    fn solves_to_the_end(&self) -> bool {
+        false
     }
 
     fn solve(
