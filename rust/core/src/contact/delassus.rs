@@ -4,7 +4,7 @@
 //! path, so a block of W is a dot product over the path that two bodies share: never a dense product.
 
 use super::contact_point::Contact;
-use crate::multibody::{FactoredMassMatrix, Kinematics, Model};
+use crate::multibody::{BASE, FactoredMassMatrix, Kinematics, Model};
 
 /// One row of Z at one velocity: the columns n, t, b of a contact, padded so that two pairs of lanes carry it.
 type Columns = [f64; 4];
@@ -78,11 +78,13 @@ impl ContactSystem {
                         }
                     }
                 }
-                for (i, sums) in block.iter().enumerate() {
-                    for (j, &value) in sums[..3].iter().enumerate() {
-                        self.W[(3 * c + i) * size + 3 * d + j] = value;
-                        self.W[(3 * d + j) * size + 3 * c + i] = value;
-                    }
+                for i in 0..3 {
+                    let row = &mut self.W[(3 * c + i) * size + 3 * d..][..3];
+                    row.copy_from_slice(&block[i][..3]);
+                }
+                for j in 0..3 {
+                    let row = &mut self.W[(3 * d + j) * size + 3 * c..][..3];
+                    row.copy_from_slice(&[block[0][j], block[1][j], block[2][j]]);
                 }
             }
         }
@@ -118,8 +120,14 @@ impl ContactSystem {
     pub fn add_impulses(&self, model: &Model, p: &[f64], y: &mut [f64]) {
         for (c, p) in p.chunks_exact(3).enumerate() {
             let path = model.path(self.bodies[c]);
-            for (z, &k) in self.Z[c * self.stride..].iter().zip(path) {
-                y[k] += z[0] * p[0] + z[1] * p[1] + z[2] * p[2];
+            let Z = &self.Z[c * self.stride..][..path.len()];
+            let product = |z: &Columns| z[0] * p[0] + z[1] * p[1] + z[2] * p[2];
+            let (base, joints) = y.split_at_mut(BASE);
+            for (y, z) in base.iter_mut().zip(&Z[..BASE]) {
+                *y += product(z);
+            }
+            for (z, &k) in Z[BASE..].iter().zip(&path[BASE..]) {
+                joints[k - BASE] += product(z);
             }
         }
     }
@@ -150,10 +158,16 @@ fn jacobian_columns(
 #[inline]
 fn path_product(path: &[usize], rows: &[Columns], v: &[f64]) -> Columns {
     let mut sums = [0.0; 4];
-    for (row, &k) in rows.iter().zip(path) {
+    let mut add = |row: &Columns, v: f64| {
         for (sum, value) in sums.iter_mut().zip(row) {
-            *sum += value * v[k];
+            *sum += value * v;
         }
+    };
+    for (row, &v) in rows[..BASE].iter().zip(&v[..BASE]) {
+        add(row, v);
+    }
+    for (row, &k) in rows[BASE..].iter().zip(&path[BASE..]) {
+        add(row, v[k]);
     }
     sums
 }

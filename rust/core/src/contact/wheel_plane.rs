@@ -49,16 +49,12 @@ pub fn rim_points(
     reach: f64,
     mut visit: impl FnMut(&RimPoint),
 ) {
-    let height = plane.distance(base) + plane.normal().dot(&wheel.centre);
-    if height - wheel.radius > reach {
-        return;
-    }
+    let rim = Rim::of(wheel, plane, base);
     for feature in 0..3 {
-        let point = rim_point(wheel, plane, base, feature);
-        if point.gap > reach {
+        if rim.gap(feature) > reach {
             return;
         }
-        visit(&point);
+        visit(&rim.point(feature));
     }
 }
 
@@ -71,29 +67,61 @@ pub fn rim_point(
     base: &Vector3<f64>,
     feature: usize,
 ) -> RimPoint {
-    let (n, s) = (plane.normal(), &wheel.axle);
-    let height = plane.distance(base) + n.dot(&wheel.centre);
-    let w = n - s * n.dot(s);
-    let length = w.norm();
-    let down = if length > 1e-9 {
-        w / -length
-    } else {
-        wheel.spoke
-    };
-    let frame = ContactFrame::of_wheel(n, s, &wheel.spoke);
-    let (direction, share) = match feature {
-        0 => (down, 1.0),
-        k => {
-            let side = s.cross(&down) * 0.75_f64.sqrt();
-            (down * -0.5 + if k == 1 { side } else { -side }, -0.5)
+    Rim::of(wheel, plane, base).point(feature)
+}
+
+/// A wheel over a plane: what its rim points share.
+struct Rim<'a> {
+    wheel: &'a PlacedWheel,
+    normal: &'a Vector3<f64>,
+    /// Of the centre, m.
+    height: f64,
+    w: Vector3<f64>,
+    /// `|w|`.
+    length: f64,
+}
+
+impl<'a> Rim<'a> {
+    #[inline]
+    fn of(wheel: &'a PlacedWheel, plane: &'a Plane, base: &Vector3<f64>) -> Self {
+        let (n, s) = (plane.normal(), &wheel.axle);
+        let w = n - s * n.dot(s);
+        Self {
+            wheel,
+            normal: n,
+            height: plane.distance(base) + n.dot(&wheel.centre),
+            w,
+            length: w.norm(),
         }
-    };
-    let gap = height - share * wheel.radius * length;
-    RimPoint {
-        feature,
-        point: wheel.centre + direction * wheel.radius,
-        frame,
-        gap,
+    }
+
+    /// Of a point, m.
+    #[inline]
+    fn gap(&self, feature: usize) -> f64 {
+        let share = if feature == 0 { 1.0 } else { -0.5 };
+        self.height - share * self.wheel.radius * self.length
+    }
+
+    #[inline]
+    fn point(&self, feature: usize) -> RimPoint {
+        let wheel = self.wheel;
+        let down = if self.length > 1e-9 {
+            self.w / -self.length
+        } else {
+            wheel.spoke
+        };
+        let side = || wheel.axle.cross(&down) * 0.75_f64.sqrt();
+        let direction = match feature {
+            0 => down,
+            1 => down * -0.5 + side(),
+            _ => down * -0.5 - side(),
+        };
+        RimPoint {
+            feature,
+            point: wheel.centre + direction * wheel.radius,
+            frame: ContactFrame::of_wheel(self.normal, &wheel.axle, &wheel.spoke),
+            gap: self.gap(feature),
+        }
     }
 }
 

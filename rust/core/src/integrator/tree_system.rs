@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use super::command::Command;
+use super::command::{Command, HeldJoint};
 use super::energy_audit::MechanicalEnergy;
 use super::gyroscopic::{GyroscopicScratch, gravity_load};
 use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
@@ -19,7 +19,7 @@ use crate::geometry::Terrain;
 use crate::multibody::bias::{BiasScratch, bias};
 use crate::multibody::momentum::{body_momenta, energy_and_momentum};
 use crate::multibody::{
-    Configuration, EnergyScratch, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum,
+    BASE, Configuration, EnergyScratch, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum,
 };
 use crate::problem::{Dimension, FrictionContactProblem};
 
@@ -171,13 +171,7 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn detect(&mut self, v: &[f64], mut activation: Activation, out: &mut Vec<Contact>) {
-        let reach: f64 = self
-            .model
-            .bodies()
-            .iter()
-            .map(|b| b.position.norm())
-            .sum::<f64>()
-            + 1.0;
+        let reach = self.model.reach() + 1.0;
         let linear = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
         let turning: f64 = v[3..].iter().map(|w| w.abs()).sum();
         activation.margin = activation.lead.abs() * (linear + turning * reach);
@@ -216,14 +210,13 @@ impl MechanicalSystem for TreeSystem<'_> {
     fn factorise(&mut self, options: &StepOptions) -> bool {
         let (h, theta) = (options.time_step, options.theta);
         let parts = &mut *self.parts;
-        for j in 0..self.model.n_joints() {
-            let (damping, stiffness) = feedback(self.command, &parts.motors, j);
+        for (j, (motor, held)) in parts.motors.iter().zip(&self.command.held).enumerate() {
+            let (damping, stiffness) = feedback(motor, held.as_ref());
             if damping > 0.0 || stiffness > 0.0 {
-                let theta_j = parts.motors[j].theta();
-                let implicit = h * theta_j * (damping + h * theta * stiffness);
+                let implicit = h * motor.theta() * (damping + h * theta * stiffness);
                 parts
                     .mass_matrix
-                    .add_to_diagonal(self.model, 6 + j, implicit);
+                    .add_to_diagonal(self.model, BASE + j, implicit);
             }
         }
         parts.mass_matrix.factorise(self.model, &mut parts.factor)
@@ -253,24 +246,19 @@ impl MechanicalSystem for TreeSystem<'_> {
         for (y, f) in y.iter_mut().zip(&parts.force) {
             *y = -options.time_step * f;
         }
-        add_command(options, self.command, start, start.v, parts, y);
+        add_command(options, self.command, start, start.v, &parts.motors, y);
     }
 
     #[inline]
     fn is_gyroscopic(&self, options: &StepOptions, v: &[f64]) -> bool {
-        let spin = (self.model.bodies().iter().zip(&v[5..]))
-            .filter(|(body, _)| body.is_spinner)
-            .fold(0.0_f64, |most, (_, rate)| most.max(rate.abs()));
+        let spin = fastest(self.model.spinning_joints(), v);
         options.time_step * self.turning(v) > MOST_TURN || options.time_step * spin > MOST_SPIN
     }
 
     #[inline]
     fn turning(&self, v: &[f64]) -> f64 {
         let base = (v[3] * v[3] + v[4] * v[4] + v[5] * v[5]).sqrt();
-        let joints = (self.model.bodies().iter().zip(&v[5..])).skip(1);
-        base + joints
-            .filter(|(body, _)| !body.is_spinner)
-            .fold(0.0_f64, |most, (_, rate)| most.max(rate.abs()))
+        base + fastest(self.model.turning_joints(), v)
     }
 
     fn conserves_momenta(&self) -> bool {
@@ -292,7 +280,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         for (y, f) in y.iter_mut().zip(&*gravity_impulse) {
             *y = options.time_step * f;
         }
-        add_command(options, self.command, start, start.v, parts, y);
+        add_command(options, self.command, start, start.v, &parts.motors, y);
         parts.gyroscopic.solve(
             model,
             &parts.kinematics,
@@ -307,16 +295,18 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn choose_branches(&mut self, start: Start<'_, Configuration>) {
-        for (j, motor) in self.parts.motors.iter_mut().enumerate() {
-            motor.choose(self.command.drives[j].as_ref(), start.v[6 + j]);
+        let drives = self.parts.motors.iter_mut().zip(&self.command.drives);
+        for ((motor, drive), rate) in drives.zip(&start.v[BASE..]) {
+            motor.choose(drive.as_ref(), *rate);
         }
     }
 
     fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
-        let parts = &mut *self.parts;
+        let drives = self.parts.motors.iter_mut().zip(&self.command.drives);
+        let rates = start.v[BASE..].iter().zip(&v_end[BASE..]);
         let mut is_new = false;
-        for (j, drive) in self.command.drives.iter().enumerate() {
-            is_new |= parts.motors[j].revise(drive.as_ref(), start.v[6 + j], v_end[6 + j]);
+        for ((motor, drive), (begin, end)) in drives.zip(rates) {
+            is_new |= motor.revise(drive.as_ref(), *begin, *end);
         }
         is_new
     }
@@ -343,16 +333,25 @@ impl MechanicalSystem for TreeSystem<'_> {
         start: Start<'_, Configuration>,
         v_end: &[f64],
     ) -> f64 {
-        let theta = options.theta;
+        let h = options.time_step;
+        let TreeScratch {
+            motors,
+            drives_tried,
+            ..
+        } = &mut *self.parts;
+        let drives = motors.iter().zip(&self.command.drives);
+        let rates = start.v[BASE..].iter().zip(&v_end[BASE..]);
+        let actuation = actuation(options, self.command, start, v_end, motors);
         let mut total = 0.0;
-        for j in 0..self.model.n_joints() {
-            let (begin, end) = (start.v[6 + j], v_end[6 + j]);
-            let turned = options.time_step * (theta * end + (1.0 - theta) * begin);
-            let torque = actuation(options, self.command, start, v_end, self.parts, j);
-            let drive = self.command.drives[j].as_ref();
-            let work = self.parts.motors[j].work(drive, begin, end, turned);
-            self.parts.drives_tried[j] = DriveAction {
-                impulse: torque.drive * options.time_step,
+        for (((tried, torque), (motor, drive)), (begin, end)) in
+            (drives_tried.iter_mut().zip(actuation))
+                .zip(drives)
+                .zip(rates)
+        {
+            let turned = h * torque.rate;
+            let work = motor.work(drive.as_ref(), *begin, *end, turned);
+            *tried = DriveAction {
+                impulse: torque.drive * h,
                 work,
             };
             // A damper never drives: where the rate changes its sign within the step, its torque at one time and the way at another may say so.
@@ -404,7 +403,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             self.parts,
             y,
         );
-        add_command(options, self.command, start, v_end, self.parts, y);
+        add_command(options, self.command, start, v_end, &self.parts.motors, y);
     }
 
     #[inline]
@@ -480,11 +479,17 @@ const MOST_TURN: f64 = 0.1;
 /// a frequency of a few per cent of the spin, so that explicit terms would do up to some twenty times more.
 const MOST_SPIN: f64 = 1.0;
 
+/// Fastest of some joints, rad/s.
+#[inline]
+fn fastest(joints: &[usize], v: &[f64]) -> f64 {
+    joints.iter().fold(0.0, |most, &k| most.max(v[k].abs()))
+}
+
 /// Damping (N m s/rad) and stiffness (N m/rad) with which a joint's torque answers to its motion.
 #[inline]
-fn feedback(command: &Command, motors: &[MotorBranch], j: usize) -> (f64, f64) {
-    let (mut damping, mut stiffness) = (motors[j].damping(), 0.0);
-    if let Some(held) = &command.held[j] {
+fn feedback(motor: &MotorBranch, held: Option<&HeldJoint>) -> (f64, f64) {
+    let (mut damping, mut stiffness) = (motor.damping(), 0.0);
+    if let Some(held) = held {
         damping += held.damping;
         stiffness += held.stiffness;
     }
@@ -498,14 +503,14 @@ fn set_held_theta(
     command: &Command,
     parts: &mut TreeScratch,
 ) {
-    for j in 0..model.n_joints() {
-        let feedback = feedback(command, &parts.motors, j);
-        let inertia = parts.mass_matrix.diagonal(model, 6 + j);
-        parts.motors[j].set_theta((options.time_step, options.theta), feedback, inertia);
+    for (j, (motor, held)) in parts.motors.iter_mut().zip(&command.held).enumerate() {
+        let feedback = feedback(motor, held.as_ref());
+        let inertia = parts.mass_matrix.diagonal(model, BASE + j);
+        motor.set_theta((options.time_step, options.theta), feedback, inertia);
     }
 }
 
-/// Mean torque of a joint over the step, N m.
+/// Mean torque of a joint over the step, N m, and its mean rate, rad/s.
 struct Actuation {
     /// Of its drive.
     drive: f64,
@@ -513,34 +518,39 @@ struct Actuation {
     damper: f64,
     /// Of everything else.
     other: f64,
+    rate: f64,
 }
 
-/// Torques of joint j; the PD and the motor's line at the θ_j-weighted position and velocity of the iterate `v_end`.
+/// Torques of all joints; the PD and the motor's line at the θ_j-weighted position and velocity of the iterate `v_end`.
 #[inline]
-fn actuation(
+fn actuation<'a>(
     options: &StepOptions,
-    command: &Command,
-    start: Start<'_, Configuration>,
-    v_end: &[f64],
-    parts: &TreeScratch,
-    j: usize,
-) -> Actuation {
+    command: &'a Command,
+    start: Start<'a, Configuration>,
+    v_end: &'a [f64],
+    motors: &'a [MotorBranch],
+) -> impl Iterator<Item = Actuation> + 'a {
     let (h, theta) = (options.time_step, options.theta);
-    let motor = &parts.motors[j];
-    let (rate, rate_end) = (start.v[6 + j], v_end[6 + j]);
-    let (mut other, mut damper) = (command.torque[j], 0.0);
-    if let Some(held) = &command.held[j] {
-        let mean = theta * rate_end + (1.0 - theta) * rate;
-        other -= held.stiffness
-            * (start.configuration.joints[j] + h * motor.theta() * mean - held.set_point);
-        damper = -held.damping * motor.rate(rate, rate_end);
-    }
-    let drive = motor.torque(rate, rate_end);
-    Actuation {
-        drive,
-        damper,
-        other,
-    }
+    let motion = (start.configuration.joints.iter())
+        .zip(&start.v[BASE..])
+        .zip(&v_end[BASE..]);
+    let torques = command.torque.iter().zip(&command.held).zip(motors);
+    motion
+        .zip(torques)
+        .map(move |(((angle, &begin), &end), ((torque, held), motor))| {
+            let rate = theta * end + (1.0 - theta) * begin;
+            let (mut other, mut damper) = (*torque, 0.0);
+            if let Some(held) = held {
+                other -= held.stiffness * (angle + h * motor.theta() * rate - held.set_point);
+                damper = -held.damping * motor.rate(begin, end);
+            }
+            Actuation {
+                drive: motor.torque(begin, end),
+                damper,
+                other,
+                rate,
+            }
+        })
 }
 
 /// Adds `h τ` to `y` for a step that ends with the iterate `v_end`.
@@ -549,12 +559,12 @@ fn add_command(
     command: &Command,
     start: Start<'_, Configuration>,
     v_end: &[f64],
-    parts: &TreeScratch,
+    motors: &[MotorBranch],
     y: &mut [f64],
 ) {
-    for j in 0..command.torque.len() {
-        let torque = actuation(options, command, start, v_end, parts, j);
-        y[6 + j] += options.time_step * (torque.other + torque.damper + torque.drive);
+    let actuation = actuation(options, command, start, v_end, motors);
+    for (y, torque) in y[BASE..].iter_mut().zip(actuation) {
+        *y += options.time_step * (torque.other + torque.damper + torque.drive);
     }
 }
 

@@ -43,6 +43,18 @@ impl JointAxis {
         }
     }
 
+    /// The axis in the frame that `R` maps to.
+    #[inline]
+    #[must_use]
+    pub fn turned(&self, R: &Matrix3<f64>) -> Vector3<f64> {
+        match self {
+            Self::X => R.column(0).into(),
+            Self::Y => R.column(1).into(),
+            Self::Z => R.column(2).into(),
+            Self::General(u) => R * u.into_inner(),
+        }
+    }
+
     /// `R · Rot(axis, angle)` and the axis in the frame that `R` maps to.
     #[inline]
     #[must_use]
@@ -54,17 +66,15 @@ impl JointAxis {
             let mut out = *R;
             out.set_column(i, &(a * c + b * s));
             out.set_column(j, &(b * c - a * s));
-            (out, Vector3::from(R.column(fixed)))
+            out
         };
-        match self {
+        let turned = match self {
             Self::X => columns(0),
             Self::Y => columns(1),
             Self::Z => columns(2),
-            Self::General(u) => (
-                R * Rotation3::from_axis_angle(u, angle).matrix(),
-                R * u.into_inner(),
-            ),
-        }
+            Self::General(u) => R * Rotation3::from_axis_angle(u, angle).matrix(),
+        };
+        (turned, self.turned(R))
     }
 }
 

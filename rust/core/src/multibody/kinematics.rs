@@ -61,20 +61,22 @@ impl Kinematics {
         self.r[0] = Vector3::zeros();
         self.c[0] = self.R[0] * bodies[0].centre_of_mass;
         for (b, body) in bodies.iter().enumerate().skip(1) {
-            let parent = self.R[body.parent];
-            self.r[b] = self.r[body.parent] + parent * body.position;
-            let frame = match &body.rotation {
-                None => parent,
-                Some(fixed) => parent * fixed,
-            };
-            let (R, axis) = if SPIN || !body.is_spinner {
-                body.axis.rotate(&frame, configuration.joints[b - 1])
+            let (before, own) = self.R.split_at_mut(b);
+            let parent = &before[body.parent];
+            let r = self.r[body.parent] + parent * body.position;
+            let fixed = body.rotation.as_ref().map(|fixed| parent * fixed);
+            let frame = fixed.as_ref().unwrap_or(parent);
+            (own[0], self.axis[b]) = if SPIN || !body.is_spinner {
+                body.axis.rotate(frame, configuration.joints[b - 1])
             } else {
-                (frame, frame * body.axis.direction())
+                (*frame, body.axis.turned(frame))
             };
-            self.R[b] = R;
-            self.axis[b] = axis;
-            self.c[b] = self.r[b] + R * body.centre_of_mass;
+            self.r[b] = r;
+            self.c[b] = if body.is_centred() {
+                r
+            } else {
+                r + own[0] * body.centre_of_mass
+            };
         }
     }
 

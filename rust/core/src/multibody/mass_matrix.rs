@@ -2,7 +2,8 @@
 //!
 //! Rows are stored **along paths**: row `k` holds `M[k][i]` for the ancestors `i` of `k`, base first,
 //! itself last. An ancestor's row is then a prefix of its descendants' rows, so the factorisation and the
-//! solves are dense loops over short contiguous pieces and never touch a structural zero.
+//! solves are dense loops over short contiguous pieces and never touch a structural zero. Every path begins with the six
+//! velocities of the base: loops over them are kept apart, as their length is known.
 //!
 //! Source: Featherstone 2008, *Rigid Body Dynamics Algorithms*, ch. 6 (composite bodies), ch. 8
 //! (branch-induced sparsity).
@@ -10,7 +11,7 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::kinematics::Kinematics;
-use super::model::Model;
+use super::model::{BASE, Model};
 use crate::spatial::SymmetricMatrix3;
 
 /// The mass matrix, its lower triangle along paths; kg, kg m, kg m².
@@ -18,63 +19,69 @@ use crate::spatial::SymmetricMatrix3;
 pub struct MassMatrix {
     stride: usize,
     rows: Vec<f64>,
-    mass: Vec<f64>,
-    moment: Vec<Vector3<f64>>,
-    inertia: Vec<SymmetricMatrix3>,
+    composites: Vec<Composite>,
+}
+
+/// A body and all that it carries: mass, first moment and inertia about the trunk origin.
+#[derive(Clone, Copy, Debug, Default)]
+struct Composite {
+    mass: f64,
+    moment: Vector3<f64>,
+    inertia: SymmetricMatrix3,
 }
 
 impl MassMatrix {
     /// Room for a model.
     #[must_use]
     pub fn new(model: &Model) -> Self {
-        let n = model.bodies().len();
         Self {
             stride: model.path_stride(),
             rows: vec![0.0; model.nv() * model.path_stride()],
-            mass: vec![0.0; n],
-            moment: vec![Vector3::zeros(); n],
-            inertia: vec![SymmetricMatrix3::default(); n],
+            composites: vec![Composite::default(); model.bodies().len()],
         }
     }
 
     /// Recomputes M at the poses of `kinematics`.
     pub fn update(&mut self, model: &Model, kinematics: &Kinematics) {
         let bodies = model.bodies();
-        for (b, body) in bodies.iter().enumerate() {
-            let c = &kinematics.c[b];
+        let poses = kinematics.R.iter().zip(&kinematics.c);
+        for ((composite, body), (R, c)) in self.composites.iter_mut().zip(bodies).zip(poses) {
+            let I = &body.principal_inertia;
             let mut inertia = match &body.principal_axes {
-                None => {
-                    SymmetricMatrix3::rotated_diagonal(&kinematics.R[b], &body.principal_inertia)
-                }
-                Some(P) => SymmetricMatrix3::rotated_diagonal(
-                    &(kinematics.R[b] * P),
-                    &body.principal_inertia,
-                ),
+                None => SymmetricMatrix3::rotated_diagonal(R, I),
+                Some(P) => SymmetricMatrix3::rotated_diagonal(&(R * P), I),
             };
             inertia += SymmetricMatrix3::point_mass(body.mass, c);
-            self.mass[b] = body.mass;
-            self.moment[b] = c * body.mass;
-            self.inertia[b] = inertia;
+            *composite = Composite {
+                mass: body.mass,
+                moment: c * body.mass,
+                inertia,
+            };
         }
         for b in (1..bodies.len()).rev() {
-            let parent = bodies[b].parent;
+            let Composite {
+                mass,
+                moment,
+                inertia,
+            } = self.composites[b];
             let a = kinematics.axis[b];
             // Momentum of the composite body when its joint turns at unit rate, about the trunk origin.
             let v = kinematics.r[b].cross(&a);
-            let f = v * self.mass[b] + a.cross(&self.moment[b]);
-            let n = self.inertia[b].times(&a) + self.moment[b].cross(&v);
-            let row = &mut self.rows[(5 + b) * self.stride..][..self.stride];
-            row[..3].copy_from_slice(f.as_slice());
-            row[3..6].copy_from_slice(n.as_slice());
-            for (entry, &k) in row.iter_mut().zip(model.path(b)).skip(6) {
+            let f = v * mass + a.cross(&moment);
+            let n = inertia.times(&a) + moment.cross(&v);
+            let (base, joints) = self.rows[(5 + b) * self.stride..].split_at_mut(BASE);
+            base[..3].copy_from_slice(f.as_slice());
+            base[3..].copy_from_slice(n.as_slice());
+            for (entry, &k) in joints.iter_mut().zip(&model.path(b)[BASE..]) {
                 *entry = kinematics.axis[k - 5].dot(&(n - kinematics.r[k - 5].cross(&f)));
             }
-            self.mass[parent] += self.mass[b];
-            self.moment[parent] = self.moment[parent] + self.moment[b];
-            let inertia = self.inertia[b];
-            self.inertia[parent] += inertia;
+            let parent = &mut self.composites[bodies[b].parent];
+            parent.mass += mass;
+            parent.moment += moment;
+            parent.inertia += inertia;
         }
-        let (m, s, I, w) = (self.mass[0], self.moment[0], self.inertia[0], self.stride);
+        let (base, w) = (self.composites[0], self.stride);
+        let (m, s, I) = (base.mass, base.moment, base.inertia);
         let base = [
             [m, 0.0, 0.0, 0.0, 0.0, 0.0],
             [0.0, m, 0.0, 0.0, 0.0, 0.0],
@@ -177,25 +184,41 @@ impl FactoredMassMatrix {
 
     fn update(&mut self, model: &Model) -> bool {
         let w = self.stride;
-        for k in (0..model.nv()).rev() {
-            let (above, rest) = self.rows.split_at_mut(k * w);
-            let n = last(model, k);
-            let row = &mut rest[..=n];
-            let d = row[n];
-            if d.is_nan() || d <= 0.0 {
+        let (base_rows, joint_rows) = self.rows.split_at_mut(BASE * w);
+        for j in (0..model.n_joints()).rev() {
+            let (above, own) = joint_rows.split_at_mut(j * w);
+            let path = &model.path(1 + j)[BASE..];
+            let n = path.len() - 1;
+            let (base, joints) = own[..=BASE + n].split_at_mut(BASE);
+            let Some(inverse_root) = inverse_root(joints[n]) else {
                 return false;
+            };
+            self.inverse_root[BASE + j] = inverse_root;
+            let inverse = inverse_root * inverse_root;
+            for p in (0..n).rev() {
+                let a = joints[p] * inverse;
+                let (ancestor, rest) = above[(path[p] - BASE) * w..].split_at_mut(BASE);
+                subtract(ancestor, a, base);
+                subtract(&mut rest[..=p], a, &joints[..=p]);
+                joints[p] = a;
             }
-            let inverse_root = 1.0 / d.sqrt();
+            let factors: [f64; BASE] = std::array::from_fn(|p| base[p] * inverse);
+            for p in 0..BASE {
+                subtract(&mut base_rows[p * w..][..=p], factors[p], &base[..=p]);
+            }
+            base.copy_from_slice(&factors);
+        }
+        for k in (0..BASE).rev() {
+            let (above, own) = base_rows.split_at_mut(k * w);
+            let Some(inverse_root) = inverse_root(own[k]) else {
+                return false;
+            };
             self.inverse_root[k] = inverse_root;
             let inverse = inverse_root * inverse_root;
-            let path = path(model, k);
-            for p in (0..n).rev() {
-                let a = row[p] * inverse;
-                let ancestor = &mut above[path[p] * w..][..=p];
-                for (x, y) in ancestor.iter_mut().zip(&row[..=p]) {
-                    *x -= a * y;
-                }
-                row[p] = a;
+            for p in (0..k).rev() {
+                let a = own[p] * inverse;
+                subtract(&mut above[p * w..][..=p], a, &own[..=p]);
+                own[p] = a;
             }
         }
         true
@@ -203,41 +226,89 @@ impl FactoredMassMatrix {
 
     /// `y ← D^(-1/2) L^(-T) y` for a full vector (nv).
     pub fn half_solve(&self, model: &Model, y: &mut [f64]) {
-        for k in (0..model.nv()).rev() {
-            let value = y[k];
-            let row = &self.rows[k * self.stride..][..last(model, k)];
-            for (entry, &i) in row.iter().zip(path(model, k)) {
-                y[i] -= entry * value;
+        let (base, joints) = y.split_at_mut(BASE);
+        for j in (0..joints.len()).rev() {
+            let value = joints[j];
+            let path = &model.path(1 + j)[BASE..];
+            let (row, rest) = self.rows[(BASE + j) * self.stride..].split_at(BASE);
+            subtract(base, value, row);
+            for (entry, &i) in rest.iter().zip(&path[..path.len() - 1]) {
+                joints[i - BASE] -= entry * value;
             }
-            y[k] = value * self.inverse_root[k];
+            joints[j] = value * self.inverse_root[BASE + j];
+        }
+        for k in (0..BASE).rev() {
+            let value = base[k];
+            subtract(&mut base[..k], value, &self.rows[k * self.stride..][..k]);
+            base[k] = value * self.inverse_root[k];
         }
     }
 
     /// `y ← D^(-1/2) L^(-T) y` for several columns along a path (nothing else is nonzero).
     #[inline]
     pub fn half_solve_path<const N: usize>(&self, path: &[usize], y: &mut [[f64; N]]) {
-        for (p, &k) in path.iter().enumerate().rev() {
-            let (before, own) = y.split_at_mut(p);
+        let (base, joints) = y.split_at_mut(BASE);
+        for (p, &k) in path[BASE..].iter().enumerate().rev() {
+            let (before, own) = joints.split_at_mut(p);
             let value = own[0];
-            let row = &self.rows[k * self.stride..][..p];
-            for (x, entry) in before.iter_mut().zip(row) {
-                for (x, value) in x.iter_mut().zip(value) {
-                    *x -= entry * value;
-                }
-            }
+            let (row, rest) = self.rows[k * self.stride..].split_at(BASE);
+            subtract_columns(base, &value, row);
+            subtract_columns(before, &value, &rest[..p]);
+            own[0] = value.map(|x| x * self.inverse_root[k]);
+        }
+        for k in (0..BASE).rev() {
+            let (before, own) = base.split_at_mut(k);
+            let value = own[0];
+            subtract_columns(before, &value, &self.rows[k * self.stride..][..k]);
             own[0] = value.map(|x| x * self.inverse_root[k]);
         }
     }
 
     /// `x ← L^(-1) D^(-1/2) x`: with [`Self::half_solve`] before it, `M^(-1)`.
     pub fn half_solve_back(&self, model: &Model, x: &mut [f64]) {
-        for k in 0..model.nv() {
-            let row = &self.rows[k * self.stride..][..last(model, k)];
-            let mut value = x[k] * self.inverse_root[k];
-            for (entry, &i) in row.iter().zip(path(model, k)) {
-                value -= entry * x[i];
+        let (base, joints) = x.split_at_mut(BASE);
+        for k in 0..BASE {
+            let mut value = base[k] * self.inverse_root[k];
+            for (entry, x) in self.rows[k * self.stride..][..k].iter().zip(&*base) {
+                value -= entry * x;
             }
-            x[k] = value;
+            base[k] = value;
+        }
+        for j in 0..joints.len() {
+            let path = &model.path(1 + j)[BASE..];
+            let (row, rest) = self.rows[(BASE + j) * self.stride..].split_at(BASE);
+            let mut value = joints[j] * self.inverse_root[BASE + j];
+            for (entry, x) in row.iter().zip(&*base) {
+                value -= entry * x;
+            }
+            for (entry, &i) in rest.iter().zip(&path[..path.len() - 1]) {
+                value -= entry * joints[i - BASE];
+            }
+            joints[j] = value;
+        }
+    }
+}
+
+/// Of a pivot; none where the matrix is not positive definite.
+#[inline]
+fn inverse_root(pivot: f64) -> Option<f64> {
+    (pivot > 0.0).then(|| 1.0 / pivot.sqrt())
+}
+
+/// `x −= a y`.
+#[inline]
+fn subtract(x: &mut [f64], a: f64, y: &[f64]) {
+    for (x, y) in x.iter_mut().zip(y) {
+        *x -= a * y;
+    }
+}
+
+/// `x −= y ⊗ a`, row by row.
+#[inline]
+fn subtract_columns<const N: usize>(x: &mut [[f64; N]], a: &[f64; N], y: &[f64]) {
+    for (x, y) in x.iter_mut().zip(y) {
+        for (x, a) in x.iter_mut().zip(a) {
+            *x -= y * a;
         }
     }
 }

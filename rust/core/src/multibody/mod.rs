@@ -24,7 +24,7 @@ pub use error::{ModelError, StateError};
 pub use joint::JointAxis;
 pub use kinematics::Kinematics;
 pub use mass_matrix::{FactoredMassMatrix, MassMatrix};
-pub(crate) use model::fingerprint;
+pub(crate) use model::{BASE, fingerprint};
 pub use model::{Body, Frame, MAX_SOLIDS, Model, Wheel};
 pub use momentum::{Energy, EnergyScratch, Momentum};
 pub use motor::{DriveTrial, Motor, MotorRegime};

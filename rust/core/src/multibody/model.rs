@@ -17,6 +17,9 @@ use crate::spatial::SymmetricMatrix3;
 /// Most solids of a model, and most wheels and tags: beyond it a step costs seconds and matrices gigabytes.
 pub const MAX_SOLIDS: usize = 1000;
 
+/// Velocities of the base, with which every path begins.
+pub(crate) const BASE: usize = 6;
+
 /// Largest length of a description either way, m.
 const MAX_LENGTH: f64 = 1e6;
 
@@ -46,6 +49,15 @@ pub struct Body {
     /// Whether turning about its own joint changes nothing but its looks: an axisymmetric body about its own axis, with
     /// nothing on it but wheels of the same axle. A step need not turn it.
     pub is_spinner: bool,
+}
+
+impl Body {
+    /// Whether its mass centre is its frame's origin.
+    #[inline]
+    #[must_use]
+    pub fn is_centred(&self) -> bool {
+        self.centre_of_mass == Vector3::zeros()
+    }
 }
 
 /// The frame of a solid, fixed to a moving body.
@@ -120,6 +132,10 @@ pub struct Model {
     /// How many leading path entries bodies `a` and `b` share: `common[a * n_bodies + b]`.
     common: Vec<usize>,
     mass: f64,
+    reach: f64,
+    /// Velocity indices of the joints of spinners, and of all others.
+    spinning: Vec<usize>,
+    turning: Vec<usize>,
     fingerprint: u64,
 }
 
@@ -407,6 +423,8 @@ impl Model {
             }
         }
         let mass = bodies.iter().map(|b| b.mass).sum();
+        let reach = bodies.iter().map(|b| b.position.norm()).sum();
+        let (spinning, turning) = (BASE..5 + bodies.len()).partition(|k| bodies[k - 5].is_spinner);
         let text = description.to_json().unwrap_or_default();
         let fingerprint = fingerprint(text.bytes());
         Self {
@@ -420,6 +438,9 @@ impl Model {
             path_stride,
             common,
             mass,
+            reach,
+            spinning,
+            turning,
             fingerprint,
         }
     }
@@ -476,6 +497,24 @@ impl Model {
     #[must_use]
     pub fn mass(&self) -> f64 {
         self.mass
+    }
+
+    /// How far a joint can be from the trunk's origin at most, m.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        self.reach
+    }
+
+    /// Velocity indices of the joints whose turning changes only looks: see [`Body::is_spinner`].
+    #[must_use]
+    pub fn spinning_joints(&self) -> &[usize] {
+        &self.spinning
+    }
+
+    /// Velocity indices of all other joints.
+    #[must_use]
+    pub fn turning_joints(&self) -> &[usize] {
+        &self.turning
     }
 
     /// Velocity indices that move body `b`, base first.

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::kinematics::Kinematics;
-use super::model::Model;
+use super::model::{Body, Model};
 use super::state::Configuration;
 
 /// Kinetic and potential energy, J.
@@ -131,40 +131,54 @@ pub fn energy_and_momentum(
     gravity: &Vector3<f64>,
     scratch: &mut EnergyScratch,
 ) -> (Energy, Vector3<f64>) {
-    let moving = &mut scratch.moving[..model.bodies().len()];
-    let rates = &v[5..5 + moving.len()];
-    let mut twice_kinetic = 0.0;
-    let mut momentum = Vector3::zeros();
-    let mut moment = Vector3::zeros();
-    for (b, body) in model.bodies().iter().enumerate() {
-        let own = if b == 0 {
-            Moving {
-                R: *q.attitude.to_rotation_matrix().matrix(),
-                r: Vector3::zeros(),
-                velocity: Vector3::new(v[0], v[1], v[2]),
-                omega: Vector3::new(v[3], v[4], v[5]),
-            }
+    let bodies = model.bodies();
+    let moving = &mut scratch.moving[..bodies.len()];
+    let mut sums = Sums::default();
+    moving[0] = Moving {
+        R: *q.attitude.to_rotation_matrix().matrix(),
+        r: Vector3::zeros(),
+        velocity: Vector3::new(v[0], v[1], v[2]),
+        omega: Vector3::new(v[3], v[4], v[5]),
+    };
+    sums.add(&bodies[0], &moving[0]);
+    let joints = q.joints.iter().zip(&v[6..]);
+    for ((b, body), (angle, rate)) in bodies.iter().enumerate().skip(1).zip(joints) {
+        let (before, own) = moving.split_at_mut(b);
+        let (carrier, own) = (&before[body.parent], &mut own[0]);
+        let lever = carrier.R * body.position;
+        own.r = carrier.r + lever;
+        own.velocity = carrier.velocity + carrier.omega.cross(&lever);
+        let fixed = body.rotation.as_ref().map(|fixed| carrier.R * fixed);
+        let frame = fixed.as_ref().unwrap_or(&carrier.R);
+        let axis;
+        (own.R, axis) = if body.is_spinner {
+            (*frame, body.axis.turned(frame))
         } else {
-            let carrier = &moving[body.parent];
-            let lever = carrier.R * body.position;
-            let frame = match &body.rotation {
-                None => carrier.R,
-                Some(fixed) => carrier.R * fixed,
-            };
-            let (R, axis) = if body.is_spinner {
-                (frame, frame * body.axis.direction())
-            } else {
-                body.axis.rotate(&frame, q.joints[b - 1])
-            };
-            Moving {
-                R,
-                r: carrier.r + lever,
-                velocity: carrier.velocity + carrier.omega.cross(&lever),
-                omega: carrier.omega + axis * rates[b],
-            }
+            body.axis.rotate(frame, *angle)
         };
+        own.omega = carrier.omega + axis * *rate;
+        sums.add(body, own);
+    }
+    let energy = Energy {
+        kinetic: 0.5 * sums.twice_kinetic,
+        potential: -gravity.dot(&(q.position * model.mass() + sums.moment)),
+    };
+    (energy, sums.momentum)
+}
+
+/// Twice the kinetic energy, linear momentum and first moment about the trunk origin of the bodies so far.
+#[derive(Default)]
+struct Sums {
+    twice_kinetic: f64,
+    momentum: Vector3<f64>,
+    moment: Vector3<f64>,
+}
+
+impl Sums {
+    #[inline]
+    fn add(&mut self, body: &Body, own: &Moving) {
         let (mut c, mut velocity) = (own.r, own.velocity);
-        if body.centre_of_mass != Vector3::zeros() {
+        if !body.is_centred() {
             let lever = own.R * body.centre_of_mass;
             c += lever;
             velocity += own.omega.cross(&lever);
@@ -173,17 +187,11 @@ pub fn energy_and_momentum(
         if let Some(P) = &body.principal_axes {
             w = P.tr_mul(&w);
         }
-        twice_kinetic +=
+        self.twice_kinetic +=
             body.mass * velocity.norm_squared() + body.principal_inertia.dot(&w.component_mul(&w));
-        momentum += velocity * body.mass;
-        moment += c * body.mass;
-        moving[b] = own;
+        self.momentum += velocity * body.mass;
+        self.moment += c * body.mass;
     }
-    let energy = Energy {
-        kinetic: 0.5 * twice_kinetic,
-        potential: -gravity.dot(&(q.position * model.mass() + moment)),
-    };
-    (energy, momentum)
 }
 
 /// Energy of a state.
