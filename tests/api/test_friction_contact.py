@@ -159,11 +159,15 @@ def test_a_contact_with_enormous_friction_sticks(solver, mu):
 def test_a_rover_with_enormous_friction_gains_no_energy():
     # With friction=1e16 every step was called converged while the energy grew.
     sim = rover_gym.Simulation(friction=1e16)
+    sim.step()  # the projection lifts the wheels out of the ground
+    sim.set_wheel_torques([20.0] * 6)
+    sim.step(100)
+    sim.set_wheel_torques([0.0] * 6)
     before = sim.energy().total
     for _ in range(40):
         report = sim.step(10)
         after = sim.energy().total
-        assert report.status != "converged" or after <= before + 1e-6 * abs(before)
+        assert report.status != "converged" or after <= before + 1e-9 * abs(before)
         before = after
 
 
@@ -240,7 +244,7 @@ def test_options_of_the_wrong_kind_are_refused_by_field(field, value):
 def test_numbers_at_the_end_of_their_range_neither_panic_nor_lie(W, q, mu, solver):
     answer = rover_gym.solve_friction_contact(W, q, mu, solver=solver, max_iterations=50)
     p, u = answer.impulses[0], answer.velocities[0]
-    assert np.isfinite(p).all() and np.isfinite(u).all()
+    assert np.isfinite([p, u]).all()
     if answer.report.is_converged:
         assert u[0] >= -1e-6 * np.abs(q).max()
-        assert p[0] >= 0.0
+        assert p[0] >= -1e-6 * np.abs(q).max() / np.asarray(W)[0, 0]

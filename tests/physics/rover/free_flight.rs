@@ -93,7 +93,7 @@ fn no_spin_and_no_step_add_energy() {
             (1e4, 1e4, 1e4),
         ] {
             for variant in VARIANTS {
-                let mut simulation = tumbling(variant, time_step, Vector3::new(0.0, -9.81, 0.0));
+                let mut simulation = tumbling(variant, time_step, Vector3::zeros());
                 let mut v = simulation.state().v.clone();
                 for (k, v) in v.iter_mut().enumerate().skip(3) {
                     let body = &simulation.model().bodies()[k.max(5) - 5];
@@ -116,9 +116,8 @@ fn no_spin_and_no_step_add_energy() {
                         Variant::Linearised => 1e-9,
                         Variant::Newton => 1e-3,
                     };
-                    let rounding = 1e-13 * before.potential.abs();
                     assert!(
-                        gained <= allowed * before.kinetic + rounding,
+                        gained <= allowed * before.kinetic,
                         "{variant:?}, {time_step} s, {base} {joints} {wheels} rad/s, step {step}: {gained} of {before:?}"
                     );
                 }

@@ -121,9 +121,7 @@ impl Part<'_> {
             let is_solved = report.is_converged();
             let audit = Audit {
                 before,
-                // Newton's law of restitution itself creates energy in some impacts: a smaller step would not help.
-                is_last: is_gyroscopic
-                    && (!can_halve || options.restitution > 0.0 && !ws.contacts.is_empty()),
+                is_last: is_gyroscopic && !can_halve,
                 drift: 0.0,
             };
             let verdict = audit.judge(system, options, start, ws, &mut report);

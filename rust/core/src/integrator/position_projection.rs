@@ -13,7 +13,8 @@ use super::mechanical_system::MechanicalSystem;
 use super::moreau_jean::{note, set_friction};
 use super::options::{Stabilisation, StepOptions};
 use super::report::StepReport;
-use crate::solver::{SolveReport, SolveStatus};
+use crate::problem::{FrictionContactProblem, Operator};
+use crate::solver::{SolveReport, SolveStatus, solve};
 
 /// Corrects `ws.end`, where the contacts are predicted to have the gaps `ws.gap_end`; tells whether it has moved.
 pub(super) fn project<S: MechanicalSystem>(
@@ -44,12 +45,17 @@ pub(super) fn project<S: MechanicalSystem>(
     ws.p_position.resize(ws.p.len(), 0.0);
     ws.u_position.resize(ws.p.len(), 0.0);
     let limit = -FARTHEST * deepest;
-    let mut solved = displace(system, options, ws);
+    let mut solved = displace(system, options, ws, 0.0);
     let is_finite = solved.status != SolveStatus::NonFinite;
     if is_finite && (!solved.is_converged() || size(system, ws) > limit) {
         // Friction locks a wedge, or fights itself over nanometres: the shortest way out needs none.
         ws.mu.fill(0.0);
-        solved = displace(system, options, ws);
+        solved = displace(system, options, ws, 0.0);
+        if !solved.is_converged() {
+            // Nothing frees what is wedged between gaps that face each other. As if the ground yielded a little there is an answer, which takes
+            // each as far as the others let it.
+            solved = displace(system, options, ws, COMPLIANCE);
+        }
         set_friction(system, options, &ws.contacts, &mut ws.mu);
     }
     note(report, &solved);
@@ -58,21 +64,43 @@ pub(super) fn project<S: MechanicalSystem>(
     true
 }
 
-/// Solves for the displacement `ws.y` with the coefficients in `ws.mu`.
+/// Compliance of the ground where nothing else frees a wedged machine, relative to W's own.
+const COMPLIANCE: f64 = 1e-2;
+
+/// Solves for the displacement `ws.y` with the coefficients in `ws.mu`, on ground of a compliance relative to W's mean.
 fn displace<S: MechanicalSystem>(
     system: &S,
     options: &StepOptions,
     ws: &mut ScratchOf<S>,
+    compliance: f64,
 ) -> SolveReport {
     ws.p_position.fill(0.0);
-    let solved = system.solve(
-        &ws.q_free,
-        &ws.mu,
-        &ws.solver_options(&options.solver),
-        &mut ws.p_position,
-        &mut ws.u_position,
-        &mut ws.solver,
-    );
+    let solver_options = ws.solver_options(&options.solver);
+    let operator = (compliance > 0.0).then(|| system.problem(&ws.q_free, &ws.mu).operator());
+    let solved = if let Some(Operator::Dense(W)) = operator {
+        let n = ws.q_free.len();
+        let mut W = W.to_vec();
+        let mean = (0..n).map(|i| W[i * (n + 1)]).sum::<f64>() / n as f64;
+        for i in 0..n {
+            W[i * (n + 1)] += compliance * mean;
+        }
+        solve(
+            &FrictionContactProblem::from_assembled(S::DIMENSION, &W, &ws.q_free, &ws.mu),
+            &solver_options,
+            &mut ws.p_position,
+            &mut ws.u_position,
+            &mut ws.solver,
+        )
+    } else {
+        system.solve(
+            &ws.q_free,
+            &ws.mu,
+            &solver_options,
+            &mut ws.p_position,
+            &mut ws.u_position,
+            &mut ws.solver,
+        )
+    };
     ws.work_left = ws.work_left.saturating_sub(solved.work);
     ws.y.fill(0.0);
     system.add_impulses(&ws.p_position, &mut ws.y);

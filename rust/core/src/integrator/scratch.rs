@@ -32,7 +32,7 @@ pub struct Scratch<Q, C> {
 }
 
 /// Share of the solver's budget that all solves of a step have together, and the share that each has in any case.
-const STEP_SHARE: u64 = 2;
+const STEP_SHARE: u64 = 4;
 const SOLVE_SHARE: u64 = 64;
 
 impl<Q: Clone, C> Scratch<Q, C> {

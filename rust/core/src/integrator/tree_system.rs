@@ -356,7 +356,8 @@ impl MechanicalSystem for TreeSystem<'_> {
                 impulse: torque.drive * options.time_step,
                 work: torque.drive * turned,
             };
-            total += (torque.drive + torque.other) * turned;
+            // A damper never drives: where the rate changes its sign within the step, its torque at one time and the way at another may say so.
+            total += (torque.drive + torque.other) * turned + (torque.damper * turned).min(0.0);
         }
         total
     }
@@ -518,6 +519,8 @@ fn set_held_theta(
 struct Actuation {
     /// Of its drive.
     drive: f64,
+    /// Of the damper that holds it.
+    damper: f64,
     /// Of everything else.
     other: f64,
 }
@@ -534,18 +537,22 @@ fn actuation(
 ) -> Actuation {
     let (h, theta, theta_j) = (options.time_step, options.theta, parts.theta_held[j]);
     let (rate, rate_end) = (start.v[6 + j], v_end[6 + j]);
-    let mut other = command.torque[j];
+    let (mut other, mut damper) = (command.torque[j], 0.0);
     if let Some(held) = &command.held[j] {
         let mean = theta * rate_end + (1.0 - theta) * rate;
         other -=
             held.stiffness * (start.configuration.joints[j] + h * theta_j * mean - held.set_point);
-        other -= held.damping * (rate + theta_j * (rate_end - rate));
+        damper = -held.damping * (rate + theta_j * (rate_end - rate));
     }
     let drive = match parts.motors[j].regime() {
         MotorRegime::Constant(torque) => torque,
         line @ MotorRegime::Line { .. } => line.torque(rate + theta_j * (rate_end - rate)),
     };
-    Actuation { drive, other }
+    Actuation {
+        drive,
+        damper,
+        other,
+    }
 }
 
 /// Adds `h τ` to `y` for a step that ends with the iterate `v_end`.
@@ -559,7 +566,7 @@ fn add_command(
 ) {
     for j in 0..command.torque.len() {
         let torque = actuation(options, command, start, v_end, parts, j);
-        y[6 + j] += options.time_step * (torque.other + torque.drive);
+        y[6 + j] += options.time_step * (torque.other + torque.damper + torque.drive);
     }
 }
 
