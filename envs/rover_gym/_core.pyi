@@ -975,6 +975,7 @@ class SolverReport:
         "guided_newton",
         "newton",
         "proximal",
+        "restarts",
         "admm",
         "relaxed",
     ]:
