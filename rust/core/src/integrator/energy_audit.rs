@@ -22,7 +22,7 @@
 use nalgebra::Vector3;
 
 use super::ScratchOf;
-use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
+use super::mechanical_system::{MechanicalSystem, Start};
 use super::moreau_jean::place;
 use super::options::StepOptions;
 use super::report::StepReport;
