@@ -231,8 +231,14 @@ fn in_persistent_contact_each_has_its_order() {
             Kind::EventDriven => 4.0,
             Kind::Penalty(..) => continue,
         };
+        // Ours takes its coarsest steps from rest in halves, which would blur the slope.
+        let coarsest = match scheme.kind {
+            Kind::MoreauJean { .. } => 32,
+            _ => 16,
+        };
         for motion in [Motion::Rolling, Motion::Sliding, Motion::Driving] {
-            check(scheme, &order_in(scheme, motion, 16).unwrap(), expected);
+            let curve = order_in(scheme, motion, coarsest).unwrap();
+            check(scheme, &curve, expected);
         }
     }
 }

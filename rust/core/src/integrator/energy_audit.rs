@@ -123,6 +123,8 @@ pub(super) struct Audit {
     pub before: Option<MechanicalEnergy>,
     /// Whether there is no safer way left.
     pub is_last: bool,
+    /// Part of the kinetic energy that may be gained, see [`GAIN`].
+    pub gain: f64,
     /// Part of the kinetic energy that free flight may gain or lose: an error of the scheme's order that does not add up.
     pub drift: f64,
 }
@@ -184,7 +186,7 @@ impl Audit {
         let is_balanced = if is_free {
             excess.abs() <= rounding + self.drift * size
         } else {
-            excess <= rounding + GAIN * size
+            excess <= rounding + self.gain * size
         };
         if is_balanced {
             report.energy_gain = report.energy_gain.max(relative(excess - rounding, size));
@@ -194,7 +196,7 @@ impl Audit {
         let coarse = if is_free { excess.abs() } else { excess };
         // What not even standing still gives back.
         let left = excess - after.kinetic;
-        let is_left = left > rounding + GAIN * size;
+        let is_left = left > rounding + self.gain * size;
         if (coarse > COARSE * size || is_left) && !self.is_last {
             return Verdict::Coarse;
         }

@@ -22,7 +22,7 @@
 //!
 //! Source: Moreau 1988; Jean 1999; Acary, Brogliato 2008, ch. 10.
 
-use super::energy_audit::{Audit, Verdict, count_lift, energy_before};
+use super::energy_audit::{Audit, GAIN, Verdict, count_lift, energy_before};
 use super::error::StepError;
 use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
 use super::options::StepOptions;
@@ -54,6 +54,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJean {
         let mut attempts = MOST_ATTEMPTS;
         let whole = Part {
             options,
+            share: 1.0,
             depth: 0,
             attempts: &mut attempts,
         };
@@ -76,6 +77,8 @@ const MOST_PARTS: f64 = 64.0;
 /// A step or a part of one: what did not come out is taken again in halves, which are other and mostly easier problems.
 struct Part<'a> {
     options: &'a StepOptions,
+    /// What part of the whole step.
+    share: f64,
     depth: usize,
     attempts: &'a mut usize,
 }
@@ -122,6 +125,7 @@ impl Part<'_> {
             let audit = Audit {
                 before,
                 is_last: is_gyroscopic && !can_halve,
+                gain: GAIN * self.share,
                 drift: 0.0,
             };
             let verdict = audit.judge(system, options, start, ws, &mut report);
@@ -163,6 +167,7 @@ impl Part<'_> {
         while k < n {
             let part = Part {
                 options: &options,
+                share: self.share / n,
                 depth: self.depth + 1,
                 attempts: &mut *self.attempts,
             };

@@ -16,7 +16,7 @@
 //! Source: the discrete d'Alembert principle, as in Simo, Wong 1991 for one body; contacts and the
 //! correction r as in [`super::moreau_jean`].
 
-use super::energy_audit::{Audit, Verdict, energy_before};
+use super::energy_audit::{Audit, GAIN, Verdict, energy_before};
 use super::error::StepError;
 use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
 use super::moreau_jean::{
@@ -122,6 +122,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         let audit = Audit {
             before,
             is_last: false,
+            gain: GAIN,
             drift,
         };
         let is_solved = report.is_converged();
