@@ -1020,6 +1020,7 @@ class SolverReport:
         "guided_newton",
         "newton",
         "proximal",
+        "restarts",
         "admm",
         "relaxed",
     ]:

@@ -178,7 +178,7 @@ def test_other_wrong_types_are_refused_by_name(field: str, call: Callable[[], An
         [datetime.timedelta(1)] * 3,
         [[1.0], [1.0, 2.0]],
         "text",
-        object(),
+        object,
     ],
     ids=repr,
 )

@@ -356,11 +356,23 @@ impl From<StepError> for BorderError {
 
 impl From<ProblemError> for BorderError {
     fn from(e: ProblemError) -> Self {
+        let value = match &e {
+            ProblemError::VelocityShape { found, .. }
+            | ProblemError::OperatorShape { found, .. }
+            | ProblemError::OperatorComponents { found, .. } => Value::Count(*found),
+            ProblemError::NonFiniteOperator { value, .. }
+            | ProblemError::NonFiniteVelocity { value, .. }
+            | ProblemError::InvalidFrictionCoefficient { value, .. }
+            | ProblemError::NonPositiveNormal { value, .. }
+            | ProblemError::NegativeTangential { value, .. } => Value::Number(*value),
+            // Also of the variants that may come: the enum is not exhaustive.
+            _ => Value::Nothing,
+        };
         Self {
             kind: Kind::Problem,
             message: e.to_string(),
-            field: None,
-            value: Value::Nothing,
+            field: Some(e.field()),
+            value,
         }
     }
 }

@@ -179,7 +179,8 @@ impl Audit {
             + after.potential.abs()
             + work.abs();
         let rounding = ROUNDINGS * f64::EPSILON * sum;
-        let is_free = ws.contacts.is_empty();
+        // With θ > ½ the scheme itself takes energy away.
+        let is_free = ws.contacts.is_empty() && options.theta <= 0.5;
         let is_balanced = if is_free {
             excess.abs() <= rounding + self.drift * size
         } else {
@@ -191,7 +192,10 @@ impl Audit {
             return Verdict::Sound;
         }
         let coarse = if is_free { excess.abs() } else { excess };
-        if coarse > COARSE * size && !self.is_last {
+        // What not even standing still gives back.
+        let left = excess - after.kinetic;
+        let is_left = left > rounding + GAIN * size;
+        if (coarse > COARSE * size || is_left) && !self.is_last {
             return Verdict::Coarse;
         }
         let whole = after.momentum.norm_squared() / (2.0 * after.mass);
@@ -207,7 +211,7 @@ impl Audit {
         } else if excess > 0.0 {
             let share = (1.0 - excess / after.kinetic).max(0.0).sqrt();
             shorten(ws, share);
-            if excess > after.kinetic {
+            if is_left {
                 self.hold_back(system, options, start, ws);
             }
         }

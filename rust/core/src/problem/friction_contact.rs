@@ -109,6 +109,24 @@ pub enum ProblemError {
     },
 }
 
+impl ProblemError {
+    /// The datum that is wrong: `q`, `mu[2]`, `W[0, 3]`.
+    #[must_use]
+    pub fn field(&self) -> String {
+        match self {
+            Self::VelocityShape { .. } => "q".to_owned(),
+            Self::OperatorShape { .. }
+            | Self::OperatorPattern { .. }
+            | Self::OperatorComponents { .. }
+            | Self::NonPositiveNormal { .. }
+            | Self::NegativeTangential { .. } => "W".to_owned(),
+            Self::NonFiniteOperator { row, column, .. } => format!("W[{row}, {column}]"),
+            Self::NonFiniteVelocity { index, .. } => format!("q[{index}]"),
+            Self::InvalidFrictionCoefficient { contact, .. } => format!("mu[{contact}]"),
+        }
+    }
+}
+
 /// Find `p` with `u = W p + q`, `ũ = u + μ|u_T| n`, `K_μ* ∋ ũ ⊥ p ∈ K_μ` at every contact.
 ///
 /// Components run contact by contact, `normal, tangent, (tangent)`; with `n_c` contacts of `d` components, `n = d n_c`.

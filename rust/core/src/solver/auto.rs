@@ -5,7 +5,9 @@ use super::nsgs::Budget;
 use super::report::{Rungs, SolveReport, SolveStatus, Stage};
 use super::work::Work;
 use super::workspace::SolverWorkspace;
-use super::{Method, SolverOptions, admm, guided, islands, newton, nsgs, pivoting, proximal, work};
+use super::{
+    Method, SolverOptions, admm, guided, islands, newton, nsgs, pivoting, proximal, restarts, work,
+};
 use crate::law::coulomb::{natural_map, violation};
 use crate::problem::{
     ContactScales, FrictionContactProblem, Magnitudes, Operator, Residual, Violations,
@@ -568,6 +570,13 @@ pub(super) fn escalate<const D: usize>(
     let stage = (Method::ProximalPoint, Stage::ProximalPoint);
     if let Some(outcome) = ladder.enter(stage, found, p, workspace, *iterations) {
         return outcome;
+    }
+    if is_few && ladder.nearest.residual.is_finite() {
+        let found = restarts::solve::<D>(data, options, p, u, workspace, iterations);
+        let stage = (Method::Newton, Stage::Restarts);
+        if let Some(outcome) = ladder.enter(stage, found, p, workspace, *iterations) {
+            return outcome;
+        }
     }
     ladder.give_nearest::<D>(data, p, u, workspace)
 }

@@ -33,6 +33,7 @@ mod pivoting;
 mod proximal;
 mod reduced_system;
 mod report;
+mod restarts;
 mod storage;
 mod work;
 mod workspace;

@@ -59,6 +59,8 @@ pub enum Stage {
     Newton,
     /// Proximal point around a damped Newton.
     ProximalPoint,
+    /// Few contacts: pivoting from the nearest answer so far and from other starts.
+    Restarts,
     /// Alternating directions.
     Admm,
     /// Alternating directions on the convex relaxation.
@@ -79,6 +81,7 @@ impl Stage {
             Self::GuidedNewton => "guided_newton",
             Self::Newton => "newton",
             Self::ProximalPoint => "proximal",
+            Self::Restarts => "restarts",
             Self::Admm => "admm",
             Self::Relaxed => "relaxed",
         }
