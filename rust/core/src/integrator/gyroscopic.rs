@@ -8,10 +8,10 @@
 //! part `½ Ṁ` can make the matrix singular where a frame turns by radians in a step; there it is left out, and what the poses at both ends
 //! make of the energy is the audit's ([`super::energy_audit`]).
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, DVectorView, Vector3};
 
 use crate::multibody::coriolis::{CoriolisScratch, coriolis_matrix};
-use crate::multibody::{Kinematics, MassMatrix, Model};
+use crate::multibody::{BASE, Kinematics, MassMatrix, Model};
 
 /// Scratch, filled at the first step that needs it.
 #[derive(Clone, Debug, Default)]
@@ -19,7 +19,8 @@ pub(super) struct GyroscopicScratch {
     coriolis: CoriolisScratch,
     C: DMatrix<f64>,
     matrix: DMatrix<f64>,
-    change: Vec<f64>,
+    /// `h (τ − G − C v) + J`, then Δv.
+    load: DVector<f64>,
 }
 
 /// `out = −G` (nv), N and N m: what gravity does.
@@ -63,22 +64,31 @@ impl GyroscopicScratch {
         let nv = model.nv();
         if self.C.nrows() != nv {
             self.C = DMatrix::zeros(nv, nv);
+            self.matrix = DMatrix::zeros(nv, nv);
+            self.load = DVector::zeros(nv);
         }
         coriolis_matrix(model, kinematics, v_frozen, &mut self.coriolis, &mut self.C);
-        let v = DVector::from_column_slice(v);
+        let v = DVectorView::from_slice(v, nv);
         for is_skew in [false, true] {
             if is_skew {
-                self.C = (&self.C - self.C.transpose()) * 0.5;
+                keep_skew_part(&mut self.C);
             }
-            self.matrix = mass_matrix.to_dense(model) + &self.C * (theta * h);
-            let load = DVector::from_column_slice(y) + DVector::from_column_slice(impulse)
-                - &self.C * &v * h;
+            let C = self.C.as_slice();
+            for (entry, c) in self.matrix.as_mut_slice().iter_mut().zip(C) {
+                *entry = theta * h * c;
+            }
+            mass_matrix.add_to_dense(model, &mut self.matrix);
+            let load = self.load.as_mut_slice();
+            for ((load, y), impulse) in load.iter_mut().zip(&*y).zip(impulse) {
+                *load = y + impulse;
+            }
+            self.load.gemv(-h, &self.C, &v, 1.0);
             // Of a matrix whose symmetric part is positive definite every pivot is positive without exchanges.
-            if let Some(change) = eliminate(&mut self.matrix, load, is_skew) {
-                self.change.resize(nv, 0.0);
-                mass_matrix.times(model, change.as_slice(), &mut self.change);
-                for ((y, change), impulse) in y.iter_mut().zip(&self.change).zip(impulse) {
-                    *y = change - impulse;
+            let change = self.load.as_mut_slice();
+            if eliminate(model, &mut self.matrix, change, is_skew) {
+                mass_matrix.times(model, change, y);
+                for (y, impulse) in y.iter_mut().zip(impulse) {
+                    *y -= impulse;
                 }
                 return;
             }
@@ -86,27 +96,84 @@ impl GyroscopicScratch {
     }
 }
 
-/// Solves by elimination without exchanges; none where a pivot is not positive, unless `is_forced`.
-fn eliminate(A: &mut DMatrix<f64>, mut b: DVector<f64>, is_forced: bool) -> Option<DVector<f64>> {
+/// `A ← ½ (A − Aᵀ)`.
+fn keep_skew_part(A: &mut DMatrix<f64>) {
+    for k in 0..A.ncols() {
+        for i in 0..=k {
+            let half = 0.5 * (A[(i, k)] - A[(k, i)]);
+            A[(i, k)] = half;
+            A[(k, i)] = -half;
+        }
+    }
+}
+
+/// Solves `A x = b` in place of b, by elimination without exchanges; false where a pivot is not positive, unless `is_forced`.
+///
+/// A has the sparsity of M. From the leaves to the base the elimination keeps it: each velocity changes only the rows and columns of its path.
+fn eliminate(model: &Model, A: &mut DMatrix<f64>, b: &mut [f64], is_forced: bool) -> bool {
     let n = b.len();
-    for k in 0..n {
-        let pivot = A[(k, k)];
-        if !is_forced && (pivot.is_nan() || pivot <= 0.0) {
-            return None;
-        }
-        for i in k + 1..n {
-            let factor = A[(i, k)] / pivot;
-            if factor != 0.0 {
-                for j in k + 1..n {
-                    A[(i, j)] -= factor * A[(k, j)];
-                }
-                b[i] -= factor * b[k];
-            }
-        }
-    }
+    let A = A.as_mut_slice();
     for k in (0..n).rev() {
-        let known: f64 = (k + 1..n).map(|j| A[(k, j)] * b[j]).sum();
-        b[k] = (b[k] - known) / A[(k, k)];
+        let (before, own) = A.split_at_mut(k * n);
+        let pivot = own[k];
+        if !is_forced && (pivot.is_nan() || pivot <= 0.0) {
+            return false;
+        }
+        let path = model.velocity_path(k);
+        let (base, joints) = path[..path.len() - 1].split_at(k.min(BASE));
+        let subtract = |x: &mut [f64], factor: f64| {
+            for (x, y) in x.iter_mut().zip(&own[..base.len()]) {
+                *x -= factor * y;
+            }
+            for &i in joints {
+                x[i] -= factor * own[i];
+            }
+        };
+        for column in (base.iter().chain(joints)).map(|j| j * n) {
+            let factor = before[column + k] / pivot;
+            subtract(&mut before[column..column + n], factor);
+        }
+        let factor = b[k] / pivot;
+        subtract(b, factor);
     }
-    Some(b)
+    for k in 0..n {
+        let path = model.velocity_path(k);
+        let known: f64 = (path[..path.len() - 1].iter())
+            .map(|&j| A[j * n + k] * b[j])
+            .sum();
+        b[k] = (b[k] - known) / A[k * n + k];
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::multibody::Configuration;
+
+    #[test]
+    fn elimination_along_the_paths_solves_what_the_dense_matrix_multiplies() {
+        let model = Model::rover();
+        let mut q = Configuration::zero(&model);
+        let v: Vec<f64> = (0..model.nv()).map(|k| (1.7 * k as f64).sin()).collect();
+        q.advance(&v, 1.0);
+        let kinematics = Kinematics::of(&model, &q);
+        let mut C = DMatrix::zeros(model.nv(), model.nv());
+        coriolis_matrix(
+            &model,
+            &kinematics,
+            &v,
+            &mut CoriolisScratch::default(),
+            &mut C,
+        );
+        let mut M = MassMatrix::new(&model);
+        M.update(&model, &kinematics);
+        let A = M.to_dense(&model) + C * 0.01;
+        let mut x = DVector::from_column_slice(&v);
+        assert!(eliminate(&model, &mut A.clone(), x.as_mut_slice(), false));
+        assert!((A * x - DVector::from_column_slice(&v)).norm() < 1e-12);
+        let mut turned_round = -M.to_dense(&model);
+        let mut x = v;
+        assert!(!eliminate(&model, &mut turned_round, &mut x, false));
+    }
 }

@@ -8,23 +8,50 @@
 //!
 //! Spatial vectors are (angular, linear) at the trunk origin, world axes. `B + Bᵀ = İ` and `B V = V×* I V`, which gives both properties.
 //!
+//! With V = (ω, v), mass m, first moment m c and inertia J about the trunk origin, and the momentum I V = (n, f)
+//!
+//! ```text
+//! I = [ J     m c× ]        B = [ K − ½ n×   0 ]        K = ½ (ω× J + (ω× J)ᵀ − m (c vᵀ + v cᵀ)) + m (c·v) 1
+//!     [ −m c×  m 1 ]            [ −f×        0 ]
+//! ```
+//!
+//! so that a body and all that it carries have sums of a few 3-vectors and symmetric matrices.
+//!
 //! Source: Echeandia, Wensing 2021, *Numerical methods to compute the Coriolis matrix and Christoffel symbols for rigid-body systems*,
 //! J. Comput. Nonlinear Dynam. 16, 091004.
 
-use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3, Vector6};
+use std::ops::{Add, AddAssign, Mul};
+
+use nalgebra::{DMatrix, Vector3};
 
 use super::kinematics::Kinematics;
-use super::model::Model;
+use super::model::{BASE, Body, Model};
 use crate::spatial::SymmetricMatrix3;
 
 /// Scratch of [`coriolis_matrix`]: sized once for a model.
 #[derive(Clone, Debug, Default)]
 pub struct CoriolisScratch {
-    velocity: Vec<Vector6<f64>>,
-    inertia: Vec<Matrix6<f64>>,
-    B: Vec<Matrix6<f64>>,
-    S: Vec<Vector6<f64>>,
-    S_dot: Vec<Vector6<f64>>,
+    velocity: Vec<Spatial>,
+    composites: Vec<Composite>,
+    S: Vec<Spatial>,
+    S_dot: Vec<Spatial>,
+}
+
+/// A motion vector (velocity of the point at the trunk origin) or a force vector (moment about it).
+#[derive(Clone, Copy, Debug, Default)]
+struct Spatial {
+    angular: Vector3<f64>,
+    linear: Vector3<f64>,
+}
+
+/// I and B of a body and all that it carries.
+#[derive(Clone, Copy, Debug, Default)]
+struct Composite {
+    mass: f64,
+    moment: Vector3<f64>,
+    J: SymmetricMatrix3,
+    K: SymmetricMatrix3,
+    momentum: Spatial,
 }
 
 /// `C(q, v)` (nv, nv) at the poses of `kinematics`, without gravity; `out` is overwritten.
@@ -40,111 +67,175 @@ pub fn coriolis_matrix(
     let bodies = model.bodies();
     let (n, nv) = (bodies.len(), model.nv());
     let s = scratch;
-    s.velocity.resize(n, Vector6::zeros());
-    s.inertia.resize(n, Matrix6::zeros());
-    s.B.resize(n, Matrix6::zeros());
-    s.S.resize(nv, Vector6::zeros());
-    s.S_dot.resize(nv, Vector6::zeros());
-    let origin_velocity = Vector3::new(v[0], v[1], v[2]);
+    s.velocity.resize(n, Spatial::default());
+    s.composites.resize(n, Composite::default());
+    s.S.resize(nv, Spatial::default());
+    s.S_dot.resize(nv, Spatial::default());
+    let base = Spatial {
+        angular: Vector3::new(v[3], v[4], v[5]),
+        linear: Vector3::new(v[0], v[1], v[2]),
+    };
     for k in 0..3 {
-        let e = Vector3::ith(k, 1.0);
-        s.S[k] = spatial(&Vector3::zeros(), &e);
-        s.S_dot[k] = Vector6::zeros();
+        let (e, zero) = (Vector3::ith(k, 1.0), Vector3::zeros());
+        s.S[k] = Spatial {
+            angular: zero,
+            linear: e,
+        };
+        s.S_dot[k] = Spatial::default();
         // The trunk turns about its own origin, which moves.
-        s.S[3 + k] = spatial(&e, &Vector3::zeros());
-        s.S_dot[3 + k] = spatial(&Vector3::zeros(), &origin_velocity.cross(&e));
+        s.S[3 + k] = Spatial {
+            angular: e,
+            linear: zero,
+        };
+        s.S_dot[3 + k] = Spatial {
+            angular: zero,
+            linear: base.linear.cross(&e),
+        };
     }
     for (b, body) in bodies.iter().enumerate() {
-        if b == 0 {
-            s.velocity[0] = spatial(&Vector3::new(v[3], v[4], v[5]), &origin_velocity);
+        s.velocity[b] = if b == 0 {
+            base
         } else {
-            let a = kinematics.axis[b];
-            let S = spatial(&a, &kinematics.r[b].cross(&a));
+            let axis = kinematics.axis[b];
+            let S = Spatial {
+                angular: axis,
+                linear: kinematics.r[b].cross(&axis),
+            };
             let carrier = s.velocity[body.parent];
             s.S[5 + b] = S;
-            s.S_dot[5 + b] = cross_motion(&carrier) * S;
-            s.velocity[b] = carrier + S * v[5 + b];
-        }
-        let I = spatial_inertia(model, kinematics, b);
-        let V = s.velocity[b];
-        let across = cross_motion(&V);
-        // V×* = −(V×)ᵀ
-        s.B[b] = (cross_force_bar(&(I * V)) - across.transpose() * I - I * across) * 0.5;
-        s.inertia[b] = I;
+            s.S_dot[5 + b] = carrier.moves(&S);
+            carrier + S * v[5 + b]
+        };
+        s.composites[b] = Composite::of(body, kinematics, b, &s.velocity[b]);
     }
     out.fill(0.0);
     for b in (0..n).rev() {
-        let own = if b == 0 { 0..6 } else { 5 + b..6 + b };
-        let (I, B) = (s.inertia[b], s.B[b]);
+        let own = if b == 0 { 0..BASE } else { 5 + b..6 + b };
+        let composite = s.composites[b];
         for k in own {
-            let F1 = I * s.S_dot[k] + B * s.S[k];
-            let F2 = I * s.S[k];
-            let F3 = B.transpose() * s.S[k];
+            let (S, S_dot) = (&s.S[k], &s.S_dot[k]);
+            let F1 = composite.times(S_dot) + composite.B_times(S);
+            let F2 = composite.times(S);
+            let F3 = composite.B_transposed_times(S);
             for &j in model.path(b).iter().take_while(|&&j| j <= k || b == 0) {
                 out[(j, k)] = s.S[j].dot(&F1);
-                out[(k, j)] = s.S_dot[j].dot(&F2) + s.S[j].dot(&F3);
+                out[(k, j)] = s.S_dot[j].dot(&F2) + s.S[j].angular.dot(&F3);
             }
-            out[(k, k)] = s.S[k].dot(&F1);
+            out[(k, k)] = S.dot(&F1);
         }
         if b > 0 {
-            let parent = bodies[b].parent;
-            s.inertia[parent] += I;
-            s.B[parent] += B;
+            s.composites[bodies[b].parent] += composite;
         }
     }
 }
 
-fn spatial(angular: &Vector3<f64>, linear: &Vector3<f64>) -> Vector6<f64> {
-    let (a, l) = (angular, linear);
-    Vector6::new(a.x, a.y, a.z, l.x, l.y, l.z)
+impl Spatial {
+    #[inline]
+    fn dot(&self, other: &Self) -> f64 {
+        self.angular.dot(&other.angular) + self.linear.dot(&other.linear)
+    }
+
+    /// `V× S`: the rate of a motion vector S that moves with the velocity V.
+    #[inline]
+    fn moves(&self, S: &Self) -> Self {
+        Self {
+            angular: self.angular.cross(&S.angular),
+            linear: self.linear.cross(&S.angular) + self.angular.cross(&S.linear),
+        }
+    }
 }
 
-fn parts(x: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    (
-        Vector3::new(x[0], x[1], x[2]),
-        Vector3::new(x[3], x[4], x[5]),
-    )
+impl Add for Spatial {
+    type Output = Self;
+
+    #[inline]
+    fn add(self, other: Self) -> Self {
+        Self {
+            angular: self.angular + other.angular,
+            linear: self.linear + other.linear,
+        }
+    }
 }
 
-fn blocks(a: &Matrix3<f64>, b: &Matrix3<f64>, c: &Matrix3<f64>, d: &Matrix3<f64>) -> Matrix6<f64> {
-    let mut out = Matrix6::zeros();
-    out.fixed_view_mut::<3, 3>(0, 0).copy_from(a);
-    out.fixed_view_mut::<3, 3>(0, 3).copy_from(b);
-    out.fixed_view_mut::<3, 3>(3, 0).copy_from(c);
-    out.fixed_view_mut::<3, 3>(3, 3).copy_from(d);
-    out
+impl Mul<f64> for Spatial {
+    type Output = Self;
+
+    #[inline]
+    fn mul(self, factor: f64) -> Self {
+        Self {
+            angular: self.angular * factor,
+            linear: self.linear * factor,
+        }
+    }
 }
 
-/// `V×`, the derivative of a motion vector that moves with V.
-fn cross_motion(V: &Vector6<f64>) -> Matrix6<f64> {
-    let (w, v) = parts(V);
-    let (w, v) = (w.cross_matrix(), v.cross_matrix());
-    blocks(&w, &Matrix3::zeros(), &v, &w)
+impl Composite {
+    /// Of one body alone, which moves with V.
+    #[inline]
+    fn of(body: &Body, kinematics: &Kinematics, b: usize, V: &Spatial) -> Self {
+        let (c, m) = (&kinematics.c[b], body.mass);
+        let R = &kinematics.R[b];
+        let mut J = match &body.principal_axes {
+            None => SymmetricMatrix3::rotated_diagonal(R, &body.principal_inertia),
+            Some(P) => SymmetricMatrix3::rotated_diagonal(&(R * P), &body.principal_inertia),
+        };
+        J += SymmetricMatrix3::point_mass(m, c);
+        let (w, v) = (&V.angular, &V.linear);
+        let turned = w.cross_matrix() * J.to_matrix();
+        let moved = c * v.transpose() * m;
+        let K = (turned + turned.transpose() - moved - moved.transpose()) * 0.5;
+        let mut K = SymmetricMatrix3::from_matrix(&K);
+        let along = m * c.dot(v);
+        K.xx += along;
+        K.yy += along;
+        K.zz += along;
+        let mut own = Self {
+            mass: m,
+            moment: c * m,
+            J,
+            K,
+            momentum: Spatial::default(),
+        };
+        own.momentum = own.times(V);
+        own
+    }
+
+    /// `I S`.
+    #[inline]
+    fn times(&self, S: &Spatial) -> Spatial {
+        Spatial {
+            angular: self.J.times(&S.angular) + self.moment.cross(&S.linear),
+            linear: S.linear * self.mass - self.moment.cross(&S.angular),
+        }
+    }
+
+    /// `B S`.
+    #[inline]
+    fn B_times(&self, S: &Spatial) -> Spatial {
+        let P = &self.momentum;
+        Spatial {
+            angular: self.K.times(&S.angular) - P.angular.cross(&S.angular) * 0.5,
+            linear: -P.linear.cross(&S.angular),
+        }
+    }
+
+    /// `Bᵀ S`, whose linear part is zero.
+    #[inline]
+    fn B_transposed_times(&self, S: &Spatial) -> Vector3<f64> {
+        let P = &self.momentum;
+        self.K.times(&S.angular) + P.angular.cross(&S.angular) * 0.5 + P.linear.cross(&S.linear)
+    }
 }
 
-/// `f×̄*` with `(f×̄*) V = V×* f`.
-fn cross_force_bar(f: &Vector6<f64>) -> Matrix6<f64> {
-    let (n, f) = parts(f);
-    let (n, f) = (n.cross_matrix(), f.cross_matrix());
-    blocks(&-n, &-f, &-f, &Matrix3::zeros())
-}
-
-fn spatial_inertia(model: &Model, kinematics: &Kinematics, b: usize) -> Matrix6<f64> {
-    let body = &model.bodies()[b];
-    let c = &kinematics.c[b];
-    let A = match &body.principal_axes {
-        None => kinematics.R[b],
-        Some(P) => kinematics.R[b] * P,
-    };
-    let mut about_origin = SymmetricMatrix3::rotated_diagonal(&A, &body.principal_inertia);
-    about_origin += SymmetricMatrix3::point_mass(body.mass, c);
-    let moment = c.cross_matrix() * body.mass;
-    blocks(
-        &about_origin.to_matrix(),
-        &moment,
-        &moment.transpose(),
-        &(Matrix3::identity() * body.mass),
-    )
+impl AddAssign for Composite {
+    #[inline]
+    fn add_assign(&mut self, other: Self) {
+        self.mass += other.mass;
+        self.moment += other.moment;
+        self.J += other.J;
+        self.K += other.K;
+        self.momentum = self.momentum + other.momentum;
+    }
 }
 
 #[cfg(test)]

@@ -114,7 +114,7 @@ impl MassMatrix {
         for k in 0..model.nv() {
             let n = last(model, k);
             let row = &self.rows[k * self.stride..][..=n];
-            let path = path(model, k);
+            let path = model.velocity_path(k);
             out[k] += row[n] * v[k];
             for (entry, &i) in row[..n].iter().zip(path) {
                 out[k] += entry * v[i];
@@ -127,13 +127,20 @@ impl MassMatrix {
     #[must_use]
     pub fn to_dense(&self, model: &Model) -> DMatrix<f64> {
         let mut dense = DMatrix::zeros(model.nv(), model.nv());
-        for k in 0..model.nv() {
-            for (entry, &i) in self.rows[k * self.stride..].iter().zip(path(model, k)) {
-                dense[(k, i)] = *entry;
-                dense[(i, k)] = *entry;
-            }
-        }
+        self.add_to_dense(model, &mut dense);
         dense
+    }
+
+    /// Adds M to a full matrix (nv, nv).
+    pub fn add_to_dense(&self, model: &Model, dense: &mut DMatrix<f64>) {
+        for (k, row) in self.rows.chunks_exact(self.stride).enumerate() {
+            let path = model.velocity_path(k);
+            for (entry, &i) in row.iter().zip(&path[..path.len() - 1]) {
+                dense[(k, i)] += entry;
+                dense[(i, k)] += entry;
+            }
+            dense[(k, k)] += row[path.len() - 1];
+        }
     }
 
     /// Factor `M = Lᵀ D L` into the room of `factor`. Returns whether M was positive definite.
@@ -143,24 +150,10 @@ impl MassMatrix {
     }
 }
 
-/// Velocity indices from the base to velocity `k` itself.
-#[inline]
-fn path(model: &Model, k: usize) -> &[usize] {
-    if k < 6 {
-        &model.path(0)[..=k]
-    } else {
-        model.path(k - 5)
-    }
-}
-
 /// Position of velocity `k` in its own row.
 #[inline]
 fn last(model: &Model, k: usize) -> usize {
-    if k < 6 {
-        k
-    } else {
-        model.path(k - 5).len() - 1
-    }
+    model.velocity_path(k).len() - 1
 }
 
 /// `M = Lᵀ D L`, L unit lower triangular with M's sparsity. Holds `L` along paths and `D^(-1/2)`.

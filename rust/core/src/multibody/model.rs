@@ -524,6 +524,17 @@ impl Model {
         &self.paths[b * self.path_stride..][..self.path_lengths[b]]
     }
 
+    /// Velocity indices from the base to velocity `k` itself.
+    #[inline]
+    #[must_use]
+    pub(crate) fn velocity_path(&self, k: usize) -> &[usize] {
+        if k < BASE {
+            &self.paths[..=k]
+        } else {
+            self.path(k - 5)
+        }
+    }
+
     /// Longest path: the stride of everything that is stored along paths.
     #[inline]
     #[must_use]
