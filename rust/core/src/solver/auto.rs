@@ -5,7 +5,9 @@ use super::nsgs::Budget;
 use super::report::{Rungs, SolveReport, SolveStatus, Stage};
 use super::work::Work;
 use super::workspace::SolverWorkspace;
-use super::{Method, SolverOptions, admm, guided, islands, newton, nsgs, pivoting, proximal, restarts, work};
+use super::{
+    Method, SolverOptions, admm, guided, islands, newton, nsgs, pivoting, proximal, restarts, work,
+};
 use crate::law::coulomb::{natural_map, violation};
 use crate::problem::{
     ContactScales, FrictionContactProblem, Magnitudes, Operator, Residual, Violations,
