@@ -108,26 +108,29 @@ def test_a_warm_start_is_taken(sim):
 
 
 @pytest.mark.parametrize(
-    "arguments",
+    ("field", "arguments"),
     [
-        (np.eye(4), np.zeros(4), [0.5]),
-        (np.ones((3, 2)), np.zeros(3), [0.5]),
-        (np.eye(3), np.zeros(2), [0.5]),
-        (np.eye(3), np.zeros(3), [0.5, 0.5]),
-        (np.eye(3), np.zeros(3), [-0.5]),
-        (np.eye(3), [np.nan, 0.0, 0.0], [0.5]),
-        (np.full((3, 3), np.inf), np.zeros(3), [0.5]),
-        (np.diag([0.0, 1.0, 1.0]), np.zeros(3), [0.5]),
-        ([["a", "b"]], np.zeros(3), [0.5]),
-        (([0, 1], [1], np.eye(3)[None]), np.zeros(3), [0.5]),
-        (([0, 1], [0.5], np.eye(3)[None]), np.zeros(3), [0.5]),
-        (([0, 1], [0], np.eye(2)[None]), np.zeros(3), [0.5]),
-        (([0, 1], [0], np.full((1, 3, 3), np.nan)), np.zeros(3), [0.5]),
+        ("W", (np.eye(4), np.zeros(3), [0.5])),
+        ("q", (np.eye(4), np.zeros(4), [0.5])),
+        ("W", (np.ones((3, 2)), np.zeros(3), [0.5])),
+        ("q", (np.eye(3), np.zeros(2), [0.5])),
+        ("q", (np.eye(3), np.zeros(3), [0.5, 0.5])),
+        ("mu[0]", (np.eye(3), np.zeros(3), [-0.5])),
+        ("q[0]", (np.eye(3), [np.nan, 0.0, 0.0], [0.5])),
+        ("W[0, 0]", (np.full((3, 3), np.inf), np.zeros(3), [0.5])),
+        ("W", (np.diag([0.0, 1.0, 1.0]), np.zeros(3), [0.5])),
+        ("W", (np.diag([1.0, 1.0, -1.0]), np.zeros(3), [0.5])),
+        ("W", ([["a", "b"]], np.zeros(3), [0.5])),
+        ("W", (([0, 1], [1], np.eye(3)[None]), np.zeros(3), [0.5])),
+        ("W", (([0, 1], [0.5], np.eye(3)[None]), np.zeros(3), [0.5])),
+        ("W", (([0, 1], [0], np.eye(2)[None]), np.zeros(3), [0.5])),
+        ("W[0, 0]", (([0, 1], [0], np.full((1, 3, 3), np.nan)), np.zeros(3), [0.5])),
     ],
 )
-def test_a_bad_problem_is_refused(arguments):
-    with pytest.raises(rover_gym.ProblemError):
+def test_a_bad_problem_is_refused_by_field(field, arguments):
+    with pytest.raises(rover_gym.ProblemError) as caught:
         rover_gym.solve_friction_contact(*arguments)
+    assert caught.value.field == field
 
 
 def test_bad_options_are_refused_by_field():
