@@ -20,7 +20,7 @@ use crate::multibody::bias::{BiasScratch, bias};
 use crate::multibody::momentum::{body_momenta, energy_and_momentum};
 use crate::multibody::{
     Configuration, DriveTrial, EnergyScratch, FactoredMassMatrix, Kinematics, MassMatrix, Model,
-    Momentum, MotorRegime,
+    Momentum, Motor, MotorRegime,
 };
 use crate::problem::{Dimension, FrictionContactProblem};
 
@@ -357,7 +357,12 @@ impl MechanicalSystem for TreeSystem<'_> {
                 work: torque.drive * turned,
             };
             // A damper never drives: where the rate changes its sign within the step, its torque at one time and the way at another may say so.
-            total += (torque.drive + torque.other) * turned + (torque.damper * turned).min(0.0);
+            // So does what a motor's line takes from the command.
+            let (command, motor) = self.command.drive(j);
+            let stall = motor.map_or(f64::INFINITY, |motor| motor.stall_torque);
+            let drive = command.clamp(-stall, stall);
+            let damper = torque.damper + (torque.drive - drive);
+            total += (drive + torque.other) * turned + (damper * turned).min(0.0);
         }
         total
     }
@@ -504,7 +509,11 @@ fn set_held_theta(
 ) {
     let h = options.time_step;
     for j in 0..model.n_joints() {
-        let (damping, stiffness) = feedback(command, &parts.motors, j);
+        // Also off its line: a motor that changed θ with its branch could find none.
+        let slope = command.drive(j).1.map_or(0.0, Motor::slope);
+        let (damping, stiffness) =
+            command.held[j].map_or((0.0, 0.0), |held| (held.damping, held.stiffness));
+        let damping = damping + slope;
         parts.theta_held[j] = if damping > 0.0 || stiffness > 0.0 {
             let inertia = parts.mass_matrix.diagonal(model, 6 + j);
             let z = h * (damping + 0.5 * h * stiffness) / inertia;

@@ -352,7 +352,9 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
         parts.mass = self.machine.mass_matrix(&parts.middle);
         for driven in &mut parts.motors {
             let k = driven.motor.coordinate;
-            let z = options.time_step * driven.damping() / parts.mass[(k, k)];
+            // Also off the line: a motor that changed θ with its branch could find none.
+            let damping = driven.motor.gain.abs() * driven.motor.line.slope();
+            let z = options.time_step * damping / parts.mass[(k, k)];
             driven.theta = fitted_theta(z).max(options.theta);
         }
     }
