@@ -134,7 +134,7 @@ def test_what_was_left_out_is_refused() -> None:
 
 
 def test_a_planar_rover_that_tips_over_says_so() -> None:
-    made = plan(straight())
+    made = plan(straight(model=RoverModel().replace(motor=None)))
     start = made.start.copy()
     start[1] += 2.0
     rover = replace(made, start=start).rover()
