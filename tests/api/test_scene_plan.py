@@ -134,10 +134,7 @@ def test_what_was_left_out_is_refused() -> None:
 
 
 def test_a_planar_rover_that_tips_over_says_so() -> None:
-    description = RoverModel().to_dict()
-    for wheel in description["wheels"]:
-        del wheel["motor"]  # which would stop pushing at their no-load speed
-    made = plan(straight(model=RoverModel.from_dict(description)))
+    made = plan(straight(model=RoverModel().replace(motor=None)))
     start = made.start.copy()
     start[1] += 2.0
     rover = replace(made, start=start).rover()

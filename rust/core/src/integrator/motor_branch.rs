@@ -44,6 +44,8 @@ impl MotorBranch {
     }
 
     /// Chooses θ_j for a coordinate with this damping (N m s/rad), stiffness (N m/rad) and inertia (kg m²), all told.
+    ///
+    /// The line's slope counts on every branch: a motor whose θ_j changed with its branch could find none.
     #[inline]
     pub(crate) fn set_theta(
         &mut self,
@@ -107,4 +109,11 @@ impl MotorBranch {
 #[inline]
 fn parts(drive: Option<&Drive>) -> (f64, Option<&Motor>) {
     drive.map_or((0.0, None), |drive| (drive.torque, drive.motor.as_ref()))
+}
+
+/// Slope of a drive's line, N m s/rad; 0 without one.
+#[inline]
+pub(crate) fn line_slope(drive: Option<&Drive>) -> f64 {
+    let (_, motor) = parts(drive);
+    motor.map_or(0.0, Motor::slope)
 }

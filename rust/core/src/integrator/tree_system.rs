@@ -10,7 +10,7 @@ use super::command::{Command, HeldJoint};
 use super::energy_audit::MechanicalEnergy;
 use super::gyroscopic::{GyroscopicScratch, gravity_load};
 use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
-use super::motor_branch::MotorBranch;
+use super::motor_branch::{MotorBranch, line_slope};
 use super::options::StepOptions;
 use crate::contact::{
     Activation, Contact, ContactKey, ContactSystem, detect, generalized_impulse, relocate,
@@ -503,9 +503,11 @@ fn set_held_theta(
     command: &Command,
     parts: &mut TreeScratch,
 ) {
-    for (j, (motor, held)) in parts.motors.iter_mut().zip(&command.held).enumerate() {
-        let feedback = feedback(motor, held.as_ref());
+    let joints = (parts.motors.iter_mut().zip(&command.held)).zip(&command.drives);
+    for (j, ((motor, held), drive)) in joints.enumerate() {
+        let (damping, stiffness) = held.map_or((0.0, 0.0), |held| (held.damping, held.stiffness));
         let inertia = parts.mass_matrix.diagonal(model, BASE + j);
+        let feedback = (damping + line_slope(drive.as_ref()), stiffness);
         motor.set_theta((options.time_step, options.theta), feedback, inertia);
     }
 }

@@ -103,12 +103,12 @@ impl Motor {
         let command = self.limited(command);
         let drop = self.slope() * rate;
         let (upper, lower) = (self.stall_torque - drop, -self.stall_torque - drop);
-        if command > upper {
-            if upper < -self.end(-command) { 4 } else { 3 }
-        } else if command < lower {
-            if lower > self.end(command) { 0 } else { 1 }
-        } else {
-            2
+        match () {
+            () if command > upper && upper < -self.end(-command) => 4,
+            () if command > upper => 3,
+            () if command < lower && lower > self.end(command) => 0,
+            () if command < lower => 1,
+            () => 2,
         }
     }
 

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ground::{ContactRule, Facing, Ground};
 use crate::contact::Activation;
-use crate::integrator::motor_branch::MotorBranch;
+use crate::integrator::motor_branch::{MotorBranch, line_slope};
 use crate::integrator::{
     Drive, MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
 };
@@ -368,7 +368,8 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
             if let Some(motor) = self.machine.motor(i) {
                 let k = motor.coordinate;
                 let inertia = parts.mass[(k, k)] / motor.gain.abs();
-                branch.set_theta(step, (branch.damping(), 0.0), inertia);
+                let drive = motor.drive(0.0);
+                branch.set_theta(step, (line_slope(Some(&drive)), 0.0), inertia);
             }
         }
     }
