@@ -205,8 +205,8 @@ def test_a_half_buried_sphere_shows_its_equator_and_one_on_top_its_own_radius() 
 
 
 def test_the_motors_work_is_what_the_environment_counts(recordings: dict[str, Path]) -> None:
-    # The environment sums |work| of each wheel and control period; where no wheel brakes, both are equal. A row has the torque of its last
-    # step, so a wheel that slips on a rock and comes to its motor's line within the period leaves a little.
+    # The environment sums |work| of each wheel and control period; where no wheel brakes, both are equal. A row has
+    # the torque of its last step: a wheel that slips and comes to its motor's line within the period leaves a little.
     for kind in ("flat", "rocks"):
         run = read_run(recordings[kind])
         spent = np.abs(np.diff(motor_work(run), axis=0)).sum(axis=1)
