@@ -36,9 +36,8 @@ def test_the_law_holds_and_velocities_are_the_known_ones(name: str) -> None:
         np.testing.assert_allclose(problem.W @ impulses + problem.q, velocities, rtol=0.0, atol=VELOCITY)
 
 
-@pytest.mark.parametrize("name", ["rover_gripping", "rover_lying_elastic"])
-def test_where_every_path_through_the_modes_stalls_another_start_helps(name: str) -> None:
-    problem, _ = load(name)
+def test_where_every_path_through_the_modes_stalls_another_start_helps() -> None:
+    problem, _ = load("rover_lying_elastic")
     answer = rover_gym.solve_friction_contact(problem.W, problem.q, problem.mu, 1e-12)
     assert answer.report.is_converged, answer.report.stages
     assert answer.report.stage == "restarts"

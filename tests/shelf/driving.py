@@ -56,16 +56,6 @@ def on_gravel(friction: float = 1.0) -> Simulation:
     return simulation
 
 
-def gripping() -> Simulation:
-    """The rover on level ground with μ = 1e8: wheels that turn against each other press without limit."""
-    simulation = Simulation(RoverModel(), friction=1e8, time_step=5e-3)
-    q = np.zeros(21)
-    q[1] = 0.45
-    simulation.set_state(q, np.zeros(21))
-    simulation.set_wheel_torques([60.0, -40.0, 50.0, -60.0, 30.0, -50.0])
-    return simulation
-
-
 def lying(restitution: float = 0.83) -> Simulation:
     """The elastic rover tumbles and comes to lie on trunk and bogies, of which many corners touch."""
     simulation = Simulation(RoverModel(), friction=0.7, restitution=restitution, time_step=5e-2)
