@@ -21,8 +21,10 @@ VELOCITY = 1e-6
 @pytest.mark.parametrize("name", names())
 def test_the_law_holds_and_velocities_are_the_known_ones(name: str) -> None:
     problem, velocities = load(name)
+    # What the default budget does not allow takes seconds, and is solved all the same.
+    options = {} if name in BOUNDS["not_reached"] else {"budget": 4_000_000_000}
     answer = rover_gym.solve_friction_contact(
-        problem.W, problem.q, problem.mu, BOUNDS["aim"], dimension=problem.dimension
+        problem.W, problem.q, problem.mu, BOUNDS["aim"], dimension=problem.dimension, **options
     )
     impulses = answer.impulses.ravel()
     relative, violation = residual(problem, impulses)
