@@ -56,11 +56,12 @@ def on_gravel(friction: float = 1.0) -> Simulation:
     return simulation
 
 
-def lying(restitution: float = 0.83) -> Simulation:
-    """The elastic rover tumbles and comes to lie on trunk and bogies, of which many corners touch."""
+def lying(restitution: float, steps: int) -> Simulation:
+    """The elastic rover, so many steps after it was thrown: it lies on trunk and bogies, of which many corners touch."""
     simulation = Simulation(RoverModel(), friction=0.7, restitution=restitution, time_step=5e-2)
     q, qdot = np.zeros(21), np.zeros(21)
     q[1], q[3] = 1.5, 2.5
     qdot[3:6] = 1.0, -2.0, 1.5
     simulation.set_state(q, qdot)
+    simulation.step(steps)
     return simulation

@@ -75,7 +75,7 @@ SHELF: dict[str, Callable[[], FreeBodies | Dense]] = {
     "rover_on_ice": lambda: driving.hardest(driving.on_rocks(5e-3, seed=3, friction=0.05), 1000),
     "rover_squeezed": lambda: driving.hardest(driving.on_rocks(1e-3, seed=1, wait=4.0), 1500),
     "rover_on_gravel": lambda: driving.hardest(driving.on_gravel(), 400),
-    "rover_lying_elastic": lambda: driving.hardest(driving.lying(), 250),
+    "rover_lying_elastic": lambda: driving.hardest(driving.lying(0.3, 93), 1),
 }
 
 

@@ -85,7 +85,7 @@ pub struct SolverOptions {
     pub tolerance: f64,
     /// Largest violation of a converged answer at any contact, m/s; default 1e-9.
     pub velocity_tolerance: f64,
-    /// Most Newton steps, counting every linear solve; default 500.
+    /// Most Newton steps of a stage, counting every linear solve; default 500.
     pub max_newton_steps: usize,
     /// Most Gauss–Seidel sweeps, or iterations of ADMM, when that is the method asked for; default 10 000. `Auto` stops earlier by itself.
     pub max_sweeps: usize,
