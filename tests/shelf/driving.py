@@ -57,7 +57,7 @@ def on_gravel(friction: float = 1.0) -> Simulation:
 
 
 def lying(restitution: float, steps: int) -> Simulation:
-    """The elastic rover, so many steps after it was thrown: it lies on trunk and bogies, of which many corners touch."""
+    """The elastic rover, so many steps after it was thrown: it lies on many corners of trunk and bogies."""
     simulation = Simulation(RoverModel(), friction=0.7, restitution=restitution, time_step=5e-2)
     q, qdot = np.zeros(21), np.zeros(21)
     q[1], q[3] = 1.5, 2.5

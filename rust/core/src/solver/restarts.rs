@@ -1,8 +1,8 @@
 //! Few contacts, when all else has failed: pivoting from other starts.
 //!
 //! Pivoting follows one path through the modes, and where that path goes round in circles another often does not. The first start is the nearest
-//! answer so far, whose modes may be right already; the others are drawn at random, always the same ones, with the size of its impulses. Measured on
-//! 395 problems of six wheels that press against each other with μ = 1e8, which nothing else solves.
+//! answer so far, whose modes may be right already; the others are drawn at random, always the same ones, with the size of its impulses. Of 40
+//! problems of six wheels that press against each other with μ = 1e8, which no stage before solves, it solves 21.
 
 use super::SolverOptions;
 use super::auto::Prepared;
