@@ -301,6 +301,9 @@ def anything(most: float) -> Any:
 
 
 FREE = Bounds(gained=None)
+DEEP = Bounds(lifted=None)
+#: Up to 43 contacts between overlapping spheres that face each other: some of the first steps' problems have no answer.
+WEDGED = Bounds(lifted=None, not_converged=5e-3)
 
 REGIMES = [
     *[Regime(f"full throttle, {v}", full_throttle(v), 12) for v in VARIANTS],
@@ -308,8 +311,8 @@ REGIMES = [
     *[Regime(f"steps of 10 us to 100 ms, {v}", steps(v), 40) for v in VARIANTS],
     Regime("free flight, to 1e4 rad/s", spin, 120),
     Regime("landing, to 1e3 rad/s", landing, 60),
-    Regime("starts deep in the ground", deep(False), 120),
-    Regime("starts deep in rocks", deep(True), 120),
+    Regime("starts deep in the ground", deep(False), 120, DEEP),
+    Regime("starts deep in rocks", deep(True), 120, DEEP),
     Regime("upside down", upside_down, 60),
     Regime("into rocks at 100 m/s", shot, 80),
     Regime("over rocks", stony, 40),
@@ -319,7 +322,7 @@ REGIMES = [
     Regime("gravity 0 and g/100", weightless, 40),
     Regime("elastic, frictionless", elastic(0.0), 60),
     Regime("elastic with friction", elastic(0.7), 40, FREE),
-    Regime("wedged between spheres", wedged, 120),
-    Regime("anything, e = 0", anything(0.0), 200),
-    Regime("anything, e to 1", anything(1.0), 100, FREE),
+    Regime("wedged between spheres", wedged, 120, WEDGED),
+    Regime("anything, e = 0", anything(0.0), 200, DEEP),
+    Regime("anything, e to 1", anything(1.0), 100, Bounds(gained=None, lifted=None)),
 ]

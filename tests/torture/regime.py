@@ -21,8 +21,8 @@ class Bounds:
         not_converged: Share of steps.
         refused: Share of steps.
         gained: Of the energy at hand in one step; None where the laws themselves may add energy.
-        lifted: The same by the projection.
-        deepest: m.
+        lifted: The same by the projection; None where a case starts deep in the ground.
+        deepest: m; None for any depth.
         slowest: s.
         reward: Either way.
     """
@@ -30,8 +30,8 @@ class Bounds:
     not_converged: float = 1e-4
     refused: float = 0.0
     gained: float | None = 1e-9
-    lifted: float | None = None
-    deepest: float | None = None
+    lifted: float | None = 1.0
+    deepest: float | None = 1.0
     slowest: float = 0.5
     reward: float = 100.0
 
