@@ -50,7 +50,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJean {
         probe: &mut dyn Probe,
     ) -> Result<StepReport, StepError> {
         scratch.fit(system.nv());
-        scratch.grant_work(&options.solver);
+        scratch.grant_work(&options.solver, system.solves_to_the_end());
         let mut attempts = MOST_ATTEMPTS;
         let whole = Part {
             options,
@@ -108,7 +108,11 @@ impl Part<'_> {
         let mut retaken = 0;
         let mut report = loop {
             *self.attempts = self.attempts.saturating_sub(1);
-            let can_halve = self.depth < MOST_HALVINGS && *self.attempts > 1 && ws.work_left > 0;
+            // Where sweeps end early by design a smaller step would end early too.
+            let can_halve = self.depth < MOST_HALVINGS
+                && *self.attempts > 1
+                && ws.work_left > 0
+                && system.solves_to_the_end();
             let attempted = attempt(system, options, start, warm_start, ws, is_gyroscopic, probe);
             let Some(mut report) = attempted else {
                 if can_halve {

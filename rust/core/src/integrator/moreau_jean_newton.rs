@@ -52,7 +52,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         let (h, theta) = (options.time_step, options.theta);
         let ws = scratch;
         ws.fit(system.nv());
-        ws.grant_work(&options.solver);
+        ws.grant_work(&options.solver, system.solves_to_the_end());
         let start = Start {
             configuration: &*state.configuration,
             v: &*state.v,

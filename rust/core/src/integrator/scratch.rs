@@ -77,9 +77,9 @@ impl<Q: Clone, C> Scratch<Q, C> {
         }
     }
 
-    /// Grants a new step its work.
-    pub(super) fn grant_work(&mut self, options: &SolverOptions) {
-        self.work_left = options.budget / STEP_SHARE;
+    /// Grants a new step its work: a share of a solve's, where it may solve several times.
+    pub(super) fn grant_work(&mut self, options: &SolverOptions, is_shared: bool) {
+        self.work_left = options.budget / if is_shared { STEP_SHARE } else { 1 };
     }
 
     /// The options of the step's next solve.
