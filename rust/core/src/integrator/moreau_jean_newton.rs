@@ -32,6 +32,9 @@ use super::{Integrator, KeyOf, ScratchOf, StateMut};
 /// Relative change below which an iteration that no longer shrinks has met rounding.
 const ROUNDING: f64 = 1e-8;
 
+/// Iterates in a row whose contacts were not solved after which the iteration is given up.
+const MOST_UNSOLVED: usize = 2;
+
 /// Turn in a step, rad, up to which the energy of free flight may err with the third power of the turn, as a part of itself.
 const MOST_TURN: f64 = 0.1;
 
@@ -68,6 +71,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         };
         let mut is_settled = false;
         let mut revisions = 0;
+        let mut unsolved = 0;
         let mut last_change = f64::INFINITY;
         for iteration in 0..options.newton_max_iterations {
             let Some(solved) = iterate(system, options, start, warm_start, ws, iteration, probe)
@@ -80,6 +84,15 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
             report.newton_iterations = iteration + 1;
             // A maximum passes over what is no number, so that has to be looked for.
             if !ws.v.iter().all(|x| x.is_finite()) {
+                break;
+            }
+            // An iterate that obeys no law leads nowhere: smaller steps have other problems.
+            unsolved = if solved.is_converged() {
+                0
+            } else {
+                unsolved + 1
+            };
+            if unsolved == MOST_UNSOLVED {
                 break;
             }
             // ws.y is now the change of v in this iteration.
