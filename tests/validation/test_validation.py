@@ -41,9 +41,11 @@ def test_disks_without_friction_pack_at_random_and_isostatically_those_with_fric
 
 
 def test_a_slope_stays_the_steeper_the_more_friction() -> None:
+    # A bed of so few disks is off by some four degrees: the mean of three.
     ledger = Ledger()
-    angles = [slope(190, mu, 0, ledger, length=20.0)["angle"] for mu in (0.05, 0.5)]
-    assert 0.0 < angles[0] < angles[1] - 3.0 < 30.0
+    beds = [[slope(190, mu, seed, ledger, length=20.0)["angle"] for seed in range(3)] for mu in (0.05, 0.5)]
+    low, high = (sum(angles) / len(angles) for angles in beds)
+    assert 0.0 < low < high - 3.0 < 30.0
     held(ledger)
 
 
