@@ -14,7 +14,8 @@
 //! - [`multibody`]: model, state, kinematics, mass matrix, bias, energy, momentum;
 //! - [`geometry`]: the ground; [`contact`]: points, frames, gaps, Delassus operator;
 //! - [`cone`], [`law`], [`problem`], [`solver`]: the friction-contact problem, which sees only (W, q, μ);
-//! - [`integrator`]: one step; [`simulation`]: many;
+//! - [`integrator`]: one step of any mechanical system; [`system`]: the tree of solids as one;
+//! - [`simulation`]: many steps;
 //! - [`planar`]: a ball and a two-wheel rover on a curve, through the same step.
 #![forbid(unsafe_code)]
 
@@ -31,3 +32,4 @@ pub mod problem;
 pub mod simulation;
 pub mod solver;
 pub mod spatial;
+pub mod system;

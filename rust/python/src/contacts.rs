@@ -3,8 +3,8 @@
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use rover_core::contact::Part;
-use rover_core::integrator::ActiveContact;
 use rover_core::multibody::Model;
+use rover_core::system::ActiveContact;
 
 use crate::arrays::{fresh_blocks, fresh_rows};
 

@@ -8,30 +8,23 @@
 //! Both treat impacts and persistent contact by the same law at velocity level and search for no event.
 //! What the velocity law leaves of penetration, [`position_projection`] removes. Every step's energy is audited ([`energy_audit`]).
 //!
-//! A scheme is written once, over what a [`MechanicalSystem`] can do: the rover's tree of solids ([`tree_system`]) and the planar
-//! systems ([`crate::planar`]) step through the same code.
+//! A scheme is written once, over what a [`MechanicalSystem`] can do: the tree of solids and the planar systems
+//! ([`crate::system`], [`crate::planar`]) step through the same code.
 
 pub mod accuracy;
-pub mod command;
 pub mod energy_audit;
 pub mod error;
-pub mod fitted_theta;
-pub mod gyroscopic;
 pub mod mechanical_system;
 pub mod moreau_jean;
 pub mod moreau_jean_newton;
-pub(crate) mod motor_branch;
 pub mod options;
 pub mod position_projection;
 pub mod probe;
 pub mod report;
 pub mod scratch;
-pub mod tree_system;
 pub mod warm_start;
-pub mod workspace;
 
 pub use accuracy::Accuracy;
-pub use command::{Command, Drive, HeldJoint};
 pub use energy_audit::MechanicalEnergy;
 pub use error::{OptionsError, StepError};
 pub use mechanical_system::{MechanicalSystem, Start, UnilateralContact};
@@ -39,9 +32,7 @@ pub use options::{Stabilisation, StepOptions, Variant};
 pub use probe::{NoProbe, Phase, Probe};
 pub use report::{StepReport, StepStatus};
 pub use scratch::Scratch;
-pub use tree_system::{DriveAction, TreeScratch, TreeSystem};
 pub use warm_start::WarmStart;
-pub use workspace::{ActiveContact, Workspace};
 
 /// Key of a system's contacts.
 pub type KeyOf<S> = <<S as MechanicalSystem>::Contact as UnilateralContact>::Key;

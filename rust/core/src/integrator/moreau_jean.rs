@@ -17,7 +17,7 @@
 //! are implicit instead: `bias = G + C(q_m, v_m) (v + (1−θ) Δv)` with the impulses of persistent contact inside Δv. Then no spin and no step
 //! make the scheme unstable.
 //!
-//! The PD of a held joint is implicit with an exponentially fitted θ_j ([`super::fitted_theta`]), so no gain and
+//! The PD of a held joint is implicit with an exponentially fitted θ_j ([`crate::system::fitted_theta`]), so no gain and
 //! no step make it unstable. Contacts enter by the forecast `gap + γ h u_N ≤ 0`, measured from q_m.
 //!
 //! Source: Moreau 1988; Jean 1999; Acary, Brogliato 2008, ch. 10.

@@ -9,12 +9,13 @@ use serde::{Deserialize, Serialize};
 
 use super::ground::{ContactRule, Facing, Ground};
 use crate::contact::Activation;
-use crate::integrator::motor_branch::{MotorBranch, line_slope};
 use crate::integrator::{
-    Drive, MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
+    MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
 };
 use crate::multibody::Motor;
 use crate::problem::{Dimension, FrictionContactProblem};
+use crate::system::Drive;
+use crate::system::motor_branch::{MotorBranch, line_slope};
 
 /// A disc of a machine in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]

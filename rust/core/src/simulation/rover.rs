@@ -10,11 +10,14 @@ use super::snapshot::Snapshot;
 use crate::contact::{Activation, Contact, ContactFrame, Part, detect, detection::wheel_contacts};
 use crate::geometry::Terrain;
 use crate::integrator::{
-    ActiveContact, Command, Drive, HeldJoint, Integrator, NoProbe, OptionsError, Probe, StateMut,
-    StepError, StepOptions, StepReport, TreeSystem, WarmStart, Workspace,
-    workspace::contact_capacity,
+    Integrator, NoProbe, OptionsError, Probe, StateMut, StepError, StepOptions, StepReport,
+    WarmStart,
 };
 use crate::multibody::{Configuration, Energy, Kinematics, Model, Momentum, State, momentum};
+use crate::system::{
+    ActiveContact, Command, Drive, HeldJoint, TreeSystem, Workspace,
+    tree_workspace::contact_capacity,
+};
 
 /// How far the squared length of a snapshot's quaternion may be from 1: the steps keep it within rounding.
 const UNIT: f64 = 1e-12;

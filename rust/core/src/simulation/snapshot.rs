@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::integrator::{ActiveContact, Command, WarmStart};
+use crate::integrator::WarmStart;
 use crate::multibody::State;
+use crate::system::{ActiveContact, Command};
 
 /// State, commands, the solver's starting point and the last step's contacts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! The branch is chosen at the θ_j-weighted rate, so that torque, branch and work belong together; where the step's end asks for another
-//! branch the step is taken again ([`super::MechanicalSystem::revise`]). Torques never rise with the speed, so the implicit term is dissipative.
+//! branch the step is taken again ([`crate::integrator::MechanicalSystem::revise`]). Torques never rise with the speed, so the implicit term is dissipative.
 
 use super::command::Drive;
 use super::fitted_theta::fitted_theta;

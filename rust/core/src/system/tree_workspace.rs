@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::scratch::Scratch;
-use super::tree_system::TreeScratch;
+use super::tree::TreeScratch;
 use crate::contact::Contact;
+use crate::integrator::Scratch;
 use crate::multibody::{Configuration, Model};
 
 /// A contact of the last step with what it did.

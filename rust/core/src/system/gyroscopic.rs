@@ -6,7 +6,7 @@
 //!
 //! C is frozen, `C = C(q_m, v_m)`. Its skew part does no work and rotates the velocity by a Cayley transform, whatever the spin. Its symmetric
 //! part `½ Ṁ` can make the matrix singular where a frame turns by radians in a step; there it is left out, and what the poses at both ends
-//! make of the energy is the audit's ([`super::energy_audit`]).
+//! make of the energy is the audit's ([`crate::integrator::energy_audit`]).
 
 use nalgebra::{DMatrix, DVector, DVectorView, Vector3};
 

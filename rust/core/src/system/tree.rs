@@ -7,15 +7,15 @@
 use nalgebra::Vector3;
 
 use super::command::{Command, HeldJoint};
-use super::energy_audit::MechanicalEnergy;
 use super::gyroscopic::{GyroscopicScratch, gravity_load};
-use super::mechanical_system::{MechanicalSystem, Start, UnilateralContact};
 use super::motor_branch::{MotorBranch, line_slope};
-use super::options::StepOptions;
 use crate::contact::{
     Activation, Contact, ContactKey, ContactSystem, detect, generalized_impulse, relocate,
 };
 use crate::geometry::Terrain;
+use crate::integrator::{
+    MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
+};
 use crate::multibody::bias::{BiasScratch, bias};
 use crate::multibody::momentum::{body_momenta, energy_and_momentum};
 use crate::multibody::{
@@ -384,7 +384,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         );
     }
 
-    /// In momentum form, exact at both ends: see [`super::moreau_jean_newton`].
+    /// In momentum form, exact at both ends: see [`crate::integrator::moreau_jean_newton`].
     fn balance(
         &mut self,
         options: &StepOptions,
@@ -570,7 +570,7 @@ fn add_command(
     }
 }
 
-/// `y = −(left side)` of the principle of [`super::moreau_jean_newton`] at the iterate `v_end`, without commands and contacts.
+/// `y = −(left side)` of the principle of [`crate::integrator::moreau_jean_newton`] at the iterate `v_end`, without commands and contacts.
 fn momentum_residual(
     model: &Model,
     gravity: &Vector3<f64>,
