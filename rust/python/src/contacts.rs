@@ -2,22 +2,22 @@
 
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
-use rover_core::contact::Part;
+use rover_core::contact::{Contact, Part};
 use rover_core::multibody::Model;
-use rover_core::system::ActiveContact;
+use rover_core::simulation::ActiveContact;
 
 use crate::arrays::{fresh_blocks, fresh_rows};
 
 /// The contacts of the last step, as fresh arrays with one row a contact.
 #[pyclass(module = "rover_gym._core", frozen)]
 pub struct Contacts {
-    active: Vec<ActiveContact>,
+    active: Vec<ActiveContact<Contact>>,
     bodies: Vec<String>,
 }
 
 impl Contacts {
-    pub fn new(model: &Model, active: &[ActiveContact]) -> Self {
-        let name = |a: &ActiveContact| match a.contact.part {
+    pub fn new(model: &Model, active: &[ActiveContact<Contact>]) -> Self {
+        let name = |a: &ActiveContact<Contact>| match a.contact.part {
             Part::Wheel(i) => model.description().wheels[i].solid.clone(),
             Part::Box(i) => model.boxes()[i].name.clone(),
         };
@@ -30,7 +30,7 @@ impl Contacts {
     fn rows<'py>(
         &self,
         py: Python<'py>,
-        f: impl Fn(&ActiveContact) -> [f64; 3],
+        f: impl Fn(&ActiveContact<Contact>) -> [f64; 3],
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         fresh_rows(py, &self.active.iter().map(f).collect::<Vec<_>>())
     }
@@ -45,7 +45,7 @@ impl Contacts {
 
     #[getter]
     fn wheels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        let index = |a: &ActiveContact| match a.contact.part {
+        let index = |a: &ActiveContact<Contact>| match a.contact.part {
             Part::Wheel(i) => i64::try_from(i).unwrap_or(-1),
             Part::Box(_) => -1,
         };
@@ -54,7 +54,7 @@ impl Contacts {
 
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.position.into())
+        self.rows(py, |a| a.position)
     }
 
     #[getter]

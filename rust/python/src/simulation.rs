@@ -8,7 +8,7 @@ use rover_core::integrator::{
 };
 use rover_core::multibody::{Energy as CoreEnergy, Model, coordinates};
 use rover_core::nalgebra::DMatrix;
-use rover_core::simulation::{Look, ReadingLayout, Simulation as CoreSimulation};
+use rover_core::simulation::{Look, ReadingLayout, RoverSimulation as CoreSimulation};
 use std::sync::{Arc, MutexGuard};
 
 use crate::accuracy;

@@ -3,7 +3,7 @@
 use pyo3::PyTypeInfo;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use rover_core::simulation::Snapshot as CoreSnapshot;
+use rover_core::simulation::{RoverScene, Snapshot as SnapshotOf};
 use serde::de::DeserializeOwned;
 
 use crate::arguments;
@@ -12,7 +12,7 @@ use crate::errors::{BorderError, Kind, Value};
 /// Everything that a simulation needs to continue bit for bit; picklable.
 #[pyclass(module = "rover_gym._core", frozen)]
 pub struct Snapshot {
-    pub inner: CoreSnapshot,
+    pub inner: SnapshotOf<RoverScene>,
 }
 
 impl Snapshot {
