@@ -112,7 +112,7 @@ pub const DURATION: f64 = 0.64;
 /// Steps of the reference over the duration.
 const REFERENCE: usize = 4096;
 
-fn run<const NV: usize, M: PlanarMachine<NV>>(
+fn run<const NV: usize, M: PlanarMachine<NV> + Clone + 'static>(
     mut simulation: PlanarSimulation<NV, M>,
     stepper: &Stepper,
     n: usize,
