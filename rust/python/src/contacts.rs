@@ -60,8 +60,9 @@ impl Contacts {
         self.rows(py, |a| a.position.into())
     }
 
-    /// Contact frames, (n, 3, 3): rows are the unit vectors n (normal), t (rolling), b (lateral),
-    /// world frame.
+    /// Contact frames, world frame, (n, 3, 3).
+    ///
+    /// Rows are the unit vectors n (normal), t (rolling direction) and b (lateral).
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let values = self

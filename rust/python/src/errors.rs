@@ -84,11 +84,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
         Ok(class.unbind())
     };
     let exception = PyTuple::new(py, [py.get_type::<PyException>()])?;
-    let root = make(
-        "RoverGymError",
-        exception,
-        ROOT,
-    )?;
+    let root = make("RoverGymError", exception, ROOT)?;
     let root = root.bind(py);
     let value_error = || PyTuple::new(py, [root.clone(), py.get_type::<PyValueError>()]);
     let classes = Classes {

@@ -21,7 +21,7 @@ pub struct SolverReport {
 
 #[pymethods]
 impl SolverReport {
-    /// "converged", "relaxed", "not_converged" or "budget_exhausted".
+    /// How it ended: "converged", "relaxed", "not_converged" or "budget_exhausted".
     ///
     /// "relaxed": the convex relaxation is solved, which is not Coulomb's law. "budget_exhausted":
     /// the work that `budget` allows is done, and the answer is the best one found.
@@ -47,8 +47,7 @@ impl SolverReport {
         self.inner.iterations
     }
 
-    /// Violation of Signorini's and Coulomb's laws relative to the data, computed from the returned
-    /// impulses.
+    /// Violation of Signorini's and Coulomb's laws by the returned impulses, relative to the data.
     #[getter]
     fn residual(&self) -> f64 {
         self.inner.residual

@@ -215,8 +215,7 @@ impl PlanarContacts {
         self.rows(py, |a| a.impulse)
     }
 
-    /// Velocities of the rim against the ground after the step along normal and tangent, (n, 2),
-    /// m/s.
+    /// Velocities of the rim after the step along normal and tangent, (n, 2), m/s.
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.rows(py, |a| a.velocity)
@@ -416,8 +415,9 @@ impl PlanarSimulation {
         Ok(settings)
     }
 
-    /// Sets coordinates and rates; time starts at 0, the next step has no warm start, and torques
-    /// stay.
+    /// Sets coordinates and rates; torques stay.
+    ///
+    /// Time starts at 0, and the next step has no warm start.
     ///
     /// Args:
     ///     q: Coordinates, (nv,), m and rad.
@@ -602,11 +602,11 @@ impl BallSimulation {
     }
 }
 
-/// A body on two driven wheels: coordinates x, y of the body's mass centre, m, theta, theta_A,
-/// theta_B, rad.
+/// A body on two driven wheels.
 ///
-/// A is the back wheel, B the front wheel. All angles are absolute. The defaults are the rover of
-/// the 2010 report's granular run.
+/// Coordinates are x, y of the body's mass centre, m, theta, theta_A and theta_B, rad. A is the
+/// back wheel, B the front wheel. All angles are absolute. The defaults are the rover of the 2010
+/// report's granular run.
 ///
 /// Args:
 ///     ground: A `Line`, `Sine`, `Spline` or `Polyline`.

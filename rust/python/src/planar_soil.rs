@@ -118,8 +118,9 @@ fn rover(given: &Bound<'_, PyDict>) -> PyResult<TwoWheelRover> {
     Ok(made.map_err(|e| border(Kind::Model, &e))?)
 }
 
-/// The contacts of a soil's last step, as new arrays with one row a contact. Those between sleeping
-/// disks are left out.
+/// The contacts of a soil's last step, as new arrays with one row a contact.
+///
+/// Contacts between sleeping disks are left out.
 #[pyclass(module = "rover_gym._core", frozen)]
 pub struct SoilContacts {
     active: Vec<SoilActiveContact>,
@@ -175,8 +176,9 @@ impl SoilContacts {
         self.rows(py, |a| a.impulse)
     }
 
-    /// Velocities of the first body against the second after the step along normal and tangent, (n,
-    /// 2), m/s.
+    /// Relative velocities after the step along normal and tangent, (n, 2), m/s.
+    ///
+    /// Of the first body against the second.
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.rows(py, |a| a.velocity)
@@ -236,8 +238,9 @@ impl SoilSnapshot {
     }
 }
 
-/// A granular soil: free disks with friction between walls or on a ground, and a machine that
-/// drives on it.
+/// A granular soil of disks, and a machine that drives on it.
+///
+/// The disks are free, with friction, between walls or on a ground.
 ///
 /// One call at a time: a call during another one, from another thread or a signal handler, raises
 /// BusyError.
@@ -710,8 +713,9 @@ impl SoilSimulation {
         Ok(inner.energy().into())
     }
 
-    /// Momentum of the disks that are not kinematic, along x and y, kg m/s, and about the origin,
-    /// kg m²/s, (3,).
+    /// Momentum of the disks, (3,): along x and y, kg m/s, and about the origin, kg m²/s.
+    ///
+    /// Kinematic disks do not count.
     fn momentum<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let inner = self.open()?;
         Ok(fresh(py, &inner.momentum()))

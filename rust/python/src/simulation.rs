@@ -32,7 +32,9 @@ pub struct StepReport {
 
 #[pymethods]
 impl StepReport {
-    /// "converged" if the contact solver met its tolerance in every step, else "not_converged".
+    /// How the steps ended: "converged" or "not_converged".
+    ///
+    /// "converged" means that the contact solver met its tolerance in every step.
     #[getter]
     fn status(&self) -> &'static str {
         if self.inner.is_converged() {
@@ -78,22 +80,24 @@ impl StepReport {
         self.inner.n_contacts
     }
 
-    /// Number of steps taken again, because a motor reached its torque-speed line, the energy audit
-    /// asked for implicit gyroscopic terms, or Newton's law of restitution had no solution.
+    /// Number of steps taken again.
+    ///
+    /// A step is taken again when a motor reached its torque-speed line, when the energy audit asks
+    /// for implicit gyroscopic terms, or when Newton's law of restitution had no solution.
     #[getter]
     fn retaken(&self) -> usize {
         self.inner.retaken
     }
 
-    /// Largest gain of energy in a step beyond the work of gravity and actuators, relative to the
-    /// kinetic energy.
+    /// Largest unexplained gain of energy in a step, relative to the kinetic energy.
+    ///
+    /// Unexplained is what exceeds the work of gravity and actuators.
     #[getter]
     fn energy_gain(&self) -> f64 {
         self.inner.energy_gain
     }
 
-    /// Energy that the scheme would have gained and the energy audit removed, summed over the
-    /// steps, J.
+    /// Energy that the scheme would have gained and the audit removed, summed over the steps, J.
     #[getter]
     fn energy_removed(&self) -> f64 {
         self.inner.energy_removed
@@ -430,22 +434,24 @@ impl Simulation {
         Ok(settings)
     }
 
-    /// Coordinates, (nq,): x, y, z of the trunk, m; roll, heading, pitch, rad; joints, rad.
+    /// Coordinates, (nq,), m and rad.
+    ///
+    /// x, y, z of the trunk's origin; roll, heading, pitch; joints.
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let q = coordinates::to_public(&self.open()?.state().configuration);
         Ok(fresh(py, &q))
     }
 
-    /// Velocities, (nv,): of the trunk, world frame, m/s; its angular velocity, world frame, rad/s;
-    /// joint rates, rad/s.
+    /// Velocities, (nv,), m/s and rad/s.
+    ///
+    /// Velocity of the trunk, world frame; its angular velocity, world frame; joint rates.
     #[getter]
     fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         Ok(fresh(py, &self.open()?.state().v))
     }
 
-    /// Rotation matrix R_WB of the trunk, (3, 3): it turns coordinates in the trunk into
-    /// coordinates in the world.
+    /// Rotation matrix R_WB, (3, 3): from coordinates in the trunk to coordinates in the world.
     #[getter]
     fn rotation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let R = self
@@ -460,7 +466,9 @@ impl Simulation {
         )
     }
 
-    /// Sets coordinates and velocities; time starts at 0, and the next step has no warm start.
+    /// Sets coordinates and velocities.
+    ///
+    /// Time starts at 0, and the next step has no warm start.
     ///
     /// Args:
     ///     q: Coordinates, (nq,).
@@ -511,10 +519,9 @@ impl Simulation {
         Ok(fresh(py, self.open()?.wheel_torques()))
     }
 
-    /// Mean torques of the drives over the last step, (n_wheels,), N m, positive forward; 0 before
-    /// any step.
+    /// Mean torques of the drives over the last step, (n_wheels,), N m, positive forward.
     ///
-    /// Each is the command within the line of the wheel's `Motor`.
+    /// Each is the command within the line of the wheel's `Motor`; 0 before any step.
     #[getter]
     fn motor_torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         Ok(fresh(py, self.open()?.motor_torques()))
@@ -683,22 +690,23 @@ impl Simulation {
         Ok(PyArray1::from_iter(py, contacts.iter().map(|c| c.gap)))
     }
 
-    /// Mean contact force on each wheel over the last step, (n_wheels, 3), N, along n, t, b of the
-    /// wheel's contact frame.
+    /// Mean contact force on each wheel over the last step, (n_wheels, 3), N.
+    ///
+    /// Along n, t, b of the wheel's contact frame.
     #[getter]
     fn wheel_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         fresh_rows(py, &self.open()?.wheel_forces())
     }
 
-    /// Mean normal force over the last step on all solids but the wheels, N. It is large when the
-    /// rover is high-centred.
+    /// Mean normal force over the last step on all solids but the wheels, N.
+    ///
+    /// It is large when the rover is high-centred.
     #[getter]
     fn trunk_force(&self) -> PyResult<f64> {
         Ok(self.open()?.body_force())
     }
 
-    /// Smallest gap now between the ground and any wheel or box, m: 0 where nothing overlaps, else
-    /// negative.
+    /// Deepest overlap of a wheel or a box with the ground now, as a gap, m; 0 without overlap.
     #[getter]
     fn deepest_overlap(&self) -> PyResult<f64> {
         Ok(self.open()?.deepest_overlap())

@@ -211,8 +211,9 @@ impl SphereField {
         build(py, &centres, &radii, ground).map_err(|e| in_file(e, &path).into())
     }
 
-    /// The wavy ground of Fig. 6.6 of the 2010 report: 50 x 25 spheres of radius 0.5 m, without a
-    /// plane.
+    /// The wavy ground of the 2010 report's Fig. 6.6.
+    ///
+    /// 50 x 25 spheres of radius 0.5 m, without a plane.
     ///
     /// Source: [R].
     #[staticmethod]
