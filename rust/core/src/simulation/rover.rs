@@ -119,7 +119,7 @@ impl Scene for RoverScene {
 
     #[inline]
     fn position(&self, parts: &RoverParts, contact: &Contact) -> [f64; 3] {
-        (parts.tree.base_of_contacts() + contact.point).into()
+        (parts.tree.origin_of_contacts(contact.body) + contact.point).into()
     }
 
     fn begin_call(&self, parts: &mut RoverParts) {
@@ -133,7 +133,7 @@ impl Scene for RoverScene {
             *work += drive.work;
         }
         for (torque, wheel) in taken.memory.iter_mut().zip(self.model.wheels()) {
-            let impulse = wheel.joint.map_or(0.0, |k| drives[k - 6].impulse);
+            let impulse = wheel.joint.map_or(0.0, |j| drives[j].impulse);
             *torque = wheel.drive_sign * impulse / taken.options.time_step;
         }
     }

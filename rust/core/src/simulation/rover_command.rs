@@ -24,15 +24,15 @@ impl RoverCommand {
     pub fn idle(model: &Model) -> Self {
         let mut actuators = Command::idle(model);
         for wheel in model.wheels() {
-            if let Some(k) = wheel.joint {
-                actuators.drives[k - 6] = Some(Drive {
+            if let Some(j) = wheel.joint {
+                actuators.drives[j] = Some(Drive {
                     torque: 0.0,
                     motor: wheel.motor,
                 });
             }
-            if let Some(k) = wheel.steering {
-                let hold = model.bodies()[k - 5].hold;
-                actuators.held[k - 6] = Some(HeldJoint {
+            if let Some(j) = wheel.steering {
+                let hold = model.hold(j);
+                actuators.held[j] = Some(HeldJoint {
                     set_point: 0.0,
                     stiffness: hold.stiffness,
                     damping: hold.damping,
@@ -129,7 +129,7 @@ impl RoverSimulation {
         {
             if let Some(drive) = wheel
                 .joint
-                .and_then(|k| self.command.actuators.drives[k - 6].as_mut())
+                .and_then(|j| self.command.actuators.drives[j].as_mut())
             {
                 drive.torque += wheel.drive_sign * torque;
             }
@@ -139,7 +139,7 @@ impl RoverSimulation {
     /// Steering set-point of each wheel, rad; 0 where its steering is not held or is locked.
     #[must_use]
     pub fn steering(&self) -> Vec<f64> {
-        let of = |k: usize| self.command.actuators.held[k - 6].map_or(0.0, |h| h.set_point);
+        let of = |j: usize| self.command.actuators.held[j].map_or(0.0, |h| h.set_point);
         self.model()
             .wheels()
             .iter()
@@ -154,12 +154,12 @@ impl RoverSimulation {
     pub fn set_steering(&mut self, set_points: &[f64]) -> Result<(), CommandError> {
         self.check_steering(set_points)?;
         for (&set_point, wheel) in set_points.iter().zip(self.scene.model.wheels()) {
-            if let Some(k) = wheel.steering {
-                let hold = self.scene.model.bodies()[k - 5].hold;
-                let held = self.command.actuators.held[k - 6];
+            if let Some(j) = wheel.steering {
+                let hold = self.scene.model.hold(j);
+                let held = self.command.actuators.held[j];
                 let (stiffness, damping) =
                     held.map_or((hold.stiffness, hold.damping), |h| (h.stiffness, h.damping));
-                self.command.actuators.held[k - 6] = Some(HeldJoint {
+                self.command.actuators.held[j] = Some(HeldJoint {
                     set_point,
                     stiffness,
                     damping,
@@ -237,7 +237,7 @@ impl RoverSimulation {
             }
         }
         for (i, &j) in indices.iter().enumerate() {
-            let hold = self.scene.model.bodies()[j + 1].hold;
+            let hold = self.scene.model.hold(j);
             self.command.actuators.held[j] = Some(HeldJoint {
                 set_point: set_points.map_or(self.state.configuration.joints[j], |p| p[i]),
                 stiffness: stiffness.unwrap_or(hold.stiffness),
@@ -263,10 +263,10 @@ impl RoverSimulation {
         self.command.wheel_torque.fill(0.0);
         self.combine_torques();
         for wheel in self.scene.model.wheels() {
-            if let Some(k) = wheel.joint {
-                let hold = self.scene.model.bodies()[k - 5].hold;
-                let set_point = self.state.configuration.joints[k - 6];
-                self.command.actuators.held[k - 6] = Some(HeldJoint {
+            if let Some(j) = wheel.joint {
+                let hold = self.scene.model.hold(j);
+                let set_point = self.state.configuration.joints[j];
+                self.command.actuators.held[j] = Some(HeldJoint {
                     set_point,
                     stiffness: hold.stiffness,
                     damping: hold.damping,
@@ -277,7 +277,7 @@ impl RoverSimulation {
 
     fn joint_indices(&self, joints: &[String]) -> Result<Vec<usize>, CommandError> {
         let index = |name: &String| {
-            let found = self.scene.model.joint_index(name).map(|k| k - 6);
+            let found = self.scene.model.joint_index(name);
             found.ok_or_else(|| CommandError::UnknownJoint {
                 field: "joints",
                 name: name.clone(),
