@@ -117,6 +117,12 @@ impl RoverModel {
         Ok((q, kind, kinematics, contacts))
     }
 
+    /// Velocity index of a joint; −1 where there is none.
+    fn velocity_index(&self, joint: Option<usize>) -> i64 {
+        let index = joint.map(|j| self.inner.joint_velocity(j));
+        index.and_then(|k| i64::try_from(k).ok()).unwrap_or(-1)
+    }
+
     fn from_json(text: &str) -> PyResult<Self> {
         Self::wrap(ModelDescription::from_json(text).and_then(Model::from_description))
     }
@@ -130,13 +136,13 @@ pub fn tags<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let tags = PyDict::new(py);
     for frame in model.frames() {
-        let x = kinematics.base + kinematics.point(frame.body, &frame.position);
+        let x = kinematics.origin(frame.body) + kinematics.point(frame.body, &frame.position);
         tags.set_item(&frame.name, fresh(py, x.as_slice()))?;
     }
     for tag in &model.description().tags {
         if let Some(frame) = model.frames().iter().find(|f| f.name == tag.solid) {
             let local = frame.position + frame.rotation * Vector3::from(tag.position);
-            let x = kinematics.base + kinematics.point(frame.body, &local);
+            let x = kinematics.origin(frame.body) + kinematics.point(frame.body, &local);
             tags.set_item(&tag.name, fresh(py, x.as_slice()))?;
         }
     }
@@ -157,7 +163,7 @@ pub fn poses<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let poses = PyDict::new(py);
     for frame in model.frames() {
-        let x = kinematics.base + kinematics.point(frame.body, &frame.position);
+        let x = kinematics.origin(frame.body) + kinematics.point(frame.body, &frame.position);
         let R = kinematics.R[frame.body] * frame.rotation;
         let R = DMatrix::from_iterator(3, 3, R.iter().copied());
         poses.set_item(
@@ -468,7 +474,7 @@ impl RoverModel {
         self.inner
             .wheels()
             .iter()
-            .map(|w| signed(w.joint))
+            .map(|w| self.velocity_index(w.joint))
             .collect()
     }
 
@@ -478,7 +484,7 @@ impl RoverModel {
         self.inner
             .wheels()
             .iter()
-            .map(|w| signed(w.steering))
+            .map(|w| self.velocity_index(w.steering))
             .collect()
     }
 
@@ -582,11 +588,11 @@ impl RoverModel {
         let wheels = self.inner.wheels();
         let mut T = DMatrix::zeros(self.inner.nv(), 2 * wheels.len());
         for (i, wheel) in wheels.iter().enumerate() {
-            if let Some(k) = wheel.joint {
-                T[(k, i)] = wheel.drive_sign;
+            if let Some(j) = wheel.joint {
+                T[(self.inner.joint_velocity(j), i)] = wheel.drive_sign;
             }
-            if let Some(k) = wheel.steering {
-                T[(k, wheels.len() + i)] = 1.0;
+            if let Some(j) = wheel.steering {
+                T[(self.inner.joint_velocity(j), wheels.len() + i)] = 1.0;
             }
         }
         fresh_matrix(py, &T)
@@ -713,7 +719,7 @@ impl RoverModel {
         let (_, _, kinematics, contacts) = self.contacts(q, terrain, coordinates)?;
         let rows: Vec<[f64; 3]> = contacts
             .iter()
-            .map(|c| (kinematics.base + c.point).into())
+            .map(|c| (kinematics.origin(c.body) + c.point).into())
             .collect();
         fresh_rows(py, &rows)
     }
@@ -748,7 +754,13 @@ impl RoverModel {
             let path = self.inner.path(contact.body);
             for d in contact.frame.rows() {
                 let mut along = vec![0.0; path.len()];
-                kinematics.point_jacobian_row(path, &contact.point, &d, &mut along);
+                kinematics.point_jacobian_row(
+                    &self.inner,
+                    contact.body,
+                    &contact.point,
+                    &d,
+                    &mut along,
+                );
                 let mut full = DVector::zeros(nv);
                 for (entry, &k) in along.iter().zip(path) {
                     full[k] = *entry;
@@ -898,10 +910,6 @@ fn replace_masses(description: &mut ModelDescription, masses: &Bound<'_, PyAny>)
         set_mass(solid, mass);
     }
     Ok(())
-}
-
-fn signed(index: Option<usize>) -> i64 {
-    index.and_then(|k| i64::try_from(k).ok()).unwrap_or(-1)
 }
 
 fn dense_mass_matrix(model: &Model, kinematics: &Kinematics) -> DMatrix<f64> {
