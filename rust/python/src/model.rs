@@ -419,7 +419,7 @@ impl RoverModel {
         self.inner.mass()
     }
 
-    /// Names of the coordinates: x, y, z, roll, heading, pitch, then the joints.
+    /// Names of the coordinates, x, y, z, roll, heading, pitch, then the joints.
     #[getter]
     fn dof_names(&self) -> Vec<String> {
         let base = ["x", "y", "z", "roll", "heading", "pitch"].map(str::to_owned);

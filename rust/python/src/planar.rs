@@ -182,7 +182,7 @@ impl PlanarContacts {
 
 #[pymethods]
 impl PlanarContacts {
-    /// Indices of the discs that touch, (n,): 0 is the ball or wheel A, 1 wheel B.
+    /// Indices of the discs that touch, (n,); 0 is the ball or wheel A, 1 wheel B.
     #[getter]
     fn discs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         PyArray1::from_iter(
@@ -352,7 +352,7 @@ impl PlanarSimulation {
         Ok(inner.options().time_step)
     }
 
-    /// Coordinates, (nv,): x and y, m, then angles, rad, which turn to the left.
+    /// Coordinates, (nv,), x and y, m, then angles, rad, which turn to the left.
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let inner = self.open()?;

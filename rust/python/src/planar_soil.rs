@@ -140,7 +140,7 @@ impl SoilContacts {
 
 #[pymethods]
 impl SoilContacts {
-    /// Numbers of both bodies, (n, 2): disks from 0, then the wheels; -1 for a wall or the ground.
+    /// Numbers of both bodies, (n, 2), disks from 0, then the wheels; -1 for a wall or the ground.
     #[getter]
     fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let name = |body: u32| {

@@ -32,7 +32,7 @@ pub struct StepReport {
 
 #[pymethods]
 impl StepReport {
-    /// How the steps ended: "converged" or "not_converged".
+    /// Whether the steps "converged" or "not_converged".
     ///
     /// "converged" means that the contact solver met its tolerance in every step.
     #[getter]
@@ -451,7 +451,7 @@ impl Simulation {
         Ok(fresh(py, &self.open()?.state().v))
     }
 
-    /// Rotation matrix R_WB, (3, 3): from coordinates in the trunk to coordinates in the world.
+    /// Rotation matrix R_WB, (3, 3), from coordinates in the trunk to coordinates in the world.
     #[getter]
     fn rotation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let R = self
