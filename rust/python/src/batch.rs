@@ -13,7 +13,7 @@ use crate::shared::{Shared, Watch};
 use crate::simulation::{Origin, Simulation};
 
 /// Many rovers stepped side by side on several threads.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct SimulationBatch(Shared<Inner>);
 
 struct Inner {

@@ -13,7 +13,7 @@ use crate::arrays::{array, fresh, vector};
 use crate::errors::{BorderError, Kind, Value};
 
 /// What a solver says of its answer.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 #[derive(Clone)]
 pub struct SolverReport {
     inner: SolveReport,
@@ -94,7 +94,7 @@ impl SolverReport {
 }
 
 /// Impulses, velocities and the solver's report.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct FrictionContactSolution {
     p: Vec<f64>,
     u: Vec<f64>,

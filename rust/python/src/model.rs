@@ -25,7 +25,7 @@ use crate::sphere_field::Ground;
 pub type Pair<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
 /// A tree of solids under a free base, read from data. Immutable.
-#[pyclass(module = "rover_gym._core", frozen, from_py_object)]
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct RoverModel {
     pub inner: Arc<Model>,

@@ -11,7 +11,7 @@ use crate::errors::{BorderError, Kind, Value};
 const WHAT: &str = "a Motor, a mapping of its fields, or None";
 
 /// Torque–speed line of a wheel's motor. Immutable.
-#[pyclass(module = "rover_gym._core", frozen, eq, from_py_object)]
+#[pyclass(module = "rover_gym.mechanics", frozen, eq, from_py_object)]
 #[derive(Clone, Copy, PartialEq)]
 pub struct Motor {
     inner: CoreMotor,

@@ -115,7 +115,7 @@ impl<const NV: usize, M: PlanarMachine<NV>> Run for Core<NV, M> {
 }
 
 /// Everything that a planar simulation needs to continue bit for bit; picklable.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct PlanarSnapshot {
     inner: CoreSnapshot,
 }
@@ -154,7 +154,7 @@ impl PlanarSnapshot {
 }
 
 /// The contacts of the last step, as fresh arrays with one row a contact.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct PlanarContacts {
     active: Vec<PlanarActiveContact>,
 }
@@ -214,7 +214,7 @@ impl PlanarContacts {
 }
 
 /// A planar machine on a ground, stepped through time by the rover's own schemes.
-#[pyclass(module = "rover_gym._core", subclass, frozen)]
+#[pyclass(module = "rover_gym.mechanics", subclass, frozen)]
 pub struct PlanarSimulation {
     inner: Shared<Box<dyn Run>>,
     ground: Py<PyAny>,
@@ -487,7 +487,7 @@ impl PlanarSimulation {
 }
 
 /// The ball of the report's section 3.1: coordinates x, y, theta.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen)]
 pub struct BallSimulation;
 
 #[pymethods]
@@ -517,7 +517,7 @@ impl BallSimulation {
 }
 
 /// The two-wheel rover of the report's section 3.1: coordinates x, y, theta, theta_A, theta_B.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen)]
 pub struct TwoWheelRoverSimulation;
 
 /// One number for both wheels, or one for each.
@@ -589,7 +589,7 @@ impl TwoWheelRoverSimulation {
 }
 
 /// The six-wheel rover driven straight: coordinates x, y, theta and one angle a pair of joints.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen)]
 pub struct MirroredRoverSimulation {
     joints: Vec<Vec<String>>,
     wheels: Vec<Vec<String>>,

@@ -54,7 +54,7 @@ fn heights<'py>(ground: &dyn Ground, x: &Bound<'py, PyAny>) -> PyResult<Bound<'p
 }
 
 /// The ground y = slope x + offset.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Line {
     inner: CoreLine,
 }
@@ -96,7 +96,7 @@ impl Line {
 }
 
 /// The ground y = amplitude sin(2 pi x / wavelength + phase) + offset.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Sine {
     inner: CoreSine,
 }
@@ -161,7 +161,7 @@ impl Sine {
 }
 
 /// The natural cubic spline through points, continued by its tangents: a ground with continuous curvature.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Spline {
     inner: CoreSpline,
 }
@@ -207,7 +207,7 @@ impl Spline {
 }
 
 /// Straight pieces between points, which may stand above each other: steps, ramps, kerbs.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Polyline {
     inner: CorePolyline,
 }

@@ -119,7 +119,7 @@ fn rover(given: &Bound<'_, PyDict>) -> PyResult<TwoWheelRover> {
 }
 
 /// The contacts of the last step of a soil, as fresh arrays with one row a contact.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct SoilContacts {
     active: Vec<SoilActiveContact>,
     /// Number of disks and of disks with wheels.
@@ -193,7 +193,7 @@ impl SoilContacts {
 }
 
 /// Everything that a soil needs to continue bit for bit; picklable.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct SoilSnapshot {
     inner: CoreSnapshot,
 }
@@ -219,7 +219,7 @@ impl SoilSnapshot {
 }
 
 /// A soil of free disks, with walls, a ground and perhaps a machine on it.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct SoilSimulation {
     inner: Shared<Core>,
 }

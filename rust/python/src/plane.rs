@@ -11,7 +11,7 @@ use crate::errors::{BorderError, Kind, Value};
 type Normal = (f64, f64, f64);
 
 /// The half-space n.x + offset >= 0 is free; the ground is below. `normal` is normalised.
-#[pyclass(module = "rover_gym._core", frozen, from_py_object)]
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct Plane {
     pub inner: CorePlane,

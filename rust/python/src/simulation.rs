@@ -25,7 +25,7 @@ use crate::snapshot::{Snapshot, belonging};
 use crate::sphere_field::Ground;
 
 /// What the solver says of the steps just taken (worst over the steps of one call).
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct StepReport {
     inner: CoreReport,
 }
@@ -105,7 +105,7 @@ impl StepReport {
 }
 
 /// Kinetic and potential energy, J.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Energy {
     inner: CoreEnergy,
 }
@@ -136,7 +136,7 @@ impl Energy {
 }
 
 /// A rover on a terrain, stepped through time.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Simulation {
     inner: Shared<CoreSimulation>,
     model: Arc<Model>,

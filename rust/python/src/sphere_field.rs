@@ -16,7 +16,7 @@ use crate::plane::Plane;
 const MAX_FILE: usize = 1 << 28;
 
 /// Fixed spheres, with or without a plane under them. Immutable.
-#[pyclass(module = "rover_gym._core", frozen, from_py_object)]
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct SphereField {
     pub inner: Arc<CoreField>,
