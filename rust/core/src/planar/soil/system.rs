@@ -11,13 +11,12 @@ use super::scene::SoilScene;
 use crate::contact::Activation;
 use crate::integrator::{MechanicalSystem, Start, StepOptions};
 use crate::problem::{
-    BlockSparseDelassus, Dimension, FrictionContactProblem, PairContact, Residual, dot,
-    evaluate_into,
+    BlockSparseDelassus, BodyPairs, Dimension, DiscPair, FrictionContactProblem, PairContact,
+    Residual, WIDE, WidePair, dot, evaluate_into, passive_share,
 };
-use crate::solver::body_pairs::{BodyPairs, DiscPair, WIDE, WidePair};
-use crate::solver::body_sweeps::solve_body_pairs;
-use crate::solver::passivity::passive_share;
-use crate::solver::{Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve};
+use crate::solver::{
+    Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve, solve_body_pairs,
+};
 
 /// Gap up to which a pair is taken as a contact though it is not forecast to close, as a share of the smallest radius: its neighbours may push it.
 const SKIN: f64 = 0.01;

@@ -2,7 +2,7 @@
 //!
 //! A contact touches two bodies, so with `u = Zᵀ y + q` and `y = Z p` in factor coordinates
 //! (see [`crate::integrator::mechanical_system`]) it reads six numbers and changes six numbers. A disc against a disc has a diagonal
-//! block of W. [`solve_body_pairs`](super::body_sweeps::solve_body_pairs) solves them.
+//! block of W. [`solve_body_pairs`](crate::solver::solve_body_pairs) solves them.
 //!
 //! Source: Jean 1999; Moreau 1999 (contact by contact on the bodies' velocities).
 

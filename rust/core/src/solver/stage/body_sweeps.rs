@@ -12,13 +12,11 @@
 //!
 //! Source: Jean 1999 and Moreau 1999 (the sweep); Nesterov 1983, O'Donoghue and Candès 2015 (extrapolation with restart).
 
-use super::body_pairs::{BodyPairs, DiscPair, WIDE};
-use super::one_contact::solve_one_contact;
-use super::options::{Method, SolverOptions};
-use super::passivity::passive_share;
-use super::report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
 use crate::law::coulomb::violation;
-use crate::problem::{Magnitudes, Residual, Violations};
+use crate::problem::{BodyPairs, DiscPair, Magnitudes, Residual, Violations, WIDE, passive_share};
+use crate::solver::one_contact::solve_one_contact;
+use crate::solver::options::{Method, SolverOptions};
+use crate::solver::report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
 
 /// Places of the list that are visited in turn.
 const PLACES: usize = 4;
@@ -270,7 +268,7 @@ impl BodySweeps {
         change
     }
 
-    /// The residual as [`crate::problem::residual::evaluate_into`] defines it; writes p and u.
+    /// The residual as [`crate::problem::evaluate_into`] defines it; writes p and u.
     fn measure(&mut self, p: &mut [f64], u: &mut [f64]) -> Measured {
         self.sum();
         let (mut violations, mut data) = (Violations::default(), Magnitudes::default());
