@@ -13,7 +13,7 @@ use crate::arrays::{array, fresh, vector};
 use crate::errors::{BorderError, Kind, Value};
 
 /// How the contact solver ended.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 #[derive(Clone)]
 pub struct SolverReport {
     inner: SolveReport,
@@ -110,7 +110,7 @@ impl SolverReport {
 }
 
 /// The solution of a friction-contact problem.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct FrictionContactSolution {
     p: Vec<f64>,
     u: Vec<f64>,

@@ -32,7 +32,7 @@ pub type Pair<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 /// Methods that take coordinates understand two sets of them, by the argument `coordinates`:
 /// "state", the `q` and `v` of `Simulation`, and "report", the Cardan angles of the 2010 report and
 /// their rates.
-#[pyclass(module = "rover_gym._core", frozen, from_py_object)]
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct RoverModel {
     pub inner: Arc<Model>,

@@ -115,7 +115,7 @@ impl<const NV: usize, M: PlanarMachine<NV>> Run for Core<NV, M> {
 }
 
 /// Everything that a planar simulation needs to continue bit for bit. Picklable.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct PlanarSnapshot {
     inner: CoreSnapshot,
 }
@@ -165,7 +165,7 @@ impl PlanarSnapshot {
 }
 
 /// The contacts of a planar simulation's last step, as new arrays with one row a contact.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct PlanarContacts {
     active: Vec<PlanarActiveContact>,
 }
@@ -234,7 +234,7 @@ impl PlanarContacts {
 ///
 /// One call at a time: a call during another one, from another thread or a signal handler, raises
 /// BusyError.
-#[pyclass(module = "rover_gym._core", subclass, frozen)]
+#[pyclass(module = "rover_gym.mechanics", subclass, frozen)]
 pub struct PlanarSimulation {
     inner: Shared<Box<dyn Run>>,
     ground: Py<PyAny>,
@@ -573,7 +573,7 @@ impl PlanarSimulation {
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen)]
 pub struct BallSimulation;
 
 #[pymethods]
@@ -628,7 +628,7 @@ impl BallSimulation {
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen)]
 pub struct TwoWheelRoverSimulation;
 
 /// One number for both wheels, or one for each.
@@ -717,7 +717,7 @@ impl TwoWheelRoverSimulation {
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen)]
 pub struct MirroredRoverSimulation {
     joints: Vec<Vec<String>>,
     wheels: Vec<Vec<String>>,

@@ -25,7 +25,7 @@ use crate::snapshot::{Snapshot, belonging};
 use crate::sphere_field::Ground;
 
 /// How the steps of one call went: the worst of them, or their sum.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct StepReport {
     inner: CoreReport,
 }
@@ -123,7 +123,7 @@ impl StepReport {
 }
 
 /// Kinetic and potential energy.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Energy {
     inner: CoreEnergy,
 }
@@ -188,7 +188,7 @@ impl Energy {
 ///     ModelError: `model` is not a RoverModel.
 ///     TerrainError: `terrain` is not a terrain.
 ///     OptionError: An option is out of its range, or is given beside `accuracy`.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Simulation {
     inner: Shared<CoreSimulation>,
     model: Arc<Model>,
