@@ -46,7 +46,7 @@ impl<C: LocatedContact> Columns<C> {
 }
 
 /// The contacts of a rover's last step, as new arrays with one row a contact.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Contacts {
     active: Columns<Contact>,
     bodies: Vec<String>,
@@ -132,7 +132,7 @@ impl Contacts {
 }
 
 /// The contacts of a planar simulation's last step, as new arrays with one row a contact.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct PlanarContacts {
     active: Columns<PlanarContact>,
 }
@@ -147,7 +147,7 @@ impl PlanarContacts {
 
 #[pymethods]
 impl PlanarContacts {
-    /// Indices of the discs that touch, (n,): 0 is the ball or wheel A, 1 wheel B.
+    /// Indices of the discs that touch, (n,); 0 is the ball or wheel A, 1 wheel B.
     #[getter]
     fn discs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         PyArray1::from_iter(
@@ -198,7 +198,7 @@ impl PlanarContacts {
 /// The contacts of a soil's last step, as new arrays with one row a contact.
 ///
 /// Contacts between sleeping disks are left out.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct SoilContacts {
     active: Columns<SoilContact>,
     n_moving: usize,
@@ -216,7 +216,7 @@ impl SoilContacts {
 
 #[pymethods]
 impl SoilContacts {
-    /// Numbers of both bodies, (n, 2): disks from 0, then the wheels; -1 for a wall or the ground.
+    /// Numbers of both bodies, (n, 2), disks from 0, then the wheels; -1 for a wall or the ground.
     #[getter]
     fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let name = |body: u32| {

@@ -52,7 +52,7 @@ macro_rules! each {
 ///
 /// One call at a time: a call during another one, from another thread or a signal handler, raises
 /// BusyError.
-#[pyclass(module = "rover_gym._core", subclass, frozen)]
+#[pyclass(module = "rover_gym.mechanics", subclass, frozen)]
 pub struct PlanarSimulation {
     inner: Shared<Machine>,
     ground: Py<PyAny>,
@@ -141,7 +141,7 @@ impl PlanarSimulation {
         Ok(each!(&*self.open()?, s => s.options().time_step))
     }
 
-    /// Coordinates, (nv,): x and y, m, then angles, rad, which turn to the left.
+    /// Coordinates, (nv,), x and y, m, then angles, rad, which turn to the left.
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         Ok(each!(&*self.open()?, s => fresh(py, s.q().as_slice())))

@@ -29,7 +29,7 @@ use crate::planar_ground::border;
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen)]
 pub struct BallSimulation;
 
 #[pymethods]
@@ -84,7 +84,7 @@ impl BallSimulation {
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen)]
 pub struct TwoWheelRoverSimulation;
 
 #[pymethods]
@@ -198,7 +198,7 @@ pub fn two_wheel_rover(parameters: &Bound<'_, PyDict>) -> PyResult<TwoWheelRover
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen)]
 pub struct MirroredRoverSimulation {
     joints: Vec<Vec<String>>,
     wheels: Vec<Vec<String>>,

@@ -130,7 +130,7 @@ fn rows(value: &Bound<'_, PyAny>, kind: Kind, field: &str, width: usize) -> PyRe
 ///         wheels overlap.
 ///     TerrainError: A wall has no direction, or `ground` is not a ground.
 ///     OptionError: An option is out of its range, or both `rover` and `rig` are given.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct SoilSimulation {
     inner: Shared<Core>,
 }

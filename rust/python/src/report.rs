@@ -5,14 +5,14 @@ use rover_core::integrator::StepReport as CoreReport;
 use rover_core::multibody::Energy as CoreEnergy;
 
 /// How the steps of one call went: the worst of them, or their sum.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct StepReport {
     inner: CoreReport,
 }
 
 #[pymethods]
 impl StepReport {
-    /// How the steps ended: "converged" or "not_converged".
+    /// Whether the steps "converged" or "not_converged".
     ///
     /// "converged" means that the contact solver met its tolerance in every step.
     #[getter]
@@ -103,7 +103,7 @@ impl StepReport {
 }
 
 /// Kinetic and potential energy.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Energy {
     inner: CoreEnergy,
 }

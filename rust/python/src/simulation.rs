@@ -57,7 +57,7 @@ use crate::stepping::{Problem, problem, step};
 ///     ModelError: `model` is not a RoverModel.
 ///     TerrainError: `terrain` is not a terrain.
 ///     OptionError: An option is out of its range, or is given beside `accuracy`.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Simulation {
     inner: Shared<CoreSimulation>,
     model: Arc<Model>,
@@ -247,7 +247,7 @@ impl Simulation {
         Ok(fresh(py, &self.open()?.state().v))
     }
 
-    /// Rotation matrix R_WB, (3, 3): from coordinates in the trunk to coordinates in the world.
+    /// Rotation matrix R_WB, (3, 3), from coordinates in the trunk to coordinates in the world.
     #[getter]
     fn rotation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let R = self

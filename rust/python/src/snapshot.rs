@@ -59,7 +59,7 @@ pub enum OfPlanar {
 macro_rules! snapshot_class {
     ($(#[doc = $doc:literal])* $class:ident, $inner:ty) => {
         $(#[doc = $doc])*
-        #[pyclass(module = "rover_gym._core", frozen)]
+        #[pyclass(module = "rover_gym.mechanics", frozen)]
         pub struct $class {
             pub inner: $inner,
         }
