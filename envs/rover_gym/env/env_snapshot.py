@@ -3,16 +3,15 @@
 import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from rover_gym.env.episode_scene import EpisodeScene
 from rover_gym.env.progress import Progress
 from rover_gym.env.task import Task
 from rover_gym.mechanics import Snapshot, StateError
 from rover_gym.validation import Range, refuse
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from rover_gym.mechanics import (
     Simulation,
     SphereField,
 )
-from rover_gym.validation import Range, array, refuse
+from rover_gym.validation import Range, array, number, refuse, span
 
 #: Steps until truncation: 60 s at the default control frequency of 20 Hz.
 MAX_EPISODE_STEPS = 1200
@@ -113,9 +113,10 @@ def make_task(given: Mapping[str, Any]) -> Task:
     rocks: RockDistribution | None = None
     if terrain == "sphere_field":
         rocks = rock_distribution(given["difficulty"], given["rock_abundance"], given["max_rock_radius"])
-        for name, value in (("goal_distance", given["goal_distance"][1]), ("goal_tolerance", given["goal_tolerance"])):
-            if value > MAX_GOAL_DISTANCE:
-                refuse(OptionError, name, value, f"must be at most {MAX_GOAL_DISTANCE:g} among rocks")
+        nearest, farthest = given["goal_distance"]
+        distance = nearest if nearest == farthest else (nearest, farthest)
+        span("goal_distance", distance, at_most=MAX_GOAL_DISTANCE)
+        number("goal_tolerance", given["goal_tolerance"], at_most=MAX_GOAL_DISTANCE)
     else:
         for name in ("difficulty", "rock_abundance", "max_rock_radius"):
             if given[name] is not None:
@@ -169,7 +170,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
         gravity=gravity,
         substeps=substeps,
         dt=substeps * step,
-        reward_weights=rewards.WEIGHTS if given["reward_weights"] is None else given["reward_weights"],
+        reward_weights=dict(rewards.WEIGHTS) if given["reward_weights"] is None else given["reward_weights"],
         simulation_options=options,
         max_steering=_steering_limit(rover, given["max_steering_deg"]),
         torque_limits=rover.wheel_torque_limits,
