@@ -9,15 +9,14 @@
 //! Measured on 3860 solves of a rover steering up a slope of 10 degrees: two systems in the median, 14 at the 99th percentile; Newton on the
 //! modes and proximal point needed 600 at the 90th.
 
-use super::SolverOptions;
-use super::auto::Prepared;
-use super::modes::{self, Linearised, Prediction, n_unknowns};
-use super::reduced_system::{self, Factors, System};
-use super::report::SolveStatus;
-use super::workspace::SolverWorkspace;
 use crate::cone::tangential_norm;
 use crate::law::coulomb::ContactMode;
-use crate::problem::Residual;
+use crate::problem::{Prepared, Residual};
+use crate::solver::linear::reduced_system::{Factors, NewtonStep};
+use crate::solver::local::modes::{self, Linearised, Prediction, n_unknowns};
+use crate::solver::options::SolverOptions;
+use crate::solver::report::SolveStatus;
+use crate::solver::scratch::Scratch;
 
 /// Most systems to solve.
 const MAX_PIVOTS: usize = 80;
@@ -195,40 +194,44 @@ fn linearise<const D: usize>(
 }
 
 /// Pivots from the warm start `p`. `u` is `W p + q` on return; `iterations` is advanced by the linear solves.
-pub(super) fn pivots<const D: usize>(
+pub(in crate::solver) fn pivots<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    workspace: &mut SolverWorkspace,
+    scratch: &mut Scratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     data.W.multiply_add(p, data.q, u);
-    modes::recall::<D>(data.mu, p, u, &mut workspace.contacts);
+    modes::recall::<D>(data.mu, p, u, &mut scratch.system.contacts);
     let mut alpha = ALPHA * data.mean_diagonal;
     let mut last = f64::INFINITY;
-    let mut residual = data.measure::<D>(workspace, p, u);
+    let mut residual = data.measure::<D>(p, u);
     for _ in 0..MAX_PIVOTS.min(options.max_newton_steps) {
-        let prediction = linearise::<D>(data.mu, &mut workspace.contacts, p, u);
-        workspace.centre.copy_from_slice(p);
+        let prediction = linearise::<D>(data.mu, &mut scratch.system.contacts, p, u);
+        scratch.system.centre.copy_from_slice(p);
         *iterations += 1;
-        let factors = reduced_system::factorise::<D>(data, alpha, prediction, true, workspace);
+        let factors =
+            scratch
+                .system
+                .factorise::<D>(data, alpha, prediction, true, &mut scratch.work);
         if factors == Factors::None && prediction.m > 0 {
             break;
         }
-        let system = System {
+        let newton_step = NewtonStep {
             alpha,
             m: prediction.m,
             factors,
             on_cone: true,
         };
-        reduced_system::newton_point::<D>(data, system, p, u, workspace);
-        let block = ratio_test::<D>(data.mu, &workspace.contacts, p, &workspace.trial);
+        scratch.system.newton_point::<D>(data, newton_step, p, u);
+        let block = ratio_test::<D>(data.mu, &scratch.system.contacts, p, &scratch.system.trial);
         if let Some((i, mode)) = block.contact {
-            for (x, trial) in p.iter_mut().zip(&workspace.trial) {
+            for (x, trial) in p.iter_mut().zip(&scratch.system.trial) {
                 *x += block.t * (trial - *x);
             }
-            for ((contact, &mu), p) in workspace
+            for ((contact, &mu), p) in scratch
+                .system
                 .contacts
                 .iter()
                 .zip(data.mu)
@@ -241,16 +244,16 @@ pub(super) fn pivots<const D: usize>(
             change_mode::<D>(
                 data.mu[i],
                 mode,
-                &mut workspace.contacts[i],
+                &mut scratch.system.contacts[i],
                 &mut p[D * i..][..D],
             );
             data.W.multiply_add(p, data.q, u);
             continue;
         }
-        p.copy_from_slice(&workspace.trial);
+        p.copy_from_slice(&scratch.system.trial);
         data.W.multiply_add(p, data.q, u);
-        residual = data.measure::<D>(workspace, p, u);
-        if Prepared::accepts(options, residual) {
+        residual = data.measure::<D>(p, u);
+        if options.accepts(residual) {
             return (SolveStatus::Converged, residual);
         }
         if !residual.is_finite() {
@@ -260,11 +263,11 @@ pub(super) fn pivots<const D: usize>(
             alpha = (ALPHA_SHRINK * alpha).max(SMALLEST_ALPHA * data.mean_diagonal);
         }
         last = residual.relative;
-        if let Some((i, mode)) = worst_contradiction::<D>(data.mu, &workspace.contacts, p, u) {
+        if let Some((i, mode)) = worst_contradiction::<D>(data.mu, &scratch.system.contacts, p, u) {
             change_mode::<D>(
                 data.mu[i],
                 mode,
-                &mut workspace.contacts[i],
+                &mut scratch.system.contacts[i],
                 &mut p[D * i..][..D],
             );
             data.W.multiply_add(p, data.q, u);

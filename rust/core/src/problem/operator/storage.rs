@@ -3,14 +3,14 @@
 //! Few contacts are dense whatever the caller has; many contacts whose blocks are mostly zero are block-sparse. Measured on 296
 //! contacts with 1.6% of the blocks: the same 580 Newton steps cost a twentieth.
 
-use crate::problem::{BlockSparseDelassus, FrictionContactProblem, Operator};
+use super::{BlockSparseDelassus, FrictionContactProblem, Operator};
 
 /// Largest share of blocks that the sparse storage is chosen for.
 const SPARSE_SHARE: f64 = 0.15;
 
 /// Memory for the storage that the caller did not choose.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Storage {
+pub(crate) struct Storage {
     dense: Vec<f64>,
     sparse: BlockSparseDelassus,
 }

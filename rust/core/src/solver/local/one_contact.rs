@@ -49,7 +49,7 @@ pub fn solve_one_contact<const D: usize>(
 
 /// As [`solve_one_contact`], but the direction of a slide is good to a few digits only. `kappa`: that of the last estimate, or zero.
 #[inline]
-pub(super) fn estimate_one_contact<const D: usize>(
+pub(in crate::solver) fn estimate_one_contact<const D: usize>(
     W: &[[f64; D]; D],
     q: &[f64; D],
     mu: f64,

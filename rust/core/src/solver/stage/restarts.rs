@@ -4,12 +4,11 @@
 //! answer so far, whose modes may be right already; the others are drawn at random, always the same ones, with the size of its impulses. Of 40
 //! problems of six wheels that press against each other with μ = 1e8, which no stage before solves, it solves 21.
 
-use super::SolverOptions;
-use super::auto::Prepared;
 use super::pivoting;
-use super::report::SolveStatus;
-use super::workspace::SolverWorkspace;
-use crate::problem::Residual;
+use crate::problem::{Prepared, Residual};
+use crate::solver::options::SolverOptions;
+use crate::solver::report::SolveStatus;
+use crate::solver::scratch::Scratch;
 
 /// Starts.
 const STARTS: usize = 16;
@@ -55,33 +54,33 @@ fn draw<const D: usize>(mu: &[f64], size: f64, draws: &mut Draws, p: &mut [f64])
 }
 
 /// Pivots from the nearest answer so far and from others. `u` is `W p + q` on return; `iterations` is advanced by the linear solves.
-pub(super) fn solve<const D: usize>(
+pub(in crate::solver) fn solve<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    workspace: &mut SolverWorkspace,
+    scratch: &mut Scratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
-    p.copy_from_slice(&workspace.nearest);
+    p.copy_from_slice(&scratch.nearest);
     let size = p.iter().step_by(D).sum::<f64>().max(0.0) / data.mu.len() as f64;
     let mut draws = Draws(0);
     let mut best = Residual::UNSOLVED;
     for _ in 0..STARTS {
-        let found = pivoting::pivots::<D>(data, options, p, u, workspace, iterations);
+        let found = pivoting::pivots::<D>(data, options, p, u, scratch, iterations);
         if found.0 == SolveStatus::Converged {
             return found;
         }
         if found.1.relative < best.relative {
             best = found.1;
-            workspace.best.copy_from_slice(p);
+            scratch.best.copy_from_slice(p);
         }
-        if workspace.work.is_exhausted || size <= 0.0 {
+        if scratch.work.is_exhausted || size <= 0.0 {
             break;
         }
         draw::<D>(data.mu, size, &mut draws, p);
     }
-    p.copy_from_slice(&workspace.best);
+    p.copy_from_slice(&scratch.best);
     data.W.multiply_add(p, data.q, u);
-    (SolveStatus::Stalled, data.measure::<D>(workspace, p, u))
+    (SolveStatus::Stalled, data.measure::<D>(p, u))
 }

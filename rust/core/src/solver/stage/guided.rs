@@ -3,15 +3,14 @@
 //! Sweeps depend on the order of the contacts; the answer does not, since only modes and sliding directions are taken from them. Where a mode is a
 //! matter of choice, or the guess was wrong, there is no answer here and the caller goes on.
 
-use super::SolverOptions;
-use super::auto::Prepared;
-use super::modes::{self, Linearised};
-use super::one_contact::estimate_one_contact;
-use super::reduced_system::{self, Factors, System};
-use super::workspace::SolverWorkspace;
 use crate::cone::tangential_norm;
 use crate::law::coulomb::ContactMode;
-use crate::problem::{Operator, Residual};
+use crate::problem::{Operator, Prepared, Residual};
+use crate::solver::linear::reduced_system::{Factors, NewtonStep};
+use crate::solver::local::modes::{self, Linearised};
+use crate::solver::local::one_contact::estimate_one_contact;
+use crate::solver::options::SolverOptions;
+use crate::solver::scratch::Scratch;
 
 /// Sweeps, and Newton steps that try their modes.
 const SWEEPS: usize = 4;
@@ -91,59 +90,62 @@ fn sweep<const D: usize>(
 
 /// Solves from `p = 0`; `None` where the modes turn out wrong or undecided. `u` is `W p + q` on return, `iterations` is advanced by sweeps and linear
 /// solves.
-pub(super) fn solve<const D: usize>(
+pub(in crate::solver) fn solve<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    workspace: &mut SolverWorkspace,
+    scratch: &mut Scratch,
     iterations: &mut usize,
 ) -> Option<Residual> {
     let Operator::Dense(W) = data.W else {
         return None;
     };
-    workspace.contacts.fill(Linearised::default());
+    scratch.system.contacts.fill(Linearised::default());
     for _ in 0..SWEEPS {
-        sweep::<D>(data, W, &mut workspace.contacts, p);
+        sweep::<D>(data, W, &mut scratch.system.contacts, p);
     }
     *iterations += SWEEPS;
     data.W.multiply_add(p, data.q, u);
-    let prediction = modes::recall::<D>(data.mu, p, u, &mut workspace.contacts);
+    let prediction = modes::recall::<D>(data.mu, p, u, &mut scratch.system.contacts);
     p.fill(0.0);
     u.copy_from_slice(data.q);
     let alpha = options.regularisation * data.mean_diagonal;
     let mut factors = Factors::None;
     let mut last = f64::INFINITY;
-    workspace.centre.fill(0.0);
+    scratch.system.centre.fill(0.0);
     for step in 0..STEPS.min(options.max_newton_steps) {
         if factors == Factors::None {
-            factors = reduced_system::factorise::<D>(data, alpha, prediction, true, workspace);
+            factors =
+                scratch
+                    .system
+                    .factorise::<D>(data, alpha, prediction, true, &mut scratch.work);
         }
         if factors == Factors::None && prediction.m > 0 {
             return None;
         }
         // Until the sliding directions are known, which the guess is not, the centre stays at zero, or the guess would stay in what W cannot see.
         if step >= SETTLED {
-            workspace.centre.copy_from_slice(p);
+            scratch.system.centre.copy_from_slice(p);
         }
-        let system = System {
+        let newton_step = NewtonStep {
             alpha,
             m: prediction.m,
             factors,
             on_cone: true,
         };
-        reduced_system::newton_point::<D>(data, system, p, u, workspace);
+        scratch.system.newton_point::<D>(data, newton_step, p, u);
         *iterations += 1;
-        p.copy_from_slice(&workspace.trial);
+        p.copy_from_slice(&scratch.system.trial);
         data.W.multiply_add(p, data.q, u);
-        let residual = data.measure::<D>(workspace, p, u);
+        let residual = data.measure::<D>(p, u);
         let progress = residual.relative / last;
-        let is_solved = Prepared::accepts(options, residual)
+        let is_solved = options.accepts(residual)
             || (progress > LEAST_GAIN
                 && residual.relative < ROUNDING_ASKED
-                && data.is_within_rounding::<D>(workspace, p, u));
+                && data.is_within_rounding::<D>(p, u));
         if is_solved {
-            return is_decided::<D>(data, &workspace.contacts, u).then_some(residual);
+            return is_decided::<D>(data, &scratch.system.contacts, u).then_some(residual);
         }
         if step >= SETTLED && (progress > LEAST_GAIN || progress.is_nan()) {
             return None;
@@ -152,7 +154,8 @@ pub(super) fn solve<const D: usize>(
             factors = Factors::None;
         }
         last = residual.relative;
-        for (contact, (p, u)) in workspace
+        for (contact, (p, u)) in scratch
+            .system
             .contacts
             .iter_mut()
             .zip(p.chunks_exact(D).zip(u.chunks_exact(D)))

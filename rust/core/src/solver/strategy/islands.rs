@@ -4,21 +4,20 @@
 //! number of contacts, and the one island that resists no longer holds up all others. Measured on 296 contacts in 33 islands,
 //! cold, to 1e-8: less than half the time of everything together.
 
-use super::auto::Prepared;
-use super::methods::{Automatic, Outcome, solve_by};
-use super::report::{SolveReport, SolveStatus, Stage};
-use super::workspace::SolverWorkspace;
-use super::{Method, SolverOptions};
 use crate::problem::{
-    BlockSparseDelassus, Dimension, FrictionContactProblem, Residual, Violations, evaluate_contact,
+    BlockSparseDelassus, Dimension, FrictionContactProblem, Operator, Prepared, Residual,
+    Violations, evaluate_contact,
 };
+use crate::solver::options::{Method, SolverOptions};
+use crate::solver::report::{SolveReport, SolveStatus};
+use crate::solver::work::Work;
 
 /// Most contacts of an island whose `W` is copied as a dense matrix.
 const DENSE_ISLAND: usize = 64;
 
 /// Memory of one island's problem.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Islands {
+pub(in crate::solver) struct Islands {
     /// Island of each contact, then contacts sorted by island with the first of each.
     label: Vec<usize>,
     starts: Vec<usize>,
@@ -31,8 +30,20 @@ pub(super) struct Islands {
     mu: Vec<f64>,
     p: Vec<f64>,
     u: Vec<f64>,
-    workspace: SolverWorkspace,
 }
+
+/// How an island is solved.
+pub(in crate::solver) struct IslandSolver<'a> {
+    /// Memory.
+    pub islands: &'a mut Islands,
+    /// Solves a problem as [`solve`](crate::solver::solve) does. An island is a problem like any other, and may escalate: this is the one place
+    /// where a strategy needs the whole solver, which is above it.
+    pub solve: &'a mut SolvePart<'a>,
+}
+
+/// Solves a part of a problem from `p` (n), N s; `u` (n), m/s, on return.
+pub(in crate::solver) type SolvePart<'a> = dyn FnMut(&FrictionContactProblem<'_>, &SolverOptions, &mut [f64], &mut [f64]) -> SolveReport
+    + 'a;
 
 impl Islands {
     /// Finds the islands of `W` and says how many there are. The order is that of their first contacts.
@@ -86,61 +97,56 @@ fn root(parents: &mut [usize], mut i: usize) -> usize {
     i
 }
 
-/// Solves every island that is not solved yet, from `p`; `None` if all contacts are one island. `u = W p + q` on return.
-pub(super) fn solve<const D: usize>(
+/// Solves every island that is not solved yet, from `p`, and says which method had to answer the hardest; `None` if all contacts are one island, or
+/// `W` is dense. `u = W p + q` on return.
+pub(in crate::solver) fn solve<const D: usize>(
     data: &Prepared<'_>,
-    W: &BlockSparseDelassus,
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    workspace: &mut SolverWorkspace,
+    work: &mut Work,
+    solver: IslandSolver<'_>,
     iterations: &mut usize,
-) -> Option<Outcome> {
-    // Out of the workspace while it is read; made at the first need, or workspaces would nest for ever.
-    let mut islands = workspace.islands.take().unwrap_or_default();
+) -> Option<(Method, SolveStatus, Residual)> {
+    let Operator::BlockSparse(W) = data.W else {
+        return None;
+    };
+    let IslandSolver { islands, solve } = solver;
     let n_islands = islands.find(W);
-    let mut worst = Method::GaussSeidel;
-    if n_islands > 1 {
-        // The small ones first: a large one may take all that is left of the budget.
-        let mut order: Vec<usize> = (0..n_islands).collect();
-        order.sort_by_key(|&island| islands.starts[island + 1] - islands.starts[island]);
-        for island in order {
-            let range = islands.starts[island]..islands.starts[island + 1];
-            let contacts = &islands.contacts[range];
-            if !is_solved::<D>(data, options, workspace, contacts, p, u) {
-                let own = SolverOptions {
-                    budget: workspace.work.budget.saturating_sub(workspace.work.spent),
-                    ..*options
-                };
-                let report = solve_island::<D>(data, W, &own, island, p, &mut islands);
-                *iterations += report.iterations;
-                workspace.work.spent += report.work;
-                workspace.work.is_exhausted |= report.status == SolveStatus::BudgetExhausted;
-                if rank(report.method) > rank(worst) {
-                    worst = report.method;
-                }
-            }
-        }
-    }
-    workspace.islands = Some(islands);
     if n_islands <= 1 {
         return None;
     }
+    let mut hardest = Method::GaussSeidel;
+    // The small ones first: a large one may take all that is left of the budget.
+    let mut order: Vec<usize> = (0..n_islands).collect();
+    order.sort_by_key(|&island| islands.starts[island + 1] - islands.starts[island]);
+    for island in order {
+        let range = islands.starts[island]..islands.starts[island + 1];
+        if is_solved::<D>(data, options, &islands.contacts[range], p, u) {
+            continue;
+        }
+        let own = SolverOptions {
+            budget: work.budget.saturating_sub(work.spent),
+            ..*options
+        };
+        let report = solve_island::<D>(data, W, &own, island, p, islands, solve);
+        *iterations += report.iterations;
+        work.spent += report.work;
+        work.is_exhausted |= report.status == SolveStatus::BudgetExhausted;
+        if rank(report.method) > rank(hardest) {
+            hardest = report.method;
+        }
+    }
     data.W.multiply_add(p, data.q, u);
-    let residual = data.measure::<D>(workspace, p, u);
-    let status = if Prepared::accepts(options, residual)
-        || (residual.relative < 1e-7 && data.is_within_rounding::<D>(workspace, p, u))
+    let residual = data.measure::<D>(p, u);
+    let status = if options.accepts(residual)
+        || (residual.relative < 1e-7 && data.is_within_rounding::<D>(p, u))
     {
         SolveStatus::Converged
     } else {
         SolveStatus::Stalled
     };
-    Some(Outcome {
-        method: worst,
-        stage: Stage::Islands,
-        status,
-        residual,
-    })
+    Some((hardest, status, residual))
 }
 
 /// How far an answer had to escalate.
@@ -156,7 +162,6 @@ fn rank(method: Method) -> usize {
 fn is_solved<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
-    workspace: &SolverWorkspace,
     contacts: &[usize],
     p: &[f64],
     u: &[f64],
@@ -164,8 +169,8 @@ fn is_solved<const D: usize>(
     let share = contacts.len() as f64 / data.mu.len() as f64;
     let mut violations = Violations::default();
     for &i in contacts {
-        let square = evaluate_contact::<D>(p, u, D * i, data.mu[i], workspace.rho_modes[i]);
-        violations.add(square, workspace.rho[i]);
+        let square = evaluate_contact::<D>(p, u, D * i, data.mu[i], data.modes[i]);
+        violations.add(square, data.masses[i]);
     }
     let Residual { relative, velocity } =
         violations.residual(data.inverse_speed, data.inverse_data);
@@ -179,6 +184,7 @@ fn solve_island<const D: usize>(
     island: usize,
     p: &mut [f64],
     islands: &mut Islands,
+    solve: &mut SolvePart<'_>,
 ) -> SolveReport {
     let Islands {
         starts,
@@ -189,7 +195,6 @@ fn solve_island<const D: usize>(
         mu,
         p: own_p,
         u: own_u,
-        workspace,
         ..
     } = islands;
     let contacts = &contacts[starts[island]..starts[island + 1]];
@@ -221,11 +226,11 @@ fn solve_island<const D: usize>(
             }
         }
         let problem = FrictionContactProblem::from_assembled(dimension, dense, q, mu);
-        solve_by::<Automatic>(&problem, options, own_p, own_u, workspace)
+        solve(&problem, options, own_p, own_u)
     } else {
         let sparse = W.restricted(contacts, place);
         let problem = FrictionContactProblem::from_assembled_sparse(&sparse, q, mu);
-        solve_by::<Automatic>(&problem, options, own_p, own_u, workspace)
+        solve(&problem, options, own_p, own_u)
     };
     if report.status != SolveStatus::NonFinite {
         for (k, &i) in contacts.iter().enumerate() {

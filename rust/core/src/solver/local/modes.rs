@@ -5,13 +5,13 @@
 //! an impact from rest where the projection cycles (measured: all recorded rover impacts in at most five steps).
 //! Neither depends on the order of the contacts.
 
-use super::auto::Prepared;
 use super::one_contact::solve_one_contact;
 use crate::law::coulomb::ContactMode;
+use crate::problem::{Prepared, Proximal};
 
 /// Mode and sliding frame of one contact in the current linearisation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Linearised {
+pub(in crate::solver) struct Linearised {
     /// Predicted mode.
     pub mode: ContactMode,
     /// Direction of the tangential impulse when sliding.
@@ -24,7 +24,7 @@ pub(super) struct Linearised {
 
 /// What a prediction of the modes found.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Prediction {
+pub(in crate::solver) struct Prediction {
     /// Whether any mode differs from the previous prediction.
     pub changed: bool,
     /// Unknowns of the reduced system.
@@ -33,18 +33,9 @@ pub(super) struct Prediction {
     pub slides: bool,
 }
 
-/// The proximal term `α (p − c)`.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Proximal<'a> {
-    /// `α ≥ 0`, 1/kg.
-    pub alpha: f64,
-    /// Centre `c` (n), N s.
-    pub centre: &'a [f64],
-}
-
 /// Number of unknowns of a contact.
 #[inline]
-pub(super) fn n_unknowns<const D: usize>(mode: ContactMode, mu: f64) -> usize {
+pub(in crate::solver) fn n_unknowns<const D: usize>(mode: ContactMode, mu: f64) -> usize {
     match mode {
         ContactMode::Open => 0,
         ContactMode::Stick => D,
@@ -65,7 +56,7 @@ fn direction<const D: usize>(v: &[f64; D], norm: f64) -> [f64; 2] {
 
 /// Direction and turning stiffness of a slide at impulse `p` and velocity `u` of one contact.
 #[inline]
-pub(super) fn set_slide<const D: usize>(contact: &mut Linearised, p: &[f64], u: &[f64]) {
+pub(in crate::solver) fn set_slide<const D: usize>(contact: &mut Linearised, p: &[f64], u: &[f64]) {
     let p: [f64; D] = std::array::from_fn(|k| p[k]);
     let norm = crate::cone::tangential_norm(&p);
     contact.e = direction(&p, norm);
@@ -83,7 +74,7 @@ pub(super) fn set_slide<const D: usize>(contact: &mut Linearised, p: &[f64], u: 
 /// in a turn slide at 1e-6 m/s, a hundredth of what the free velocity changes from step to step, so the sign of their slip is lost in `u`
 /// until the modes are right. A contact without impulse is taken to stick if the ground approaches it, else to be open.
 #[inline]
-pub(super) fn recall<const D: usize>(
+pub(in crate::solver) fn recall<const D: usize>(
     mu: &[f64],
     p: &[f64],
     u: &[f64],
@@ -126,9 +117,8 @@ pub(super) fn recall<const D: usize>(
 
 /// Predicts the modes at `(p, u)`, `u = W p + q`; `contacts` receives them. `exact` chooses the predictor.
 #[inline]
-pub(super) fn predict<const D: usize>(
+pub(in crate::solver) fn predict<const D: usize>(
     data: &Prepared<'_>,
-    rho_modes: &[[f64; 2]],
     prox: Proximal<'_>,
     exact: bool,
     p: &[f64],
@@ -144,7 +134,7 @@ pub(super) fn predict<const D: usize>(
     for (i, ((((contact, &mu), &rho), (p, u)), c)) in contacts
         .iter_mut()
         .zip(data.mu)
-        .zip(rho_modes)
+        .zip(data.modes)
         .zip(p.chunks_exact(D).zip(u.chunks_exact(D)))
         .zip(prox.centre.chunks_exact(D))
         .enumerate()

@@ -1,23 +1,25 @@
 //! Semismooth Newton on the contact modes.
 //!
 //! One step predicts each contact's mode ([`modes`]) for the regularised velocity `û = W p + q + α (p − c)` and solves
-//! the equations of those modes ([`reduced_system`]). Once the modes are right the convergence is quadratic, and
+//! the equations of those modes ([`ReducedSystem`]). Once the modes are right the convergence is quadratic, and
 //! finite when nothing slides. `α > 0` makes the system regular when `W` is not: every step is a proximal step, whose answer moves
 //! from the centre `c` no farther than `W` asks.
 
-use super::modes::{self, Prediction, Proximal};
-use super::reduced_system::{self, Factors, System};
-use super::report::SolveStatus;
-use super::workspace::SolverWorkspace;
-use super::{SolverOptions, auto::Prepared, nsgs, work};
-use crate::problem::Residual;
+use crate::problem::{Prepared, Proximal, Residual};
+use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
+use crate::solver::local::modes::{self, Prediction};
+use crate::solver::local::sweep;
+use crate::solver::options::SolverOptions;
+use crate::solver::report::SolveStatus;
+use crate::solver::scratch::Scratch;
+use crate::solver::work;
 
 /// Most full steps before the safeguarded method takes over. Measured on the recorded problems: modes that full steps find at
 /// all are found within about ten.
-pub(super) const FULL_STEPS: usize = 24;
+pub(in crate::solver) const FULL_STEPS: usize = 24;
 
 /// Most full steps from a warm start before pivoting takes over. Measured on a rover that steers: 3 to 6 cost the same.
-pub(super) const WARM_STEPS: usize = 3;
+pub(in crate::solver) const WARM_STEPS: usize = 3;
 
 /// Steps with changing modes after which a few sweeps break the cycle.
 const CYCLE: usize = 8;
@@ -85,17 +87,19 @@ fn predict<const D: usize>(
     course: &mut Course,
     p: &[f64],
     u: &[f64],
-    workspace: &mut SolverWorkspace,
+    scratch: &mut Scratch,
 ) -> Prediction {
+    let ReducedSystem {
+        centre, contacts, ..
+    } = &mut scratch.system;
     let prox = Proximal {
         alpha: course.alpha,
-        centre: &workspace.centre,
+        centre,
     };
-    let (scales, contacts) = (&workspace.rho_modes, &mut workspace.contacts);
-    let mut prediction = modes::predict::<D>(data, scales, prox, course.exact, p, u, contacts);
+    let mut prediction = modes::predict::<D>(data, prox, course.exact, p, u, contacts);
     if prediction.changed && !course.exact {
         course.exact = true;
-        prediction = modes::predict::<D>(data, scales, prox, true, p, u, contacts);
+        prediction = modes::predict::<D>(data, prox, true, p, u, contacts);
         prediction.changed = true;
     }
     if prediction.changed {
@@ -107,9 +111,9 @@ fn predict<const D: usize>(
     // impulses that W cannot see. The modes of the warm start need no such care.
     if !course.exact
         || course.settled > PATIENCE
-        || data.merit::<D>(workspace, course.alpha, p, u).sqrt() * data.inverse_data <= SOLVED
+        || data.merit::<D>(prox, p, u).sqrt() * data.inverse_data <= SOLVED
     {
-        workspace.centre.copy_from_slice(p);
+        centre.copy_from_slice(p);
     }
     prediction
 }
@@ -120,9 +124,9 @@ fn give_best(
     best: Residual,
     p: &mut [f64],
     u: &mut [f64],
-    workspace: &SolverWorkspace,
+    scratch: &Scratch,
 ) -> (SolveStatus, Residual) {
-    p.copy_from_slice(&workspace.best);
+    p.copy_from_slice(&scratch.best);
     data.W.multiply_add(p, data.q, u);
     (SolveStatus::Stalled, best)
 }
@@ -131,13 +135,13 @@ fn give_best(
 ///
 /// The proximal centre stays at the start until the modes settle and follows the iterate then, so that the last steps refine what the
 /// regularisation left. `u` is `W p + q` on return; `iterations` is advanced by the linear solves.
-pub(super) fn full_steps<const D: usize>(
+pub(in crate::solver) fn full_steps<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
     max_steps: usize,
     p: &mut [f64],
     u: &mut [f64],
-    workspace: &mut SolverWorkspace,
+    scratch: &mut Scratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     let mut course = Course {
@@ -149,81 +153,78 @@ pub(super) fn full_steps<const D: usize>(
         last: f64::INFINITY,
     };
     data.W.multiply_add(p, data.q, u);
-    let recalled = modes::recall::<D>(data.mu, p, u, &mut workspace.contacts);
+    let recalled = modes::recall::<D>(data.mu, p, u, &mut scratch.system.contacts);
     let is_warm = p.iter().any(|x| x.abs() > 0.0);
-    workspace.centre.copy_from_slice(p);
+    scratch.system.centre.copy_from_slice(p);
     let mut step = 0;
     let mut best = Residual::UNSOLVED;
     loop {
-        let residual = data.measure::<D>(workspace, p, u);
+        let residual = data.measure::<D>(p, u);
         if residual.relative < best.relative {
             best = residual;
-            workspace.best.copy_from_slice(p);
+            scratch.best.copy_from_slice(p);
         }
-        if Prepared::accepts(options, residual) {
+        if options.accepts(residual) {
             return (SolveStatus::Converged, residual);
         }
         if !residual.is_finite() {
             if best.is_finite() {
-                return give_best(data, best, p, u, workspace);
+                return give_best(data, best, p, u, scratch);
             }
             return (SolveStatus::NonFinite, residual);
         }
         let progress = residual.relative / course.last;
         if progress > 0.5
             && residual.relative < ROUNDING_ASKED
-            && data.is_within_rounding::<D>(workspace, p, u)
+            && data.is_within_rounding::<D>(p, u)
         {
             return (SolveStatus::Converged, residual);
         }
         if step == max_steps {
-            return give_best(data, best, p, u, workspace);
+            return give_best(data, best, p, u, scratch);
         }
         course.last = residual.relative;
         let prediction = if step == 0 && is_warm {
             recalled
         } else {
-            predict::<D>(data, &mut course, p, u, workspace)
+            predict::<D>(data, &mut course, p, u, scratch)
         };
         *iterations += 1;
         if prediction.changed && step > 0 && step % CYCLE == 0 {
-            let prox = Proximal {
-                alpha: course.alpha,
-                centre: &workspace.centre,
-            };
-            if !workspace
+            let prox = scratch.system.prox(course.alpha);
+            if !scratch
                 .work
                 .affords(CYCLE_SWEEPS as u64 * work::sweep(data.product, data.mu.len()))
             {
-                return give_best(data, best, p, u, workspace);
+                return give_best(data, best, p, u, scratch);
             }
             for _ in 0..CYCLE_SWEEPS {
-                nsgs::sweep::<D>(data, prox, p);
+                sweep::sweep::<D>(data, prox, p);
             }
             course.last = f64::INFINITY;
             course.factors = Factors::None;
         } else {
             course.revise(progress, prediction, SMALLEST * data.mean_diagonal);
             if course.factors == Factors::None {
-                course.factors = reduced_system::factorise::<D>(
+                course.factors = scratch.system.factorise::<D>(
                     data,
                     course.alpha,
                     prediction,
                     course.allow_symmetric,
-                    workspace,
+                    &mut scratch.work,
                 );
                 if course.factors == Factors::None && prediction.m > 0 {
-                    return give_best(data, best, p, u, workspace);
+                    return give_best(data, best, p, u, scratch);
                 }
             }
-            let system = System {
+            let newton_step = NewtonStep {
                 alpha: course.alpha,
                 m: prediction.m,
                 factors: course.factors,
                 on_cone: true,
             };
-            reduced_system::newton_point::<D>(data, system, p, u, workspace);
-            p.copy_from_slice(&workspace.trial);
+            scratch.system.newton_point::<D>(data, newton_step, p, u);
+            p.copy_from_slice(&scratch.system.trial);
         }
         data.W.multiply_add(p, data.q, u);
         step += 1;

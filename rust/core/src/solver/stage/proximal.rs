@@ -8,12 +8,13 @@
 //! Inside: Newton steps with backtracking on the natural map of the regularised problem, and Gauss–Seidel sweeps on the same
 //! problem when backtracking fails. Once a step is cheap, a sprint with a small `α` tries to end the search at Newton's speed.
 
-use super::modes::{self, Proximal};
-use super::reduced_system::{self, Factors, System};
-use super::report::SolveStatus;
-use super::workspace::SolverWorkspace;
-use super::{SolverOptions, auto::Prepared, nsgs, work};
-use crate::problem::Residual;
+use crate::problem::{Prepared, Proximal, Residual};
+use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
+use crate::solver::local::{modes, sweep};
+use crate::solver::options::SolverOptions;
+use crate::solver::report::SolveStatus;
+use crate::solver::scratch::Scratch;
+use crate::solver::work;
 
 /// Most Newton steps for one value of `α`.
 const INNER_STEPS: usize = 30;
@@ -132,7 +133,7 @@ impl Course {
 /// One regularised problem to solve.
 #[derive(Clone, Copy, Debug)]
 struct Task {
-    /// `α`, 1/kg; the centre is in the workspace.
+    /// `α`, 1/kg; the centre is in the scratch.
     alpha: f64,
     /// Relative natural map to reach.
     tolerance: f64,
@@ -142,37 +143,38 @@ struct Task {
     steps: usize,
 }
 
-/// Moves from `(p, u)` towards `workspace.trial` until the natural map falls; `false`, and no move, if it does not.
+/// Moves from `(p, u)` towards `scratch.system.trial` until the natural map falls; `false`, and no move, if it does not.
 fn backtrack<const D: usize>(
     data: &Prepared<'_>,
     alpha: f64,
     current: f64,
     p: &mut [f64],
     u: &mut [f64],
-    workspace: &mut SolverWorkspace,
+    scratch: &mut Scratch,
 ) -> bool {
-    for ((d, t), x) in workspace
+    for ((d, t), x) in scratch
         .direction
         .iter_mut()
-        .zip(&workspace.trial)
+        .zip(&scratch.system.trial)
         .zip(&*p)
     {
         *d = t - x;
     }
-    workspace.trial_velocity.fill(0.0);
+    scratch.system.trial_velocity.fill(0.0);
     data.W.multiply_add(
-        &workspace.direction,
-        &workspace.trial_velocity,
-        &mut workspace.image,
+        &scratch.direction,
+        &scratch.system.trial_velocity,
+        &mut scratch.image,
     );
     let mut t = 1.0;
     for _ in 0..HALVINGS {
         for k in 0..data.n {
-            workspace.trial[k] = p[k] + t * workspace.direction[k];
-            workspace.trial_velocity[k] = u[k] + t * workspace.image[k];
+            scratch.system.trial[k] = p[k] + t * scratch.direction[k];
+            scratch.system.trial_velocity[k] = u[k] + t * scratch.image[k];
         }
-        let (trial, velocity) = (&workspace.trial, &workspace.trial_velocity);
-        if data.merit::<D>(workspace, alpha, trial, velocity) < (1.0 - 1e-3 * t) * current {
+        let (trial, velocity) = (&scratch.system.trial, &scratch.system.trial_velocity);
+        if data.merit::<D>(scratch.system.prox(alpha), trial, velocity) < (1.0 - 1e-3 * t) * current
+        {
             p.copy_from_slice(trial);
             u.copy_from_slice(velocity);
             return true;
@@ -182,14 +184,14 @@ fn backtrack<const D: usize>(
     false
 }
 
-/// Solves one regularised problem with the centre `workspace.centre`, from `p`; says whether its natural map fell below
+/// Solves one regularised problem with the centre `scratch.system.centre`, from `p`; says whether its natural map fell below
 /// the tolerance. `u = W p + q` on return.
 fn descend<const D: usize>(
     data: &Prepared<'_>,
     task: Task,
     p: &mut [f64],
     u: &mut [f64],
-    workspace: &mut SolverWorkspace,
+    scratch: &mut Scratch,
     iterations: &mut usize,
 ) -> bool {
     let Task {
@@ -202,31 +204,33 @@ fn descend<const D: usize>(
     let threshold = (tolerance / data.inverse_data).powi(2);
     let mut stuck = 0;
     for step in 0..=steps {
-        let prox = Proximal {
-            alpha,
-            centre: &workspace.centre,
-        };
-        let current = data.merit::<D>(workspace, alpha, p, u);
+        let current = data.merit::<D>(scratch.system.prox(alpha), p, u);
         if !current.is_finite() || step == steps {
             return current <= threshold;
         }
         if current <= threshold {
             break;
         }
-        let (scales, contacts) = (&workspace.rho_modes, &mut workspace.contacts);
-        let prediction = modes::predict::<D>(data, scales, prox, exact, p, u, contacts);
-        let factors = reduced_system::factorise::<D>(data, alpha, prediction, false, workspace);
+        let ReducedSystem {
+            centre, contacts, ..
+        } = &mut scratch.system;
+        let prox = Proximal { alpha, centre };
+        let prediction = modes::predict::<D>(data, prox, exact, p, u, contacts);
+        let factors =
+            scratch
+                .system
+                .factorise::<D>(data, alpha, prediction, false, &mut scratch.work);
         *iterations += 1;
         let mut accepted = false;
         if factors != Factors::None || prediction.m == 0 {
-            let system = System {
+            let newton_step = NewtonStep {
                 alpha,
                 m: prediction.m,
                 factors,
                 on_cone: false,
             };
-            reduced_system::newton_point::<D>(data, system, p, u, workspace);
-            accepted = backtrack::<D>(data, alpha, current, p, u, workspace);
+            scratch.system.newton_point::<D>(data, newton_step, p, u);
+            accepted = backtrack::<D>(data, alpha, current, p, u, scratch);
         }
         if accepted {
             stuck = 0;
@@ -241,18 +245,15 @@ fn descend<const D: usize>(
         if stuck > MAX_STUCK {
             return false;
         }
-        let prox = Proximal {
-            alpha,
-            centre: &workspace.centre,
-        };
-        if !workspace
+        let prox = scratch.system.prox(alpha);
+        if !scratch
             .work
             .affords(SWEEPS as u64 * work::sweep(data.product, data.mu.len()))
         {
             return false;
         }
         for _ in 0..SWEEPS {
-            nsgs::sweep::<D>(data, prox, p);
+            sweep::sweep::<D>(data, prox, p);
         }
         data.W.multiply_add(p, data.q, u);
     }
@@ -261,25 +262,25 @@ fn descend<const D: usize>(
 }
 
 /// Proximal point from `p`. `u = W p + q` on return; the best impulse met is returned when nothing converges.
-pub(super) fn solve<const D: usize>(
+pub(in crate::solver) fn solve<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
-    workspace: &mut SolverWorkspace,
+    scratch: &mut Scratch,
     iterations: &mut usize,
 ) -> (SolveStatus, Residual) {
     data.W.multiply_add(p, data.q, u);
-    let mut best = data.measure::<D>(workspace, p, u);
-    if Prepared::accepts(options, best) {
+    let mut best = data.measure::<D>(p, u);
+    if options.accepts(best) {
         return (SolveStatus::Converged, best);
     }
     if !best.is_finite() {
         return (SolveStatus::NonFinite, best);
     }
-    workspace.best.copy_from_slice(p);
-    workspace.accepted.copy_from_slice(p);
-    workspace.centre.copy_from_slice(p);
+    scratch.best.copy_from_slice(p);
+    scratch.accepted.copy_from_slice(p);
+    scratch.system.centre.copy_from_slice(p);
     let target = options.regularisation * data.mean_diagonal;
     let mut course = Course::new(data.mean_diagonal);
     let mut last = f64::INFINITY;
@@ -287,11 +288,11 @@ pub(super) fn solve<const D: usize>(
     let mut asked = options.tolerance;
     let limit = *iterations + options.max_newton_steps;
     let mut status = SolveStatus::MaxIterations;
-    while *iterations < limit && !workspace.work.is_exhausted {
+    while *iterations < limit && !scratch.work.is_exhausted {
         let sprints = course.begins_sprint();
         let task = if sprints {
             let tolerance = 1e-2 * asked;
-            workspace.centre.copy_from_slice(p);
+            scratch.system.centre.copy_from_slice(p);
             Task {
                 alpha: target,
                 tolerance,
@@ -313,12 +314,12 @@ pub(super) fn solve<const D: usize>(
             }
         };
         let before = *iterations;
-        let solved = descend::<D>(data, task, p, u, workspace, iterations);
+        let solved = descend::<D>(data, task, p, u, scratch, iterations);
         // A round counts even where its start was its answer, so that the search ends.
         *iterations = (*iterations).max(before + 1);
-        let residual = data.measure::<D>(workspace, p, u);
-        if Prepared::accepts(options, residual)
-            || (residual.relative < LOOSE && data.is_within_rounding::<D>(workspace, p, u))
+        let residual = data.measure::<D>(p, u);
+        if options.accepts(residual)
+            || (residual.relative < LOOSE && data.is_within_rounding::<D>(p, u))
         {
             return (SolveStatus::Converged, residual);
         }
@@ -327,38 +328,38 @@ pub(super) fn solve<const D: usize>(
         }
         if residual.relative < best.relative {
             best = residual;
-            workspace.best.copy_from_slice(p);
+            scratch.best.copy_from_slice(p);
         }
         if sprints {
             if residual.relative < SLOW * last {
                 last = residual.relative;
-                workspace.accepted.copy_from_slice(p);
+                scratch.accepted.copy_from_slice(p);
             } else {
-                p.copy_from_slice(&workspace.accepted);
+                p.copy_from_slice(&scratch.accepted);
                 course.sprint_wait *= 2;
             }
-            workspace.centre.copy_from_slice(p);
+            scratch.system.centre.copy_from_slice(p);
         } else if solved {
-            workspace.accepted.copy_from_slice(p);
+            scratch.accepted.copy_from_slice(p);
             let slow = residual.relative > SLOW * last;
             last = residual.relative;
             if course.follows_path && course.alpha > target {
                 course.proved = course.alpha;
                 course.alpha = (course.alpha * PATH_SHRINK).max(target);
             } else {
-                workspace.centre.copy_from_slice(p);
+                scratch.system.centre.copy_from_slice(p);
                 course.succeed(slow, *iterations - before, SMALLEST * data.mean_diagonal);
             }
         } else {
-            p.copy_from_slice(&workspace.accepted);
-            workspace.centre.copy_from_slice(p);
+            p.copy_from_slice(&scratch.accepted);
+            scratch.system.centre.copy_from_slice(p);
             if !course.fail(100.0 * data.mean_diagonal) {
                 status = SolveStatus::Stalled;
                 break;
             }
         }
     }
-    p.copy_from_slice(&workspace.best);
+    p.copy_from_slice(&scratch.best);
     data.W.multiply_add(p, data.q, u);
-    (status, data.measure::<D>(workspace, p, u))
+    (status, data.measure::<D>(p, u))
 }

@@ -8,9 +8,9 @@
 
 use std::collections::BTreeSet;
 
-use super::modes::Linearised;
 use crate::law::coulomb::ContactMode;
 use crate::problem::BlockSparseDelassus;
+use crate::solver::local::modes::{Linearised, n_unknowns};
 
 /// Pattern and numbers of a factorisation, kept between solves for their memory.
 #[derive(Clone, Debug, Default)]
@@ -273,7 +273,7 @@ impl BlockLu {
             {
                 let mut reduced = reduce::<D>(block, contact, &contacts[j], mu[i], mu[j]);
                 if i == j {
-                    let size = super::modes::n_unknowns::<D>(contact.mode, mu[i]);
+                    let size = n_unknowns::<D>(contact.mode, mu[i]);
                     let alpha = alpha * weights.map_or(1.0, |w| w[i]);
                     for r in 0..D {
                         reduced[r][r] = if r < size { reduced[r][r] + alpha } else { 1.0 };
