@@ -84,7 +84,7 @@ def _write_generated(_app: Sphinx) -> None:
 
 def _mend_docstring(_app: Sphinx, _what: str, _name: str, obj: object, _options: object, lines: list[str]) -> None:
     """The card appears as its first line, since the whole has its own page; a bar is a norm, no substitution."""
-    if obj in CARDS.values():
+    if any(obj is environment for environment in CARDS.values()):
         lines[1:] = ["", "The environment's card has a page of its own."]
     lines[:] = [line.replace("|", r"\|") for line in lines]
 
