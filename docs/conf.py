@@ -50,7 +50,7 @@ def _use_stub() -> None:
     text = source.read_text(encoding="utf-8")
     for alias, name_in_print in (("npt.ArrayLike", "ArrayLike"), ("npt.NDArray[np.float64]", "np.ndarray")):
         text = text.replace(alias, name_in_print)  # unfolded, they fill half a page
-    stub.ArrayLike = type("ArrayLike", (), {})
+    stub.ArrayLike = type("ArrayLike", (), {"__module__": "numpy.typing"})
     # A stub may name a class before it is there, so its annotations stay unevaluated.
     code = compile(text, source, "exec", __future__.annotations.compiler_flag)
     exec(code, stub.__dict__)  # noqa: S102 - our own stub
