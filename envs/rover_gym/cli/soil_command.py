@@ -58,17 +58,15 @@ def soil(
     wheel_friction: Annotated[float, typer.Option(help="Friction coefficient at the wheels.")] = 0.9,
     time_step: Annotated[
         float | None,
-        typer.Option(
-            help="Time step, s; 1 ms (in a sweep 2 ms) at 9.81 m/s^2, longer as gravity is weaker, if not given."
-        ),
+        typer.Option(help="Time step, s. Default: 1 ms (in a sweep 2 ms) at 9.81 m/s^2, longer under weaker gravity."),
     ] = None,
     duration: Annotated[
         float | None,
         typer.Option(
             min=0.01,
             max=1000.0,
-            help="Time to simulate, s; 4 s at 9.81 m/s^2, longer as gravity is weaker, if not given. "
-            "It ends earlier where the soil does.",
+            help="Time to simulate, s. Default: 4 s at 9.81 m/s^2, longer under weaker gravity. "
+            "The run ends early where the soil ends.",
         ),
     ] = None,
     seed: Annotated[
