@@ -19,9 +19,6 @@ use crate::system::{
     tree_workspace::contact_capacity,
 };
 
-/// How far the squared length of a snapshot's quaternion may be from 1: the steps keep it within rounding.
-const UNIT: f64 = 1e-12;
-
 /// A machine on a terrain. Model and terrain are shared; everything else is its own.
 #[derive(Clone)]
 pub struct Simulation {
@@ -143,9 +140,8 @@ impl Simulation {
     /// # Panics
     /// If the sizes are another model's.
     pub fn set_state(&mut self, configuration: Configuration, v: Vec<f64>) {
-        assert_eq!(
-            configuration.joints.len(),
-            self.model.n_joints(),
+        assert!(
+            configuration.is_of(&self.model),
             "invariant: a configuration of this model"
         );
         assert_eq!(
@@ -479,15 +475,17 @@ impl Simulation {
         Kinematics::of(&self.model, &self.state.configuration)
     }
 
-    /// Kinetic and potential energy now, J.
+    /// Kinetic and potential energy now, springs included, J.
     #[must_use]
     pub fn energy(&self) -> Energy {
-        momentum::energy(
+        let mut energy = momentum::energy(
             &self.model,
             &self.kinematics(),
             &self.state.v,
             &self.options.gravity,
-        )
+        );
+        energy.potential += self.model.spring_energy(&self.state.configuration);
+        energy
     }
 
     /// Linear momentum, and angular momentum about the world's origin.
@@ -601,10 +599,8 @@ impl Simulation {
             .chain(&snapshot.wheel_torque)
             .chain(&snapshot.joint_torque)
             .chain(&snapshot.motor_torque);
-        let attitude = snapshot.state.configuration.attitude.norm_squared();
         let is_sound = snapshot.state.is_finite()
-            && (attitude - 1.0).abs() <= UNIT
-            && snapshot.state.configuration.joints.len() == expected
+            && snapshot.state.configuration.is_of(&self.model)
             && [&snapshot.wheel_torque, &snapshot.motor_torque]
                 .iter()
                 .all(|t| t.len() == self.model.wheels().len())
