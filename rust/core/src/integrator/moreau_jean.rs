@@ -20,7 +20,7 @@
 //! The PD of a held joint is implicit with an exponentially fitted θ_j ([`crate::system::fitted_theta`]), so no gain and
 //! no step make it unstable. Contacts enter by the forecast `gap + γ h u_N ≤ 0`, measured from q_m.
 //!
-//! Source: Moreau 1988; Jean 1999; Acary, Brogliato 2008, ch. 10.
+//! Source: Moreau 1988; Jean 1999; Acary and Brogliato 2008, ch. 10.
 
 use super::energy_audit::{Audit, GAIN, Verdict, count_lift, energy_before};
 use super::error::StepError;

@@ -13,7 +13,7 @@
 //! and does not drift, and the audit ([`super::energy_audit`]) lets it, since taking it out would cost the momentum. The iteration uses M̂(q_m) as its matrix, which
 //! differs from the true Jacobian by O(h) and converges by that factor.
 //!
-//! Source: the discrete d'Alembert principle, as in Simo, Wong 1991 for one body; contacts and the
+//! Source: the discrete d'Alembert principle, as in Simo and Wong 1991 for one body; contacts and the
 //! correction r as in [`super::moreau_jean`].
 
 use super::energy_audit::{Audit, GAIN, Verdict, energy_before};
