@@ -8,7 +8,7 @@
 //! - `scratch`: what the stages share;
 //! - `stage`: the iterations, a file each;
 //! - `strategy`: which stage when; `reference`: answers to compare with;
-//! - `workspace` and `solve`: from the caller's problem to the judged answer.
+//! - `workspace` and `entry`: from the caller's problem to the judged answer.
 //!
 //! The problem itself, its scales and its residual lie below all of them, in [`crate::problem`]. A [`Method`] names a stage or, as
 //! [`Method::Auto`], the escalation over them. Every report is computed from the returned impulse, never from inside an iteration.
@@ -19,22 +19,22 @@
 //!
 #![doc = include_str!("escalation.md")]
 
+mod entry;
 mod linear;
 mod local;
 mod options;
 mod reference;
 mod report;
 mod scratch;
-mod solve;
 mod stage;
 mod strategy;
 mod work;
 mod workspace;
 
+pub use entry::{solve, solve_many_bodies};
 pub use local::one_contact::{OneContactSolution, solve_one_contact};
 pub use options::{ContactLaw, Method, SolverOptions};
 pub use report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
-pub use solve::{solve, solve_many_bodies};
 pub use stage::body_sweeps::{BodySweeps, solve_body_pairs};
 pub use strategy::many_bodies::ManyBodies;
 pub use workspace::SolverWorkspace;
