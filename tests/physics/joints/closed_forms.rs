@@ -64,7 +64,7 @@ fn a_slide_with_a_spring_and_a_damper_is_an_oscillator() {
     let decay: f64 = 0.5 * 2.0 / m;
     let w = (w2 - decay * decay).sqrt();
     let mut errors = Vec::new();
-    for steps in [500, 1000] {
+    for steps in [500_u32, 1000] {
         let h = 1.0 / f64::from(steps);
         let mut run = simulation(model.clone(), options(h, Variant::Linearised));
         run.step(steps as usize).unwrap();

@@ -150,10 +150,10 @@ fn jacobian_columns(
     let x = &contact.point;
     let (xn, xt, xb) = (x.cross(&n), x.cross(&t), x.cross(&b));
     let (lead, rest) = rows.split_at_mut(model.lead(contact.body));
-    if let Some((linear, angular)) = lead.split_at_mut_checked(3) {
+    if let Some(base) = lead.first_chunk_mut::<BASE>() {
         for i in 0..3 {
-            linear[i] = [n[i], t[i], b[i], 0.0];
-            angular[i] = [xn[i], xt[i], xb[i], 0.0];
+            base[i] = [n[i], t[i], b[i], 0.0];
+            base[3 + i] = [xn[i], xt[i], xb[i], 0.0];
         }
     }
     for (row, &m) in rest.iter_mut().zip(model.motions(contact.body)) {
@@ -197,10 +197,10 @@ pub fn generalized_impulse(
         let force = n * p[0] + t * p[1] + b * p[2];
         let moment = contact.point.cross(&force);
         let (lead, rest) = model.split_path(contact.body);
-        if let Some((linear, angular)) = out[lead].split_at_mut_checked(3) {
+        if let Some(base) = out[lead].first_chunk_mut::<BASE>() {
             for i in 0..3 {
-                linear[i] += force[i];
-                angular[i] += moment[i];
+                base[i] += force[i];
+                base[3 + i] += moment[i];
             }
         }
         for (&k, &m) in rest.iter().zip(model.motions(contact.body)) {
