@@ -26,7 +26,7 @@ fn bed(count: usize) -> SoilSimulation {
     let width = 0.033 * count as f64 / 10.0 * 1.01;
     let packing = Packing {
         count,
-        width,
+        sides: [width, f64::INFINITY],
         radius_min: 0.014,
         radius_max: 0.0165,
         ..Packing::default()
@@ -39,13 +39,13 @@ fn bed(count: usize) -> SoilSimulation {
         ground: None,
         machine: None,
         friction: SoilFriction::default(),
-        disks,
+        grains: disks,
     };
     let mut soil = SoilSimulation::new(Arc::new(scene), options, None, q).expect("a soil");
     // Until it rests, or for 12 s.
     for _ in 0..120 {
         soil.step(100).expect("finite");
-        let mass: f64 = soil.scene().disks.mass().iter().sum();
+        let mass: f64 = soil.scene().grains.mass().iter().sum();
         if 2.0 * soil.energy().kinetic < 1e-10 * mass {
             break;
         }
@@ -81,7 +81,7 @@ fn measure(name: &str, soil: &mut SoilSimulation, steps: usize) {
         converged += usize::from(report.is_converged());
     }
     let time = cpu_seconds(Instant::now()) - before;
-    let disks = soil.scene().disks.len();
+    let disks = soil.scene().grains.len();
     println!(
         "{disks:6} {:8.0e}   {name:5}  {:12.2e}  {:11.1}  {contacts:8}  {:9.2}  {:17.1}  {:13.4}  {gain:9.1e}",
         soil.options().solver.tolerance,
@@ -89,7 +89,7 @@ fn measure(name: &str, soil: &mut SoilSimulation, steps: usize) {
         sweeps as f64 / steps as f64,
         converged as f64 / steps as f64,
         1e9 * time / visits as f64,
-        soil.penetration() / soil.scene().disks.smallest(),
+        soil.penetration() / soil.scene().grains.smallest(),
     );
 }
 

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use rover_core::nalgebra::{Vector2, Vector3};
 use rover_core::planar::soil::{
-    Packing, SleepOptions, SoilFriction, SoilScene, SoilSimulation, Wall, soil_options,
+    Packing, SleepOptions, SoilFriction, SoilScene, SoilSimulation, Wall, on_soil, soil_options,
 };
 use rover_core::planar::{PlanarWheel, TwoWheelRover};
 
@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         options.gravity = Vector3::new(4.0, -9.0, 0.0);
     }
     let mut scene = SoilScene {
-        disks,
+        grains: disks,
         walls: vec![Wall::floor(0.0), Wall::left(0.0), Wall::right(2.4494)],
         ground: None,
         machine: None,
@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             axle: Vector2::new(x, 0.0),
         };
         let rover = TwoWheelRover::new(130.0, 130.0 * 0.64 / 12.0, wheel(-0.4), wheel(0.4))?;
-        scene.machine = Some(Arc::new(rover));
+        scene.machine = Some(on_soil(rover));
         q.extend([0.7, 0.32, 0.0, 0.0, 0.0]);
     }
     let sleep = drives.then(SleepOptions::default);

@@ -15,11 +15,8 @@ use crate::errors::{BorderError, Kind, Value};
 /// A planar error on its way to Python, as a terrain's or a machine's.
 pub fn border(kind: Kind, e: &PlanarError) -> BorderError {
     let value = match e {
-        PlanarError::NotFinite { value, .. }
-        | PlanarError::NotPositive { value, .. }
-        | PlanarError::Negative { value, .. }
-        | PlanarError::OutOfRange { value, .. }
-        | PlanarError::WheelsOverlap { value, .. }
+        PlanarError::Number(number) => Value::Number(number.value()),
+        PlanarError::WheelsOverlap { value, .. }
         | PlanarError::NotAFunction { value, .. }
         | PlanarError::RepeatedPoint { value, .. } => Value::Number(*value),
         PlanarError::TooFewPoints { count, .. }

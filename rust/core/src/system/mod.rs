@@ -2,10 +2,12 @@
 //!
 //! - [`tree`]: a tree of solids on a terrain, under a [`command`]; [`tree_workspace`]: its scratch;
 //! - [`gyroscopic`]: its gyroscopic terms, implicit; `motor_branch`: the line that a motor is on in a step, taken implicitly with
-//!   [`fitted_theta`].
+//!   [`fitted_theta`];
+//! - [`grains`]: thousands of free disks or balls, and a machine among them.
 
 pub mod command;
 pub mod fitted_theta;
+pub mod grains;
 pub mod gyroscopic;
 pub(crate) mod motor_branch;
 pub mod tree;

@@ -1,41 +1,36 @@
-//! Granular soil: free disks with friction, walls, a floor, and a machine that drives over them.
+//! Granular soil in the plane: the disks of [`crate::system::grains`], and a machine that drives over them.
 //!
-//! - [`disks`], [`wall`], [`scene`]: what there is; [`packing`]: where disks start, without overlap, from a seed;
-//! - [`grid`]: which disks are near which; [`contact`]: a contact and its name; contacts come and go with the disks;
-//! - [`system`]: the soil as a mechanical system, stepped by [`crate::integrator`] as everything else;
-//! - [`sleep`]: disks that rest far from anything that moves are left out; [`simulation`]: a scene through time, from which disks can be
-//!   taken;
-//! - [`rig`]: one wheel at a given slip, for the drawbar pull.
-//!
-//! A soil steps with θ = 1: contacts are measured where the step begins and a contact may close as far as its gap goes,
-//! `0 ≤ u_N + gap⁺/h ⊥ p_N ≥ 0`. To first order no disk ends a step inside another, and neither gravity (which loses m g²h²/2 a step) nor contact
-//! adds energy. What rounding and the solver's tolerance leave of penetration grows by their error in velocity; where it passes a
-//! tolerance the common projection removes it.
-//!
-//! Source: Moreau 1999; Staron, Hinch 2005 (contact dynamics of disks); Anitescu, Potra 1997 (the gap in the velocity's law).
+//! - [`simulation`]: a scene through time, from which disks can be taken;
+//! - [`machine`]: a planar machine among disks; [`rig`]: one wheel at a given slip, for the drawbar pull.
 
-pub mod contact;
-pub mod disks;
-pub mod error;
-pub mod grid;
-pub mod packing;
-mod removal;
+pub mod machine;
 pub mod rig;
-pub mod scene;
 pub mod simulation;
-pub mod sleep;
-pub mod system;
-pub mod wall;
 
-pub use contact::{SoilContact, SoilKey};
-pub use disks::Disks;
-pub use error::SoilError;
-pub use packing::Packing;
+pub use crate::system::grains::{
+    GrainError as SoilError, GrainFriction as SoilFriction, GrainKey as SoilKey, SleepOptions,
+};
+pub use machine::on_soil;
 pub use rig::WheelRig;
-pub use scene::{Machine, SoilFriction, SoilScene};
 pub use simulation::{
     SoilActiveContact, SoilSetupError, SoilSimulation, SoilSnapshot, soil_options,
 };
-pub use sleep::SleepOptions;
-pub use system::{SoilParts, SoilSystem};
-pub use wall::Wall;
+
+use crate::system::grains;
+
+/// The disks.
+pub type Disks = grains::Grains<2>;
+/// Where they start.
+pub type Packing = grains::Packing<2>;
+/// What holds them.
+pub type Wall = grains::Wall<2>;
+/// What drives on them.
+pub type Machine = dyn grains::Machine<2>;
+/// A soil's description.
+pub type SoilScene = grains::GrainScene<2>;
+/// A contact of a disk or a wheel.
+pub type SoilContact = grains::GrainContact<2>;
+/// Scratch of a soil.
+pub type SoilParts = grains::GrainParts<2>;
+/// A soil in a step.
+pub type SoilSystem<'a> = grains::GrainSystem<'a, 2>;

@@ -2,25 +2,19 @@
 
 use std::sync::Arc;
 
-use nalgebra::{SVector, Vector2};
+use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
-use super::super::error::finite;
-use super::contact::{SoilContact, SoilKey};
-use super::disks::Disks;
-use super::error::SoilError;
-use super::grid::Grid;
-use super::removal::Renumbering;
-use super::scene::SoilScene;
-use super::sleep::{Sleep, SleepOptions, StepTaken};
-use super::system::{SoilParts, SoilSystem};
+use super::{Disks, SoilContact, SoilError, SoilKey, SoilParts, SoilScene, SoilSystem};
 use crate::integrator::{
     Integrator, NoProbe, OptionsError, Probe, Scratch, Stabilisation, StateMut, StepError,
     StepOptions, StepReport, WarmStart,
 };
 use crate::multibody::Energy;
+use crate::quantity::finite;
 use crate::simulation::SnapshotError;
 use crate::solver::SolverOptions;
+use crate::system::grains::{Renumbering, Sleep, SleepOptions, StepTaken};
 
 /// Options that suit a soil of these disks.
 ///
@@ -124,7 +118,7 @@ impl SoilSimulation {
         }
         scene.check()?;
         scene.check_configuration(&q)?;
-        let (n, nv) = (scene.disks.len(), scene.nv());
+        let (n, nv) = (scene.grains.len(), scene.nv());
         let n_inputs = scene.machine.as_ref().map_or(0, |m| m.n_inputs());
         Ok(Self {
             scratch: Scratch::new(&q, nv, 3 * n, 2),
@@ -135,7 +129,7 @@ impl SoilSimulation {
             inputs: vec![0.0; n_inputs],
             pull: Vector2::zeros(),
             warm_start: WarmStart::default(),
-            sleep: Sleep::new(scene.disks.kinematic()),
+            sleep: Sleep::new(scene.grains.kinematic()),
             parts: SoilParts::default(),
             has_contacts: false,
             scene,
@@ -222,21 +216,13 @@ impl SoilSimulation {
                 count: v.len(),
             });
         }
-        let n = self.scene.disks.len();
-        for (k, value) in v.iter().enumerate() {
-            let field = if k < 3 * n {
-                format!("velocity[{}]", k / 3)
-            } else {
-                format!("machine_rate[{}]", k - 3 * n)
-            };
-            finite(&field, *value)?;
-        }
+        self.scene.check_finite("velocity", "machine_rate", v, 3)?;
         self.q.copy_from_slice(q);
         self.v.copy_from_slice(v);
         self.time = 0.0;
         self.count = 0;
         self.warm_start.clear();
-        self.sleep = Sleep::new(self.scene.disks.kinematic());
+        self.sleep = Sleep::new(self.scene.grains.kinematic());
         self.has_contacts = false;
         Ok(())
     }
@@ -248,7 +234,7 @@ impl SoilSimulation {
     /// # Errors
     /// Another number of marks; none would be left. Nothing is changed then.
     pub fn remove(&mut self, marked: &[bool]) -> Result<(), SoilError> {
-        let n = self.scene.disks.len();
+        let n = self.scene.grains.len();
         if marked.len() != n {
             return Err(SoilError::Length {
                 field: "which",
@@ -257,9 +243,9 @@ impl SoilSimulation {
             });
         }
         let renumbering = Renumbering::without(marked);
-        let disks = self.scene.disks.without(&renumbering)?;
+        let grains = self.scene.grains.without(&renumbering)?;
         self.scene = Arc::new(SoilScene {
-            disks,
+            grains,
             ..(*self.scene).clone()
         });
         self.q = renumbering.keep(&self.q, 3);
@@ -397,51 +383,20 @@ impl SoilSimulation {
     /// Kinetic and potential energy now, J, without kinematic disks.
     #[must_use]
     pub fn energy(&self) -> Energy {
-        let disks = &self.scene.disks;
-        let gravity = self.options.gravity.xy();
-        let mut energy = Energy::default();
-        let free = |(i, _): &(usize, &f64)| !disks.kinematic()[*i];
-        for (i, m) in disks.mass().iter().enumerate().filter(free) {
-            let (q, v) = (&self.q[3 * i..3 * i + 3], &self.v[3 * i..3 * i + 3]);
-            energy.kinetic += 0.5 * m * (v[0] * v[0] + v[1] * v[1]);
-            energy.kinetic += 0.5 * disks.inertia(i) * v[2] * v[2];
-            energy.potential -= m * (gravity.x * q[0] + gravity.y * q[1]);
-        }
-        if let Some(machine) = &self.scene.machine {
-            let (pose, rate) = self.own();
-            energy.kinetic += 0.5 * rate.dot(&(machine.mass_matrix(&pose) * rate));
-            energy.potential += machine.potential(&pose, &gravity);
-        }
-        energy
-    }
-
-    fn own(&self) -> (SVector<f64, 5>, SVector<f64, 5>) {
-        let at = 3 * self.scene.disks.len();
-        (
-            SVector::from_column_slice(&self.q[at..]),
-            SVector::from_column_slice(&self.v[at..]),
-        )
+        self.scene.energy(&self.q, &self.v, &self.options.gravity)
     }
 
     /// Momentum (x, y) of the disks that are not kinematic, kg m/s, and their moment of momentum about the origin, kg m²/s.
     #[must_use]
     pub fn momentum(&self) -> [f64; 3] {
-        let disks = &self.scene.disks;
-        let mut sum = [0.0; 3];
-        let free = |(i, _): &(usize, &f64)| !disks.kinematic()[*i];
-        for (i, m) in disks.mass().iter().enumerate().filter(free) {
-            let (q, v) = (&self.q[3 * i..3 * i + 3], &self.v[3 * i..3 * i + 3]);
-            sum[0] += m * v[0];
-            sum[1] += m * v[1];
-            sum[2] += m * (q[0] * v[1] - q[1] * v[0]) + disks.inertia(i) * v[2];
-        }
-        sum
+        let (linear, moment) = self.scene.momentum(&self.q, &self.v);
+        [linear.x, linear.y, moment.z]
     }
 
     /// Impulse (x, y) of the last step's contacts on the machine's wheels, N s.
     #[must_use]
     pub fn impulse_on_wheels(&self) -> [f64; 2] {
-        let n = self.scene.disks.len();
+        let n = self.scene.grains.len();
         let mut sum = Vector2::zeros();
         for active in self.contacts().filter(|c| c.contact.key.a as usize >= n) {
             let [p_N, p_T] = active.impulse;
@@ -453,49 +408,13 @@ impl SoilSimulation {
     /// Deepest overlap now, m: 0 where nothing overlaps. Kinematic disks among themselves and in walls do not count.
     #[must_use]
     pub fn penetration(&self) -> f64 {
-        let disks = &self.scene.disks;
-        let (n, radius, kinematic) = (disks.len(), disks.radius(), disks.kinematic());
-        let mut grid = Grid::default();
-        grid.fill(&self.q, radius, 2.0 * disks.largest());
-        let mut facing = Vec::new();
-        let mut least = 0.0_f64;
-        let mut meet = |i: usize, x: f64, y: f64, r: f64| {
-            let is_kinematic = i < n && kinematic[i];
-            grid.near(x, y, r + disks.largest(), |item| {
-                let other = item.index as usize;
-                if other != i && !(is_kinematic && kinematic[other]) {
-                    least = least.min((item.x - x).hypot(item.y - y) - r - item.radius);
-                }
-            });
-            if is_kinematic {
-                return;
-            }
-            for wall in &self.scene.walls {
-                least = least.min(wall.distance(x, y) - r);
-            }
-            if let Some(ground) = &self.scene.ground {
-                facing.clear();
-                ground.facing(&Vector2::new(x, y), r, &mut facing);
-                least = facing.iter().fold(least, |l, f| l.min(f.distance - r));
-            }
-        };
-        for (i, r) in radius.iter().enumerate() {
-            meet(i, self.q[3 * i], self.q[3 * i + 1], *r);
-        }
-        if let Some(machine) = &self.scene.machine {
-            let (pose, _) = self.own();
-            for k in 0..machine.n_discs() {
-                let disc = machine.disc(k, &pose);
-                meet(n + k, disc.centre.x, disc.centre.y, disc.radius);
-            }
-        }
-        -least
+        self.scene.penetration(&self.q)
     }
 
     /// Wakes all disks.
     pub fn wake(&mut self) {
         self.sleep
-            .wake_all(self.scene.disks.kinematic(), &mut self.warm_start);
+            .wake_all(self.scene.grains.kinematic(), &mut self.warm_start);
     }
 
     /// Everything that is needed to continue bit for bit.
@@ -534,7 +453,7 @@ impl SoilSimulation {
             && snapshot.count <= MAX_STEPS
             && [0, nv].contains(&warm.persistent.len())
             && snapshot.time.is_finite()
-            && snapshot.sleep.is_of(self.scene.disks.kinematic())
+            && snapshot.sleep.is_of(self.scene.grains.kinematic())
             && numbers.all(|x| x.is_finite());
         if !is_sound {
             return Err(SnapshotError::Damaged);
