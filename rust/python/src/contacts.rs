@@ -8,7 +8,7 @@ use rover_core::system::ActiveContact;
 
 use crate::arrays::{fresh_blocks, fresh_rows};
 
-/// The contacts of the last step, as fresh arrays with one row a contact.
+/// The contacts of a rover's last step, as new arrays with one row a contact.
 #[pyclass(module = "rover_gym._core", frozen)]
 pub struct Contacts {
     active: Vec<ActiveContact>,
@@ -38,11 +38,13 @@ impl Contacts {
 
 #[pymethods]
 impl Contacts {
+    /// Names of the solids that touch the ground.
     #[getter]
     fn bodies(&self) -> Vec<String> {
         self.bodies.clone()
     }
 
+    /// Indices of the wheels that touch, (n,); -1 where it is another solid.
     #[getter]
     fn wheels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         let index = |a: &ActiveContact| match a.contact.part {
@@ -52,11 +54,15 @@ impl Contacts {
         PyArray1::from_iter(py, self.active.iter().map(index))
     }
 
+    /// Contact points, world frame, (n, 3), m.
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.rows(py, |a| a.position.into())
     }
 
+    /// Contact frames, world frame, (n, 3, 3).
+    ///
+    /// Rows are the unit vectors n (normal), t (rolling direction) and b (lateral).
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let values = self
@@ -68,16 +74,19 @@ impl Contacts {
         fresh_blocks(py, values, [self.active.len(), 3, 3])
     }
 
+    /// Gaps, (n,), m, at the configuration where the step evaluated the contacts.
     #[getter]
     fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_iter(py, self.active.iter().map(|a| a.contact.gap))
     }
 
+    /// Impulses of the step along n, t, b, (n, 3), N s.
     #[getter]
     fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.rows(py, |a| a.impulse)
     }
 
+    /// Relative velocities after the step along n, t, b, (n, 3), m/s.
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.rows(py, |a| a.velocity)

@@ -23,7 +23,10 @@ mod sphere_field;
 
 use pyo3::prelude::*;
 
-/// Compiled core of rover-gym.
+/// Compiled core of rover-gym: the border to the Rust mechanics (`rover-core`).
+///
+/// SI units and radians everywhere. World frame: x forward, y up, z to the right. Wheels are always
+/// listed FL, FR, ML, BL, MR, BR. Every array returned is new.
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;

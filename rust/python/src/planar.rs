@@ -114,7 +114,7 @@ impl<const NV: usize, M: PlanarMachine<NV>> Run for Core<NV, M> {
     }
 }
 
-/// Everything that a planar simulation needs to continue bit for bit; picklable.
+/// Everything that a planar simulation needs to continue bit for bit. Picklable.
 #[pyclass(module = "rover_gym._core", frozen)]
 pub struct PlanarSnapshot {
     inner: CoreSnapshot,
@@ -122,11 +122,22 @@ pub struct PlanarSnapshot {
 
 #[pymethods]
 impl PlanarSnapshot {
+    /// Reads a snapshot.
+    ///
+    /// Args:
+    ///     data: What `to_bytes` returned.
+    ///
+    /// Returns:
+    ///     The snapshot.
+    ///
+    /// Raises:
+    ///     StateError: The bytes are not those of a snapshot.
     #[staticmethod]
     fn from_bytes(data: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self { inner: read(data)? })
     }
 
+    /// The snapshot as bytes, as `from_bytes` reads them.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let bytes = postcard::to_stdvec(&self.inner).map_err(|e| damaged(&e))?;
         Ok(PyBytes::new(py, &bytes))
@@ -153,7 +164,7 @@ impl PlanarSnapshot {
     }
 }
 
-/// The contacts of the last step, as fresh arrays with one row a contact.
+/// The contacts of a planar simulation's last step, as new arrays with one row a contact.
 #[pyclass(module = "rover_gym._core", frozen)]
 pub struct PlanarContacts {
     active: Vec<PlanarActiveContact>,
@@ -171,6 +182,7 @@ impl PlanarContacts {
 
 #[pymethods]
 impl PlanarContacts {
+    /// Indices of the discs that touch, (n,): 0 is the ball or wheel A, 1 wheel B.
     #[getter]
     fn discs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         PyArray1::from_iter(
@@ -179,26 +191,31 @@ impl PlanarContacts {
         )
     }
 
+    /// Points of the ground, world frame, (n, 2), m.
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.rows(py, |a| a.contact.foot.into())
     }
 
+    /// Unit normals out of the ground, (n, 2); the tangent is (n_y, -n_x).
     #[getter]
     fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.rows(py, |a| a.contact.n.into())
     }
 
+    /// Gaps, (n,), m.
     #[getter]
     fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_iter(py, self.active.iter().map(|a| a.contact.gap))
     }
 
+    /// Impulses of the step along normal and tangent, (n, 2), N s.
     #[getter]
     fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.rows(py, |a| a.impulse)
     }
 
+    /// Velocities of the rim after the step along normal and tangent, (n, 2), m/s.
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.rows(py, |a| a.velocity)
@@ -213,7 +230,10 @@ impl PlanarContacts {
     }
 }
 
-/// A planar machine on a ground, stepped through time by the rover's own schemes.
+/// A planar machine on a ground: what the machines share. Made by the classes derived from it.
+///
+/// One call at a time: a call during another one, from another thread or a signal handler, raises
+/// BusyError.
 #[pyclass(module = "rover_gym._core", subclass, frozen)]
 pub struct PlanarSimulation {
     inner: Shared<Box<dyn Run>>,
@@ -312,48 +332,55 @@ impl PlanarSimulation {
 
 #[pymethods]
 impl PlanarSimulation {
+    /// The ground.
     #[getter]
     fn ground(&self, py: Python<'_>) -> Py<PyAny> {
         self.ground.clone_ref(py)
     }
 
+    /// Time since the last call of `set_state`, s.
     #[getter]
     fn time(&self) -> PyResult<f64> {
         let inner = self.open()?;
         Ok(inner.time())
     }
 
+    /// Time step, s.
     #[getter]
     fn time_step(&self) -> PyResult<f64> {
         let inner = self.open()?;
         Ok(inner.options().time_step)
     }
 
+    /// Coordinates, (nv,): x and y, m, then angles, rad, which turn to the left.
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let inner = self.open()?;
         Ok(fresh(py, inner.q()))
     }
 
+    /// Rates of the coordinates, (nv,), m/s and rad/s.
     #[getter]
     fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let inner = self.open()?;
         Ok(fresh(py, inner.v()))
     }
 
-    /// Centres of the discs that touch the ground.
+    /// Centres of the discs, world frame, (n_discs, 2), m.
     #[getter]
     fn centres<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let inner = self.open()?;
         fresh_rows(py, &inner.centres())
     }
 
+    /// Gap of each disc now, (n_discs,), m; negative where it overlaps the ground.
     #[getter]
     fn gaps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let inner = self.open()?;
         Ok(fresh(py, &inner.gaps()))
     }
 
+    /// Commanded torques, (n_discs,), N m, positive forward.
     #[getter]
     fn torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let inner = self.open()?;
@@ -366,7 +393,7 @@ impl PlanarSimulation {
         self.parameters.bind(py).copy()
     }
 
-    /// The keyword arguments that make a simulation with these options.
+    /// The keyword arguments that make a simulation with the same options.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let inner = self.open()?;
@@ -388,6 +415,17 @@ impl PlanarSimulation {
         Ok(settings)
     }
 
+    /// Sets coordinates and rates; torques stay.
+    ///
+    /// Time starts at 0, and the next step has no warm start.
+    ///
+    /// Args:
+    ///     q: Coordinates, (nv,), m and rad.
+    ///     v: Their rates, (nv,), m/s and rad/s; at rest by default.
+    ///
+    /// Raises:
+    ///     StateError: An array has a wrong length or an entry that is not finite. Nothing has
+    ///         changed.
     #[pyo3(signature = (q, v = None))]
     fn set_state(&self, q: &Bound<'_, PyAny>, v: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let mut inner = self.open()?;
@@ -397,12 +435,30 @@ impl PlanarSimulation {
         Ok(inner.set_state(&q, &v).map_err(BorderError::from)?)
     }
 
+    /// Sets the driving torques; each saturates at its limit, where the machine has one.
+    ///
+    /// Args:
+    ///     torques: Torques between the body and each disc, (n_discs,), N m, positive forward.
+    ///
+    /// Raises:
+    ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
     fn set_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
         let mut inner = self.open()?;
         let torques = vector(torques, Kind::Command, "torques")?;
         Ok(inner.set_inputs(&torques).map_err(BorderError::from)?)
     }
 
+    /// Takes n steps, as `Simulation.step` does.
+    ///
+    /// Args:
+    ///     n: Number of steps.
+    ///
+    /// Returns:
+    ///     How the steps went.
+    ///
+    /// Raises:
+    ///     StepError: A step could not be taken; the state before it stays.
+    ///     OptionError: `n` is not a count.
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
     fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
         let steps = n.count(1, Kind::Option, "n")?;
@@ -412,6 +468,7 @@ impl PlanarSimulation {
         Ok(watch.result(report)?.into())
     }
 
+    /// The contacts of the last step.
     #[getter]
     fn contacts(&self) -> PyResult<PlanarContacts> {
         let inner = self.open()?;
@@ -420,17 +477,23 @@ impl PlanarSimulation {
         })
     }
 
+    /// Kinetic and potential energy now.
     fn energy(&self) -> PyResult<Energy> {
         let inner = self.open()?;
         Ok(inner.energy().into())
     }
 
+    /// Mass matrix now, (nv, nv), in kg, kg m and kg m².
     fn mass_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let inner = self.open()?;
         fresh_matrix(py, &inner.mass_matrix())
     }
 
-    /// W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem.
+    /// The friction-contact problem of the last step.
+    ///
+    /// Returns:
+    ///     Delassus operator W, (2 n_c, 2 n_c), 1/kg; free velocity, (2 n_c,), m/s; friction
+    ///     coefficients, (n_c,).
     fn last_problem<'py>(&self, py: Python<'py>) -> PyResult<Problem<'py>> {
         let inner = self.open()?;
         let (W, q, mu) = inner.last_problem();
@@ -440,6 +503,7 @@ impl PlanarSimulation {
         Ok((fresh_matrix(py, &W)?, fresh(py, q), fresh(py, mu)))
     }
 
+    /// Everything that is needed to continue bit for bit.
     fn snapshot(&self) -> PyResult<PlanarSnapshot> {
         let inner = self.open()?;
         Ok(PlanarSnapshot {
@@ -447,6 +511,13 @@ impl PlanarSimulation {
         })
     }
 
+    /// Goes back to a snapshot.
+    ///
+    /// Args:
+    ///     snapshot: A snapshot of a simulation of the same machine.
+    ///
+    /// Raises:
+    ///     StateError: The snapshot belongs to another machine or is damaged. Nothing has changed.
     fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
         let mut inner = self.open()?;
         let snapshot = belonging::<PlanarSnapshot>(snapshot, "a PlanarSnapshot")?;
@@ -486,7 +557,22 @@ impl PlanarSimulation {
     }
 }
 
-/// The ball of the report's section 3.1: coordinates x, y, theta.
+/// A disc on a ground: coordinates x, y of its centre, m, and its angle theta, rad.
+///
+/// Args:
+///     ground: A `Line`, `Sine`, `Spline` or `Polyline`.
+///     mass: Mass, kg.
+///     radius: Radius, m.
+///     inertia: Inertia about the centre, kg m²; that of a homogeneous disc by default.
+///     **options: Options as of `Simulation`, from `gravity`, here (2,), to `warm_start`, and
+///         `contact`: "nearest", the disc touches where the ground is nearest to its centre, or
+///         "centre_height", the 2010 report's rule, by which the centre itself stops at the ground.
+///
+/// Raises:
+///     ModelError: `mass`, `radius` or `inertia` is not finite and positive.
+///     TerrainError: `ground` is not a ground.
+///     OptionError: An option is out of its range.
+///     TypeError: An option is unknown.
 #[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
 pub struct BallSimulation;
 
@@ -516,7 +602,32 @@ impl BallSimulation {
     }
 }
 
-/// The two-wheel rover of the report's section 3.1: coordinates x, y, theta, theta_A, theta_B.
+/// A body on two driven wheels.
+///
+/// Coordinates are x, y of the body's mass centre, m, theta, theta_A and theta_B, rad. A is the
+/// back wheel, B the front wheel. All angles are absolute. The defaults are the rover of the 2010
+/// report's granular run.
+///
+/// Args:
+///     ground: A `Line`, `Sine`, `Spline` or `Polyline`.
+///     mass: Mass of the body, kg.
+///     inertia: Inertia of the body about its mass centre, kg m²; that of a rod from axle to axle
+///         by default.
+///     wheel_mass: Mass of both wheels or of each, kg; 60 by default.
+///     wheel_radius: Radius of both wheels or of each, m; 0.2 by default.
+///     wheel_inertia: Inertia of both wheels or of each about the axle, kg m²; that of a
+///         homogeneous disc by default.
+///     axle_a: Back axle relative to the body's mass centre, body axes, (2,), m; (-0.4, 0) by
+///         default.
+///     axle_b: Front axle relative to the body's mass centre, body axes, (2,), m; (0.4, 0) by
+///         default.
+///     **options: Options as of `BallSimulation`.
+///
+/// Raises:
+///     ModelError: A mass, radius or inertia is not finite and positive, or the wheels overlap.
+///     TerrainError: `ground` is not a ground.
+///     OptionError: An option is out of its range.
+///     TypeError: An option is unknown.
 #[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
 pub struct TwoWheelRoverSimulation;
 
@@ -588,7 +699,24 @@ impl TwoWheelRoverSimulation {
     }
 }
 
-/// The six-wheel rover driven straight: coordinates x, y, theta and one angle a pair of joints.
+/// The six-wheel rover driven straight, in its plane of symmetry.
+///
+/// Coordinates are x, y, m, theta, and the angle of each mirrored pair of joints, rad. Joints that
+/// do not turn about z are locked at 0. Only wheels touch the ground. A torque is that of each
+/// wheel of a pair.
+///
+/// Args:
+///     ground: A `Line`, `Sine`, `Spline` or `Polyline`.
+///     model: The machine, its own mirror image about the trunk's x-y plane; the built-in rover by
+///         default.
+///     **options: Options as of `BallSimulation`.
+///
+/// Raises:
+///     ModelError: The model is not its own mirror image, or its planar image has not 7
+///         coordinates.
+///     TerrainError: `ground` is not a ground.
+///     OptionError: An option is out of its range.
+///     TypeError: An option is unknown.
 #[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
 pub struct MirroredRoverSimulation {
     joints: Vec<Vec<String>>,
@@ -617,11 +745,13 @@ impl MirroredRoverSimulation {
         Ok(PyClassInitializer::from(base).add_subclass(own))
     }
 
+    /// Names of the joints that share each coordinate from the fourth on.
     #[getter]
     fn joints(&self) -> Vec<Vec<String>> {
         self.joints.clone()
     }
 
+    /// Names of the wheels of each disc.
     #[getter]
     fn wheels(&self) -> Vec<Vec<String>> {
         self.wheels.clone()

@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 use crate::arguments;
 use crate::errors::{BorderError, Kind, Value};
 
-/// Everything that a simulation needs to continue bit for bit; picklable.
+/// Everything that a simulation needs to continue bit for bit. Picklable.
 #[pyclass(module = "rover_gym._core", frozen)]
 pub struct Snapshot {
     pub inner: CoreSnapshot,
@@ -59,11 +59,22 @@ fn refused(reason: &str) -> BorderError {
 
 #[pymethods]
 impl Snapshot {
+    /// Reads a snapshot.
+    ///
+    /// Args:
+    ///     data: What `to_bytes` returned.
+    ///
+    /// Returns:
+    ///     The snapshot.
+    ///
+    /// Raises:
+    ///     StateError: The bytes are not those of a snapshot.
     #[staticmethod]
     fn from_bytes(data: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self { inner: read(data)? })
     }
 
+    /// The snapshot as bytes, as `from_bytes` reads them.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         Ok(PyBytes::new(py, &self.bytes()?))
     }

@@ -86,7 +86,7 @@ fn places_and_contacts_agree_with_the_reference() {
         let angles = coordinates::report_angles(&q);
         let kinematics = Kinematics::of(&model, &coordinates::from_report(&model, &q).unwrap());
         let origins = model.frames().iter().flat_map(|f| {
-            let x = kinematics.base + kinematics.point(f.body, &f.position);
+            let x = kinematics.origin(f.body) + kinematics.point(f.body, &f.position);
             [x.x, x.y, x.z]
         });
         assert_close(
@@ -106,11 +106,11 @@ fn places_and_contacts_agree_with_the_reference() {
         let mut points = Vec::new();
         let mut rows = Vec::new();
         for contact in &contacts {
-            points.extend_from_slice((kinematics.base + contact.point).as_slice());
+            points.extend_from_slice((kinematics.origin(contact.body) + contact.point).as_slice());
             let path = model.path(contact.body);
             for d in contact.frame.rows() {
                 let mut along = vec![0.0; path.len()];
-                kinematics.point_jacobian_row(path, &contact.point, &d, &mut along);
+                kinematics.point_jacobian_row(&model, contact.body, &contact.point, &d, &mut along);
                 let mut full = DVector::zeros(21);
                 for (x, &k) in along.iter().zip(path) {
                     full[k] = *x;

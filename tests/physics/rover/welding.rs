@@ -45,7 +45,7 @@ fn mass_matrix_is_the_block_of_the_full_one() {
         assert_eq!(welded.nv() + joints.len(), full.nv());
         let mut q: Vec<f64> = (0..21).map(|k| 0.3 * f64::from(k).sin()).collect();
         for (name, angle) in &joints {
-            q[full.joint_index(name).unwrap()] = *angle;
+            q[full.joint_velocity(full.joint_index(name).unwrap())] = *angle;
         }
         let reduced: Vec<f64> = kept.iter().map(|&k| q[k]).collect();
         let (M, M_welded) = (dense(&full, &q), dense(&welded, &reduced));

@@ -3,6 +3,8 @@
 //! With `M̂ = Lᵀ D L` and `Z = D^(-1/2) L^(-T) H` the operator is `W = Zᵀ Z`. A column of Z is nonzero only along its body's
 //! path, so a block of W is a dot product over the path that two bodies share: never a dense product.
 
+use std::ops::Range;
+
 use super::contact_point::Contact;
 use crate::multibody::{BASE, FactoredMassMatrix, Kinematics, Model};
 
@@ -59,8 +61,8 @@ impl ContactSystem {
         for (c, contact) in contacts.iter().enumerate() {
             let path = model.path(contact.body);
             let rows = &mut self.Z[c * w..][..path.len()];
-            jacobian_columns(kinematics, path, contact, rows);
-            let u = path_product(path, rows, v);
+            jacobian_columns(model, kinematics, contact, rows);
+            let u = path_product(model.split_path(contact.body), rows, v);
             self.u[3 * c..][..3].copy_from_slice(&u[..3]);
             factor.half_solve_path(path, rows);
         }
@@ -93,8 +95,8 @@ impl ContactSystem {
     /// `out = Zᵀ y` (3 n_c): what a velocity change `y` in factor coordinates does at the contacts.
     pub fn local(&self, model: &Model, y: &[f64], out: &mut [f64]) {
         for (c, values) in out.chunks_exact_mut(3).enumerate() {
-            let path = model.path(self.bodies[c]);
-            let u = path_product(path, &self.Z[c * self.stride..][..path.len()], y);
+            let path = model.split_path(self.bodies[c]);
+            let u = path_product(path, &self.Z[c * self.stride..], y);
             values.copy_from_slice(&u[..3]);
         }
     }
@@ -119,15 +121,19 @@ impl ContactSystem {
     /// `y += Z p`: impulses to a velocity change in factor coordinates.
     pub fn add_impulses(&self, model: &Model, p: &[f64], y: &mut [f64]) {
         for (c, p) in p.chunks_exact(3).enumerate() {
-            let path = model.path(self.bodies[c]);
-            let Z = &self.Z[c * self.stride..][..path.len()];
+            let (lead, rest) = model.split_path(self.bodies[c]);
+            let (Z_lead, Z_rest) = self.Z[c * self.stride..].split_at(lead.len());
             let product = |z: &Columns| z[0] * p[0] + z[1] * p[1] + z[2] * p[2];
-            let (base, joints) = y.split_at_mut(BASE);
-            for (y, z) in base.iter_mut().zip(&Z[..BASE]) {
-                *y += product(z);
+            if let (Some(y), Some(Z)) = (
+                y[lead].first_chunk_mut::<BASE>(),
+                Z_lead.first_chunk::<BASE>(),
+            ) {
+                for (y, z) in y.iter_mut().zip(Z) {
+                    *y += product(z);
+                }
             }
-            for (z, &k) in Z[BASE..].iter().zip(&path[BASE..]) {
-                joints[k - BASE] += product(z);
+            for (z, &k) in Z_rest.iter().zip(rest) {
+                y[k] += product(z);
             }
         }
     }
@@ -135,8 +141,8 @@ impl ContactSystem {
 
 /// `Hᵀ` of one contact along its path: for each velocity, what it moves the point along n, t, b.
 fn jacobian_columns(
+    model: &Model,
     kinematics: &Kinematics,
-    path: &[usize],
     contact: &Contact,
     rows: &mut [Columns],
 ) {
@@ -147,26 +153,29 @@ fn jacobian_columns(
         rows[i] = [n[i], t[i], b[i], 0.0];
         rows[3 + i] = [xn[i], xt[i], xb[i], 0.0];
     }
-    for (row, &k) in rows.iter_mut().zip(path).skip(6) {
-        // Velocity of the point when the joint turns at unit rate.
-        let velocity = kinematics.axis[k - 5].cross(&(x - kinematics.r[k - 5]));
+    let lead = model.lead(contact.body);
+    for (row, &m) in rows[lead..].iter_mut().zip(model.motions(contact.body)) {
+        let velocity = kinematics.motions[m].velocity_at(x);
         *row = [velocity.dot(&n), velocity.dot(&t), velocity.dot(&b), 0.0];
     }
 }
 
 /// Product of columns along a path with a full vector.
 #[inline]
-fn path_product(path: &[usize], rows: &[Columns], v: &[f64]) -> Columns {
+fn path_product((lead, rest): (Range<usize>, &[usize]), rows: &[Columns], v: &[f64]) -> Columns {
     let mut sums = [0.0; 4];
     let mut add = |row: &Columns, v: f64| {
         for (sum, value) in sums.iter_mut().zip(row) {
             *sum += value * v;
         }
     };
-    for (row, &v) in rows[..BASE].iter().zip(&v[..BASE]) {
-        add(row, v);
+    let (of_lead, of_rest) = rows.split_at(lead.len());
+    if let (Some(rows), Some(v)) = (of_lead.first_chunk::<BASE>(), v[lead].first_chunk::<BASE>()) {
+        for (row, &v) in rows.iter().zip(v) {
+            add(row, v);
+        }
     }
-    for (row, &k) in rows[BASE..].iter().zip(&path[BASE..]) {
+    for (row, &k) in of_rest.iter().zip(rest) {
         add(row, v[k]);
     }
     sums
@@ -189,8 +198,9 @@ pub fn generalized_impulse(
             out[i] += force[i];
             out[3 + i] += moment[i];
         }
-        for &k in &model.path(contact.body)[6..] {
-            out[k] += kinematics.axis[k - 5].dot(&(moment - kinematics.r[k - 5].cross(&force)));
+        let (_, rest) = model.split_path(contact.body);
+        for (&k, &m) in rest.iter().zip(model.motions(contact.body)) {
+            out[k] += kinematics.motions[m].power(&force, &moment);
         }
     }
 }

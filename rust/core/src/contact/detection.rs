@@ -111,10 +111,10 @@ fn wheel_candidates(i: usize, end: &Kinematics, terrain: &dyn Terrain, gate: &mu
     let kinematics = gate.kinematics;
     let wheel = &gate.model.wheels()[i];
     let (part, body) = (Part::Wheel(i), wheel.body);
-    let base = &kinematics.base;
+    let base = kinematics.origin(body);
     let placed = place_wheel(kinematics, wheel);
     let half_way = if gate.can_be_passed {
-        end.base - base + end.point(body, &wheel.centre) - placed.centre
+        end.origin(body) - base + end.point(body, &wheel.centre) - placed.centre
     } else {
         Vector3::zeros()
     };
@@ -163,13 +163,13 @@ fn box_candidates(i: usize, end: &Kinematics, terrain: &dyn Terrain, gate: &mut 
     let kinematics = gate.kinematics;
     let solid = &gate.model.boxes()[i];
     let (part, body) = (Part::Box(i), solid.body);
-    let base = &kinematics.base;
+    let base = kinematics.origin(body);
     let R = kinematics.R[body] * solid.rotation;
     let centre = kinematics.point(body, &solid.centre);
     let end_centre = end.point(body, &solid.centre);
     let size = solid.half_size.norm();
     let motion = if gate.can_be_passed {
-        (end.base - base + end_centre - centre).norm()
+        (end.origin(body) - base + end_centre - centre).norm()
             + (end.R[body] - kinematics.R[body]).norm() * size
     } else {
         0.0
@@ -208,7 +208,7 @@ fn box_candidates(i: usize, end: &Kinematics, terrain: &dyn Terrain, gate: &mut 
                 let near = box_sphere::nearest_point(&centre, &R, &solid.half_size, sphere, base);
                 gate.offer_sphere((part, body, id), sphere, &near, motion, || {
                     let end_R = end.R[body] * solid.rotation;
-                    let end = end_R.tr_mul(&(sphere.centre - end.base - end_centre));
+                    let end = end_R.tr_mul(&(sphere.centre - end.origin(body) - end_centre));
                     let distance = |x: &Vector3<f64>| {
                         let (_, n, distance) = box_sphere::nearest_local(x, &solid.half_size);
                         (n, distance)
@@ -237,7 +237,7 @@ pub fn relocate(
     terrain: &dyn Terrain,
     contact: &mut Contact,
 ) {
-    let base = &kinematics.base;
+    let base = kinematics.origin(contact.body);
     let feature = usize::from(contact.key.feature);
     match (contact.part, terrain.primitive(contact.key.primitive)) {
         (Part::Wheel(i), Primitive::Plane(plane)) => {
@@ -262,7 +262,7 @@ fn relocate_on_sphere(
     sphere: &Sphere,
     contact: &mut Contact,
 ) {
-    let base = &kinematics.base;
+    let base = kinematics.origin(contact.body);
     let n = &contact.frame.n;
     let is_passing = contact.key.feature == PASSING;
     let near = match contact.part {
@@ -335,7 +335,7 @@ fn look_around(
     reach: f64,
     best: &mut Contact,
 ) {
-    let base = &kinematics.base;
+    let base = kinematics.origin(best.body);
     terrain.visit_near(&(base + placed.centre), reach, &mut |id, primitive| {
         let (point, frame, gap) = match primitive {
             Primitive::Plane(plane) => {

@@ -56,7 +56,7 @@ pub fn bias(
         } else {
             let carrier = &moved[body.parent];
             let d = r - kinematics.r[body.parent];
-            let spin = kinematics.axis[b] * v[5 + b];
+            let spin = kinematics.motions[b - 1].axis * v[5 + b];
             (
                 carrier.omega + spin,
                 carrier.alpha + carrier.omega.cross(&spin),
@@ -93,7 +93,9 @@ pub fn bias(
     }
     for b in (1..bodies.len()).rev() {
         let Moved { force, moment, .. } = moved[b];
-        out[5 + b] = kinematics.axis[b].dot(&(moment - kinematics.r[b].cross(&force)));
+        out[5 + b] = kinematics.motions[b - 1]
+            .axis
+            .dot(&(moment - kinematics.r[b].cross(&force)));
         let carrier = &mut moved[bodies[b].parent];
         carrier.force += force;
         carrier.moment += moment;

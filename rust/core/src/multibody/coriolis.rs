@@ -96,7 +96,7 @@ pub fn coriolis_matrix(
         s.velocity[b] = if b == 0 {
             base
         } else {
-            let axis = kinematics.axis[b];
+            let axis = kinematics.motions[b - 1].axis;
             let S = Spatial {
                 angular: axis,
                 linear: kinematics.r[b].cross(&axis),

@@ -7,17 +7,42 @@ use nalgebra::{Matrix3, Vector3};
 use super::model::Model;
 use super::state::Configuration;
 
+/// What one joint velocity does per unit: a turn about an axis.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Motion {
+    /// Unit vector of the axis, world axes.
+    pub axis: Vector3<f64>,
+    /// A point of the axis, relative to the origin of the tree's places, m.
+    pub place: Vector3<f64>,
+}
+
+impl Motion {
+    /// Velocity of the material point at `x` per unit of the joint's velocity.
+    #[inline]
+    #[must_use]
+    pub fn velocity_at(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        self.axis.cross(&(x - self.place))
+    }
+
+    /// Generalized force on the joint's velocity of a force (N) and its moment about the origin of the tree's places (N m).
+    #[inline]
+    #[must_use]
+    pub fn power(&self, force: &Vector3<f64>, moment: &Vector3<f64>) -> f64 {
+        // a · ((x − r) × f) = a · (x × f − r × f)
+        self.axis.dot(&(moment - self.place.cross(force)))
+    }
+}
+
 /// Poses of all bodies in one configuration. Scratch: sized once for a model, then reused.
 #[derive(Clone, Debug)]
 pub struct Kinematics {
-    /// Trunk origin, world, m.
-    pub base: Vector3<f64>,
+    origin: Vector3<f64>,
     /// `R_WB` of each body.
     pub R: Vec<Matrix3<f64>>,
     /// Origin of each body's frame relative to the trunk origin, world axes, m.
     pub r: Vec<Vector3<f64>>,
-    /// Joint axis of each body, world axes (the base's is unused).
-    pub axis: Vec<Vector3<f64>>,
+    /// What each joint velocity does, by the numbers of [`Model::motions`].
+    pub motions: Vec<Motion>,
     /// Mass centre of each body relative to the trunk origin, world axes, m.
     pub c: Vec<Vector3<f64>>,
 }
@@ -28,10 +53,10 @@ impl Kinematics {
     pub fn new(model: &Model) -> Self {
         let n = model.bodies().len();
         Self {
-            base: Vector3::zeros(),
+            origin: Vector3::zeros(),
             R: vec![Matrix3::identity(); n],
             r: vec![Vector3::zeros(); n],
-            axis: vec![Vector3::zeros(); n],
+            motions: vec![Motion::default(); model.n_joints()],
             c: vec![Vector3::zeros(); n],
         }
     }
@@ -56,7 +81,7 @@ impl Kinematics {
 
     fn update_poses<const SPIN: bool>(&mut self, model: &Model, configuration: &Configuration) {
         let bodies = model.bodies();
-        self.base = configuration.position;
+        self.origin = configuration.position;
         self.R[0] = *configuration.attitude.to_rotation_matrix().matrix();
         self.r[0] = Vector3::zeros();
         self.c[0] = self.R[0] * bodies[0].centre_of_mass;
@@ -66,11 +91,13 @@ impl Kinematics {
             let r = self.r[body.parent] + parent * body.position;
             let fixed = body.rotation.as_ref().map(|fixed| parent * fixed);
             let frame = fixed.as_ref().unwrap_or(parent);
-            (own[0], self.axis[b]) = if SPIN || !body.is_spinner {
+            let axis;
+            (own[0], axis) = if SPIN || !body.is_spinner {
                 body.axis.rotate(frame, configuration.joints[b - 1])
             } else {
                 (*frame, body.axis.turned(frame))
             };
+            self.motions[b - 1] = Motion { axis, place: r };
             self.r[b] = r;
             self.c[b] = if body.is_centred() {
                 r
@@ -78,6 +105,13 @@ impl Kinematics {
                 r + own[0] * body.centre_of_mass
             };
         }
+    }
+
+    /// World position of the point to which all places of body `b` are relative, m: the origin of its tree's base.
+    #[inline]
+    #[must_use]
+    pub fn origin(&self, _b: usize) -> &Vector3<f64> {
+        &self.origin
     }
 
     /// A point of body `b` given in its frame, relative to the trunk origin, world axes.
@@ -97,8 +131,8 @@ impl Kinematics {
         v: &[f64],
     ) -> Vector3<f64> {
         let mut velocity = Vector3::new(v[0], v[1], v[2]) + Vector3::new(v[3], v[4], v[5]).cross(x);
-        for &k in &model.path(b)[6..] {
-            velocity += self.axis[k - 5].cross(&(x - self.r[k - 5])) * v[k];
+        for (&k, &m) in model.path(b)[model.lead(b)..].iter().zip(model.motions(b)) {
+            velocity += self.motions[m].velocity_at(x) * v[k];
         }
         velocity
     }
@@ -109,7 +143,8 @@ impl Kinematics {
     #[inline]
     pub fn point_jacobian_row(
         &self,
-        path: &[usize],
+        model: &Model,
+        b: usize,
         x: &Vector3<f64>,
         d: &Vector3<f64>,
         row: &mut [f64],
@@ -117,9 +152,8 @@ impl Kinematics {
         let moment = x.cross(d);
         row[..3].copy_from_slice(d.as_slice());
         row[3..6].copy_from_slice(moment.as_slice());
-        for (entry, &k) in row.iter_mut().zip(path).skip(6) {
-            // a · ((x − r) × d) = a · (x × d − r × d)
-            *entry = self.axis[k - 5].dot(&(moment - self.r[k - 5].cross(d)));
+        for (entry, &m) in row[model.lead(b)..].iter_mut().zip(model.motions(b)) {
+            *entry = self.motions[m].power(d, &moment);
         }
     }
 }

@@ -64,7 +64,7 @@ impl MassMatrix {
                 moment,
                 inertia,
             } = self.composites[b];
-            let a = kinematics.axis[b];
+            let a = kinematics.motions[b - 1].axis;
             // Momentum of the composite body when its joint turns at unit rate, about the trunk origin.
             let v = kinematics.r[b].cross(&a);
             let f = v * mass + a.cross(&moment);
@@ -72,8 +72,8 @@ impl MassMatrix {
             let (base, joints) = self.rows[(5 + b) * self.stride..].split_at_mut(BASE);
             base[..3].copy_from_slice(f.as_slice());
             base[3..].copy_from_slice(n.as_slice());
-            for (entry, &k) in joints.iter_mut().zip(&model.path(b)[BASE..]) {
-                *entry = kinematics.axis[k - 5].dot(&(n - kinematics.r[k - 5].cross(&f)));
+            for (entry, &m) in joints.iter_mut().zip(model.motions(b)) {
+                *entry = kinematics.motions[m].power(&f, &n);
             }
             let parent = &mut self.composites[bodies[b].parent];
             parent.mass += mass;

@@ -22,10 +22,10 @@ pub use description::{
 };
 pub use error::{ModelError, StateError};
 pub use joint::JointAxis;
-pub use kinematics::Kinematics;
+pub use kinematics::{Kinematics, Motion};
 pub use mass_matrix::{FactoredMassMatrix, MassMatrix};
-pub(crate) use model::{BASE, fingerprint};
-pub use model::{Body, Frame, MAX_SOLIDS, Model, Wheel};
+pub(crate) use model::fingerprint;
+pub use model::{BASE, Body, Frame, MAX_SOLIDS, Model, Wheel};
 pub use momentum::{Energy, EnergyScratch, Momentum};
 pub use motor::{DriveTrial, Motor, MotorRegime};
 pub use state::{Configuration, State};

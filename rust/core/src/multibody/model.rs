@@ -5,6 +5,7 @@
 //! coordinate is gone from every matrix.
 
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
@@ -17,8 +18,8 @@ use crate::spatial::SymmetricMatrix3;
 /// Most solids of a model, and most wheels and tags: beyond it a step costs seconds and matrices gigabytes.
 pub const MAX_SOLIDS: usize = 1000;
 
-/// Velocities of the base, with which every path begins.
-pub(crate) const BASE: usize = 6;
+/// Velocities of a free base, with which every path of its tree begins.
+pub const BASE: usize = 6;
 
 /// Largest length of a description either way, m.
 const MAX_LENGTH: f64 = 1e6;
@@ -94,9 +95,9 @@ pub struct Wheel {
     pub drive_sign: f64,
     /// Torque–speed line of its motor, where it has one.
     pub motor: Option<Motor>,
-    /// Velocity index of the wheel's own joint; none where it is locked.
+    /// Its own joint, by its number ([`Model::joint_index`]); none where it is locked.
     pub joint: Option<usize>,
-    /// Velocity index of its steering joint; none where there is none or it is locked.
+    /// Its steering joint, by its number; none where there is none or it is locked.
     pub steering: Option<usize>,
     /// Largest steering set-point either way, rad.
     pub steering_limit: f64,
@@ -129,6 +130,10 @@ pub struct Model {
     paths: Vec<usize>,
     path_lengths: Vec<usize>,
     path_stride: usize,
+    /// Numbers of the joints from the base to a body, in the manner of `paths`.
+    motions: Vec<usize>,
+    joint_velocities: Vec<usize>,
+    body_of_velocity: Vec<usize>,
     /// How many leading path entries bodies `a` and `b` share: `common[a * n_bodies + b]`.
     common: Vec<usize>,
     mass: f64,
@@ -361,7 +366,7 @@ impl Model {
             }
         }
         let joints: HashMap<&str, usize> = (bodies.iter().skip(1).map(|b| b.name.as_str()))
-            .zip(6..)
+            .zip(0..)
             .collect();
         let joint_of = |name: &str| joints.get(name).copied();
         let mut wheels = Vec::new();
@@ -411,6 +416,10 @@ impl Model {
         for (b, path) in path_of.iter().enumerate() {
             paths[b * path_stride..][..path.len()].copy_from_slice(path);
         }
+        let motions = paths.iter().map(|k| k.saturating_sub(BASE)).collect();
+        let joint_velocities = (BASE..5 + bodies.len()).collect();
+        let joint_bodies = 1..bodies.len();
+        let body_of_velocity = [0; BASE].into_iter().chain(joint_bodies).collect();
         // A path ends with its own body, which no path of a body before it has: what both share is what the parent shares.
         let n = bodies.len();
         let mut common = vec![0; n * n];
@@ -436,6 +445,9 @@ impl Model {
             paths,
             path_lengths,
             path_stride,
+            motions,
+            joint_velocities,
+            body_of_velocity,
             common,
             mass,
             reach,
@@ -451,7 +463,7 @@ impl Model {
         &self.description
     }
 
-    /// Moving bodies; the first is the base, body `b > 0` has velocity index `5 + b`.
+    /// Moving bodies; the first is the base.
     #[must_use]
     pub fn bodies(&self) -> &[Body] {
         &self.bodies
@@ -531,7 +543,7 @@ impl Model {
         if k < BASE {
             &self.paths[..=k]
         } else {
-            self.path(k - 5)
+            self.path(self.body_of_velocity[k])
         }
     }
 
@@ -549,14 +561,59 @@ impl Model {
         self.common[a * self.bodies.len() + b]
     }
 
-    /// Velocity index of a joint by name.
+    /// How many velocities of a free base begin the path of body `b`: 6, or 0 in a tree on a fixed base.
+    #[inline]
+    #[must_use]
+    pub fn lead(&self, _b: usize) -> usize {
+        BASE
+    }
+
+    /// Body whose joint has velocity `k`.
+    #[inline]
+    #[must_use]
+    pub fn body_of_velocity(&self, k: usize) -> usize {
+        self.body_of_velocity[k]
+    }
+
+    /// The path of body `b` in two parts: the velocities of a free base, which are consecutive, and those of the joints.
+    #[inline]
+    #[must_use]
+    pub fn split_path(&self, b: usize) -> (Range<usize>, &[usize]) {
+        (0..BASE, &self.path(b)[BASE..])
+    }
+
+    /// The motions ([`Kinematics::motions`](super::Kinematics::motions)) that the velocities of body `b`'s path beyond its
+    /// [`Self::lead`] give it, in the order of the path.
+    #[inline]
+    #[must_use]
+    pub fn motions(&self, b: usize) -> &[usize] {
+        &self.motions[b * self.path_stride..][BASE..self.path_lengths[b]]
+    }
+
+    /// Number of a joint by name: its index in commands and in [`Configuration::joints`](super::Configuration::joints).
     #[must_use]
     pub fn joint_index(&self, name: &str) -> Option<usize> {
-        self.bodies
-            .iter()
-            .skip(1)
-            .position(|b| b.name == name)
-            .map(|k| k + 6)
+        self.bodies.iter().skip(1).position(|b| b.name == name)
+    }
+
+    /// Velocity index of every joint (n_joints).
+    #[inline]
+    #[must_use]
+    pub fn joint_velocities(&self) -> &[usize] {
+        &self.joint_velocities
+    }
+
+    /// Velocity index of a joint.
+    #[inline]
+    #[must_use]
+    pub fn joint_velocity(&self, joint: usize) -> usize {
+        self.joint_velocities[joint]
+    }
+
+    /// Gains with which a joint is held.
+    #[must_use]
+    pub fn hold(&self, joint: usize) -> Hold {
+        self.bodies[joint + 1].hold
     }
 }
 

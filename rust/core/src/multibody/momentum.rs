@@ -56,7 +56,7 @@ pub fn body_momenta(
             let d = kinematics.r[b] - kinematics.r[body.parent];
             (
                 p.linear + p.angular.cross(&d),
-                p.angular + kinematics.axis[b] * v[5 + b],
+                p.angular + kinematics.motions[b - 1].axis * v[5 + b],
             )
         };
         out[b] = Momentum {
@@ -95,7 +95,7 @@ pub fn centre_of_mass(model: &Model, kinematics: &Kinematics) -> Vector3<f64> {
         .zip(&kinematics.c)
         .map(|(body, c)| c * body.mass)
         .sum();
-    kinematics.base + moment / model.mass()
+    *kinematics.origin(0) + moment / model.mass()
 }
 
 /// Scratch of [`energy_and_momentum`]: sized once for a model.
@@ -209,7 +209,7 @@ pub fn energy(model: &Model, kinematics: &Kinematics, v: &[f64], gravity: &Vecto
 #[must_use]
 pub fn momentum(model: &Model, kinematics: &Kinematics, v: &[f64]) -> Momentum {
     let mut momenta = vec![Momentum::default(); model.bodies().len()];
-    body_momenta(model, kinematics, v, &kinematics.base, &mut momenta);
+    body_momenta(model, kinematics, v, kinematics.origin(0), &mut momenta);
     Momentum {
         linear: momenta.iter().map(|m| m.linear).sum(),
         angular: momenta.iter().map(|m| m.angular).sum(),

@@ -10,15 +10,16 @@
 //! [`FrictionContactProblem`] states it, with `W` dense or, for many contacts, as [`BlockSparseDelassus`]; [`Residual`] judges an answer. Nothing here knows a body, so a problem read
 //! from a file is as good as one from a rover.
 
-mod block_sparse;
 mod friction_contact;
 mod operator;
+mod passivity;
 mod residual;
 
-pub use block_sparse::{BlockSparseDelassus, PairContact};
 pub use friction_contact::{Dimension, FrictionContactProblem, ProblemError};
-pub use operator::Operator;
+pub use operator::{BlockSparseDelassus, BodyPairs, Operator, PairContact, RoundPair};
+pub(crate) use operator::{dot, rim_impulse, rim_velocity};
+pub(crate) use passivity::passive_share;
 pub use residual::{
     ContactScales, Residual, contact_scales, evaluate, evaluate_into, local_velocity,
 };
-pub(crate) use residual::{Magnitudes, Violations, dot, evaluate_contact, power_of_two};
+pub(crate) use residual::{Magnitudes, Violations, evaluate_contact, power_of_two};

@@ -126,7 +126,8 @@ impl Simulation {
         let R_WB = state.configuration.attitude.to_rotation_matrix();
 
         let mut pose = coordinates::to_public(&state.configuration);
-        for k in model.wheels().iter().filter_map(|wheel| wheel.joint) {
+        for j in model.wheels().iter().filter_map(|wheel| wheel.joint) {
+            let k = model.joint_velocity(j);
             let turn = std::f64::consts::TAU;
             pose[k] -= turn * (pose[k] / turn).round_ties_even();
         }
@@ -138,7 +139,7 @@ impl Simulation {
         let angular = R_WB.inverse() * Vector3::new(v[3], v[4], v[5]);
         row.put(linear.iter().copied());
         row.put(angular.iter().copied());
-        row.put(v[6..].iter().copied());
+        row.put(model.joint_velocities().iter().map(|&k| v[k]));
 
         let wheels = self.wheel_contacts();
         row.put(wheels.iter().map(|wheel| wheel.gap));
@@ -195,7 +196,8 @@ impl Simulation {
         for active in self.contacts() {
             if let Part::Wheel(i) = active.contact.part {
                 let wheel = &self.model().wheels()[i];
-                let rate = wheel.joint.map_or(0.0, |k| self.state().v[k]);
+                let rate = wheel.joint;
+                let rate = rate.map_or(0.0, |j| self.state().v[self.model().joint_velocity(j)]);
                 let rim = wheel.radius * wheel.drive_sign * rate;
                 let [_, u_t, u_b] = active.velocity;
                 let ground = (rim + u_t).hypot(u_b);

@@ -64,15 +64,15 @@ impl Simulation {
         options.check()?;
         let mut command = Command::idle(&model);
         for wheel in model.wheels() {
-            if let Some(k) = wheel.joint {
-                command.drives[k - 6] = Some(Drive {
+            if let Some(j) = wheel.joint {
+                command.drives[j] = Some(Drive {
                     torque: 0.0,
                     motor: wheel.motor,
                 });
             }
-            if let Some(k) = wheel.steering {
-                let hold = model.bodies()[k - 5].hold;
-                command.held[k - 6] = Some(HeldJoint {
+            if let Some(j) = wheel.steering {
+                let hold = model.hold(j);
+                command.held[j] = Some(HeldJoint {
                     set_point: 0.0,
                     stiffness: hold.stiffness,
                     damping: hold.damping,
@@ -213,10 +213,7 @@ impl Simulation {
             drive.torque = 0.0;
         }
         for (wheel, torque) in self.model.wheels().iter().zip(&self.wheel_torque) {
-            if let Some(drive) = wheel
-                .joint
-                .and_then(|k| self.command.drives[k - 6].as_mut())
-            {
+            if let Some(drive) = wheel.joint.and_then(|j| self.command.drives[j].as_mut()) {
                 drive.torque += wheel.drive_sign * torque;
             }
         }
@@ -225,7 +222,7 @@ impl Simulation {
     /// Steering set-point of each wheel, rad; 0 where its steering is not held or is locked.
     #[must_use]
     pub fn steering(&self) -> Vec<f64> {
-        let of = |k: usize| self.command.held[k - 6].map_or(0.0, |h| h.set_point);
+        let of = |j: usize| self.command.held[j].map_or(0.0, |h| h.set_point);
         self.model
             .wheels()
             .iter()
@@ -240,12 +237,12 @@ impl Simulation {
     pub fn set_steering(&mut self, set_points: &[f64]) -> Result<(), CommandError> {
         self.check_steering(set_points)?;
         for (&set_point, wheel) in set_points.iter().zip(self.model.wheels()) {
-            if let Some(k) = wheel.steering {
-                let hold = self.model.bodies()[k - 5].hold;
-                let held = self.command.held[k - 6];
+            if let Some(j) = wheel.steering {
+                let hold = self.model.hold(j);
+                let held = self.command.held[j];
                 let (stiffness, damping) =
                     held.map_or((hold.stiffness, hold.damping), |h| (h.stiffness, h.damping));
-                self.command.held[k - 6] = Some(HeldJoint {
+                self.command.held[j] = Some(HeldJoint {
                     set_point,
                     stiffness,
                     damping,
@@ -322,7 +319,7 @@ impl Simulation {
             }
         }
         for (i, &j) in indices.iter().enumerate() {
-            let hold = self.model.bodies()[j + 1].hold;
+            let hold = self.model.hold(j);
             self.command.held[j] = Some(HeldJoint {
                 set_point: set_points.map_or(self.state.configuration.joints[j], |p| p[i]),
                 stiffness: stiffness.unwrap_or(hold.stiffness),
@@ -348,10 +345,10 @@ impl Simulation {
         self.wheel_torque.fill(0.0);
         self.combine_torques();
         for wheel in self.model.wheels() {
-            if let Some(k) = wheel.joint {
-                let hold = self.model.bodies()[k - 5].hold;
-                let set_point = self.state.configuration.joints[k - 6];
-                self.command.held[k - 6] = Some(HeldJoint {
+            if let Some(j) = wheel.joint {
+                let hold = self.model.hold(j);
+                let set_point = self.state.configuration.joints[j];
+                self.command.held[j] = Some(HeldJoint {
                     set_point,
                     stiffness: hold.stiffness,
                     damping: hold.damping,
@@ -362,7 +359,7 @@ impl Simulation {
 
     fn joint_indices(&self, joints: &[String]) -> Result<Vec<usize>, CommandError> {
         let index = |name: &String| {
-            let found = self.model.joint_index(name).map(|k| k - 6);
+            let found = self.model.joint_index(name);
             found.ok_or_else(|| CommandError::UnknownJoint {
                 field: "joints",
                 name: name.clone(),
@@ -454,7 +451,7 @@ impl Simulation {
             *work += drive.work;
         }
         for (torque, wheel) in self.motor_torque.iter_mut().zip(self.model.wheels()) {
-            let impulse = wheel.joint.map_or(0.0, |k| drives[k - 6].impulse);
+            let impulse = wheel.joint.map_or(0.0, |j| drives[j].impulse);
             *torque = wheel.drive_sign * impulse / self.options.time_step;
         }
     }

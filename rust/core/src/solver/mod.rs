@@ -7,7 +7,7 @@
 //! - `pivoting`: one contact changes its mode at a time, from a warm start that full Newton steps do not profit from;
 //! - `proximal`: the proximal-point method around Newton, for whatever resists (redundant contacts, jammed stacks);
 //! - `admm`: alternating directions, and with them the convex relaxation of Coulomb's law, both for comparison;
-//! - [`body_sweeps`]: accelerated Gauss–Seidel on the bodies' velocities, for thousands of free bodies;
+//! - [`solve_body_pairs`]: accelerated Gauss–Seidel on the bodies' velocities, for thousands of free bodies;
 //! - `block_lu`: the sparse factors of a Newton step of many contacts.
 //!
 //! All stand behind the trait [`Solver`]; [`Method`] names them.
@@ -17,8 +17,6 @@
 mod admm;
 mod auto;
 mod block_lu;
-pub mod body_pairs;
-pub mod body_sweeps;
 mod dense;
 mod guided;
 mod islands;
@@ -28,12 +26,12 @@ mod newton;
 mod nsgs;
 pub mod one_contact;
 mod options;
-pub(crate) mod passivity;
 mod pivoting;
 mod proximal;
 mod reduced_system;
 mod report;
 mod restarts;
+mod stage;
 mod storage;
 mod work;
 mod workspace;
@@ -43,6 +41,7 @@ pub use methods::{
 };
 pub use options::{Method, SolverOptions};
 pub use report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
+pub use stage::body_sweeps::{BodySweeps, LocalProblem, Swept, solve_body_pairs};
 pub use workspace::SolverWorkspace;
 
 use crate::problem::FrictionContactProblem;

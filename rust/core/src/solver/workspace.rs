@@ -1,11 +1,11 @@
 //! Scratch memory of a solve, kept between solves so that none of them allocates.
 
 use super::block_lu::BlockLu;
-use super::body_sweeps::BodySweeps;
 use super::dense::{self, Chunk, LANES};
 use super::islands::Islands;
 use super::modes::Linearised;
 use super::report::Rungs;
+use super::stage::body_sweeps::BodySweeps;
 use super::storage::Storage;
 use super::work::Work;
 use crate::problem::Operator;

@@ -11,7 +11,7 @@
 use nalgebra::{DMatrix, DVector, DVectorView, Vector3};
 
 use crate::multibody::coriolis::{CoriolisScratch, coriolis_matrix};
-use crate::multibody::{BASE, Kinematics, MassMatrix, Model};
+use crate::multibody::{Kinematics, MassMatrix, Model};
 
 /// Scratch, filled at the first step that needs it.
 #[derive(Clone, Debug, Default)]
@@ -39,9 +39,9 @@ pub(super) fn gravity_load(
             out[k] += weight[k];
             out[3 + k] += moment[k];
         }
-        for &k in &model.path(b)[6..] {
-            let (axis, place) = (&kinematics.axis[k - 5], &kinematics.r[k - 5]);
-            out[k] += axis.dot(&(moment - place.cross(&weight)));
+        let (_, rest) = model.split_path(b);
+        for (&k, &m) in rest.iter().zip(model.motions(b)) {
+            out[k] += kinematics.motions[m].power(&weight, &moment);
         }
     }
 }
@@ -120,7 +120,8 @@ fn eliminate(model: &Model, A: &mut DMatrix<f64>, b: &mut [f64], is_forced: bool
             return false;
         }
         let path = model.velocity_path(k);
-        let (base, joints) = path[..path.len() - 1].split_at(k.min(BASE));
+        let path = &path[..path.len() - 1];
+        let (base, joints) = path.split_at(model.lead(model.body_of_velocity(k)).min(path.len()));
         let subtract = |x: &mut [f64], factor: f64| {
             for (x, y) in x.iter_mut().zip(&own[..base.len()]) {
                 *x -= factor * y;

@@ -19,7 +19,7 @@ use crate::integrator::{
 use crate::multibody::bias::{BiasScratch, bias};
 use crate::multibody::momentum::{body_momenta, energy_and_momentum};
 use crate::multibody::{
-    BASE, Configuration, EnergyScratch, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum,
+    Configuration, EnergyScratch, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum,
 };
 use crate::problem::{Dimension, FrictionContactProblem};
 
@@ -109,10 +109,10 @@ impl TreeScratch {
         &self.system.W
     }
 
-    /// World position of the trunk's origin at the pose where contacts were last measured, m.
+    /// World position of the origin of a body's places at the pose where contacts were last measured, m.
     #[must_use]
-    pub fn base_of_contacts(&self) -> &Vector3<f64> {
-        &self.kinematics_end.base
+    pub fn origin_of_contacts(&self, body: usize) -> &Vector3<f64> {
+        self.kinematics_end.origin(body)
     }
 }
 
@@ -210,13 +210,12 @@ impl MechanicalSystem for TreeSystem<'_> {
     fn factorise(&mut self, options: &StepOptions) -> bool {
         let (h, theta) = (options.time_step, options.theta);
         let parts = &mut *self.parts;
-        for (j, (motor, held)) in parts.motors.iter().zip(&self.command.held).enumerate() {
+        let joints = parts.motors.iter().zip(&self.command.held);
+        for ((motor, held), &k) in joints.zip(self.model.joint_velocities()) {
             let (damping, stiffness) = feedback(motor, held.as_ref());
             if damping > 0.0 || stiffness > 0.0 {
                 let implicit = h * motor.theta() * (damping + h * theta * stiffness);
-                parts
-                    .mass_matrix
-                    .add_to_diagonal(self.model, BASE + j, implicit);
+                parts.mass_matrix.add_to_diagonal(self.model, k, implicit);
             }
         }
         parts.mass_matrix.factorise(self.model, &mut parts.factor)
@@ -246,7 +245,15 @@ impl MechanicalSystem for TreeSystem<'_> {
         for (y, f) in y.iter_mut().zip(&parts.force) {
             *y = -options.time_step * f;
         }
-        add_command(options, self.command, start, start.v, &parts.motors, y);
+        add_command(
+            self.model,
+            options,
+            self.command,
+            start,
+            start.v,
+            &parts.motors,
+            y,
+        );
     }
 
     #[inline]
@@ -280,7 +287,15 @@ impl MechanicalSystem for TreeSystem<'_> {
         for (y, f) in y.iter_mut().zip(&*gravity_impulse) {
             *y = options.time_step * f;
         }
-        add_command(options, self.command, start, start.v, &parts.motors, y);
+        add_command(
+            self.model,
+            options,
+            self.command,
+            start,
+            start.v,
+            &parts.motors,
+            y,
+        );
         parts.gyroscopic.solve(
             model,
             &parts.kinematics,
@@ -296,17 +311,16 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn choose_branches(&mut self, start: Start<'_, Configuration>) {
         let drives = self.parts.motors.iter_mut().zip(&self.command.drives);
-        for ((motor, drive), rate) in drives.zip(&start.v[BASE..]) {
-            motor.choose(drive.as_ref(), *rate);
+        for ((motor, drive), &k) in drives.zip(self.model.joint_velocities()) {
+            motor.choose(drive.as_ref(), start.v[k]);
         }
     }
 
     fn revise(&mut self, start: Start<'_, Configuration>, v_end: &[f64]) -> bool {
         let drives = self.parts.motors.iter_mut().zip(&self.command.drives);
-        let rates = start.v[BASE..].iter().zip(&v_end[BASE..]);
         let mut is_new = false;
-        for ((motor, drive), (begin, end)) in drives.zip(rates) {
-            is_new |= motor.revise(drive.as_ref(), *begin, *end);
+        for ((motor, drive), &k) in drives.zip(self.model.joint_velocities()) {
+            is_new |= motor.revise(drive.as_ref(), start.v[k], v_end[k]);
         }
         is_new
     }
@@ -340,16 +354,14 @@ impl MechanicalSystem for TreeSystem<'_> {
             ..
         } = &mut *self.parts;
         let drives = motors.iter().zip(&self.command.drives);
-        let rates = start.v[BASE..].iter().zip(&v_end[BASE..]);
-        let actuation = actuation(options, self.command, start, v_end, motors);
+        let actuation = actuation(self.model, options, self.command, start, v_end, motors);
         let mut total = 0.0;
-        for (((tried, torque), (motor, drive)), (begin, end)) in
-            (drives_tried.iter_mut().zip(actuation))
-                .zip(drives)
-                .zip(rates)
+        for (((tried, torque), (motor, drive)), &k) in (drives_tried.iter_mut().zip(actuation))
+            .zip(drives)
+            .zip(self.model.joint_velocities())
         {
             let turned = h * torque.rate;
-            let work = motor.work(drive.as_ref(), *begin, *end, turned);
+            let work = motor.work(drive.as_ref(), start.v[k], v_end[k], turned);
             *tried = DriveAction {
                 impulse: torque.drive * h,
                 work,
@@ -403,7 +415,15 @@ impl MechanicalSystem for TreeSystem<'_> {
             self.parts,
             y,
         );
-        add_command(options, self.command, start, v_end, &self.parts.motors, y);
+        add_command(
+            self.model,
+            options,
+            self.command,
+            start,
+            v_end,
+            &self.parts.motors,
+            y,
+        );
     }
 
     #[inline]
@@ -462,8 +482,9 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     /// The trunk's origin, and what turns by so much at arm's length.
     fn displacement(&self, y: &[f64]) -> f64 {
-        let trunk = y[..6].iter().copied();
-        let joints = y[6..].iter().map(|angle| angle * JOINT_ARM);
+        let trunk = y[..self.model.lead(0)].iter().copied();
+        let joints = self.model.joint_velocities().iter();
+        let joints = joints.map(|&k| y[k] * JOINT_ARM);
         trunk.chain(joints).fold(0.0_f64, |m, d| m.max(d.abs()))
     }
 }
@@ -504,9 +525,9 @@ fn set_held_theta(
     parts: &mut TreeScratch,
 ) {
     let joints = (parts.motors.iter_mut().zip(&command.held)).zip(&command.drives);
-    for (j, ((motor, held), drive)) in joints.enumerate() {
+    for (((motor, held), drive), &k) in joints.zip(model.joint_velocities()) {
         let (damping, stiffness) = held.map_or((0.0, 0.0), |held| (held.damping, held.stiffness));
-        let inertia = parts.mass_matrix.diagonal(model, BASE + j);
+        let inertia = parts.mass_matrix.diagonal(model, k);
         let feedback = (damping + line_slope(drive.as_ref()), stiffness);
         motor.set_theta((options.time_step, options.theta), feedback, inertia);
     }
@@ -526,6 +547,7 @@ struct Actuation {
 /// Torques of all joints; the PD and the motor's line at the θ_j-weighted position and velocity of the iterate `v_end`.
 #[inline]
 fn actuation<'a>(
+    model: &'a Model,
     options: &StepOptions,
     command: &'a Command,
     start: Start<'a, Configuration>,
@@ -533,13 +555,12 @@ fn actuation<'a>(
     motors: &'a [MotorBranch],
 ) -> impl Iterator<Item = Actuation> + 'a {
     let (h, theta) = (options.time_step, options.theta);
-    let motion = (start.configuration.joints.iter())
-        .zip(&start.v[BASE..])
-        .zip(&v_end[BASE..]);
+    let motion = (start.configuration.joints.iter()).zip(model.joint_velocities());
     let torques = command.torque.iter().zip(&command.held).zip(motors);
     motion
         .zip(torques)
-        .map(move |(((angle, &begin), &end), ((torque, held), motor))| {
+        .map(move |((angle, &k), ((torque, held), motor))| {
+            let (begin, end) = (start.v[k], v_end[k]);
             let rate = theta * end + (1.0 - theta) * begin;
             let (mut other, mut damper) = (*torque, 0.0);
             if let Some(held) = held {
@@ -557,6 +578,7 @@ fn actuation<'a>(
 
 /// Adds `h τ` to `y` for a step that ends with the iterate `v_end`.
 fn add_command(
+    model: &Model,
     options: &StepOptions,
     command: &Command,
     start: Start<'_, Configuration>,
@@ -564,9 +586,9 @@ fn add_command(
     motors: &[MotorBranch],
     y: &mut [f64],
 ) {
-    let actuation = actuation(options, command, start, v_end, motors);
-    for (y, torque) in y[BASE..].iter_mut().zip(actuation) {
-        *y += options.time_step * (torque.other + torque.damper + torque.drive);
+    let actuation = actuation(model, options, command, start, v_end, motors);
+    for (&k, torque) in model.joint_velocities().iter().zip(actuation) {
+        y[k] += options.time_step * (torque.other + torque.damper + torque.drive);
     }
 }
 
@@ -580,7 +602,7 @@ fn momentum_residual(
     parts: &mut TreeScratch,
     y: &mut [f64],
 ) {
-    let end = parts.kinematics_end.base - start;
+    let end = parts.kinematics_end.origin(0) - start;
     body_momenta(
         model,
         &parts.kinematics_end,
@@ -588,7 +610,7 @@ fn momentum_residual(
         &end,
         &mut parts.momenta_end,
     );
-    let middle = parts.kinematics.base - start;
+    let middle = parts.kinematics.origin(0) - start;
     let bodies = model.bodies();
     parts.sums.copy_from_slice(&parts.momenta_end);
     for (b, (sum, begin)) in parts.sums.iter_mut().zip(&parts.momenta).enumerate() {
@@ -608,8 +630,8 @@ fn momentum_residual(
                 y[3 + k] = -about_middle[k];
             }
         } else {
-            let a = &parts.kinematics.axis[b];
-            y[5 + b] = -a.dot(&(about_middle - parts.kinematics.r[b].cross(&P)));
+            let k = model.joint_velocity(b - 1);
+            y[k] = -parts.kinematics.motions[b - 1].power(&P, &about_middle);
             let parent = bodies[b].parent;
             parts.sums[parent].linear += P;
             parts.sums[parent].angular += L;

@@ -51,7 +51,7 @@ impl Workspace {
             .zip(self.step.velocities().chunks_exact(3));
         let active = |(contact, (p, u)): (&Contact, (&[f64], &[f64]))| ActiveContact {
             contact: *contact,
-            position: self.tree.base_of_contacts() + contact.point,
+            position: self.tree.origin_of_contacts(contact.body) + contact.point,
             impulse: [p[0], p[1], p[2]],
             velocity: [u[0], u[1], u[2]],
         };

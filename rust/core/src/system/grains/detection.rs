@@ -8,8 +8,8 @@ use super::grid::Grid;
 use super::machine::point_velocity;
 use super::system::GrainSystem;
 use crate::contact::Activation;
-use crate::solver::body_pairs::BodyPairs;
-use crate::solver::body_sweeps::Swept;
+use crate::problem::BodyPairs;
+use crate::solver::Swept;
 use crate::spatial::space::{axis, body_velocities, dot, length};
 
 /// Gap up to which a pair is taken as a contact though it is not forecast to close, as a share of the smallest radius: its neighbours may push it.

@@ -1,11 +1,13 @@
 //! How the contacts of a step are solved: sweeps, and where they end early a search by factorisation.
 
 use super::system::GrainSystem;
-use crate::problem::{FrictionContactProblem, Residual, dot, evaluate_into};
-use crate::solver::body_pairs::BodyPairs;
-use crate::solver::body_sweeps::{LocalProblem, Swept, solve_body_pairs};
-use crate::solver::passivity::passive_share;
-use crate::solver::{Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve};
+use crate::problem::{
+    BodyPairs, FrictionContactProblem, Residual, dot, evaluate_into, passive_share,
+};
+use crate::solver::{
+    LocalProblem, Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, Swept, solve,
+    solve_body_pairs,
+};
 
 /// Contacts up to which an answer that the sweeps did not reach is sought by factorisation: a step costs some 3 µs a contact there.
 const FEW: usize = 1000;

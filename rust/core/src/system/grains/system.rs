@@ -13,10 +13,10 @@ use super::scene::GrainScene;
 use super::support::Facing;
 use crate::contact::Activation;
 use crate::integrator::{MechanicalSystem, Start, StepOptions};
-use crate::problem::{BlockSparseDelassus, Dimension, FrictionContactProblem};
-use crate::solver::body_pairs::{BodyPairs, RoundPair};
-use crate::solver::body_sweeps::Swept;
-use crate::solver::{SolveReport, SolverOptions, SolverWorkspace};
+use crate::problem::{
+    BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, RoundPair,
+};
+use crate::solver::{SolveReport, SolverOptions, SolverWorkspace, Swept};
 use crate::spatial::space::body_velocities;
 
 /// A place that holds nothing that moves: c = s = 0 there.

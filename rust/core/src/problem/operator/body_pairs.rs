@@ -2,7 +2,7 @@
 //!
 //! A contact touches two bodies, so with `u = Zᵀ y + q` and `y = Z p` in factor coordinates
 //! (see [`crate::integrator::mechanical_system`]) it reads and changes three numbers of each in the plane, six in space. Two round bodies, disks for
-//! D = 2 and balls for D = 3, have a diagonal block of W. [`solve_body_pairs`](super::body_sweeps::solve_body_pairs) solves them.
+//! D = 2 and balls for D = 3, have a diagonal block of W. [`solve_body_pairs`](crate::solver::solve_body_pairs) solves them.
 //!
 //! With the arms `∓r n` from the centres to the point of contact, turning moves the rims along the tangents t, b (`n = b × t`) alone:
 //!
@@ -14,7 +14,7 @@
 //!
 //! Source: Jean 1999; Moreau 1999 (contact by contact on the bodies' velocities).
 
-use crate::problem::BlockSparseDelassus;
+use super::BlockSparseDelassus;
 use crate::spatial::space::{body_velocities, dot};
 
 /// A contact of two round bodies, or of one with what does not move.
@@ -53,7 +53,7 @@ pub struct BodyPairs<const D: usize> {
 
 /// Velocity along tangent k (from 1) of a rim that turns with `rim` = r ω.
 #[inline]
-pub(super) fn rim_velocity<const D: usize>(frame: &[[f64; D]; D], k: usize, rim: &[f64]) -> f64 {
+pub(crate) fn rim_velocity<const D: usize>(frame: &[[f64; D]; D], k: usize, rim: &[f64]) -> f64 {
     if D == 2 {
         return rim[0];
     }
@@ -65,7 +65,7 @@ pub(super) fn rim_velocity<const D: usize>(frame: &[[f64; D]; D], k: usize, rim:
 
 /// Component c of what the tangential impulses turn, divided by r: the transpose of [`rim_velocity`].
 #[inline]
-pub(super) fn rim_impulse<const D: usize>(frame: &[[f64; D]; D], p: &[f64; D], c: usize) -> f64 {
+pub(crate) fn rim_impulse<const D: usize>(frame: &[[f64; D]; D], p: &[f64; D], c: usize) -> f64 {
     if D == 2 {
         return p[1];
     }
@@ -186,7 +186,7 @@ impl<const D: usize> BodyPairs<D> {
 
     /// The machine's rows of its contact i.
     #[inline]
-    pub(super) fn rows_of(&self, i: usize) -> impl Iterator<Item = &[f64]> {
+    pub(crate) fn rows_of(&self, i: usize) -> impl Iterator<Item = &[f64]> {
         let size = D * self.width;
         self.rows[size * i..size * (i + 1)].chunks_exact(self.width)
     }
@@ -220,7 +220,7 @@ impl<const D: usize> BodyPairs<D> {
 
     /// `own += Z p` of the machine's contact i.
     #[inline]
-    pub(super) fn add_to_machine(&self, i: usize, p: &[f64; D], own: &mut [f64]) {
+    pub(crate) fn add_to_machine(&self, i: usize, p: &[f64; D], own: &mut [f64]) {
         for (row, p) in self.rows_of(i).zip(p) {
             for (y, z) in own.iter_mut().zip(row) {
                 *y += z * p;
@@ -230,7 +230,7 @@ impl<const D: usize> BodyPairs<D> {
 
     /// `u += Zᵀ own` of the machine's contact i.
     #[inline]
-    pub(super) fn add_local_of_machine(&self, i: usize, own: &[f64], u: &mut [f64; D]) {
+    pub(crate) fn add_local_of_machine(&self, i: usize, own: &[f64], u: &mut [f64; D]) {
         for (u, row) in u.iter_mut().zip(self.rows_of(i)) {
             *u += row.iter().zip(own).map(|(a, b)| a * b).sum::<f64>();
         }

@@ -432,7 +432,7 @@ mod tests {
         let mut out = [0.0; 6];
         sparse.multiply_add(&x, &[1.0; 6], &mut out);
         let mut expected = [0.0; 6];
-        super::super::residual::multiply_add(&W, &x, &[1.0; 6], &mut expected);
+        super::super::dense::multiply_add(&W, &x, &[1.0; 6], &mut expected);
         assert!(
             out.iter()
                 .zip(&expected)

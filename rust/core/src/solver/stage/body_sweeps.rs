@@ -12,13 +12,14 @@
 //!
 //! Source: Jean 1999 and Moreau 1999 (the sweep); Nesterov 1983, O'Donoghue and Candès 2015 (extrapolation with restart).
 
-use super::body_pairs::{BodyPairs, RoundPair, rim_impulse, rim_velocity};
-use super::one_contact::solve_one_contact;
-use super::options::{Method, SolverOptions};
-use super::passivity::passive_share;
-use super::report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
 use crate::law::coulomb::violation;
-use crate::problem::{Magnitudes, Residual, Violations};
+use crate::problem::{
+    BodyPairs, Magnitudes, Residual, RoundPair, Violations, passive_share, rim_impulse,
+    rim_velocity,
+};
+use crate::solver::one_contact::solve_one_contact;
+use crate::solver::options::{Method, SolverOptions};
+use crate::solver::report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
 use crate::spatial::space::{body_velocities, dot};
 
 /// Places of the list that are visited in turn.
@@ -433,7 +434,7 @@ impl<const D: usize, const T: usize, const S: usize> Sweeps<D, T, S> {
         change
     }
 
-    /// The residual as [`crate::problem::residual::evaluate_into`] defines it; writes p and u.
+    /// The residual as [`crate::problem::evaluate_into`] defines it; writes p and u.
     fn measure(&mut self, pairs: &BodyPairs<D>, p: &mut [f64], u: &mut [f64]) -> Measured {
         self.sum(pairs);
         let (mut violations, mut data) = (Violations::default(), Magnitudes::default());

@@ -1,7 +1,19 @@
-//! `W` in either storage, behind the few products that a solver needs.
+//! The Delassus operator `W`, behind the few products that a solver needs.
+//!
+//! [`Operator`] is `W` in either storage, dense or [block-sparse](BlockSparseDelassus). [`BodyPairs`] is for very many free bodies: the
+//! contacts themselves stand in for `W`, which nobody forms.
 
-use super::residual::multiply_add;
-use super::{BlockSparseDelassus, Dimension};
+mod block_sparse;
+mod body_pairs;
+mod dense;
+
+pub use block_sparse::{BlockSparseDelassus, PairContact};
+pub use body_pairs::{BodyPairs, RoundPair};
+pub(crate) use body_pairs::{rim_impulse, rim_velocity};
+pub(crate) use dense::dot;
+
+use super::{Dimension, ProblemError};
+use dense::multiply_add;
 
 /// The Delassus operator `W` of a problem, borrowed.
 #[derive(Clone, Copy, Debug)]
