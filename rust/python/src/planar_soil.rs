@@ -11,6 +11,7 @@ use rover_core::planar::soil::{
     soil_options,
 };
 use rover_core::planar::{Ground, PlanarWheel, TwoWheelRover};
+use rover_core::system::grains::Support;
 use std::sync::{Arc, MutexGuard};
 
 use crate::arguments::{Given, flags, number, text};
@@ -449,7 +450,7 @@ impl SoilSimulation {
         let scene = SoilScene {
             grains: disks,
             walls: lines,
-            ground,
+            ground: ground.map(|ground| ground as Arc<dyn Support<2>>),
             machine: who,
             friction: SoilFriction {
                 grains: friction.number(0.5, option, "friction")?,

@@ -217,7 +217,7 @@ fn a_disk_on_a_slope_rolls_below_and_slides_above_three_times_the_friction() {
         let options = soil_options(&disks);
         let alpha = slope.atan();
         let scene = SoilScene {
-            disks,
+            grains: disks,
             walls: vec![],
             ground: Some(Arc::new(Line::new(-slope, 0.0).expect("a line"))),
             machine: None,

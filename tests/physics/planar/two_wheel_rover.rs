@@ -8,6 +8,7 @@ use rover_core::planar::{
     ContactRule, Ground, Line, PlanarMachine, PlanarWheel, Polyline, Sine, TwoWheelRover,
     TwoWheelRoverSimulation, contact_rows,
 };
+use rover_core::system::grains::Support;
 
 use crate::scenes::{G, VARIANTS, count, level, options};
 
