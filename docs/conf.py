@@ -1,14 +1,13 @@
 """Sphinx configuration.
 
 Two pages are made from the code itself: the environment's card and the command line's help. The compiled module is
-documented from its stub, which has the types, and where the stub says nothing by the module's own docstrings.
+documented from its stub, which has the types beside the module's own docstrings.
 """
 
 import __future__
 
 import inspect
 import sys
-from functools import reduce
 from pathlib import Path
 from types import ModuleType
 
@@ -84,10 +83,6 @@ def _write_generated(_app: Sphinx) -> None:
 
 def _mend_docstring(_app: Sphinx, _what: str, name: str, _obj: object, _options: object, lines: list[str]) -> None:
     """The card appears as its first line, since the whole has its own page; a bar is a norm, no substitution."""
-    if not any(lines):
-        path = name.removeprefix("rover_gym.").removeprefix("_core.").split(".")
-        documented = reduce(lambda owner, part: getattr(owner, part, None), path, compiled)
-        lines[:] = (inspect.getdoc(documented) or "").splitlines() if documented is not None else []
     if name == "rover_gym.RoverEnv":
         lines[1:] = ["", "The environment's card has a page of its own."]
     lines[:] = [line.replace("|", r"\|") for line in lines]

@@ -1,6 +1,7 @@
 """rover-gym: a nonsmooth simulator of a six-wheel Mars rover, with Gymnasium environments."""
 
-from rover_gym._core import (
+from rover_gym.env.rover_env import RoverEnv
+from rover_gym.mechanics import (
     BusyError,
     CommandError,
     ModelError,
@@ -20,8 +21,7 @@ from rover_gym._core import (
     accuracy_options,
     solve_friction_contact,
 )
-from rover_gym.env import RoverEnv
-from rover_gym.policy import PDPolicy
+from rover_gym.policy.pd_policy import PDPolicy
 from rover_gym.registration import register_environments
 
 register_environments()

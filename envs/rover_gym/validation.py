@@ -13,7 +13,7 @@ from typing import NoReturn, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym._core import OptionError, RoverGymError
+from rover_gym.mechanics import OptionError, RoverGymError
 
 Range: TypeAlias = tuple[float, float]
 

@@ -8,9 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from rover_gym import RoverEnv, rewards
-from rover_gym.observation import build_layout
-from rover_gym.scene import RESET_OPTIONS
+from rover_gym import RoverEnv
+from rover_gym.env import rewards
+from rover_gym.env.episode_scene import RESET_OPTIONS
+from rover_gym.env.observation import build_layout
 
 
 @cache

@@ -26,7 +26,7 @@ use crate::simulation::{Origin, Simulation};
 /// Raises:
 ///     OptionError: There are no simulations or their models differ in size, `scan` has a wrong
 ///         shape, or `threads` is out of its range.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct SimulationBatch(Shared<Inner>);
 
 struct Inner {

@@ -9,7 +9,7 @@ use rover_core::system::ActiveContact;
 use crate::arrays::{fresh_blocks, fresh_rows};
 
 /// The contacts of a rover's last step, as new arrays with one row a contact.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Contacts {
     active: Vec<ActiveContact>,
     bodies: Vec<String>,

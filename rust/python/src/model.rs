@@ -32,7 +32,7 @@ pub type Pair<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 /// Methods that take coordinates understand two sets of them, by the argument `coordinates`:
 /// "state", the `q` and `v` of `Simulation`, and "report", the Cardan angles of the 2010 report and
 /// their rates.
-#[pyclass(module = "rover_gym._core", frozen, from_py_object)]
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct RoverModel {
     pub inner: Arc<Model>,
@@ -419,7 +419,7 @@ impl RoverModel {
         self.inner.mass()
     }
 
-    /// Names of the coordinates: x, y, z, roll, heading, pitch, then the joints.
+    /// Names of the coordinates, x, y, z, roll, heading, pitch, then the joints.
     #[getter]
     fn dof_names(&self) -> Vec<String> {
         let base = ["x", "y", "z", "roll", "heading", "pitch"].map(str::to_owned);

@@ -115,7 +115,7 @@ impl<const NV: usize, M: PlanarMachine<NV>> Run for Core<NV, M> {
 }
 
 /// Everything that a planar simulation needs to continue bit for bit. Picklable.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct PlanarSnapshot {
     inner: CoreSnapshot,
 }
@@ -165,7 +165,7 @@ impl PlanarSnapshot {
 }
 
 /// The contacts of a planar simulation's last step, as new arrays with one row a contact.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct PlanarContacts {
     active: Vec<PlanarActiveContact>,
 }
@@ -182,7 +182,7 @@ impl PlanarContacts {
 
 #[pymethods]
 impl PlanarContacts {
-    /// Indices of the discs that touch, (n,): 0 is the ball or wheel A, 1 wheel B.
+    /// Indices of the discs that touch, (n,); 0 is the ball or wheel A, 1 wheel B.
     #[getter]
     fn discs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         PyArray1::from_iter(
@@ -234,7 +234,7 @@ impl PlanarContacts {
 ///
 /// One call at a time: a call during another one, from another thread or a signal handler, raises
 /// BusyError.
-#[pyclass(module = "rover_gym._core", subclass, frozen)]
+#[pyclass(module = "rover_gym.mechanics", subclass, frozen)]
 pub struct PlanarSimulation {
     inner: Shared<Box<dyn Run>>,
     ground: Py<PyAny>,
@@ -352,7 +352,7 @@ impl PlanarSimulation {
         Ok(inner.options().time_step)
     }
 
-    /// Coordinates, (nv,): x and y, m, then angles, rad, which turn to the left.
+    /// Coordinates, (nv,), x and y, m, then angles, rad, which turn to the left.
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let inner = self.open()?;
@@ -573,7 +573,7 @@ impl PlanarSimulation {
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen)]
 pub struct BallSimulation;
 
 #[pymethods]
@@ -628,7 +628,7 @@ impl BallSimulation {
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen)]
 pub struct TwoWheelRoverSimulation;
 
 /// One number for both wheels, or one for each.
@@ -717,7 +717,7 @@ impl TwoWheelRoverSimulation {
 ///     TerrainError: `ground` is not a ground.
 ///     OptionError: An option is out of its range.
 ///     TypeError: An option is unknown.
-#[pyclass(module = "rover_gym._core", extends = PlanarSimulation, frozen)]
+#[pyclass(module = "rover_gym.mechanics", extends = PlanarSimulation, frozen)]
 pub struct MirroredRoverSimulation {
     joints: Vec<Vec<String>>,
     wheels: Vec<Vec<String>>,

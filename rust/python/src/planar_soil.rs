@@ -122,7 +122,7 @@ fn rover(given: &Bound<'_, PyDict>) -> PyResult<TwoWheelRover> {
 /// The contacts of a soil's last step, as new arrays with one row a contact.
 ///
 /// Contacts between sleeping disks are left out.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct SoilContacts {
     active: Vec<SoilActiveContact>,
     /// Number of disks and of disks with wheels.
@@ -141,7 +141,7 @@ impl SoilContacts {
 
 #[pymethods]
 impl SoilContacts {
-    /// Numbers of both bodies, (n, 2): disks from 0, then the wheels; -1 for a wall or the ground.
+    /// Numbers of both bodies, (n, 2), disks from 0, then the wheels; -1 for a wall or the ground.
     #[getter]
     fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let name = |body: u32| {
@@ -203,7 +203,7 @@ impl SoilContacts {
 }
 
 /// Everything that a soil needs to continue bit for bit. Picklable.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct SoilSnapshot {
     inner: CoreSnapshot,
 }
@@ -286,7 +286,7 @@ impl SoilSnapshot {
 ///         wheels overlap.
 ///     TerrainError: A wall has no direction, or `ground` is not a ground.
 ///     OptionError: An option is out of its range, or both `rover` and `rig` are given.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct SoilSimulation {
     inner: Shared<Core>,
 }

@@ -25,14 +25,14 @@ use crate::snapshot::{Snapshot, belonging};
 use crate::sphere_field::Ground;
 
 /// How the steps of one call went: the worst of them, or their sum.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct StepReport {
     inner: CoreReport,
 }
 
 #[pymethods]
 impl StepReport {
-    /// How the steps ended: "converged" or "not_converged".
+    /// Whether the steps "converged" or "not_converged".
     ///
     /// "converged" means that the contact solver met its tolerance in every step.
     #[getter]
@@ -123,7 +123,7 @@ impl StepReport {
 }
 
 /// Kinetic and potential energy.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Energy {
     inner: CoreEnergy,
 }
@@ -188,7 +188,7 @@ impl Energy {
 ///     ModelError: `model` is not a RoverModel.
 ///     TerrainError: `terrain` is not a terrain.
 ///     OptionError: An option is out of its range, or is given beside `accuracy`.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Simulation {
     inner: Shared<CoreSimulation>,
     model: Arc<Model>,
@@ -451,7 +451,7 @@ impl Simulation {
         Ok(fresh(py, &self.open()?.state().v))
     }
 
-    /// Rotation matrix R_WB, (3, 3): from coordinates in the trunk to coordinates in the world.
+    /// Rotation matrix R_WB, (3, 3), from coordinates in the trunk to coordinates in the world.
     #[getter]
     fn rotation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let R = self

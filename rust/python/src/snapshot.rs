@@ -10,7 +10,7 @@ use crate::arguments;
 use crate::errors::{BorderError, Kind, Value};
 
 /// Everything that a simulation needs to continue bit for bit. Picklable.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Snapshot {
     pub inner: CoreSnapshot,
 }

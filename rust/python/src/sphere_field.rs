@@ -25,7 +25,7 @@ const MAX_FILE: usize = 1 << 28;
 /// Raises:
 ///     TerrainError: An array has a wrong shape, an entry is not finite or out of its range, or
 ///         there are no spheres or too many of them.
-#[pyclass(module = "rover_gym._core", frozen, from_py_object)]
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct SphereField {
     pub inner: Arc<CoreField>,

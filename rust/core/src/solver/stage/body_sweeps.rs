@@ -17,7 +17,7 @@ use crate::problem::{
     BodyPairs, Magnitudes, Residual, RoundPair, Violations, passive_share, rim_impulse,
     rim_velocity,
 };
-use crate::solver::one_contact::solve_one_contact;
+use crate::solver::local::one_contact::solve_one_contact;
 use crate::solver::options::{Method, SolverOptions};
 use crate::solver::report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
 use crate::spatial::space::{body_velocities, dot};
@@ -43,7 +43,8 @@ pub trait Swept<const D: usize> {
     /// Solves them as [`solve_body_pairs`] says.
     fn sweep(
         &self,
-        problem: LocalProblem<'_>,
+        q: &[f64],
+        mu: &[f64],
         options: &SolverOptions,
         p: &mut [f64],
         u: &mut [f64],
@@ -54,36 +55,29 @@ pub trait Swept<const D: usize> {
 impl Swept<2> for BodyPairs<2> {
     fn sweep(
         &self,
-        problem: LocalProblem<'_>,
+        q: &[f64],
+        mu: &[f64],
         options: &SolverOptions,
         p: &mut [f64],
         u: &mut [f64],
         sweeps: &mut BodySweeps,
     ) -> SolveReport {
-        sweeps.disks.solve(self, problem, options, p, u)
+        sweeps.disks.solve(self, q, mu, options, p, u)
     }
 }
 
 impl Swept<3> for BodyPairs<3> {
     fn sweep(
         &self,
-        problem: LocalProblem<'_>,
+        q: &[f64],
+        mu: &[f64],
         options: &SolverOptions,
         p: &mut [f64],
         u: &mut [f64],
         sweeps: &mut BodySweeps,
     ) -> SolveReport {
-        sweeps.balls.solve(self, problem, options, p, u)
+        sweeps.balls.solve(self, q, mu, options, p, u)
     }
-}
-
-/// What is asked at the contacts: the free velocity q (D n_c), m/s, and μ (n_c).
-#[derive(Clone, Copy, Debug)]
-pub struct LocalProblem<'a> {
-    /// Free velocity, m/s.
-    pub q: &'a [f64],
-    /// Coulomb's μ.
-    pub mu: &'a [f64],
 }
 
 /// The sweeps in D dimensions. T numbers tell where a contact's tangents are: none in the plane, the first tangent in space. A body has S
@@ -485,7 +479,8 @@ impl<const D: usize, const T: usize, const S: usize> Sweeps<D, T, S> {
     fn solve(
         &mut self,
         pairs: &BodyPairs<D>,
-        LocalProblem { q, mu }: LocalProblem<'_>,
+        q: &[f64],
+        mu: &[f64],
         options: &SolverOptions,
         p: &mut [f64],
         u: &mut [f64],
@@ -570,14 +565,15 @@ impl<const D: usize, const T: usize, const S: usize> Sweeps<D, T, S> {
 
 /// Solves `K_μ* ∋ ũ ⊥ p ∈ K_μ`, `u = Zᵀ Z p + q`, among round bodies and a machine.
 ///
-/// p (D n_c), N s: in, the warm start, out, the impulses inside their cones; u (D n_c), m/s: out. Only
+/// q (D n_c), m/s; mu (n_c); p (D n_c), N s: in, the warm start, out, the impulses inside their cones; u (D n_c), m/s: out. Only
 /// the tolerances and `max_sweeps` of the options matter; the budget does not. Allocates only when there are more contacts than ever before.
 ///
 /// # Panics
 /// If a length does not fit.
 pub fn solve_body_pairs<const D: usize>(
     pairs: &BodyPairs<D>,
-    problem: LocalProblem<'_>,
+    q: &[f64],
+    mu: &[f64],
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
@@ -586,7 +582,7 @@ pub fn solve_body_pairs<const D: usize>(
 where
     BodyPairs<D>: Swept<D>,
 {
-    let mut report = pairs.sweep(problem, options, p, u, sweeps);
+    let mut report = pairs.sweep(q, mu, options, p, u, sweeps);
     report.work = UNITS * (pairs.len() * report.iterations) as u64;
     report.rungs.push(Rung {
         stage: report.stage,

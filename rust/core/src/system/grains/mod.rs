@@ -5,8 +5,8 @@
 //!
 //! - [`bodies`], [`wall`], [`support`], [`machine`], [`scene`]: what there is; [`packing`]: where grains start, without overlap, from a seed;
 //! - [`grid`]: which grains are near which; [`contact`]: a contact and its name; contacts come and go with the grains;
-//! - [`system`]: grains as a mechanical system, stepped by [`crate::integrator`] as everything else: `detection` finds its contacts, `escalation`
-//!   solves them; `measures`: energy, momentum, overlap;
+//! - [`system`]: grains as a mechanical system, stepped by [`crate::integrator`] as everything else: `detection` finds its contacts;
+//!   `measures`: energy, momentum, overlap;
 //! - [`sleep`]: grains that rest far from anything that moves are left out; [`removal`]: new numbers for those that stay.
 //!
 //! Grains step with θ = 1: contacts are measured where the step begins and a contact may close as far as its gap goes,
@@ -20,7 +20,6 @@ pub mod bodies;
 pub mod contact;
 mod detection;
 pub mod error;
-mod escalation;
 pub mod grid;
 pub mod machine;
 mod measures;

@@ -16,7 +16,9 @@ use crate::integrator::{MechanicalSystem, Start, StepOptions};
 use crate::problem::{
     BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, RoundPair,
 };
-use crate::solver::{SolveReport, SolverOptions, SolverWorkspace, Swept};
+use crate::solver::{
+    ManyBodies, SolveReport, SolverOptions, SolverWorkspace, Swept, solve_many_bodies,
+};
 use crate::spatial::space::body_velocities;
 
 /// A place that holds nothing that moves: c = s = 0 there.
@@ -395,7 +397,7 @@ where
     }
 
     fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a> {
-        self.sparse_problem(q, mu)
+        FrictionContactProblem::from_assembled_sparse(self.parts.operator(), q, mu)
     }
 
     /// Newton's law for a pair that comes together fast within the step; any other may close by its gap.
@@ -432,7 +434,13 @@ where
         u: &mut [f64],
         workspace: &mut SolverWorkspace,
     ) -> SolveReport {
-        self.solve_contacts(q, mu, options, p, u, workspace)
+        let bodies = ManyBodies {
+            pairs: &self.parts.pairs,
+            q,
+            mu,
+            operator: &|| self.parts.operator(),
+        };
+        solve_many_bodies(&bodies, options, p, u, workspace)
     }
 
     fn displacement(&self, y: &[f64]) -> f64 {
