@@ -1613,6 +1613,9 @@ class SoilSnapshot:
         """
     def to_bytes(self) -> bytes:
         """The snapshot as bytes, as `from_bytes` reads them."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __reduce__(self) -> Any: ...
 
 @final
 class SoilSimulation:

@@ -7,6 +7,7 @@ use rover_core::integrator::{
     StepReport, WarmStart,
 };
 use rover_core::nalgebra::{SVector, Vector3};
+use rover_core::simulation::GrainSimulation;
 use rover_core::solver::SolverOptions;
 use rover_core::spatial::space::{axis, body_velocities};
 use rover_core::system::grains::{
@@ -416,14 +417,14 @@ fn bed(count: usize) -> Heap<3> {
 
 #[test]
 fn balls_fall_in_a_box_and_rest_in_it_and_their_energy_never_grows() {
-    let mut heap = bed(150);
+    let mut heap = bed(100);
     let mut energy = heap.energy();
     let scale = energy;
     let mass: f64 = heap.scene.grains.mass().iter().sum();
     let smallest = heap.scene.grains.smallest();
     let (mut momentum, _) = heap.scene.momentum(&heap.q, &heap.v);
     let mut converged = 0;
-    for step in 0..600 {
+    for step in 0..900 {
         converged += usize::from(heap.step(1).is_converged());
         let now = heap.energy();
         assert!(
@@ -441,13 +442,17 @@ fn balls_fall_in_a_box_and_rest_in_it_and_their_energy_never_grows() {
         let depth = heap.scene.penetration(&heap.q) / smallest;
         assert!(depth < 0.01, "step {step}: {depth}");
     }
-    assert!(converged > 590, "{converged} of 600 steps");
-    let fastest = (0..150).fold(0.0_f64, |most, i| most.max(heap.velocity(i).norm()));
-    assert!(fastest < 0.02, "{fastest} m/s");
+    assert!(converged > 890, "{converged} of 900 steps");
+    // There is no rolling friction, so one or the other still rolls: 2 cm/s of all together.
+    let kinetic = heap
+        .scene
+        .energy(&heap.q, &heap.v, &heap.options.gravity)
+        .kinetic;
+    assert!(kinetic < 0.5 * mass * 0.02 * 0.02, "{kinetic} J");
     let force = heap.impulse_of_walls() / heap.options.time_step;
     assert!((force.y - mass * G).abs() < 0.02 * mass * G, "{force:?} N");
-    let highest = (0..150).fold(0.0_f64, |most, i| most.max(heap.centre(i).y));
-    assert!(highest < 0.21, "they settled: {highest} m");
+    let highest = (0..100).fold(0.0_f64, |most, i| most.max(heap.centre(i).y));
+    assert!(highest < 0.14, "they settled: {highest} m");
 }
 
 #[test]
@@ -662,4 +667,29 @@ fn packings_in_space_do_not_overlap_and_stay_in_their_box() {
     let refused = narrow.build().expect_err("no room");
     assert_eq!(refused.field(), "depth");
     assert!(refused.to_string().contains("ball"), "{refused}");
+}
+
+#[test]
+fn a_simulation_of_balls_continues_from_its_snapshot_bit_for_bit_and_lets_balls_be_taken() {
+    let Heap {
+        scene, options, q, ..
+    } = bed(60);
+    let mut balls = GrainSimulation::<3>::new(Arc::new(scene), options, None, q).expect("balls");
+    balls.step(200).expect("finite");
+    let snapshot = balls.snapshot();
+    balls.step(50).expect("finite");
+    let end = (balls.q().clone(), balls.v().to_vec());
+    balls.restore(&snapshot).expect("its own");
+    balls.step(50).expect("finite");
+    assert_eq!((balls.q().clone(), balls.v().to_vec()), end);
+    let marked: Vec<bool> = (0..60).map(|i| i % 3 == 0).collect();
+    balls.remove(&marked).expect("others are left");
+    let kept: Vec<f64> = (0..60)
+        .filter(|i| i % 3 != 0)
+        .flat_map(|i| end.0[3 * i..3 * i + 3].to_vec())
+        .collect();
+    assert_eq!(balls.q(), &kept);
+    assert!(balls.restore(&snapshot).is_err(), "of another bed");
+    balls.step(50).expect("finite");
+    assert!(balls.penetration() < 0.01 * balls.soil().grains.smallest());
 }

@@ -3,7 +3,7 @@
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::simulation::{Batch, Simulation as CoreSimulation};
+use rover_core::simulation::{Batch, RoverSimulation as CoreSimulation};
 
 use crate::arguments::{Given, count, flags, refused};
 use crate::arrays::array;

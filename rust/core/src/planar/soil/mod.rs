@@ -1,20 +1,17 @@
 //! Granular soil in the plane: the disks of [`crate::system::grains`], and a machine that drives over them.
 //!
-//! - [`simulation`]: a scene through time, from which disks can be taken;
+//! [`crate::simulation::grains`] takes them through time.
+//!
 //! - [`machine`]: a planar machine among disks; [`rig`]: one wheel at a given slip, for the drawbar pull.
 
 pub mod machine;
 pub mod rig;
-pub mod simulation;
 
 pub use crate::system::grains::{
     GrainError as SoilError, GrainFriction as SoilFriction, GrainKey as SoilKey, SleepOptions,
 };
 pub use machine::on_soil;
 pub use rig::WheelRig;
-pub use simulation::{
-    SoilActiveContact, SoilSetupError, SoilSimulation, SoilSnapshot, soil_options,
-};
 
 use crate::system::grains;
 

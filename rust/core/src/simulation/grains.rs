@@ -1,0 +1,392 @@
+//! A bed of free grains, perhaps with a machine on it.
+
+use std::sync::Arc;
+
+use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
+
+use super::active_contact::LocatedContact;
+use super::scene::{Scene, StepTaken};
+use super::snapshot::Snapshot;
+use super::state::State;
+use super::stepping::Simulation;
+use crate::integrator::{OptionsError, Scratch, Stabilisation, StepOptions};
+use crate::multibody::Energy;
+use crate::problem::BodyPairs;
+use crate::quantity::finite;
+use crate::solver::{SolverOptions, Swept};
+use crate::spatial::space::body_velocities;
+use crate::system::grains::contact::WALL;
+use crate::system::grains::{
+    self, COORDINATES, GrainContact, GrainError, GrainParts, GrainScene, GrainSystem, Grains,
+    Renumbering, Sleep, SleepOptions,
+};
+
+/// Options that suit a bed of these grains.
+///
+/// θ = 1 and γ = 1, which the contact's law needs; h = 1 ms; solver tolerance 1e-4 and at most 2000 sweeps. Penetration is
+/// not projected away, which lifts what lies above and adds energy: circles and spheres that come together by their gap along the normal do
+/// not overlap, so nothing but the solver's tolerance is left to project. Asked for, projection begins at 0.5% of the smallest radius.
+#[must_use]
+pub fn soil_options<const D: usize>(grains: &Grains<D>) -> StepOptions {
+    StepOptions {
+        theta: 1.0,
+        forecast: 1.0,
+        time_step: 1e-3,
+        stabilisation: Stabilisation::None,
+        penetration_tolerance: 5e-3 * grains.smallest(),
+        solver: SolverOptions {
+            tolerance: 1e-4,
+            velocity_tolerance: 1e-3,
+            max_sweeps: 2000,
+            ..SolverOptions::default()
+        },
+        ..StepOptions::default()
+    }
+}
+
+/// Most steps that a snapshot may have behind it.
+const MAX_STEPS: usize = 1 << 53;
+
+/// Grains, what they lie on, and when they sleep. The description is shared.
+#[derive(Clone, Debug)]
+pub struct GrainBed<const D: usize> {
+    /// What there is.
+    pub soil: Arc<GrainScene<D>>,
+    /// When grains sleep; by None never.
+    pub sleep: Option<SleepOptions>,
+}
+
+/// What a bed's machine is told.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BedCommand<const D: usize> {
+    /// Torques, N m, positive forward.
+    pub torques: Vec<f64>,
+    /// Force at the machine's first D coordinates, N: a drawbar.
+    pub pull: SVector<f64, D>,
+}
+
+/// What a bed remembers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BedMemory {
+    /// Steps taken.
+    pub count: usize,
+    /// Who sleeps.
+    pub sleep: Sleep,
+}
+
+/// A bed of grains, stepped through time.
+pub type GrainSimulation<const D: usize> = Simulation<GrainBed<D>>;
+
+/// A bed of disks, stepped through time.
+pub type SoilSimulation = GrainSimulation<2>;
+
+impl<const D: usize> LocatedContact for GrainContact<D> {
+    type Vector = [f64; D];
+
+    fn normal(&self) -> [f64; D] {
+        self.n.into()
+    }
+
+    fn is_finite(&self) -> bool {
+        let numbers = [&self.n, &self.point].into_iter().flatten();
+        numbers
+            .chain([&self.gap, &self.gap_start])
+            .all(|x| x.is_finite())
+    }
+}
+
+impl<const D: usize> Scene for GrainBed<D>
+where
+    BodyPairs<D>: Swept<D>,
+{
+    /// [`COORDINATES`] of each grain, then the machine's, m and rad.
+    type Configuration = Vec<f64>;
+    type Contact = GrainContact<D>;
+    type Command = BedCommand<D>;
+    type Memory = BedMemory;
+    type Parts = GrainParts<D>;
+    type System<'a> = GrainSystem<'a, D>;
+
+    fn nv(&self) -> usize {
+        self.soil.nv()
+    }
+
+    fn command(&self) -> BedCommand<D> {
+        let machine = self.soil.machine.as_ref();
+        BedCommand {
+            torques: vec![0.0; machine.map_or(0, |m| m.n_inputs())],
+            pull: SVector::zeros(),
+        }
+    }
+
+    fn memory(&self) -> BedMemory {
+        BedMemory {
+            count: 0,
+            sleep: Sleep::new(self.soil.grains.kinematic()),
+        }
+    }
+
+    fn parts(&self) -> GrainParts<D> {
+        GrainParts::default()
+    }
+
+    fn contact_capacity(&self) -> usize {
+        3 * self.soil.grains.len()
+    }
+
+    fn system<'a>(
+        &'a self,
+        command: &'a BedCommand<D>,
+        memory: &'a BedMemory,
+        parts: &'a mut GrainParts<D>,
+    ) -> GrainSystem<'a, D> {
+        GrainSystem {
+            scene: &self.soil,
+            asleep: memory.sleep.asleep(),
+            inputs: &command.torques,
+            pull: command.pull,
+            parts,
+        }
+    }
+
+    fn position(&self, _parts: &GrainParts<D>, contact: &GrainContact<D>) -> [f64; D] {
+        contact.point.into()
+    }
+
+    /// Lets grains sleep and wake.
+    fn after_step(&self, taken: StepTaken<'_, Self>) {
+        taken.memory.count += 1;
+        let Some(options) = &self.sleep else {
+            return;
+        };
+        let step = grains::StepTaken {
+            scene: &self.soil,
+            weight_impulse: taken.options.gravity.norm() * taken.options.time_step,
+            q: &taken.state.configuration,
+            v: &mut taken.state.v,
+            contacts: taken.scratch.contacts(),
+            impulses: taken.scratch.impulses(),
+            count: taken.memory.count,
+        };
+        taken.memory.sleep.update(options, step, taken.warm_start);
+    }
+
+    /// Without kinematic disks.
+    fn energy(&self, options: &StepOptions, state: &State<Vec<f64>>) -> Energy {
+        let State {
+            configuration, v, ..
+        } = state;
+        self.soil.energy(configuration, v, &options.gravity)
+    }
+
+    fn fingerprint(&self) -> u64 {
+        self.soil.fingerprint()
+    }
+
+    fn admits(&self, snapshot: &Snapshot<Self>) -> bool {
+        let GrainScene {
+            grains, machine, ..
+        } = &*self.soil;
+        let (torques, pull) = (&snapshot.command.torques, &snapshot.command.pull);
+        let expected = machine
+            .as_ref()
+            .map_or([0; 2], |m| [m.n_inputs(), m.n_wheels()]);
+        let mut numbers = snapshot
+            .state
+            .configuration
+            .iter()
+            .chain(torques)
+            .chain(pull);
+        let n_bodies = grains.len() + expected[1];
+        let is_body = |body: u32| (body as usize) < n_bodies;
+        let mut keys = snapshot.active.iter().map(|a| a.contact.key);
+        snapshot.state.configuration.len() == self.soil.nq()
+            && torques.len() == expected[0]
+            && snapshot.memory.count <= MAX_STEPS
+            && snapshot.memory.sleep.is_of(grains.kinematic())
+            && numbers.all(|x| x.is_finite())
+            && keys.all(|key| is_body(key.a) && (key.b >= WALL || is_body(key.b)))
+    }
+}
+
+impl<const D: usize> GrainSimulation<D>
+where
+    BodyPairs<D>: Swept<D>,
+{
+    /// At rest in the configuration `q` (nq): [`COORDINATES`] of each grain, then the machine's.
+    ///
+    /// # Errors
+    /// A description or configuration that cannot be: see [`GrainScene::check_configuration`].
+    pub fn new(
+        soil: Arc<GrainScene<D>>,
+        options: StepOptions,
+        sleep: Option<SleepOptions>,
+        q: Vec<f64>,
+    ) -> Result<Self, SoilSetupError> {
+        options.check()?;
+        for (field, value) in [("theta", options.theta), ("forecast", options.forecast)] {
+            if value < 1.0 {
+                return Err(SoilSetupError::Options(OptionsError::OutOfRange {
+                    field,
+                    range: "1 in a soil",
+                    value,
+                }));
+            }
+        }
+        soil.check()?;
+        soil.check_configuration(&q)?;
+        Ok(Self::of(GrainBed { soil, sleep }, q, options)?)
+    }
+
+    /// The description.
+    #[must_use]
+    pub fn soil(&self) -> &Arc<GrainScene<D>> {
+        &self.scene.soil
+    }
+
+    /// Which grains sleep (n); kinematic ones always do.
+    #[must_use]
+    pub fn asleep(&self) -> &[bool] {
+        self.memory.sleep.asleep()
+    }
+
+    /// Sets configuration (nq) and velocities (nv), those that kinematic grains keep among them; time 0, all awake, warm start forgotten, torques kept.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; nothing is changed then.
+    pub fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), GrainError> {
+        self.soil().check_configuration(q)?;
+        if v.len() != self.soil().nv() {
+            return Err(GrainError::Length {
+                field: "velocity",
+                expected: self.soil().nv(),
+                count: v.len(),
+            });
+        }
+        let width = body_velocities(D);
+        let soil = self.soil();
+        soil.check_finite("velocity", "machine_rate", v, width)?;
+        self.place(q.to_vec(), v.to_vec());
+        Ok(())
+    }
+
+    /// Takes the grains that are marked (n) out of the bed; the others go on as they are, under new numbers in the same order.
+    ///
+    /// Snapshots of before belong to another bed.
+    ///
+    /// # Errors
+    /// Another number of marks; none would be left. Nothing is changed then.
+    pub fn remove(&mut self, marked: &[bool]) -> Result<(), GrainError> {
+        let n = self.soil().grains.len();
+        if marked.len() != n {
+            return Err(GrainError::Length {
+                field: "which",
+                expected: n,
+                count: marked.len(),
+            });
+        }
+        let renumbering = Renumbering::without(marked);
+        let grains = self.soil().grains.without(&renumbering)?;
+        self.scene.soil = Arc::new(GrainScene {
+            grains,
+            ..(**self.soil()).clone()
+        });
+        self.state.configuration = renumbering.keep(&self.state.configuration, COORDINATES);
+        self.state.v = renumbering.keep(&self.state.v, body_velocities(D));
+        self.memory.sleep = self.memory.sleep.without(&renumbering);
+        self.warm_start.persistent.clear();
+        let impulses = self.warm_start.impulses.iter();
+        self.warm_start.impulses = impulses
+            .filter_map(|(key, p)| Some((renumbering.key(*key)?, *p)))
+            .collect();
+        let room = 3 * renumbering.left();
+        self.scratch = Scratch::new(&self.state.configuration, self.scene.nv(), room, D);
+        self.active.clear();
+        Ok(())
+    }
+
+    /// Sets the torques, N m, positive forward. Wakes nothing: what turns does.
+    ///
+    /// # Errors
+    /// Wrong length or an entry that is not finite; nothing is changed then.
+    pub fn set_inputs(&mut self, inputs: &[f64]) -> Result<(), GrainError> {
+        let own = &mut self.command.torques;
+        if inputs.len() != own.len() {
+            return Err(GrainError::Length {
+                field: "torques",
+                expected: own.len(),
+                count: inputs.len(),
+            });
+        }
+        for (k, value) in inputs.iter().enumerate() {
+            finite(&format!("torques[{k}]"), *value)?;
+        }
+        own.copy_from_slice(inputs);
+        Ok(())
+    }
+
+    /// Sets a force at the machine's first D coordinates, N: a drawbar.
+    ///
+    /// # Errors
+    /// No machine, or an entry that is not finite; nothing is changed then.
+    pub fn set_pull(&mut self, pull: [f64; D]) -> Result<(), GrainError> {
+        if self.soil().machine.is_none() {
+            return Err(GrainError::NoMachine);
+        }
+        for (k, value) in pull.iter().enumerate() {
+            finite(&format!("pull[{k}]"), *value)?;
+        }
+        self.command.pull = pull.into();
+        Ok(())
+    }
+
+    /// Impulse of the last step's contacts on the machine's wheels, N s.
+    #[must_use]
+    pub fn impulse_on_wheels(&self) -> [f64; D] {
+        let n = self.soil().grains.len();
+        let wheels = self.active.iter().filter(|c| c.contact.key.a as usize >= n);
+        let mut sum = SVector::<f64, D>::zeros();
+        for active in wheels {
+            let frame = active.contact.frame();
+            let mut impulse = frame[0] * active.impulse[0];
+            for k in 1..D {
+                impulse += frame[k] * active.impulse[k];
+            }
+            sum += impulse;
+        }
+        sum.into()
+    }
+
+    /// Deepest overlap now, m: 0 where nothing overlaps. Kinematic grains among themselves and in walls do not count.
+    #[must_use]
+    pub fn penetration(&self) -> f64 {
+        self.soil().penetration(self.q())
+    }
+
+    /// Wakes all grains.
+    pub fn wake(&mut self) {
+        let kinematic = self.scene.soil.grains.kinematic();
+        self.memory.sleep.wake_all(kinematic, &mut self.warm_start);
+    }
+}
+
+impl SoilSimulation {
+    /// Momentum (x, y) of the disks that are not kinematic, kg m/s, and their moment of momentum about the origin, kg m²/s.
+    #[must_use]
+    pub fn momentum(&self) -> [f64; 3] {
+        let (linear, moment) = self.soil().momentum(self.q(), self.v());
+        [linear.x, linear.y, moment.z]
+    }
+}
+
+/// What a soil's simulation cannot be built from.
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
+pub enum SoilSetupError {
+    /// An option.
+    #[error(transparent)]
+    Options(#[from] OptionsError),
+    /// The scene or its configuration.
+    #[error(transparent)]
+    Soil(#[from] GrainError),
+}
