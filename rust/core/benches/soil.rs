@@ -9,8 +9,8 @@ use std::time::Instant;
 
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
-use rover_core::planar::soil::{Packing, SoilFriction, SoilScene, Wall};
 use rover_core::simulation::{SoilSimulation, soil_options};
+use rover_core::system::soil::{Packing, SoilFriction, SoilScene, Wall};
 
 /// CPU seconds of this thread, wall seconds where /proc does not tell.
 fn cpu_seconds(start: Instant) -> f64 {

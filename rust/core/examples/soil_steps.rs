@@ -9,9 +9,9 @@ use std::error::Error;
 use std::sync::Arc;
 
 use rover_core::nalgebra::{Vector2, Vector3};
-use rover_core::planar::soil::{Packing, SleepOptions, SoilFriction, SoilScene, Wall, on_soil};
 use rover_core::planar::{PlanarWheel, TwoWheelRover};
 use rover_core::simulation::{SoilSimulation, soil_options};
+use rover_core::system::soil::{Packing, SleepOptions, SoilFriction, SoilScene, Wall, on_soil};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().collect();

@@ -3,15 +3,14 @@
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use rover_core::geometry::Support;
 use rover_core::integrator::Stabilisation;
 use rover_core::nalgebra::Vector2;
-use rover_core::planar::Ground;
-use rover_core::planar::soil::{
-    Disks, Machine, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, Wall, WheelRig,
-    on_soil,
-};
+use rover_core::planar::{Ground, WheelRig};
 use rover_core::simulation::{SoilSetupError, SoilSimulation as Core, soil_options};
-use rover_core::system::grains::Support;
+use rover_core::system::soil::{
+    Disks, Machine, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, Wall, on_soil,
+};
 use std::sync::{Arc, MutexGuard};
 
 use crate::arguments::{Given, flags, text};

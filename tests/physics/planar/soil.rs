@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use rover_core::integrator::{Stabilisation, StepOptions};
 use rover_core::nalgebra::{Vector2, Vector3};
-use rover_core::planar::soil::{
-    Disks, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, Wall, on_soil,
-};
 use rover_core::planar::{Line, PlanarWheel, TwoWheelRover};
 use rover_core::simulation::{SoilSetupError, SoilSimulation, soil_options};
 use rover_core::solver::Method;
+use rover_core::system::soil::{
+    Disks, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, Wall, on_soil,
+};
 
 fn box_of(width: f64) -> Vec<Wall> {
     vec![Wall::floor(0.0), Wall::left(0.0), Wall::right(width)]

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use nalgebra::{SMatrix, SVector, Vector2};
+use rover_core::geometry::Support;
 use rover_core::integrator::StepOptions;
 use rover_core::planar::{
     ContactRule, Ground, Line, PlanarMachine, PlanarWheel, Polyline, Sine, TwoWheelRover,
 };
 use rover_core::simulation::TwoWheelRoverSimulation;
 use rover_core::system::contact_rows;
-use rover_core::system::grains::Support;
 
 use crate::scenes::{G, VARIANTS, count, level, options, speed};
 

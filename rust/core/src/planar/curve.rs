@@ -15,8 +15,8 @@ use nalgebra::Vector2;
 
 use super::error::PlanarError;
 use super::ground::{Facing, Ground, MAX_FACING};
+use crate::geometry::Support;
 use crate::quantity::{PLACES, QuantityError, Range, finite, within};
-use crate::system::grains::Support;
 
 /// Slopes, m/m.
 const SLOPES: Range = Range {

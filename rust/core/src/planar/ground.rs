@@ -6,10 +6,10 @@
 
 use nalgebra::Vector2;
 
-use crate::system::grains::Support;
+use crate::geometry::Support;
 
 /// A point of the ground that faces a disc's centre.
-pub type Facing = crate::system::grains::Facing<2>;
+pub type Facing = crate::geometry::Facing<2>;
 
 /// Most points of the ground that face one disc: the nearest of more.
 pub const MAX_FACING: usize = 64;

@@ -5,8 +5,8 @@ use nalgebra::Vector2;
 use super::curve::{check_points, keep_nearest};
 use super::error::PlanarError;
 use super::ground::{Facing, Ground, keep_few, keep_if};
+use crate::geometry::Support;
 use crate::quantity::{PLACES, QuantityError, within};
-use crate::system::grains::Support;
 
 /// Straight pieces between points, continued beyond the ends with the slope of the last pieces (level where those are vertical).
 ///

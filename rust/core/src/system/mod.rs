@@ -4,7 +4,7 @@
 //! - [`planar`]: a planar machine on a ground;
 //! - [`gyroscopic`]: its gyroscopic terms, implicit; `motor_branch`: the line that a motor is on in a step, taken implicitly with
 //!   [`fitted_theta`];
-//! - [`grains`]: thousands of free disks or balls, and a machine among them.
+//! - [`grains`]: thousands of free disks or balls, and a machine among them; [`soil`]: disks under a planar machine.
 
 pub mod command;
 pub mod fitted_theta;
@@ -12,6 +12,7 @@ pub mod grains;
 pub mod gyroscopic;
 pub(crate) mod motor_branch;
 pub mod planar;
+pub mod soil;
 pub mod tree;
 
 pub use command::{Command, Drive, HeldJoint};

@@ -76,9 +76,10 @@ impl<const D: usize> Grid<D> {
             // Three cells along each later axis must fit; the last is folded.
             let later = if k + 2 < D { 3 } else { 1 };
             let most = (self.size / 4 / stride / later).max(3);
+            // A coordinate that is not finite leaves no number of cells.
             #[allow(clippy::cast_possible_truncation)] // clamped
-            let cells = cells.clamp(3.0, most as f64) as i64;
-            stride *= cells;
+            let cells = cells.min(most as f64) as i64;
+            stride *= cells.max(3);
         }
         self.starts.clear();
         self.starts.resize(size + 1, 0);
@@ -204,6 +205,17 @@ mod tests {
     fn finds_every_neighbour_once_also_with_grains_far_away() {
         finds_every_neighbour_once::<2>(0.1);
         finds_every_neighbour_once::<3>(0.1);
+    }
+
+    #[test]
+    fn coordinates_that_are_not_finite_do_no_harm() {
+        for bad in [f64::INFINITY, f64::NAN] {
+            let mut grid = Grid::<3>::default();
+            grid.fill(&[bad; 6], &[0.1; 2], 0.2);
+            let mut seen = 0;
+            grid.near(&[0.0; 3], 0.2, |_| seen += 1);
+            assert!(seen <= 2);
+        }
     }
 
     /// A wheel of twelve cells over a bed that one grain had left: the cells of its upper rows had the same entries as those of the lower ones, and it met

@@ -3,7 +3,7 @@
 //! One code for D = 2 and D = 3; what differs is how many rates of turning a body has and how a frame is made of a normal
 //! ([`crate::spatial::space`], [`GrainContact::frame`]).
 //!
-//! - [`bodies`], [`wall`], [`support`], [`machine`], [`scene`]: what there is; [`packing`]: where grains start, without overlap, from a seed;
+//! - [`bodies`], [`wall`], [`machine`], [`scene`]: what there is; [`packing`]: where grains start, without overlap, from a seed;
 //! - [`grid`]: which grains are near which; [`contact`]: a contact and its name; contacts come and go with the grains;
 //! - [`system`]: grains as a mechanical system, stepped by [`crate::integrator`] as everything else: `detection` finds its contacts;
 //!   `measures`: energy, momentum, overlap;
@@ -27,7 +27,6 @@ pub mod packing;
 pub mod removal;
 pub mod scene;
 pub mod sleep;
-pub mod support;
 pub mod system;
 pub mod wall;
 
@@ -39,6 +38,5 @@ pub use packing::Packing;
 pub use removal::Renumbering;
 pub use scene::{GrainFriction, GrainScene, OVERLAP};
 pub use sleep::{Sleep, SleepOptions, StepTaken};
-pub use support::{Facing, Support};
 pub use system::{GrainParts, GrainSystem};
 pub use wall::Wall;

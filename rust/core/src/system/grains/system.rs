@@ -10,8 +10,8 @@ use super::detection::Neighbour;
 use super::grid::Grid;
 use super::machine::MachineParts;
 use super::scene::GrainScene;
-use super::support::Facing;
 use crate::contact::Activation;
+use crate::geometry::Facing;
 use crate::integrator::{MechanicalSystem, Start, StepOptions};
 use crate::problem::{
     BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, RoundPair,

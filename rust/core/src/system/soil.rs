@@ -1,22 +1,43 @@
-//! A planar machine among disks.
+//! Granular soil in the plane: the disks of [`super::grains`], and a planar machine that drives over them.
 
 use std::sync::Arc;
 
 use nalgebra::{SVector, Vector2, Vector3};
 
-use super::super::machine::PlanarMachine;
-use crate::system::grains::{Machine, Wheel};
+use super::grains::{self, Wheel};
+use crate::planar::PlanarMachine;
+
+pub use super::grains::{
+    GrainError as SoilError, GrainFriction as SoilFriction, GrainKey as SoilKey, SleepOptions,
+};
+
+/// The disks.
+pub type Disks = grains::Grains<2>;
+/// Where they start.
+pub type Packing = grains::Packing<2>;
+/// What holds them.
+pub type Wall = grains::Wall<2>;
+/// What drives on them.
+pub type Machine = dyn grains::Machine<2>;
+/// A soil's description.
+pub type SoilScene = grains::GrainScene<2>;
+/// A contact of a disk or a wheel.
+pub type SoilContact = grains::GrainContact<2>;
+/// Scratch of a soil.
+pub type SoilParts = grains::GrainParts<2>;
+/// A soil in a step.
+pub type SoilSystem<'a> = grains::GrainSystem<'a, 2>;
 
 /// A machine of NV coordinates, as grains know one.
 #[derive(Clone, Copy, Debug)]
 struct OnSoil<const NV: usize, M>(M);
 
 /// Puts a machine of any number of coordinates on a soil.
-pub fn on_soil<const NV: usize, M: PlanarMachine<NV> + 'static>(machine: M) -> Arc<dyn Machine<2>> {
+pub fn on_soil<const NV: usize, M: PlanarMachine<NV> + 'static>(machine: M) -> Arc<Machine> {
     Arc::new(OnSoil(machine))
 }
 
-impl<const NV: usize, M: PlanarMachine<NV>> Machine<2> for OnSoil<NV, M> {
+impl<const NV: usize, M: PlanarMachine<NV>> grains::Machine<2> for OnSoil<NV, M> {
     fn nv(&self) -> usize {
         NV
     }

@@ -6,8 +6,8 @@
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
-use super::super::error::PlanarError;
-use super::super::machine::{Disc, PlanarMachine, fingerprint};
+use super::error::PlanarError;
+use super::machine::{Disc, PlanarMachine, fingerprint};
 use crate::quantity::{LENGTHS, MASSES, within};
 
 /// A wheel of the test rig.
