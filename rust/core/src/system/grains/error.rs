@@ -97,11 +97,10 @@ impl GrainError {
             Self::Number(number) => number.field().to_owned(),
             Self::Empty => "radius".to_owned(),
             Self::TooMany { .. } => "count".to_owned(),
-            Self::Length { field, .. } => (*field).to_owned(),
+            Self::Length { field, .. } | Self::TooNarrow { field, .. } => (*field).to_owned(),
             Self::Overlap { second, .. } => format!("position[{second}]"),
             Self::InWall { grain, .. } => format!("position[{grain}]"),
             Self::WheelIn { .. } | Self::NoMachine => "machine".to_owned(),
-            Self::TooNarrow { field, .. } => (*field).to_owned(),
             Self::Range { .. } => "radius_max".to_owned(),
         }
     }

@@ -8,7 +8,7 @@ use super::bodies::COORDINATES;
 use super::contact::{GrainContact, GrainKey, WALL};
 use super::detection::Neighbour;
 use super::grid::Grid;
-use super::machine::MachineParts;
+use super::machine::{Machine, MachineParts};
 use super::scene::GrainScene;
 use crate::contact::Activation;
 use crate::geometry::Facing;
@@ -290,7 +290,7 @@ where
             ..
         } = &mut *self.parts;
         let pose = scene.machine_coordinates(middle);
-        pairs.clear(machine.map_or(0, |m| m.nv()), V * n, scene.nv());
+        pairs.clear(machine.map_or(0, Machine::nv), V * n, scene.nv());
         own.clear_rows();
         operator.take();
         let asleep = self.asleep;
