@@ -307,7 +307,7 @@ class RoverModel:
             StateError: `q` has a wrong length or an entry that is not finite.
             OptionError: `coordinates` is neither of the two.
 
-        Source: [F] ch. 6.
+        Source: Featherstone 2008, ch. 6.
         """
     def bias(
         self,
@@ -332,7 +332,7 @@ class RoverModel:
             OptionError: `gravity` is not three finite numbers, or `coordinates` is neither of the
                 two.
 
-        Source: [F] ch. 5.
+        Source: Featherstone 2008, ch. 5.
         """
     def actuation_matrix(self) -> _Array:
         """The matrix that maps wheel torques and steering torques to generalized forces.
@@ -542,7 +542,7 @@ class SphereField:
 
         50 x 25 spheres of radius 0.5 m, without a plane.
 
-        Source: [R].
+        Source: Yang 2010, Fig. 6.6.
         """
     @staticmethod
     def rocks(
@@ -576,7 +576,7 @@ class SphereField:
         Raises:
             TerrainError: An argument is out of its range.
 
-        Source: [GR].
+        Source: Golombek and Rapp 1997.
         """
     @property
     def centres(self) -> _Array:
@@ -1987,5 +1987,5 @@ def solve_friction_contact(
         OptionError: The solver or the dimension is unknown, or `tolerance`, `max_iterations` or
             `budget` is out of its range.
 
-    Source: [AB], [A].
+    Source: Acary and Brogliato 2008; Acary, Brémond and Huber 2018.
     """

@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 from rover_gym import PDPolicy, RoverEnv, RoverGymError
+from rover_gym.env.argument_checks import SOLVER_OPTIONS
 from rover_gym.env.episode_scene import RESET_OPTIONS
 from rover_gym.env.rewards import WEIGHTS
-from rover_gym.env.task import SOLVER_OPTIONS
 from rover_gym.planning import Scene, plan
 from rover_gym.policy import CommandController, CommandLimits, DriveByCommand, Features, PDGains
 from rover_gym.vector import RoverVectorEnv

@@ -1,5 +1,6 @@
 """The environment `Rover-v0`: its card and arguments, its task, and what a control period comes to."""
 
+from rover_gym.env.arguments import ARGUMENTS, Argument, RoverArguments
 from rover_gym.env.env_snapshot import EnvSnapshot
 from rover_gym.env.observation import ObservationField, ObservationLayout
 from rover_gym.env.randomisation import Domain
@@ -10,12 +11,15 @@ from rover_gym.env.task import Task
 from rover_gym.env.wheels import drive_signs, wheel_centres
 
 __all__ = [
+    "ARGUMENTS",
+    "Argument",
     "Domain",
     "EnvSnapshot",
     "HeightScan",
     "ObservationField",
     "ObservationLayout",
     "Rocks",
+    "RoverArguments",
     "RoverEnv",
     "Start",
     "Task",

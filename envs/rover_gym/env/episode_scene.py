@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.env.argument_checks import MAX_SLOPE_DEG
 from rover_gym.env.randomisation import Domain
 from rover_gym.env.rocks import MAX_GOAL_DISTANCE, Rocks
 from rover_gym.env.start import Start, resting_pose, sample_start, tilted_plane
-from rover_gym.env.task import MAX_SLOPE_DEG, Task, mapping
+from rover_gym.env.task import Task
 from rover_gym.mechanics import OptionError, Plane, Simulation, SphereField, StateError
-from rover_gym.validation import Range, known_keys, number, refuse, span, vector
+from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector
 
 RESET_OPTIONS = ("difficulty", "slope_deg", "uphill_deg", "position", "heading_deg", "goal", "q", "v")
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from rover_gym.env.start import Point, Start
 from rover_gym.env.wheels import wheel_centres
 from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField
-from rover_gym.validation import Range, number, refuse, span, vector
+from rover_gym.validation import Range, number, refuse, vector
 
 #: At difficulty 1; landing sites on Mars have 0.03 to 0.2 (Golombek and Rapp 1997).
 HARDEST_ABUNDANCE = 0.2
@@ -141,31 +141,25 @@ def heights(terrain: Plane | SphereField, points: npt.NDArray[np.float64]) -> np
     return terrain.heights(points)
 
 
-def check_rocks(difficulty: object, abundance: object, max_radius: object) -> RockDistribution:
-    """The distribution that arguments ask for; None takes the default."""
+def rock_distribution(difficulty: Range | None, abundance: float | None, max_radius: float | None) -> RockDistribution:
+    """The distribution that checked arguments ask for; None takes the default."""
     return RockDistribution(
-        difficulty=span(
-            "difficulty", DEFAULT_DIFFICULTY if difficulty is None else difficulty, at_least=0.0, at_most=1.0
-        ),
-        abundance=None
-        if abundance is None
-        else number("rock_abundance", abundance, at_least=0.0, at_most=MAX_ABUNDANCE),
-        max_radius=None
-        if max_radius is None
-        else number("max_rock_radius", max_radius, at_least=ROCK_RADII[0], at_most=ROCK_RADII[1]),
+        difficulty=(DEFAULT_DIFFICULTY, DEFAULT_DIFFICULTY) if difficulty is None else difficulty,
+        abundance=abundance,
+        max_radius=max_radius,
     )
 
 
-def check_scan(value: object) -> HeightScan | None:
+def check_scan(field: str, value: object) -> HeightScan | None:
     """The scan that an argument asks for: False, True, or (rows, columns, spacing)."""
     if value is None or value is False:
         return None
     if value is True:
         return HeightScan()
-    rows, columns, spacing = vector("height_scan", value, 3)
+    rows, columns, spacing = vector(field, value, 3)
     for i, count in enumerate((rows, columns)):
         if not (count.is_integer() and 1.0 <= count <= 200.0):
-            refuse(OptionError, f"height_scan[{i}]", count, "must be a whole number from 1 to 200")
+            refuse(OptionError, f"{field}[{i}]", count, "must be a whole number from 1 to 200")
     return HeightScan(
-        int(rows), int(columns), number("height_scan[2]", spacing, at_least=SPACINGS[0], at_most=SPACINGS[1])
+        int(rows), int(columns), number(f"{field}[2]", spacing, at_least=SPACINGS[0], at_most=SPACINGS[1])
     )

@@ -1,18 +1,18 @@
 """`Rover-v0`: drive a six-wheel rover to a goal. The class docstring is the environment's card."""
 
 import copy
-from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
+from rover_gym.env.arguments import RoverArguments, check_arguments, takes_arguments, with_argument_table
 from rover_gym.env.beginning import check_seed, draw_beginning, put_back, seeded
 from rover_gym.env.control_period import advance, motor_commands
-from rover_gym.env.env_snapshot import EnvSnapshot
+from rover_gym.env.env_snapshot import EnvSnapshot, check_random_state, check_snapshot
 from rover_gym.env.episode_scene import EpisodeScene, check_difficulty, check_reset_options
 from rover_gym.env.observation import ObservationLayout
 from rover_gym.env.progress import Progress
@@ -20,16 +20,17 @@ from rover_gym.env.randomisation import Domain
 from rover_gym.env.readings import draw_noise
 from rover_gym.env.rocks import Rocks
 from rover_gym.env.start import Start
-from rover_gym.env.task import Task, check_actions, check_task, mapping
+from rover_gym.env.task import Task, check_actions, make_task
 from rover_gym.env.wheels import N_ACTIONS
-from rover_gym.mechanics import Plane, RoverModel, Simulation, Snapshot, SphereField, StateError, StepError
-from rover_gym.rendering.render_options import RENDER_MODES, RenderOptions, check_render_mode, check_render_options
-from rover_gym.validation import Range, refuse
+from rover_gym.mechanics import Plane, Simulation, StepError
+from rover_gym.rendering.render_options import RENDER_MODES, RenderOptions
+from rover_gym.validation import Range
 
 if TYPE_CHECKING:
     from rover_gym.rendering import FrameRenderer
 
 
+@with_argument_table
 class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     """Drive a six-wheel, 21-dof rover with six motors and six steered wheels to a goal on the map.
 
@@ -181,36 +182,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     ## Arguments
 
-    | name              | default        | meaning                                                         |
-    |-------------------|----------------|-----------------------------------------------------------------|
-    | terrain           | "plane"        | "plane", "sphere_field" or a `SphereField` on a ground plane    |
-    | difficulty        | None           | of the rocks, or range, 0 to 1; None: 0.5                       |
-    | rock_abundance    | None           | 0 to 0.5; None: by the difficulty                               |
-    | max_rock_radius   | None           | in wheel radii, 0.3 to 10; None: by the difficulty              |
-    | height_scan       | False          | observe heights: True or (rows, columns, spacing in m)          |
-    | slope_deg         | None           | slope, or range, 0 to 60; None: 0, among rocks by the difficulty |
-    | uphill_deg        | (-180, 180)    | direction of steepest ascent, or range                          |
-    | heading_deg       | (-180, 180)    | start heading, or range                                         |
-    | goal_distance     | (5, 10)        | m, or range                                                     |
-    | goal_bearing_deg  | (-90, 90)      | direction of the goal from the start heading, or range          |
-    | goal_tolerance    | 0.5            | m                                                               |
-    | max_steering_deg  | None           | set-point of a steering action of 1; None: the model's limit    |
-    | max_tilt_deg      | 60             | roll-over beyond                                                |
-    | stuck_time        | 2              | s until a high-centred rover ends the episode                   |
-    | friction          | 0.7            | Coulomb's coefficient, or range                                 |
-    | restitution       | 0              | Newton's coefficient                                            |
-    | gravity           | (0, -9.81, 0)  | m/s2; Mars is (0, -3.72, 0)                                     |
-    | mass_scale        | 1              | masses and inertias over the model's, or range                  |
-    | actuator_gain     | 1              | torque given over torque asked, up to the limit, or range       |
-    | gravity_scale     | 1              | gravity over `gravity`, or range                                |
-    | observation_noise | 0              | standard deviation, in the observation's units                  |
-    | control_frequency | 20             | Hz; a whole number of physics steps a period                    |
-    | time_step         | 0.005          | s, of the physics                                               |
-    | model             | None           | a `RoverModel` with six driven, steered wheels; None: the rover |
-    | solver_options    | None           | further options of `Simulation`, by name                        |
-    | reward_weights    | None           | weights to replace, by term                                     |
-    | render_mode       | None           | "rgb_array": `render()` returns a frame                         |
-    | render_options    | None           | width, height, camera, show_forces, antialiasing, by name       |
+    {arguments}
 
     ## Frames
 
@@ -227,66 +199,10 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 20}  # noqa: RUF012 - as Gymnasium declares it
 
-    def __init__(
-        self,
-        *,
-        terrain: str | SphereField = "plane",
-        difficulty: float | Range | None = None,
-        rock_abundance: float | None = None,
-        max_rock_radius: float | None = None,
-        height_scan: bool | tuple[int, int, float] = False,
-        slope_deg: float | Range | None = None,
-        uphill_deg: float | Range = (-180.0, 180.0),
-        heading_deg: float | Range = (-180.0, 180.0),
-        goal_distance: float | Range = (5.0, 10.0),
-        goal_bearing_deg: float | Range = (-90.0, 90.0),
-        goal_tolerance: float = 0.5,
-        max_steering_deg: float | None = None,
-        max_tilt_deg: float = 60.0,
-        stuck_time: float = 2.0,
-        friction: float | Range = 0.7,
-        restitution: float = 0.0,
-        gravity: tuple[float, float, float] = (0.0, -9.81, 0.0),
-        mass_scale: float | Range = 1.0,
-        actuator_gain: float | Range = 1.0,
-        gravity_scale: float | Range = 1.0,
-        observation_noise: float = 0.0,
-        control_frequency: float = 20.0,
-        time_step: float = 0.005,
-        model: RoverModel | None = None,
-        solver_options: Mapping[str, Any] | None = None,
-        reward_weights: Mapping[str, float] | None = None,
-        render_mode: str | None = None,
-        render_options: Mapping[str, Any] | None = None,
-    ) -> None:
-        self.task: Task = check_task(
-            terrain=terrain,
-            difficulty=difficulty,
-            rock_abundance=rock_abundance,
-            max_rock_radius=max_rock_radius,
-            height_scan=height_scan,
-            slope_deg=slope_deg,
-            uphill_deg=uphill_deg,
-            heading_deg=heading_deg,
-            goal_distance=goal_distance,
-            goal_bearing_deg=goal_bearing_deg,
-            goal_tolerance=goal_tolerance,
-            max_steering_deg=max_steering_deg,
-            max_tilt_deg=max_tilt_deg,
-            stuck_time=stuck_time,
-            friction=friction,
-            restitution=restitution,
-            gravity=gravity,
-            mass_scale=mass_scale,
-            actuator_gain=actuator_gain,
-            gravity_scale=gravity_scale,
-            observation_noise=observation_noise,
-            control_frequency=control_frequency,
-            time_step=time_step,
-            model=model,
-            solver_options=solver_options,
-            reward_weights=reward_weights,
-        )
+    @takes_arguments
+    def __init__(self, **arguments: Unpack[RoverArguments]) -> None:
+        given = check_arguments(type(self).__name__, arguments)
+        self.task: Task = make_task(given)
         self.model = self.task.model
         self.gravity = self.task.gravity
         self.dt = self.task.dt
@@ -302,11 +218,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         self._progress: Progress
         self._difficulty: Range | None = None
 
-        check_render_mode(render_mode)
-        self.render_mode = render_mode
-        self.render_options: RenderOptions = check_render_options(
-            "render_options", mapping("render_options", render_options)
-        )
+        self.render_mode: str | None = given["render_mode"]
+        self.render_options: RenderOptions = given["render_options"] or RenderOptions()
         fps = round(1.0 / self.dt, 9)
         self.metadata = {**type(self).metadata, "render_fps": int(fps) if fps.is_integer() else fps}
         self._renderer: FrameRenderer | None = None
@@ -442,31 +355,14 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         Raises:
             StateError: This is no snapshot, or a damaged one, or one of other arguments; nothing has changed.
         """
-        if not isinstance(snapshot, EnvSnapshot):
-            refuse(StateError, "snapshot", snapshot, "must come from RoverEnv.snapshot()")
-        for name, kind in (("scene", EpisodeScene), ("progress", Progress), ("simulation", Snapshot)):
-            part = getattr(snapshot, name)
-            if not isinstance(part, kind):
-                refuse(StateError, f"snapshot.{name}", part, f"must be a {kind.__name__}")
-        if not snapshot.progress.is_of(self.task):
-            refuse(StateError, "snapshot.progress", snapshot.progress, "must be of an environment with these arguments")
-        state = self._check_random_state(snapshot.random_state)
+        check_snapshot(self.task, snapshot)
+        state = check_random_state(self.np_random, snapshot.random_state)
         difficulty = None if snapshot.difficulty is None else check_difficulty(self.task, snapshot.difficulty)
         simulation = self.task.simulate(snapshot.scene.terrain, snapshot.scene.domain)
         simulation.restore(snapshot.simulation)
         self.np_random.bit_generator.state = state
         self._simulation, self._scene = simulation, snapshot.scene
         self._progress, self._difficulty = snapshot.progress.copy(), difficulty
-
-    def _check_random_state(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """A copy of a random generator's state, once a generator of that kind has taken it."""
-        trial = type(self.np_random.bit_generator)()
-        try:
-            state = copy.deepcopy(dict(given))
-            trial.state = state
-        except (TypeError, ValueError, KeyError, AttributeError, OverflowError) as error:
-            refuse(StateError, "snapshot.random_state", given, f"is no state of {type(trial).__name__} ({error!r})")
-        return state
 
     def _running(self) -> EpisodeScene:
         if self._scene is None:

@@ -11,48 +11,23 @@ import numpy.typing as npt
 from rover_gym.env import rewards
 from rover_gym.env.observation import ObservationLayout, build_layout
 from rover_gym.env.randomisation import Domain, DomainDistribution
-from rover_gym.env.rocks import MAX_GOAL_DISTANCE, RockDistribution, check_rocks, check_scan
+from rover_gym.env.rocks import MAX_GOAL_DISTANCE, RockDistribution, rock_distribution
 from rover_gym.env.start import StartDistribution, slope_of
-from rover_gym.env.wheels import N_WHEELS
 from rover_gym.mechanics import (
     CommandError,
-    ModelError,
     OptionError,
     Plane,
     RoverModel,
     Simulation,
     SphereField,
-    TerrainError,
 )
-from rover_gym.validation import Range, array, known_keys, number, refuse, span, vector
-
-TERRAINS = ("plane", "sphere_field")
-SOLVER_OPTIONS = (
-    "variant",
-    "theta",
-    "forecast",
-    "solver",
-    "tolerance",
-    "max_iterations",
-    "stabilisation",
-    "warm_start",
-)
+from rover_gym.validation import Range, array, number, refuse, span
 
 #: Steps until truncation: 60 s at the default control frequency of 20 Hz.
 MAX_EPISODE_STEPS = 1200
 
-#: Steeper ground than this is a wall to a wheel.
-MAX_SLOPE_DEG = 60.0
-
-#: Ranges far beyond any rover, within which all sums stay finite: m, m/s2, factors, and the rest as named.
-MAX_DISTANCE = 1e6
-MAX_FRICTION = 1e3
-GRAVITIES = (1e-3, 1e3)
-SCALES = (1e-3, 1e3)
-MAX_WEIGHT = 1e6
-MIN_TIME_STEP = 1e-6  # s
+#: Physics steps a control period, at most.
 MAX_SUBSTEPS = 10_000
-MIN_STEERING_DEG = 0.01
 
 #: High-centring: the trunk carries this share of the weight.
 TRUNK_LOAD = 0.1
@@ -126,113 +101,61 @@ class Task:
         return TRUNK_LOAD * weight * domain.mass_scale * domain.gravity_scale
 
 
-def check_task(
-    *,
-    terrain: object,
-    difficulty: object,
-    rock_abundance: object,
-    max_rock_radius: object,
-    height_scan: object,
-    slope_deg: object,
-    uphill_deg: object,
-    heading_deg: object,
-    goal_distance: object,
-    goal_bearing_deg: object,
-    goal_tolerance: object,
-    max_steering_deg: object,
-    max_tilt_deg: object,
-    stuck_time: object,
-    friction: object,
-    restitution: Any,
-    gravity: object,
-    mass_scale: object,
-    actuator_gain: object,
-    gravity_scale: object,
-    observation_noise: object,
-    control_frequency: object,
-    time_step: object,
-    model: object,
-    solver_options: object,
-    reward_weights: object,
-) -> Task:
-    """The task of `RoverEnv`'s arguments, or the first that is refused, by name."""
+def make_task(given: Mapping[str, Any]) -> Task:
+    """The task that arguments come to, each of which `check_arguments` has passed: here they must fit together.
+
+    Raises:
+        OptionError: Two of them do not go together, or the core refuses an option; `field` names one.
+        TerrainError: The field has no ground that a rover could stand on.
+    """
+    terrain, model, scan = given["terrain"], given["model"], given["height_scan"]
     field = terrain if isinstance(terrain, SphereField) else None
-    if field is None and not (isinstance(terrain, str) and terrain in TERRAINS):
-        refuse(TerrainError, "terrain", terrain, f"unknown; known are {', '.join(TERRAINS)} and a SphereField")
     rocks: RockDistribution | None = None
-    if field is None and terrain == "sphere_field":
-        rocks = check_rocks(difficulty, rock_abundance, max_rock_radius)
+    if terrain == "sphere_field":
+        rocks = rock_distribution(given["difficulty"], given["rock_abundance"], given["max_rock_radius"])
+        nearest, farthest = given["goal_distance"]
+        distance = nearest if nearest == farthest else (nearest, farthest)
+        span("goal_distance", distance, at_most=MAX_GOAL_DISTANCE)
+        number("goal_tolerance", given["goal_tolerance"], at_most=MAX_GOAL_DISTANCE)
     else:
-        for name, value in (
-            ("difficulty", difficulty),
-            ("rock_abundance", rock_abundance),
-            ("max_rock_radius", max_rock_radius),
-        ):
-            if value is not None:
-                refuse(OptionError, name, value, "needs terrain 'sphere_field'")
-    scan = check_scan(height_scan)
-    farthest = MAX_DISTANCE if rocks is None else MAX_GOAL_DISTANCE
+        for name in ("difficulty", "rock_abundance", "max_rock_radius"):
+            if given[name] is not None:
+                refuse(OptionError, name, given[name], "needs terrain 'sphere_field'")
+    slope_deg = given["slope_deg"]
     start = StartDistribution(
-        slope=_radians(span("slope_deg", 0.0 if slope_deg is None else slope_deg, at_least=0.0, at_most=MAX_SLOPE_DEG)),
-        uphill=_radians(span("uphill_deg", uphill_deg)),
-        heading=_radians(span("heading_deg", heading_deg)),
-        goal_distance=span("goal_distance", goal_distance, above=0.0, at_most=farthest),
-        goal_bearing=_radians(span("goal_bearing_deg", goal_bearing_deg)),
+        slope=_radians((0.0, 0.0) if slope_deg is None else slope_deg),
+        uphill=_radians(given["uphill_deg"]),
+        heading=_radians(given["heading_deg"]),
+        goal_distance=given["goal_distance"],
+        goal_bearing=_radians(given["goal_bearing_deg"]),
     )
     if field is not None:
         if slope_deg is not None:
             refuse(OptionError, "slope_deg", slope_deg, "is the given field's own")
         slope, uphill = slope_of(field)
         start = replace(start, slope=(slope, slope), uphill=(uphill, uphill))
-    tolerance = number("goal_tolerance", goal_tolerance, above=0.0, at_most=farthest)
-    max_tilt = math.radians(number("max_tilt_deg", max_tilt_deg, above=0.0, at_most=180.0))
-    stuck = number("stuck_time", stuck_time, at_least=MIN_TIME_STEP)
-    g = vector("gravity", gravity, 3)
-    magnitude = math.hypot(*g)
-    if not magnitude > 0.0:
-        refuse(OptionError, "gravity", gravity, "must not vanish: it says where up is")
-    if not GRAVITIES[0] <= magnitude <= GRAVITIES[1]:
-        refuse(OptionError, "gravity", gravity, "must have a magnitude of {:g} to {:g} m/s2".format(*GRAVITIES))
     domain = DomainDistribution(
-        mass_scale=span("mass_scale", mass_scale, at_least=SCALES[0], at_most=SCALES[1]),
-        friction=span("friction", friction, at_least=0.0, at_most=MAX_FRICTION),
-        actuator_gain=span("actuator_gain", actuator_gain, at_least=0.0, at_most=SCALES[1]),
-        gravity_scale=span("gravity_scale", gravity_scale, at_least=SCALES[0], at_most=SCALES[1]),
-        observation_noise=number("observation_noise", observation_noise, at_least=0.0, at_most=MAX_DISTANCE),
+        mass_scale=given["mass_scale"],
+        friction=given["friction"],
+        actuator_gain=given["actuator_gain"],
+        gravity_scale=given["gravity_scale"],
+        observation_noise=given["observation_noise"],
     )
-
-    frequency = number("control_frequency", control_frequency, above=0.0)
-    step = number("time_step", time_step, at_least=MIN_TIME_STEP, at_most=1.0)
-    if frequency * step < (1.0 - 1e-9) / MAX_SUBSTEPS:
-        reason = f"must give at most {MAX_SUBSTEPS} physics steps of {step:g} s a period"
-        refuse(OptionError, "control_frequency", control_frequency, reason)
-    substeps = round(1.0 / (frequency * step))
-    if substeps < 1 or not math.isclose(substeps * frequency * step, 1.0, rel_tol=1e-9):
-        reason = f"must give a whole number of physics steps of {step:g} s a period"
-        refuse(OptionError, "control_frequency", control_frequency, reason)
-
-    weights = dict(rewards.WEIGHTS)
-    for name, weight in mapping("reward_weights", reward_weights).items():
-        known_keys("reward_weights", (name,), rewards.WEIGHTS)
-        weights[name] = number(f"reward_weights.{name}", weight, at_least=-MAX_WEIGHT, at_most=MAX_WEIGHT)
-
-    rover = _six_wheels(RoverModel() if model is None else model)
-    further = mapping("solver_options", solver_options)
-    known_keys("solver_options", further, SOLVER_OPTIONS)
-    options = {"gravity": g, "friction": domain.friction[0], "restitution": restitution, "time_step": step, **further}
+    step = given["time_step"]
+    substeps = _substeps(given["control_frequency"], step)
+    rover = RoverModel() if model is None else model
+    gravity = given["gravity"]
+    options = {
+        "gravity": gravity,
+        "friction": domain.friction[0],
+        "restitution": given["restitution"],
+        "time_step": step,
+        **(given["solver_options"] or {}),
+    }
+    n_scan = 0 if scan is None else len(scan.offsets)
     # The core validates what it takes.
-    places = Simulation(rover, Plane(), **options).reading_layout(0 if scan is None else len(scan.offsets))
-
-    # What one stands for must be within every wheel's limit.
-    limit = min(wheel["steering_limit"] for wheel in rover.to_dict()["wheels"])
-    if max_steering_deg is not None:
-        asked = number("max_steering_deg", max_steering_deg, at_least=MIN_STEERING_DEG)
-        if math.radians(asked) > limit * (1.0 + 1e-12):
-            reason = f"must be at most the model's limit, {math.degrees(limit):g}"
-            refuse(OptionError, "max_steering_deg", max_steering_deg, reason)
-        limit = min(limit, math.radians(asked))
-
-    layout = build_layout(rover, magnitude, 0 if scan is None else len(scan.offsets))
+    places = Simulation(rover, Plane(), **options).reading_layout(n_scan)
+    layout = build_layout(rover, math.hypot(*gravity), n_scan)
     return Task(
         model=rover,
         field=field,
@@ -241,15 +164,15 @@ def check_task(
         scan=None if scan is None else scan.offsets,
         start=start,
         domain=domain,
-        goal_tolerance=tolerance,
-        cos_max_tilt=math.cos(max_tilt),
-        stuck_time=stuck,
-        gravity=g,
+        goal_tolerance=given["goal_tolerance"],
+        cos_max_tilt=math.cos(math.radians(given["max_tilt_deg"])),
+        stuck_time=given["stuck_time"],
+        gravity=gravity,
         substeps=substeps,
         dt=substeps * step,
-        reward_weights=weights,
+        reward_weights=dict(rewards.WEIGHTS) if given["reward_weights"] is None else given["reward_weights"],
         simulation_options=options,
-        max_steering=limit,
+        max_steering=_steering_limit(rover, given["max_steering_deg"]),
         torque_limits=rover.wheel_torque_limits,
         layout=layout,
         inverse_scale=1.0 / layout.scale,
@@ -258,6 +181,29 @@ def check_task(
         n_shared=places["target"].stop,
         scalars=slice(places["target"].stop - 1, places["solver"].stop),
     )
+
+
+def _substeps(frequency: float, step: float) -> int:
+    """Physics steps a control period, which must come out even."""
+    if frequency * step < (1.0 - 1e-9) / MAX_SUBSTEPS:
+        reason = f"must give at most {MAX_SUBSTEPS} physics steps of {step:g} s a period"
+        refuse(OptionError, "control_frequency", frequency, reason)
+    substeps = round(1.0 / (frequency * step))
+    if substeps < 1 or not math.isclose(substeps * frequency * step, 1.0, rel_tol=1e-9):
+        reason = f"must give a whole number of physics steps of {step:g} s a period"
+        refuse(OptionError, "control_frequency", frequency, reason)
+    return substeps
+
+
+def _steering_limit(rover: RoverModel, asked_deg: float | None) -> float:
+    """Set-point of a steering action of 1, rad: what it stands for must be within every wheel's limit."""
+    limit: float = min(wheel["steering_limit"] for wheel in rover.to_dict()["wheels"])
+    if asked_deg is None:
+        return limit
+    if math.radians(asked_deg) > limit * (1.0 + 1e-12):
+        reason = f"must be at most the model's limit, {math.degrees(limit):g}"
+        refuse(OptionError, "max_steering_deg", asked_deg, reason)
+    return min(limit, math.radians(asked_deg))
 
 
 def check_actions(actions: object, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
@@ -273,27 +219,5 @@ def check_actions(actions: object, shape: tuple[int, ...]) -> npt.NDArray[np.flo
     return commands
 
 
-def mapping(name: str, value: object) -> Mapping[str, Any]:
-    """A mapping, or none as an empty one."""
-    if value is None:
-        return {}
-    if not isinstance(value, Mapping):
-        refuse(OptionError, name, value, "must be a mapping or None")
-    return value
-
-
 def _radians(degrees: Range) -> Range:
     return (math.radians(degrees[0]), math.radians(degrees[1]))
-
-
-def _six_wheels(model: object) -> RoverModel:
-    """The model, if it has what the action drives."""
-    if not isinstance(model, RoverModel):
-        refuse(ModelError, "model", model, "must be a RoverModel")
-    for name, indices in (
-        ("wheel_joint_indices", model.wheel_joint_indices),
-        ("steering_joint_indices", model.steering_joint_indices),
-    ):
-        if len(indices) != N_WHEELS or min(indices) < 0:
-            refuse(ModelError, f"model.{name}", indices, f"must be {N_WHEELS} joints that move")
-    return model

@@ -16,6 +16,7 @@ from typing import Any, TypeVar, get_args, get_type_hints
 
 import yaml
 
+from rover_gym.env.arguments import ARGUMENTS
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.command import CommandLimits
@@ -161,10 +162,9 @@ def rover(arguments: Mapping[str, Any]) -> RoverEnv:
 
 def environment_arguments(arguments: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of `RoverEnv`: YAML's lists become pairs, and an unknown name is refused."""
-    known = set(RoverEnv.__init__.__kwdefaults__ or {})
     for name in arguments:
-        if name not in known:
-            refuse(OptionError, f"environment.{name}", name, f"unknown; known are {', '.join(sorted(known))}")
+        if name not in ARGUMENTS:
+            refuse(OptionError, f"environment.{name}", name, f"unknown; known are {', '.join(sorted(ARGUMENTS))}")
     return {name: tuple(value) if isinstance(value, list) else value for name, value in arguments.items()}
 
 

@@ -1,13 +1,12 @@
 """The card of a trained policy: what it was trained for, what its commands stand for, where it came from."""
 
-import inspect
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from rover_gym.env.rover_env import RoverEnv
+from rover_gym.env.arguments import ARGUMENTS
 from rover_gym.mechanics import RoverGymError
 from rover_gym.policy.command import CommandLimits
 from rover_gym.policy.network import LARGEST_CARD
@@ -93,7 +92,7 @@ def _read_object(path: Path) -> dict[str, Any]:
 
 def check_arguments(path: Path, arguments: Mapping[str, Any]) -> None:
     """Refuses arguments that no environment has; the environment itself checks their values."""
-    known = [name for name in inspect.signature(RoverEnv).parameters if name not in NOT_A_POLICYS]
+    known = [name for name in ARGUMENTS if name not in NOT_A_POLICYS]
     for name in arguments:
         if name not in known:
             refuse_field(path, f"environment.{name}", arguments[name], f"unknown; known are {', '.join(known)}")

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import RoverModel, Simulation
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)

@@ -66,20 +66,19 @@ def check_render_options(field: str, given: Mapping[str, Any]) -> RenderOptions:
     return RenderOptions(**options)
 
 
-def check_render_mode(render_mode: object) -> None:
-    """Refuses a mode that the environment cannot render, or whose packages are missing.
+def check_render_mode(field: str, render_mode: object) -> str:
+    """A mode that the environment can render, and whose packages are installed.
 
     Raises:
         OptionError: The mode is unknown.
         MissingExtraError: The renderer is not installed.
     """
-    if render_mode is None:
-        return
     if not (isinstance(render_mode, str) and render_mode in RENDER_MODES):
         reason = f"unknown; known is {', '.join(RENDER_MODES)}, and gymnasium.make adds 'human', a window"
-        refuse(OptionError, "render_mode", render_mode, reason)
+        refuse(OptionError, field, render_mode, reason)
     if importlib.util.find_spec("vtkmodules") is None:
         raise MissingExtraError("vtk", "render")
+    return render_mode
 
 
 def _check_camera(field: str, value: object) -> Camera:

@@ -10,15 +10,11 @@ from __future__ import annotations
 import json
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rover_gym.mechanics import BallSimulation, Line, Sine
-
-if TYPE_CHECKING:
-    pass
-
 
 BALL: dict[str, Any] = {
     "mass": 3.0,

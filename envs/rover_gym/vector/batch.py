@@ -7,12 +7,13 @@ the functions that `RoverEnv` calls, over arrays.
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
+from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.beginning import Beginning, check_seed, draw_beginning, put_back, seeded
 from rover_gym.env.control_period import advance, motor_commands
 from rover_gym.env.episode_scene import EpisodeScene, ResetOptions, check_difficulty, check_reset_options
@@ -53,8 +54,14 @@ class RoverBatch:
         rovers: One view a rover.
     """
 
+    @takes_arguments
     def __init__(
-        self, n: int, *, threads: int | None = None, max_episode_steps: int | None = None, **arguments: Any
+        self,
+        n: int,
+        *,
+        threads: int | None = None,
+        max_episode_steps: int | None = None,
+        **arguments: Unpack[RoverArguments],
     ) -> None:
         self.n = whole("num_envs", n, at_least=1, at_most=MAX_ROVERS)
         self.max_episode_steps = (

@@ -9,11 +9,12 @@ model = stable_baselines3.PPO("MlpPolicy", VecMonitor(venv))
 import copy
 from collections.abc import Sequence
 from contextlib import ExitStack
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.beginning import check_seed
 from rover_gym.env.observation import LARGEST
 from rover_gym.env.rover_env import RoverEnv
@@ -50,13 +51,14 @@ class RoverVecEnv(VecEnv):
         **arguments: Those of `RoverEnv`.
     """
 
+    @takes_arguments
     def __init__(
         self,
         n_envs: int,
         *,
         threads: int | None = None,
         max_episode_steps: int | None = MAX_EPISODE_STEPS,
-        **arguments: Any,
+        **arguments: Unpack[RoverArguments],
     ) -> None:
         self.batch = RoverBatch(n_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments)
         self._actions: npt.NDArray[np.float64] | None = None

@@ -7,12 +7,13 @@ round of each counts.
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.vector.batch import RoverBatch
 from rover_gym.vector.vector_env import RoverVectorEnv
 
@@ -82,6 +83,7 @@ class _TimedSimulations:
         return getattr(self._inner, name)
 
 
+@takes_arguments
 def measure_speed(
     num_envs: int = 64,
     threads: int | None = None,
@@ -89,7 +91,7 @@ def measure_speed(
     rounds: int = 200,
     steps: int = 1,
     progress: Callable[[], object] = lambda: None,
-    **arguments: Any,
+    **arguments: Unpack[RoverArguments],
 ) -> VectorSpeed:
     """Steps batches with one thread and with more, and a `SyncVectorEnv`, by the same actions.
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -10,12 +10,13 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.beginning import spread_seeds
 from rover_gym.env.quantities import Array, Mask, Observations
-from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions, mapping
+from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.mechanics import OptionError, RoverGymError
-from rover_gym.validation import refuse
+from rover_gym.validation import mapping, refuse
 from rover_gym.vector.batch import RoverBatch
 
 _Info = dict[str, Any]
@@ -35,6 +36,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         **arguments: Those of `RoverEnv`.
     """
 
+    @takes_arguments
     def __init__(
         self,
         num_envs: int = 1,
@@ -42,7 +44,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         threads: int | None = None,
         max_episode_steps: int | None = MAX_EPISODE_STEPS,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        **arguments: Any,
+        **arguments: Unpack[RoverArguments],
     ) -> None:
         super().__init__()
         self.autoreset_mode = _check_mode(autoreset_mode)

@@ -278,7 +278,7 @@ fn problem_error(field: &str, message: String, value: Value) -> BorderError {
 ///     OptionError: The solver or the dimension is unknown, or `tolerance`, `max_iterations` or
 ///         `budget` is out of its range.
 ///
-/// Source: [AB], [A].
+/// Source: Acary and Brogliato 2008; Acary, Brémond and Huber 2018.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
 #[pyo3(signature = (

@@ -511,7 +511,7 @@ impl RoverModel {
     ///     StateError: `q` has a wrong length or an entry that is not finite.
     ///     OptionError: `coordinates` is neither of the two.
     ///
-    /// Source: [F] ch. 6.
+    /// Source: Featherstone 2008, ch. 6.
     #[pyo3(signature = (q, coordinates = Given::MISSING), text_signature = "($self, q, coordinates='state')")]
     fn mass_matrix<'py>(
         &self,
@@ -546,7 +546,7 @@ impl RoverModel {
     ///     OptionError: `gravity` is not three finite numbers, or `coordinates` is neither of the
     ///         two.
     ///
-    /// Source: [F] ch. 5.
+    /// Source: Featherstone 2008, ch. 5.
     #[pyo3(signature = (q, qdot, gravity = None, coordinates = Given::MISSING), text_signature = "($self, q, qdot, gravity=None, coordinates='state')")]
     fn bias<'py>(
         &self,
