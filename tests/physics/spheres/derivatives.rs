@@ -52,6 +52,7 @@ proptest! {
             position: Vector3::new(3.0, 2.0, -1.0),
             attitude: UnitQuaternion::from_scaled_axis(Vector3::from(turn)),
             joints,
+            ..Configuration::zero(&model)
         };
         let field = field(&[[place[0] + 3.0, place[1] + 1.8, place[2] - 1.0, radius]]);
         let contact = contact_at(&model, &field, &start, part);
@@ -60,7 +61,7 @@ proptest! {
         let step = 1e-6;
         let moved = |h: f64| {
             let mut moved = start.clone();
-            moved.set_moved(&start, &v, h);
+            moved.set_moved(&model, &start, &v, h);
             contact_at(&model, &field, &moved, part)
         };
         let (before, after) = (moved(-step), moved(step));

@@ -149,12 +149,14 @@ fn jacobian_columns(
     let [n, t, b] = contact.frame.rows();
     let x = &contact.point;
     let (xn, xt, xb) = (x.cross(&n), x.cross(&t), x.cross(&b));
-    for i in 0..3 {
-        rows[i] = [n[i], t[i], b[i], 0.0];
-        rows[3 + i] = [xn[i], xt[i], xb[i], 0.0];
+    let (lead, rest) = rows.split_at_mut(model.lead(contact.body));
+    if let Some(base) = lead.first_chunk_mut::<BASE>() {
+        for i in 0..3 {
+            base[i] = [n[i], t[i], b[i], 0.0];
+            base[3 + i] = [xn[i], xt[i], xb[i], 0.0];
+        }
     }
-    let lead = model.lead(contact.body);
-    for (row, &m) in rows[lead..].iter_mut().zip(model.motions(contact.body)) {
+    for (row, &m) in rest.iter_mut().zip(model.motions(contact.body)) {
         let velocity = kinematics.motions[m].velocity_at(x);
         *row = [velocity.dot(&n), velocity.dot(&t), velocity.dot(&b), 0.0];
     }
@@ -194,11 +196,13 @@ pub fn generalized_impulse(
         let [n, t, b] = contact.frame.rows();
         let force = n * p[0] + t * p[1] + b * p[2];
         let moment = contact.point.cross(&force);
-        for i in 0..3 {
-            out[i] += force[i];
-            out[3 + i] += moment[i];
+        let (lead, rest) = model.split_path(contact.body);
+        if let Some(base) = out[lead].first_chunk_mut::<BASE>() {
+            for i in 0..3 {
+                base[i] += force[i];
+                base[3 + i] += moment[i];
+            }
         }
-        let (_, rest) = model.split_path(contact.body);
         for (&k, &m) in rest.iter().zip(model.motions(contact.body)) {
             out[k] += kinematics.motions[m].power(&force, &moment);
         }
