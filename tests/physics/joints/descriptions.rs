@@ -23,10 +23,10 @@ fn bad_joints_are_refused_by_field() {
     type Spoil = fn(&mut ModelDescription);
     let cases: [(&str, Spoil); 14] = [
         ("solids[0].position", |d| {
-            d.solids[0].position = Some([0.0; 3])
+            d.solids[0].position = Some([0.0; 3]);
         }),
         ("solids[0].rotation", |d| {
-            d.solids[0].rotation = Some([0.0; 3])
+            d.solids[0].rotation = Some([0.0; 3]);
         }),
         ("solids[0].damping", |d| d.solids[0].damping = Some(1.0)),
         ("solids[1].parent", |d| {
