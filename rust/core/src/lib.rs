@@ -12,7 +12,7 @@
 //!
 //! - [`spatial`]: rotations and inertias;
 //! - [`multibody`]: model, state, kinematics, mass matrix, bias, energy, momentum;
-//! - [`geometry`]: the ground; [`contact`]: points, frames, gaps, Delassus operator;
+//! - [`geometry`]: shapes, the ground, the distances between them; [`contact`]: points, frames, gaps, Delassus operator;
 //! - [`cone`], [`law`], [`problem`], [`solver`]: the friction-contact problem, which sees only (W, q, μ);
 //! - [`integrator`]: one step of any mechanical system; [`system`]: the tree of solids as one;
 //! - [`simulation`]: many steps;

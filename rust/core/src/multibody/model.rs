@@ -118,6 +118,19 @@ pub struct CollisionBox {
     pub half_size: Vector3<f64>,
 }
 
+/// A ball that touches the ground.
+#[derive(Clone, Debug)]
+pub struct CollisionSphere {
+    /// Body that carries it.
+    pub body: usize,
+    /// Name of its solid.
+    pub name: String,
+    /// Centre in the body's frame, m.
+    pub centre: Vector3<f64>,
+    /// m.
+    pub radius: f64,
+}
+
 /// A tree of bodies under a free base. Velocity: 3 linear (trunk origin, world), 3 angular (world), joint rates.
 #[derive(Clone, Debug)]
 pub struct Model {
@@ -126,6 +139,7 @@ pub struct Model {
     frames: Vec<Frame>,
     wheels: Vec<Wheel>,
     boxes: Vec<CollisionBox>,
+    spheres: Vec<CollisionSphere>,
     /// Velocity indices from the base to body `b`: `paths[b * path_stride ..][.. path_lengths[b]]`.
     paths: Vec<usize>,
     path_lengths: Vec<usize>,
@@ -255,6 +269,7 @@ impl Model {
         let mut lumps: Vec<Lump> = Vec::new();
         let mut frames: Vec<Frame> = Vec::new();
         let mut boxes = Vec::new();
+        let mut spheres = Vec::new();
         let index_of: HashMap<&str, usize> = (description.solids.iter().map(|s| s.name.as_str()))
             .zip(0..)
             .collect();
@@ -349,6 +364,14 @@ impl Model {
                     half_size: Vector3::from(size) * 0.5,
                 });
             }
+            if let (true, Shape::Sphere { radius }) = (solid.collides, solid.shape) {
+                spheres.push(CollisionSphere {
+                    body: frame.body,
+                    name: solid.name.clone(),
+                    centre,
+                    radius,
+                });
+            }
             frames.push(frame);
         }
         for (body, lump) in bodies.iter_mut().zip(&lumps) {
@@ -393,8 +416,9 @@ impl Model {
                 steering_limit: wheel.steering_limit.unwrap_or(0.0),
             });
         }
-        mark_spinners(&mut bodies, &wheels, &boxes);
-        Self::with_tree(description, bodies, frames, wheels, boxes)
+        let carriers = (boxes.iter().map(|x| x.body)).chain(spheres.iter().map(|x| x.body));
+        mark_spinners(&mut bodies, &wheels, carriers);
+        Self::with_tree(description, bodies, frames, wheels, (boxes, spheres))
     }
 
     fn with_tree(
@@ -402,7 +426,7 @@ impl Model {
         bodies: Vec<Body>,
         frames: Vec<Frame>,
         wheels: Vec<Wheel>,
-        boxes: Vec<CollisionBox>,
+        (boxes, spheres): (Vec<CollisionBox>, Vec<CollisionSphere>),
     ) -> Self {
         let mut path_of: Vec<Vec<usize>> = vec![(0..6).collect()];
         for (b, body) in bodies.iter().enumerate().skip(1) {
@@ -442,6 +466,7 @@ impl Model {
             frames,
             wheels,
             boxes,
+            spheres,
             paths,
             path_lengths,
             path_stride,
@@ -485,6 +510,19 @@ impl Model {
     #[must_use]
     pub fn boxes(&self) -> &[CollisionBox] {
         &self.boxes
+    }
+
+    /// Balls that touch the ground.
+    #[must_use]
+    pub fn spheres(&self) -> &[CollisionSphere] {
+        &self.spheres
+    }
+
+    /// Whether parts of two bodies can touch: in one machine only where it has self-contact, and not across a joint.
+    #[must_use]
+    pub fn can_touch(&self, a: usize, b: usize) -> bool {
+        let is_joined = self.bodies[a].parent == b || self.bodies[b].parent == a;
+        a != b && !is_joined && self.description.self_contact
     }
 
     /// Number of velocities: 6 + free joints.
@@ -625,9 +663,9 @@ pub(crate) fn fingerprint(bytes: impl IntoIterator<Item = u8>) -> u64 {
 }
 
 /// Finds the bodies whose own rotation is only looks.
-fn mark_spinners(bodies: &mut [Body], wheels: &[Wheel], boxes: &[CollisionBox]) {
+fn mark_spinners(bodies: &mut [Body], wheels: &[Wheel], carriers: impl Iterator<Item = usize>) {
     let carriers: HashSet<usize> = (bodies.iter().skip(1).map(|b| b.parent))
-        .chain(boxes.iter().map(|x| x.body))
+        .chain(carriers)
         .collect();
     let mut wheels_of: HashMap<usize, Vec<&Wheel>> = HashMap::new();
     for wheel in wheels {
@@ -867,7 +905,9 @@ fn check_body(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
             length(&at("shape.radius"), radius)?;
             length(&at("shape.height"), height)?;
         }
-        Shape::Disc { radius } => length(&at("shape.radius"), radius)?,
+        Shape::Disc { radius } | Shape::Sphere { radius } => {
+            length(&at("shape.radius"), radius)?;
+        }
     }
     place(
         &at("centre_of_mass"),
@@ -884,7 +924,7 @@ fn check_body(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
             principal: principal.into(),
         });
     }
-    if solid.collides && !matches!(solid.shape, Shape::Box { .. }) {
+    if solid.collides && !matches!(solid.shape, Shape::Box { .. } | Shape::Sphere { .. }) {
         return Err(ModelError::CollidesWithoutBox {
             field: at("collides"),
         });

@@ -7,7 +7,9 @@ use nalgebra::Vector3;
 use super::error::{CommandError, SnapshotError};
 use super::profile::Stopwatch;
 use super::snapshot::Snapshot;
-use crate::contact::{Activation, Contact, ContactFrame, Part, detect, detection::wheel_contacts};
+use crate::contact::{
+    Activation, Contact, ContactFrame, Opposite, OtherSide, Part, detect, detection::wheel_contacts,
+};
 use crate::geometry::Terrain;
 use crate::integrator::{
     Integrator, NoProbe, OptionsError, Probe, StateMut, StepError, StepOptions, StepReport,
@@ -555,7 +557,7 @@ impl Simulation {
         let boxes = self
             .active
             .iter()
-            .filter(|a| matches!(a.contact.part, Part::Box(_)));
+            .filter(|a| !matches!(a.contact.part, Part::Wheel(_)));
         boxes.map(|a| a.impulse[0]).sum::<f64>() / self.options.time_step
     }
 
@@ -646,12 +648,12 @@ impl Simulation {
 /// Whether a contact is one of finite numbers, of a part that a model has.
 fn is_sound(model: &Model, active: &ActiveContact) -> bool {
     let contact = &active.contact;
-    let is_part = match contact.part {
-        Part::Wheel(i) => i < model.wheels().len(),
-        Part::Box(i) => i < model.boxes().len(),
-    };
-    is_part
-        && contact.body < model.bodies().len()
+    let is_part = |part: Part, body: usize| part.is_of(model) && part.body(model) == body;
+    let is_other = |other: &OtherSide| is_part(other.part, other.body);
+    let is_paired = matches!(contact.key.opposite, Opposite::Part(_)) == contact.other.is_some();
+    is_part(contact.part, contact.body)
+        && contact.other.as_ref().is_none_or(is_other)
+        && is_paired
         && contact.frame.rows().iter().flatten().all(|x| x.is_finite())
         && (contact.point.iter())
             .chain(&active.position)

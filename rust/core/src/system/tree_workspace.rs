@@ -69,7 +69,7 @@ impl Workspace {
     }
 }
 
-/// Most contacts on a plane: three rim points a wheel, four corners a box.
+/// Most contacts on a plane: three rim points a wheel, four corners a box, one point a ball.
 pub(crate) fn contact_capacity(model: &Model) -> usize {
-    3 * model.wheels().len() + 4 * model.boxes().len()
+    3 * model.wheels().len() + 4 * model.boxes().len() + model.spheres().len()
 }

@@ -118,7 +118,7 @@ impl Grid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::rocks::Random;
+    use crate::geometry::terrain::rocks::Random;
 
     #[test]
     fn finds_every_neighbour_once_also_with_disks_far_away() {

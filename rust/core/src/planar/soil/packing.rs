@@ -3,7 +3,7 @@
 use super::super::error::{LENGTHS, MASSES, PLACES, within};
 use super::disks::{Disks, check_count};
 use super::error::SoilError;
-use crate::geometry::rocks::Random;
+use crate::geometry::terrain::rocks::Random;
 
 /// Disks of radii drawn evenly from a range, row upon row over a width.
 ///

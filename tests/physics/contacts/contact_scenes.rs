@@ -1,0 +1,97 @@
+//! Machines whose parts meet.
+
+use std::sync::Arc;
+
+use rover_core::contact::{Activation, PairSearch, detect_pairs};
+use rover_core::geometry::Plane;
+use rover_core::integrator::{StepOptions, Variant};
+use rover_core::multibody::{Configuration, Model, ModelDescription};
+use rover_core::simulation::Simulation;
+
+/// A chassis with an arm of two links over it: the second link, a box, a ball or a wheel, folds down onto the chassis.
+pub fn folding(last: &str) -> Model {
+    let text = format!(
+        r#"
+name = "folding"
+self_contact = true
+
+[[solids]]
+name = "chassis"
+mass = 20.0
+shape = {{ kind = "box", size = [1.0, 0.2, 0.6] }}
+collides = true
+
+[[solids]]
+name = "shoulder"
+parent = "chassis"
+position = [-0.4, 0.3, 0.0]
+axis = [0.0, 1.0, 0.0]
+mass = 1.0
+shape = {{ kind = "box", size = [0.1, 0.1, 0.1] }}
+
+[[solids]]
+name = "arm"
+parent = "shoulder"
+position = [0.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+mass = 2.0
+centre_of_mass = [0.3, 0.0, 0.0]
+inertia = [0.01, 0.1, 0.1, 0.0, 0.0, 0.0]
+shape = {{ kind = "box", size = [0.1, 0.1, 0.1] }}
+
+[[solids]]
+name = "tip"
+parent = "arm"
+position = [0.6, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+mass = 3.0
+{last}
+"#
+    );
+    Model::from_description(ModelDescription::from_toml(&text).unwrap()).unwrap()
+}
+
+/// The tips that an arm may have.
+pub fn tips() -> [&'static str; 3] {
+    [
+        "shape = { kind = \"box\", size = [0.2, 0.1, 0.3] }\ncollides = true",
+        "shape = { kind = \"sphere\", radius = 0.1 }\ncollides = true",
+        "shape = { kind = \"disc\", radius = 0.15 }\n[[wheels]]\nname = \"W\"\nsolid = \"tip\"\naxle = [0.0, 0.0, 1.0]\nradius = 0.15\ntorque_limit = 1.0\ndrive_sign = 1.0",
+    ]
+}
+
+/// Deepest gap between two bodies now, m: 0 where none overlap.
+pub fn overlap(simulation: &Simulation) -> f64 {
+    let (model, kinematics) = (simulation.model(), simulation.kinematics());
+    let at_rest = vec![0.0; model.nv()];
+    let mut found = Vec::new();
+    let mut search = PairSearch::new(model);
+    let touching = Activation::default();
+    detect_pairs(
+        model,
+        &kinematics,
+        &at_rest,
+        &touching,
+        &mut search,
+        &mut found,
+    );
+    found
+        .iter()
+        .fold(0.0, |deepest, contact| deepest.min(contact.gap))
+}
+
+/// A simulation on flat ground that begins at rest, its base's centre at a height.
+pub fn at_rest(model: Model, height: f64, joints: &[f64], variant: Variant) -> Simulation {
+    let mut start = Configuration::zero(&model);
+    start.position.y = height;
+    start.joints.copy_from_slice(joints);
+    let options = StepOptions {
+        variant,
+        ..StepOptions::default()
+    };
+    let v = vec![0.0; model.nv()];
+    let model = Arc::new(model);
+    let mut simulation = Simulation::new(model, Arc::new(Plane::ground()), options).unwrap();
+    simulation.set_state(start, v);
+    simulation
+}
