@@ -10,15 +10,6 @@ use super::jacobian::{Columns, columns, columns_of_other, relative_velocity};
 use super::pair::Contact;
 use crate::multibody::{BASE, FactoredMassMatrix, Kinematics, Model};
 
-/// Where the rows of a contact are.
-#[derive(Clone, Copy, Debug)]
-enum Rows {
-    /// In `Z`, along the path of a body: a contact with the ground.
-    Path(usize),
-    /// From here to there in `unions`: a contact of two bodies.
-    Union(usize, usize),
-}
-
 /// The contacts of a step in matrix form. Scratch: grows to what was needed most, then reuses it.
 #[derive(Clone, Debug, Default)]
 pub struct ContactSystem {
@@ -29,7 +20,10 @@ pub struct ContactSystem {
     /// Z along each path: `Z[c * stride + k]` belongs to the k-th velocity of the path of contact c.
     Z: Vec<Columns>,
     stride: usize,
-    rows: Vec<Rows>,
+    /// Body of each contact.
+    bodies: Vec<usize>,
+    /// From where to where in `unions` a contact of two bodies has its rows; nothing of one with the ground. Empty where there is none of two.
+    spans: Vec<Range<usize>>,
     /// Velocities along the unions of two paths, ascending, and Z there.
     unions: Vec<(usize, Columns)>,
     /// One column a velocity (nv), while a union is made.
@@ -47,7 +41,8 @@ impl ContactSystem {
             u: Vec::with_capacity(3 * n),
             Z: Vec::with_capacity(n * model.path_stride()),
             stride: model.path_stride(),
-            rows: Vec::with_capacity(n),
+            bodies: Vec::with_capacity(n),
+            spans: Vec::new(),
             unions: Vec::new(),
             full: Vec::new(),
             path_rows: Vec::new(),
@@ -57,7 +52,7 @@ impl ContactSystem {
     /// Number of contacts.
     #[must_use]
     pub fn n_contacts(&self) -> usize {
-        self.rows.len()
+        self.bodies.len()
     }
 
     /// Builds Z, W and `u = Hᵀ v` at the poses of `kinematics`.
@@ -70,7 +65,9 @@ impl ContactSystem {
         v: &[f64],
     ) {
         let (n, w) = (contacts.len(), self.stride);
-        self.rows.clear();
+        self.bodies.clear();
+        self.bodies.extend(contacts.iter().map(|c| c.body));
+        self.spans.clear();
         self.unions.clear();
         self.Z.resize(n * w, [0.0; 4]);
         self.u.resize(3 * n, 0.0);
@@ -79,6 +76,9 @@ impl ContactSystem {
             if let Some(other) = contact.other {
                 let u = self.unite(model, kinematics, factor, contact, other.body, v);
                 self.u[3 * c..][..3].copy_from_slice(&u[..3]);
+                self.spans.resize(n, 0..0);
+                let begin = self.spans[..c].iter().map(|span| span.end).max();
+                self.spans[c] = begin.unwrap_or(0)..self.unions.len();
                 continue;
             }
             let path = model.path(contact.body);
@@ -87,7 +87,6 @@ impl ContactSystem {
             let u = path_product(model.split_path(contact.body), rows, v);
             self.u[3 * c..][..3].copy_from_slice(&u[..3]);
             factor.half_solve_path(path, rows);
-            self.rows.push(Rows::Path(contact.body));
         }
         let size = 3 * n;
         for c in 0..n {
@@ -152,7 +151,6 @@ impl ContactSystem {
         for (k, z) in &mut self.unions[begin..] {
             *z = self.full[*k];
         }
-        self.rows.push(Rows::Union(begin, self.unions.len()));
         u
     }
 
@@ -166,8 +164,8 @@ impl ContactSystem {
                 add(sums, *factor, y);
             }
         };
-        if let (Rows::Path(a), Rows::Path(b)) = (self.rows[c], self.rows[d]) {
-            let shared = model.common_path(a, b);
+        if self.union(c).is_empty() && self.union(d).is_empty() {
+            let shared = model.common_path(self.bodies[c], self.bodies[d]);
             let (a, b) = (
                 &self.Z[c * self.stride..][..shared],
                 &self.Z[d * self.stride..][..shared],
@@ -187,15 +185,27 @@ impl ContactSystem {
         block
     }
 
+    /// Rows of a contact of two bodies; nothing of one with the ground.
+    #[inline]
+    fn union(&self, c: usize) -> &[(usize, Columns)] {
+        if self.spans.is_empty() {
+            &[]
+        } else {
+            &self.unions[self.spans[c].clone()]
+        }
+    }
+
     /// Velocities of a contact, ascending, and its Z there.
     fn entries<'a>(
         &'a self,
         model: &'a Model,
         c: usize,
     ) -> impl Iterator<Item = (usize, &'a Columns)> {
-        let (path, unions): (&[usize], &[(usize, Columns)]) = match self.rows[c] {
-            Rows::Path(body) => (model.path(body), &[]),
-            Rows::Union(begin, end) => (&[], &self.unions[begin..end]),
+        let unions = self.union(c);
+        let path = if unions.is_empty() {
+            model.path(self.bodies[c])
+        } else {
+            &[]
         };
         let along_path = path.iter().copied().zip(&self.Z[c * self.stride..]);
         along_path.chain(unions.iter().map(|(k, z)| (*k, z)))
@@ -204,18 +214,16 @@ impl ContactSystem {
     /// `out = Zᵀ y` (3 n_c): what a velocity change `y` in factor coordinates does at the contacts.
     pub fn local(&self, model: &Model, y: &[f64], out: &mut [f64]) {
         for (c, values) in out.chunks_exact_mut(3).enumerate() {
-            let u = match self.rows[c] {
-                Rows::Path(body) => {
-                    let path = model.split_path(body);
-                    path_product(path, &self.Z[c * self.stride..], y)
+            let union = self.union(c);
+            let u = if union.is_empty() {
+                let path = model.split_path(self.bodies[c]);
+                path_product(path, &self.Z[c * self.stride..], y)
+            } else {
+                let mut u = [0.0; 4];
+                for (k, z) in union {
+                    add(&mut u, y[*k], z);
                 }
-                Rows::Union(begin, end) => {
-                    let mut u = [0.0; 4];
-                    for (k, z) in &self.unions[begin..end] {
-                        add(&mut u, y[*k], z);
-                    }
-                    u
-                }
+                u
             };
             values.copy_from_slice(&u[..3]);
         }
@@ -242,16 +250,14 @@ impl ContactSystem {
     pub fn add_impulses(&self, model: &Model, p: &[f64], y: &mut [f64]) {
         for (c, p) in p.chunks_exact(3).enumerate() {
             let product = |z: &Columns| z[0] * p[0] + z[1] * p[1] + z[2] * p[2];
-            let body = match self.rows[c] {
-                Rows::Path(body) => body,
-                Rows::Union(begin, end) => {
-                    for (k, z) in &self.unions[begin..end] {
-                        y[*k] += product(z);
-                    }
-                    continue;
+            let union = self.union(c);
+            if !union.is_empty() {
+                for (k, z) in union {
+                    y[*k] += product(z);
                 }
-            };
-            let (lead, rest) = model.split_path(body);
+                continue;
+            }
+            let (lead, rest) = model.split_path(self.bodies[c]);
             let (Z_lead, Z_rest) = self.Z[c * self.stride..].split_at(lead.len());
             if let (Some(y), Some(Z)) = (
                 y[lead].first_chunk_mut::<BASE>(),
