@@ -265,7 +265,7 @@ class RoverModel:
         """Total mass, kg."""
     @property
     def dof_names(self) -> list[str]:
-        """Names of the coordinates: x, y, z, roll, heading, pitch, then the joints."""
+        """Names of the coordinates, x, y, z, roll, heading, pitch, then the joints."""
     @property
     def joint_names(self) -> list[str]:
         """Names of the joints that are not locked, in the order of q."""
@@ -307,7 +307,7 @@ class RoverModel:
             StateError: `q` has a wrong length or an entry that is not finite.
             OptionError: `coordinates` is neither of the two.
 
-        Source: [F] ch. 6.
+        Source: Featherstone 2008, ch. 6.
         """
     def bias(
         self,
@@ -332,7 +332,7 @@ class RoverModel:
             OptionError: `gravity` is not three finite numbers, or `coordinates` is neither of the
                 two.
 
-        Source: [F] ch. 5.
+        Source: Featherstone 2008, ch. 5.
         """
     def actuation_matrix(self) -> _Array:
         """The matrix that maps wheel torques and steering torques to generalized forces.
@@ -542,7 +542,7 @@ class SphereField:
 
         50 x 25 spheres of radius 0.5 m, without a plane.
 
-        Source: [R].
+        Source: Yang 2010, Fig. 6.6.
         """
     @staticmethod
     def rocks(
@@ -576,7 +576,7 @@ class SphereField:
         Raises:
             TerrainError: An argument is out of its range.
 
-        Source: [GR].
+        Source: Golombek and Rapp 1997.
         """
     @property
     def centres(self) -> _Array:
@@ -608,7 +608,7 @@ class StepReport:
 
     @property
     def status(self) -> Literal["converged", "not_converged"]:
-        """How the steps ended: "converged" or "not_converged".
+        """Whether the steps "converged" or "not_converged".
 
         "converged" means that the contact solver met its tolerance in every step.
         """
@@ -810,7 +810,7 @@ class Simulation:
         """
     @property
     def rotation(self) -> _Array:
-        """Rotation matrix R_WB, (3, 3): from coordinates in the trunk to coordinates in the world."""
+        """Rotation matrix R_WB, (3, 3), from coordinates in the trunk to coordinates in the world."""
     def set_state(
         self, q: npt.ArrayLike, qdot: npt.ArrayLike | None = None, *, coordinates: _Coordinates = "state"
     ) -> None:
@@ -1232,7 +1232,7 @@ class PlanarContacts:
 
     @property
     def discs(self) -> npt.NDArray[np.int64]:
-        """Indices of the discs that touch, (n,): 0 is the ball or wheel A, 1 wheel B."""
+        """Indices of the discs that touch, (n,); 0 is the ball or wheel A, 1 wheel B."""
     @property
     def points(self) -> _Array:
         """Points of the ground, world frame, (n, 2), m."""
@@ -1292,7 +1292,7 @@ class PlanarSimulation:
         """Time step, s."""
     @property
     def q(self) -> _Array:
-        """Coordinates, (nv,): x and y, m, then angles, rad, which turn to the left."""
+        """Coordinates, (nv,), x and y, m, then angles, rad, which turn to the left."""
     @property
     def v(self) -> _Array:
         """Rates of the coordinates, (nv,), m/s and rad/s."""
@@ -1570,7 +1570,7 @@ class SoilContacts:
 
     @property
     def bodies(self) -> npt.NDArray[np.int64]:
-        """Numbers of both bodies, (n, 2): disks from 0, then the wheels; -1 for a wall or the ground."""
+        """Numbers of both bodies, (n, 2), disks from 0, then the wheels; -1 for a wall or the ground."""
     @property
     def points(self) -> npt.NDArray[np.float64]:
         """Points of the first body's rim, (n, 2), m."""
@@ -1613,6 +1613,9 @@ class SoilSnapshot:
         """
     def to_bytes(self) -> bytes:
         """The snapshot as bytes, as `from_bytes` reads them."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __reduce__(self) -> Any: ...
 
 @final
 class SoilSimulation:
@@ -1862,7 +1865,7 @@ class SolverReport:
 
     @property
     def status(self) -> Literal["converged", "relaxed", "not_converged", "budget_exhausted"]:
-        """How it ended: "converged", "relaxed", "not_converged" or "budget_exhausted".
+        """One of "converged", "relaxed", "not_converged" and "budget_exhausted".
 
         "relaxed": the convex relaxation is solved, which is not Coulomb's law. "budget_exhausted":
         the work that `budget` allows is done, and the answer is the best one found.
@@ -1902,10 +1905,10 @@ class SolverReport:
         """Name of the stage that answered; "at_rest" where q = 0 left nothing to do."""
     @property
     def stages(self) -> list[tuple[str, str, int]]:
-        """Every stage that was tried, in order: name, why it ended and its iterations.
+        """Every stage that was tried, in order, with the reason for its end and its iterations.
 
-        The reasons are "converged", "max_iterations", "stalled", "budget_exhausted", "non_finite"
-        and "relaxed".
+        Reasons are "converged", "max_iterations", "stalled", "budget_exhausted", "non_finite" and
+        "relaxed".
         """
     @property
     def work(self) -> int:
@@ -1984,5 +1987,5 @@ def solve_friction_contact(
         OptionError: The solver or the dimension is unknown, or `tolerance`, `max_iterations` or
             `budget` is out of its range.
 
-    Source: [AB], [A].
+    Source: Acary and Brogliato 2008; Acary, Brémond and Huber 2018.
     """

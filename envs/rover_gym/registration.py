@@ -4,8 +4,7 @@ from collections.abc import Mapping
 
 import gymnasium as gym
 
-#: Steps until truncation: 60 s at the default control frequency of 20 Hz.
-MAX_EPISODE_STEPS = 1200
+from rover_gym.env.task import MAX_EPISODE_STEPS
 
 #: One class, by name and arguments.
 ENVIRONMENTS: Mapping[str, Mapping[str, str]] = {"Rover-v0": {}, "RoverRocks-v0": {"terrain": "sphere_field"}}

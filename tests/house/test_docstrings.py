@@ -94,6 +94,8 @@ def test_everything_public_says_what_it_is(name: str) -> None:
     assert doc, "has no docstring"
     first = doc.splitlines()[0]
     assert re.fullmatch(r"[A-Z`].*\.", first), f"does not begin with a sentence of one line: {first!r}"
+    if inspect.isdatadescriptor(runtime(name)):
+        assert ": " not in first, "the documentation takes what stands before a colon for the property's type"
 
 
 @pytest.mark.parametrize("name", CALLED)

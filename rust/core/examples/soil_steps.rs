@@ -9,10 +9,9 @@ use std::error::Error;
 use std::sync::Arc;
 
 use rover_core::nalgebra::{Vector2, Vector3};
-use rover_core::planar::soil::{
-    Packing, SleepOptions, SoilFriction, SoilScene, SoilSimulation, Wall, soil_options,
-};
+use rover_core::planar::soil::{Packing, SleepOptions, SoilFriction, SoilScene, Wall};
 use rover_core::planar::{PlanarWheel, TwoWheelRover};
+use rover_core::simulation::{SoilSimulation, soil_options};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().collect();

@@ -6,7 +6,7 @@ use rover_core::integrator::Accuracy;
 
 use crate::arguments::{number, refused};
 use crate::errors::Kind;
-use crate::simulation::{VARIANTS, name_of};
+use crate::options::{VARIANTS, name_of};
 
 const PRESETS: [(&str, Accuracy); 3] = [
     ("fast", Accuracy::FAST),

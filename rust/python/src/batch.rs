@@ -3,7 +3,7 @@
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::simulation::{Batch, Simulation as CoreSimulation};
+use rover_core::simulation::{Batch, RoverSimulation as CoreSimulation};
 
 use crate::arguments::{Given, count, flags, refused};
 use crate::arrays::array;
@@ -26,7 +26,7 @@ use crate::simulation::{Origin, Simulation};
 /// Raises:
 ///     OptionError: There are no simulations or their models differ in size, `scan` has a wrong
 ///         shape, or `threads` is out of its range.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct SimulationBatch(Shared<Inner>);
 
 struct Inner {

@@ -13,7 +13,7 @@ use crate::arrays::{array, fresh, vector};
 use crate::errors::{BorderError, Kind, Value};
 
 /// How the contact solver ended.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 #[derive(Clone)]
 pub struct SolverReport {
     inner: SolveReport,
@@ -21,7 +21,7 @@ pub struct SolverReport {
 
 #[pymethods]
 impl SolverReport {
-    /// How it ended: "converged", "relaxed", "not_converged" or "budget_exhausted".
+    /// One of "converged", "relaxed", "not_converged" and "budget_exhausted".
     ///
     /// "relaxed": the convex relaxation is solved, which is not Coulomb's law. "budget_exhausted":
     /// the work that `budget` allows is done, and the answer is the best one found.
@@ -71,10 +71,10 @@ impl SolverReport {
         self.inner.stage.name()
     }
 
-    /// Every stage that was tried, in order: name, why it ended and its iterations.
+    /// Every stage that was tried, in order, with the reason for its end and its iterations.
     ///
-    /// The reasons are "converged", "max_iterations", "stalled", "budget_exhausted", "non_finite"
-    /// and "relaxed".
+    /// Reasons are "converged", "max_iterations", "stalled", "budget_exhausted", "non_finite" and
+    /// "relaxed".
     #[getter]
     fn stages(&self) -> Vec<(&'static str, &'static str, usize)> {
         let rungs = self.inner.rungs.as_slice().iter();
@@ -110,7 +110,7 @@ impl SolverReport {
 }
 
 /// The solution of a friction-contact problem.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct FrictionContactSolution {
     p: Vec<f64>,
     u: Vec<f64>,
@@ -278,7 +278,7 @@ fn problem_error(field: &str, message: String, value: Value) -> BorderError {
 ///     OptionError: The solver or the dimension is unknown, or `tolerance`, `max_iterations` or
 ///         `budget` is out of its range.
 ///
-/// Source: [AB], [A].
+/// Source: Acary and Brogliato 2008; Acary, Brémond and Huber 2018.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
 #[pyo3(signature = (

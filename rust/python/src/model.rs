@@ -32,7 +32,7 @@ pub type Pair<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 /// Methods that take coordinates understand two sets of them, by the argument `coordinates`:
 /// "state", the `q` and `v` of `Simulation`, and "report", the Cardan angles of the 2010 report and
 /// their rates.
-#[pyclass(module = "rover_gym._core", frozen, from_py_object)]
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct RoverModel {
     pub inner: Arc<Model>,
@@ -419,7 +419,7 @@ impl RoverModel {
         self.inner.mass()
     }
 
-    /// Names of the coordinates: x, y, z, roll, heading, pitch, then the joints.
+    /// Names of the coordinates, x, y, z, roll, heading, pitch, then the joints.
     #[getter]
     fn dof_names(&self) -> Vec<String> {
         let base = ["x", "y", "z", "roll", "heading", "pitch"].map(str::to_owned);
@@ -511,7 +511,7 @@ impl RoverModel {
     ///     StateError: `q` has a wrong length or an entry that is not finite.
     ///     OptionError: `coordinates` is neither of the two.
     ///
-    /// Source: [F] ch. 6.
+    /// Source: Featherstone 2008, ch. 6.
     #[pyo3(signature = (q, coordinates = Given::MISSING), text_signature = "($self, q, coordinates='state')")]
     fn mass_matrix<'py>(
         &self,
@@ -546,7 +546,7 @@ impl RoverModel {
     ///     OptionError: `gravity` is not three finite numbers, or `coordinates` is neither of the
     ///         two.
     ///
-    /// Source: [F] ch. 5.
+    /// Source: Featherstone 2008, ch. 5.
     #[pyo3(signature = (q, qdot, gravity = None, coordinates = Given::MISSING), text_signature = "($self, q, qdot, gravity=None, coordinates='state')")]
     fn bias<'py>(
         &self,

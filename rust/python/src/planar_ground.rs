@@ -61,7 +61,7 @@ fn heights<'py>(ground: &dyn Ground, x: &Bound<'py, PyAny>) -> PyResult<Bound<'p
 ///
 /// Raises:
 ///     TerrainError: A number is not finite, the slope is beyond 1000 or the offset beyond 1e6 m.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Line {
     inner: CoreLine,
 }
@@ -125,7 +125,7 @@ impl Line {
 /// Raises:
 ///     TerrainError: A number is not finite, the wavelength is below 1e-3 m, or the slope 2 pi
 ///         amplitude / wavelength is beyond 1000.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Sine {
     inner: CoreSine,
 }
@@ -214,7 +214,7 @@ impl Sine {
 /// Raises:
 ///     TerrainError: There are fewer than two points or more than 2 000 000, the lengths differ, an
 ///         entry is not finite or beyond 1e6 m, or x does not increase.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Spline {
     inner: CoreSpline,
 }
@@ -282,7 +282,7 @@ impl Spline {
 /// Raises:
 ///     TerrainError: There are fewer than two points or more than 2 000 000, the lengths differ, an
 ///         entry is not finite or beyond 1e6 m, x decreases, or a point is given twice.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Polyline {
     inner: CorePolyline,
 }

@@ -2,25 +2,28 @@
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict};
+use pyo3::types::PyDict;
 use rover_core::integrator::Stabilisation;
 use rover_core::nalgebra::Vector2;
+use rover_core::planar::Ground;
 use rover_core::planar::soil::{
-    Disks, Machine, Packing, SleepOptions, SoilActiveContact, SoilError, SoilFriction, SoilScene,
-    SoilSetupError, SoilSimulation as Core, SoilSnapshot as CoreSnapshot, Wall, WheelRig,
-    soil_options,
+    Disks, Machine, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, Wall, WheelRig,
 };
-use rover_core::planar::{Ground, PlanarWheel, TwoWheelRover};
+use rover_core::simulation::{SoilSetupError, SoilSimulation as Core, soil_options};
 use std::sync::{Arc, MutexGuard};
 
-use crate::arguments::{Given, flags, number, text};
+use crate::arguments::{Given, flags, text};
 use crate::arrays::{array, fresh, fresh_rows, vector};
+use crate::contacts::SoilContacts;
 use crate::errors::{BorderError, Kind, Value};
-use crate::planar::{one_or_two, pair};
+use crate::options::{STABILISATIONS, choice, name_of};
+use crate::planar::pair;
 use crate::planar_ground::{border, parse};
-use crate::shared::{Shared, Watch};
-use crate::simulation::{Energy, STABILISATIONS, StepReport, choice, name_of};
-use crate::snapshot::{belonging, damaged, read};
+use crate::planar_machines::two_wheel_rover;
+use crate::report::{Energy, StepReport};
+use crate::shared::Shared;
+use crate::snapshot::{SoilSnapshot, belonging};
+use crate::stepping::step;
 
 /// Radii, masses and centres of a packing.
 type Packed<'py> = (
@@ -80,164 +83,6 @@ fn rows(value: &Bound<'_, PyAny>, kind: Kind, field: &str, width: usize) -> PyRe
     Ok(view.iter().copied().collect())
 }
 
-/// Two numbers out of a mapping, or one for both.
-fn both(given: &Bound<'_, PyDict>, field: &str, default: [f64; 2]) -> PyResult<[f64; 2]> {
-    match given.get_item(field)? {
-        None => Ok(default),
-        Some(value) => one_or_two(&value, field),
-    }
-}
-
-/// The two-wheel rover of the keyword arguments that `TwoWheelRoverSimulation` takes.
-fn rover(given: &Bound<'_, PyDict>) -> PyResult<TwoWheelRover> {
-    let optional = |field: &str| -> PyResult<Option<f64>> {
-        given
-            .get_item(field)?
-            .map(|x| number(&x, Kind::Model, field))
-            .transpose()
-    };
-    let masses = both(given, "wheel_mass", [60.0; 2])?;
-    let radii = both(given, "wheel_radius", [0.2; 2])?;
-    let of_disc = |i: usize| 0.5 * masses[i] * radii[i] * radii[i];
-    let inertias = both(given, "wheel_inertia", [of_disc(0), of_disc(1)])?;
-    let axles = [
-        both(given, "axle_a", [-0.4, 0.0])?,
-        both(given, "axle_b", [0.4, 0.0])?,
-    ]
-    .map(Vector2::from);
-    let mass = optional("mass")?.unwrap_or(130.0);
-    let rod = mass * (axles[1] - axles[0]).norm_squared() / 12.0;
-    let wheel = |i: usize| PlanarWheel {
-        mass: masses[i],
-        radius: radii[i],
-        inertia: inertias[i],
-        axle: axles[i],
-    };
-    let inertia = optional("inertia")?.unwrap_or(rod);
-    let made = TwoWheelRover::new(mass, inertia, wheel(0), wheel(1));
-    Ok(made.map_err(|e| border(Kind::Model, &e))?)
-}
-
-/// The contacts of a soil's last step, as new arrays with one row a contact.
-///
-/// Contacts between sleeping disks are left out.
-#[pyclass(module = "rover_gym._core", frozen)]
-pub struct SoilContacts {
-    active: Vec<SoilActiveContact>,
-    /// Number of disks and of disks with wheels.
-    counts: [usize; 2],
-}
-
-impl SoilContacts {
-    fn rows<'py>(
-        &self,
-        py: Python<'py>,
-        f: impl Fn(&SoilActiveContact) -> [f64; 2],
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        fresh_rows(py, &self.active.iter().map(f).collect::<Vec<_>>())
-    }
-}
-
-#[pymethods]
-impl SoilContacts {
-    /// Numbers of both bodies, (n, 2): disks from 0, then the wheels; -1 for a wall or the ground.
-    #[getter]
-    fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let name = |body: u32| {
-            let is_fixed = body as usize >= self.counts[1];
-            if is_fixed { -1 } else { i64::from(body) }
-        };
-        let keys = self.active.iter().map(|a| a.contact.key);
-        let flat = PyArray1::from_iter(py, keys.flat_map(|k| [name(k.a), name(k.b)]));
-        flat.call_method1("reshape", (self.active.len(), 2))
-    }
-
-    /// Points of the first body's rim, (n, 2), m.
-    #[getter]
-    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.contact.point.into())
-    }
-
-    /// Unit normals from the second body into the first, (n, 2).
-    #[getter]
-    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.contact.n.into())
-    }
-
-    /// Gaps at the start of the step, (n,), m; negative where bodies overlap.
-    #[getter]
-    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_iter(py, self.active.iter().map(|a| a.contact.gap_start))
-    }
-
-    /// Impulses on the first body along the normal and the tangent (n_y, -n_x), (n, 2), N s.
-    #[getter]
-    fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.impulse)
-    }
-
-    /// Relative velocities after the step along normal and tangent, (n, 2), m/s.
-    ///
-    /// Of the first body against the second.
-    #[getter]
-    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.velocity)
-    }
-
-    /// Impulses on the first body along x and y, (n, 2), N s.
-    #[getter]
-    fn world_impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| {
-            (a.contact.n * a.impulse[0] + a.contact.t() * a.impulse[1]).into()
-        })
-    }
-
-    fn __len__(&self) -> usize {
-        self.active.len()
-    }
-
-    fn __repr__(&self) -> String {
-        format!("SoilContacts({})", self.active.len())
-    }
-}
-
-/// Everything that a soil needs to continue bit for bit. Picklable.
-#[pyclass(module = "rover_gym._core", frozen)]
-pub struct SoilSnapshot {
-    inner: CoreSnapshot,
-}
-
-#[pymethods]
-impl SoilSnapshot {
-    /// Reads a snapshot.
-    ///
-    /// Args:
-    ///     data: What `to_bytes` returned.
-    ///
-    /// Returns:
-    ///     The snapshot.
-    ///
-    /// Raises:
-    ///     StateError: The bytes are not those of a snapshot.
-    #[staticmethod]
-    fn from_bytes(data: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(Self { inner: read(data)? })
-    }
-
-    /// The snapshot as bytes, as `from_bytes` reads them.
-    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let bytes = postcard::to_stdvec(&self.inner).map_err(|e| damaged(&e))?;
-        Ok(PyBytes::new(py, &bytes))
-    }
-
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
-        let bytes = slf.get().to_bytes(slf.py())?;
-        Ok((slf.get_type().getattr("from_bytes")?, (bytes,)))
-    }
-}
-
 /// A granular soil of disks, and a machine that drives on it.
 ///
 /// The disks are free, with friction, between walls or on a ground.
@@ -285,7 +130,7 @@ impl SoilSnapshot {
 ///         wheels overlap.
 ///     TerrainError: A wall has no direction, or `ground` is not a ground.
 ///     OptionError: An option is out of its range, or both `rover` and `rig` are given.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct SoilSimulation {
     inner: Shared<Core>,
 }
@@ -302,7 +147,7 @@ impl SoilSimulation {
 }
 
 fn n_disks(inner: &Core) -> usize {
-    inner.scene().disks.len()
+    inner.soil().disks.len()
 }
 
 /// Positions with an angle where none was given.
@@ -431,7 +276,7 @@ impl SoilSimulation {
         let ground: Option<Arc<dyn Ground>> = ground.map(parse).transpose()?;
         let rover = rover.object::<Bound<'_, PyDict>>(Kind::Model, "rover", "a dict")?;
         let who: Option<Arc<Machine>> = match (&rover, rig) {
-            (Some(given), None) => Some(Arc::new(self::rover(given)?)),
+            (Some(given), None) => Some(Arc::new(two_wheel_rover(&given.copy()?)?)),
             (None, Some(given)) => {
                 let given = pair(given, Kind::Model, "rig")?;
                 let rig = WheelRig::new(given.x, given.y);
@@ -476,29 +321,25 @@ impl SoilSimulation {
     /// Time since the last call of `set_state`, s.
     #[getter]
     fn time(&self) -> PyResult<f64> {
-        let inner = self.open()?;
-        Ok(inner.time())
+        Ok(self.open()?.time())
     }
 
     /// Time step, s.
     #[getter]
     fn time_step(&self) -> PyResult<f64> {
-        let inner = self.open()?;
-        Ok(inner.options().time_step)
+        Ok(self.open()?.options().time_step)
     }
 
     /// Radii of the disks, (n,), m.
     #[getter]
     fn radius<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let inner = self.open()?;
-        Ok(fresh(py, inner.scene().disks.radius()))
+        Ok(fresh(py, self.open()?.soil().disks.radius()))
     }
 
     /// Masses of the disks, (n,), kg.
     #[getter]
     fn mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let inner = self.open()?;
-        Ok(fresh(py, inner.scene().disks.mass()))
+        Ok(fresh(py, self.open()?.soil().disks.mass()))
     }
 
     /// Centres and angles of the disks, (n, 3), m and rad.
@@ -518,15 +359,16 @@ impl SoilSimulation {
     /// Which disks are kinematic, (n,).
     #[getter]
     fn kinematic<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let inner = self.open()?;
-        Ok(PyArray1::from_slice(py, inner.scene().disks.kinematic()))
+        Ok(PyArray1::from_slice(
+            py,
+            self.open()?.soil().disks.kinematic(),
+        ))
     }
 
     /// Which disks sleep, (n,); kinematic ones always do.
     #[getter]
     fn asleep<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let inner = self.open()?;
-        Ok(PyArray1::from_slice(py, inner.asleep()))
+        Ok(PyArray1::from_slice(py, self.open()?.asleep()))
     }
 
     /// Coordinates of the machine, (5,), m and rad; empty without one.
@@ -547,7 +389,7 @@ impl SoilSimulation {
     #[getter]
     fn wheels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let inner = self.open()?;
-        let Some(machine) = &inner.scene().machine else {
+        let Some(machine) = &inner.soil().machine else {
             return fresh_rows::<3>(py, &[]);
         };
         let own = &inner.q()[3 * n_disks(&inner)..];
@@ -562,15 +404,14 @@ impl SoilSimulation {
     /// Commanded torques of the rover's wheels, (2,), N m, positive forward; empty without a rover.
     #[getter]
     fn torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let inner = self.open()?;
-        Ok(fresh(py, inner.inputs()))
+        Ok(fresh(py, &self.open()?.command().torques))
     }
 
     /// Force at the machine's centre, (2,), N.
     #[getter]
     fn pull(&self) -> PyResult<(f64, f64)> {
         let inner = self.open()?;
-        let pull = inner.pull();
+        let pull = inner.command().pull;
         Ok((pull.x, pull.y))
     }
 
@@ -578,7 +419,7 @@ impl SoilSimulation {
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let inner = self.open()?;
-        let (o, friction) = (inner.options(), &inner.scene().friction);
+        let (o, friction) = (inner.options(), &inner.soil().friction);
         let settings = PyDict::new(py);
         settings.set_item("friction", friction.disks)?;
         settings.set_item("wall_friction", friction.walls)?;
@@ -689,54 +530,45 @@ impl SoilSimulation {
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
     fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
         let steps = n.count(1, Kind::Option, "n")?;
-        let mut held = self.open()?;
-        let (inner, mut watch) = (&mut *held, Watch::new());
-        let report = py.detach(|| inner.step_while(steps, &mut || watch.go_on()));
-        Ok(watch.result(report)?.into())
+        step(py, &mut *self.open()?, steps)
     }
 
     /// The contacts of the last step.
     #[getter]
     fn contacts(&self) -> PyResult<SoilContacts> {
         let inner = self.open()?;
-        let n = n_disks(&inner);
-        let wheels = inner.scene().machine.as_ref().map_or(0, |m| m.n_discs());
-        Ok(SoilContacts {
-            active: inner.contacts().collect(),
-            counts: [n, n + wheels],
-        })
+        let wheels = inner.soil().machine.as_ref().map_or(0, |m| m.n_discs());
+        Ok(SoilContacts::new(
+            inner.contacts(),
+            n_disks(&inner) + wheels,
+        ))
     }
 
     /// Kinetic and potential energy now.
     fn energy(&self) -> PyResult<Energy> {
-        let inner = self.open()?;
-        Ok(inner.energy().into())
+        Ok(self.open()?.energy().into())
     }
 
     /// Momentum of the disks, (3,): along x and y, kg m/s, and about the origin, kg m²/s.
     ///
     /// Kinematic disks do not count.
     fn momentum<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let inner = self.open()?;
-        Ok(fresh(py, &inner.momentum()))
+        Ok(fresh(py, &self.open()?.momentum()))
     }
 
     /// Sum of the last step's contact impulses on the wheels, along x and y, (2,), N s.
     fn impulse_on_wheels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let inner = self.open()?;
-        Ok(fresh(py, &inner.impulse_on_wheels()))
+        Ok(fresh(py, &self.open()?.impulse_on_wheels()))
     }
 
     /// Deepest overlap now, m.
     fn penetration(&self) -> PyResult<f64> {
-        let inner = self.open()?;
-        Ok(inner.penetration())
+        Ok(self.open()?.penetration())
     }
 
     /// Wakes all disks.
     fn wake(&self) -> PyResult<()> {
-        let mut inner = self.open()?;
-        inner.wake();
+        self.open()?.wake();
         Ok(())
     }
 

@@ -23,7 +23,7 @@ type Normal = (f64, f64, f64);
 /// Raises:
 ///     TerrainError: A number is not finite, the normal has no direction, or the offset is beyond
 ///         1e6 m.
-#[pyclass(module = "rover_gym._core", frozen, from_py_object)]
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct Plane {
     pub inner: CorePlane,

@@ -3,158 +3,27 @@
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use rover_core::integrator::{
-    Accuracy, Stabilisation, StepOptions, StepReport as CoreReport, Variant,
-};
-use rover_core::multibody::{Energy as CoreEnergy, Model, coordinates};
+use rover_core::integrator::{Accuracy, StepOptions};
+use rover_core::multibody::{Model, coordinates};
 use rover_core::nalgebra::DMatrix;
-use rover_core::simulation::{Look, ReadingLayout, Simulation as CoreSimulation};
+use rover_core::simulation::{Look, ReadingLayout, RoverSimulation as CoreSimulation};
+use rover_core::solver::SolverOptions;
 use std::sync::{Arc, MutexGuard};
 
 use crate::accuracy;
-use crate::arguments::{Given, number, text, texts};
+use crate::arguments::{Given, number, texts};
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Value};
-use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
+use crate::options::{Options, SolverWords, settings};
 use crate::plane::Plane;
 use crate::reading::{place, scan_points, slices};
+use crate::report::{Energy, StepReport};
 use crate::shared::{Shared, Watch};
 use crate::snapshot::{Snapshot, belonging};
 use crate::sphere_field::Ground;
-
-/// How the steps of one call went: the worst of them, or their sum.
-#[pyclass(module = "rover_gym._core", frozen)]
-pub struct StepReport {
-    inner: CoreReport,
-}
-
-#[pymethods]
-impl StepReport {
-    /// How the steps ended: "converged" or "not_converged".
-    ///
-    /// "converged" means that the contact solver met its tolerance in every step.
-    #[getter]
-    fn status(&self) -> &'static str {
-        if self.inner.is_converged() {
-            "converged"
-        } else {
-            "not_converged"
-        }
-    }
-
-    /// Whether the contact solver met its tolerance in every step.
-    #[getter]
-    fn is_converged(&self) -> bool {
-        self.inner.is_converged()
-    }
-
-    /// Number of steps taken.
-    #[getter]
-    fn steps(&self) -> usize {
-        self.inner.steps
-    }
-
-    /// Iterations of the contact solver, summed over the steps.
-    #[getter]
-    fn iterations(&self) -> usize {
-        self.inner.iterations
-    }
-
-    /// Newton iterations of the scheme, summed over the steps; 0 with the linearised scheme.
-    #[getter]
-    fn newton_iterations(&self) -> usize {
-        self.inner.newton_iterations
-    }
-
-    /// Largest relative residual of a step's contact problem, computed from its impulses.
-    #[getter]
-    fn residual(&self) -> f64 {
-        self.inner.residual
-    }
-
-    /// Largest number of contacts in a step.
-    #[getter]
-    fn n_contacts(&self) -> usize {
-        self.inner.n_contacts
-    }
-
-    /// Number of steps taken again.
-    ///
-    /// A step is taken again when a motor reached its torque-speed line, when the energy audit asks
-    /// for implicit gyroscopic terms, or when Newton's law of restitution had no solution.
-    #[getter]
-    fn retaken(&self) -> usize {
-        self.inner.retaken
-    }
-
-    /// Largest unexplained gain of energy in a step, relative to the kinetic energy.
-    ///
-    /// Unexplained is what exceeds the work of gravity and actuators.
-    #[getter]
-    fn energy_gain(&self) -> f64 {
-        self.inner.energy_gain
-    }
-
-    /// Energy that the scheme would have gained and the audit removed, summed over the steps, J.
-    #[getter]
-    fn energy_removed(&self) -> f64 {
-        self.inner.energy_removed
-    }
-
-    /// Potential energy gained by pushing bodies out of penetration, summed over the steps, J.
-    #[getter]
-    fn energy_lifted(&self) -> f64 {
-        self.inner.energy_lifted
-    }
-
-    fn __repr__(&self) -> String {
-        let r = &self.inner;
-        format!(
-            "StepReport(status={:?}, steps={}, iterations={}, residual={:.3e}, n_contacts={})",
-            self.status(),
-            r.steps,
-            r.iterations,
-            r.residual,
-            r.n_contacts
-        )
-    }
-}
-
-/// Kinetic and potential energy.
-#[pyclass(module = "rover_gym._core", frozen)]
-pub struct Energy {
-    inner: CoreEnergy,
-}
-
-#[pymethods]
-impl Energy {
-    /// Kinetic energy, J.
-    #[getter]
-    fn kinetic(&self) -> f64 {
-        self.inner.kinetic
-    }
-
-    /// Potential energy in gravity, J, zero at the world's origin.
-    #[getter]
-    fn potential(&self) -> f64 {
-        self.inner.potential
-    }
-
-    /// Sum of both, J.
-    #[getter]
-    fn total(&self) -> f64 {
-        self.inner.total()
-    }
-
-    fn __repr__(&self) -> String {
-        format!(
-            "Energy(kinetic={}, potential={})",
-            self.inner.kinetic, self.inner.potential
-        )
-    }
-}
+use crate::stepping::{Problem, problem, step};
 
 /// A rover on a terrain, stepped through time.
 ///
@@ -188,7 +57,7 @@ impl Energy {
 ///     ModelError: `model` is not a RoverModel.
 ///     TerrainError: `terrain` is not a terrain.
 ///     OptionError: An option is out of its range, or is given beside `accuracy`.
-#[pyclass(module = "rover_gym._core", frozen)]
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Simulation {
     inner: Shared<CoreSimulation>,
     model: Arc<Model>,
@@ -200,66 +69,11 @@ pub struct Simulation {
 #[derive(Clone)]
 pub struct Origin {
     terrain: Ground,
-    solver: String,
-    max_iterations: usize,
+    words: SolverWords,
 }
-
-/// W, free velocity and friction coefficients.
-pub type Problem<'py> = (
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-);
 
 fn names(joints: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
     texts(joints, Kind::Command, "joints")
-}
-
-/// The value that a word stands for.
-pub fn choice<T: Copy>(field: &str, given: &str, choices: &[(&str, T)]) -> Result<T, BorderError> {
-    let found = choices
-        .iter()
-        .find(|(name, _)| *name == given)
-        .map(|(_, value)| *value);
-    found.ok_or_else(|| {
-        let known: Vec<String> = choices
-            .iter()
-            .map(|(name, _)| format!("{name:?}"))
-            .collect();
-        let message = format!("{field}: must be one of {}, is {given:?}", known.join(", "));
-        BorderError::option(field, message, Value::Text(given.to_owned()))
-    })
-}
-
-/// Schemes by name.
-pub const VARIANTS: [(&str, Variant); 2] = [
-    ("linearised", Variant::Linearised),
-    ("newton", Variant::Newton),
-];
-/// Stabilisations by name.
-pub const STABILISATIONS: [(&str, Stabilisation); 2] = [
-    ("projection", Stabilisation::Projection),
-    ("none", Stabilisation::None),
-];
-
-/// The word that stands for a value.
-pub fn name_of<T: PartialEq + Copy>(value: T, choices: &[(&'static str, T)]) -> &'static str {
-    choices
-        .iter()
-        .find(|(_, v)| *v == value)
-        .map_or("", |(name, _)| name)
-}
-
-impl From<CoreReport> for StepReport {
-    fn from(inner: CoreReport) -> Self {
-        Self { inner }
-    }
-}
-
-impl From<CoreEnergy> for Energy {
-    fn from(inner: CoreEnergy) -> Self {
-        Self { inner }
-    }
 }
 
 impl Simulation {
@@ -310,17 +124,22 @@ impl Simulation {
         warm_start: Given<'_>,
         accuracy: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let option = Kind::Option;
-        let time_step = time_step.maybe(option, "time_step")?;
-        let tolerance = tolerance.maybe(option, "tolerance")?;
-        let variant = (variant.some())
-            .map(|v| {
-                choice("variant", &text(&v, option, "variant")?, &VARIANTS).map_err(PyErr::from)
-            })
-            .transpose()?;
-        let solver = solver.text("auto", option, "solver")?;
-        let max_iterations = max_iterations.count(1000, option, "max_iterations")?;
-        let stabilisation = stabilisation.text("projection", option, "stabilisation")?;
+        let free = [
+            ("time_step", time_step.some()),
+            ("variant", variant.some()),
+            ("tolerance", tolerance.some()),
+        ];
+        let clash = free.iter().find(|(_, given)| given.is_some());
+        let given = [
+            ("friction", friction.given()),
+            ("restitution", restitution.given()),
+            ("theta", theta.given()),
+            ("forecast", forecast.given()),
+            ("solver", solver.given()),
+            ("max_iterations", max_iterations.given()),
+            ("stabilisation", stabilisation.given()),
+            ("warm_start", warm_start.given()),
+        ];
         let model = model.object::<RoverModel>(Kind::Model, "model", "a RoverModel")?;
         let model = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
         let terrain = match terrain {
@@ -329,44 +148,33 @@ impl Simulation {
             }),
             Some(given) => Ground::parse(given)?,
         };
-        let chosen = match accuracy {
-            None => Accuracy::BALANCED,
-            Some(given) => {
-                let chosen = accuracy::parse(given)?;
-                let clash = [
-                    ("time_step", time_step.is_some()),
-                    ("variant", variant.is_some()),
-                    ("tolerance", tolerance.is_some()),
-                ];
-                if let Some((field, _)) = clash.iter().find(|(_, given)| *given) {
-                    let message =
-                        format!("{field}: accuracy chooses it, so it cannot be given beside");
-                    return Err(BorderError::option(field, message, Value::Nothing).into());
-                }
-                chosen
+        let chosen = match (accuracy, clash) {
+            (None, _) => Accuracy::BALANCED,
+            (Some(given), None) => accuracy::parse(given)?,
+            (Some(_), Some((field, _))) => {
+                let message = format!("{field}: accuracy chooses it, so it cannot be given beside");
+                return Err(BorderError::option(field, message, Value::Nothing).into());
             }
         };
-        let tolerance = tolerance.unwrap_or(chosen.tolerance);
-        let options = StepOptions {
+        let mut options = Options::of(StepOptions {
             gravity: checked_gravity(gravity)?,
-            friction_coefficient: friction.number(0.7, option, "friction")?,
-            restitution: restitution.number(0.0, option, "restitution")?,
-            time_step: time_step.unwrap_or(chosen.time_step),
-            theta: theta.number(0.5, option, "theta")?,
-            forecast: forecast.number(0.5, option, "forecast")?,
-            variant: variant.unwrap_or(chosen.variant),
-            stabilisation: choice("stabilisation", &stabilisation, &STABILISATIONS)?,
-            warm_start: warm_start.flag(true, option, "warm_start")?,
-            solver: solver_options(&solver, tolerance, max_iterations, &SIMULATION_SOLVERS)?,
+            time_step: chosen.time_step,
+            variant: chosen.variant,
+            solver: SolverOptions {
+                tolerance: chosen.tolerance,
+                ..SolverOptions::default()
+            },
             ..StepOptions::default()
-        };
+        });
+        for (field, value) in free.iter().chain(&given) {
+            if let Some(value) = value {
+                options.take(field, value)?;
+            }
+        }
+        let (options, words) = options.finish()?;
         let inner =
             CoreSimulation::new(model, terrain.terrain(), options).map_err(BorderError::from)?;
-        let origin = Origin {
-            terrain,
-            solver,
-            max_iterations,
-        };
+        let origin = Origin { terrain, words };
         Ok(Self::of(inner, origin))
     }
 
@@ -417,21 +225,9 @@ impl Simulation {
     /// The keyword arguments that make a simulation with the same options.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let o = &self.options;
-        let settings = PyDict::new(py);
-        settings.set_item("gravity", (o.gravity.x, o.gravity.y, o.gravity.z))?;
-        settings.set_item("friction", o.friction_coefficient)?;
-        settings.set_item("restitution", o.restitution)?;
-        settings.set_item("time_step", o.time_step)?;
-        settings.set_item("variant", name_of(o.variant, &VARIANTS))?;
-        settings.set_item("theta", o.theta)?;
-        settings.set_item("forecast", o.forecast)?;
-        settings.set_item("solver", &self.origin.solver)?;
-        settings.set_item("tolerance", o.solver.tolerance)?;
-        settings.set_item("max_iterations", self.origin.max_iterations)?;
-        settings.set_item("stabilisation", name_of(o.stabilisation, &STABILISATIONS))?;
-        settings.set_item("warm_start", o.warm_start)?;
-        Ok(settings)
+        let gravity = &self.options.gravity;
+        let gravity = (gravity.x, gravity.y, gravity.z).into_pyobject(py)?;
+        settings(&gravity, &self.options, &self.origin.words)
     }
 
     /// Coordinates, (nq,), m and rad.
@@ -451,7 +247,7 @@ impl Simulation {
         Ok(fresh(py, &self.open()?.state().v))
     }
 
-    /// Rotation matrix R_WB, (3, 3): from coordinates in the trunk to coordinates in the world.
+    /// Rotation matrix R_WB, (3, 3), from coordinates in the trunk to coordinates in the world.
     #[getter]
     fn rotation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let R = self
@@ -671,10 +467,7 @@ impl Simulation {
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
     fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
         let steps = n.count(1, Kind::Option, "n")?;
-        let mut held = self.open()?;
-        let (inner, mut watch) = (&mut *held, Watch::new());
-        let report = py.detach(|| inner.step_while(steps, &mut || watch.go_on()));
-        Ok(watch.result(report)?.into())
+        step(py, &mut *self.open()?, steps)
     }
 
     /// The contacts of the last step.
@@ -844,12 +637,7 @@ impl Simulation {
     ///     Delassus operator W, (3 n_c, 3 n_c), 1/kg; free velocity, (3 n_c,), m/s; friction
     ///     coefficients, (n_c,).
     fn last_problem<'py>(&self, py: Python<'py>) -> PyResult<Problem<'py>> {
-        let held = self.open()?;
-        let (W, q, mu) = held.last_problem();
-        let (n, size) = (mu.len(), 3 * mu.len());
-        let q = if n == 0 { &q[..0] } else { q };
-        let W = DMatrix::from_row_slice(size, size, &W[..size * size]);
-        Ok((fresh_matrix(py, &W)?, fresh(py, q), fresh(py, mu)))
+        problem(py, &*self.open()?)
     }
 
     /// Measures where the time of a step goes, on a copy of this simulation.

@@ -25,7 +25,7 @@ const MAX_FILE: usize = 1 << 28;
 /// Raises:
 ///     TerrainError: An array has a wrong shape, an entry is not finite or out of its range, or
 ///         there are no spheres or too many of them.
-#[pyclass(module = "rover_gym._core", frozen, from_py_object)]
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct SphereField {
     pub inner: Arc<CoreField>,
@@ -215,7 +215,7 @@ impl SphereField {
     ///
     /// 50 x 25 spheres of radius 0.5 m, without a plane.
     ///
-    /// Source: [R].
+    /// Source: Yang 2010, Fig. 6.6.
     #[staticmethod]
     fn rug() -> Self {
         Self {
@@ -243,7 +243,7 @@ impl SphereField {
     /// Raises:
     ///     TerrainError: An argument is out of its range.
     ///
-    /// Source: [GR].
+    /// Source: Golombek and Rapp 1997.
     #[staticmethod]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
     #[pyo3(signature = (abundance, area, seed, *, max_diameter = Given::MISSING, min_diameter = Given::MISSING, burial = None, ground = None,

@@ -6,7 +6,7 @@ use rover_core::contact::{Activation, PairSearch, detect_pairs};
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{Configuration, Model, ModelDescription};
-use rover_core::simulation::Simulation;
+use rover_core::simulation::RoverSimulation;
 
 /// A chassis with an arm of two links over it: the second link, a box, a ball or a wheel, folds down onto the chassis.
 pub fn folding(last: &str) -> Model {
@@ -61,7 +61,7 @@ pub fn tips() -> [&'static str; 3] {
 }
 
 /// Deepest gap between two bodies now, m: 0 where none overlap.
-pub fn overlap(simulation: &Simulation) -> f64 {
+pub fn overlap(simulation: &RoverSimulation) -> f64 {
     let (model, kinematics) = (simulation.model(), simulation.kinematics());
     let at_rest = vec![0.0; model.nv()];
     let mut found = Vec::new();
@@ -81,7 +81,7 @@ pub fn overlap(simulation: &Simulation) -> f64 {
 }
 
 /// A simulation on flat ground that begins at rest, its base's centre at a height.
-pub fn at_rest(model: Model, height: f64, joints: &[f64], variant: Variant) -> Simulation {
+pub fn at_rest(model: Model, height: f64, joints: &[f64], variant: Variant) -> RoverSimulation {
     let mut start = Configuration::zero(&model);
     start.position.y = height;
     start.joints.copy_from_slice(joints);
@@ -91,7 +91,7 @@ pub fn at_rest(model: Model, height: f64, joints: &[f64], variant: Variant) -> S
     };
     let v = vec![0.0; model.nv()];
     let model = Arc::new(model);
-    let mut simulation = Simulation::new(model, Arc::new(Plane::ground()), options).unwrap();
+    let mut simulation = RoverSimulation::new(model, Arc::new(Plane::ground()), options).unwrap();
     simulation.set_state(start, v);
     simulation
 }

@@ -28,4 +28,4 @@ pub(crate) use model::fingerprint;
 pub use model::{BASE, Body, Frame, MAX_SOLIDS, Model, Wheel};
 pub use momentum::{Energy, EnergyScratch, Momentum};
 pub use motor::{DriveTrial, Motor, MotorRegime};
-pub use state::{Configuration, State};
+pub use state::Configuration;

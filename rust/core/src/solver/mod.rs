@@ -14,64 +14,22 @@
 //! [`Method::Auto`] takes few contacts to Newton at once and many to Gauss–Seidel first, and escalates when progress stops.
 //! Every report is computed from the returned impulse, never from inside an iteration.
 
-mod admm;
-mod auto;
-mod block_lu;
-mod dense;
-mod guided;
-mod islands;
-mod methods;
-mod modes;
-mod newton;
-mod nsgs;
-pub mod one_contact;
+mod linear;
+mod local;
 mod options;
-mod pivoting;
-mod proximal;
-mod reduced_system;
+mod reference;
 mod report;
-mod restarts;
+mod scratch;
+mod solve;
 mod stage;
-mod storage;
+mod strategy;
 mod work;
 mod workspace;
 
-pub use methods::{
-    Admm, Automatic, ContactLaw, GaussSeidel, Newton, ProximalPoint, Relaxed, Solver,
-};
-pub use options::{Method, SolverOptions};
+pub use local::one_contact::{OneContactSolution, solve_one_contact};
+pub use options::{ContactLaw, Method, SolverOptions};
 pub use report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
+pub use solve::{solve, solve_many_bodies};
 pub use stage::body_sweeps::{BodySweeps, solve_body_pairs};
+pub use strategy::many_bodies::ManyBodies;
 pub use workspace::SolverWorkspace;
-
-use crate::problem::FrictionContactProblem;
-
-/// Solves `K_μ* ∋ ũ ⊥ p ∈ K_μ`, `u = W p + q`.
-///
-/// `p` (n), N s: in, the warm start or zeros; out, the impulses, inside the friction cones up to the report's residual.
-/// `u` (n), m/s: out, `W p + q` of the returned `p`. `workspace` may have served any other problem before; it influences
-/// no bit of the answer, and allocates only when a problem is larger than all before.
-///
-/// From `p = 0` and few contacts the answer is the one next to zero (Tikhonov's limit), so a symmetric problem has a
-/// symmetric answer and the order of the contacts does not matter; from a warm start it is the one next to the warm start.
-///
-/// Not converged is an answer, see [`SolveStatus`]: then `p` is the best impulse met by any stage. The work is bounded, see
-/// [`SolverOptions::budget`]. Where `q = 0` the answer is zero, whatever the warm start. Data or warm start that are not finite
-/// never come out again: with bad data `p` and `u` are zero and the status is [`SolveStatus::NonFinite`]; a bad warm start
-/// counts as zeros.
-///
-/// # Panics
-/// If `p` or `u` has not the problem's number of unknowns.
-pub fn solve(
-    problem: &FrictionContactProblem<'_>,
-    options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
-    workspace: &mut SolverWorkspace,
-) -> SolveReport {
-    match options.method {
-        // The time stepper's choice, without the detour of a virtual call.
-        Method::Auto => methods::solve_by::<Automatic>(problem, options, p, u, workspace),
-        method => method.solver().solve(problem, options, p, u, workspace),
-    }
-}

@@ -6,12 +6,14 @@
 mod block_sparse;
 mod body_pairs;
 mod dense;
+mod storage;
 
 pub use block_sparse::{BlockSparseDelassus, PairContact};
 pub use body_pairs::{BodyPairs, DiscPair, WIDE, WidePair};
 pub(crate) use dense::dot;
+pub(crate) use storage::Storage;
 
-use super::{Dimension, ProblemError};
+use super::{Dimension, FrictionContactProblem, ProblemError};
 use dense::multiply_add;
 
 /// The Delassus operator `W` of a problem, borrowed.
@@ -31,6 +33,15 @@ impl Operator<'_> {
             Self::Dense(W) => multiply_add(W, x, b, out),
             Self::BlockSparse(W) => W.multiply_add(x, b, out),
         }
+    }
+
+    /// Work of one product with `W`, the judgement of its contacts included, in units of a multiplication with its addition.
+    pub(crate) fn product_work(self, n: usize) -> u64 {
+        let entries = match self {
+            Self::Dense(_) => n * n,
+            Self::BlockSparse(W) => W.components().pow(2) * W.n_blocks(),
+        };
+        (entries + 20 * n) as u64
     }
 
     /// Diagonal block of contact `i`, 1/kg; `n` unknowns in all.

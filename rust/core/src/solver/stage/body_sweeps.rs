@@ -14,7 +14,7 @@
 
 use crate::law::coulomb::violation;
 use crate::problem::{BodyPairs, DiscPair, Magnitudes, Residual, Violations, WIDE, passive_share};
-use crate::solver::one_contact::solve_one_contact;
+use crate::solver::local::one_contact::solve_one_contact;
 use crate::solver::options::{Method, SolverOptions};
 use crate::solver::report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
 
