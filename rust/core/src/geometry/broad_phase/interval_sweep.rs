@@ -84,12 +84,14 @@ mod tests {
                 .collect();
             let is_wanted = |i: usize, j: usize| !(i + j).is_multiple_of(3);
             let mut sweep = IntervalSweep::default();
-            let found = sweep.pairs(&balls, reach, is_wanted).to_vec();
+            let found: Vec<(usize, usize)> = (sweep.pairs(&balls, reach, is_wanted).iter())
+                .map(|&(i, j)| (i as usize, j as usize))
+                .collect();
             let mut expected = Vec::new();
             for i in 0..balls.len() {
                 for j in i + 1..balls.len() {
                     if is_wanted(i, j) && balls[i].distance(&balls[j].centre) <= balls[j].radius + reach {
-                        expected.push((i as u32, j as u32));
+                        expected.push((i, j));
                     }
                 }
             }
