@@ -6,5 +6,7 @@ mod contact_scenes;
 
 #[path = "contacts/derivatives.rs"]
 mod derivatives;
+#[path = "contacts/loose.rs"]
+mod loose;
 #[path = "contacts/self_contact.rs"]
 mod self_contact;

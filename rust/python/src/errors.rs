@@ -194,7 +194,9 @@ impl From<ModelError> for BorderError {
             ModelError::Unreadable { .. }
             | ModelError::NoSolids
             | ModelError::Missing { .. }
-            | ModelError::NotForBase { .. }
+            | ModelError::NotForJoint { .. }
+            | ModelError::OtherTree { .. }
+            | ModelError::CoupledApart { .. }
             | ModelError::CollidesWithoutBox { .. } => Value::Nothing,
             ModelError::DuplicateName { name, .. }
             | ModelError::UnknownParent { name, .. }
@@ -231,7 +233,9 @@ impl From<StateError> for BorderError {
                 index,
                 value,
             } => (format!("{field}[{index}]"), Value::Number(*value)),
-            StateError::SingularCardan { heading } => ("q[4]".to_owned(), Value::Number(*heading)),
+            StateError::SingularCardan { index, heading } => {
+                (format!("q[{index}]"), Value::Number(*heading))
+            }
         };
         Self {
             kind: Kind::State,

@@ -9,8 +9,8 @@ use pyo3::types::{PyDict, PyMapping};
 use rover_core::contact::{Contact, detection::wheel_contacts};
 use rover_core::multibody::bias::BiasScratch;
 use rover_core::multibody::{
-    Configuration, Kinematics, MassMatrix, Model, ModelDescription, ModelError, SolidDescription,
-    bias, coordinates, description::MAX_TEXT, momentum,
+    Configuration, Joint, Kinematics, MassMatrix, Model, ModelDescription, ModelError,
+    SolidDescription, bias, coordinates, description::MAX_TEXT, momentum,
 };
 use rover_core::nalgebra::{DMatrix, DVector, Vector3};
 
@@ -422,18 +422,36 @@ impl RoverModel {
     /// Names of the coordinates, x, y, z, roll, heading, pitch, then the joints.
     #[getter]
     fn dof_names(&self) -> Vec<String> {
-        let base = ["x", "y", "z", "roll", "heading", "pitch"].map(str::to_owned);
-        base.into_iter().chain(self.joint_names()).collect()
+        let model = &self.inner;
+        let mut names = Vec::with_capacity(model.nv());
+        for (b, body) in model.bodies().iter().enumerate() {
+            let of_body = |x: &str| {
+                if b == 0 {
+                    x.to_owned()
+                } else {
+                    format!("{}.{x}", body.name)
+                }
+            };
+            match body.joint {
+                Joint::Free(_) => {
+                    names.extend(["x", "y", "z", "roll", "heading", "pitch"].map(of_body));
+                }
+                Joint::Spherical(_) => names.extend(["roll", "heading", "pitch"].map(of_body)),
+                Joint::Revolute(_) | Joint::Prismatic(_) if !body.is_coupled => {
+                    names.push(body.name.clone());
+                }
+                Joint::Revolute(_) | Joint::Prismatic(_) | Joint::Fixed => {}
+            }
+        }
+        names
     }
 
     /// Names of the joints that are not locked, in the order of q.
     #[getter]
     fn joint_names(&self) -> Vec<String> {
-        self.inner
-            .bodies()
-            .iter()
-            .skip(1)
-            .map(|b| b.name.clone())
+        let joints = self.inner.joints().iter();
+        joints
+            .map(|joint| self.inner.bodies()[joint.body].name.clone())
             .collect()
     }
 
@@ -525,7 +543,7 @@ impl RoverModel {
             Coordinates::State => fresh_matrix(py, &dense),
             Coordinates::Report => fresh_matrix(
                 py,
-                &coordinates::congruence(&dense, coordinates::report_angles(&q)),
+                &coordinates::congruence(&dense, &coordinates::report_angles(&self.inner, &q)),
             ),
         }
     }
@@ -572,10 +590,10 @@ impl RoverModel {
         if kind == Coordinates::State {
             return Ok(fresh(py, &out));
         }
-        let angles = coordinates::report_angles(&q);
+        let angles = coordinates::report_angles(&self.inner, &q);
         let drift =
-            dense_mass_matrix(&self.inner, &kinematics) * coordinates::rate_drift(angles, &qdot);
-        let pulled = coordinates::pull_back(&(DVector::from_vec(out) + drift), angles);
+            dense_mass_matrix(&self.inner, &kinematics) * coordinates::rate_drift(&angles, &qdot);
+        let pulled = coordinates::pull_back(&(DVector::from_vec(out) + drift), &angles);
         Ok(fresh(py, pulled.as_slice()))
     }
 
@@ -766,7 +784,8 @@ impl RoverModel {
                     full[k] = *entry;
                 }
                 if kind == Coordinates::Report {
-                    full = coordinates::pull_back(&full, coordinates::report_angles(&q));
+                    full =
+                        coordinates::pull_back(&full, &coordinates::report_angles(&self.inner, &q));
                 }
                 rows.extend_from_slice(full.as_slice());
             }
@@ -796,7 +815,8 @@ impl RoverModel {
             Coordinates::State.configuration(&self.inner, &vector(q, Kind::State, "q")?)?;
         let v = coordinates::checked_velocity(&self.inner, &vector(v, Kind::State, "v")?)
             .map_err(BorderError::from)?;
-        let (q, qdot) = coordinates::to_report(&configuration, &v).map_err(BorderError::from)?;
+        let (q, qdot) =
+            coordinates::to_report(&self.inner, &configuration, &v).map_err(BorderError::from)?;
         Ok((fresh(py, &q), fresh(py, &qdot)))
     }
 
@@ -823,7 +843,7 @@ impl RoverModel {
         let v =
             Coordinates::Report.velocity(&self.inner, &q, &vector(qdot, Kind::State, "qdot")?)?;
         Ok((
-            fresh(py, &coordinates::to_public(&configuration)),
+            fresh(py, &coordinates::to_public(&self.inner, &configuration)),
             fresh(py, &v),
         ))
     }

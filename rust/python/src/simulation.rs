@@ -235,7 +235,10 @@ impl Simulation {
     /// x, y, z of the trunk's origin; roll, heading, pitch; joints.
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let q = coordinates::to_public(&self.open()?.state().configuration);
+        let q = {
+            let simulation = self.open()?;
+            coordinates::to_public(simulation.model(), &simulation.state().configuration)
+        };
         Ok(fresh(py, &q))
     }
 
@@ -304,8 +307,8 @@ impl Simulation {
     fn report_state<'py>(&self, py: Python<'py>) -> PyResult<Pair<'py>> {
         let held = self.open()?;
         let state = held.state();
-        let (q, qdot) =
-            coordinates::to_report(&state.configuration, &state.v).map_err(BorderError::from)?;
+        let (q, qdot) = coordinates::to_report(&self.model, &state.configuration, &state.v)
+            .map_err(BorderError::from)?;
         Ok((fresh(py, &q), fresh(py, &qdot)))
     }
 

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use rover_core::contact::{Activation, PairSearch, detect_pairs};
+use rover_core::contact::{Activation, Contact, PairSearch, detect_pairs};
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
-use rover_core::multibody::{Configuration, Model, ModelDescription};
+use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription};
 use rover_core::simulation::RoverSimulation;
 
 /// A chassis with an arm of two links over it: the second link, a box, a ball or a wheel, folds down onto the chassis.
@@ -60,20 +60,37 @@ pub fn tips() -> [&'static str; 3] {
     ]
 }
 
-/// Deepest gap between two bodies now, m: 0 where none overlap.
-pub fn overlap(simulation: &RoverSimulation) -> f64 {
-    let (model, kinematics) = (simulation.model(), simulation.kinematics());
-    let at_rest = vec![0.0; model.nv()];
-    let mut found = Vec::new();
+/// Contacts of a machine's bodies with each other that are no further apart than 20 cm.
+pub fn near(model: &Model, kinematics: &Kinematics) -> Vec<Contact> {
+    let activation = Activation {
+        lead: 0.0,
+        hover: 0.2,
+        slow: f64::INFINITY,
+        margin: 0.0,
+    };
+    touching(model, kinematics, &activation)
+}
+
+fn touching(model: &Model, kinematics: &Kinematics, activation: &Activation) -> Vec<Contact> {
+    let (at_rest, mut found) = (vec![0.0; model.nv()], Vec::new());
     let mut search = PairSearch::new(model);
-    let touching = Activation::default();
     detect_pairs(
         model,
-        &kinematics,
+        kinematics,
         &at_rest,
-        &touching,
+        activation,
         &mut search,
         &mut found,
+    );
+    found
+}
+
+/// Deepest gap between two bodies now, m: 0 where none overlap.
+pub fn overlap(simulation: &RoverSimulation) -> f64 {
+    let found = touching(
+        simulation.model(),
+        &simulation.kinematics(),
+        &Activation::default(),
     );
     found
         .iter()

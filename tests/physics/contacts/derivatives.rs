@@ -1,13 +1,11 @@
 //! The Jacobian of a contact of two bodies is the gap's derivative, and its impulse is nobody's from outside.
 
 use proptest::prelude::*;
-use rover_core::contact::{
-    Activation, Contact, PairSearch, detect_pairs, generalized_impulse, relocate,
-};
+use rover_core::contact::{Contact, generalized_impulse, relocate};
 use rover_core::geometry::Plane;
 use rover_core::multibody::{Configuration, Kinematics, Model};
 
-use crate::contact_scenes::{folding, tips};
+use crate::contact_scenes::{folding, near, tips};
 
 /// Where the machine is, and its contacts with itself that are no further apart than 20 cm.
 fn contacts(model: &Model, joints: [f64; 3], turn: [f64; 3]) -> (Configuration, Vec<Contact>) {
@@ -18,25 +16,8 @@ fn contacts(model: &Model, joints: [f64; 3], turn: [f64; 3]) -> (Configuration, 
         .chain(turn)
         .chain([0.0; 3])
         .collect();
-    q.advance(&v, 1.0);
-    let activation = Activation {
-        lead: 0.0,
-        hover: 0.2,
-        slow: f64::INFINITY,
-        margin: 0.0,
-    };
-    let kinematics = Kinematics::of(model, &q);
-    let at_rest = vec![0.0; model.nv()];
-    let mut found = Vec::new();
-    let mut search = PairSearch::new(model);
-    detect_pairs(
-        model,
-        &kinematics,
-        &at_rest,
-        &activation,
-        &mut search,
-        &mut found,
-    );
+    q.advance(model, &v, 1.0);
+    let found = near(model, &Kinematics::of(model, &q));
     (q, found)
 }
 
@@ -67,7 +48,7 @@ proptest! {
                     let mut v = vec![0.0; model.nv()];
                     v[k] = 1.0;
                     let mut moved = q.clone();
-                    moved.advance(&v, h);
+                    moved.advance(&model, &v, h);
                     let mut contact = *contact;
                     relocate(&model, &Kinematics::of(&model, &moved), &Plane::ground(), &mut contact);
                     contact.gap

@@ -128,7 +128,7 @@ fn largest_distance(
         reduced.set_inputs(&[torque; 3]).unwrap();
         assert!(full.step(10).unwrap().is_converged());
         assert!(reduced.step(10).unwrap().is_converged());
-        let full_q = coordinates::to_public(&full.state().configuration);
+        let full_q = coordinates::to_public(full.model(), &full.state().configuration);
         way = way.max(reduced.q()[0].abs());
         largest = largest.max((DVector::from_vec(full_q) - &P * reduced.q()).amax());
     }

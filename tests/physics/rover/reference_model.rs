@@ -35,13 +35,13 @@ fn dynamics_agree_with_the_reference() {
         let model = machine(&numbers(&reference["meta"][table]));
         for case in reference["cases"].as_array().unwrap() {
             let (q, qdot) = (numbers(&case["q"]), numbers(&case["qdot"]));
-            let angles = coordinates::report_angles(&q);
+            let angles = coordinates::report_angles(&model, &q);
             let kinematics = Kinematics::of(&model, &coordinates::from_report(&model, &q).unwrap());
             let mut M = MassMatrix::new(&model);
             M.update(&model, &kinematics);
             let M = M.to_dense(&model);
             let expected = &case[table];
-            let dense: DMatrix<f64> = coordinates::congruence(&M, angles);
+            let dense: DMatrix<f64> = coordinates::congruence(&M, &angles);
             assert_close("M", dense.transpose().as_slice(), &numbers(&expected["M"]));
             for (rates, name) in [(qdot.clone(), "bias"), (vec![0.0; 21], "gravity")] {
                 let v = coordinates::velocity_from_report(&model, &q, &rates).unwrap();
@@ -54,10 +54,10 @@ fn dynamics_agree_with_the_reference() {
                     &mut BiasScratch::new(&model),
                     &mut out,
                 );
-                let full = DVector::from_vec(out) + &M * coordinates::rate_drift(angles, &rates);
+                let full = DVector::from_vec(out) + &M * coordinates::rate_drift(&angles, &rates);
                 assert_close(
                     name,
-                    coordinates::pull_back(&full, angles).as_slice(),
+                    coordinates::pull_back(&full, &angles).as_slice(),
                     &numbers(&expected[name]),
                 );
                 if name == "bias" {
@@ -83,7 +83,7 @@ fn places_and_contacts_agree_with_the_reference() {
     let plane = Plane::new(n, 0.0).unwrap();
     for case in reference["cases"].as_array().unwrap() {
         let q = numbers(&case["q"]);
-        let angles = coordinates::report_angles(&q);
+        let angles = coordinates::report_angles(&model, &q);
         let kinematics = Kinematics::of(&model, &coordinates::from_report(&model, &q).unwrap());
         let origins = model.frames().iter().flat_map(|f| {
             let x = kinematics.origin(f.body) + kinematics.point(f.body, &f.position);
@@ -115,7 +115,7 @@ fn places_and_contacts_agree_with_the_reference() {
                 for (x, &k) in along.iter().zip(path) {
                     full[k] = *x;
                 }
-                rows.extend_from_slice(coordinates::pull_back(&full, angles).as_slice());
+                rows.extend_from_slice(coordinates::pull_back(&full, &angles).as_slice());
             }
         }
         assert_close(

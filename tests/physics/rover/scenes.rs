@@ -162,7 +162,7 @@ pub fn check_drive(variant: Variant, h: f64) -> (Vector3<f64>, f64, StepReport) 
     simulation.set_wheel_torques(&[20.0; 6]).unwrap();
     report.merge(&simulation.step(count(10.0, h)).unwrap());
     let end = &simulation.state().configuration;
-    let heading = coordinates::to_public(end)[4];
+    let heading = coordinates::to_public(simulation.model(), end)[4];
     (end.position - start, heading, report)
 }
 

@@ -228,7 +228,8 @@ fn turning_through_a_full_circle_is_smooth() {
         simulation.set_wheel_torques(&[8.0; 6]).unwrap();
         simulation.step(200).unwrap();
         let mut turned = 0.0_f64;
-        let heading = |s: &RoverSimulation| coordinates::to_public(&s.state().configuration)[4];
+        let heading =
+            |s: &RoverSimulation| coordinates::to_public(s.model(), &s.state().configuration)[4];
         let (mut last, mut rate) = (heading(&simulation), simulation.state().v[4]);
         let mut steps = 0;
         while turned.abs() < 2.0 * PI {

@@ -22,7 +22,7 @@ fn driving(heading: f64, steering: f64) -> RoverSimulation {
     let start = Configuration {
         position: turn * Vector3::new(0.0, 0.5, 0.0),
         attitude: turn,
-        joints: vec![0.0; 15],
+        ..Configuration::zero(simulation.model())
     };
     simulation.set_state(start, vec![0.0; 21]);
     simulation

@@ -19,8 +19,12 @@ fn pair(joints: &[(&str, f64)]) -> (Model, Model, Vec<usize>) {
     let full = Model::rover();
     let named: Vec<(String, f64)> = joints.iter().map(|(n, a)| ((*n).to_owned(), *a)).collect();
     let welded = full.with_locked_joints(&named).unwrap();
-    let is_locked =
-        |k: usize| k >= 6 && joints.iter().any(|(n, _)| full.bodies()[k - 5].name == *n);
+    let is_locked = |k: usize| {
+        k >= 6
+            && joints
+                .iter()
+                .any(|(n, _)| full.bodies()[full.body_of_velocity(k)].name == *n)
+    };
     let kept = (0..full.nv()).filter(|&k| !is_locked(k)).collect();
     (full, welded, kept)
 }

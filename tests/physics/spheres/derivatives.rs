@@ -57,7 +57,7 @@ proptest! {
         let step = 1e-6;
         let moved = |h: f64| {
             let mut moved = start.clone();
-            moved.set_moved(&start, &v, h);
+            moved.set_moved(&model, &start, &v, h);
             contact_at(&model, &field, &moved, part)
         };
         let (before, after) = (moved(-step), moved(step));

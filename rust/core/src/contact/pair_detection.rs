@@ -1,7 +1,7 @@
 //! Which contacts between bodies a step must consider.
 //!
-//! Two parts can touch where they belong to different machines, or, in a machine that says so
-//! ([`crate::multibody::ModelDescription::self_contact`]), to bodies of one machine that no joint connects. What passes another body within one
+//! Two parts can touch where they belong to different trees, or, in a model that says so
+//! ([`crate::multibody::ModelDescription::self_contact`]), to bodies of one tree that no joint connects. What passes another body within one
 //! step is not seen: between bodies there is no sweep.
 
 use super::activation::Activation;

@@ -1,11 +1,12 @@
 //! Bias `N(q, v) v + G(q)` by recursive Newton–Euler: what must be pushed to keep all accelerations zero.
 //!
-//! Source: Luh, Walker and Paul 1980; here in world axes about the trunk origin.
+//! Source: Luh, Walker and Paul 1980; here in world axes about each tree's origin of places.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::kinematics::Kinematics;
-use super::model::Model;
+use super::joint::Joint;
+use super::kinematics::{JointRate, Kinematics, joint_rate};
+use super::model::{Body, Model};
 
 /// Scratch of [`bias`]: sized once for a model.
 #[derive(Clone, Debug)]
@@ -20,7 +21,7 @@ struct Moved {
     alpha: Vector3<f64>,
     /// Acceleration of its frame's origin, m/s².
     origin: Vector3<f64>,
-    /// What it and all that it carries need, N and N m about the trunk origin.
+    /// What it and all that it carries need, N and N m about the tree's origin.
     force: Vector3<f64>,
     moment: Vector3<f64>,
 }
@@ -35,9 +36,38 @@ impl BiasScratch {
     }
 }
 
+impl Moved {
+    /// Acceleration of what is fixed to it, `d` from its frame's origin.
+    #[inline]
+    fn accelerates(&self, d: &Vector3<f64>) -> Vector3<f64> {
+        self.origin + self.alpha.cross(d) + self.omega.cross(&self.omega.cross(d))
+    }
+}
+
+/// Angular velocity, angular acceleration and acceleration of the origin of a body that no revolute joint ties to another one.
+#[cold]
+fn otherwise_carried(
+    body: &Body,
+    kinematics: &Kinematics,
+    moved: &[Moved],
+    b: usize,
+    v: &[f64],
+) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>) {
+    let (carrier, d) = match body.parent {
+        Some(parent) => (moved[parent], kinematics.r[b] - kinematics.r[parent]),
+        None => (Moved::default(), Vector3::zeros()),
+    };
+    let JointRate { spin, slide } = joint_rate(body, kinematics, v);
+    (
+        carrier.omega + spin,
+        carrier.alpha + carrier.omega.cross(&spin),
+        carrier.accelerates(&d) + carrier.omega.cross(&slide) * 2.0,
+    )
+}
+
 /// Bias `b` in `M v̇ + b = τ`: Coriolis, centrifugal, gyroscopic and gravity terms.
 ///
-/// `v`, `out`: (nv), N for the first three, N m for the others. `gravity`: m/s², world.
+/// `v`, `out`: (nv), N along a velocity in m/s, N m about one in rad/s. `gravity`: m/s², world.
 pub fn bias(
     model: &Model,
     kinematics: &Kinematics,
@@ -50,20 +80,23 @@ pub fn bias(
     let moved = &mut scratch.bodies[..bodies.len()];
     for (b, body) in bodies.iter().enumerate() {
         let r = &kinematics.r[b];
-        let (omega, alpha, origin) = if b == 0 {
-            let omega = Vector3::new(v[3], v[4], v[5]);
-            (omega, Vector3::zeros(), Vector3::zeros())
-        } else {
-            let carrier = &moved[body.parent];
-            let d = r - kinematics.r[body.parent];
-            let spin = kinematics.motions[b - 1].axis * v[5 + b];
-            (
-                carrier.omega + spin,
-                carrier.alpha + carrier.omega.cross(&spin),
-                carrier.origin
-                    + carrier.alpha.cross(&d)
-                    + carrier.omega.cross(&carrier.omega.cross(&d)),
-            )
+        let (omega, alpha, origin) = match (&body.joint, body.parent) {
+            (Joint::Free(_), _) => {
+                let k = body.velocity + 3;
+                let omega = Vector3::new(v[k], v[k + 1], v[k + 2]);
+                (omega, Vector3::zeros(), Vector3::zeros())
+            }
+            (Joint::Revolute(_), Some(parent)) => {
+                let carrier = &moved[parent];
+                let d = r - kinematics.r[parent];
+                let spin = kinematics.motions[body.motion].axis() * v[body.velocity];
+                (
+                    carrier.omega + spin,
+                    carrier.alpha + carrier.omega.cross(&spin),
+                    carrier.accelerates(&d),
+                )
+            }
+            _ => otherwise_carried(body, kinematics, moved, b, v),
         };
         let c = &kinematics.c[b];
         let acceleration = if body.is_centred() {
@@ -91,15 +124,23 @@ pub fn bias(
             moment: moment + c.cross(&force),
         };
     }
-    for b in (1..bodies.len()).rev() {
+    out.fill(0.0);
+    for (b, body) in bodies.iter().enumerate().rev() {
         let Moved { force, moment, .. } = moved[b];
-        out[5 + b] = kinematics.motions[b - 1]
-            .axis
-            .dot(&(moment - kinematics.r[b].cross(&force)));
-        let carrier = &mut moved[bodies[b].parent];
-        carrier.force += force;
-        carrier.moment += moment;
+        let k = body.velocity;
+        if let Joint::Free(_) = body.joint {
+            out[k..k + 3].copy_from_slice(force.as_slice());
+            out[k + 3..k + 6].copy_from_slice(moment.as_slice());
+            continue;
+        }
+        // A joint that follows another adds to that one's.
+        for (i, m) in body.motions().enumerate() {
+            out[k + i] += kinematics.motions[m].power(&force, &moment);
+        }
+        if let Some(parent) = body.parent {
+            let carrier = &mut moved[parent];
+            carrier.force += force;
+            carrier.moment += moment;
+        }
     }
-    out[..3].copy_from_slice(moved[0].force.as_slice());
-    out[3..6].copy_from_slice(moved[0].moment.as_slice());
 }

@@ -1,12 +1,16 @@
-//! The 21 numbers that users and references see, and the state behind them.
+//! The numbers that users and references see, and the state behind them: for the rover 21.
 //!
-//! Public `q`: trunk position, then roll, heading, pitch at 3, 4, 5 with `R = Ry(heading) Rz(pitch) Rx(roll)`,
-//! then the joints. Report `q`: Cardan angles about x, y, z at 3, 4, 5 with `R = Rz(q5) Ry(q4) Rx(q3)`, and velocity
-//! `qdot = dq/dt`, so that `v = B(q) qdot` with B the identity but for the angular block.
+//! One number a velocity, in the order of the velocities (nv): of a free body its position, then three angles; of a revolute or
+//! prismatic joint its coordinate; of a spherical joint three angles of the body relative to the joint's frame.
+//!
+//! Public `q`: the angles are roll, heading, pitch with `R = Ry(heading) Rz(pitch) Rx(roll)`. Report `q`: Cardan angles about x, y, z with
+//! `R = Rz(q5) Ry(q4) Rx(q3)` (the numbers are a rover's), and velocity `qdot = dq/dt`, so that `v = B(q) qdot` with B the identity but
+//! for the blocks of the angles.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 
 use super::error::StateError;
+use super::joint::{Joint, Pose, Spherical};
 use super::model::Model;
 use super::state::Configuration;
 use crate::spatial::{CardanReport, HeadingPitchRoll};
@@ -29,33 +33,85 @@ fn check(field: &'static str, values: &[f64], expected: usize) -> Result<(), Sta
     }
 }
 
+/// The configuration of coordinates (nv) whose angles `turn` turns into a rotation.
+fn from_angles(
+    model: &Model,
+    q: &[f64],
+    turn: impl Fn([f64; 3]) -> UnitQuaternion<f64>,
+) -> Result<Configuration, StateError> {
+    check("q", q, model.nv())?;
+    let mut configuration = Configuration::zero(model);
+    for (own, &k) in (configuration.joints.iter_mut()).zip(model.joint_velocities()) {
+        *own = q[k];
+    }
+    for (joint, k) in model.rotating_joints() {
+        let q = &q[*k..];
+        match joint {
+            Joint::Free(free) => {
+                let pose = Pose {
+                    position: Vector3::new(q[0], q[1], q[2]),
+                    attitude: turn([q[3], q[4], q[5]]),
+                };
+                configuration.set_pose(*free, pose);
+            }
+            Joint::Spherical(Spherical { rotation }) => {
+                configuration.rotations[*rotation] = turn([q[0], q[1], q[2]]);
+            }
+            Joint::Fixed | Joint::Revolute(_) | Joint::Prismatic(_) => {}
+        }
+    }
+    Ok(configuration)
+}
+
+/// Coordinates (nv) of a configuration, whose rotations `angles` turns into three angles.
+fn to_angles(
+    model: &Model,
+    configuration: &Configuration,
+    angles: impl Fn(&Matrix3<f64>) -> [f64; 3],
+) -> Vec<f64> {
+    let mut q = vec![0.0; model.nv()];
+    for (own, &k) in configuration.joints.iter().zip(model.joint_velocities()) {
+        q[k] = *own;
+    }
+    for (joint, k) in model.rotating_joints() {
+        let (q, rotation) = match joint {
+            Joint::Free(free) => {
+                let pose = configuration.pose(*free);
+                q[*k..*k + 3].copy_from_slice(pose.position.as_slice());
+                (&mut q[*k + 3..], pose.attitude)
+            }
+            Joint::Spherical(Spherical { rotation }) => {
+                (&mut q[*k..], configuration.rotations[*rotation])
+            }
+            Joint::Fixed | Joint::Revolute(_) | Joint::Prismatic(_) => continue,
+        };
+        q[..3].copy_from_slice(&angles(rotation.to_rotation_matrix().matrix()));
+    }
+    q
+}
+
 /// Configuration of public coordinates (nv).
 ///
 /// # Errors
 /// Wrong length, or an entry that is not finite.
 pub fn from_public(model: &Model, q: &[f64]) -> Result<Configuration, StateError> {
-    check("q", q, model.nv())?;
-    let angles = HeadingPitchRoll {
-        roll: q[3],
-        heading: q[4],
-        pitch: q[5],
-    };
-    Ok(Configuration {
-        position: Vector3::new(q[0], q[1], q[2]),
-        attitude: angles.to_quaternion(),
-        joints: q[6..].to_vec(),
+    from_angles(model, q, |[roll, heading, pitch]| {
+        let angles = HeadingPitchRoll {
+            roll,
+            heading,
+            pitch,
+        };
+        angles.to_quaternion()
     })
 }
 
 /// Public coordinates (nv) of a configuration.
 #[must_use]
-pub fn to_public(configuration: &Configuration) -> Vec<f64> {
-    let angles =
-        HeadingPitchRoll::from_rotation(configuration.attitude.to_rotation_matrix().matrix());
-    let p = &configuration.position;
-    let mut q = vec![p.x, p.y, p.z, angles.roll, angles.heading, angles.pitch];
-    q.extend_from_slice(&configuration.joints);
-    q
+pub fn to_public(model: &Model, configuration: &Configuration) -> Vec<f64> {
+    to_angles(model, configuration, |R| {
+        let angles = HeadingPitchRoll::from_rotation(R);
+        [angles.roll, angles.heading, angles.pitch]
+    })
 }
 
 /// Configuration of the report's coordinates (nv).
@@ -63,22 +119,35 @@ pub fn to_public(configuration: &Configuration) -> Vec<f64> {
 /// # Errors
 /// Wrong length, or an entry that is not finite.
 pub fn from_report(model: &Model, q: &[f64]) -> Result<Configuration, StateError> {
-    check("q", q, model.nv())?;
-    Ok(Configuration {
-        position: Vector3::new(q[0], q[1], q[2]),
-        attitude: report_angles(q).to_quaternion(),
-        joints: q[6..].to_vec(),
+    from_angles(model, q, |[x, y, z]| {
+        CardanReport { x, y, z }.to_quaternion()
     })
 }
 
-/// The Cardan angles in report coordinates.
+/// Where angles stand among the coordinates, and what they are there.
+#[derive(Clone, Debug)]
+pub struct ReportAngles {
+    blocks: Vec<(usize, CardanReport)>,
+}
+
+/// The Cardan angles in report coordinates (nv).
 #[must_use]
-pub fn report_angles(q: &[f64]) -> CardanReport {
-    CardanReport {
-        x: q[3],
-        y: q[4],
-        z: q[5],
+pub fn report_angles(model: &Model, q: &[f64]) -> ReportAngles {
+    let blocks = angular_blocks(model).map(|k| {
+        let [x, y, z] = [q[k], q[k + 1], q[k + 2]];
+        (k, CardanReport { x, y, z })
+    });
+    ReportAngles {
+        blocks: blocks.collect(),
     }
+}
+
+/// First velocities of the angular velocities.
+fn angular_blocks(model: &Model) -> impl Iterator<Item = usize> + '_ {
+    (model.rotating_joints().iter()).map(|(joint, k)| match joint {
+        Joint::Free(_) => k + 3,
+        _ => *k,
+    })
 }
 
 /// A checked velocity (nv).
@@ -102,64 +171,78 @@ pub fn velocity_from_report(
     check("q", q, model.nv())?;
     check("qdot", qdot, model.nv())?;
     let mut v = qdot.to_vec();
-    let omega = report_angles(q).rate_matrix() * Vector3::new(qdot[3], qdot[4], qdot[5]);
-    v[3..6].copy_from_slice(omega.as_slice());
+    for (k, angles) in report_angles(model, q).blocks {
+        let omega = angles.rate_matrix() * Vector3::new(qdot[k], qdot[k + 1], qdot[k + 2]);
+        v[k..k + 3].copy_from_slice(omega.as_slice());
+    }
     Ok(v)
 }
 
 /// Report coordinates and rates of a configuration and a velocity.
 ///
 /// # Errors
-/// `SingularCardan` where the heading is ±90 degrees and the rates do not exist.
+/// `SingularCardan` where a heading is ±90 degrees and the rates do not exist.
 pub fn to_report(
+    model: &Model,
     configuration: &Configuration,
     v: &[f64],
 ) -> Result<(Vec<f64>, Vec<f64>), StateError> {
-    let angles = CardanReport::from_rotation(configuration.attitude.to_rotation_matrix().matrix());
-    let p = &configuration.position;
-    let mut q = vec![p.x, p.y, p.z, angles.x, angles.y, angles.z];
-    q.extend_from_slice(&configuration.joints);
-    let E = angles.rate_matrix();
-    let inverse = (angles.y.cos().abs() > 1e-9)
-        .then(|| E.try_inverse())
-        .flatten();
-    let Some(inverse) = inverse else {
-        return Err(StateError::SingularCardan { heading: angles.y });
-    };
+    let q = to_angles(model, configuration, |R| {
+        let angles = CardanReport::from_rotation(R);
+        [angles.x, angles.y, angles.z]
+    });
     let mut qdot = v.to_vec();
-    let rates = inverse * Vector3::new(v[3], v[4], v[5]);
-    qdot[3..6].copy_from_slice(rates.as_slice());
+    for (k, angles) in report_angles(model, &q).blocks {
+        let E = angles.rate_matrix();
+        let inverse = (angles.y.cos().abs() > 1e-9)
+            .then(|| E.try_inverse())
+            .flatten();
+        let Some(inverse) = inverse else {
+            return Err(StateError::SingularCardan {
+                index: k + 1,
+                heading: angles.y,
+            });
+        };
+        let rates = inverse * Vector3::new(v[k], v[k + 1], v[k + 2]);
+        qdot[k..k + 3].copy_from_slice(rates.as_slice());
+    }
     Ok((q, qdot))
 }
 
 /// `Bᵀ A B`: a symmetric operator on velocities, in the report's coordinates.
 #[must_use]
-pub fn congruence(A: &DMatrix<f64>, angles: CardanReport) -> DMatrix<f64> {
-    let B = rate_operator(A.nrows(), &angles.rate_matrix());
+pub fn congruence(A: &DMatrix<f64>, angles: &ReportAngles) -> DMatrix<f64> {
+    let B = angles.rate_operator(A.nrows());
     B.transpose() * A * B
 }
 
 /// `Bᵀ f`: a generalized force, in the report's coordinates.
 #[must_use]
-pub fn pull_back(f: &DVector<f64>, angles: CardanReport) -> DVector<f64> {
-    rate_operator(f.nrows(), &angles.rate_matrix()).transpose() * f
+pub fn pull_back(f: &DVector<f64>, angles: &ReportAngles) -> DVector<f64> {
+    angles.rate_operator(f.nrows()).transpose() * f
 }
 
 /// `Ḃ qdot`: what the report's coordinates add to the acceleration, `v̇ = B q̈ + Ḃ q̇`.
 #[must_use]
-pub fn rate_drift(angles: CardanReport, qdot: &[f64]) -> DVector<f64> {
+pub fn rate_drift(angles: &ReportAngles, qdot: &[f64]) -> DVector<f64> {
     let mut drift = DVector::zeros(qdot.len());
-    let rates = Vector3::new(qdot[3], qdot[4], qdot[5]);
-    drift
-        .rows_mut(3, 3)
-        .copy_from(&angles.rate_matrix_derivative_times_rates(&rates));
+    for &(k, angles) in &angles.blocks {
+        let rates = Vector3::new(qdot[k], qdot[k + 1], qdot[k + 2]);
+        drift
+            .rows_mut(k, 3)
+            .copy_from(&angles.rate_matrix_derivative_times_rates(&rates));
+    }
     drift
 }
 
-/// `B`: identity but for the angular block `E`.
-#[must_use]
-pub fn rate_operator(nv: usize, E: &Matrix3<f64>) -> DMatrix<f64> {
-    let mut B = DMatrix::identity(nv, nv);
-    B.view_mut((3, 3), (3, 3)).copy_from(E);
-    B
+impl ReportAngles {
+    /// `B` (nv, nv): identity but for the angular blocks `E`.
+    #[must_use]
+    pub fn rate_operator(&self, nv: usize) -> DMatrix<f64> {
+        let mut B = DMatrix::identity(nv, nv);
+        for &(k, angles) in &self.blocks {
+            B.view_mut((k, k), (3, 3)).copy_from(&angles.rate_matrix());
+        }
+        B
+    }
 }

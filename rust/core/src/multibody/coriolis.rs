@@ -6,9 +6,10 @@
 //! C_jk = Σ S_jᵀ (I Ṡ_k + B S_k)      over the bodies that both j and k move
 //! ```
 //!
-//! Spatial vectors are (angular, linear) at the trunk origin, world axes. `B + Bᵀ = İ` and `B V = V×* I V`, which gives both properties.
+//! Spatial vectors are (angular, linear) at the origin of the tree's places, world axes. A velocity that several joints share, as coupled
+//! ones do, has a screw of each; their products add. `B + Bᵀ = İ` and `B V = V×* I V`, which gives both properties.
 //!
-//! With V = (ω, v), mass m, first moment m c and inertia J about the trunk origin, and the momentum I V = (n, f)
+//! With V = (ω, v), mass m, first moment m c and inertia J about that origin, and the momentum I V = (n, f)
 //!
 //! ```text
 //! I = [ J     m c× ]        B = [ K − ½ n×   0 ]        K = ½ (ω× J + (ω× J)ᵀ − m (c vᵀ + v cᵀ)) + m (c·v) 1
@@ -20,12 +21,13 @@
 //! Source: Echeandia and Wensing 2021, *Numerical methods to compute the Coriolis matrix and Christoffel symbols for rigid-body systems*,
 //! J. Comput. Nonlinear Dynam. 16, 091004.
 
-use std::ops::{Add, AddAssign, Mul};
+use std::ops::{Add, AddAssign, Mul, Range};
 
 use nalgebra::{DMatrix, Vector3};
 
+use super::joint::Joint;
 use super::kinematics::Kinematics;
-use super::model::{BASE, Body, Model};
+use super::model::{Body, Model};
 use crate::spatial::SymmetricMatrix3;
 
 /// Scratch of [`coriolis_matrix`]: sized once for a model.
@@ -33,11 +35,20 @@ use crate::spatial::SymmetricMatrix3;
 pub struct CoriolisScratch {
     velocity: Vec<Spatial>,
     composites: Vec<Composite>,
-    S: Vec<Spatial>,
-    S_dot: Vec<Spatial>,
+    screws: Vec<Screw>,
+    /// The screws of each body's joint.
+    own: Vec<Range<usize>>,
 }
 
-/// A motion vector (velocity of the point at the trunk origin) or a force vector (moment about it).
+/// What a unit of a velocity gives to a body by its own joint, and the rate of that.
+#[derive(Clone, Copy, Debug)]
+struct Screw {
+    velocity: usize,
+    S: Spatial,
+    S_dot: Spatial,
+}
+
+/// A motion vector (velocity of the point at the tree's origin) or a force vector (moment about it).
 #[derive(Clone, Copy, Debug, Default)]
 struct Spatial {
     angular: Vector3<f64>,
@@ -65,67 +76,100 @@ pub fn coriolis_matrix(
     out: &mut DMatrix<f64>,
 ) {
     let bodies = model.bodies();
-    let (n, nv) = (bodies.len(), model.nv());
     let s = scratch;
-    s.velocity.resize(n, Spatial::default());
-    s.composites.resize(n, Composite::default());
-    s.S.resize(nv, Spatial::default());
-    s.S_dot.resize(nv, Spatial::default());
-    let base = Spatial {
-        angular: Vector3::new(v[3], v[4], v[5]),
-        linear: Vector3::new(v[0], v[1], v[2]),
-    };
-    for k in 0..3 {
-        let (e, zero) = (Vector3::ith(k, 1.0), Vector3::zeros());
-        s.S[k] = Spatial {
-            angular: zero,
-            linear: e,
-        };
-        s.S_dot[k] = Spatial::default();
-        // The trunk turns about its own origin, which moves.
-        s.S[3 + k] = Spatial {
-            angular: e,
-            linear: zero,
-        };
-        s.S_dot[3 + k] = Spatial {
-            angular: zero,
-            linear: base.linear.cross(&e),
-        };
-    }
+    s.velocity.resize(bodies.len(), Spatial::default());
+    s.composites.resize(bodies.len(), Composite::default());
+    s.screws.clear();
+    s.own.clear();
     for (b, body) in bodies.iter().enumerate() {
-        s.velocity[b] = if b == 0 {
-            base
+        let first = s.screws.len();
+        s.velocity[b] = if let Joint::Free(_) = body.joint {
+            s.add_free(body.velocity, v)
         } else {
-            let axis = kinematics.motions[b - 1].axis;
-            let S = Spatial {
-                angular: axis,
-                linear: kinematics.r[b].cross(&axis),
-            };
-            let carrier = s.velocity[body.parent];
-            s.S[5 + b] = S;
-            s.S_dot[5 + b] = carrier.moves(&S);
-            carrier + S * v[5 + b]
+            let carrier = (body.parent).map_or(Spatial::default(), |parent| s.velocity[parent]);
+            let mut velocity = carrier;
+            for (i, motion) in kinematics.motions[body.motions()].iter().enumerate() {
+                let (angular, linear) = motion.twist();
+                let S = Spatial { angular, linear };
+                let k = body.velocity + i;
+                velocity = velocity + S * v[k];
+                s.screws.push(Screw {
+                    velocity: k,
+                    S,
+                    S_dot: carrier.moves(&S),
+                });
+            }
+            velocity
         };
+        s.own.push(first..s.screws.len());
         s.composites[b] = Composite::of(body, kinematics, b, &s.velocity[b]);
     }
     out.fill(0.0);
-    for b in (0..n).rev() {
-        let own = if b == 0 { 0..BASE } else { 5 + b..6 + b };
+    for (b, body) in bodies.iter().enumerate().rev() {
         let composite = s.composites[b];
-        for k in own {
-            let (S, S_dot) = (&s.S[k], &s.S_dot[k]);
+        for t in s.own[b].clone() {
+            let Screw {
+                velocity: k,
+                S,
+                S_dot,
+            } = &s.screws[t];
             let F1 = composite.times(S_dot) + composite.B_times(S);
             let F2 = composite.times(S);
             let F3 = composite.B_transposed_times(S);
-            for &j in model.path(b).iter().take_while(|&&j| j <= k || b == 0) {
-                out[(j, k)] = s.S[j].dot(&F1);
-                out[(k, j)] = s.S_dot[j].dot(&F2) + s.S[j].angular.dot(&F3);
+            let mut carrier = Some(b);
+            while let Some(a) = carrier {
+                for before in s.screws[s.own[a].clone()]
+                    .iter()
+                    .take_while(|x| a < b || x.velocity < *k)
+                {
+                    out[(before.velocity, *k)] += before.S.dot(&F1);
+                    out[(*k, before.velocity)] += before.S_dot.dot(&F2) + before.S.angular.dot(&F3);
+                }
+                carrier = bodies[a].parent;
             }
-            out[(k, k)] = S.dot(&F1);
+            out[(*k, *k)] += S.dot(&F1);
         }
-        if b > 0 {
-            s.composites[bodies[b].parent] += composite;
+        if let Some(parent) = body.parent {
+            s.composites[parent] += composite;
         }
+    }
+}
+
+impl CoriolisScratch {
+    /// The six screws of a free body, whose velocity is returned.
+    fn add_free(&mut self, first: usize, v: &[f64]) -> Spatial {
+        let v = &v[first..];
+        let base = Spatial {
+            angular: Vector3::new(v[3], v[4], v[5]),
+            linear: Vector3::new(v[0], v[1], v[2]),
+        };
+        let zero = Vector3::zeros();
+        for k in 0..3 {
+            self.screws.push(Screw {
+                velocity: first + k,
+                S: Spatial {
+                    angular: zero,
+                    linear: Vector3::ith(k, 1.0),
+                },
+                S_dot: Spatial::default(),
+            });
+        }
+        for k in 0..3 {
+            let e = Vector3::ith(k, 1.0);
+            // It turns about its own origin, which moves.
+            self.screws.push(Screw {
+                velocity: first + 3 + k,
+                S: Spatial {
+                    angular: e,
+                    linear: zero,
+                },
+                S_dot: Spatial {
+                    angular: zero,
+                    linear: base.linear.cross(&e),
+                },
+            });
+        }
+        base
     }
 }
 
@@ -250,7 +294,7 @@ mod tests {
         let mut q = Configuration::zero(model);
         let v: Vec<f64> = (0..model.nv()).map(|k| (1.7 * k as f64).sin()).collect();
         let turn: Vec<f64> = (0..model.nv()).map(|k| (0.3 + k as f64).cos()).collect();
-        q.advance(&turn, 1.0);
+        q.advance(model, &turn, 1.0);
         (q, v)
     }
 
@@ -310,7 +354,7 @@ mod tests {
             let h = 1e-5;
             let mass_matrix_at = |time: f64| {
                 let mut moved = q.clone();
-                moved.advance(&v, time);
+                moved.advance(&model, &v, time);
                 let mut M = MassMatrix::new(&model);
                 M.update(&model, &Kinematics::of(&model, &moved));
                 M.to_dense(&model)

@@ -12,7 +12,7 @@ pub enum ModelError {
         message: String,
     },
     /// No solids at all.
-    #[error("solids: a model needs at least one solid, the free base")]
+    #[error("solids: a model needs at least one solid")]
     NoSolids,
     /// Two things of one name.
     #[error("{field}: the name {name:?} is used twice")]
@@ -44,13 +44,35 @@ pub enum ModelError {
         /// Path of the field.
         field: String,
     },
-    /// A field that only another kind of solid may have.
-    #[error("{field}: the free base (the first solid) has no {what}")]
-    NotForBase {
+    /// A field that only another kind of joint may have.
+    #[error("{field}: a {joint} joint has no {what}")]
+    NotForJoint {
         /// Path of the field.
         field: String,
         /// The field's name.
         what: &'static str,
+        /// Kind of the joint.
+        joint: &'static str,
+    },
+    /// A solid that is listed among those of another tree.
+    #[error(
+        "{field}: the solids of one tree are listed together, and those under {name:?} have ended"
+    )]
+    OtherTree {
+        /// Path of the field.
+        field: String,
+        /// The root of the tree that it belongs to.
+        name: String,
+    },
+    /// A joint that follows one on another branch, or one that has no coordinate of its own.
+    #[error(
+        "{field}: the joint {name:?} must have a coordinate of its own, and lie on the way to this one or hang on the same solid"
+    )]
+    CoupledApart {
+        /// Path of the field.
+        field: String,
+        /// What was given.
+        name: String,
     },
     /// NaN or infinite.
     #[error("{field}: must be finite, is {value}")]
@@ -173,7 +195,9 @@ impl ModelError {
             | Self::UnknownParent { field, .. }
             | Self::UnknownName { field, .. }
             | Self::Missing { field }
-            | Self::NotForBase { field, .. }
+            | Self::NotForJoint { field, .. }
+            | Self::OtherTree { field, .. }
+            | Self::CoupledApart { field, .. }
             | Self::NotFinite { field, .. }
             | Self::NotPositive { field, .. }
             | Self::Negative { field, .. }
@@ -214,9 +238,11 @@ pub enum StateError {
     },
     /// The report's angles cannot express a rate there.
     #[error(
-        "q[4]: the report's coordinates are singular at a heading of 90 degrees, is {heading} rad"
+        "q[{index}]: the report's coordinates are singular at a heading of 90 degrees, is {heading} rad"
     )]
     SingularCardan {
+        /// Where the angle stands.
+        index: usize,
         /// Middle Cardan angle, rad.
         heading: f64,
     },

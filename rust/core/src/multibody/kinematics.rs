@@ -1,49 +1,26 @@
 //! Forward kinematics: attitude, origin, joint axis and mass centre of every body.
 //!
-//! World axes, positions relative to the trunk origin.
+//! World axes. The places of a tree are relative to its origin: that of its root where the root is free, else the world's.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::model::Model;
+use super::joint::{Coordinate, Coupling, Joint, Motion, Prismatic, Revolute, Spherical};
+use super::model::{Body, Model};
 use super::state::Configuration;
-
-/// What one joint velocity does per unit: a turn about an axis.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Motion {
-    /// Unit vector of the axis, world axes.
-    pub axis: Vector3<f64>,
-    /// A point of the axis, relative to the origin of the tree's places, m.
-    pub place: Vector3<f64>,
-}
-
-impl Motion {
-    /// Velocity of the material point at `x` per unit of the joint's velocity.
-    #[inline]
-    #[must_use]
-    pub fn velocity_at(&self, x: &Vector3<f64>) -> Vector3<f64> {
-        self.axis.cross(&(x - self.place))
-    }
-
-    /// Generalized force on the joint's velocity of a force (N) and its moment about the origin of the tree's places (N m).
-    #[inline]
-    #[must_use]
-    pub fn power(&self, force: &Vector3<f64>, moment: &Vector3<f64>) -> f64 {
-        // a · ((x − r) × f) = a · (x × f − r × f)
-        self.axis.dot(&(moment - self.place.cross(force)))
-    }
-}
 
 /// Poses of all bodies in one configuration. Scratch: sized once for a model, then reused.
 #[derive(Clone, Debug)]
 pub struct Kinematics {
-    origin: Vector3<f64>,
+    /// World position of every tree's origin of places, m.
+    origins: Vec<Vector3<f64>>,
+    tree_of: Vec<usize>,
     /// `R_WB` of each body.
     pub R: Vec<Matrix3<f64>>,
-    /// Origin of each body's frame relative to the trunk origin, world axes, m.
+    /// Origin of each body's frame relative to its tree's origin, world axes, m.
     pub r: Vec<Vector3<f64>>,
     /// What each joint velocity does, by the numbers of [`Model::motions`].
     pub motions: Vec<Motion>,
-    /// Mass centre of each body relative to the trunk origin, world axes, m.
+    /// Mass centre of each body relative to its tree's origin, world axes, m.
     pub c: Vec<Vector3<f64>>,
 }
 
@@ -53,10 +30,11 @@ impl Kinematics {
     pub fn new(model: &Model) -> Self {
         let n = model.bodies().len();
         Self {
-            origin: Vector3::zeros(),
+            origins: vec![Vector3::zeros(); model.trees().len()],
+            tree_of: model.bodies().iter().map(|body| body.tree).collect(),
             R: vec![Matrix3::identity(); n],
             r: vec![Vector3::zeros(); n],
-            motions: vec![Motion::default(); model.n_joints()],
+            motions: vec![Motion::default(); model.n_motions()],
             c: vec![Vector3::zeros(); n],
         }
     }
@@ -80,48 +58,81 @@ impl Kinematics {
     }
 
     fn update_poses<const SPIN: bool>(&mut self, model: &Model, configuration: &Configuration) {
-        let bodies = model.bodies();
-        self.origin = configuration.position;
-        self.R[0] = *configuration.attitude.to_rotation_matrix().matrix();
-        self.r[0] = Vector3::zeros();
-        self.c[0] = self.R[0] * bodies[0].centre_of_mass;
-        for (b, body) in bodies.iter().enumerate().skip(1) {
+        let (world, nowhere) = (Matrix3::identity(), Vector3::zeros());
+        let joints = &configuration.joints;
+        for (b, body) in model.bodies().iter().enumerate() {
             let (before, own) = self.R.split_at_mut(b);
-            let parent = &before[body.parent];
-            let r = self.r[body.parent] + parent * body.position;
-            let fixed = body.rotation.as_ref().map(|fixed| parent * fixed);
-            let frame = fixed.as_ref().unwrap_or(parent);
-            let axis;
-            (own[0], axis) = if SPIN || !body.is_spinner {
-                body.axis.rotate(frame, configuration.joints[b - 1])
-            } else {
-                (*frame, body.axis.turned(frame))
+            let own = &mut own[0];
+            if let Joint::Free(free) = body.joint {
+                let pose = configuration.pose(free);
+                self.origins[body.tree] = pose.position;
+                *own = *pose.attitude.to_rotation_matrix().matrix();
+                self.r[b] = nowhere;
+                self.c[b] = *own * body.centre_of_mass;
+                continue;
+            }
+            let (carrier, r_carrier) = match body.parent {
+                Some(parent) => (&before[parent], self.r[parent]),
+                None => (&world, nowhere),
             };
-            self.motions[b - 1] = Motion { axis, place: r };
+            let mut r = r_carrier + carrier * body.position;
+            let fixed = body.rotation.as_ref().map(|fixed| carrier * fixed);
+            let frame = fixed.as_ref().unwrap_or(carrier);
+            match &body.joint {
+                Joint::Revolute(Revolute { axis, coordinate }) => {
+                    let turned;
+                    (*own, turned) = if SPIN || !body.is_spinner {
+                        axis.rotate(frame, coordinate.of(joints))
+                    } else {
+                        (*frame, axis.turned(frame))
+                    };
+                    let motion = Motion::turn(turned, r);
+                    set_motion(&mut self.motions, body.motion, coordinate, motion);
+                }
+                Joint::Prismatic(Prismatic { axis, coordinate }) => {
+                    let axis = axis.turned(frame);
+                    *own = *frame;
+                    r += axis * coordinate.of(joints);
+                    set_motion(
+                        &mut self.motions,
+                        body.motion,
+                        coordinate,
+                        Motion::slide(axis),
+                    );
+                }
+                Joint::Spherical(Spherical { rotation }) => {
+                    let rotation = configuration.rotations[*rotation].to_rotation_matrix();
+                    *own = frame * rotation.matrix();
+                    let motions = Spherical::motions(frame, &r);
+                    self.motions[body.motions()].copy_from_slice(&motions);
+                }
+                Joint::Free(_) | Joint::Fixed => *own = *frame,
+            }
             self.r[b] = r;
             self.c[b] = if body.is_centred() {
                 r
             } else {
-                r + own[0] * body.centre_of_mass
+                r + *own * body.centre_of_mass
             };
         }
     }
 
-    /// World position of the point to which all places of body `b` are relative, m: the origin of its tree's base.
+    /// World position of the point to which all places of body `b` are relative, m: the origin of its tree's free root, else
+    /// the world's.
     #[inline]
     #[must_use]
-    pub fn origin(&self, _b: usize) -> &Vector3<f64> {
-        &self.origin
+    pub fn origin(&self, b: usize) -> &Vector3<f64> {
+        &self.origins[self.tree_of[b]]
     }
 
-    /// A point of body `b` given in its frame, relative to the trunk origin, world axes.
+    /// A point of body `b` given in its frame, relative to its tree's origin, world axes.
     #[inline]
     #[must_use]
     pub fn point(&self, b: usize, p: &Vector3<f64>) -> Vector3<f64> {
         self.r[b] + self.R[b] * p
     }
 
-    /// Velocity (m/s, world) of the material point of body `b` that is at `x` (relative to the trunk origin).
+    /// Velocity (m/s, world) of the material point of body `b` that is at `x` (relative to its tree's origin).
     #[must_use]
     pub fn point_velocity(
         &self,
@@ -130,8 +141,14 @@ impl Kinematics {
         x: &Vector3<f64>,
         v: &[f64],
     ) -> Vector3<f64> {
-        let mut velocity = Vector3::new(v[0], v[1], v[2]) + Vector3::new(v[3], v[4], v[5]).cross(x);
-        for (&k, &m) in model.path(b)[model.lead(b)..].iter().zip(model.motions(b)) {
+        let (lead, rest) = model.split_path(b);
+        let mut velocity = match v[lead].first_chunk() {
+            Some(&[x_dot, y_dot, z_dot, w_x, w_y, w_z]) => {
+                Vector3::new(x_dot, y_dot, z_dot) + Vector3::new(w_x, w_y, w_z).cross(x)
+            }
+            None => Vector3::zeros(),
+        };
+        for (&k, &m) in rest.iter().zip(model.motions(b)) {
             velocity += self.motions[m].velocity_at(x) * v[k];
         }
         velocity
@@ -150,10 +167,60 @@ impl Kinematics {
         row: &mut [f64],
     ) {
         let moment = x.cross(d);
-        row[..3].copy_from_slice(d.as_slice());
-        row[3..6].copy_from_slice(moment.as_slice());
-        for (entry, &m) in row[model.lead(b)..].iter_mut().zip(model.motions(b)) {
+        let (lead, rest) = row.split_at_mut(model.lead(b));
+        if let Some((linear, angular)) = lead.split_at_mut_checked(3) {
+            linear.copy_from_slice(d.as_slice());
+            angular.copy_from_slice(moment.as_slice());
+        }
+        for (entry, &m) in rest.iter_mut().zip(model.motions(b)) {
             *entry = self.motions[m].power(d, &moment);
         }
     }
+}
+
+/// Enters the motion of a joint's rate, and what the velocity gives in all to the bodies of a coupled joint.
+#[inline]
+fn set_motion(motions: &mut [Motion], m: usize, coordinate: &Coordinate, of_rate: Motion) {
+    motions[m] = of_rate;
+    if let Some(coupling) = &coordinate.coupling {
+        couple(motions, m, coupling);
+    }
+}
+
+#[cold]
+fn couple(motions: &mut [Motion], m: usize, coupling: &Coupling) {
+    motions[m] = motions[m] * coupling.ratio;
+    if let Some((before, combined)) = coupling.combined {
+        motions[combined] = motions[before] + motions[m];
+    }
+}
+
+/// Velocity of a body relative to its carrier, world axes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct JointRate {
+    /// rad/s.
+    pub spin: Vector3<f64>,
+    /// m/s.
+    pub slide: Vector3<f64>,
+}
+
+/// What a joint that is not free does at the velocity `v` (nv).
+#[cold]
+pub(super) fn joint_rate(body: &Body, kinematics: &Kinematics, v: &[f64]) -> JointRate {
+    let none = Vector3::zeros();
+    let axis = || kinematics.motions[body.motion].axis() * v[body.velocity];
+    let (spin, slide) = match body.joint {
+        Joint::Revolute(_) => (axis(), none),
+        Joint::Prismatic(_) => (none, axis()),
+        Joint::Spherical(_) => (spherical_spin(body, kinematics, v), none),
+        Joint::Free(_) | Joint::Fixed => (none, none),
+    };
+    JointRate { spin, slide }
+}
+
+fn spherical_spin(body: &Body, kinematics: &Kinematics, v: &[f64]) -> Vector3<f64> {
+    let motions = kinematics.motions[body.motions()].iter();
+    (motions.zip(&v[body.velocity..]))
+        .map(|(motion, v)| motion.axis() * *v)
+        .sum()
 }

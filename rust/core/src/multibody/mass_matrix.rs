@@ -2,16 +2,20 @@
 //!
 //! Rows are stored **along paths**: row `k` holds `M[k][i]` for the ancestors `i` of `k`, base first,
 //! itself last. An ancestor's row is then a prefix of its descendants' rows, so the factorisation and the
-//! solves are dense loops over short contiguous pieces and never touch a structural zero. Every path begins with the six
-//! velocities of the base: loops over them are kept apart, as their length is known.
+//! solves are dense loops over short contiguous pieces and never touch a structural zero. In a tree on a free base every path begins
+//! with the six velocities of the base: loops over them are kept apart, as their length is known.
 //!
 //! Source: Featherstone 2008, *Rigid Body Dynamics Algorithms*, ch. 6 (composite bodies), ch. 8
 //! (branch-induced sparsity).
 
+use std::cmp::Ordering;
+use std::ops::Range;
+
 use nalgebra::{DMatrix, Vector3};
 
+use super::joint::Motion;
 use super::kinematics::Kinematics;
-use super::model::{BASE, Model};
+use super::model::{BASE, Model, Tree};
 use crate::spatial::SymmetricMatrix3;
 
 /// The mass matrix, its lower triangle along paths; kg, kg m, kg m².
@@ -22,12 +26,23 @@ pub struct MassMatrix {
     composites: Vec<Composite>,
 }
 
-/// A body and all that it carries: mass, first moment and inertia about the trunk origin.
+/// A body and all that it carries: mass, first moment and inertia about its tree's origin.
 #[derive(Clone, Copy, Debug, Default)]
 struct Composite {
     mass: f64,
     moment: Vector3<f64>,
     inertia: SymmetricMatrix3,
+}
+
+impl Composite {
+    /// Linear momentum, and angular momentum about the tree's origin, where it moves with a motion.
+    #[inline]
+    fn momentum(&self, motion: &Motion) -> (Vector3<f64>, Vector3<f64>) {
+        let (a, v) = motion.twist();
+        let f = v * self.mass + a.cross(&self.moment);
+        let n = self.inertia.times(&a) + self.moment.cross(&v);
+        (f, n)
+    }
 }
 
 impl MassMatrix {
@@ -58,29 +73,57 @@ impl MassMatrix {
                 inertia,
             };
         }
-        for b in (1..bodies.len()).rev() {
-            let Composite {
-                mass,
-                moment,
-                inertia,
-            } = self.composites[b];
-            let a = kinematics.motions[b - 1].axis;
-            // Momentum of the composite body when its joint turns at unit rate, about the trunk origin.
-            let v = kinematics.r[b].cross(&a);
-            let f = v * mass + a.cross(&moment);
-            let n = inertia.times(&a) + moment.cross(&v);
-            let (base, joints) = self.rows[(5 + b) * self.stride..].split_at_mut(BASE);
-            base[..3].copy_from_slice(f.as_slice());
-            base[3..].copy_from_slice(n.as_slice());
-            for (entry, &m) in joints.iter_mut().zip(model.motions(b)) {
-                *entry = kinematics.motions[m].power(&f, &n);
+        for tree in model.trees() {
+            if tree.is_free {
+                self.update_tree::<BASE>(model, tree, kinematics);
+            } else {
+                self.update_tree::<0>(model, tree, kinematics);
             }
-            let parent = &mut self.composites[bodies[b].parent];
-            parent.mass += mass;
-            parent.moment += moment;
-            parent.inertia += inertia;
         }
-        let (base, w) = (self.composites[0], self.stride);
+        for &b in model.coupled_bodies() {
+            self.add_coupled(model, kinematics, b);
+        }
+        for &(k, inertia) in model.armatures() {
+            self.add_to_diagonal(model, k, inertia);
+        }
+    }
+
+    /// Rows of a tree of which `LEAD` velocities are a free root's; of the coupled joints nothing but what they carry.
+    fn update_tree<const LEAD: usize>(
+        &mut self,
+        model: &Model,
+        tree: &Tree,
+        kinematics: &Kinematics,
+    ) {
+        let bodies = model.bodies();
+        for b in tree.bodies.clone().rev() {
+            let body = &bodies[b];
+            let composite = self.composites[b];
+            if !body.is_coupled {
+                for i in 0..body.n_motions {
+                    let (f, n) = composite.momentum(&kinematics.motions[body.motion + i]);
+                    let row = &mut self.rows[(body.velocity + i) * self.stride..];
+                    let (base, joints) = row.split_at_mut(LEAD);
+                    if LEAD == BASE {
+                        base[..3].copy_from_slice(f.as_slice());
+                        base[3..].copy_from_slice(n.as_slice());
+                    }
+                    for (entry, &m) in joints.iter_mut().zip(model.motions(b)) {
+                        *entry = kinematics.motions[m].power(&f, &n);
+                    }
+                }
+            }
+            if let Some(parent) = body.parent {
+                let parent = &mut self.composites[parent];
+                parent.mass += composite.mass;
+                parent.moment += composite.moment;
+                parent.inertia += composite.inertia;
+            }
+        }
+        if LEAD == 0 {
+            return;
+        }
+        let (base, w) = (self.composites[tree.bodies.start], self.stride);
         let (m, s, I) = (base.mass, base.moment, base.inertia);
         let base = [
             [m, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -91,11 +134,37 @@ impl MassMatrix {
             [-s.y, s.x, 0.0, I.xz, I.yz, I.zz],
         ];
         for (k, row) in base.iter().enumerate() {
-            self.rows[k * w..][..6].copy_from_slice(row);
+            self.rows[(tree.velocities.start + k) * w..][..BASE].copy_from_slice(row);
         }
     }
 
-    /// Diagonal entry of velocity `k` (a joint: `k ≥ 6`).
+    /// Adds what the motion of a coupled joint has in common with all that moves its carrier, and with itself.
+    fn add_coupled(&mut self, model: &Model, kinematics: &Kinematics, b: usize) {
+        let body = &model.bodies()[b];
+        let (k, own) = (body.velocity, &kinematics.motions[body.motion]);
+        let (f, n) = self.composites[b].momentum(own);
+        let at = last(model, k);
+        let w = self.stride;
+        self.rows[k * w + at] += own.power(&f, &n);
+        let Some(parent) = body.parent else {
+            return;
+        };
+        let (lead, rest) = model.split_path(parent);
+        let of_base = f.iter().chain(&n).copied();
+        for (entry, value) in self.rows[k * w..].iter_mut().zip(of_base).take(lead.len()) {
+            *entry += value;
+        }
+        for ((p, &i), &m) in rest.iter().enumerate().zip(model.motions(parent)) {
+            let shared = kinematics.motions[m].power(&f, &n);
+            match i.cmp(&k) {
+                Ordering::Less => self.rows[k * w + lead.len() + p] += shared,
+                Ordering::Equal => self.rows[k * w + at] += 2.0 * shared,
+                Ordering::Greater => self.rows[i * w + at] += shared,
+            }
+        }
+    }
+
+    /// Diagonal entry of velocity `k`.
     #[inline]
     #[must_use]
     pub fn diagonal(&self, model: &Model, k: usize) -> f64 {
@@ -162,6 +231,8 @@ pub struct FactoredMassMatrix {
     stride: usize,
     rows: Vec<f64>,
     inverse_root: Vec<f64>,
+    /// Whether a velocity belongs to a tree on a free base.
+    is_free: Vec<bool>,
 }
 
 impl FactoredMassMatrix {
@@ -172,41 +243,58 @@ impl FactoredMassMatrix {
             stride: model.path_stride(),
             rows: vec![0.0; model.nv() * model.path_stride()],
             inverse_root: vec![0.0; model.nv()],
+            is_free: (model.trees().iter())
+                .flat_map(|tree| tree.velocities.clone().map(|_| tree.is_free))
+                .collect(),
         }
     }
 
     fn update(&mut self, model: &Model) -> bool {
+        (model.trees().iter()).all(|tree| {
+            if tree.is_free {
+                self.update_tree::<BASE>(model, tree)
+            } else {
+                self.update_tree::<0>(model, tree)
+            }
+        })
+    }
+
+    fn update_tree<const LEAD: usize>(&mut self, model: &Model, tree: &Tree) -> bool {
         let w = self.stride;
-        let (base_rows, joint_rows) = self.rows.split_at_mut(BASE * w);
-        for j in (0..model.n_joints()).rev() {
+        let Range { start, end } = tree.velocities;
+        let first = start + LEAD;
+        let roots = &mut self.inverse_root[start..end];
+        let rows = &mut self.rows[start * w..end * w];
+        let (base_rows, joint_rows) = rows.split_at_mut(LEAD * w);
+        for j in (0..end - first).rev() {
             let (above, own) = joint_rows.split_at_mut(j * w);
-            let path = &model.path(1 + j)[BASE..];
+            let path = &model.velocity_path(first + j)[LEAD..];
             let n = path.len() - 1;
-            let (base, joints) = own[..=BASE + n].split_at_mut(BASE);
+            let (base, joints) = own[..=LEAD + n].split_at_mut(LEAD);
             let Some(inverse_root) = inverse_root(joints[n]) else {
                 return false;
             };
-            self.inverse_root[BASE + j] = inverse_root;
+            roots[LEAD + j] = inverse_root;
             let inverse = inverse_root * inverse_root;
             for p in (0..n).rev() {
                 let a = joints[p] * inverse;
-                let (ancestor, rest) = above[(path[p] - BASE) * w..].split_at_mut(BASE);
+                let (ancestor, rest) = above[(path[p] - first) * w..].split_at_mut(LEAD);
                 subtract(ancestor, a, base);
                 subtract(&mut rest[..=p], a, &joints[..=p]);
                 joints[p] = a;
             }
-            let factors: [f64; BASE] = std::array::from_fn(|p| base[p] * inverse);
-            for p in 0..BASE {
+            let factors: [f64; LEAD] = std::array::from_fn(|p| base[p] * inverse);
+            for p in 0..LEAD {
                 subtract(&mut base_rows[p * w..][..=p], factors[p], &base[..=p]);
             }
             base.copy_from_slice(&factors);
         }
-        for k in (0..BASE).rev() {
+        for k in (0..LEAD).rev() {
             let (above, own) = base_rows.split_at_mut(k * w);
             let Some(inverse_root) = inverse_root(own[k]) else {
                 return false;
             };
-            self.inverse_root[k] = inverse_root;
+            roots[k] = inverse_root;
             let inverse = inverse_root * inverse_root;
             for p in (0..k).rev() {
                 let a = own[p] * inverse;
@@ -219,41 +307,68 @@ impl FactoredMassMatrix {
 
     /// `y ← D^(-1/2) L^(-T) y` for a full vector (nv).
     pub fn half_solve(&self, model: &Model, y: &mut [f64]) {
-        let (base, joints) = y.split_at_mut(BASE);
+        for tree in model.trees() {
+            if tree.is_free {
+                self.half_solve_tree::<BASE>(model, tree, y);
+            } else {
+                self.half_solve_tree::<0>(model, tree, y);
+            }
+        }
+    }
+
+    fn half_solve_tree<const LEAD: usize>(&self, model: &Model, tree: &Tree, y: &mut [f64]) {
+        let start = tree.velocities.start;
+        let first = start + LEAD;
+        let rows = &self.rows[start * self.stride..];
+        let roots = &self.inverse_root[tree.velocities.clone()];
+        let (base, joints) = y[tree.velocities.clone()].split_at_mut(LEAD);
         for j in (0..joints.len()).rev() {
             let value = joints[j];
-            let path = &model.path(1 + j)[BASE..];
-            let (row, rest) = self.rows[(BASE + j) * self.stride..].split_at(BASE);
+            let path = &model.velocity_path(first + j)[LEAD..];
+            let (row, rest) = rows[(LEAD + j) * self.stride..].split_at(LEAD);
             subtract(base, value, row);
             for (entry, &i) in rest.iter().zip(&path[..path.len() - 1]) {
-                joints[i - BASE] -= entry * value;
+                joints[i - first] -= entry * value;
             }
-            joints[j] = value * self.inverse_root[BASE + j];
+            joints[j] = value * roots[LEAD + j];
         }
-        for k in (0..BASE).rev() {
+        for k in (0..LEAD).rev() {
             let value = base[k];
-            subtract(&mut base[..k], value, &self.rows[k * self.stride..][..k]);
-            base[k] = value * self.inverse_root[k];
+            subtract(&mut base[..k], value, &rows[k * self.stride..][..k]);
+            base[k] = value * roots[k];
         }
     }
 
     /// `y ← D^(-1/2) L^(-T) y` for several columns along a path (nothing else is nonzero).
     #[inline]
     pub fn half_solve_path<const N: usize>(&self, path: &[usize], y: &mut [[f64; N]]) {
-        let (base, joints) = y.split_at_mut(BASE);
-        for (p, &k) in path[BASE..].iter().enumerate().rev() {
+        match path.first() {
+            Some(&k) if self.is_free[k] => self.half_solve_path_of::<N, BASE>(path, y),
+            _ => self.half_solve_path_of::<N, 0>(path, y),
+        }
+    }
+
+    #[inline]
+    fn half_solve_path_of<const N: usize, const LEAD: usize>(
+        &self,
+        path: &[usize],
+        y: &mut [[f64; N]],
+    ) {
+        let (base, joints) = y.split_at_mut(LEAD);
+        for (p, &k) in path[LEAD..].iter().enumerate().rev() {
             let (before, own) = joints.split_at_mut(p);
             let value = own[0];
-            let (row, rest) = self.rows[k * self.stride..].split_at(BASE);
+            let (row, rest) = self.rows[k * self.stride..].split_at(LEAD);
             subtract_columns(base, &value, row);
             subtract_columns(before, &value, &rest[..p]);
             own[0] = value.map(|x| x * self.inverse_root[k]);
         }
-        for k in (0..BASE).rev() {
+        let start = path.first().copied().unwrap_or(0);
+        for k in (0..LEAD).rev() {
             let (before, own) = base.split_at_mut(k);
             let value = own[0];
-            subtract_columns(before, &value, &self.rows[k * self.stride..][..k]);
-            own[0] = value.map(|x| x * self.inverse_root[k]);
+            subtract_columns(before, &value, &self.rows[(start + k) * self.stride..][..k]);
+            own[0] = value.map(|x| x * self.inverse_root[start + k]);
         }
     }
 
@@ -279,23 +394,37 @@ impl FactoredMassMatrix {
 
     /// `x ← L^(-1) D^(-1/2) x`: with [`Self::half_solve`] before it, `M^(-1)`.
     pub fn half_solve_back(&self, model: &Model, x: &mut [f64]) {
-        let (base, joints) = x.split_at_mut(BASE);
-        for k in 0..BASE {
-            let mut value = base[k] * self.inverse_root[k];
-            for (entry, x) in self.rows[k * self.stride..][..k].iter().zip(&*base) {
+        for tree in model.trees() {
+            if tree.is_free {
+                self.half_solve_back_tree::<BASE>(model, tree, x);
+            } else {
+                self.half_solve_back_tree::<0>(model, tree, x);
+            }
+        }
+    }
+
+    fn half_solve_back_tree<const LEAD: usize>(&self, model: &Model, tree: &Tree, x: &mut [f64]) {
+        let start = tree.velocities.start;
+        let first = start + LEAD;
+        let rows = &self.rows[start * self.stride..];
+        let roots = &self.inverse_root[tree.velocities.clone()];
+        let (base, joints) = x[tree.velocities.clone()].split_at_mut(LEAD);
+        for k in 0..LEAD {
+            let mut value = base[k] * roots[k];
+            for (entry, x) in rows[k * self.stride..][..k].iter().zip(&*base) {
                 value -= entry * x;
             }
             base[k] = value;
         }
         for j in 0..joints.len() {
-            let path = &model.path(1 + j)[BASE..];
-            let (row, rest) = self.rows[(BASE + j) * self.stride..].split_at(BASE);
-            let mut value = joints[j] * self.inverse_root[BASE + j];
+            let path = &model.velocity_path(first + j)[LEAD..];
+            let (row, rest) = rows[(LEAD + j) * self.stride..].split_at(LEAD);
+            let mut value = joints[j] * roots[LEAD + j];
             for (entry, x) in row.iter().zip(&*base) {
                 value -= entry * x;
             }
             for (entry, &i) in rest.iter().zip(&path[..path.len() - 1]) {
-                value -= entry * joints[i - BASE];
+                value -= entry * joints[i - first];
             }
             joints[j] = value;
         }
@@ -336,7 +465,7 @@ mod tests {
         let model = Model::rover();
         let mut configuration = Configuration::zero(&model);
         let v: Vec<f64> = (0..model.nv()).map(|k| (k as f64 * 0.7).sin()).collect();
-        configuration.advance(&v, 1.0);
+        configuration.advance(&model, &v, 1.0);
         let kinematics = Kinematics::of(&model, &configuration);
         let mut M = MassMatrix::new(&model);
         M.update(&model, &kinematics);

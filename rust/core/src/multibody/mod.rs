@@ -1,7 +1,9 @@
-//! The tree of solids: from its description to mass matrix, bias, energy and momentum.
+//! Trees of solids: from their description to mass matrix, bias, energy and momentum.
 //!
-//! All spatial quantities of a step are taken in **world axes about the trunk origin**: composite
-//! inertias then add without any transformation, and a rover far from the world's origin loses no digit.
+//! A machine is one or several trees of bodies under the joints of a catalogue ([`joint`]); the root of a tree is free, or a joint ties
+//! it to the world. All spatial quantities of a tree are taken in **world axes about one origin**, that of its root where the root is
+//! free and the world's otherwise: composite inertias then add without any transformation, and a rover far from the world's origin
+//! loses no digit.
 
 pub mod bias;
 pub mod coordinates;
@@ -18,14 +20,18 @@ pub mod state;
 
 pub use bias::bias;
 pub use description::{
-    Hold, ModelDescription, Shape, SolidDescription, TagDescription, WheelDescription,
+    CouplingDescription, Hold, JointKind, ModelDescription, Shape, SolidDescription, Spring,
+    TagDescription, WheelDescription,
 };
 pub use error::{ModelError, StateError};
-pub use joint::JointAxis;
-pub use kinematics::{Kinematics, Motion};
+pub use joint::{Joint, JointAxis, Motion, Pose};
+pub use kinematics::Kinematics;
 pub use mass_matrix::{FactoredMassMatrix, MassMatrix};
 pub(crate) use model::fingerprint;
-pub use model::{BASE, Body, Frame, MAX_SOLIDS, Model, Wheel};
+pub use model::{
+    BASE, Body, CollisionBox, CollisionSphere, Frame, JointProperties, MAX_SOLIDS, Model, Passive,
+    Tree, Wheel,
+};
 pub use momentum::{Energy, EnergyScratch, Momentum};
 pub use motor::{DriveTrial, Motor, MotorRegime};
 pub use state::Configuration;

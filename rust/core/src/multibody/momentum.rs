@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::kinematics::Kinematics;
+use super::joint::{Joint, Prismatic, Revolute, Spherical};
+use super::kinematics::{JointRate, Kinematics, joint_rate};
 use super::model::{Body, Model};
 use super::state::Configuration;
 
@@ -32,32 +33,43 @@ pub struct Momentum {
     pub angular: Vector3<f64>,
 }
 
-/// Momentum of each body about the trunk origin shifted by `−about`, that is about the point
-/// `base − about`; also returns the kinetic energy (J).
+/// Momentum of each body about a point of its tree, and the kinetic energy of all, rotors included (J).
 ///
-/// `out`: one entry a body.
+/// `about`: the origin of each tree's places relative to that point, m. `out`: one entry a body.
 pub fn body_momenta(
     model: &Model,
     kinematics: &Kinematics,
     v: &[f64],
-    about: &Vector3<f64>,
+    about: impl Fn(usize) -> Vector3<f64>,
     out: &mut [Momentum],
 ) -> f64 {
     let mut kinetic = 0.0;
     // Velocity of each frame's origin and angular velocity ride along the tree in `out` until overwritten.
     for (b, body) in model.bodies().iter().enumerate() {
-        let (origin, omega) = if b == 0 {
-            (
-                Vector3::new(v[0], v[1], v[2]),
-                Vector3::new(v[3], v[4], v[5]),
-            )
-        } else {
-            let p = &out[body.parent];
-            let d = kinematics.r[b] - kinematics.r[body.parent];
-            (
-                p.linear + p.angular.cross(&d),
-                p.angular + kinematics.motions[b - 1].axis * v[5 + b],
-            )
+        let (origin, omega) = match (&body.joint, body.parent) {
+            (Joint::Free(_), _) => {
+                let v = &v[body.velocity..];
+                (
+                    Vector3::new(v[0], v[1], v[2]),
+                    Vector3::new(v[3], v[4], v[5]),
+                )
+            }
+            (Joint::Revolute(_), Some(parent)) => {
+                let p = &out[parent];
+                let d = kinematics.r[b] - kinematics.r[parent];
+                (
+                    p.linear + p.angular.cross(&d),
+                    p.angular + kinematics.motions[body.motion].axis() * v[body.velocity],
+                )
+            }
+            (_, parent) => {
+                let (p, d) = match parent {
+                    Some(parent) => (out[parent], kinematics.r[b] - kinematics.r[parent]),
+                    None => (Momentum::default(), Vector3::zeros()),
+                };
+                let JointRate { spin, slide } = joint_rate(body, kinematics, v);
+                (p.linear + p.angular.cross(&d) + slide, p.angular + spin)
+            }
         };
         out[b] = Momentum {
             linear: origin,
@@ -80,8 +92,11 @@ pub fn body_momenta(
         kinetic += 0.5 * (p.dot(&velocity) + spin.dot(&w));
         out[b] = Momentum {
             linear: p,
-            angular: A * spin + (kinematics.c[b] + about).cross(&p),
+            angular: A * spin + (kinematics.c[b] + about(body.tree)).cross(&p),
         };
+    }
+    for &(k, inertia) in model.armatures() {
+        kinetic += 0.5 * inertia * v[k] * v[k];
     }
     kinetic
 }
@@ -89,13 +104,14 @@ pub fn body_momenta(
 /// Mass centre, world, m.
 #[must_use]
 pub fn centre_of_mass(model: &Model, kinematics: &Kinematics) -> Vector3<f64> {
-    let moment: Vector3<f64> = model
-        .bodies()
-        .iter()
-        .zip(&kinematics.c)
+    let mut moment: Vector3<f64> = (model.bodies().iter().zip(&kinematics.c))
         .map(|(body, c)| c * body.mass)
         .sum();
-    *kinematics.origin(0) + moment / model.mass()
+    for tree in &model.trees()[1..] {
+        let from_first = kinematics.origin(tree.bodies.start) - kinematics.origin(0);
+        moment += from_first * tree.mass;
+    }
+    kinematics.origin(0) + moment / model.mass()
 }
 
 /// Scratch of [`energy_and_momentum`]: sized once for a model.
@@ -114,7 +130,7 @@ impl EnergyScratch {
     }
 }
 
-/// Pose and velocity of a body's frame, world axes, places relative to the trunk origin.
+/// Pose and velocity of a body's frame, world axes, places relative to the tree's origin.
 #[derive(Clone, Copy, Debug, Default)]
 struct Moving {
     R: Matrix3<f64>,
@@ -134,39 +150,93 @@ pub fn energy_and_momentum(
     let bodies = model.bodies();
     let moving = &mut scratch.moving[..bodies.len()];
     let mut sums = Sums::default();
-    moving[0] = Moving {
-        R: *q.attitude.to_rotation_matrix().matrix(),
-        r: Vector3::zeros(),
-        velocity: Vector3::new(v[0], v[1], v[2]),
-        omega: Vector3::new(v[3], v[4], v[5]),
+    let world = Moving {
+        R: Matrix3::identity(),
+        ..Moving::default()
     };
-    sums.add(&bodies[0], &moving[0]);
-    let joints = q.joints.iter().zip(&v[6..]);
-    for ((b, body), (angle, rate)) in bodies.iter().enumerate().skip(1).zip(joints) {
+    let mut height = Vector3::zeros();
+    for (b, body) in bodies.iter().enumerate() {
         let (before, own) = moving.split_at_mut(b);
-        let (carrier, own) = (&before[body.parent], &mut own[0]);
-        let lever = carrier.R * body.position;
-        own.r = carrier.r + lever;
-        own.velocity = carrier.velocity + carrier.omega.cross(&lever);
-        let fixed = body.rotation.as_ref().map(|fixed| carrier.R * fixed);
-        let frame = fixed.as_ref().unwrap_or(&carrier.R);
-        let axis;
-        (own.R, axis) = if body.is_spinner {
-            (*frame, body.axis.turned(frame))
-        } else {
-            body.axis.rotate(frame, *angle)
-        };
-        own.omega = carrier.omega + axis * *rate;
+        let own = &mut own[0];
+        let carrier = || body.parent.map_or(&world, |parent| &before[parent]);
+        match &body.joint {
+            Joint::Free(free) => {
+                let (pose, v) = (q.pose(*free), &v[body.velocity..]);
+                *own = Moving {
+                    R: *pose.attitude.to_rotation_matrix().matrix(),
+                    r: Vector3::zeros(),
+                    velocity: Vector3::new(v[0], v[1], v[2]),
+                    omega: Vector3::new(v[3], v[4], v[5]),
+                };
+                height += pose.position * model.trees()[body.tree].mass;
+            }
+            Joint::Revolute(joint) => own.turn(carrier(), body, joint, q, v),
+            _ => own.follow(carrier(), body, q, v),
+        }
         sums.add(body, own);
+    }
+    for &(k, inertia) in model.armatures() {
+        sums.twice_kinetic += inertia * v[k] * v[k];
     }
     let energy = Energy {
         kinetic: 0.5 * sums.twice_kinetic,
-        potential: -gravity.dot(&(q.position * model.mass() + sums.moment)),
+        potential: -gravity.dot(&(height + sums.moment)),
     };
     (energy, sums.momentum)
 }
 
-/// Twice the kinetic energy, linear momentum and first moment about the trunk origin of the bodies so far.
+impl Moving {
+    /// Places a body under a revolute joint on its carrier.
+    #[inline]
+    fn turn(
+        &mut self,
+        carrier: &Self,
+        body: &Body,
+        joint: &Revolute,
+        q: &Configuration,
+        v: &[f64],
+    ) {
+        let lever = carrier.R * body.position;
+        self.r = carrier.r + lever;
+        self.velocity = carrier.velocity + carrier.omega.cross(&lever);
+        let fixed = body.rotation.as_ref().map(|fixed| carrier.R * fixed);
+        let frame = fixed.as_ref().unwrap_or(&carrier.R);
+        let axis;
+        (self.R, axis) = if body.is_spinner {
+            (*frame, joint.axis.turned(frame))
+        } else {
+            joint.axis.rotate(frame, joint.coordinate.of(&q.joints))
+        };
+        self.omega = carrier.omega + axis * joint.coordinate.rate(v[body.velocity]);
+    }
+
+    /// Places any other body on its carrier.
+    #[cold]
+    fn follow(&mut self, carrier: &Self, body: &Body, q: &Configuration, v: &[f64]) {
+        let mut lever = carrier.R * body.position;
+        let frame = body.rotation.map_or(carrier.R, |fixed| carrier.R * fixed);
+        let k = body.velocity;
+        self.R = frame;
+        self.omega = carrier.omega;
+        self.velocity = carrier.velocity;
+        match &body.joint {
+            Joint::Prismatic(Prismatic { axis, coordinate }) => {
+                let axis = axis.turned(&frame);
+                lever += axis * coordinate.of(&q.joints);
+                self.velocity += axis * coordinate.rate(v[k]);
+            }
+            Joint::Spherical(Spherical { rotation }) => {
+                self.R = frame * q.rotations[*rotation].to_rotation_matrix().matrix();
+                self.omega += frame * Vector3::new(v[k], v[k + 1], v[k + 2]);
+            }
+            Joint::Free(_) | Joint::Fixed | Joint::Revolute(_) => {}
+        }
+        self.r = carrier.r + lever;
+        self.velocity += carrier.omega.cross(&lever);
+    }
+}
+
+/// Twice the kinetic energy, linear momentum and first moment about their trees' origins of the bodies so far.
 #[derive(Default)]
 struct Sums {
     twice_kinetic: f64,
@@ -198,7 +268,8 @@ impl Sums {
 #[must_use]
 pub fn energy(model: &Model, kinematics: &Kinematics, v: &[f64], gravity: &Vector3<f64>) -> Energy {
     let mut momenta = vec![Momentum::default(); model.bodies().len()];
-    let kinetic = body_momenta(model, kinematics, v, &Vector3::zeros(), &mut momenta);
+    let here = |_| Vector3::zeros();
+    let kinetic = body_momenta(model, kinematics, v, here, &mut momenta);
     Energy {
         kinetic,
         potential: -model.mass() * gravity.dot(&centre_of_mass(model, kinematics)),
@@ -209,7 +280,8 @@ pub fn energy(model: &Model, kinematics: &Kinematics, v: &[f64], gravity: &Vecto
 #[must_use]
 pub fn momentum(model: &Model, kinematics: &Kinematics, v: &[f64]) -> Momentum {
     let mut momenta = vec![Momentum::default(); model.bodies().len()];
-    body_momenta(model, kinematics, v, kinematics.origin(0), &mut momenta);
+    let about = |tree: usize| *kinematics.origin(model.trees()[tree].bodies.start);
+    body_momenta(model, kinematics, v, about, &mut momenta);
     Momentum {
         linear: momenta.iter().map(|m| m.linear).sum(),
         angular: momenta.iter().map(|m| m.angular).sum(),
@@ -231,7 +303,7 @@ mod tests {
         for model in [rover, welded] {
             let mut q = Configuration::zero(&model);
             let v: Vec<f64> = (0..model.nv()).map(|k| (1.7 * k as f64).sin()).collect();
-            q.advance(&v, 0.8);
+            q.advance(&model, &v, 0.8);
             let gravity = Vector3::new(0.3, -9.81, 1.0);
             let kinematics = Kinematics::of(&model, &q);
             let mut scratch = EnergyScratch::new(&model);

@@ -3,18 +3,25 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::joint::{Free, Joint, Pose, Spherical};
 use super::model::Model;
-use crate::spatial::exp_rotation;
 
-/// Where the machine is: trunk origin and attitude, joint angles. A point of R³ × SO(3) × R^n.
+/// How far the squared length of a unit quaternion may be from 1: the steps keep it within rounding.
+const UNIT: f64 = 1e-12;
+
+/// Where the machine is: a point of the product of its joints' manifolds.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct Configuration {
-    /// Trunk origin, world, m.
+    /// Origin of the first body, world, m; zero where that body is not free.
     pub position: Vector3<f64>,
-    /// Attitude `R_WB`.
+    /// Attitude `R_WB` of the first body; the identity where it is not free.
     pub attitude: UnitQuaternion<f64>,
-    /// Joint angles in the order of the bodies, rad.
+    /// Coordinates of the revolute (rad) and prismatic (m) joints in the order of the bodies (n_joints).
     pub joints: Vec<f64>,
+    /// Poses of the free bodies other than the first.
+    pub others: Vec<Pose>,
+    /// Rotations of the spherical joints, from the body's frame to the joint's.
+    pub rotations: Vec<UnitQuaternion<f64>>,
 }
 
 impl Clone for Configuration {
@@ -23,6 +30,8 @@ impl Clone for Configuration {
             position: self.position,
             attitude: self.attitude,
             joints: self.joints.clone(),
+            others: self.others.clone(),
+            rotations: self.rotations.clone(),
         }
     }
 
@@ -31,6 +40,8 @@ impl Clone for Configuration {
         self.position = other.position;
         self.attitude = other.attitude;
         self.joints.clone_from(&other.joints);
+        self.others.clone_from(&other.others);
+        self.rotations.clone_from(&other.rotations);
     }
 }
 
@@ -42,28 +53,92 @@ impl Configuration {
             position: Vector3::zeros(),
             attitude: UnitQuaternion::identity(),
             joints: vec![0.0; model.n_joints()],
+            others: vec![Pose::default(); model.n_poses() - 1],
+            rotations: vec![UnitQuaternion::identity(); model.n_rotations()],
         }
     }
 
-    /// `self = from ⊕ h v`: moves with the velocity `v` (nv) for `h` seconds along the exponential map.
-    ///
-    /// The angular velocity is in world axes, so the turn multiplies from the left.
-    pub fn set_moved(&mut self, from: &Self, v: &[f64], h: f64) {
-        self.position = from.position + Vector3::new(v[0], v[1], v[2]) * h;
-        let turn = exp_rotation(&(Vector3::new(v[3], v[4], v[5]) * h));
-        self.attitude = turn * from.attitude;
-        for ((q, q0), rate) in self.joints.iter_mut().zip(&from.joints).zip(&v[6..]) {
-            *q = q0 + h * rate;
+    /// Pose of a free body.
+    #[inline]
+    #[must_use]
+    pub fn pose(&self, free: Free) -> Pose {
+        match free.pose.checked_sub(1) {
+            None => Pose {
+                position: self.position,
+                attitude: self.attitude,
+            },
+            Some(i) => self.others[i],
+        }
+    }
+
+    /// Places a free body.
+    #[inline]
+    pub fn set_pose(&mut self, free: Free, pose: Pose) {
+        match free.pose.checked_sub(1) {
+            None => (self.position, self.attitude) = (pose.position, pose.attitude),
+            Some(i) => self.others[i] = pose,
+        }
+    }
+
+    /// `self = from ⊕ h v`: moves with the velocity `v` (nv) for `h` seconds along the exponential maps of the joints.
+    pub fn set_moved(&mut self, model: &Model, from: &Self, v: &[f64], h: f64) {
+        let joints = self.joints.iter_mut().zip(&from.joints);
+        for ((q, q0), &k) in joints.zip(model.joint_velocities()) {
+            *q = q0 + h * v[k];
+        }
+        for (joint, k) in model.rotating_joints() {
+            match joint {
+                Joint::Free(free) => self.set_pose(*free, from.pose(*free).moved(&v[*k..], h)),
+                Joint::Spherical(Spherical { rotation }) => {
+                    let before = &from.rotations[*rotation];
+                    self.rotations[*rotation] = Spherical::moved(before, &v[*k..], h);
+                }
+                Joint::Fixed | Joint::Revolute(_) | Joint::Prismatic(_) => {}
+            }
         }
     }
 
     /// `self ⊕= h v`, in place.
-    pub fn advance(&mut self, v: &[f64], h: f64) {
-        self.position += Vector3::new(v[0], v[1], v[2]) * h;
-        self.attitude = exp_rotation(&(Vector3::new(v[3], v[4], v[5]) * h)) * self.attitude;
-        for (q, rate) in self.joints.iter_mut().zip(&v[6..]) {
-            *q += h * rate;
+    pub fn advance(&mut self, model: &Model, v: &[f64], h: f64) {
+        for (q, &k) in self.joints.iter_mut().zip(model.joint_velocities()) {
+            *q += h * v[k];
         }
+        for (joint, k) in model.rotating_joints() {
+            match joint {
+                Joint::Free(free) => self.set_pose(*free, self.pose(*free).moved(&v[*k..], h)),
+                Joint::Spherical(Spherical { rotation }) => {
+                    let own = &mut self.rotations[*rotation];
+                    *own = Spherical::moved(own, &v[*k..], h);
+                }
+                Joint::Fixed | Joint::Revolute(_) | Joint::Prismatic(_) => {}
+            }
+        }
+    }
+
+    /// Takes rounding out of the unit quaternions.
+    pub fn normalise(&mut self) {
+        self.attitude.renormalize_fast();
+        for pose in &mut self.others {
+            pose.attitude.renormalize_fast();
+        }
+        for rotation in &mut self.rotations {
+            rotation.renormalize_fast();
+        }
+    }
+
+    fn attitudes(&self) -> impl Iterator<Item = &UnitQuaternion<f64>> {
+        std::iter::once(&self.attitude)
+            .chain(self.others.iter().map(|pose| &pose.attitude))
+            .chain(&self.rotations)
+    }
+
+    /// Whether it has the sizes of a model's, and quaternions of length 1.
+    #[must_use]
+    pub fn is_of(&self, model: &Model) -> bool {
+        self.joints.len() == model.n_joints()
+            && self.others.len() + 1 == model.n_poses()
+            && self.rotations.len() == model.n_rotations()
+            && (self.attitudes()).all(|q| (q.norm_squared() - 1.0).abs() <= UNIT)
     }
 
     /// Whether every entry is finite.
@@ -71,7 +146,8 @@ impl Configuration {
     pub fn is_finite(&self) -> bool {
         self.position
             .iter()
-            .chain(self.attitude.coords.iter())
+            .chain(self.others.iter().flat_map(|pose| &pose.position))
+            .chain(self.attitudes().flat_map(|q| q.coords.iter()))
             .chain(&self.joints)
             .all(|x| x.is_finite())
     }

@@ -18,7 +18,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 use super::error::PlanarError;
 use super::machine::{Disc, PlanarMachine, PlanarMotor};
-use crate::multibody::{Body, JointAxis, Model, Motor};
+use crate::multibody::{Body, Joint, JointAxis, JointProperties, Model, Motor, Passive};
 
 /// Relative difference up to which two sides count as mirror images.
 const ALIKE: f64 = 1e-9;
@@ -98,7 +98,7 @@ impl<const NV: usize> MirroredRover<NV> {
     pub fn new(model: &Model) -> Result<Self, PlanarError> {
         let across: Vec<(String, f64)> = model.bodies()[1..]
             .iter()
-            .filter(|b| b.axis != JointAxis::Z)
+            .filter(|b| b.joint.axis().is_some_and(|axis| *axis != JointAxis::Z))
             .map(|b| (b.name.clone(), 0.0))
             .collect();
         let model = model
@@ -147,7 +147,10 @@ impl<const NV: usize> MirroredRover<NV> {
         match k {
             0 | 1 => vec![k],
             2 => vec![5],
-            _ => self.parts[k - 2].bodies.iter().map(|b| b + 5).collect(),
+            _ => {
+                let bodies = self.parts[k - 2].bodies.iter();
+                bodies.map(|&b| self.model.bodies()[b].velocity).collect()
+            }
         }
     }
 
@@ -191,13 +194,27 @@ fn pair_bodies(model: &Model) -> Result<Vec<Part>, PlanarError> {
     let bodies = model.bodies();
     // Nothing turns out of the plane, so z adds up along the tree.
     let mut z = vec![0.0; bodies.len()];
-    for (b, body) in bodies.iter().enumerate().skip(1) {
-        if body.rotation.is_some() || body.axis != JointAxis::Z {
+    for (b, body) in bodies.iter().enumerate() {
+        let is_in_plane = match (&body.joint, body.parent) {
+            (Joint::Free(_), _) => b == 0,
+            (Joint::Revolute(joint), Some(_)) => {
+                let is_own = joint.coordinate.coupling.is_none();
+                body.rotation.is_none() && joint.axis == JointAxis::Z && is_own
+            }
+            _ => false,
+        };
+        if !is_in_plane {
             return Err(PlanarError::NotMirrored {
                 body: body.name.clone(),
             });
         }
-        z[b] = z[body.parent] + body.position.z;
+        z[b] = body.parent.map_or(0.0, |parent| z[parent]) + body.position.z;
+    }
+    let is_plain = |joint: &&JointProperties| joint.passive == Passive::default();
+    if let Some(joint) = model.joints().iter().find(|joint| !is_plain(joint)) {
+        return Err(PlanarError::NotMirrored {
+            body: bodies[joint.body].name.clone(),
+        });
     }
     let size = bodies
         .iter()
@@ -219,9 +236,10 @@ fn pair_bodies(model: &Model) -> Result<Vec<Part>, PlanarError> {
         if part_of[a].is_some() {
             continue;
         }
-        let parent = part_of[body.parent].unwrap_or(0);
+        let part_of_parent = |b: usize| bodies[b].parent.and_then(|parent| part_of[parent]);
+        let parent = part_of_parent(a).unwrap_or(0);
         let partner = (a..bodies.len()).find(|&b| {
-            let has_same_parent = b == a || (a > 0 && part_of[bodies[b].parent] == Some(parent));
+            let has_same_parent = b == a || (a > 0 && part_of_parent(b) == Some(parent));
             has_same_parent && part_of[b].is_none() && are_alike(a, b)
         });
         let Some(partner) = partner else {

@@ -125,18 +125,25 @@ impl RoverSimulation {
         let state = self.state();
         let R_WB = state.configuration.attitude.to_rotation_matrix();
 
-        let mut pose = coordinates::to_public(&state.configuration);
+        let mut pose = coordinates::to_public(model, &state.configuration);
         for j in model.wheels().iter().filter_map(|wheel| wheel.joint) {
             let k = model.joint_velocity(j);
             let turn = std::f64::consts::TAU;
             pose[k] -= turn * (pose[k] / turn).round_ties_even();
         }
-        let (x, y, z, heading) = (pose[0], pose[1], pose[2], pose[4]);
+        let [x, y, z]: [f64; 3] = state.configuration.position.into();
+        let is_free = model.trees()[0].is_free;
+        let heading = if is_free { pose[4] } else { 0.0 };
         row.put(pose);
 
+        // A first body that is not free has the world's velocity.
         let v = &state.v;
-        let linear = R_WB.inverse() * Vector3::new(v[0], v[1], v[2]);
-        let angular = R_WB.inverse() * Vector3::new(v[3], v[4], v[5]);
+        let base = match v[..] {
+            [a, b, c, d, e, f, ..] if is_free => [a, b, c, d, e, f],
+            _ => [0.0; 6],
+        };
+        let linear = R_WB.inverse() * Vector3::new(base[0], base[1], base[2]);
+        let angular = R_WB.inverse() * Vector3::new(base[3], base[4], base[5]);
         row.put(linear.iter().copied());
         row.put(angular.iter().copied());
         row.put(model.joint_velocities().iter().map(|&k| v[k]));
@@ -163,7 +170,7 @@ impl RoverSimulation {
         let up = gravity.try_normalize(0.0).map_or(Vector3::y(), |g| -g);
         row.put([
             up.dot(&R_WB.matrix().column(1)),
-            v[0].hypot(v[2]),
+            base[0].hypot(base[2]),
             self.body_force(),
             self.slip_ratio(),
         ]);

@@ -17,9 +17,6 @@ use crate::integrator::{OptionsError, StepOptions, StepReport};
 use crate::multibody::{Configuration, Energy, Kinematics, Model, Momentum, momentum};
 use crate::system::{TreeScratch, TreeSystem};
 
-/// How far the squared length of a snapshot's quaternion may be from 1: the steps keep it within rounding.
-const UNIT: f64 = 1e-12;
-
 /// A machine on a terrain, both shared.
 #[derive(Clone)]
 pub struct RoverScene {
@@ -141,7 +138,9 @@ impl Scene for RoverScene {
 
     fn energy(&self, options: &StepOptions, state: &State<Configuration>) -> Energy {
         let kinematics = Kinematics::of(&self.model, &state.configuration);
-        momentum::energy(&self.model, &kinematics, &state.v, &options.gravity)
+        let mut energy = momentum::energy(&self.model, &kinematics, &state.v, &options.gravity);
+        energy.potential += self.model.spring_energy(&state.configuration);
+        energy
     }
 
     fn fingerprint(&self) -> u64 {
@@ -159,8 +158,7 @@ impl Scene for RoverScene {
                 && (contact.other).is_none_or(|other| is_part(other.part, other.body))
         };
         configuration.is_finite()
-            && (configuration.attitude.norm_squared() - 1.0).abs() <= UNIT
-            && configuration.joints.len() == model.n_joints()
+            && configuration.is_of(model)
             && snapshot.command.is_of(model)
             && snapshot.memory.len() == model.wheels().len()
             && snapshot.memory.iter().all(|x| x.is_finite())
@@ -210,9 +208,8 @@ impl RoverSimulation {
     /// # Panics
     /// If the sizes are another model's.
     pub fn set_state(&mut self, configuration: Configuration, v: Vec<f64>) {
-        assert_eq!(
-            configuration.joints.len(),
-            self.model().n_joints(),
+        assert!(
+            configuration.is_of(self.model()),
             "invariant: a configuration of this model"
         );
         self.place(configuration, v);

@@ -35,11 +35,13 @@ pub(super) fn gravity_load(
     for (b, body) in bodies.iter().enumerate() {
         let weight = gravity * body.mass;
         let moment = kinematics.c[b].cross(&weight);
-        for k in 0..3 {
-            out[k] += weight[k];
-            out[3 + k] += moment[k];
+        let (lead, rest) = model.split_path(b);
+        if let Some((linear, angular)) = out[lead].split_at_mut_checked(3) {
+            for k in 0..3 {
+                linear[k] += weight[k];
+                angular[k] += moment[k];
+            }
         }
-        let (_, rest) = model.split_path(b);
         for (&k, &m) in rest.iter().zip(model.motions(b)) {
             out[k] += kinematics.motions[m].power(&weight, &moment);
         }
@@ -122,8 +124,11 @@ fn eliminate(model: &Model, A: &mut DMatrix<f64>, b: &mut [f64], is_forced: bool
         let path = model.velocity_path(k);
         let path = &path[..path.len() - 1];
         let (base, joints) = path.split_at(model.lead(model.body_of_velocity(k)).min(path.len()));
+        let base_rows = base
+            .first()
+            .map_or(0..0, |&first| first..first + base.len());
         let subtract = |x: &mut [f64], factor: f64| {
-            for (x, y) in x.iter_mut().zip(&own[..base.len()]) {
+            for (x, y) in x[base_rows.clone()].iter_mut().zip(&own[base_rows.clone()]) {
                 *x -= factor * y;
             }
             for &i in joints {
@@ -157,7 +162,7 @@ mod tests {
         let model = Model::rover();
         let mut q = Configuration::zero(&model);
         let v: Vec<f64> = (0..model.nv()).map(|k| (1.7 * k as f64).sin()).collect();
-        q.advance(&v, 1.0);
+        q.advance(&model, &v, 1.0);
         let kinematics = Kinematics::of(&model, &q);
         let mut C = DMatrix::zeros(model.nv(), model.nv());
         coriolis_matrix(

@@ -20,7 +20,8 @@ use crate::integrator::{
 use crate::multibody::bias::{BiasScratch, bias};
 use crate::multibody::momentum::{body_momenta, energy_and_momentum};
 use crate::multibody::{
-    Configuration, EnergyScratch, FactoredMassMatrix, Kinematics, MassMatrix, Model, Momentum,
+    Configuration, EnergyScratch, FactoredMassMatrix, Joint, JointProperties, Kinematics,
+    MassMatrix, Model, Momentum, Passive, Tree,
 };
 use crate::problem::{Dimension, FrictionContactProblem};
 
@@ -131,6 +132,32 @@ pub struct TreeSystem<'a> {
     pub parts: &'a mut TreeScratch,
 }
 
+impl TreeSystem<'_> {
+    /// No point of a tree is faster, m/s.
+    fn fastest_point(&self, tree: &Tree, v: &[f64]) -> f64 {
+        let v = &v[tree.velocities.clone()];
+        let linear = match v {
+            [x, y, z, ..] if tree.is_free => (x * x + y * y + z * z).sqrt(),
+            _ => 0.0,
+        };
+        let half = tree.lead() / 2;
+        // A slide counts as a turn at an arm of more than a metre.
+        let turning: f64 = v[half..].iter().map(|w| w.abs()).sum();
+        let mut reach = tree.reach + 1.0;
+        if self.model.has_slides() {
+            let places = &self.parts.kinematics.r[tree.bodies.clone()];
+            let farthest = places.iter().map(|r| (r - places[0]).norm());
+            reach = farthest.fold(reach, f64::max);
+        }
+        let ratio = |b: &usize| {
+            let coupling = self.model.bodies()[*b].joint.coupling();
+            coupling.map_or(0.0, |c| c.ratio.abs())
+        };
+        let coupled: f64 = self.model.coupled_bodies().iter().map(ratio).sum();
+        linear + turning * reach * (1.0 + coupled)
+    }
+}
+
 impl MechanicalSystem for TreeSystem<'_> {
     type Configuration = Configuration;
     type Contact = Contact;
@@ -144,12 +171,12 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn set_moved(&self, from: &Configuration, v: &[f64], h: f64, to: &mut Configuration) {
-        to.set_moved(from, v, h);
+        to.set_moved(self.model, from, v, h);
     }
 
     #[inline]
     fn advance(&self, q: &mut Configuration, v: &[f64], h: f64) {
-        q.advance(v, h);
+        q.advance(self.model, v, h);
     }
 
     #[inline]
@@ -159,7 +186,7 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn normalise(&self, q: &mut Configuration) {
-        q.attitude.renormalize_fast();
+        q.normalise();
     }
 
     #[inline]
@@ -174,10 +201,13 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn detect(&mut self, v: &[f64], mut activation: Activation, out: &mut Vec<Contact>) {
-        let reach = self.model.reach() + 1.0;
-        let linear = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-        let turning: f64 = v[3..].iter().map(|w| w.abs()).sum();
-        activation.margin = activation.lead.abs() * (linear + turning * reach);
+        // Two trees may go towards each other.
+        let (mut fastest, mut next) = (0.0_f64, 0.0_f64);
+        for tree in self.model.trees() {
+            let speed = self.fastest_point(tree, v);
+            (fastest, next) = (fastest.max(speed), next.max(fastest.min(speed)));
+        }
+        activation.margin = activation.lead.abs() * (fastest + next);
         detect(
             self.model,
             &self.parts.kinematics,
@@ -218,10 +248,11 @@ impl MechanicalSystem for TreeSystem<'_> {
         let (h, theta) = (options.time_step, options.theta);
         let parts = &mut *self.parts;
         let joints = parts.motors.iter().zip(&self.command.held);
-        for ((motor, held), &k) in joints.zip(self.model.joint_velocities()) {
-            let (damping, stiffness) = feedback(motor, held.as_ref());
+        for ((motor, held), joint) in joints.zip(self.model.joints()) {
+            let (damping, stiffness) = feedback(motor.damping(), held.as_ref(), &joint.passive);
             if damping > 0.0 || stiffness > 0.0 {
                 let implicit = h * motor.theta() * (damping + h * theta * stiffness);
+                let k = joint.velocity;
                 parts.mass_matrix.add_to_diagonal(self.model, k, implicit);
             }
         }
@@ -271,12 +302,26 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn turning(&self, v: &[f64]) -> f64 {
-        let base = (v[3] * v[3] + v[4] * v[4] + v[5] * v[5]).sqrt();
-        base + fastest(self.model.turning_joints(), v)
+        let mut base = 0.0_f64;
+        for tree in self.model.trees() {
+            if let [_, _, _, x, y, z, ..] = v[tree.velocities.clone()]
+                && tree.is_free
+            {
+                base = base.max((x * x + y * y + z * z).sqrt());
+            }
+        }
+        let bodies = self.model.bodies();
+        let mut joints = fastest(self.model.turning_joints(), v);
+        for &b in self.model.coupled_bodies() {
+            if let Joint::Revolute(joint) = &bodies[b].joint {
+                joints = joints.max(joint.coordinate.rate(v[bodies[b].velocity]).abs());
+            }
+        }
+        base + joints
     }
 
     fn conserves_momenta(&self) -> bool {
-        true
+        self.model.is_free_tree()
     }
 
     fn load_gyroscopic(
@@ -343,7 +388,12 @@ impl MechanicalSystem for TreeSystem<'_> {
         Some(MechanicalEnergy {
             kinetic: energy.kinetic,
             potential: energy.potential,
-            momentum,
+            // That of several trees, or of one on a fixed base, is no one velocity's.
+            momentum: if self.model.is_free_tree() {
+                momentum
+            } else {
+                Vector3::zeros()
+            },
             mass: self.model.mass(),
         })
     }
@@ -360,15 +410,21 @@ impl MechanicalSystem for TreeSystem<'_> {
             drives_tried,
             ..
         } = &mut *self.parts;
-        let drives = motors.iter().zip(&self.command.drives);
-        let actuation = actuation(self.model, options, self.command, start, v_end, motors);
+        let trial = Trial {
+            options,
+            command: self.command,
+            start,
+            v_end,
+            motors,
+        };
         let mut total = 0.0;
-        for (((tried, torque), (motor, drive)), &k) in (drives_tried.iter_mut().zip(actuation))
-            .zip(drives)
-            .zip(self.model.joint_velocities())
-        {
+        let joints = self.model.joints().iter().zip(drives_tried).enumerate();
+        for (j, (joint, tried)) in joints {
+            let torque = trial.actuation(j, joint);
+            let (begin, end) = (start.v[joint.velocity], v_end[joint.velocity]);
             let turned = h * torque.rate;
-            let work = motor.work(drive.as_ref(), start.v[k], v_end[k], turned);
+            let drive = self.command.drives[j].as_ref();
+            let work = motors[j].work(drive, begin, end, turned);
             *tried = DriveAction {
                 impulse: torque.drive * h,
                 work,
@@ -398,7 +454,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             self.model,
             &parts.kinematics,
             start.v,
-            &Vector3::zeros(),
+            |_| Vector3::zeros(),
             &mut parts.momenta,
         );
     }
@@ -417,7 +473,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             self.model,
             &options.gravity,
             (options.time_step, options.theta),
-            &start.configuration.position,
+            start,
             v_end,
             self.parts,
             y,
@@ -489,10 +545,15 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     /// The trunk's origin, and what turns by so much at arm's length.
     fn displacement(&self, y: &[f64]) -> f64 {
-        let trunk = y[..self.model.lead(0)].iter().copied();
-        let joints = self.model.joint_velocities().iter();
-        let joints = joints.map(|&k| y[k] * JOINT_ARM);
-        trunk.chain(joints).fold(0.0_f64, |m, d| m.max(d.abs()))
+        let mut largest = 0.0_f64;
+        for tree in self.model.trees() {
+            let (base, joints) = y[tree.velocities.clone()].split_at(tree.lead());
+            let joints = joints.iter().map(|angle| angle * JOINT_ARM);
+            largest = (base.iter().copied())
+                .chain(joints)
+                .fold(largest, |m, d| m.max(d.abs()));
+        }
+        largest
     }
 }
 
@@ -513,10 +574,11 @@ fn fastest(joints: &[usize], v: &[f64]) -> f64 {
     joints.iter().fold(0.0, |most, &k| most.max(v[k].abs()))
 }
 
-/// Damping (N m s/rad) and stiffness (N m/rad) with which a joint's torque answers to its motion.
+/// Damping (N m s/rad) and stiffness (N m/rad) with which a joint's torque answers to its motion: those of its motor, of what holds it,
+/// of its own damper and spring.
 #[inline]
-fn feedback(motor: &MotorBranch, held: Option<&HeldJoint>) -> (f64, f64) {
-    let (mut damping, mut stiffness) = (motor.damping(), 0.0);
+fn feedback(motor: f64, held: Option<&HeldJoint>, passive: &Passive) -> (f64, f64) {
+    let (mut damping, mut stiffness) = (motor + passive.damping, passive.stiffness);
     if let Some(held) = held {
         damping += held.damping;
         stiffness += held.stiffness;
@@ -532,10 +594,9 @@ fn set_held_theta(
     parts: &mut TreeScratch,
 ) {
     let joints = (parts.motors.iter_mut().zip(&command.held)).zip(&command.drives);
-    for (((motor, held), drive), &k) in joints.zip(model.joint_velocities()) {
-        let (damping, stiffness) = held.map_or((0.0, 0.0), |held| (held.damping, held.stiffness));
-        let inertia = parts.mass_matrix.diagonal(model, k);
-        let feedback = (damping + line_slope(drive.as_ref()), stiffness);
+    for (((motor, held), drive), joint) in joints.zip(model.joints()) {
+        let inertia = parts.mass_matrix.diagonal(model, joint.velocity);
+        let feedback = feedback(line_slope(drive.as_ref()), held.as_ref(), &joint.passive);
         motor.set_theta((options.time_step, options.theta), feedback, inertia);
     }
 }
@@ -544,43 +605,58 @@ fn set_held_theta(
 struct Actuation {
     /// Of its drive.
     drive: f64,
-    /// Of the damper that holds it.
+    /// Of its dampers.
     damper: f64,
     /// Of everything else.
     other: f64,
     rate: f64,
 }
 
-/// Torques of all joints; the PD and the motor's line at the θ_j-weighted position and velocity of the iterate `v_end`.
-#[inline]
-fn actuation<'a>(
-    model: &'a Model,
-    options: &StepOptions,
+/// A step that is tried: where it starts, the velocity at its end, what acts.
+#[derive(Clone, Copy)]
+struct Trial<'a> {
+    options: &'a StepOptions,
     command: &'a Command,
     start: Start<'a, Configuration>,
     v_end: &'a [f64],
     motors: &'a [MotorBranch],
-) -> impl Iterator<Item = Actuation> + 'a {
-    let (h, theta) = (options.time_step, options.theta);
-    let motion = (start.configuration.joints.iter()).zip(model.joint_velocities());
-    let torques = command.torque.iter().zip(&command.held).zip(motors);
-    motion
-        .zip(torques)
-        .map(move |((angle, &k), ((torque, held), motor))| {
-            let (begin, end) = (start.v[k], v_end[k]);
-            let rate = theta * end + (1.0 - theta) * begin;
-            let (mut other, mut damper) = (*torque, 0.0);
-            if let Some(held) = held {
-                other -= held.stiffness * (angle + h * motor.theta() * rate - held.set_point);
-                damper = -held.damping * motor.rate(begin, end);
-            }
-            Actuation {
-                drive: motor.torque(begin, end),
-                damper,
-                other,
-                rate,
-            }
-        })
+}
+
+impl Trial<'_> {
+    /// Torques of joint `j`; the PD, the spring and the motor's line at the θ_j-weighted position and velocity of the iterate.
+    #[inline(always)]
+    fn actuation(&self, j: usize, joint: &JointProperties) -> Actuation {
+        let (h, theta) = (self.options.time_step, self.options.theta);
+        let (motor, held) = (&self.motors[j], &self.command.held[j]);
+        let (begin, end) = (self.start.v[joint.velocity], self.v_end[joint.velocity]);
+        let rate = theta * end + (1.0 - theta) * begin;
+        let (mut other, mut damper) = (self.command.torque[j], 0.0);
+        if held.is_some() || joint.is_passive {
+            let place = self.start.configuration.joints[j] + h * motor.theta() * rate;
+            let (spring, brake) = answer(held.as_ref(), &joint.passive, place);
+            other -= spring;
+            damper = -brake * motor.rate(begin, end);
+        }
+        Actuation {
+            drive: motor.torque(begin, end),
+            damper,
+            other,
+            rate,
+        }
+    }
+}
+
+/// Torque of the springs (N m) at a place, and damping (N m s/rad), of what holds a joint and of its own.
+#[inline]
+fn answer(held: Option<&HeldJoint>, passive: &Passive, place: f64) -> (f64, f64) {
+    let own = passive.stiffness * (place - passive.rest);
+    match held {
+        Some(held) => {
+            let spring = held.stiffness * (place - held.set_point);
+            (spring + own, held.damping + passive.damping)
+        }
+        None => (own, passive.damping),
+    }
 }
 
 /// Adds `h τ` to `y` for a step that ends with the iterate `v_end`.
@@ -593,9 +669,16 @@ fn add_command(
     motors: &[MotorBranch],
     y: &mut [f64],
 ) {
-    let actuation = actuation(model, options, command, start, v_end, motors);
-    for (&k, torque) in model.joint_velocities().iter().zip(actuation) {
-        y[k] += options.time_step * (torque.other + torque.damper + torque.drive);
+    let trial = Trial {
+        options,
+        command,
+        start,
+        v_end,
+        motors,
+    };
+    for (j, joint) in model.joints().iter().enumerate() {
+        let torque = trial.actuation(j, joint);
+        y[joint.velocity] += options.time_step * (torque.other + torque.damper + torque.drive);
     }
 }
 
@@ -604,44 +687,62 @@ fn momentum_residual(
     model: &Model,
     gravity: &Vector3<f64>,
     (h, theta): (f64, f64),
-    start: &Vector3<f64>,
+    start: Start<'_, Configuration>,
     v_end: &[f64],
     parts: &mut TreeScratch,
     y: &mut [f64],
 ) {
-    let end = parts.kinematics_end.origin(0) - start;
+    let origin_of = |tree: &Tree| match model.bodies()[tree.bodies.start].joint {
+        Joint::Free(free) => start.configuration.pose(free).position,
+        _ => Vector3::zeros(),
+    };
+    let end_of = |tree: &Tree| parts.kinematics_end.origin(tree.bodies.start) - origin_of(tree);
     body_momenta(
         model,
         &parts.kinematics_end,
         v_end,
-        &end,
+        |tree| end_of(&model.trees()[tree]),
         &mut parts.momenta_end,
     );
-    let middle = parts.kinematics.origin(0) - start;
     let bodies = model.bodies();
     parts.sums.copy_from_slice(&parts.momenta_end);
-    for (b, (sum, begin)) in parts.sums.iter_mut().zip(&parts.momenta).enumerate() {
-        let weight = gravity * (bodies[b].mass * h);
-        // Both mass centres relative to the point of reference, the trunk origin at the start of the step.
-        let centre = (parts.kinematics_end.c[b] + end) * theta + parts.c_start[b] * (1.0 - theta);
-        sum.linear -= begin.linear + weight;
-        sum.angular -= begin.angular + centre.cross(&weight);
-    }
-    for b in (0..bodies.len()).rev() {
-        let (P, L) = (parts.sums[b].linear, parts.sums[b].angular);
-        // About the trunk origin at the midpoint, where the screws are taken.
-        let about_middle = L - middle.cross(&P);
-        if b == 0 {
-            for k in 0..3 {
-                y[k] = -P[k];
-                y[3 + k] = -about_middle[k];
-            }
-        } else {
-            let k = model.joint_velocity(b - 1);
-            y[k] = -parts.kinematics.motions[b - 1].power(&P, &about_middle);
-            let parent = bodies[b].parent;
-            parts.sums[parent].linear += P;
-            parts.sums[parent].angular += L;
+    for tree in model.trees() {
+        let end = end_of(tree);
+        for b in tree.bodies.clone() {
+            let (sum, begin) = (&mut parts.sums[b], &parts.momenta[b]);
+            let weight = gravity * (bodies[b].mass * h);
+            // Both mass centres relative to the point of reference, the tree's origin at the start of the step.
+            let centre =
+                (parts.kinematics_end.c[b] + end) * theta + parts.c_start[b] * (1.0 - theta);
+            sum.linear -= begin.linear + weight;
+            sum.angular -= begin.angular + centre.cross(&weight);
         }
+    }
+    y.fill(0.0);
+    for tree in model.trees() {
+        let middle = parts.kinematics.origin(tree.bodies.start) - origin_of(tree);
+        for b in tree.bodies.clone().rev() {
+            let body = &bodies[b];
+            let (P, L) = (parts.sums[b].linear, parts.sums[b].angular);
+            // About the tree's origin at the midpoint, where the screws are taken.
+            let about_middle = L - middle.cross(&P);
+            if let Joint::Free(_) = body.joint {
+                for k in 0..3 {
+                    y[body.velocity + k] = -P[k];
+                    y[body.velocity + 3 + k] = -about_middle[k];
+                }
+            } else {
+                for (y, m) in y[body.velocity..].iter_mut().zip(body.motions()) {
+                    *y -= parts.kinematics.motions[m].power(&P, &about_middle);
+                }
+            }
+            if let Some(parent) = body.parent {
+                parts.sums[parent].linear += P;
+                parts.sums[parent].angular += L;
+            }
+        }
+    }
+    for &(k, inertia) in model.armatures() {
+        y[k] -= inertia * (v_end[k] - start.v[k]);
     }
 }

@@ -1,22 +1,26 @@
-//! The model as data: what a rover's file says, readable and writable, not yet checked.
+//! The model as data: what a machine's file says, readable and writable, not yet checked.
 //!
 //! [`Model::from_description`](super::Model::from_description) checks it and computes the tree.
 
 use serde::{Deserialize, Serialize};
 
+pub(super) mod check;
+pub mod joint;
+
 use super::error::ModelError;
 use super::motor::Motor;
+pub use joint::{CouplingDescription, Hold, JointKind, Spring};
 
 /// The built-in rover: Table 4.1 and Fig. 4.5 of the report, in SI units.
-const ROVER: &str = include_str!("../../models/rover.toml");
+const ROVER: &str = include_str!("../../../models/rover.toml");
 
-/// A tree of solids under a free base, with its wheels.
+/// Trees of solids, with their wheels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelDescription {
     /// Name of the machine.
     pub name: String,
-    /// Solids, parents before children; the first is the free base. Their order is the order of the coordinates.
+    /// Solids, parents before children, those of one tree together. Their order is the order of the coordinates.
     pub solids: Vec<SolidDescription>,
     /// Wheels in the order of every public array.
     #[serde(default)]
@@ -24,7 +28,7 @@ pub struct ModelDescription {
     /// Points with a name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tags: Vec<TagDescription>,
-    /// Whether parts of one machine touch each other, where no joint connects their bodies. Parts of two machines always do.
+    /// Whether parts of one tree touch each other, where no joint connects their bodies. Parts of two trees always do.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub self_contact: bool,
 }
@@ -41,19 +45,27 @@ pub struct TagDescription {
     pub position: [f64; 3],
 }
 
-/// One solid and the revolute joint that carries it.
+/// One solid and the joint that carries it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolidDescription {
     /// Name of the solid and of its joint.
     pub name: String,
-    /// Name of the solid that carries it; none for the base.
+    /// Name of the solid that carries it; none for a root, which its joint ties to the world.
+    ///
+    /// A root other than the first names its `joint`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parent: Option<String>,
-    /// Origin of the frame in the parent's frame, m.
+    /// Kind of the joint: by default free for a root and revolute for all others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<JointKind>,
+    /// Origin of the joint's frame in the parent's frame, m; in the world for a root that is not free.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position: Option<[f64; 3]>,
-    /// Direction of the revolute joint, the same in both frames; need not be normalised.
+    /// Rotation from the joint's frame to the parent's as a rotation vector: the axis times the angle, rad. None by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<[f64; 3]>,
+    /// Axis of a revolute or prismatic joint in the joint's frame; need not be normalised.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<[f64; 3]>,
     /// Mass, kg.
@@ -72,19 +84,21 @@ pub struct SolidDescription {
     /// Gains with which the joint is held at a set-point.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hold: Option<Hold>,
-    /// Angle at which the joint is locked (welded), rad: its coordinate is gone. Free by default.
+    /// Spring of the joint.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spring: Option<Spring>,
+    /// Viscous damping of the joint, N m s/rad or N s/m; 0 by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub damping: Option<f64>,
+    /// Inertia of the joint's rotor, reflected to the joint, kg m² or kg; 0 by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub armature: Option<f64>,
+    /// Another joint that this one follows: its coordinate is gone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coupled: Option<CouplingDescription>,
+    /// Angle (rad) or displacement (m) at which the joint is locked (welded): its coordinate is gone. Free by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub locked: Option<f64>,
-}
-
-/// Gains of a joint held at a set-point: `τ = −stiffness (q − q*) − damping q̇`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Hold {
-    /// N m/rad.
-    pub stiffness: f64,
-    /// N m s/rad.
-    pub damping: f64,
 }
 
 /// Shape of a solid, centred at its mass centre.
@@ -181,6 +195,18 @@ fn check_length(text: &str) -> Result<(), ModelError> {
         });
     }
     Ok(())
+}
+
+impl SolidDescription {
+    /// Kind of its joint: what it says, else free for a root and revolute for all others.
+    #[must_use]
+    pub fn joint_kind(&self) -> JointKind {
+        self.joint.unwrap_or(if self.parent.is_some() {
+            JointKind::Revolute
+        } else {
+            JointKind::Free
+        })
+    }
 }
 
 impl ModelDescription {

@@ -1,8 +1,8 @@
-//! Revolute joint: rotation about an axis fixed in parent and child.
+//! Direction of a joint's axis.
 
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
-/// Direction of a revolute joint; the coordinate axes are kept apart because their product is two columns' work.
+/// Direction of a revolute or prismatic joint; the coordinate axes are kept apart because their product is two columns' work.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointAxis {
     /// About x.

@@ -1,0 +1,422 @@
+//! What a description must satisfy, in the order of its text.
+
+use std::collections::{HashMap, HashSet};
+
+use nalgebra::{Unit, Vector3};
+
+use super::joint::JointKind;
+use super::{ModelDescription, Shape, SolidDescription};
+use crate::multibody::error::ModelError;
+use crate::multibody::model::{MAX_SOLIDS, solid_inertia};
+
+/// Largest length of a description either way, m.
+const MAX_LENGTH: f64 = 1e6;
+
+/// Finite, and at most `limit` either way.
+pub(in crate::multibody) fn in_range(
+    field: &str,
+    value: f64,
+    limit: f64,
+    range: &'static str,
+) -> Result<(), ModelError> {
+    finite(field, &[value])?;
+    if value.abs() <= limit {
+        return Ok(());
+    }
+    Err(ModelError::OutOfRange {
+        field: field.to_owned(),
+        range,
+        value,
+    })
+}
+
+/// A length that is positive, m.
+pub(in crate::multibody) fn length(field: &str, value: f64) -> Result<(), ModelError> {
+    positive(field, value)?;
+    if (1e-6..=MAX_LENGTH).contains(&value) {
+        return Ok(());
+    }
+    Err(ModelError::OutOfRange {
+        field: field.to_owned(),
+        range: "from 1e-6 to 1e6 m",
+        value,
+    })
+}
+
+/// A place, m.
+fn place(field: &str, values: &[f64; 3]) -> Result<(), ModelError> {
+    (values.iter()).try_for_each(|&x| in_range(field, x, MAX_LENGTH, "at most 1e6 m either way"))
+}
+
+/// A gain, a torque or an inertia: not negative, and no larger than a double can carry through a step.
+fn moderate(field: &str, value: f64) -> Result<(), ModelError> {
+    not_negative(field, value)?;
+    in_range(field, value, 1e18, "at most 1e18")
+}
+
+fn finite(field: &str, values: &[f64]) -> Result<(), ModelError> {
+    values.iter().try_for_each(|&value| {
+        if value.is_finite() {
+            Ok(())
+        } else {
+            Err(ModelError::NotFinite {
+                field: field.to_owned(),
+                value,
+            })
+        }
+    })
+}
+
+fn positive(field: &str, value: f64) -> Result<(), ModelError> {
+    finite(field, &[value])?;
+    if value > 0.0 {
+        Ok(())
+    } else {
+        Err(ModelError::NotPositive {
+            field: field.to_owned(),
+            value,
+        })
+    }
+}
+
+fn not_negative(field: &str, value: f64) -> Result<(), ModelError> {
+    finite(field, &[value])?;
+    if value >= 0.0 {
+        Ok(())
+    } else {
+        Err(ModelError::Negative {
+            field: field.to_owned(),
+            value,
+        })
+    }
+}
+
+fn direction(field: &str, value: [f64; 3]) -> Result<(), ModelError> {
+    finite(field, &value)?;
+    if Unit::try_new(Vector3::from(value), 1e-9).is_some() {
+        Ok(())
+    } else {
+        Err(ModelError::NoDirection {
+            field: field.to_owned(),
+            value,
+        })
+    }
+}
+
+/// Everything that a description must satisfy, in the order of its text.
+pub(in crate::multibody) fn check(description: &ModelDescription) -> Result<(), ModelError> {
+    if description.solids.is_empty() {
+        return Err(ModelError::NoSolids);
+    }
+    for (field, count) in [
+        ("solids", description.solids.len()),
+        ("wheels", description.wheels.len()),
+        ("tags", description.tags.len()),
+    ] {
+        if count > MAX_SOLIDS {
+            return Err(ModelError::TooMany {
+                field,
+                what: field,
+                count,
+                limit: MAX_SOLIDS,
+            });
+        }
+    }
+    let mut solids: HashMap<&str, usize> = HashMap::new();
+    for (i, solid) in description.solids.iter().enumerate() {
+        if solids.contains_key(solid.name.as_str()) {
+            return Err(ModelError::DuplicateName {
+                field: format!("solids[{i}].name"),
+                name: solid.name.clone(),
+            });
+        }
+        check_joint(i, solid, &solids)?;
+        check_body(i, solid)?;
+        solids.insert(&solid.name, i);
+    }
+    check_trees(description)?;
+    check_wheels(description, &solids)?;
+    check_tags(description, &solids)
+}
+
+/// What carries a solid. `before`: the solids listed before it.
+fn check_joint(
+    i: usize,
+    solid: &SolidDescription,
+    before: &HashMap<&str, usize>,
+) -> Result<(), ModelError> {
+    let at = |what: &str| format!("solids[{i}].{what}");
+    let missing = |what: &str| ModelError::Missing { field: at(what) };
+    let kind = solid.joint_kind();
+    let has_axis = matches!(kind, JointKind::Revolute | JointKind::Prismatic);
+    let given = [
+        (solid.parent.is_some(), "parent", kind != JointKind::Free),
+        (
+            solid.position.is_some(),
+            "position",
+            kind != JointKind::Free,
+        ),
+        (
+            solid.rotation.is_some(),
+            "rotation",
+            kind != JointKind::Free,
+        ),
+        (solid.axis.is_some(), "axis", has_axis),
+        (solid.hold.is_some(), "hold", has_axis),
+        (solid.spring.is_some(), "spring", has_axis),
+        (solid.damping.is_some(), "damping", has_axis),
+        (solid.armature.is_some(), "armature", has_axis),
+        (solid.coupled.is_some(), "coupled", has_axis),
+        (solid.locked.is_some(), "locked", has_axis),
+    ];
+    let unwanted = (given.iter()).find(|(is_given, _, is_allowed)| *is_given && !is_allowed);
+    if let Some((_, what, _)) = unwanted {
+        return Err(ModelError::NotForJoint {
+            field: at(what),
+            what,
+            joint: kind.name(),
+        });
+    }
+    match &solid.parent {
+        // A root by mistake would fall out of its machine.
+        None if i > 0 && solid.joint.is_none() => return Err(missing("parent")),
+        None => {}
+        Some(parent) if !before.contains_key(parent.as_str()) => {
+            return Err(ModelError::UnknownParent {
+                field: at("parent"),
+                name: parent.clone(),
+            });
+        }
+        Some(_) => {}
+    }
+    if kind == JointKind::Free {
+        return Ok(());
+    }
+    if has_axis {
+        direction(&at("axis"), solid.axis.ok_or_else(|| missing("axis"))?)?;
+    }
+    let position = solid.position.ok_or_else(|| missing("position"))?;
+    place(&at("position"), &position)?;
+    for angle in solid.rotation.iter().flatten() {
+        in_range(&at("rotation"), *angle, 1e3, "at most 1e3 rad either way")?;
+    }
+    check_properties(i, solid, before)
+}
+
+/// What a revolute or prismatic joint does by itself.
+fn check_properties(
+    i: usize,
+    solid: &SolidDescription,
+    before: &HashMap<&str, usize>,
+) -> Result<(), ModelError> {
+    let at = |what: &str| format!("solids[{i}].{what}");
+    if let Some(value) = solid.locked {
+        in_range(&at("locked"), value, 1e9, "at most 1e9 rad")?;
+    }
+    if let Some(hold) = solid.hold {
+        moderate(&at("hold.stiffness"), hold.stiffness)?;
+        moderate(&at("hold.damping"), hold.damping)?;
+    }
+    if let Some(spring) = solid.spring {
+        moderate(&at("spring.stiffness"), spring.stiffness)?;
+        in_range(&at("spring.rest"), spring.rest, 1e9, "at most 1e9 rad or m")?;
+    }
+    moderate(&at("damping"), solid.damping.unwrap_or(0.0))?;
+    moderate(&at("armature"), solid.armature.unwrap_or(0.0))?;
+    let Some(coupled) = &solid.coupled else {
+        return Ok(());
+    };
+    if !before.contains_key(coupled.joint.as_str()) {
+        return Err(ModelError::UnknownName {
+            field: at("coupled.joint"),
+            name: coupled.joint.clone(),
+        });
+    }
+    in_range(
+        &at("coupled.ratio"),
+        coupled.ratio,
+        1e6,
+        "at most 1e6 either way",
+    )?;
+    in_range(
+        &at("coupled.offset"),
+        coupled.offset,
+        1e9,
+        "at most 1e9 rad or m",
+    )?;
+    for (is_given, what) in [
+        (solid.hold.is_some(), "hold"),
+        (solid.locked.is_some(), "locked"),
+    ] {
+        if is_given {
+            return Err(ModelError::NotForJoint {
+                field: at(what),
+                what,
+                joint: "coupled",
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The solids of a tree are listed together.
+fn check_trees(description: &ModelDescription) -> Result<(), ModelError> {
+    let mut roots: HashMap<&str, usize> = HashMap::new();
+    let mut current = 0;
+    for (i, solid) in description.solids.iter().enumerate() {
+        let root = match solid.parent.as_deref() {
+            None => i,
+            Some(parent) => roots.get(parent).copied().unwrap_or(current),
+        };
+        if solid.parent.is_some() && root != current {
+            return Err(ModelError::OtherTree {
+                field: format!("solids[{i}].parent"),
+                name: description.solids[root].name.clone(),
+            });
+        }
+        current = root;
+        roots.insert(&solid.name, root);
+    }
+    Ok(())
+}
+
+/// Mass, shape and inertia of a solid.
+fn check_body(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
+    let at = |what: &str| format!("solids[{i}].{what}");
+    positive(&at("mass"), solid.mass)?;
+    if !(1e-9..=1e12).contains(&solid.mass) {
+        return Err(ModelError::OutOfRange {
+            field: at("mass"),
+            range: "from 1e-9 to 1e12 kg",
+            value: solid.mass,
+        });
+    }
+    match solid.shape {
+        Shape::Box { size } => size
+            .iter()
+            .try_for_each(|&s| length(&at("shape.size"), s))?,
+        Shape::Cylinder { radius, height } => {
+            length(&at("shape.radius"), radius)?;
+            length(&at("shape.height"), height)?;
+        }
+        Shape::Disc { radius } | Shape::Sphere { radius } => {
+            length(&at("shape.radius"), radius)?;
+        }
+    }
+    place(
+        &at("centre_of_mass"),
+        &solid.centre_of_mass.unwrap_or_default(),
+    )?;
+    for entry in solid.inertia.iter().flatten() {
+        in_range(&at("inertia"), *entry, 1e24, "at most 1e24 kg m²")?;
+    }
+    let principal = solid_inertia(solid.mass, &solid.shape, solid.inertia).symmetric_eigenvalues();
+    let (sum, largest) = (principal.sum(), principal.max());
+    if principal.min() <= 0.0 || largest > (sum - largest) * (1.0 + 1e-9) {
+        return Err(ModelError::ImpossibleInertia {
+            field: at("inertia"),
+            principal: principal.into(),
+        });
+    }
+    if solid.collides && !matches!(solid.shape, Shape::Box { .. } | Shape::Sphere { .. }) {
+        return Err(ModelError::CollidesWithoutBox {
+            field: at("collides"),
+        });
+    }
+    Ok(())
+}
+
+fn check_tags(
+    description: &ModelDescription,
+    solids: &HashMap<&str, usize>,
+) -> Result<(), ModelError> {
+    let mut names = HashSet::new();
+    for (i, tag) in description.tags.iter().enumerate() {
+        let at = |what: &str| format!("tags[{i}].{what}");
+        if solids.contains_key(tag.name.as_str()) || !names.insert(tag.name.as_str()) {
+            return Err(ModelError::DuplicateName {
+                field: at("name"),
+                name: tag.name.clone(),
+            });
+        }
+        if !solids.contains_key(tag.solid.as_str()) {
+            return Err(ModelError::UnknownName {
+                field: at("solid"),
+                name: tag.solid.clone(),
+            });
+        }
+        place(&at("position"), &tag.position)?;
+    }
+    Ok(())
+}
+
+fn check_wheels(
+    description: &ModelDescription,
+    solids: &HashMap<&str, usize>,
+) -> Result<(), ModelError> {
+    let mut names = HashSet::new();
+    for (i, wheel) in description.wheels.iter().enumerate() {
+        let at = |what: &str| format!("wheels[{i}].{what}");
+        if !names.insert(wheel.name.as_str()) {
+            return Err(ModelError::DuplicateName {
+                field: at("name"),
+                name: wheel.name.clone(),
+            });
+        }
+        let find = |field: &str, name: &String| {
+            let found = solids.get(name.as_str()).copied();
+            found.ok_or_else(|| ModelError::UnknownName {
+                field: at(field),
+                name: name.clone(),
+            })
+        };
+        let mut solid = find("solid", &wheel.solid)?;
+        direction(&at("axle"), wheel.axle)?;
+        length(&at("radius"), wheel.radius)?;
+        if let Some(radius) = wheel.contact_radius {
+            length(&at("contact_radius"), radius)?;
+        }
+        if let Shape::Disc { radius } = description.solids[solid].shape
+            && (radius - wheel.radius).abs() > 1e-9 * radius
+        {
+            return Err(ModelError::RadiusContradictsShape {
+                field: at("radius"),
+                value: wheel.radius,
+                solid: wheel.solid.clone(),
+                shape: radius,
+            });
+        }
+        moderate(&at("torque_limit"), wheel.torque_limit)?;
+        finite(&at("drive_sign"), &[wheel.drive_sign])?;
+        if (wheel.drive_sign.abs() - 1.0).abs() > 0.0 {
+            return Err(ModelError::NotASign {
+                field: at("drive_sign"),
+                value: wheel.drive_sign,
+            });
+        }
+        if let Some(motor) = wheel.motor {
+            motor.check(|field| at(&format!("motor.{field}")))?;
+        }
+        if let Some(name) = &wheel.steering {
+            let steering = find("steering", name)?;
+            // Parents come before their children, so the way up ends.
+            while solid > steering {
+                let parent = description.solids[solid].parent.as_deref();
+                solid = parent.and_then(|p| solids.get(p).copied()).unwrap_or(0);
+            }
+            if solid != steering || description.solids[steering].parent.is_none() {
+                return Err(ModelError::SteeringNotAbove {
+                    field: at("steering"),
+                    name: name.clone(),
+                });
+            }
+            let Some(limit) = wheel.steering_limit else {
+                return Err(ModelError::Missing {
+                    field: at("steering_limit"),
+                });
+            };
+            moderate(&at("steering_limit"), limit)?;
+        }
+    }
+    Ok(())
+}

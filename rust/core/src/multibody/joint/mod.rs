@@ -1,0 +1,132 @@
+//! The catalogue of joints: what lets a body move relative to the one that carries it, or to the world.
+//!
+//! | joint | coordinates | velocities | moves |
+//! |---|---|---|---|
+//! | [`free`] | position, unit quaternion | 6 | anywhere; a root only |
+//! | [`fixed`] | – | – | not at all |
+//! | [`revolute`] | angle, rad | 1 | about an axis |
+//! | [`prismatic`] | displacement, m | 1 | along an axis |
+//! | [`spherical`] | unit quaternion | 3 | about a point |
+//! | [`coupled`] | – | – | as a revolute or prismatic joint, in proportion to another |
+//!
+//! Each velocity has a [`Motion`]: the screw that its unit gives to all that the joint carries.
+//!
+//! Source: Featherstone 2008, *Rigid Body Dynamics Algorithms*, ch. 4; Carpentier et al. 2019, *The Pinocchio C++ library*, for the
+//! joints as types with their own numbers of coordinates and velocities.
+
+pub mod axis;
+pub mod coupled;
+pub mod fixed;
+pub mod free;
+pub mod motion;
+pub mod prismatic;
+pub mod revolute;
+pub mod spherical;
+
+pub use axis::JointAxis;
+pub use coupled::Coupling;
+pub use free::{Free, Pose};
+pub use motion::Motion;
+pub use prismatic::Prismatic;
+pub use revolute::Revolute;
+pub use spherical::Spherical;
+
+/// A joint of a body.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Joint {
+    /// Six degrees of freedom, of a root.
+    Free(Free),
+    /// None, of a root: what is fixed to another body is merged with it.
+    Fixed,
+    /// A turn about an axis.
+    Revolute(Revolute),
+    /// A displacement along an axis.
+    Prismatic(Prismatic),
+    /// Any rotation about a point.
+    Spherical(Spherical),
+}
+
+impl Joint {
+    /// Number of velocities of its own: 0 of a coupled joint.
+    #[must_use]
+    pub fn nv(&self) -> usize {
+        match self {
+            Self::Free(_) => free::NV,
+            Self::Fixed => 0,
+            Self::Revolute(Revolute { coordinate, .. })
+            | Self::Prismatic(Prismatic { coordinate, .. }) => coordinate.nv(),
+            Self::Spherical(_) => spherical::NV,
+        }
+    }
+
+    /// Number of [`Motion`]s: one a velocity beyond those of a free base, and one of a coupled joint.
+    #[must_use]
+    pub fn n_motions(&self) -> usize {
+        match self {
+            Self::Free(_) | Self::Fixed => 0,
+            Self::Revolute(_) | Self::Prismatic(_) => 1,
+            Self::Spherical(_) => spherical::NV,
+        }
+    }
+
+    /// Axis of a revolute or a prismatic joint.
+    #[must_use]
+    pub fn axis(&self) -> Option<&JointAxis> {
+        match self {
+            Self::Revolute(Revolute { axis, .. }) | Self::Prismatic(Prismatic { axis, .. }) => {
+                Some(axis)
+            }
+            Self::Free(_) | Self::Fixed | Self::Spherical(_) => None,
+        }
+    }
+
+    /// The coordinate of a revolute or a prismatic joint.
+    #[inline]
+    #[must_use]
+    pub fn coordinate(&self) -> Option<&Coordinate> {
+        match self {
+            Self::Revolute(Revolute { coordinate, .. })
+            | Self::Prismatic(Prismatic { coordinate, .. }) => Some(coordinate),
+            Self::Free(_) | Self::Fixed | Self::Spherical(_) => None,
+        }
+    }
+
+    /// How it follows another joint, where it does.
+    #[inline]
+    #[must_use]
+    pub fn coupling(&self) -> Option<&Coupling> {
+        self.coordinate().and_then(|c| c.coupling.as_ref())
+    }
+}
+
+/// Where the one coordinate of a revolute or prismatic joint comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coordinate {
+    /// Number of the joint in [`Configuration::joints`](super::Configuration::joints): its own, or the one that it follows.
+    pub joint: usize,
+    /// How it follows that joint; none where the coordinate is its own.
+    pub coupling: Option<Coupling>,
+}
+
+impl Coordinate {
+    /// Its value: rad or m.
+    #[inline]
+    #[must_use]
+    pub fn of(&self, joints: &[f64]) -> f64 {
+        let own = joints[self.joint];
+        self.coupling.as_ref().map_or(own, |c| c.value(own))
+    }
+
+    /// Its rate at the velocity that it has or follows: rad/s or m/s.
+    #[inline]
+    #[must_use]
+    pub fn rate(&self, v: f64) -> f64 {
+        self.coupling.as_ref().map_or(v, |c| c.ratio * v)
+    }
+
+    /// Number of velocities of its own.
+    #[must_use]
+    pub fn nv(&self) -> usize {
+        usize::from(self.coupling.is_none())
+    }
+}

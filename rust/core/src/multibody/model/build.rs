@@ -1,0 +1,424 @@
+//! From a description to bodies, frames, wheels and boxes.
+
+use std::collections::HashMap;
+
+use nalgebra::{Matrix3, Rotation3, Vector3};
+
+use super::parts::{CollisionBox, CollisionSphere, Frame, Wheel};
+use super::properties::{JointProperties, Passive};
+use super::spinners::mark_spinners;
+use super::tree::{Paths, Tree};
+use super::{Body, Model, fingerprint};
+use crate::multibody::description::{
+    JointKind, ModelDescription, Shape, SolidDescription, WheelDescription,
+};
+use crate::multibody::error::ModelError;
+use crate::multibody::joint::fixed::Lock;
+use crate::multibody::joint::{
+    Coordinate, Coupling, Free, Joint, JointAxis, Prismatic, Revolute, Spherical,
+};
+use crate::spatial::{SymmetricMatrix3, exp_rotation};
+
+/// Mass, first moment and inertia about the body frame's origin, while solids are merged.
+#[derive(Clone, Default)]
+struct Lump {
+    mass: f64,
+    moment: Vector3<f64>,
+    inertia: Matrix3<f64>,
+}
+
+/// A model that grows solid by solid.
+#[derive(Default)]
+struct Builder {
+    bodies: Vec<Body>,
+    lumps: Vec<Lump>,
+    frames: Vec<Frame>,
+    boxes: Vec<CollisionBox>,
+    spheres: Vec<CollisionSphere>,
+    joints: Vec<JointProperties>,
+    n_trees: usize,
+    n_poses: usize,
+    n_rotations: usize,
+}
+
+impl Model {
+    pub(super) fn build(description: ModelDescription) -> Result<Self, ModelError> {
+        let index_of: HashMap<&str, usize> = (description.solids.iter().map(|s| s.name.as_str()))
+            .zip(0..)
+            .collect();
+        let mut builder = Builder {
+            n_poses: 1, // the first is the first body's, whether it is free or not
+            ..Builder::default()
+        };
+        let mut solid_of_body = Vec::new();
+        for (i, solid) in description.solids.iter().enumerate() {
+            let parent = (solid.parent.as_deref()).and_then(|p| index_of.get(p).copied());
+            let frame = builder.frame_of(i, solid, parent)?;
+            solid_of_body.resize(builder.bodies.len(), i);
+            builder.carry(solid, frame);
+        }
+        builder.settle_masses();
+        let Builder {
+            mut bodies,
+            frames,
+            boxes,
+            spheres,
+            mut joints,
+            n_trees,
+            n_poses,
+            n_rotations,
+            ..
+        } = builder;
+        let paths = Paths::number(&mut bodies).map_err(|b| {
+            let i = solid_of_body[b];
+            coupled_apart(i, &description.solids[i])
+        })?;
+        let wheels = wheels(&description.wheels, &index_of, &frames, &bodies);
+        let carriers = (boxes.iter().map(|x| x.body)).chain(spheres.iter().map(|x| x.body));
+        mark_spinners(&mut bodies, &wheels, carriers);
+        let trees = (0..n_trees).map(|t| tree(t, &bodies, &paths)).collect();
+        for joint in &mut joints {
+            joint.velocity = bodies[joint.body].velocity;
+            joint.is_passive = joint.passive.stiffness > 0.0 || joint.passive.damping > 0.0;
+        }
+        let joint_velocities = joints.iter().map(|joint| joint.velocity).collect();
+        let is_turn = |k: &usize| {
+            let body = &bodies[paths.body_of_velocity[*k]];
+            matches!(body.joint, Joint::Revolute(_) | Joint::Spherical(_))
+        };
+        let (spinning, turning) = (0..paths.body_of_velocity.len())
+            .filter(is_turn)
+            .partition(|&k| bodies[paths.body_of_velocity[k]].is_spinner);
+        let armatures = (joints.iter())
+            .filter(|joint| joint.passive.armature > 0.0)
+            .map(|joint| (joint.velocity, joint.passive.armature))
+            .collect();
+        let rotating = (bodies.iter())
+            .filter(|body| matches!(body.joint, Joint::Free(_) | Joint::Spherical(_)))
+            .map(|body| (body.joint.clone(), body.velocity))
+            .collect();
+        let coupled = (0..bodies.len())
+            .filter(|&b| bodies[b].joint.coupling().is_some())
+            .collect();
+        let has_slides = bodies
+            .iter()
+            .any(|b| matches!(b.joint, Joint::Prismatic(_)));
+        let text = description.to_json().unwrap_or_default();
+        Ok(Self {
+            mass: bodies.iter().map(|b| b.mass).sum(),
+            fingerprint: fingerprint(text.bytes()),
+            n_poses,
+            n_rotations,
+            has_slides,
+            armatures,
+            joint_velocities,
+            spinning,
+            turning,
+            coupled,
+            rotating,
+            trees,
+            joints,
+            description,
+            bodies,
+            frames,
+            wheels,
+            boxes,
+            spheres,
+            paths,
+        })
+    }
+}
+
+impl Builder {
+    /// The frame of a solid: of a new body, or fixed to one.
+    fn frame_of(
+        &mut self,
+        i: usize,
+        solid: &SolidDescription,
+        parent: Option<usize>,
+    ) -> Result<Frame, ModelError> {
+        let kind = solid.joint_kind();
+        let axis = solid
+            .axis
+            .and_then(|a| JointAxis::from_direction(&a.into()));
+        let axis = axis.unwrap_or(JointAxis::X);
+        let given = Vector3::from(solid.position.unwrap_or_default());
+        let turn =
+            (solid.rotation).map(|turn| *exp_rotation(&turn.into()).to_rotation_matrix().matrix());
+        let place = parent.map(|p| {
+            let carrier = &self.frames[p];
+            let position = carrier.position + carrier.rotation * given;
+            let rotation = turn.map_or(carrier.rotation, |turn| carrier.rotation * turn);
+            (carrier.body, position, rotation)
+        });
+        let lock = match (kind, solid.locked) {
+            (JointKind::Fixed, _) => Some(Lock::AtZero),
+            (JointKind::Revolute, Some(angle)) => Some(Lock::Turned(axis, angle)),
+            (JointKind::Prismatic, Some(way)) => Some(Lock::Displaced(axis, way)),
+            _ => None,
+        };
+        if let (Some((body, position, rotation)), Some(lock)) = (place, lock) {
+            let (displacement, rotation) = lock.place(&rotation);
+            return Ok(Frame {
+                name: solid.name.clone(),
+                body,
+                position: position + displacement,
+                rotation,
+            });
+        }
+        let mut position = place.map_or(given, |(_, position, _)| position);
+        let mut rotation = place.map_or_else(|| turn.unwrap_or_else(Matrix3::identity), |p| p.2);
+        let joint = match lock {
+            // A root: its lock is its place in the world.
+            Some(lock) => {
+                let displacement;
+                (displacement, rotation) = lock.place(&rotation);
+                position += displacement;
+                Joint::Fixed
+            }
+            None => self.joint_of(i, solid, axis)?,
+        };
+        if place.is_none() {
+            self.n_trees += 1;
+        }
+        self.bodies.push(Body {
+            name: solid.name.clone(),
+            parent: place.map(|(body, ..)| body),
+            tree: self.n_trees - 1,
+            position,
+            rotation: (rotation != Matrix3::identity()).then_some(rotation),
+            n_motions: joint.n_motions(),
+            is_coupled: joint.coupling().is_some(),
+            joint,
+            velocity: 0,
+            motion: 0,
+            mass: 0.0,
+            centre_of_mass: Vector3::zeros(),
+            principal_inertia: Vector3::zeros(),
+            principal_axes: None,
+            is_spinner: false,
+        });
+        self.lumps.push(Lump::default());
+        Ok(Frame {
+            name: solid.name.clone(),
+            body: self.bodies.len() - 1,
+            position: Vector3::zeros(),
+            rotation: Matrix3::identity(),
+        })
+    }
+
+    /// The joint of a new body.
+    fn joint_of(
+        &mut self,
+        i: usize,
+        solid: &SolidDescription,
+        axis: JointAxis,
+    ) -> Result<Joint, ModelError> {
+        match solid.joint_kind() {
+            JointKind::Fixed => Ok(Joint::Fixed),
+            JointKind::Free => {
+                let pose = if self.bodies.is_empty() {
+                    0
+                } else {
+                    self.n_poses
+                };
+                self.n_poses = self.n_poses.max(pose + 1);
+                Ok(Joint::Free(Free { pose }))
+            }
+            JointKind::Spherical => {
+                self.n_rotations += 1;
+                let rotation = self.n_rotations - 1;
+                Ok(Joint::Spherical(Spherical { rotation }))
+            }
+            JointKind::Revolute => {
+                let coordinate = self.coordinate_of(i, solid)?;
+                Ok(Joint::Revolute(Revolute { axis, coordinate }))
+            }
+            JointKind::Prismatic => {
+                let coordinate = self.coordinate_of(i, solid)?;
+                Ok(Joint::Prismatic(Prismatic { axis, coordinate }))
+            }
+        }
+    }
+
+    fn coordinate_of(
+        &mut self,
+        i: usize,
+        solid: &SolidDescription,
+    ) -> Result<Coordinate, ModelError> {
+        let Some(coupled) = &solid.coupled else {
+            self.joints
+                .push(JointProperties::of(self.bodies.len(), solid));
+            return Ok(Coordinate {
+                joint: self.joints.len() - 1,
+                coupling: None,
+            });
+        };
+        let mut joints = self.joints.iter();
+        let joint = joints.position(|joint| self.bodies[joint.body].name == coupled.joint);
+        let joint = joint.ok_or_else(|| coupled_apart(i, solid))?;
+        let coupling = Coupling {
+            ratio: coupled.ratio,
+            offset: coupled.offset,
+            combined: None,
+        };
+        // Springs, dampers and rotors of a joint that follows another act on that one.
+        let passive = Passive::of(solid).seen_through(&coupling);
+        self.joints[joint].passive = self.joints[joint].passive.with(&passive);
+        Ok(Coordinate {
+            joint,
+            coupling: Some(coupling),
+        })
+    }
+
+    /// Adds mass and shape of a solid to the body that its frame is fixed to.
+    fn carry(&mut self, solid: &SolidDescription, frame: Frame) {
+        let centre = frame.position
+            + frame.rotation * Vector3::from(solid.centre_of_mass.unwrap_or_default());
+        let about_centre = frame.rotation
+            * solid_inertia(solid.mass, &solid.shape, solid.inertia)
+            * frame.rotation.transpose();
+        let lump = &mut self.lumps[frame.body];
+        lump.mass += solid.mass;
+        lump.moment += centre * solid.mass;
+        lump.inertia +=
+            about_centre + SymmetricMatrix3::point_mass(solid.mass, &centre).to_matrix();
+        if let (true, Shape::Box { size }) = (solid.collides, solid.shape) {
+            self.boxes.push(CollisionBox {
+                body: frame.body,
+                name: solid.name.clone(),
+                centre,
+                rotation: frame.rotation,
+                half_size: Vector3::from(size) * 0.5,
+            });
+        }
+        if let (true, Shape::Sphere { radius }) = (solid.collides, solid.shape) {
+            self.spheres.push(CollisionSphere {
+                body: frame.body,
+                name: solid.name.clone(),
+                centre,
+                radius,
+            });
+        }
+        self.frames.push(frame);
+    }
+
+    fn settle_masses(&mut self) {
+        for (body, lump) in self.bodies.iter_mut().zip(&self.lumps) {
+            body.mass = lump.mass;
+            body.centre_of_mass = lump.moment / lump.mass;
+            let steiner = SymmetricMatrix3::point_mass(lump.mass, &body.centre_of_mass).to_matrix();
+            let about = SymmetricMatrix3::from_matrix(&(lump.inertia - steiner));
+            let off = about.xy.abs() + about.xz.abs() + about.yz.abs();
+            if off <= 1e-14 * (about.xx + about.yy + about.zz) {
+                body.principal_inertia = Vector3::new(about.xx, about.yy, about.zz);
+            } else {
+                let eigen = about.to_matrix().symmetric_eigen();
+                body.principal_inertia = eigen.eigenvalues;
+                let mut axes = eigen.eigenvectors;
+                if axes.determinant() < 0.0 {
+                    // Left-handed axes would turn the gyroscopic moment round.
+                    axes.column_mut(0).neg_mut();
+                }
+                body.principal_axes = Some(axes);
+            }
+        }
+    }
+}
+
+fn coupled_apart(i: usize, solid: &SolidDescription) -> ModelError {
+    let name = solid.coupled.as_ref().map(|c| c.joint.clone());
+    ModelError::CoupledApart {
+        field: format!("solids[{i}].coupled.joint"),
+        name: name.unwrap_or_default(),
+    }
+}
+
+fn tree(t: usize, bodies: &[Body], paths: &Paths) -> Tree {
+    let own = || (0..bodies.len()).filter(|&b| bodies[b].tree == t);
+    let first = own().next().unwrap_or(0);
+    let range = first..first + own().count();
+    let of_tree = |k: &usize| range.contains(&paths.body_of_velocity[*k]);
+    let mut velocities = (0..paths.body_of_velocity.len()).filter(of_tree);
+    let from = velocities.next();
+    let n = from.map_or(0, |_| 1 + velocities.count());
+    let from = from.unwrap_or(0);
+    Tree {
+        velocities: from..from + n,
+        is_free: matches!(bodies[first].joint, Joint::Free(_)),
+        mass: bodies[range.clone()].iter().map(|b| b.mass).sum(),
+        reach: (bodies[range.clone()].iter().filter(|b| b.parent.is_some()))
+            .map(|b| b.position.norm())
+            .sum(),
+        bodies: range,
+    }
+}
+
+fn wheels(
+    described: &[WheelDescription],
+    index_of: &HashMap<&str, usize>,
+    frames: &[Frame],
+    bodies: &[Body],
+) -> Vec<Wheel> {
+    // A joint that follows another one has no torque of its own.
+    let own = |body: &Body| {
+        let coordinate = body.joint.coordinate();
+        coordinate.filter(|c| c.coupling.is_none()).map(|c| c.joint)
+    };
+    let joints: HashMap<&str, usize> = (bodies.iter())
+        .filter_map(|body| own(body).map(|joint| (body.name.as_str(), joint)))
+        .collect();
+    let joint_of = |name: &str| joints.get(name).copied();
+    let mut wheels = Vec::new();
+    for wheel in described {
+        let Some(frame) = index_of.get(wheel.solid.as_str()).map(|&k| &frames[k]) else {
+            continue;
+        };
+        let axle = frame.rotation * Vector3::from(wheel.axle).normalize();
+        wheels.push(Wheel {
+            name: wheel.name.clone(),
+            body: frame.body,
+            centre: frame.position,
+            axle,
+            spoke: perpendicular(&axle),
+            radius: wheel.contact_radius.unwrap_or(wheel.radius),
+            torque_limit: wheel.torque_limit,
+            drive_sign: wheel.drive_sign,
+            motor: wheel.motor,
+            joint: joint_of(&wheel.solid),
+            steering: wheel.steering.as_deref().and_then(joint_of),
+            steering_limit: wheel.steering_limit.unwrap_or(0.0),
+        });
+    }
+    wheels
+}
+
+/// Inertia about the mass centre in the solid's frame, kg m².
+pub(in crate::multibody) fn solid_inertia(
+    mass: f64,
+    shape: &Shape,
+    given: Option<[f64; 6]>,
+) -> Matrix3<f64> {
+    match given {
+        Some([xx, yy, zz, xy, xz, yz]) => SymmetricMatrix3 {
+            xx,
+            yy,
+            zz,
+            xy,
+            xz,
+            yz,
+        }
+        .to_matrix(),
+        None => Matrix3::from_diagonal(&shape.inertia(mass).into()),
+    }
+}
+
+/// Some unit vector perpendicular to a unit vector.
+fn perpendicular(axle: &Vector3<f64>) -> Vector3<f64> {
+    let e = if axle.x.abs() < 0.7 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
+    Rotation3::face_towards(axle, &e) * -Vector3::x()
+}

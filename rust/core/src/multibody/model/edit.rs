@@ -1,0 +1,87 @@
+//! The same machine with some of its data changed.
+
+use super::Model;
+use crate::multibody::description::check::{in_range, length};
+use crate::multibody::description::{JointKind, Shape};
+use crate::multibody::error::ModelError;
+use crate::multibody::motor::Motor;
+
+impl Model {
+    /// The same machine with joints locked at angles (rad) or displacements (m): their solids are merged and the coordinates gone.
+    ///
+    /// # Errors
+    /// `UnknownName` for a joint that is not there or has no single coordinate, `NotFinite` for an angle that is not finite,
+    /// `CoupledApart` where another joint follows one of these.
+    pub fn with_locked_joints(&self, joints: &[(String, f64)]) -> Result<Self, ModelError> {
+        let mut description = self.description.clone();
+        for (i, (name, angle)) in joints.iter().enumerate() {
+            let mut solids = description.solids.iter_mut();
+            let is_joint = |kind| matches!(kind, JointKind::Revolute | JointKind::Prismatic);
+            let found = solids.find(|s| &s.name == name && is_joint(s.joint_kind()));
+            let Some(solid) = found else {
+                return Err(ModelError::UnknownName {
+                    field: format!("joints[{i}]"),
+                    name: name.clone(),
+                });
+            };
+            in_range(&format!("joints[{name}]"), *angle, 1e9, "at most 1e9 rad")?;
+            solid.locked = Some(*angle);
+        }
+        Self::build(description)
+    }
+
+    /// The same machine with wheels of another radius (m): the shape, its inertia and the contact change together. An
+    /// inertia that the description states is scaled by the square of the radius.
+    ///
+    /// # Errors
+    /// `NotADisc` for a wheel whose solid has another shape; a radius out of its range.
+    pub fn with_wheel_radius(&self, radius: f64) -> Result<Self, ModelError> {
+        let mut description = self.description.clone();
+        length("wheel_radius", radius)?;
+        for wheel in &mut description.wheels {
+            let mut solids = description.solids.iter_mut();
+            let solid = solids.find(|s| s.name == wheel.solid);
+            if let Some(solid) = solid {
+                let Shape::Disc { radius: before } = &mut solid.shape else {
+                    return Err(ModelError::NotADisc {
+                        field: "wheel_radius",
+                        solid: wheel.solid.clone(),
+                    });
+                };
+                let scale = (radius / *before).powi(2);
+                *before = radius;
+                for entry in solid.inertia.iter_mut().flatten() {
+                    *entry *= scale;
+                }
+            }
+            wheel.radius = radius;
+            wheel.contact_radius = None;
+        }
+        Self::from_description(description)
+    }
+
+    /// The same machine whose wheels touch the ground at another radius (m) than their discs': masses, inertias and looks stay.
+    ///
+    /// # Errors
+    /// A radius out of its range.
+    pub fn with_contact_radius(&self, radius: f64) -> Result<Self, ModelError> {
+        let mut description = self.description.clone();
+        length("contact_radius", radius)?;
+        for wheel in &mut description.wheels {
+            wheel.contact_radius = Some(radius);
+        }
+        Self::from_description(description)
+    }
+
+    /// The same machine with another torque–speed line, or none, on all wheels.
+    ///
+    /// # Errors
+    /// `NotPositive` or `NotFinite` for a torque or a speed that is none.
+    pub fn with_motors(&self, motor: Option<Motor>) -> Result<Self, ModelError> {
+        let mut description = self.description.clone();
+        for wheel in &mut description.wheels {
+            wheel.motor = motor;
+        }
+        Self::from_description(description)
+    }
+}

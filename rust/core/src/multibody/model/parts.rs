@@ -1,0 +1,75 @@
+//! What the bodies carry: frames of the solids, wheels, boxes.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::multibody::motor::Motor;
+
+/// The frame of a solid, fixed to a moving body.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Name of the solid.
+    pub name: String,
+    /// Body that carries it.
+    pub body: usize,
+    /// Origin in the body's frame, m.
+    pub position: Vector3<f64>,
+    /// Rotation from the solid's frame to the body's.
+    pub rotation: Matrix3<f64>,
+}
+
+/// A wheel: disc of radius `radius` and no width, fixed to a body.
+#[derive(Clone, Debug)]
+pub struct Wheel {
+    /// Short name, such as `FL`.
+    pub name: String,
+    /// Body that it is fixed to.
+    pub body: usize,
+    /// Centre in the body's frame, m.
+    pub centre: Vector3<f64>,
+    /// Unit axle in the body's frame.
+    pub axle: Vector3<f64>,
+    /// A unit vector in the wheel's plane, body's frame: rolling direction where no other is defined.
+    pub spoke: Vector3<f64>,
+    /// Contact radius, m.
+    pub radius: f64,
+    /// Largest driving torque, N m.
+    pub torque_limit: f64,
+    /// 1 or −1: joint torque of a positive (forward) command.
+    pub drive_sign: f64,
+    /// Torque–speed line of its motor, where it has one.
+    pub motor: Option<Motor>,
+    /// Its own joint, by its number ([`Model::joint_index`]); none where it is locked.
+    pub joint: Option<usize>,
+    /// Its steering joint, by its number; none where there is none or it is locked.
+    pub steering: Option<usize>,
+    /// Largest steering set-point either way, rad.
+    pub steering_limit: f64,
+}
+
+/// A box that touches the ground.
+#[derive(Clone, Debug)]
+pub struct CollisionBox {
+    /// Body that carries it.
+    pub body: usize,
+    /// Name of its solid.
+    pub name: String,
+    /// Centre in the body's frame, m.
+    pub centre: Vector3<f64>,
+    /// Rotation from the box's frame to the body's.
+    pub rotation: Matrix3<f64>,
+    /// Half edge lengths, m.
+    pub half_size: Vector3<f64>,
+}
+
+/// A ball that touches the ground.
+#[derive(Clone, Debug)]
+pub struct CollisionSphere {
+    /// Body that carries it.
+    pub body: usize,
+    /// Name of its solid.
+    pub name: String,
+    /// Centre in the body's frame, m.
+    pub centre: Vector3<f64>,
+    /// m.
+    pub radius: f64,
+}

@@ -1,0 +1,103 @@
+//! What a joint does by itself: springs, dampers, rotors, and the gains with which it can be held.
+
+use crate::multibody::description::{Hold, SolidDescription};
+use crate::multibody::joint::Coupling;
+
+/// A joint with one coordinate of its own.
+#[derive(Clone, Debug)]
+pub struct JointProperties {
+    /// The body that it moves.
+    pub body: usize,
+    /// Its velocity.
+    pub velocity: usize,
+    /// Gains with which it is held.
+    pub hold: Hold,
+    /// Its spring, damper and rotor, with those of all joints that follow it.
+    pub passive: Passive,
+    /// Whether it has a spring or a damper.
+    pub is_passive: bool,
+}
+
+/// Spring, damper and rotor: `τ = −stiffness (q − rest) − damping q̇ − armature q̈`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Passive {
+    /// N m/rad or N/m.
+    pub stiffness: f64,
+    /// rad or m.
+    pub rest: f64,
+    /// N m s/rad or N s/m.
+    pub damping: f64,
+    /// kg m² or kg.
+    pub armature: f64,
+}
+
+impl JointProperties {
+    /// Of the joint that carries a solid.
+    pub(super) fn of(body: usize, solid: &SolidDescription) -> Self {
+        Self {
+            body,
+            velocity: 0,
+            hold: solid.hold.unwrap_or(Hold {
+                stiffness: 0.0,
+                damping: 0.0,
+            }),
+            passive: Passive::of(solid),
+            is_passive: false,
+        }
+    }
+}
+
+impl Passive {
+    pub(super) fn of(solid: &SolidDescription) -> Self {
+        Self {
+            stiffness: solid.spring.map_or(0.0, |spring| spring.stiffness),
+            rest: solid.spring.map_or(0.0, |spring| spring.rest),
+            damping: solid.damping.unwrap_or(0.0),
+            armature: solid.armature.unwrap_or(0.0),
+        }
+    }
+
+    /// What acts at a joint that another one leads, as the leading joint feels it.
+    pub(super) fn seen_through(&self, coupling: &Coupling) -> Self {
+        let Coupling { ratio, offset, .. } = *coupling;
+        let square = ratio * ratio;
+        let is_spring = self.stiffness > 0.0 && square > 0.0;
+        Self {
+            stiffness: if is_spring {
+                square * self.stiffness
+            } else {
+                0.0
+            },
+            rest: if is_spring {
+                (self.rest - offset) / ratio
+            } else {
+                0.0
+            },
+            damping: square * self.damping,
+            armature: square * self.armature,
+        }
+    }
+
+    /// Both at one joint. Two springs act as one between their places of rest.
+    pub(super) fn with(&self, other: &Self) -> Self {
+        let stiffness = self.stiffness + other.stiffness;
+        let moment = self.stiffness * self.rest + other.stiffness * other.rest;
+        Self {
+            stiffness,
+            rest: if stiffness > 0.0 {
+                moment / stiffness
+            } else {
+                0.0
+            },
+            damping: self.damping + other.damping,
+            armature: self.armature + other.armature,
+        }
+    }
+
+    /// Energy of the spring at a coordinate, J.
+    #[must_use]
+    pub fn potential(&self, coordinate: f64) -> f64 {
+        let stretch = coordinate - self.rest;
+        0.5 * self.stiffness * stretch * stretch
+    }
+}

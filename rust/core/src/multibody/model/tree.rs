@@ -1,0 +1,198 @@
+//! Which velocities move which body: the paths of the trees.
+
+use std::ops::Range;
+
+use super::Body;
+use crate::multibody::joint::{Joint, Prismatic, Revolute, free};
+
+/// Bodies and velocities of a tree: one root and all that it carries.
+#[derive(Clone, Debug)]
+pub struct Tree {
+    /// Its bodies; the first is the root.
+    pub bodies: Range<usize>,
+    /// Its velocities; a free root's come first.
+    pub velocities: Range<usize>,
+    /// Whether its root is free: the tree's places are then relative to the root's origin, else to the world's.
+    pub is_free: bool,
+    /// kg.
+    pub mass: f64,
+    /// How far a joint can be from the root at most, m, but for what prismatic joints add.
+    pub reach: f64,
+}
+
+impl Tree {
+    /// How many velocities of a free root begin every path: 6 or 0.
+    #[inline]
+    #[must_use]
+    pub fn lead(&self) -> usize {
+        if self.is_free { free::NV } else { 0 }
+    }
+}
+
+/// Velocities and motions of all bodies, from the root on.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Paths {
+    /// Those of body `b`: `velocities[b * stride..][..lengths[b]]`.
+    velocities: Vec<usize>,
+    lengths: Vec<usize>,
+    leads: Vec<usize>,
+    pub(super) stride: usize,
+    /// Of the velocities beyond the lead, in the same layout.
+    motions: Vec<usize>,
+    pub(super) n_motions: usize,
+    /// Body of each velocity, and where in its body's path the velocity stands.
+    pub(super) body_of_velocity: Vec<usize>,
+    velocity_paths: Vec<(usize, usize)>,
+    /// How many leading entries bodies `a` and `b` share: `common[a * n_bodies + b]`.
+    common: Vec<usize>,
+}
+
+/// Path of one body while the tree grows.
+#[derive(Clone, Default)]
+struct Path {
+    velocities: Vec<usize>,
+    motions: Vec<usize>,
+}
+
+impl Paths {
+    /// Numbers velocities and motions and writes the numbers into the bodies; the body of a coupling that no path allows otherwise.
+    pub(super) fn number(bodies: &mut [Body]) -> Result<Self, usize> {
+        let mut paths = Self::default();
+        let mut grown: Vec<Path> = Vec::with_capacity(bodies.len());
+        for b in 0..bodies.len() {
+            let mut path = bodies[b]
+                .parent
+                .map_or(Path::default(), |p| grown[p].clone());
+            let lead = match (bodies[b].parent, &bodies[b].joint) {
+                (Some(p), _) => paths.leads[p],
+                (None, Joint::Free(_)) => free::NV,
+                (None, _) => 0,
+            };
+            paths.leads.push(lead);
+            let first = paths.body_of_velocity.len();
+            let motion = paths.n_motions;
+            bodies[b].velocity = first;
+            bodies[b].motion = motion;
+            paths.n_motions += bodies[b].joint.n_motions();
+            if bodies[b].joint.coupling().is_some() {
+                paths.follow(bodies, &grown, b, &mut path)?;
+            } else {
+                let nv = bodies[b].joint.nv();
+                path.velocities.extend(first..first + nv);
+                path.motions.extend(motion..paths.n_motions);
+                paths.body_of_velocity.extend((0..nv).map(|_| b));
+            }
+            grown.push(path);
+        }
+        paths.lay_out(bodies, &grown);
+        Ok(paths)
+    }
+
+    /// Continues the path of a body whose joint follows another.
+    fn follow(
+        &mut self,
+        bodies: &mut [Body],
+        grown: &[Path],
+        b: usize,
+        path: &mut Path,
+    ) -> Result<(), usize> {
+        let motion = bodies[b].motion;
+        let lead = self.leads[b];
+        let coordinate = bodies[b].joint.coordinate().ok_or(b)?;
+        let is_followed = |other: &&Body| {
+            let own = other.joint.coordinate();
+            own.is_some_and(|c| c.coupling.is_none() && c.joint == coordinate.joint)
+        };
+        let leader = bodies[..b].iter().find(is_followed).ok_or(b)?;
+        if leader.tree != bodies[b].tree {
+            return Err(b);
+        }
+        let (k, leader) = (leader.velocity, self.body_of_velocity[leader.velocity]);
+        let mut combined = None;
+        if let Some(at) = path.velocities.iter().position(|&i| i == k) {
+            let before = path.motions[at - lead];
+            combined = Some((before, self.n_motions));
+            path.motions[at - lead] = self.n_motions;
+            self.n_motions += 1;
+        } else if grown[leader].velocities.split_last() == Some((&k, &path.velocities[..])) {
+            path.velocities.push(k);
+            path.motions.push(motion);
+        } else {
+            return Err(b);
+        }
+        bodies[b].velocity = k;
+        if let Joint::Revolute(Revolute { coordinate, .. })
+        | Joint::Prismatic(Prismatic { coordinate, .. }) = &mut bodies[b].joint
+            && let Some(coupling) = &mut coordinate.coupling
+        {
+            coupling.combined = combined;
+        }
+        Ok(())
+    }
+
+    fn lay_out(&mut self, bodies: &[Body], grown: &[Path]) {
+        let n = bodies.len();
+        let longest = grown.iter().map(|path| path.velocities.len()).max();
+        self.stride = longest.unwrap_or(0).max(1);
+        self.velocities = vec![0; n * self.stride];
+        self.motions = vec![0; n * self.stride];
+        for (b, path) in grown.iter().enumerate() {
+            let start = b * self.stride;
+            self.velocities[start..][..path.velocities.len()].copy_from_slice(&path.velocities);
+            self.motions[start..][..path.motions.len()].copy_from_slice(&path.motions);
+            self.lengths.push(path.velocities.len());
+        }
+        for (k, &b) in self.body_of_velocity.iter().enumerate() {
+            let at = grown[b].velocities.iter().position(|&i| i == k);
+            self.velocity_paths
+                .push((b * self.stride, at.unwrap_or(0) + 1));
+        }
+        self.common = vec![0; n * n];
+        for (a, body) in bodies.iter().enumerate() {
+            self.common[a * n + a] = self.lengths[a];
+            let Some(parent) = body.parent else {
+                continue; // Shares nothing with the trees before it.
+            };
+            // A path ends with its own body, which no path of a body before it has, unless it follows one.
+            let own = &grown[parent].velocities.len();
+            let follows = grown[a]
+                .velocities
+                .get(*own)
+                .filter(|_| body.joint.coupling().is_some());
+            for b in 0..a {
+                let mut shared = self.common[parent * n + b];
+                if shared == *own && follows.is_some() && grown[b].velocities.get(*own) == follows {
+                    shared += 1;
+                }
+                self.common[a * n + b] = shared;
+                self.common[b * n + a] = shared;
+            }
+        }
+    }
+
+    #[inline]
+    pub(super) fn path(&self, b: usize) -> &[usize] {
+        &self.velocities[b * self.stride..][..self.lengths[b]]
+    }
+
+    #[inline]
+    pub(super) fn lead(&self, b: usize) -> usize {
+        self.leads[b]
+    }
+
+    #[inline]
+    pub(super) fn motions(&self, b: usize) -> &[usize] {
+        &self.motions[b * self.stride..][..self.lengths[b] - self.leads[b]]
+    }
+
+    #[inline]
+    pub(super) fn velocity_path(&self, k: usize) -> &[usize] {
+        let (start, length) = self.velocity_paths[k];
+        &self.velocities[start..][..length]
+    }
+
+    #[inline]
+    pub(super) fn common(&self, a: usize, b: usize) -> usize {
+        self.common[a * self.lengths.len() + b]
+    }
+}

@@ -1,0 +1,150 @@
+//! Joints that follow others.
+
+use rover_core::integrator::Variant;
+use rover_core::multibody::{
+    Configuration, CouplingDescription, JointKind, Kinematics, Model, ModelError, SolidDescription,
+    Spring,
+};
+
+use crate::machines::{energy, machine, model, options, simulation, solid};
+
+fn follows(joint: &str, ratio: f64, offset: f64) -> Option<CouplingDescription> {
+    Some(CouplingDescription {
+        joint: joint.into(),
+        ratio,
+        offset,
+    })
+}
+
+fn rocker(name: &str, z: f64, bob: f64) -> SolidDescription {
+    let mut rocker = solid(name, Some("body"), JointKind::Revolute);
+    rocker.position = Some([0.0, 0.0, z]);
+    rocker.centre_of_mass = Some([bob, -0.3, 0.0]);
+    rocker
+}
+
+/// The rockers of a differential on a fixed body: one coordinate with the inertia of both, `q̈ = Σ c τ / Σ I`.
+#[test]
+fn a_differential_is_one_coordinate() {
+    let base = solid("body", None, JointKind::Fixed);
+    let (left, mut right) = (rocker("left", -0.5, 0.2), rocker("right", 0.5, 0.6));
+    right.coupled = follows("left", -1.0, 0.0);
+    let model = model(vec![base, left, right]);
+    assert_eq!((model.nv(), model.n_joints()), (1, 1));
+    let h = 1e-6;
+    let mut run = simulation(model, options(h, Variant::Linearised));
+    run.step(1).unwrap();
+    let disc = 0.5 * 0.1 * 0.1;
+    let inertia = 2.0 * disc + (0.04 + 0.09) + (0.36 + 0.09);
+    // Gravity turns each about z by −m g x; the right one turns the other way.
+    let expected = -9.81 * (0.2 - 0.6) / inertia;
+    let found = run.state().v[0] / h;
+    assert!(
+        (found - expected).abs() < 1e-4 * expected,
+        "{found} {expected}"
+    );
+}
+
+/// The same differential with a very stiff hold between the rockers is the limit of what the coupling does exactly.
+#[test]
+fn a_follower_on_a_free_body_stays_where_the_ratio_says() {
+    let body = solid("body", None, JointKind::Free);
+    let (left, mut right) = (rocker("left", -0.5, 0.2), rocker("right", 0.5, 0.6));
+    right.coupled = follows("left", -0.5, 0.3);
+    for variant in [Variant::Linearised, Variant::Newton] {
+        let model = model(vec![body.clone(), left.clone(), right.clone()]);
+        assert_eq!((model.nv(), model.n_joints()), (7, 1));
+        let mut run = simulation(model, options(1e-3, variant));
+        let mut v = vec![0.0; 7];
+        v[3..].copy_from_slice(&[0.5, -0.3, 0.2, 2.0]);
+        run.set_state(Configuration::zero(run.model()), v);
+        let (before, momentum) = (energy(&run), run.momentum());
+        run.step(1000).unwrap();
+        let q = run.state().configuration.joints[0];
+        let kinematics: Kinematics = run.kinematics();
+        let relative = kinematics.R[0].transpose() * kinematics.R[2];
+        let angle = relative[(1, 0)].atan2(relative[(0, 0)]);
+        assert!((angle - (0.3 - 0.5 * q)).abs() < 1e-12);
+        // It falls with some 150 J.
+        assert!((energy(&run) - before).abs() < 1e-3);
+        // Only gravity acts on it: m g t, and the angular momentum stays sideways to it.
+        let change = run.momentum().linear - momentum.linear;
+        assert!(
+            (change.y + 3.0 * 9.81).abs() < 2e-5 && change.xz().norm() < 2e-5,
+            "{change}"
+        );
+    }
+}
+
+/// A telescope whose second stage slides as far again as the first: the tip moves at twice the speed.
+#[test]
+fn a_telescope_is_one_mass() {
+    let mut first = solid("first", None, JointKind::Prismatic);
+    first.axis = Some([0.0, 1.0, 0.0]);
+    first.spring = Some(Spring {
+        stiffness: 50.0,
+        rest: 0.0,
+    });
+    let mut second = solid("second", Some("first"), JointKind::Prismatic);
+    second.axis = Some([0.0, 1.0, 0.0]);
+    second.coupled = follows("first", 1.0, 0.1);
+    second.spring = Some(Spring {
+        stiffness: 30.0,
+        rest: 0.2,
+    });
+    second.damping = Some(1.0);
+    second.armature = Some(0.5);
+    let h = 1e-6;
+    let mut run = simulation(model(vec![first, second]), options(h, Variant::Linearised));
+    let mut start = Configuration::zero(run.model());
+    start.joints[0] = 0.4;
+    run.set_state(start, vec![0.7]);
+    let mass = 1.0 + 4.0 + 0.5;
+    let force = -9.81 * 3.0 - 50.0 * 0.4 - 30.0 * (0.4 + 0.1 - 0.2) - 0.7;
+    run.step(1).unwrap();
+    let found = (run.state().v[0] - 0.7) / h;
+    assert!(
+        (found - force / mass).abs() < 1e-3,
+        "{found} {}",
+        force / mass
+    );
+}
+
+#[test]
+fn couplings_that_no_tree_has_are_refused() {
+    let chain = || {
+        vec![
+            solid("body", None, JointKind::Fixed),
+            solid("a", Some("body"), JointKind::Revolute),
+            solid("b", Some("a"), JointKind::Revolute),
+            solid("c", Some("body"), JointKind::Revolute),
+        ]
+    };
+    let refused = |solids| Model::from_description(machine(solids)).unwrap_err();
+    // On another branch, further out.
+    let mut solids = chain();
+    solids[3].coupled = follows("b", 1.0, 0.0);
+    let error = refused(solids);
+    assert_eq!(error.field(), "solids[3].coupled.joint", "{error}");
+    assert!(matches!(error, ModelError::CoupledApart { .. }));
+    // A joint that follows one itself.
+    let mut solids = chain();
+    solids[2].coupled = follows("a", 1.0, 0.0);
+    solids.push(solid("d", Some("b"), JointKind::Revolute));
+    solids[4].coupled = follows("b", 1.0, 0.0);
+    assert_eq!(refused(solids).field(), "solids[4].coupled.joint");
+    // One that is locked, one that is not there, one that has no coordinate.
+    let mut solids = chain();
+    solids[3].coupled = follows("a", 1.0, 0.0);
+    let model = Model::from_description(machine(solids.clone())).unwrap();
+    let error = model.with_locked_joints(&[("a".into(), 0.1)]).unwrap_err();
+    assert_eq!(error.field(), "solids[3].coupled.joint");
+    for (leader, ratio, field) in [
+        ("nothing", 1.0, "solids[3].coupled.joint"),
+        ("body", 1.0, "solids[3].coupled.joint"),
+        ("a", f64::NAN, "solids[3].coupled.ratio"),
+    ] {
+        solids[3].coupled = follows(leader, ratio, 0.0);
+        assert_eq!(refused(solids.clone()).field(), field);
+    }
+}
