@@ -14,7 +14,7 @@ UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
 export VIRTUAL_ENV := $(abspath $(VENV))# where maturin installs
 
-.PHONY: help demo test check lint types deny format test-rust test-python docs bench chart stability torture validate orders profiles train train-rllib pins clean
+.PHONY: help demo test check lint types deny format stub test-rust test-python docs bench chart stability torture validate orders profiles train train-rllib pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -47,6 +47,10 @@ format: $(STAMPS)/test ## rewrite the sources as the linters want them
 	cargo fmt --all
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
+
+stub: $(STAMPS)/test $(STAMPS)/core ## write the compiled module's docstrings into its stub
+	$(BIN)/python rust/python/stub.py
+	$(BIN)/ruff format --quiet envs/rover_gym/_core.pyi
 
 test-rust: ## the Rust tests only
 	cargo test --locked --quiet

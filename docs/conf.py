@@ -1,14 +1,13 @@
 """Sphinx configuration.
 
 Two pages are made from the code itself: the environment's card and the command line's help. The compiled module is
-documented from its stub, which has the types, and where the stub says nothing by the module's own docstrings.
+documented from its stub, which has the types beside the module's own docstrings.
 """
 
 import __future__
 
 import inspect
 import sys
-from functools import reduce
 from pathlib import Path
 from types import ModuleType
 
@@ -16,8 +15,7 @@ from sphinx.application import Sphinx
 from typer.testing import CliRunner
 
 import rover_gym
-from rover_gym import RoverEnv, __version__
-from rover_gym import _core as compiled
+from rover_gym import RoverEnv, __version__, mechanics
 from rover_gym.cli import app as rover
 
 HERE = Path(__file__).parent
@@ -44,26 +42,27 @@ autodoc_default_options = {"members": True, "undoc-members": True}
 
 
 def _use_stub() -> None:
-    """Puts the stub's classes where Sphinx looks for the compiled ones."""
-    name = compiled.__name__
-    stub = ModuleType(name)
-    source = Path(compiled.__file__).with_name("_core.pyi")
+    """Puts the stub's classes where Sphinx looks for the compiled ones, in `rover_gym.mechanics`."""
+    name = mechanics.__name__
+    stub = ModuleType(name, mechanics.__doc__)
+    source = Path(mechanics.__file__).with_name("_core.pyi")
     text = source.read_text(encoding="utf-8")
     for alias, name_in_print in (("npt.ArrayLike", "ArrayLike"), ("npt.NDArray[np.float64]", "np.ndarray")):
         text = text.replace(alias, name_in_print)  # unfolded, they fill half a page
-    stub.ArrayLike = type("ArrayLike", (), {})
+    stub.ArrayLike = type("ArrayLike", (), {"__module__": "numpy.typing"})
     # A stub may name a class before it is there, so its annotations stay unevaluated.
     code = compile(text, source, "exec", __future__.annotations.compiler_flag)
     exec(code, stub.__dict__)  # noqa: S102 - our own stub
-    sys.modules[name] = stub
-    rover_gym._core = stub
-    for public in set(stub.__all__) & set(rover_gym.__all__) - {"__version__"}:
-        setattr(rover_gym, public, getattr(stub, public))
+    sys.modules[name] = rover_gym.mechanics = stub
 
 
-def _card() -> str:
-    """The environment's docstring, which is Markdown."""
-    return f"# Rover-v0\n\n{inspect.getdoc(RoverEnv)}\n"
+#: Environments whose docstring is a card in Markdown, by name; each has a page of its own.
+CARDS = {"Rover-v0": RoverEnv}
+
+
+def _card(name: str) -> str:
+    """An environment's card."""
+    return f"# {name}\n\n{inspect.getdoc(CARDS[name])}\n"
 
 
 def _command_line() -> str:
@@ -78,17 +77,14 @@ def _command_line() -> str:
 
 def _write_generated(_app: Sphinx) -> None:
     GENERATED.mkdir(exist_ok=True)
-    for name, text in (("rover-v0.md", _card()), ("command-line.md", _command_line())):
+    pages = {f"{name.lower()}.md": _card(name) for name in CARDS}
+    for name, text in (pages | {"command-line.md": _command_line()}).items():
         (GENERATED / name).write_text(text, encoding="utf-8")
 
 
-def _mend_docstring(_app: Sphinx, _what: str, name: str, _obj: object, _options: object, lines: list[str]) -> None:
+def _mend_docstring(_app: Sphinx, _what: str, _name: str, obj: object, _options: object, lines: list[str]) -> None:
     """The card appears as its first line, since the whole has its own page; a bar is a norm, no substitution."""
-    if not any(lines):
-        path = name.removeprefix("rover_gym.").removeprefix("_core.").split(".")
-        documented = reduce(lambda owner, part: getattr(owner, part, None), path, compiled)
-        lines[:] = (inspect.getdoc(documented) or "").splitlines() if documented is not None else []
-    if name == "rover_gym.RoverEnv":
+    if any(obj is environment for environment in CARDS.values()):
         lines[1:] = ["", "The environment's card has a page of its own."]
     lines[:] = [line.replace("|", r"\|") for line in lines]
 

@@ -14,7 +14,7 @@ import typer
 from matplotlib.figure import Figure
 
 from rover_gym.cli.console import plain_errors, say_path
-from rover_gym.learning.config import read_config
+from rover_gym.learning.training_config import read_config
 
 # Episodes over which the share of successes is averaged.
 WINDOW = 200

@@ -14,8 +14,7 @@ import typer
 from gymnasium.wrappers import RecordVideo
 
 from rover_gym.cli.console import plain_errors, say_path
-from rover_gym.episodes import run_episode
-from rover_gym.trained import TrainedPolicy, policy_arguments
+from rover_gym.policy import TrainedPolicy, policy_arguments, run_episode
 
 
 @plain_errors

@@ -23,9 +23,17 @@ from rich.progress import Progress, TaskID
 
 from rover_gym import PDPolicy
 from rover_gym.cli.console import plain_errors, progress_bar, say_path
-from rover_gym.episodes import Policy
-from rover_gym.evaluation import Drive, Estimate, Summary, drive_all, summarise
-from rover_gym.trained import PolicyCard, TrainedPolicy, policy_arguments
+from rover_gym.policy import (
+    EvaluatedEpisode,
+    IntervalEstimate,
+    Policy,
+    PolicyCard,
+    PolicySummary,
+    TrainedPolicy,
+    drive_all,
+    policy_arguments,
+    summarise,
+)
 
 COLUMNS = ("policy", "success", "95% interval", "time to goal, s", "energy, J/m", "slip", "tilt, °", "other ends")
 
@@ -61,7 +69,7 @@ def evaluate(
         makers.append((given.name, partial(_load, folder), policy_arguments(folder)))
 
     output.mkdir(parents=True, exist_ok=True)
-    drives: dict[str, list[Drive]] = {}
+    drives: dict[str, list[EvaluatedEpisode]] = {}
     with progress_bar() as bar:
         for name, make_policy, further in makers:
             task = bar.add_task(name, total=episodes, state="")
@@ -108,7 +116,7 @@ def _drive(
     arguments: dict[str, Any],
     threads: int,
     progress: Callable[[int], None],
-) -> list[Drive]:
+) -> list[EvaluatedEpisode]:
     """The episodes of one policy, from an earlier evaluation where that was the same."""
     scene = json.loads(json.dumps({"environment": arguments, "seeds": [seeds[0], seeds[-1]]}))
     kept = _kept(path, scene)
@@ -120,16 +128,16 @@ def _drive(
     return drives
 
 
-def _kept(path: Path, scene: Any) -> list[Drive] | None:
+def _kept(path: Path, scene: Any) -> list[EvaluatedEpisode] | None:
     """The episodes of an earlier evaluation; None where that was another one, or its file is damaged."""
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
-        return [Drive(**drive) for drive in kept["drives"]] if kept["scene"] == scene else None
+        return [EvaluatedEpisode(**drive) for drive in kept["drives"]] if kept["scene"] == scene else None
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
         return None
 
 
-def _markdown(rows: Sequence[Summary]) -> str:
+def _markdown(rows: Sequence[PolicySummary]) -> str:
     """The table."""
     lines = ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
     for row in rows:
@@ -149,7 +157,7 @@ def _markdown(rows: Sequence[Summary]) -> str:
     return "\n".join(lines)
 
 
-def _number(estimate: Estimate, form: str) -> str:
+def _number(estimate: IntervalEstimate, form: str) -> str:
     if math.isnan(estimate.value):
         return "-"
     half = 0.5 * (estimate.interval[1] - estimate.interval[0])
@@ -165,10 +173,10 @@ def _without_nan(value: Any) -> Any:
     return None if isinstance(value, float) and math.isnan(value) else value
 
 
-def _plot(rows: Sequence[Summary], path: Path) -> None:
+def _plot(rows: Sequence[PolicySummary], path: Path) -> None:
     """Every figure of every policy with its interval."""
     figure = Figure(figsize=(10.0, 1.2 + 0.3 * len(rows)), layout="constrained")
-    quantities: tuple[tuple[str, Callable[[Summary], Estimate], float], ...] = (
+    quantities: tuple[tuple[str, Callable[[PolicySummary], IntervalEstimate], float], ...] = (
         ("success, %", lambda row: row.success, 100.0),
         ("time to goal, s", lambda row: row.time, 1.0),
         ("energy, J/m", lambda row: row.energy_per_metre, 1.0),

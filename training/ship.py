@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from rover_gym.cli.console import plain_errors, say_path
-from rover_gym.trained import policy_folder
+from rover_gym.policy import policy_folder
 
 
 @plain_errors

@@ -23,10 +23,10 @@ from rover_gym import OptionError
 from rover_gym.cli.console import plain_errors, say_path
 from rover_gym.learning.build import build_env, normalised
 from rover_gym.learning.callbacks import CheckpointCallback, CurriculumCallback, SameFieldsEvalCallback
-from rover_gym.learning.config import PPOConfig, read_config
 from rover_gym.learning.export import export
 from rover_gym.learning.provenance import provenance
 from rover_gym.learning.stopwatch import Stopwatch
+from rover_gym.learning.training_config import PPOConfig, read_config
 from rover_gym.validation import refuse
 
 # Fields of different seeds and of resumed runs differ; all stay below the evaluations' million.

@@ -19,7 +19,7 @@ from ray.rllib.algorithms.ppo import PPOConfig
 from ray.rllib.utils.metrics import ENV_RUNNER_RESULTS, EPISODE_RETURN_MEAN
 from ray.tune.registry import register_env
 
-from rover_gym.wrappers import DriveByCommand
+from rover_gym.policy import DriveByCommand
 
 # Control periods a decision: 0.3 s, as in configs/plane.yaml.
 REPEAT = 6

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from rover_gym.cli import app
 from rover_gym.figures import draw_run
-from rover_gym.run import read_run
+from rover_gym.record import read_run
 
 HERE = Path(__file__).parent
 WIDTH = 900  # pixels

@@ -1,6 +1,28 @@
-"""rover-gym: a nonsmooth simulator of a six-wheel Mars rover, with Gymnasium environments."""
+"""rover-gym: a nonsmooth simulator of a six-wheel Mars rover, with Gymnasium environments.
 
-from rover_gym._core import (
+The package stands in rooms. A room may use those above it in this list, never one below:
+
+    mechanics      the compiled core: models, grounds, simulations, the contact solver
+    validation     arguments, refused by name
+    extras         optional packages
+    rendering      what a rover looks like: frames and video
+    env            `Rover-v0`: its card, its arguments, a control period
+    vector         many rovers at once, for Gymnasium and for stable-baselines3
+    policy         who drives: the baseline, trained policies, how far each gets
+    planning       what a scene needs, and no more
+    record         trajectories in HDF5
+    planar         the planar systems: a ball, a two-wheel rover
+    soil           granular soil
+    reproduction   the report of 2010, run again
+    replay         saved runs for the browser, VRML and glTF
+    figures        figures of saved runs
+    learning       training with stable-baselines3
+    cli            the command `rover`
+    registration   the environments' names for Gymnasium
+"""
+
+from rover_gym.env.rover_env import RoverEnv
+from rover_gym.mechanics import (
     BusyError,
     CommandError,
     ModelError,
@@ -20,8 +42,7 @@ from rover_gym._core import (
     accuracy_options,
     solve_friction_contact,
 )
-from rover_gym.env import RoverEnv
-from rover_gym.policy import PDPolicy
+from rover_gym.policy.pd_policy import PDPolicy
 from rover_gym.registration import register_environments
 
 register_environments()

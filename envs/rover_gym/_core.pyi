@@ -1,7 +1,7 @@
 """Compiled core of rover-gym: the border to the Rust mechanics (`rover-core`).
 
 SI units and radians everywhere. World frame: x forward, y up, z to the right. Wheels are always
-listed FL, FR, ML, BL, MR, BR.
+listed FL, FR, ML, BL, MR, BR. Every array returned is new.
 """
 
 from collections.abc import Mapping, Sequence
@@ -59,80 +59,152 @@ __all__ = [
 __version__: str
 
 class RoverGymError(Exception):
-    """Root of every error that rover-gym raises. `field` names the culprit, `value` is what was given."""
+    """Root of every error that rover-gym raises.
+
+    Attributes:
+        field: Name of the argument at fault, with the index of the entry; None where there is none.
+        value: What was given there, or None.
+    """
 
     field: str | None
     value: object
 
 class ModelError(RoverGymError, ValueError):
-    """A model description is not physical or not readable."""
+    """A model's description is unreadable or not physical."""
 
 class StateError(RoverGymError, ValueError):
-    """A state (q, velocities, snapshot) has a wrong shape or a non-finite entry."""
+    """A state or a snapshot has a wrong shape or an entry that is not finite."""
 
 class TerrainError(RoverGymError, ValueError):
-    """A terrain description is invalid."""
+    """A terrain's description is invalid."""
 
 class OptionError(RoverGymError, ValueError):
-    """A simulation option or an argument is out of its range."""
+    """An option or another argument is out of its range."""
 
 class CommandError(RoverGymError, ValueError):
-    """A torque, set-point or action is invalid."""
+    """A torque, a set-point or an action is invalid."""
 
 class ProblemError(RoverGymError, ValueError):
-    """A friction-contact problem (W, q, mu) has wrong shapes or entries."""
+    """A friction-contact problem has a wrong shape or an invalid entry."""
 
 class StepError(RoverGymError, RuntimeError):
-    """A time step could not be taken; the state is as it was before the call."""
+    """A time step could not be taken; the state is as it was before that step."""
 
 class BusyError(RoverGymError, RuntimeError):
-    """An object was used while another call on it was still going on; nothing has changed."""
+    """An object was used while another call on it was still going on. Nothing has changed."""
 
 @final
 class Motor:
     """The torque-speed line of a wheel's motor. Immutable.
 
-    The torque is the command, but within `stall (1 - speed / no_load_speed)` forwards, `-stall (1 + speed /
-    no_load_speed)` backwards, and `stall` either way.
+    The torque is the command, but at most `stall_torque * (1 - speed / no_load_speed)` forwards and
+    `stall_torque * (1 + speed / no_load_speed)` backwards, and at most `stall_torque` either way.
 
     Args:
-        stall_torque: Of the line at rest, N m.
-        no_load_speed: Where the line reaches zero, rad/s; may be infinite: then the speed does not matter.
-        regenerating: Whether it brakes when it is driven faster than that, by the line and at most by the stall torque;
-            if not, it turns freely there.
+        stall_torque: Torque of the line at rest, N m.
+        no_load_speed: Speed at which the line reaches zero, rad/s. If infinite, the torque does not
+            depend on the speed.
+        regenerating: Whether the motor brakes when it is driven faster than `no_load_speed`, along
+            the line and with at most the stall torque. Otherwise it turns freely there.
 
     Raises:
-        ModelError: `stall_torque` is not from 1e-9 to 1e9 N m, or `no_load_speed` neither from 1e-6 to 1e9 rad/s nor
-            infinite.
+        ModelError: `stall_torque` is not from 1e-9 to 1e9 N m, or `no_load_speed` is neither from
+            1e-6 to 1e9 rad/s nor infinite.
     """
 
     def __new__(cls, stall_torque: float, no_load_speed: float, regenerating: bool = True) -> Motor: ...
     @property
-    def stall_torque(self) -> float: ...
+    def stall_torque(self) -> float:
+        """Torque of the line at rest, N m."""
     @property
-    def no_load_speed(self) -> float: ...
+    def no_load_speed(self) -> float:
+        """Speed at which the line reaches zero, rad/s; may be infinite."""
     @property
-    def regenerating(self) -> bool: ...
+    def regenerating(self) -> bool:
+        """Whether the motor brakes when it is driven faster than `no_load_speed`."""
     def torque(self, command: float, speed: float) -> float:
-        """N m that a command (N m) gives at a speed (rad/s). Raises CommandError for what is not finite."""
+        """The torque that the motor gives under a command at a speed.
+
+        Args:
+            command: Commanded torque, N m.
+            speed: Speed of the wheel in the direction of positive torque, rad/s.
+
+        Returns:
+            The torque, N m.
+
+        Raises:
+            CommandError: A number is not finite.
+        """
     def __getnewargs__(self) -> tuple[float, float, bool]: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
 
 @final
 class RoverModel:
-    """A tree of solids under a free base, read from data. Immutable."""
+    """A machine: a tree of solids under a free base, read from data. Immutable.
+
+    `RoverModel()` is the built-in six-wheel rover. The other constructors are `from_file`,
+    `from_text` and `from_dict`.
+
+    Methods that take coordinates understand two sets of them, by the argument `coordinates`:
+    "state", the `q` and `v` of `Simulation`, and "report", the Cardan angles of the 2010 report and
+    their rates.
+    """
 
     def __new__(cls) -> RoverModel: ...
     @staticmethod
-    def from_file(path: str | Any) -> RoverModel: ...
+    def from_file(path: str | Any) -> RoverModel:
+        """Reads a model file (TOML).
+
+        Args:
+            path: Path of the file.
+
+        Returns:
+            The model.
+
+        Raises:
+            ModelError: The file does not describe a model; the message names the path.
+            OSError: The file cannot be read.
+        """
     @staticmethod
-    def from_text(text: str) -> RoverModel: ...
+    def from_text(text: str) -> RoverModel:
+        """Reads a model from TOML text.
+
+        Args:
+            text: What a model file holds.
+
+        Returns:
+            The model.
+
+        Raises:
+            ModelError: The text does not describe a model.
+        """
     @staticmethod
-    def from_dict(description: Mapping[str, Any]) -> RoverModel: ...
-    def to_file(self, path: str | Any) -> None: ...
-    def to_text(self) -> str: ...
-    def to_dict(self) -> dict[str, Any]: ...
+    def from_dict(description: Mapping[str, Any]) -> RoverModel:
+        """Reads a model from nested dictionaries and lists.
+
+        Args:
+            description: What `to_dict` returns.
+
+        Returns:
+            The model.
+
+        Raises:
+            ModelError: The dictionaries do not describe a model.
+        """
+    def to_file(self, path: str | Any) -> None:
+        """Writes a model file (TOML), with locked joints.
+
+        Args:
+            path: Path of the file.
+
+        Raises:
+            OSError: The file cannot be written.
+        """
+    def to_text(self) -> str:
+        """The description as TOML text, as `from_text` reads it."""
+    def to_dict(self) -> dict[str, Any]:
+        """The description as nested dictionaries and lists, as `from_dict` reads it."""
     def replace(
         self,
         *,
@@ -145,114 +217,333 @@ class RoverModel:
         mass_scale: float | None = None,
         motor: Motor | Mapping[str, Any] | None = ...,
     ) -> RoverModel:
-        """A model that differs in what is given.
+        """Returns a model that differs in what is given.
 
         Args:
-            wheel_radius: Of all wheels, m: shape, inertia and contact change together.
-            contact_radius: Radius at which the wheels touch the ground, m; shape and inertia stay as they are.
-            masses: kg, by solid or one for each. Inertias go with them.
-            steering_stiffness: N m/rad.
-            steering_damping: N m s/rad.
-            wheel_torque_limit: N m.
-            mass_scale: Multiplies masses and inertias.
-            motor: Of all wheels: a `Motor`, or its fields by name; None for none: each wheel gives its command at any
-                speed. If it is not given, the motors stay.
+            wheel_radius: Radius of all wheels, m: shape, inertia and contact change together.
+            contact_radius: Radius at which the wheels touch the ground, m; shape and inertia stay
+                as they are.
+            masses: Masses by name of the solid, or one for each solid, kg. Inertias scale with
+                them.
+            steering_stiffness: Stiffness of every steering controller, N m/rad.
+            steering_damping: Damping of every steering controller, N m s/rad.
+            wheel_torque_limit: Largest torque of every wheel, N m.
+            mass_scale: Factor of all masses and inertias.
+            motor: The motor of all wheels: a `Motor`, its fields by name, or None for wheels that
+                give their command at any speed. Left out, the motors stay.
+
+        Returns:
+            The new model; this one stays as it is.
 
         Raises:
-            ModelError: A number out of its range, or a wheel radius where a wheel's solid is no disc.
+            ModelError: A number is out of its range, a solid has no such name, or a wheel radius is
+                given where a wheel's solid is no disc.
         """
     def weld(self, joints: Mapping[str, float] | Sequence[str] | str) -> RoverModel:
-        """The same machine with joints locked at 0, or at the given angles (rad), also in files and dictionaries."""
+        """Returns the same machine with joints locked; their coordinates are gone.
+
+        Args:
+            joints: Names of joints, which are locked at 0, or a mapping of names to angles, rad.
+
+        Returns:
+            The new model. The locks are kept in its files and dictionaries.
+
+        Raises:
+            ModelError: There is no such joint, or an angle is not finite.
+        """
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Name of the model."""
     @property
-    def nq(self) -> int: ...
+    def nq(self) -> int:
+        """Number of coordinates."""
     @property
-    def nv(self) -> int: ...
+    def nv(self) -> int:
+        """Number of velocities."""
     @property
-    def mass(self) -> float: ...
+    def mass(self) -> float:
+        """Total mass, kg."""
     @property
-    def dof_names(self) -> list[str]: ...
+    def dof_names(self) -> list[str]:
+        """Names of the coordinates, x, y, z, roll, heading, pitch, then the joints."""
     @property
-    def joint_names(self) -> list[str]: ...
+    def joint_names(self) -> list[str]:
+        """Names of the joints that are not locked, in the order of q."""
     @property
-    def solid_names(self) -> list[str]: ...
+    def solid_names(self) -> list[str]:
+        """Names of the solids."""
     @property
-    def wheel_names(self) -> list[str]: ...
+    def wheel_names(self) -> list[str]:
+        """Names of the wheels, in the order of every array with one entry a wheel."""
     @property
-    def wheel_radii(self) -> _Array: ...
+    def wheel_radii(self) -> _Array:
+        """Radius at which each wheel touches the ground, (n_wheels,), m."""
     @property
-    def wheel_torque_limits(self) -> _Array: ...
+    def wheel_torque_limits(self) -> _Array:
+        """Largest torque of each wheel, (n_wheels,), N m."""
     @property
     def motors(self) -> list[Motor | None]:
         """The motor of each wheel; None where the torque is the command at any speed."""
     @property
     def wheel_joint_indices(self) -> list[int]:
-        """Index in q of each wheel's rotation (-1 where welded)."""
+        """Index in q of each wheel's rotation; -1 where it is locked."""
     @property
     def steering_joint_indices(self) -> list[int]:
-        """Index in q of each wheel's steering joint (-1 where there is none or it is welded)."""
+        """Index in q of each wheel's steering joint; -1 where there is none or it is locked."""
     @property
     def steering_limit(self) -> float:
-        """Largest steering set-point, rad, either way."""
-    def mass_matrix(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> _Array: ...
+        """Largest steering set-point either way, rad."""
+    def mass_matrix(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> _Array:
+        """The mass matrix M(q).
+
+        Args:
+            q: Coordinates, (nq,).
+            coordinates: "state" or "report".
+
+        Returns:
+            (nv, nv), in kg, kg m and kg m².
+
+        Raises:
+            StateError: `q` has a wrong length or an entry that is not finite.
+            OptionError: `coordinates` is neither of the two.
+
+        Source: Featherstone 2008, ch. 6.
+        """
     def bias(
         self,
         q: npt.ArrayLike,
         qdot: npt.ArrayLike,
         gravity: npt.ArrayLike | None = None,
         coordinates: _Coordinates = "state",
-    ) -> _Array: ...
-    def actuation_matrix(self) -> _Array: ...
-    def kinetic_energy(self, q: npt.ArrayLike, qdot: npt.ArrayLike, coordinates: _Coordinates = "state") -> float: ...
-    def tags(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> dict[str, _Array]: ...
+    ) -> _Array:
+        """The bias N(q, v) v + G(q) of the equations of motion, M dv/dt + bias = generalized forces.
+
+        Args:
+            q: Coordinates, (nq,).
+            qdot: Velocity in the same coordinates, (nv,).
+            gravity: Gravity, world frame, (3,), m/s²; (0, -9.81, 0) by default.
+            coordinates: "state" or "report".
+
+        Returns:
+            (nv,), in N and N m.
+
+        Raises:
+            StateError: `q` or `qdot` has a wrong length or an entry that is not finite.
+            OptionError: `gravity` is not three finite numbers, or `coordinates` is neither of the
+                two.
+
+        Source: Featherstone 2008, ch. 5.
+        """
+    def actuation_matrix(self) -> _Array:
+        """The matrix that maps wheel torques and steering torques to generalized forces.
+
+        Returns:
+            (nv, 2 n_wheels): a column for each wheel's torque, positive forward, then one for each
+            steering torque.
+        """
+    def kinetic_energy(self, q: npt.ArrayLike, qdot: npt.ArrayLike, coordinates: _Coordinates = "state") -> float:
+        """The kinetic energy, half of v · M v.
+
+        Args:
+            q: Coordinates, (nq,).
+            qdot: Velocity in the same coordinates, (nv,).
+            coordinates: "state" or "report".
+
+        Returns:
+            The energy, J.
+
+        Raises:
+            StateError: `q` or `qdot` has a wrong length or an entry that is not finite.
+            OptionError: `coordinates` is neither of the two.
+        """
+    def tags(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> dict[str, _Array]:
+        """Named points and axes of the machine in the world frame.
+
+        Args:
+            q: Coordinates, (nq,).
+            coordinates: "state" or "report".
+
+        Returns:
+            Vectors (3,) by name: the origin of every solid and the tags of the model, m; the unit
+            axle of every wheel, `axle_FL` and so on; the mass centre, `centre_of_mass`, m.
+
+        Raises:
+            StateError: `q` has a wrong length or an entry that is not finite.
+            OptionError: `coordinates` is neither of the two.
+        """
     def poses(self, q: npt.ArrayLike, coordinates: _Coordinates = "state") -> dict[str, tuple[_Array, _Array]]:
-        """Origin (3,) and rotation matrix (3, 3) of every solid, world frame."""
-    def wheel_gaps(
-        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
-    ) -> _Array: ...
+        """The pose of every solid in the world frame.
+
+        Args:
+            q: Coordinates, (nq,).
+            coordinates: "state" or "report".
+
+        Returns:
+            Origin (3,), m, and rotation matrix (3, 3) by name of the solid.
+
+        Raises:
+            StateError: `q` has a wrong length or an entry that is not finite.
+            OptionError: `coordinates` is neither of the two.
+        """
+    def wheel_gaps(self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state") -> _Array:
+        """The distance of each wheel to the terrain.
+
+        Args:
+            q: Coordinates, (nq,).
+            terrain: A `Plane` or a `SphereField`.
+            coordinates: "state" or "report".
+
+        Returns:
+            (n_wheels,), m, positive when apart.
+
+        Raises:
+            StateError: `q` has a wrong length or an entry that is not finite.
+            TerrainError: `terrain` is not a terrain.
+            OptionError: `coordinates` is neither of the two.
+        """
     def wheel_contact_points(
         self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
-    ) -> _Array: ...
+    ) -> _Array:
+        """The point of each wheel's rim that is nearest to the terrain.
+
+        Args:
+            q: Coordinates, (nq,).
+            terrain: A `Plane` or a `SphereField`.
+            coordinates: "state" or "report".
+
+        Returns:
+            (n_wheels, 3), world frame, m.
+
+        Raises:
+            StateError: `q` has a wrong length or an entry that is not finite.
+            TerrainError: `terrain` is not a terrain.
+            OptionError: `coordinates` is neither of the two.
+        """
     def wheel_jacobians(
         self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
-    ) -> _Array: ...
+    ) -> _Array:
+        """The contact Jacobian of each wheel: u = J v is the velocity of its contact point.
+
+        Args:
+            q: Coordinates, (nq,).
+            terrain: A `Plane` or a `SphereField`.
+            coordinates: "state" or "report".
+
+        Returns:
+            (n_wheels, 3, nv): rows along the normal, the rolling direction and the lateral
+            direction.
+
+        Raises:
+            StateError: `q` has a wrong length or an entry that is not finite.
+            TerrainError: `terrain` is not a terrain.
+            OptionError: `coordinates` is neither of the two.
+        """
     def to_report(self, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[_Array, _Array]:
-        """Public q and state velocity -> the report's q and qdot."""
+        """Converts a state to the report's coordinates.
+
+        Args:
+            q: Coordinates as `Simulation.q`, (nq,).
+            v: Velocity as `Simulation.v`, (nv,).
+
+        Returns:
+            The report's q, (nq,), and its rate, (nv,).
+
+        Raises:
+            StateError: An array has a wrong length or an entry that is not finite, or the heading
+                is ±90 degrees, where the report's angles are singular.
+        """
     def from_report(self, q: npt.ArrayLike, qdot: npt.ArrayLike) -> tuple[_Array, _Array]:
-        """The report's q and qdot -> public q and state velocity."""
+        """Converts the report's coordinates to a state.
+
+        Args:
+            q: The report's coordinates, (nq,).
+            qdot: Their rates, (nv,).
+
+        Returns:
+            Coordinates as `Simulation.q`, (nq,), and velocity as `Simulation.v`, (nv,).
+
+        Raises:
+            StateError: An array has a wrong length or an entry that is not finite.
+        """
     def __reduce__(self) -> Any: ...
 
 @final
 class Plane:
-    """The half-space n.x + offset >= 0 is free; the ground is below. `normal` (default: up) is normalised.
+    """A plane as ground: the half-space `normal · x + offset >= 0` is free, the ground lies below.
 
-    A normal of unit length is taken as it is, so a plane's own normal and offset make the same plane, to the bit.
+    A normal of unit length is taken as it is, so a plane's own `normal` and `offset` make the same
+    plane to the bit.
+
+    Args:
+        normal: Direction out of the ground, (3,), of any length; straight up by default.
+        offset: Gap between the world's origin and the plane, m; flat ground at height y has the
+            offset -y.
 
     Raises:
-        TerrainError: A number is not finite, the normal has no direction, the offset is beyond 1e6 m.
+        TerrainError: A number is not finite, the normal has no direction, or the offset is beyond
+            1e6 m.
     """
 
     def __new__(cls, normal: npt.ArrayLike | None = None, offset: float = 0.0) -> Plane: ...
     @property
-    def normal(self) -> _Array: ...
+    def normal(self) -> _Array:
+        """Unit normal out of the ground, (3,)."""
     @property
-    def offset(self) -> float: ...
-    def height(self, x: float, z: float) -> float: ...
+    def offset(self) -> float:
+        """Gap between the world's origin and the plane, m; flat ground at height y has the offset -y."""
+    def height(self, x: float, z: float) -> float:
+        """The height of the plane at a place.
+
+        Args:
+            x: Coordinate forward, m.
+            z: Coordinate to the right, m.
+
+        Returns:
+            The height y, m.
+
+        Raises:
+            TerrainError: The plane is vertical, or an argument is not a number.
+        """
     def __reduce__(self) -> Any: ...
 
 @final
 class SphereField:
-    """Fixed spheres, with or without a plane under them. Immutable."""
+    """Fixed spheres, with or without a plane under them. Immutable.
 
-    def __new__(cls, centres: npt.ArrayLike, radii: npt.ArrayLike, ground: Plane | None = None) -> SphereField:
-        """From centres (n, 3) and radii (n,), m. Raises TerrainError by field."""
+    Args:
+        centres: Centres of the spheres, (n, 3), m.
+        radii: Their radii, (n,), m.
+        ground: The plane under them; none by default.
+
+    Raises:
+        TerrainError: An array has a wrong shape, an entry is not finite or out of its range, or
+            there are no spheres or too many of them.
+    """
+
+    def __new__(cls, centres: npt.ArrayLike, radii: npt.ArrayLike, ground: Plane | None = None) -> SphereField: ...
     @staticmethod
     def from_file(path: str | PathLike[str], ground: Plane | None = None) -> SphereField:
-        """Reads a CSV file with the header x,y,z,radius (m)."""
+        """Reads spheres from a CSV file with the header `x,y,z,radius`, in m.
+
+        Args:
+            path: Path of the file.
+            ground: The plane under the spheres; none by default.
+
+        Returns:
+            The field.
+
+        Raises:
+            TerrainError: The file does not describe spheres; the message names the path.
+            OSError: The file cannot be read.
+        """
     @staticmethod
     def rug() -> SphereField:
-        """The report's Fig. 6.6: 50 x 25 spheres of radius 0.5 m on a wave, without a plane."""
+        """The wavy ground of the 2010 report's Fig. 6.6.
+
+        50 x 25 spheres of radius 0.5 m, without a plane.
+
+        Source: Yang 2010, Fig. 6.6.
+        """
     @staticmethod
     def rocks(
         abundance: float,
@@ -265,110 +556,203 @@ class SphereField:
         ground: Plane | None = None,
         clear: npt.ArrayLike | None = None,
     ) -> SphereField:
-        """Rocks with the size-frequency distribution of Mars on a plane (Golombek and Rapp 1997).
+        """Rocks on a plane, with the size-frequency distribution of rocks on Mars.
 
         Args:
             abundance: Fraction of the ground that rocks of all sizes cover, 0 to 0.5.
-            area: x_min, z_min, x_max, z_max, m.
-            seed: Equal seeds give equal rocks.
-            max_diameter: m.
-            min_diameter: m; the law has ever more, ever smaller rocks.
-            burial: Fraction of its diameter that a rock is sunk into the ground, 0 to 0.5, or a range to draw it from
-                for each rock; 0.5 by default.
+            area: Corners x_min, z_min, x_max, z_max of the rectangle, m.
+            seed: Seed of the random numbers; equal seeds give equal rocks.
+            max_diameter: Largest diameter, m.
+            min_diameter: Smallest diameter, m; the number of rocks grows without bound as it
+                shrinks.
+            burial: Fraction of its diameter that a rock is sunk into the ground, 0 to 0.5, or a
+                range from which it is drawn for each rock; 0.5 by default.
             ground: The plane; flat ground at height 0 by default.
-            clear: (n, 3) circles x, z, radius that no rock reaches into, m.
+            clear: Circles x, z, radius that no rock reaches into, (n, 3), m; none by default.
+
+        Returns:
+            The field.
+
+        Raises:
+            TerrainError: An argument is out of its range.
+
+        Source: Golombek and Rapp 1997.
         """
     @property
-    def centres(self) -> _Array: ...
+    def centres(self) -> _Array:
+        """Centres of the spheres, (n, 3), m."""
     @property
-    def radii(self) -> _Array: ...
+    def radii(self) -> _Array:
+        """Radii of the spheres, (n,), m."""
     @property
-    def ground(self) -> Plane | None: ...
+    def ground(self) -> Plane | None:
+        """The plane under the spheres, or None."""
     def heights(self, points: npt.ArrayLike) -> _Array:
-        """(m,) height y of the visible surface at the points (x, z) (m, 2); nan where there is none."""
+        """The height of the visible surface at places of the map.
+
+        Args:
+            points: Places (x, z), (m, 2), m.
+
+        Returns:
+            Heights y, (m,), m; nan where there is no ground.
+
+        Raises:
+            TerrainError: `points` has a wrong shape.
+        """
     def __len__(self) -> int: ...
     def __reduce__(self) -> Any: ...
 
 @final
 class StepReport:
-    """What the solver says of the steps just taken (worst over the steps of one call)."""
+    """How the steps of one call went: the worst of them, or their sum."""
 
     @property
-    def status(self) -> Literal["converged", "not_converged"]: ...
+    def status(self) -> Literal["converged", "not_converged"]:
+        """Whether the steps "converged" or "not_converged".
+
+        "converged" means that the contact solver met its tolerance in every step.
+        """
     @property
-    def is_converged(self) -> bool: ...
+    def is_converged(self) -> bool:
+        """Whether the contact solver met its tolerance in every step."""
     @property
-    def steps(self) -> int: ...
+    def steps(self) -> int:
+        """Number of steps taken."""
     @property
-    def iterations(self) -> int: ...
+    def iterations(self) -> int:
+        """Iterations of the contact solver, summed over the steps."""
     @property
-    def newton_iterations(self) -> int: ...
+    def newton_iterations(self) -> int:
+        """Newton iterations of the scheme, summed over the steps; 0 with the linearised scheme."""
     @property
-    def residual(self) -> float: ...
+    def residual(self) -> float:
+        """Largest relative residual of a step's contact problem, computed from its impulses."""
     @property
-    def n_contacts(self) -> int: ...
+    def n_contacts(self) -> int:
+        """Largest number of contacts in a step."""
     @property
     def retaken(self) -> int:
-        """Steps taken again: a motor changed its branch, or the energy asked for implicit gyroscopic terms."""
+        """Number of steps taken again.
+
+        A step is taken again when a motor reached its torque-speed line, when the energy audit asks
+        for implicit gyroscopic terms, or when Newton's law of restitution had no solution.
+        """
     @property
     def energy_gain(self) -> float:
-        """Largest gain in a step beyond the work of gravity and actuators, over the kinetic energy."""
+        """Largest unexplained gain of energy in a step, relative to the kinetic energy.
+
+        Unexplained is what exceeds the work of gravity and actuators.
+        """
     @property
     def energy_removed(self) -> float:
-        """J that the scheme would have gained and that the audit took out, summed over the steps."""
+        """Energy that the scheme would have gained and the audit removed, summed over the steps, J."""
     @property
     def energy_lifted(self) -> float:
-        """J that lifting out of penetration gave, summed over the steps."""
+        """Potential energy gained by pushing bodies out of penetration, summed over the steps, J."""
 
 @final
 class Contacts:
-    """The contacts of the last step, as fresh arrays with one row a contact."""
+    """The contacts of a rover's last step, as new arrays with one row a contact."""
 
     @property
     def bodies(self) -> list[str]:
-        """Name of the solid that touches."""
+        """Names of the solids that touch the ground."""
     @property
     def wheels(self) -> npt.NDArray[np.int64]:
-        """(n,) wheel index 0..5, or -1 for the trunk."""
+        """Indices of the wheels that touch, (n,); -1 where it is another solid."""
     @property
     def points(self) -> _Array:
-        """(n, 3) m, world."""
+        """Contact points, world frame, (n, 3), m."""
     @property
     def frames(self) -> _Array:
-        """(n, 3, 3): rows are the unit vectors n, t, b, world."""
+        """Contact frames, world frame, (n, 3, 3).
+
+        Rows are the unit vectors n (normal), t (rolling direction) and b (lateral).
+        """
     @property
     def gaps(self) -> _Array:
-        """(n,) m, at the configuration where the step's contact was evaluated."""
+        """Gaps, (n,), m, at the configuration where the step evaluated the contacts."""
     @property
     def impulses(self) -> _Array:
-        """(n, 3) N s, along n, t, b."""
+        """Impulses of the step along n, t, b, (n, 3), N s."""
     @property
     def velocities(self) -> _Array:
-        """(n, 3) m/s after the step, along n, t, b."""
+        """Relative velocities after the step along n, t, b, (n, 3), m/s."""
     def __len__(self) -> int: ...
 
 @final
 class Energy:
+    """Kinetic and potential energy."""
+
     @property
-    def kinetic(self) -> float: ...
+    def kinetic(self) -> float:
+        """Kinetic energy, J."""
     @property
-    def potential(self) -> float: ...
+    def potential(self) -> float:
+        """Potential energy in gravity, J, zero at the world's origin."""
     @property
-    def total(self) -> float: ...
+    def total(self) -> float:
+        """Sum of both, J."""
 
 @final
 class Snapshot:
-    """Everything that a simulation needs to continue bit for bit; picklable."""
+    """Everything that a simulation needs to continue bit for bit. Picklable."""
 
     @staticmethod
-    def from_bytes(data: bytes) -> Snapshot: ...
-    def to_bytes(self) -> bytes: ...
+    def from_bytes(data: bytes) -> Snapshot:
+        """Reads a snapshot.
+
+        Args:
+            data: What `to_bytes` returned.
+
+        Returns:
+            The snapshot.
+
+        Raises:
+            StateError: The bytes are not those of a snapshot.
+        """
+    def to_bytes(self) -> bytes:
+        """The snapshot as bytes, as `from_bytes` reads them."""
     def __reduce__(self) -> Any: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
 
 @final
 class Simulation:
+    """A rover on a terrain, stepped through time.
+
+    It starts at rest with all coordinates 0, with its steering held at 0 and every other joint
+    free. One call at a time: a call during another one, from another thread or a signal handler,
+    raises BusyError.
+
+    Args:
+        model: The machine; the built-in rover by default.
+        terrain: A `Plane` or a `SphereField`; flat ground at height 0 by default.
+        gravity: Gravity, world frame, (3,), m/s²; (0, -9.81, 0) by default.
+        friction: Coulomb's coefficient of every contact.
+        restitution: Newton's coefficient of every contact, in [0, 1].
+        time_step: Time step, s, from 1e-9 to 1000; 0.005 by default.
+        variant: "linearised" evaluates the forces once a step; "newton" solves for those at its
+            end. "linearised" by default.
+        theta: Weight of the end of the step in the time stepping, in [0.5, 1].
+        forecast: A contact takes part in a step where gap + forecast * time_step * u_N <= 0, with
+            u_N its normal velocity; in [0, 1].
+        solver: Method for the contact problem, as in `solve_friction_contact`.
+        tolerance: Largest relative residual of the contact problem; 1e-12 by default.
+        max_iterations: Largest number of iterations of the contact solver in a step.
+        stabilisation: What is done about penetration: "projection" moves the bodies out of it,
+            "none" leaves it.
+        warm_start: Whether the contact solver starts from the last step's impulses.
+        accuracy: Chooses `time_step`, `variant` and `tolerance`, which then cannot be given, as
+            `accuracy_options` does: "fast", "balanced", "reference", or the error allowed on a path
+            of 20 m on flat ground, m.
+
+    Raises:
+        ModelError: `model` is not a RoverModel.
+        TerrainError: `terrain` is not a terrain.
+        OptionError: An option is out of its range, or is given beside `accuracy`.
+    """
+
     def __new__(
         cls,
         model: RoverModel | None = None,
@@ -387,80 +771,122 @@ class Simulation:
         stabilisation: Literal["projection", "none"] = "projection",
         warm_start: bool = True,
         accuracy: Literal["fast", "balanced", "reference"] | float | None = None,
-    ) -> Simulation:
-        """A rover on a terrain.
-
-        Args:
-            model: The machine; the built-in rover by default.
-            terrain: Flat ground by default.
-            gravity: (3,) m/s2; (0, -9.81, 0) by default.
-            friction: Coulomb's coefficient of every contact.
-            restitution: Newton's, in [0, 1].
-            time_step: s; 0.005 by default.
-            variant: "linearised" by default; "newton" solves for the forces at the end of the step.
-            theta: Weight of the step's end, in [0.5, 1].
-            forecast: A contact takes part where gap + forecast h u_N <= 0.
-            solver: Of the contact problem.
-            tolerance: Relative, of the contact solver; 1e-12 by default.
-            max_iterations: Of the contact solver.
-            stabilisation: What is done about penetration.
-            warm_start: Whether the solver starts from the last step's impulses.
-            accuracy: Chooses time_step, variant and tolerance, which then cannot be given: by name, or by the error (m)
-                allowed on a path of 20 m on flat ground. docs/accuracy.md says what each costs and gives.
-
-        Raises:
-            OptionError: An option is out of its range, or is given beside `accuracy`.
-        """
+    ) -> Simulation: ...
     @property
-    def model(self) -> RoverModel: ...
+    def model(self) -> RoverModel:
+        """The machine."""
     @property
-    def terrain(self) -> Plane | SphereField: ...
+    def terrain(self) -> Plane | SphereField:
+        """The ground."""
     @property
-    def time(self) -> float: ...
+    def time(self) -> float:
+        """Time since the last call of `set_state`, s."""
     @property
-    def time_step(self) -> float: ...
+    def time_step(self) -> float:
+        """Time step, s."""
     @property
-    def gravity(self) -> _Array: ...
+    def gravity(self) -> _Array:
+        """Gravity, world frame, (3,), m/s²."""
     @property
-    def friction(self) -> float: ...
+    def friction(self) -> float:
+        """Coulomb's coefficient of every contact."""
     @property
-    def restitution(self) -> float: ...
+    def restitution(self) -> float:
+        """Newton's coefficient of every contact."""
     @property
     def settings(self) -> dict[str, Any]:
-        """The keyword arguments that make a simulation with these options."""
+        """The keyword arguments that make a simulation with the same options."""
     @property
     def q(self) -> _Array:
-        """(nq,) x, y, z, roll, heading, pitch, joints."""
+        """Coordinates, (nq,), m and rad.
+
+        x, y, z of the trunk's origin; roll, heading, pitch; joints.
+        """
     @property
     def v(self) -> _Array:
-        """(nv,) trunk velocity (world, m/s), angular velocity (world, rad/s), joint rates."""
+        """Velocities, (nv,), m/s and rad/s.
+
+        Velocity of the trunk, world frame; its angular velocity, world frame; joint rates.
+        """
     @property
     def rotation(self) -> _Array:
-        """(3, 3) trunk attitude R_WB."""
+        """Rotation matrix R_WB, (3, 3), from coordinates in the trunk to coordinates in the world."""
     def set_state(
         self, q: npt.ArrayLike, qdot: npt.ArrayLike | None = None, *, coordinates: _Coordinates = "state"
     ) -> None:
-        """Sets q and velocity ("state": as `q` and `v` return them). Time goes to 0, warm start is dropped."""
-    def report_state(self) -> tuple[_Array, _Array]: ...
+        """Sets coordinates and velocities.
+
+        Time starts at 0, and the next step has no warm start.
+
+        Args:
+            q: Coordinates, (nq,).
+            qdot: Velocity in the same coordinates, (nv,); at rest by default.
+            coordinates: "state", as `q` and `v` return them, or "report".
+
+        Raises:
+            StateError: An array has a wrong length or an entry that is not finite. Nothing has
+                changed.
+            OptionError: `coordinates` is neither of the two.
+        """
+    def report_state(self) -> tuple[_Array, _Array]:
+        """The state in the report's coordinates.
+
+        Returns:
+            The report's q, (nq,), and its rate, (nv,).
+
+        Raises:
+            StateError: The heading is ±90 degrees, where these coordinates are singular.
+        """
     @property
     def wheel_torques(self) -> _Array:
-        """(6,) N m, positive drives forward: the commands, within the model's limits."""
+        """Commanded torques, within the model's limits, (n_wheels,), N m, positive forward."""
     @property
     def motor_torques(self) -> _Array:
-        """(6,) N m, positive drives forward: mean torque that each drive gave in the last step; 0 before any.
+        """Mean torques of the drives over the last step, (n_wheels,), N m, positive forward.
 
-        It is the command, within the line of the wheel's `Motor`.
+        Each is the command within the line of the wheel's `Motor`; 0 before any step.
         """
     def set_wheel_torques(self, torques: npt.ArrayLike) -> None:
-        """(6,) N m, positive drives forward; saturates at the model's limits."""
+        """Sets the driving torques; each saturates at its wheel's limit.
+
+        Args:
+            torques: Torques, (n_wheels,), N m, positive forward.
+
+        Raises:
+            CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
+        """
     @property
-    def steering(self) -> _Array: ...
+    def steering(self) -> _Array:
+        """Steering set-points, (n_wheels,), rad; 0 for wheels whose steering is not held."""
     def set_steering(self, set_points: npt.ArrayLike) -> None:
-        """(6,) rad, held by the implicit PD with the model's gains."""
+        """Sets the steering set-points, which an implicit PD controller holds with the model's gains.
+
+        Args:
+            set_points: Angles, (n_wheels,), rad.
+
+        Raises:
+            CommandError: A wrong length, an entry that is not finite or beyond the wheel's limit,
+                or one that is not 0 for a wheel that cannot be steered. Nothing has changed.
+        """
     def set_commands(self, torques: npt.ArrayLike, set_points: npt.ArrayLike) -> None:
-        """`set_wheel_torques` and `set_steering` in one: both, or neither where either is refused."""
+        """Sets torques and steering together: both, or neither where either is refused.
+
+        Args:
+            torques: As of `set_wheel_torques`, (n_wheels,), N m.
+            set_points: As of `set_steering`, (n_wheels,), rad.
+
+        Raises:
+            CommandError: As of these two methods. Nothing has changed.
+        """
     def set_joint_torques(self, torques: npt.ArrayLike) -> None:
-        """(nv - 6,) N m about the joint axes, added to what set_wheel_torques gives; no limit."""
+        """Sets torques about the joint axes, added to the wheels' and without a limit.
+
+        Args:
+            torques: Torques, (n_joints,), N m, in the order of `RoverModel.joint_names`.
+
+        Raises:
+            CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
+        """
     def hold(
         self,
         joints: str | Sequence[str],
@@ -469,59 +895,171 @@ class Simulation:
         stiffness: float | None = None,
         damping: float | None = None,
     ) -> None:
-        """Holds joints at set-points (default: where they are) by the implicit PD (default: the model's gains)."""
-    def release(self, joints: str | Sequence[str]) -> None: ...
+        """Holds joints at set-points by an implicit PD controller.
+
+        Args:
+            joints: Name of a joint, or names.
+            set_points: Angles, one for each joint, rad; where they are now by default.
+            stiffness: Stiffness of the controllers, N m/rad; the model's by default.
+            damping: Damping of the controllers, N m s/rad; the model's by default.
+
+        Raises:
+            CommandError: There is no such joint, the number of set-points differs, or a number is
+                negative or not finite where it must not be. Nothing has changed.
+        """
+    def release(self, joints: str | Sequence[str]) -> None:
+        """Releases joints that are held.
+
+        Args:
+            joints: Name of a joint, or names.
+
+        Raises:
+            CommandError: There is no such joint. Nothing has changed.
+        """
     def brake(self) -> None:
-        """Holds the six wheels where they are (`hold` on the wheel joints), and zeroes their torques."""
+        """Holds all wheels where they are, as `hold` does, and sets their torques to 0."""
     def step(self, n: int = 1) -> StepReport:
         """Takes n steps.
 
-        Other threads run meanwhile; on this object their calls are refused with BusyError. Ctrl-C, or whatever a signal
-        handler raises, ends the call after a whole step, whose state stays.
+        Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
+        after a whole step, whose state stays. A contact solver that does not converge is no error:
+        the report says so.
+
+        Args:
+            n: Number of steps.
+
+        Returns:
+            How the steps went.
 
         Raises:
             StepError: A step could not be taken; the state before it stays.
+            OptionError: `n` is not a count.
         """
     @property
-    def contacts(self) -> Contacts: ...
+    def contacts(self) -> Contacts:
+        """The contacts of the last step."""
     @property
     def wheel_gaps(self) -> _Array:
-        """(6,) m at the current state."""
+        """Gap of each wheel now, (n_wheels,), m, positive when apart."""
     @property
     def wheel_forces(self) -> _Array:
-        """(6, 3) N: mean contact force of the last step along n, t, b of each wheel's frame."""
+        """Mean contact force on each wheel over the last step, (n_wheels, 3), N.
+
+        Along n, t, b of the wheel's contact frame.
+        """
     @property
     def trunk_force(self) -> float:
-        """N: mean normal force on trunk and beams in the last step (high-centred if large)."""
+        """Mean normal force over the last step on all solids but the wheels, N.
+
+        It is large when the rover is high-centred.
+        """
     @property
     def deepest_overlap(self) -> float:
-        """Deepest gap of any wheel or box with the ground now, m: 0 where nothing overlaps, else negative."""
+        """Deepest overlap of a wheel or a box with the ground now, as a gap, m; 0 without overlap."""
     def reading(self, target: Sequence[float] | None = None, scan: npt.ArrayLike | None = None) -> _Array:
-        """All that a controller looks at as one fresh row; `reading_layout` names its parts.
+        """Everything that a controller looks at, as one new row.
 
-        `solver`, `work` and `positive_work` are those of the last call of `step`. `target`: a place on the map (x, z),
-        m; the origin by default. `scan` (n, 2): points ahead and to the right of the trunk's origin in the heading
-        frame, m, whose heights over the origin come last.
+        Args:
+            target: The place (x, z) on the map that the entry `target` refers to, m; the origin by
+                default.
+            scan: Points of the height scan ahead and to the right of the trunk's origin in the
+                heading frame, (n, 2), m; none by default.
+
+        Returns:
+            The row, whose parts `reading_layout` names.
+
+        Raises:
+            OptionError: An argument has a wrong shape or an entry that is not finite.
         """
     def reading_layout(self, n_scan: int = 0) -> dict[str, slice]:
-        """Names and places of the numbers in a reading."""
-    def energy(self) -> Energy: ...
+        """The place of each quantity in a reading.
+
+        - `pose`: q, with the angles of the wheels wrapped to one turn
+        - `body_velocity`: linear and angular velocity of the trunk in its own frame, m/s and rad/s
+        - `joint_rates`: rad/s
+        - `wheel_gaps`: m, positive when apart
+        - `wheel_contacts`: 1 where the wheel touches the ground, within 1 mm, else 0
+        - `normal_forces`: mean over the last step, N
+        - `tangential_forces`: mean over the last step, rolling and lateral for each wheel, N
+        - `ground_normal`: normal of the ground plane in the trunk's frame; 0 without one
+        - `target`: how far ahead of the trunk's origin and to its right the target is, and how far
+          away, all horizontal, m
+        - `cos_tilt`: cosine of the angle between the trunk's y axis and up
+        - `speed`: horizontal speed of the trunk's origin, m/s
+        - `trunk_force`: as the property, N
+        - `slip_ratio`: mean over the wheels in contact of slip over the faster of rim and ground
+        - `work`: work through the wheel motors in the last call of `step`, driving or braking, J
+        - `positive_work`: the driving part of it, J
+        - `time`: s
+        - `solver`: of the last call of `step`: 1 if it did not converge, iterations, residual,
+          contacts
+        - `heights`: height of the ground at the points of the scan above the trunk's origin, m; nan
+          where there is no ground
+
+        Args:
+            n_scan: Number of points of the height scan.
+
+        Returns:
+            Slices by name.
+
+        Raises:
+            OptionError: `n_scan` is not a count.
+        """
+    def energy(self) -> Energy:
+        """Kinetic and potential energy now."""
     def momentum(self) -> tuple[_Array, _Array]:
-        """Linear (3,) kg m/s and angular momentum about the world origin (3,) kg m2/s."""
-    def centre_of_mass(self) -> _Array: ...
-    def tags(self) -> dict[str, _Array]: ...
-    def poses(self) -> dict[str, tuple[_Array, _Array]]: ...
-    def snapshot(self) -> Snapshot: ...
-    def restore(self, snapshot: Snapshot) -> None: ...
+        """Momentum of the rover.
+
+        Returns:
+            Linear momentum, (3,), kg m/s, and angular momentum about the origin, (3,), kg m²/s,
+            world frame.
+        """
+    def centre_of_mass(self) -> _Array:
+        """Mass centre, world frame, (3,), m."""
+    def tags(self) -> dict[str, _Array]:
+        """Named points and axes of the machine now, world frame, (3,) by name, as `RoverModel.tags`."""
+    def poses(self) -> dict[str, tuple[_Array, _Array]]:
+        """Origin (3,), m, and rotation matrix (3, 3) of every solid now, world frame, by name."""
+    def snapshot(self) -> Snapshot:
+        """Everything that is needed to continue bit for bit."""
+    def restore(self, snapshot: Snapshot) -> None:
+        """Goes back to a snapshot.
+
+        Args:
+            snapshot: A snapshot of a simulation of the same model.
+
+        Raises:
+            StateError: The snapshot belongs to another model or is damaged. Nothing has changed.
+        """
     def last_problem(self) -> tuple[_Array, _Array, _Array]:
-        """W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem."""
+        """The friction-contact problem of the last step.
+
+        Returns:
+            Delassus operator W, (3 n_c, 3 n_c), 1/kg; free velocity, (3 n_c,), m/s; friction
+            coefficients, (n_c,).
+        """
     def profile(self, n: int = 1000) -> dict[str, float]:
-        """Mean microseconds per step by part (kinematics, mass_matrix, factor, ...) over n steps of a copy."""
+        """Measures where the time of a step goes, on a copy of this simulation.
+
+        Args:
+            n: Number of steps.
+
+        Returns:
+            Mean time a step of each part (`kinematics`, `mass_matrix`, `solve` and so on), µs.
+
+        Raises:
+            StepError: A step could not be taken.
+            OptionError: `n` is not a count.
+        """
     def __reduce__(self) -> Any: ...
 
 @final
 class Line:
-    """The ground y = slope x + offset (m) of a planar scene; x forward, y up.
+    """The ground y = slope x + offset of a planar scene: x forward, y up.
+
+    Args:
+        slope: Tangent of the inclination.
+        offset: Height at x = 0, m.
 
     Raises:
         TerrainError: A number is not finite, the slope is beyond 1000 or the offset beyond 1e6 m.
@@ -529,175 +1067,330 @@ class Line:
 
     def __new__(cls, slope: float = 0.0, offset: float = 0.0) -> Line: ...
     @property
-    def slope(self) -> float: ...
+    def slope(self) -> float:
+        """Tangent of the inclination."""
     @property
-    def offset(self) -> float: ...
+    def offset(self) -> float:
+        """Height at x = 0, m."""
     @overload
-    def height(self, x: float) -> float: ...
+    def height(self, x: float) -> float:
+        """The height of the ground at one place or at many.
+
+        Args:
+            x: Places, a number or (m,), m.
+
+        Returns:
+            Heights, a number or (m,), m.
+
+        Raises:
+            OptionError: `x` is not a number or an array of one dimension.
+        """
     @overload
     def height(self, x: Sequence[float] | _Array) -> _Array: ...
     def __reduce__(self) -> Any: ...
 
 @final
 class Sine:
-    """The ground y = amplitude sin(2 pi x / wavelength + phase) + offset, m.
+    """The ground y = amplitude sin(2 pi x / wavelength + phase) + offset of a planar scene.
+
+    Args:
+        amplitude: Amplitude, m.
+        wavelength: Wavelength, m.
+        phase: Phase at x = 0, rad.
+        offset: Mean height, m.
 
     Raises:
-        TerrainError: A number is not finite, the wavelength is below 1e-3 m, the slope 2 pi amplitude / wavelength
-            beyond 1000.
+        TerrainError: A number is not finite, the wavelength is below 1e-3 m, or the slope 2 pi
+            amplitude / wavelength is beyond 1000.
     """
 
     def __new__(cls, amplitude: float, wavelength: float, phase: float = 0.0, offset: float = 0.0) -> Sine: ...
     @property
-    def amplitude(self) -> float: ...
+    def amplitude(self) -> float:
+        """Amplitude, m."""
     @property
-    def wavelength(self) -> float: ...
+    def wavelength(self) -> float:
+        """Wavelength, m."""
     @property
-    def phase(self) -> float: ...
+    def phase(self) -> float:
+        """Phase at x = 0, rad."""
     @property
-    def offset(self) -> float: ...
+    def offset(self) -> float:
+        """Mean height, m."""
     @overload
-    def height(self, x: float) -> float: ...
+    def height(self, x: float) -> float:
+        """The height of the ground at one place or at many.
+
+        Args:
+            x: Places, a number or (m,), m.
+
+        Returns:
+            Heights, a number or (m,), m.
+
+        Raises:
+            OptionError: `x` is not a number or an array of one dimension.
+        """
     @overload
     def height(self, x: Sequence[float] | _Array) -> _Array: ...
     def __reduce__(self) -> Any: ...
 
 @final
 class Spline:
-    """The natural cubic spline through points (m), continued by its tangents: a ground with continuous curvature.
+    """The natural cubic spline through points: a ground with continuous curvature.
+
+    It goes on along its tangents beyond the first and the last point.
+
+    Args:
+        x: Places of the points, (n,), m, increasing.
+        y: Their heights, (n,), m.
 
     Raises:
-        TerrainError: Fewer than two points or more than 2 000 000, lengths that differ, an entry that is not finite or
-            beyond 1e6 m, x that does not increase.
+        TerrainError: There are fewer than two points or more than 2 000 000, the lengths differ, an
+            entry is not finite or beyond 1e6 m, or x does not increase.
     """
 
     def __new__(cls, x: npt.ArrayLike, y: npt.ArrayLike) -> Spline: ...
     @property
-    def x(self) -> _Array: ...
+    def x(self) -> _Array:
+        """Places of the points, (n,), m."""
     @property
-    def y(self) -> _Array: ...
+    def y(self) -> _Array:
+        """Heights of the points, (n,), m."""
     @overload
-    def height(self, x: float) -> float: ...
+    def height(self, x: float) -> float:
+        """The height of the ground at one place or at many.
+
+        Args:
+            x: Places, a number or (m,), m.
+
+        Returns:
+            Heights, a number or (m,), m.
+
+        Raises:
+            OptionError: `x` is not a number or an array of one dimension.
+        """
     @overload
     def height(self, x: Sequence[float] | _Array) -> _Array: ...
     def __reduce__(self) -> Any: ...
 
 @final
 class Polyline:
-    """Straight pieces between points (m), which may stand above each other: steps, ramps, kerbs, with corners.
+    """Straight pieces between points, with corners: a ground of steps, ramps and kerbs.
+
+    Two points may stand above each other.
+
+    Args:
+        x: Places of the points, (n,), m, not decreasing.
+        y: Their heights, (n,), m.
 
     Raises:
-        TerrainError: Fewer than two points or more than 2 000 000, lengths that differ, an entry that is not finite or
-            beyond 1e6 m, x that decreases, a point twice.
+        TerrainError: There are fewer than two points or more than 2 000 000, the lengths differ, an
+            entry is not finite or beyond 1e6 m, x decreases, or a point is given twice.
     """
 
     def __new__(cls, x: npt.ArrayLike, y: npt.ArrayLike) -> Polyline: ...
     @staticmethod
     def step(x: float, height: float) -> Polyline:
-        """Level ground at height 0 with a step up (or down, if negative) at x, m."""
+        """Level ground at height 0 with one step.
+
+        Args:
+            x: Place of the step, m.
+            height: Height of the ground beyond it, m; negative for a step down.
+
+        Returns:
+            The ground.
+
+        Raises:
+            TerrainError: A number is not finite or beyond 1e6 m, or the step has no height.
+        """
     @property
-    def x(self) -> _Array: ...
+    def x(self) -> _Array:
+        """Places of the points, (n,), m."""
     @property
-    def y(self) -> _Array: ...
+    def y(self) -> _Array:
+        """Heights of the points, (n,), m."""
     @overload
-    def height(self, x: float) -> float: ...
+    def height(self, x: float) -> float:
+        """The height of the ground at one place or at many.
+
+        Args:
+            x: Places, a number or (m,), m.
+
+        Returns:
+            Heights, a number or (m,), m.
+
+        Raises:
+            OptionError: `x` is not a number or an array of one dimension.
+        """
     @overload
     def height(self, x: Sequence[float] | _Array) -> _Array: ...
     def __reduce__(self) -> Any: ...
 
 @final
 class PlanarContacts:
-    """The contacts of a planar simulation's last step, as fresh arrays with one row a contact."""
+    """The contacts of a planar simulation's last step, as new arrays with one row a contact."""
 
     @property
     def discs(self) -> npt.NDArray[np.int64]:
-        """(n,) which disc touches: 0 the ball or wheel A, 1 wheel B."""
+        """Indices of the discs that touch, (n,); 0 is the ball or wheel A, 1 wheel B."""
     @property
     def points(self) -> _Array:
-        """(n, 2) points of the ground, world, m."""
+        """Points of the ground, world frame, (n, 2), m."""
     @property
     def normals(self) -> _Array:
-        """(n, 2) unit normals out of the ground; the tangent is (n_y, -n_x)."""
+        """Unit normals out of the ground, (n, 2); the tangent is (n_y, -n_x)."""
     @property
     def gaps(self) -> _Array:
-        """(n,) m."""
+        """Gaps, (n,), m."""
     @property
     def impulses(self) -> _Array:
-        """(n, 2) along normal and tangent, N s."""
+        """Impulses of the step along normal and tangent, (n, 2), N s."""
     @property
     def velocities(self) -> _Array:
-        """(n, 2) of the rim against the ground after the step, along normal and tangent, m/s."""
+        """Velocities of the rim after the step along normal and tangent, (n, 2), m/s."""
     def __len__(self) -> int: ...
 
 @final
 class PlanarSnapshot:
-    """Everything that a planar simulation needs to continue bit for bit; picklable."""
+    """Everything that a planar simulation needs to continue bit for bit. Picklable."""
 
     @staticmethod
-    def from_bytes(data: bytes) -> PlanarSnapshot: ...
-    def to_bytes(self) -> bytes: ...
+    def from_bytes(data: bytes) -> PlanarSnapshot:
+        """Reads a snapshot.
+
+        Args:
+            data: What `to_bytes` returned.
+
+        Returns:
+            The snapshot.
+
+        Raises:
+            StateError: The bytes are not those of a snapshot.
+        """
+    def to_bytes(self) -> bytes:
+        """The snapshot as bytes, as `from_bytes` reads them."""
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
     def __reduce__(self) -> Any: ...
 
 @disjoint_base
 class PlanarSimulation:
-    """A planar machine on a ground, stepped by the rover's own schemes: what the two kinds below share."""
+    """A planar machine on a ground: what the machines share. Made by the classes derived from it.
+
+    One call at a time: a call during another one, from another thread or a signal handler, raises
+    BusyError.
+    """
 
     @property
-    def ground(self) -> Line | Sine | Spline | Polyline: ...
+    def ground(self) -> Line | Sine | Spline | Polyline:
+        """The ground."""
     @property
-    def time(self) -> float: ...
+    def time(self) -> float:
+        """Time since the last call of `set_state`, s."""
     @property
-    def time_step(self) -> float: ...
+    def time_step(self) -> float:
+        """Time step, s."""
     @property
     def q(self) -> _Array:
-        """(nv,) coordinates: m, m, then rad; angles turn to the left."""
+        """Coordinates, (nv,), x and y, m, then angles, rad, which turn to the left."""
     @property
     def v(self) -> _Array:
-        """(nv,) their rates."""
+        """Rates of the coordinates, (nv,), m/s and rad/s."""
     @property
     def centres(self) -> _Array:
-        """(n_discs, 2) centres of the ball or of wheels A, B, world, m."""
+        """Centres of the discs, world frame, (n_discs, 2), m."""
     @property
     def gaps(self) -> _Array:
-        """(n_discs,) distance to the ground now, m; negative where they overlap."""
+        """Gap of each disc now, (n_discs,), m; negative where it overlaps the ground."""
     @property
-    def torques(self) -> _Array: ...
+    def torques(self) -> _Array:
+        """Commanded torques, (n_discs,), N m, positive forward."""
     @property
     def parameters(self) -> dict[str, Any]:
         """The keyword arguments that describe the machine."""
     @property
     def settings(self) -> dict[str, Any]:
-        """The keyword arguments that make a simulation with these options."""
+        """The keyword arguments that make a simulation with the same options."""
     def set_state(self, q: npt.ArrayLike, v: npt.ArrayLike | None = None) -> None:
-        """Sets coordinates and rates (default: at rest). Time goes to 0, warm start is dropped, torques stay."""
+        """Sets coordinates and rates; torques stay.
+
+        Time starts at 0, and the next step has no warm start.
+
+        Args:
+            q: Coordinates, (nv,), m and rad.
+            v: Their rates, (nv,), m/s and rad/s; at rest by default.
+
+        Raises:
+            StateError: An array has a wrong length or an entry that is not finite. Nothing has
+                changed.
+        """
     def set_torques(self, torques: npt.ArrayLike) -> None:
-        """(n_discs,) N m, positive drives forward; the rover's act between body and wheels."""
-    def step(self, n: int = 1) -> StepReport: ...
+        """Sets the driving torques; each saturates at its limit, where the machine has one.
+
+        Args:
+            torques: Torques between the body and each disc, (n_discs,), N m, positive forward.
+
+        Raises:
+            CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
+        """
+    def step(self, n: int = 1) -> StepReport:
+        """Takes n steps, as `Simulation.step` does.
+
+        Args:
+            n: Number of steps.
+
+        Returns:
+            How the steps went.
+
+        Raises:
+            StepError: A step could not be taken; the state before it stays.
+            OptionError: `n` is not a count.
+        """
     @property
-    def contacts(self) -> PlanarContacts: ...
-    def energy(self) -> Energy: ...
+    def contacts(self) -> PlanarContacts:
+        """The contacts of the last step."""
+    def energy(self) -> Energy:
+        """Kinetic and potential energy now."""
     def mass_matrix(self) -> _Array:
-        """(nv, nv) at the current state."""
+        """Mass matrix now, (nv, nv), in kg, kg m and kg m²."""
     def last_problem(self) -> tuple[_Array, _Array, _Array]:
-        """W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem."""
-    def snapshot(self) -> PlanarSnapshot: ...
-    def restore(self, snapshot: PlanarSnapshot) -> None: ...
+        """The friction-contact problem of the last step.
+
+        Returns:
+            Delassus operator W, (2 n_c, 2 n_c), 1/kg; free velocity, (2 n_c,), m/s; friction
+            coefficients, (n_c,).
+        """
+    def snapshot(self) -> PlanarSnapshot:
+        """Everything that is needed to continue bit for bit."""
+    def restore(self, snapshot: PlanarSnapshot) -> None:
+        """Goes back to a snapshot.
+
+        Args:
+            snapshot: A snapshot of a simulation of the same machine.
+
+        Raises:
+            StateError: The snapshot belongs to another machine or is damaged. Nothing has changed.
+        """
     def __reduce__(self) -> Any: ...
 
 @final
 class BallSimulation(PlanarSimulation):
-    """A disc on a ground: coordinates x, y (centre, m) and theta (rad).
+    """A disc on a ground: coordinates x, y of its centre, m, and its angle theta, rad.
 
-    `inertia` (kg m2) is a homogeneous disc's if not given. Options as `Simulation`'s, but for gravity (x, y), and
-    `contact`: "nearest" (the disc touches where the ground is nearest to its centre) or "centre_height" (the
-    report's: the centre itself stops at the ground).
+    Args:
+        ground: A `Line`, `Sine`, `Spline` or `Polyline`.
+        mass: Mass, kg.
+        radius: Radius, m.
+        inertia: Inertia about the centre, kg m²; that of a homogeneous disc by default.
+        **options: Options as of `Simulation`, from `gravity`, here (2,), to `warm_start`, and
+            `contact`: "nearest", the disc touches where the ground is nearest to its centre, or
+            "centre_height", the 2010 report's rule, by which the centre itself stops at the ground.
 
     Raises:
-        ModelError: Mass, radius or inertia is not finite and positive.
-        TerrainError: `ground` is none.
+        ModelError: `mass`, `radius` or `inertia` is not finite and positive.
+        TerrainError: `ground` is not a ground.
         OptionError: An option is out of its range.
+        TypeError: An option is unknown.
     """
 
     def __new__(
@@ -712,17 +1405,32 @@ class BallSimulation(PlanarSimulation):
 
 @final
 class TwoWheelRoverSimulation(PlanarSimulation):
-    """Body and two driven wheels: coordinates x, y (body's mass centre, m), theta, theta_A, theta_B (rad).
+    """A body on two driven wheels.
 
-    A is the back wheel, B the front one; their angles are absolute. `wheel_*` take one number or one a wheel. `axle_a`,
-    `axle_b`: axles relative to the body's mass centre in its own axes, m; (-0.4, 0) and (0.4, 0) if not given.
-    `inertia` is a rod's from axle to axle and `wheel_inertia` a disc's if not given. Defaults are the scale of the
-    report's granular run. Options as `BallSimulation`'s.
+    Coordinates are x, y of the body's mass centre, m, theta, theta_A and theta_B, rad. A is the
+    back wheel, B the front wheel. All angles are absolute. The defaults are the rover of the 2010
+    report's granular run.
+
+    Args:
+        ground: A `Line`, `Sine`, `Spline` or `Polyline`.
+        mass: Mass of the body, kg.
+        inertia: Inertia of the body about its mass centre, kg m²; that of a rod from axle to axle
+            by default.
+        wheel_mass: Mass of both wheels or of each, kg; 60 by default.
+        wheel_radius: Radius of both wheels or of each, m; 0.2 by default.
+        wheel_inertia: Inertia of both wheels or of each about the axle, kg m²; that of a
+            homogeneous disc by default.
+        axle_a: Back axle relative to the body's mass centre, body axes, (2,), m; (-0.4, 0) by
+            default.
+        axle_b: Front axle relative to the body's mass centre, body axes, (2,), m; (0.4, 0) by
+            default.
+        **options: Options as of `BallSimulation`.
 
     Raises:
         ModelError: A mass, radius or inertia is not finite and positive, or the wheels overlap.
-        TerrainError: `ground` is none.
+        TerrainError: `ground` is not a ground.
         OptionError: An option is out of its range.
+        TypeError: An option is unknown.
     """
 
     def __new__(
@@ -741,16 +1449,24 @@ class TwoWheelRoverSimulation(PlanarSimulation):
 
 @final
 class MirroredRoverSimulation(PlanarSimulation):
-    """The six-wheel rover driven straight, in its plane of symmetry: x, y, theta, then a joint angle a pair.
+    """The six-wheel rover driven straight, in its plane of symmetry.
 
-    `model` must be its own mirror image about the trunk's x-y plane; the built-in rover if not given. Its joints that
-    do not turn about z are locked at zero. Torques: one a pair, of each of its wheels; they saturate at the model's
-    limits. Only wheels touch the ground. Options as `BallSimulation`'s.
+    Coordinates are x, y, m, theta, and the angle of each mirrored pair of joints, rad. Joints that
+    do not turn about z are locked at 0. Only wheels touch the ground. A torque is that of each
+    wheel of a pair.
+
+    Args:
+        ground: A `Line`, `Sine`, `Spline` or `Polyline`.
+        model: The machine, its own mirror image about the trunk's x-y plane; the built-in rover by
+            default.
+        **options: Options as of `BallSimulation`.
 
     Raises:
-        ModelError: The model has no planar image, or one that has not 7 coordinates.
-        TerrainError: `ground` is none.
+        ModelError: The model is not its own mirror image, or its planar image has not 7
+            coordinates.
+        TerrainError: `ground` is not a ground.
         OptionError: An option is out of its range.
+        TypeError: An option is unknown.
     """
 
     def __new__(
@@ -765,17 +1481,31 @@ class MirroredRoverSimulation(PlanarSimulation):
 
 @final
 class SimulationBatch:
-    """Many rovers stepped side by side on several threads, bit for bit as each would be alone."""
+    """Many rovers stepped side by side on several threads, each bit for bit as it would be alone.
+
+    The batch copies the simulations. One call at a time: a call during another one raises
+    BusyError.
+
+    Args:
+        simulations: Simulations of models with equally many coordinates.
+        scan: Points of the height scan ahead and to the right of the trunk's origin in the heading
+            frame, (n, 2), m; none by default.
+        threads: Number of threads; one a core by default.
+
+    Raises:
+        OptionError: There are no simulations or their models differ in size, `scan` has a wrong
+            shape, or `threads` is out of its range.
+    """
 
     def __new__(
         cls, simulations: Sequence[Simulation], *, scan: npt.ArrayLike | None = None, threads: int | None = None
-    ) -> SimulationBatch:
-        """Copies the simulations, whose models must be of one size. `threads`: None for one a core."""
+    ) -> SimulationBatch: ...
     @property
-    def threads(self) -> int: ...
+    def threads(self) -> int:
+        """Number of threads."""
     @property
     def reading_layout(self) -> dict[str, slice]:
-        """Names and places of the numbers in a row of readings."""
+        """Place of each quantity in a row of readings; `Simulation.reading_layout` lists them."""
     def step(
         self,
         torques: npt.ArrayLike,
@@ -784,91 +1514,158 @@ class SimulationBatch:
         *,
         active: npt.NDArray[np.bool_] | None = None,
     ) -> tuple[_Array, dict[int, str]]:
-        """Commands (n_rovers, 6) as `set_wheel_torques` and `set_steering` take them, then n steps.
+        """Sets the commands of all rovers and takes n steps.
 
-        Rovers that are not `active` keep still. Returns a fresh row of readings a rover, and why a rover could not
-        take a step, by its number; the others have gone on. Ctrl-C ends the call after a whole step of each rover, not
-        the same one for all.
+        Ctrl-C ends the call after a whole step of each rover, which need not be the same one.
+
+        Args:
+            torques: Commands as of `Simulation.set_wheel_torques`, (n_rovers, n_wheels), N m.
+            set_points: Commands as of `Simulation.set_steering`, (n_rovers, n_wheels), rad.
+            n: Number of steps.
+            active: Which rovers move, (n_rovers,); all by default. The others stay as they are.
+
+        Returns:
+            A row of readings for each rover, (n_rovers, size), and the message of the StepError of
+            each rover that could not take a step, by its index. The other rovers go on.
+
+        Raises:
+            CommandError: An array has a wrong shape or an entry that a rover refuses. No rover has
+                moved.
+            OptionError: `n` or `active` is invalid.
         """
     def readings(self) -> _Array:
-        """(n_rovers, size) as the rovers are now."""
+        """The readings of all rovers now, (n_rovers, size)."""
     def replace(self, index: int, simulation: Simulation, target: Sequence[float] | None = None) -> None:
-        """Puts a copy of a simulation, with its own terrain, in a place. `target` (x, z): what its readings look at."""
+        """Puts a copy of a simulation, with its own terrain, in the place of a rover.
+
+        Args:
+            index: Index of the rover.
+            simulation: Its replacement, a model with equally many coordinates.
+            target: The place (x, z) on the map that its readings refer to, m; the origin by
+                default.
+
+        Raises:
+            OptionError: There is no such rover, or an argument is invalid. Nothing has changed.
+        """
     def simulation(self, index: int) -> Simulation:
-        """A copy of one rover, to look at."""
+        """Returns a copy of one rover.
+
+        Args:
+            index: Index of the rover.
+
+        Returns:
+            The copy; stepping it does not move the rover.
+
+        Raises:
+            OptionError: There is no such rover.
+        """
     def __len__(self) -> int: ...
 
 @final
 class SoilContacts:
-    """Contacts of a soil's last step, one row each; those between disks that sleep are not in it."""
+    """The contacts of a soil's last step, as new arrays with one row a contact.
+
+    Contacts between sleeping disks are left out.
+    """
 
     @property
     def bodies(self) -> npt.NDArray[np.int64]:
-        """(n, 2) numbers of both bodies: disks from 0, then the wheels; -1 for a wall or the ground."""
+        """Numbers of both bodies, (n, 2), disks from 0, then the wheels; -1 for a wall or the ground."""
     @property
     def points(self) -> npt.NDArray[np.float64]:
-        """(n, 2) where the first body's rim touches, m."""
+        """Points of the first body's rim, (n, 2), m."""
     @property
     def normals(self) -> npt.NDArray[np.float64]:
-        """(n, 2) unit normals, from the second body into the first."""
+        """Unit normals from the second body into the first, (n, 2)."""
     @property
     def gaps(self) -> npt.NDArray[np.float64]:
-        """(n,) at the start of the step, m; negative where bodies overlap."""
+        """Gaps at the start of the step, (n,), m; negative where bodies overlap."""
     @property
     def impulses(self) -> npt.NDArray[np.float64]:
-        """(n, 2) on the first body along the normal and the tangent (n_y, -n_x), N s."""
+        """Impulses on the first body along the normal and the tangent (n_y, -n_x), (n, 2), N s."""
     @property
     def velocities(self) -> npt.NDArray[np.float64]:
-        """(n, 2) of the first body against the second after the step, along normal and tangent, m/s."""
+        """Relative velocities after the step along normal and tangent, (n, 2), m/s.
+
+        Of the first body against the second.
+        """
     @property
     def world_impulses(self) -> npt.NDArray[np.float64]:
-        """(n, 2) on the first body along x and y, N s."""
+        """Impulses on the first body along x and y, (n, 2), N s."""
     def __len__(self) -> int: ...
 
 @final
 class SoilSnapshot:
-    """Everything that a soil needs to continue bit for bit; picklable."""
+    """Everything that a soil needs to continue bit for bit. Picklable."""
 
     @staticmethod
-    def from_bytes(data: bytes) -> SoilSnapshot: ...
-    def to_bytes(self) -> bytes: ...
+    def from_bytes(data: bytes) -> SoilSnapshot:
+        """Reads a snapshot.
+
+        Args:
+            data: What `to_bytes` returned.
+
+        Returns:
+            The snapshot.
+
+        Raises:
+            StateError: The bytes are not those of a snapshot.
+        """
+    def to_bytes(self) -> bytes:
+        """The snapshot as bytes, as `from_bytes` reads them."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __reduce__(self) -> Any: ...
 
 @final
 class SoilSimulation:
-    """Free disks with friction, between walls or on a ground, and perhaps a machine that drives over them.
+    """A granular soil of disks, and a machine that drives on it.
+
+    The disks are free, with friction, between walls or on a ground.
+
+    One call at a time: a call during another one, from another thread or a signal handler, raises
+    BusyError.
 
     Args:
-        radius: (n,) m.
-        mass: (n,) kg; the disks are solid.
-        position: (n, 2) centres or (n, 3) with angles, m and rad.
-        kinematic: (n,) disks whose velocity nothing changes, as grains glued to a rough floor, or a piston with the
-            velocity that `set_state` gives it; none if not given. They may overlap one another and walls.
-        walls: (n, 4) a point of each wall and the normal to its free side.
-        ground: A ground of any shape.
-        rover: Keyword arguments of `TwoWheelRoverSimulation` that describe a rover, such as its `parameters`.
-        rig: Mass (kg) and radius (m) of one wheel whose forward speed and turning rate nothing changes.
-        machine: (5,) coordinates of the rover (x, y, theta, theta_A, theta_B) or the rig (x, y, -, theta, -).
+        radius: Radii of the disks, (n,), m.
+        mass: Masses of the disks, (n,), kg; they are homogeneous.
+        position: Centres, (n, 2), m, or centres and angles, (n, 3), m and rad.
+        kinematic: Disks whose velocity no force changes, (n,), such as grains glued to a rough
+            floor, or a piston with the velocity that `set_state` gives it; none by default. They
+            may overlap one another and walls.
+        walls: A point of each wall and the normal to its free side, (n, 4), m; none by default.
+        ground: A `Line`, `Sine`, `Spline` or `Polyline` below the disks; none by default.
+        rover: Keyword arguments of `TwoWheelRoverSimulation` that describe a rover, such as its
+            `parameters`; none by default.
+        rig: Mass (kg) and radius (m) of a single wheel whose forward speed and turning rate no
+            force changes; none by default.
+        machine: Coordinates of the rover (x, y, theta, theta_A, theta_B) or of the rig (x, y, -,
+            theta, -), (5,), m and rad.
         friction: Coulomb's coefficient between disks.
-        wall_friction: Of disks against walls and ground.
-        wheel_friction: Of wheels.
-        restitution: Newton's coefficient of all contacts.
-        gravity: (2,) m/s^2; (0, -9.81) if not given.
-        time_step: s.
-        tolerance: Of the contact solver, relative; its velocities are also right to ten times that in m/s, times the
-            root of gravity over 9.81 m/s^2.
-        max_iterations: Most sweeps of the contact solver in a step.
-        stabilisation: "none" or "projection", which takes overlaps away and may add energy by lifting what lies above;
-            if not given, "none" without restitution and "projection" with it, for what is struck away may hit others.
-        penetration_tolerance: From which overlap on it projects, m; 0.5% of the smallest radius if not given.
-        sleep: Whether disks sleep that rest far from anything that moves.
-        sleep_speed: m/s below which a disk is still; 5e-4 if not given.
-        sleep_distance: m within which nothing may move; 0.2 if not given.
+        wall_friction: Coulomb's coefficient of disks on walls and ground.
+        wheel_friction: Coulomb's coefficient of wheels.
+        restitution: Newton's coefficient of all contacts, in [0, 1].
+        gravity: Gravity, (2,), m/s²; (0, -9.81) by default.
+        time_step: Time step, s.
+        tolerance: Largest relative residual of the contact problem. Its velocities are also right
+            to ten times that in m/s, times the square root of gravity over 9.81 m/s².
+        max_iterations: Largest number of sweeps of the contact solver in a step.
+        stabilisation: "projection" moves overlapping bodies apart, which may add energy by lifting
+            those above; "none" leaves them. By default "none" without restitution and "projection"
+            with it.
+        penetration_tolerance: Overlap that projection leaves alone, m; 0.5% of the smallest radius
+            by default.
+        sleep: Whether disks at rest far from anything that moves are left out of the step.
+        sleep_speed: Speed below which a disk is at rest, m/s; 5e-4 by default.
+        sleep_distance: Distance within which nothing may move for a disk to sleep, m; 0.2 by
+            default.
 
     Raises:
-        ModelError: A radius or mass is not finite and positive.
-        StateError: Positions of a wrong shape or not finite; disks, walls, wheels that overlap.
-        TerrainError: A wall without direction, or a ground that is none.
-        OptionError: An option is out of its range.
+        ModelError: A radius or mass is not finite and positive, or the machine's data are invalid.
+        StateError: Positions have a wrong shape or an entry that is not finite, or disks, walls or
+            wheels overlap.
+        TerrainError: A wall has no direction, or `ground` is not a ground.
+        OptionError: An option is out of its range, or both `rover` and `rig` are given.
     """
 
     def __new__(
@@ -898,42 +1695,47 @@ class SoilSimulation:
         sleep_distance: float | None = None,
     ) -> SoilSimulation: ...
     @property
-    def time(self) -> float: ...
+    def time(self) -> float:
+        """Time since the last call of `set_state`, s."""
     @property
-    def time_step(self) -> float: ...
+    def time_step(self) -> float:
+        """Time step, s."""
     @property
-    def radius(self) -> npt.NDArray[np.float64]: ...
+    def radius(self) -> npt.NDArray[np.float64]:
+        """Radii of the disks, (n,), m."""
     @property
-    def mass(self) -> npt.NDArray[np.float64]: ...
+    def mass(self) -> npt.NDArray[np.float64]:
+        """Masses of the disks, (n,), kg."""
     @property
     def position(self) -> npt.NDArray[np.float64]:
-        """(n, 3) x, y (m) and angle (rad) of each disk."""
+        """Centres and angles of the disks, (n, 3), m and rad."""
     @property
     def velocity(self) -> npt.NDArray[np.float64]:
-        """(n, 3) their rates, m/s and rad/s."""
+        """Rates of `position`, (n, 3), m/s and rad/s."""
     @property
     def kinematic(self) -> npt.NDArray[np.bool_]:
-        """(n,) disks whose velocity nothing changes."""
+        """Which disks are kinematic, (n,)."""
     @property
     def asleep(self) -> npt.NDArray[np.bool_]:
-        """(n,) which disks sleep; kinematic ones always do."""
+        """Which disks sleep, (n,); kinematic ones always do."""
     @property
     def machine(self) -> npt.NDArray[np.float64]:
-        """(5,) the machine's coordinates; empty without one."""
+        """Coordinates of the machine, (5,), m and rad; empty without one."""
     @property
     def machine_rate(self) -> npt.NDArray[np.float64]:
-        """(5,) their rates; empty without a machine."""
+        """Rates of the machine's coordinates, (5,), m/s and rad/s; empty without one."""
     @property
     def wheels(self) -> npt.NDArray[np.float64]:
-        """(n, 3) centre and radius of each wheel, m."""
+        """Centre and radius of each wheel, (n_wheels, 3), m."""
     @property
-    def torques(self) -> npt.NDArray[np.float64]: ...
+    def torques(self) -> npt.NDArray[np.float64]:
+        """Commanded torques of the rover's wheels, (2,), N m, positive forward; empty without a rover."""
     @property
     def pull(self) -> tuple[float, float]:
-        """Force at the machine's centre, N."""
+        """Force at the machine's centre along x and y, N."""
     @property
     def settings(self) -> dict[str, Any]:
-        """The options, by the names of the arguments."""
+        """The options of contacts, gravity and solver, by the names of the arguments."""
     def set_state(
         self,
         position: npt.ArrayLike,
@@ -941,31 +1743,87 @@ class SoilSimulation:
         machine: npt.ArrayLike | None = None,
         machine_rate: npt.ArrayLike | None = None,
     ) -> None:
-        """Sets the state at time 0; rates are 0 and the machine stays where it is if not given."""
-    def remove(self, which: npt.ArrayLike) -> None:
-        """Takes the disks that `which` (n,) marks out; the others go on under new numbers in the same order.
+        """Sets positions and rates; time starts at 0.
+
+        Args:
+            position: Centres, (n, 2), m, or centres and angles, (n, 3), m and rad.
+            velocity: Rates, (n, 2), m/s, or (n, 3), m/s and rad/s; at rest by default.
+            machine: Coordinates of the machine, (5,), m and rad; where it is by default.
+            machine_rate: Rates of the machine's coordinates, (5,), m/s and rad/s; at rest by
+                default.
 
         Raises:
-            ModelError: Another number of marks, or no disk would be left.
+            StateError: An array has a wrong shape or an entry that is not finite, or bodies
+                overlap. Nothing has changed.
+        """
+    def remove(self, which: npt.ArrayLike) -> None:
+        """Takes disks out; the others keep their order.
+
+        Args:
+            which: Which disks go, (n,) truth values.
+
+        Raises:
+            ModelError: The number of truth values differs, or no disk would be left. Nothing has
+                changed.
         """
     def set_torques(self, torques: npt.ArrayLike) -> None:
-        """(2,) N m of the rover's wheels, positive forward."""
+        """Sets the torques of the rover's wheels.
+
+        Args:
+            torques: Torques of wheels A and B, (2,), N m, positive forward.
+
+        Raises:
+            CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
+        """
     def set_pull(self, pull: npt.ArrayLike) -> None:
-        """(2,) N at the machine's centre: a drawbar."""
-    def step(self, n: int = 1) -> StepReport: ...
+        """Sets the force at the machine's centre, such as that of a drawbar.
+
+        Args:
+            pull: Force along x and y, (2,), N.
+
+        Raises:
+            CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
+        """
+    def step(self, n: int = 1) -> StepReport:
+        """Takes n steps, as `Simulation.step` does.
+
+        Args:
+            n: Number of steps.
+
+        Returns:
+            How the steps went.
+
+        Raises:
+            StepError: A step could not be taken; the state before it stays.
+            OptionError: `n` is not a count.
+        """
     @property
-    def contacts(self) -> SoilContacts: ...
-    def energy(self) -> Energy: ...
+    def contacts(self) -> SoilContacts:
+        """The contacts of the last step."""
+    def energy(self) -> Energy:
+        """Kinetic and potential energy now."""
     def momentum(self) -> npt.NDArray[np.float64]:
-        """(3,) momentum of the disks but kinematic ones (kg m/s), and its moment about the origin (kg m^2/s)."""
+        """Momentum of the disks, (3,): along x and y, kg m/s, and about the origin, kg m²/s.
+
+        Kinematic disks do not count.
+        """
     def impulse_on_wheels(self) -> npt.NDArray[np.float64]:
-        """(2,) of the last step's contacts, N s."""
+        """Sum of the last step's contact impulses on the wheels, along x and y, (2,), N s."""
     def penetration(self) -> float:
         """Deepest overlap now, m."""
     def wake(self) -> None:
         """Wakes all disks."""
-    def snapshot(self) -> SoilSnapshot: ...
-    def restore(self, snapshot: SoilSnapshot) -> None: ...
+    def snapshot(self) -> SoilSnapshot:
+        """Everything that is needed to continue bit for bit."""
+    def restore(self, snapshot: SoilSnapshot) -> None:
+        """Goes back to a snapshot.
+
+        Args:
+            snapshot: A snapshot of the same soil.
+
+        Raises:
+            StateError: The snapshot belongs to another soil or is damaged. Nothing has changed.
+        """
 
 def soil_packing(
     count: int = 222,
@@ -978,35 +1836,55 @@ def soil_packing(
     bottom: float = 0.0,
     seed: int = 0,
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Radii (n,), masses (n,) and centres (n, 2) of disks in loose rows over a width, without overlap.
+    """Disks in loose rows over a width, without overlap: where a soil starts from.
 
-    Radii are drawn evenly from the range; `mass` is a disk's of the mean radius, others go with the area. The
-    defaults are the original's soil: three layers of 74.
+    The radii are drawn evenly from their range. The defaults are the soil of the 2010 report: three
+    layers of 74.
+
+    Args:
+        count: Number of disks, at most 1 000 000.
+        radius_min: Smallest radius, m.
+        radius_max: Largest radius, m.
+        mass: Mass of a disk of the mean radius, kg; the others' go with their area.
+        left: Left edge, m.
+        width: Width of the rows, m.
+        bottom: Height of the lower edge, m.
+        seed: Seed of the random numbers; equal seeds give equal disks.
+
+    Returns:
+        Radii, (n,), m, masses, (n,), kg, and centres, (n, 2), m.
 
     Raises:
-        ModelError: No disk or more than 1 000 000, a number that is not finite, of the wrong sign or out of its range,
-            radii the wrong way round, no room for a disk.
+        ModelError: A number is not finite or out of its range, the radii are the wrong way round,
+            or a disk does not fit.
     """
 
 @final
 class SolverReport:
+    """How the contact solver ended."""
+
     @property
     def status(self) -> Literal["converged", "relaxed", "not_converged", "budget_exhausted"]:
-        """ "relaxed": the convex relaxation is solved, not Coulomb's law. "budget_exhausted": the work that `budget`
-        allows was done; the answer is the nearest one known by then."""
+        """One of "converged", "relaxed", "not_converged" and "budget_exhausted".
+
+        "relaxed": the convex relaxation is solved, which is not Coulomb's law. "budget_exhausted":
+        the work that `budget` allows is done, and the answer is the best one found.
+        """
     @property
-    def is_converged(self) -> bool: ...
+    def is_converged(self) -> bool:
+        """Whether Coulomb's law holds to the tolerance."""
     @property
-    def iterations(self) -> int: ...
+    def iterations(self) -> int:
+        """Iterations of the stage that answered."""
     @property
     def residual(self) -> float:
-        """Violation of Signorini's and Coulomb's laws relative to the data, computed from the returned impulses."""
+        """Violation of Signorini's and Coulomb's laws by the returned impulses, relative to the data."""
     @property
     def velocity_error(self) -> float:
         """Largest violation of Signorini's and Coulomb's laws at one contact, m/s."""
     @property
     def solver(self) -> str:
-        """The method that answered; never "auto"."""
+        """Name of the method that answered; never "auto"."""
     @property
     def stage(
         self,
@@ -1024,29 +1902,48 @@ class SolverReport:
         "admm",
         "relaxed",
     ]:
-        """The stage that answered; "at_rest" where q = 0 left nothing to do."""
+        """Name of the stage that answered; "at_rest" where q = 0 left nothing to do."""
     @property
     def stages(self) -> list[tuple[str, str, int]]:
-        """Every stage that was tried, in order: its name, why it ended ("converged", "max_iterations", "stalled",
-        "budget_exhausted", "non_finite", "relaxed") and its iterations."""
+        """Every stage that was tried, in order, with the reason for its end and its iterations.
+
+        Reasons are "converged", "max_iterations", "stalled", "budget_exhausted", "non_finite" and
+        "relaxed".
+        """
     @property
     def work(self) -> int:
-        """Work done, in the unit of `budget`."""
+        """Work done, in the unit of the argument `budget`."""
     @property
     def law(self) -> Literal["coulomb", "relaxed"]:
-        """The law that the answer obeys."""
+        """The law that the answer obeys, "coulomb" or "relaxed"."""
 
 @final
 class FrictionContactSolution:
+    """The solution of a friction-contact problem."""
+
     @property
-    def impulses(self) -> _Array: ...
+    def impulses(self) -> _Array:
+        """Impulses p, (n_c, d), N s, along the normal and the tangents."""
     @property
-    def velocities(self) -> _Array: ...
+    def velocities(self) -> _Array:
+        """Velocities u = W p + q, (n_c, d), m/s, along the normal and the tangents."""
     @property
-    def report(self) -> SolverReport: ...
+    def report(self) -> SolverReport:
+        """How the solver ended."""
 
 def accuracy_options(accuracy: Literal["fast", "balanced", "reference"] | float) -> dict[str, Any]:
-    """The keyword arguments time_step, variant and tolerance of `Simulation` that an accuracy stands for."""
+    """The options of `Simulation` that an accuracy stands for.
+
+    Args:
+        accuracy: "fast", "balanced" or "reference", or the error allowed on a path of 20 m on flat
+            ground, m.
+
+    Returns:
+        The keyword arguments `time_step` (s), `variant` and `tolerance`.
+
+    Raises:
+        OptionError: The name is unknown, or the error is finer than any choice of options gives.
+    """
 
 def solve_friction_contact(
     W: npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
@@ -1060,26 +1957,35 @@ def solve_friction_contact(
     initial: npt.ArrayLike | None = None,
     budget: int = 300000000,
 ) -> FrictionContactSolution:
-    """Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K, for any W (n_c d, n_c d).
+    """Solves the friction-contact problem K* contains W p + q + mu |u_T| n, orthogonal to p in K.
 
     Args:
-        W: Delassus operator, 1/kg, used as it is (it need not be symmetric or regular). For many contacts its block
-            rows ``(indptr (n_c + 1,), indices (n_blocks,), data (n_blocks, d, d))``: each row ascending, with its
-            diagonal block.
-        q: Free velocity (n_c d,), m/s, contact by contact: normal, tangent (, tangent).
-        mu: Friction coefficients (n_c,).
-        tolerance: Largest relative residual of a converged answer; its velocities are also right to
-            max(tolerance, 1e-9) m/s.
-        dimension: Components of a contact, 2 or 3.
-        solver: "auto" escalates from what is cheap to what is robust; "nsgs", "newton", "proximal", "admm" are single
-            methods of Coulomb's law; "relaxed" solves its convex relaxation, another law, and so never counts as
-            converged.
-        max_iterations: Most Newton steps, sweeps or ADMM iterations.
-        initial: Warm start (n_c d,), N s.
-        budget: Most work, counted and not timed: one unit is a multiplication with its addition in a product with W.
-            The default takes about 0.3 s. What it does not allow is left undone, and the report says so.
+        W: Delassus operator, (n_c d, n_c d), 1/kg, used as it is: it may be singular or
+            unsymmetric. For many contacts its block rows `(indptr, indices, data)` of shapes
+            (n_c + 1,), (n_blocks,), (n_blocks, d, d), each row ascending and with its diagonal
+            block.
+        q: Free velocity, (n_c d,), m/s, contact by contact: normal, tangents.
+        mu: Friction coefficients, (n_c,).
+        tolerance: Largest relative residual of a converged answer; its velocities are right to
+            max(tolerance, 1e-9) m/s as well.
+        dimension: Components d of a contact, 2 or 3.
+        solver: "auto" tries cheap methods first and robust ones last; "nsgs", "newton", "proximal"
+            and "admm" are single methods for Coulomb's law; "relaxed" solves its convex relaxation,
+            another law, and never counts as converged.
+        max_iterations: Largest number of Newton steps, sweeps or ADMM iterations.
+        initial: Impulses from which the solver starts, (n_c d,), N s; zero by default.
+        budget: Largest amount of work, counted and not timed: a unit is one multiplication and
+            addition in a product with W. The default takes about 0.3 s. What exceeds it is left
+            undone, and the report says so.
+
+    Returns:
+        Impulses, velocities and the solver's report. Not converging is no error: see
+        `report.status`.
 
     Raises:
-        ProblemError: Wrong shapes or entries.
-        OptionError: Unknown solver or dimension; tolerance, max_iterations or budget out of range.
+        ProblemError: An array has a wrong shape or an invalid entry.
+        OptionError: The solver or the dimension is unknown, or `tolerance`, `max_iterations` or
+            `budget` is out of its range.
+
+    Source: Acary and Brogliato 2008; Acary, Brémond and Huber 2018.
     """

@@ -8,12 +8,12 @@ import math
 import numbers
 from collections.abc import Iterable, Mapping, Set, Sized
 from decimal import Decimal
-from typing import NoReturn, TypeAlias
+from typing import Any, NoReturn, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym._core import OptionError, RoverGymError
+from rover_gym.mechanics import OptionError, RoverGymError
 
 Range: TypeAlias = tuple[float, float]
 
@@ -131,6 +131,15 @@ def span(
     if low > high:
         refuse(OptionError, field, value, "must be a pair (low, high) with low <= high")
     return (low, high)
+
+
+def mapping(field: str, value: object) -> Mapping[str, Any]:
+    """A mapping, or none as an empty one."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        refuse(OptionError, field, value, "must be a mapping or None")
+    return value
 
 
 def known_keys(field: str, value: Iterable[object], known: Iterable[str]) -> None:

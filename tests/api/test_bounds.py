@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rover_gym import ModelError, Plane, RoverModel, Simulation, SphereField, StepError, TerrainError
-from rover_gym._core import SoilSimulation, soil_packing
+from rover_gym.mechanics import SoilSimulation, soil_packing
 from rover_gym.planar import BallSimulation, Line, Polyline, Sine, Spline, TwoWheelRoverSimulation
 
 

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from rover_gym import BusyError, RoverGymError, Simulation, SphereField
-from rover_gym._core import SimulationBatch
-from rover_gym.planar import BallSimulation, Line, SoilSimulation
+from rover_gym.mechanics import SimulationBatch
+from rover_gym.planar import BallSimulation, Line
+from rover_gym.soil import SoilSimulation
 
 FOR_EVER = 10**12
 

@@ -15,10 +15,10 @@ from rover_gym.planar import (
     Sine,
     Spline,
     TwoWheelRoverSimulation,
-    describe,
-    record,
+    describe_planar,
+    record_planar,
 )
-from rover_gym.recording import read_trajectory
+from rover_gym.record import read_trajectory
 
 G = 9.81
 
@@ -180,7 +180,7 @@ def test_runs_are_recorded_with_all_that_made_them(tmp_path: Path) -> None:
     sim = TwoWheelRoverSimulation(Sine(0.05, 2.0), friction=0.9)
     sim.set_state([0.0, 0.4, 0.0, 0.0, 0.0])
     sim.set_torques([40.0, 40.0])
-    unconverged = record(sim, tmp_path / "run.h5", describe(sim, "a test"), duration=1.0, steps_per_row=4)
+    unconverged = record_planar(sim, tmp_path / "run.h5", describe_planar(sim, "a test"), duration=1.0, steps_per_row=4)
     assert unconverged == 0
     run = read_trajectory(tmp_path / "run.h5")
     assert run["q"].shape == (51, 5)

@@ -1,4 +1,4 @@
-"""`rover_gym.planar.SoilSimulation`: arrays, bad input, snapshots, recording and pictures."""
+"""`rover_gym.soil.SoilSimulation`: arrays, bad input, snapshots, recording and pictures."""
 
 from collections.abc import Callable
 from functools import partial
@@ -8,14 +8,25 @@ import numpy as np
 import pytest
 
 from rover_gym import OptionError
-from rover_gym.figures.soil import draw_soil
-from rover_gym.figures.soil_run import draw_soil_run
-from rover_gym.planar import BallSimulation, Line, SoilSimulation, SoilSnapshot, describe, record, soil_packing
-from rover_gym.planar_soil import Bed, record_soil, rover_on_soil, settled_bed
-from rover_gym.recording import RecordingError
-from rover_gym.soil_run import read_soil_run
-from rover_gym.soil_trials import Pull, drawbar_pull, drive_on_soil, over_beds
-from rover_gym.traction import fit_traction
+from rover_gym.figures.soil_frames import draw_soil
+from rover_gym.figures.soil_run_figures import draw_soil_run
+from rover_gym.planar import BallSimulation, Line, describe_planar, record_planar
+from rover_gym.record import RecordingError
+from rover_gym.soil import (
+    Bed,
+    Pull,
+    SoilSimulation,
+    SoilSnapshot,
+    drawbar_pull,
+    drive_on_soil,
+    fit_traction,
+    over_beds,
+    read_soil_run,
+    record_soil,
+    rover_on_soil,
+    settled_bed,
+    soil_packing,
+)
 
 
 def pair(**options: object) -> SoilSimulation:
@@ -148,7 +159,7 @@ def test_a_soil_without_a_machine_is_recorded_and_drawn(bed: Bed, tmp_path: Path
 
 def test_a_file_without_a_soil_is_refused(tmp_path: Path) -> None:
     sim = BallSimulation(Line())
-    record(sim, tmp_path / "ball.h5", describe(sim, "a ball"), duration=0.01)
+    record_planar(sim, tmp_path / "ball.h5", describe_planar(sim, "a ball"), duration=0.01)
     with pytest.raises(RecordingError, match="holds no soil"):
         read_soil_run(tmp_path / "ball.h5")
 

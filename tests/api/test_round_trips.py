@@ -19,7 +19,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField, StateError, StepError
-from rover_gym._core import PlanarSnapshot, Snapshot, SoilSimulation, SoilSnapshot, soil_packing
+from rover_gym.mechanics import PlanarSnapshot, Snapshot, SoilSimulation, SoilSnapshot, soil_packing
 from rover_gym.planar import (
     BallSimulation,
     Line,
@@ -29,8 +29,7 @@ from rover_gym.planar import (
     Spline,
     TwoWheelRoverSimulation,
 )
-from rover_gym.recording import Recorder, Sampler, describe
-from rover_gym.run import read_run
+from rover_gym.record import Recorder, RoverSampler, describe, read_run
 
 quick = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 lengths = st.floats(-1e3, 1e3)
@@ -119,7 +118,7 @@ def test_a_welded_model_is_no_freer_after_a_file() -> None:
 def test_a_recorded_welded_rover_is_still_welded(tmp_path: Path) -> None:
     plane = Plane((-0.3, 1.0, 0.1), 0.02)
     sim = driven(Simulation(RoverModel().weld({"front_axle": 0.05, "left_bogie": 0.0}), plane))
-    sampler = Sampler(sim.model)
+    sampler = RoverSampler(sim.model)
     with Recorder(tmp_path / "run.h5", sampler.channels, describe(sim, "welded"), terrain=plane) as recorder:
         recorder.append(sampler.row(sim))
     run = read_run(tmp_path / "run.h5")

@@ -18,10 +18,10 @@ from rover_gym import (
     StepError,
     TerrainError,
 )
-from rover_gym.economy import measure_economies
+from rover_gym.env import resting_pose, tilted_plane
 from rover_gym.planar import MirroredRoverSimulation
-from rover_gym.scene_plan import WELD_ERROR, Scene, ScenePlan, plan
-from rover_gym.start import resting_pose, tilted_plane
+from rover_gym.planning import Scene, ScenePlan, measure_economies, plan
+from rover_gym.planning.planner import WELD_ERROR
 
 PARTS = ["ground", "steering", "base", "scheme", "contact solver", "step"]
 

@@ -21,7 +21,7 @@ from rover_gym import (
     accuracy_options,
     solve_friction_contact,
 )
-from rover_gym._core import SoilSimulation, soil_packing
+from rover_gym.mechanics import SoilSimulation, soil_packing
 from rover_gym.planar import BallSimulation, Line, MirroredRoverSimulation, Polyline, Sine, TwoWheelRoverSimulation
 
 NONSENSE = [

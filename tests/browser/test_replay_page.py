@@ -18,12 +18,10 @@ from selenium.common.exceptions import TimeoutException, WebDriverException
 from selenium.webdriver.common.by import By
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
-from rover_gym.appearance import GROUND_COLOUR, TRUNK_COLOUR
-from rover_gym.planar_soil import record_soil, rover_on_soil, settled_bed
-from rover_gym.recording import Recorder, Sampler, describe
+from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
+from rover_gym.rendering.appearance import GROUND_COLOUR, TRUNK_COLOUR
 from rover_gym.replay import write_page, write_soil_page
-from rover_gym.run import Run, read_run
-from rover_gym.soil_run import SoilRun, read_soil_run
+from rover_gym.soil import SoilRun, read_soil_run, record_soil, rover_on_soil, settled_bed
 
 ROCKS = SphereField([[1.6, 0.0, 0.6], [1.2, 0.05, -1.3], [-0.9, 0.0, 1.3]], [0.25, 0.2, 0.15], Plane())
 PEAK = 1e5  # N, of an impact
@@ -34,7 +32,7 @@ class Shown(NamedTuple):
     """A page that is open, and the run that it should show."""
 
     browser: webdriver.Chrome
-    run: Run
+    run: RoverRun
     page: Path
 
 
@@ -81,14 +79,14 @@ def start_browser(profile: Path) -> webdriver.Chrome:
     return webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
 
 
-def drive(path: Path) -> Run:
+def drive(path: Path) -> RoverRun:
     """Two seconds over a few rocks, at 10 frames a second."""
     sim = Simulation(RoverModel(), ROCKS)
     q = np.zeros(sim.model.nq)
     q[1] = 0.4
     sim.set_state(q)
     sim.set_wheel_torques(np.full(6, 20.0))
-    sampler = Sampler(sim.model)
+    sampler = RoverSampler(sim.model)
     with Recorder(path, sampler.channels, describe(sim, "a drive over rocks"), terrain=sim.terrain) as recorder:
         recorder.append(sampler.row(sim))
         for _ in range(100):

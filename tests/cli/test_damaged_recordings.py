@@ -12,9 +12,8 @@ import pytest
 from torture.mutate import mutate_bytes, mutate_hdf5
 
 from rover_gym import RoverModel, Simulation
-from rover_gym.recording import Channel, Recorder, RecordingError, Sampler, describe, read_trajectory
-from rover_gym.run import read_run
-from rover_gym.soil_run import read_soil_run
+from rover_gym.record import Channel, Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
+from rover_gym.soil import read_soil_run
 
 TIME = Channel("time", "s", "time since the start")
 POINT = Channel("point", "m", "a point, world", (3,), ("x", "y", "z"))
@@ -22,7 +21,7 @@ SECRET = 1234.5678
 
 AGAIN = """
 import sys
-from rover_gym.recording import Channel, Recorder, RecordingError
+from rover_gym.record import Channel, Recorder, RecordingError
 
 try:
     Recorder(sys.argv[1], [Channel("time", "s", "time")])
@@ -32,7 +31,7 @@ except RecordingError as error:
 
 FULL = """
 import resource, signal, sys
-from rover_gym.recording import Channel, Recorder, RecordingError
+from rover_gym.record import Channel, Recorder, RecordingError
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
 recorder = Recorder(sys.argv[1], [Channel("time", "s", "time"), Channel("x", "m", "x", (10,))], rows_per_flush=50)
@@ -45,7 +44,7 @@ except RecordingError as error:
 
 LEFT_OPEN = """
 import sys
-from rover_gym.recording import Channel, Recorder
+from rover_gym.record import Channel, Recorder
 
 recorder = Recorder(sys.argv[1], [Channel("time", "s", "time")], rows_per_flush=10)
 for i in range(25):
@@ -57,7 +56,7 @@ for i in range(25):
 def sound_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recorded run of the rover, 25 rows."""
     sim = Simulation(RoverModel())
-    sampler = Sampler(sim.model)
+    sampler = RoverSampler(sim.model)
     path = tmp_path_factory.mktemp("sound") / "run.h5"
     with Recorder(path, sampler.channels, describe(sim, "a drop"), terrain=sim.terrain, rows_per_flush=10) as recorder:
         for _ in range(25):

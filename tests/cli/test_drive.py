@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from rover_gym.cli import app
-from rover_gym.recording import read_trajectory
+from rover_gym.record import read_trajectory
 
 
 def rover(*arguments: str) -> Result:

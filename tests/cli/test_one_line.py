@@ -14,13 +14,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-import rover_gym.baseline
+import rover_gym.policy.baseline
 from rover_gym import OptionError
-from rover_gym.cli import app
-from rover_gym.recording import read_trajectory
+from rover_gym.cli import app, drive_command
+from rover_gym.record import read_trajectory
 from rover_gym.validation import refuse
 
-DRIVE = sys.modules["rover_gym.cli.drive"]  # the command has the module's name
 NO_FILE = "cannot be written"
 
 
@@ -44,7 +43,7 @@ def raising(error: BaseException) -> Callable[..., NoReturn]:
 
 @pytest.mark.parametrize("error", [ZeroDivisionError("by zero"), KeyError("q"), MemoryError(), RecursionError("a\nb")])
 def test_an_error_that_nobody_foresaw_is_one_line_too(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(DRIVE, "find_policy", raising(error))
+    monkeypatch.setattr(drive_command, "find_policy", raising(error))
     line = one_line(rover("drive"), code=1)
     assert line.startswith(f"error: unforeseen {type(error).__name__}: ")
     assert "ROVER_DEBUG=1" in line
@@ -113,7 +112,7 @@ def test_numbers_beyond_reason_are_refused_before_the_work(arguments: list[str])
 def test_a_place_that_cannot_be_written_is_told_before_driving(
     option: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(DRIVE, "run_episode", raising(AssertionError("it drove")))
+    monkeypatch.setattr(drive_command, "run_episode", raising(AssertionError("it drove")))
     (tmp_path / "taken").write_text("a file", encoding="utf-8")
     for name in ("taken/below/film.mp4", "taken" if option == "--output" else "."):
         result = rover("drive", option, str(tmp_path / name))
@@ -123,7 +122,7 @@ def test_a_place_that_cannot_be_written_is_told_before_driving(
 
 
 def test_a_film_of_another_kind_is_refused_before_driving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(DRIVE, "run_episode", raising(AssertionError("it drove")))
+    monkeypatch.setattr(drive_command, "run_episode", raising(AssertionError("it drove")))
     assert "--video: must be a file's name that ends in .mp4" in one_line(
         rover("drive", "--video", str(tmp_path / "film.txt"))
     )
@@ -143,7 +142,7 @@ def test_a_replay_is_not_made_for_a_place_that_cannot_be_written(option: str, tm
 
 
 def test_an_interrupted_drive_keeps_and_prints_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    drive, started = DRIVE.run_episode, []
+    drive, started = drive_command.run_episode, []
 
     def interrupted(*args: Any, on_step: Callable[..., None], **kwargs: Any) -> Any:
         started.append(1)
@@ -157,7 +156,7 @@ def test_an_interrupted_drive_keeps_and_prints_what_is_done(tmp_path: Path, monk
 
         return drive(*args, on_step=step, **kwargs)
 
-    monkeypatch.setattr(DRIVE, "run_episode", interrupted)
+    monkeypatch.setattr(drive_command, "run_episode", interrupted)
     video = tmp_path / "film.mp4"
     result = rover("drive", "--episodes", "3", "--time-limit", "0.5", "--output", str(tmp_path), "--video", str(video))
     assert one_line(result, 130) == "interrupted: 1 of 3 episodes are done\n"
@@ -172,7 +171,7 @@ def test_an_interrupted_drive_keeps_and_prints_what_is_done(tmp_path: Path, monk
 
 
 def test_an_interrupted_baseline_prints_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
-    drive, driven = rover_gym.baseline.run_episode, []
+    drive, driven = rover_gym.policy.baseline.run_episode, []
 
     def interrupted(*args: Any, **kwargs: Any) -> Any:
         if len(driven) == 3:
@@ -180,7 +179,7 @@ def test_an_interrupted_baseline_prints_what_is_done(monkeypatch: pytest.MonkeyP
         driven.append(1)
         return drive(*args, **kwargs)
 
-    monkeypatch.setattr(rover_gym.baseline, "run_episode", interrupted)
+    monkeypatch.setattr(rover_gym.policy.baseline, "run_episode", interrupted)
     options = ["--episodes", "2", "--difficulty", "0", "--difficulty", "0.25", "--difficulty", "0.5"]
     result = rover("baseline", *options, "--json")
     assert one_line(result, 130) == "interrupted: 3 of 6 episodes are done\n"

@@ -12,11 +12,12 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from rover_gym.cli import app
-from rover_gym.figures.chapter_3 import draw_chapter_3, incline, published
-from rover_gym.figures.soil_run import SOIL_DRAWINGS
-from rover_gym.planar import describe, record
-from rover_gym.recording import read_trajectory
-from rover_gym.soil_run import read_soil_run
+from rover_gym.figures.chapter_3 import draw_chapter_3
+from rover_gym.figures.soil_run_figures import SOIL_DRAWINGS
+from rover_gym.planar import describe_planar, record_planar
+from rover_gym.record import read_trajectory
+from rover_gym.reproduction.chapter_3_balls import ball_on_incline, published
+from rover_gym.soil import read_soil_run
 
 
 def png_size(path: Path) -> tuple[int, int]:
@@ -139,7 +140,7 @@ def test_a_run_on_a_soil_is_plotted(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert np.isfinite(ratios[:, 1:]).all()
     assert 0.0 < ratios.mean() < 100.0
 
-    monkeypatch.setattr("rover_gym.figures.soil_run.SOIL_DRAWINGS", {"driving": SOIL_DRAWINGS["driving"]})
+    monkeypatch.setattr("rover_gym.figures.soil_run_figures.SOIL_DRAWINGS", {"driving": SOIL_DRAWINGS["driving"]})
     result = CliRunner().invoke(app, ["plot", str(tmp_path / "soil.h5"), "--overview"])
     assert result.exit_code == 0, result.output
     files = sorted((tmp_path / "soil-plots").iterdir())
@@ -159,7 +160,7 @@ def test_a_crossing_ends_where_the_soil_does(tmp_path: Path) -> None:
 
 def test_a_sweep_is_drawn_and_its_numbers_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, values in (("TORQUES", (50.0,)), ("SLIPS", (0.0, 0.2, 0.5, 0.7)), ("LOADS", (10.0,))):
-        monkeypatch.setattr(f"rover_gym.cli.soil.{name}", values)
+        monkeypatch.setattr(f"rover_gym.cli.soil_command.{name}", values)
     options = [*SMALL, "--sweep", "--seeds", "1", "--pull-disks", "190", "--pull-layers", "3"]
     result = CliRunner().invoke(app, ["planar", "soil", *options, "--output", str(tmp_path)])
     assert result.exit_code == 0, result.output
@@ -198,8 +199,8 @@ def test_a_soil_that_cannot_be_ends_with_one_line(options: list[str], message: s
 
 def test_the_incline_is_the_published_figure(tmp_path: Path) -> None:
     # The figure's curves were read off the page to about a pixel: 0.3 m of 190 m, 0.1 m/s.
-    sim, duration = incline()
-    record(sim, tmp_path / "run.h5", describe(sim, "figure 3.2"), duration=duration)
+    sim, duration = ball_on_incline()
+    record_planar(sim, tmp_path / "run.h5", describe_planar(sim, "figure 3.2"), duration=duration)
     run = read_trajectory(tmp_path / "run.h5")
     t, speed = np.array(published()["fig_3_3_ball_incline_velocity_forces"]["curves"]["Ball Velocity"]).T
     ours = np.interp(t, run["time"], np.linalg.norm(run["v"][:, :2], axis=1))

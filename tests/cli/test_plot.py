@@ -16,16 +16,16 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 from typer.testing import CliRunner, Result
 
-from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField, report, rug
+from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField
 from rover_gym.cli import app
 from rover_gym.extras import MissingExtraError
 from rover_gym.figures import draw_run
-from rover_gym.figures.derived import contact_velocities, motor_work, slip_ratios, smooth
-from rover_gym.figures.path import footprints
-from rover_gym.figures.run import DRAWINGS, drawable
+from rover_gym.figures.derived_signals import contact_velocities, motor_work, slip_ratios, smooth
+from rover_gym.figures.run_figures import DRAWINGS, drawable
 from rover_gym.figures.style import COLOURS, STYLE, WHEELS
-from rover_gym.recording import Recorder, Sampler, describe
-from rover_gym.run import Run, read_run
+from rover_gym.figures.wheel_paths import footprints
+from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
+from rover_gym.reproduction import inclined_plane, sphere_rug
 
 KINDS = ("flat", "rocks", "section_6_1", "rug")
 # "gap, left wheels (mm)"; a pure number has the unit 1.
@@ -34,13 +34,13 @@ LABEL_WITH_UNIT = re.compile(r".+ \((s|m|mm|m/s|mm/s|N|N m|J|°|%|1)\)$", flags=
 KILLED = """
 import os, signal, sys
 from rover_gym import RoverModel, Simulation
-from rover_gym.recording import Recorder, Sampler, describe
+from rover_gym.record import Recorder, RoverSampler, describe
 
 sim = Simulation(RoverModel())
 q = sim.q
 q[1] = 0.45
 sim.set_state(q)
-sampler = Sampler(sim.model)
+sampler = RoverSampler(sim.model)
 recorder = Recorder(sys.argv[1], sampler.channels, describe(sim, "a drop"), terrain=sim.terrain, rows_per_flush=10)
 for _ in range(57):
     step = sim.step()
@@ -61,8 +61,8 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     assert rover("drive", *common, str(folder / "flat")).exit_code == 0
     rocks = ("--terrain", "sphere_field", "--difficulty", "1")
     assert rover("drive", *rocks, *common, str(folder / "rocks")).exit_code == 0
-    report.run(folder / "section_6_1.h5", duration=3.5)
-    rug.run(folder / "rug.h5", duration=4.0)
+    inclined_plane.run(folder / "section_6_1.h5", duration=3.5)
+    sphere_rug.run(folder / "rug.h5", duration=4.0)
     return {
         "flat": folder / "flat" / "episode-1.h5",
         "rocks": folder / "rocks" / "episode-1.h5",
@@ -72,7 +72,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @pytest.fixture(scope="module", params=KINDS)
-def run(request: pytest.FixtureRequest, recordings: dict[str, Path]) -> Run:
+def run(request: pytest.FixtureRequest, recordings: dict[str, Path]) -> RoverRun:
     return read_run(recordings[request.param])
 
 
@@ -82,7 +82,7 @@ def style() -> Iterator[None]:
         yield
 
 
-def drawn(name: str, run: Run) -> Figure:
+def drawn(name: str, run: RoverRun) -> Figure:
     figure = Figure()
     DRAWINGS[name].draw(figure, run)
     return figure
@@ -106,7 +106,7 @@ def test_without_a_folder_the_figures_lie_beside_the_run(
     recordings: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     few = {name: DRAWINGS[name] for name in ("path", "wheel-loads", "energy")}  # drawing takes half a second each
-    monkeypatch.setattr("rover_gym.figures.run.DRAWINGS", few)
+    monkeypatch.setattr("rover_gym.figures.run_figures.DRAWINGS", few)
     result = rover("plot", str(recordings["rug"]), "--format", "svg", "--overview")
     assert result.exit_code == 0, result.output
     files = sorted(recordings["rug"].with_name("rug-plots").iterdir())
@@ -115,7 +115,7 @@ def test_without_a_folder_the_figures_lie_beside_the_run(
 
 
 @pytest.mark.parametrize("name", DRAWINGS)
-def test_every_axis_has_a_unit_and_every_line_is_named(name: str, run: Run) -> None:
+def test_every_axis_has_a_unit_and_every_line_is_named(name: str, run: RoverRun) -> None:
     figure = drawn(name, run)
     titles = [axes.get_title() for axes in figure.axes]
     assert run.title in figure.get_suptitle()
@@ -213,8 +213,8 @@ def test_the_motors_work_is_what_the_environment_counts(recordings: dict[str, Pa
         assert np.cumsum(spent) == pytest.approx(run.trajectory["motor_energy"][1:], rel=1e-3, abs=1e-9)
 
 
-def recorded(sim: Simulation, path: Path, steps: int) -> Run:
-    sampler = Sampler(sim.model)
+def recorded(sim: Simulation, path: Path, steps: int) -> RoverRun:
+    sampler = RoverSampler(sim.model)
     with Recorder(path, sampler.channels, describe(sim, "a test"), terrain=sim.terrain) as recorder:
         recorder.append(sampler.row(sim))
         for _ in range(steps):
@@ -307,7 +307,7 @@ def test_a_run_of_one_row_is_drawn(tmp_path: Path) -> None:
 
 def test_what_was_not_recorded_is_left_out(tmp_path: Path) -> None:
     sim = lifted(0.5)
-    sampler = Sampler(sim.model)
+    sampler = RoverSampler(sim.model)
     channels = [channel for channel in sampler.channels if channel.name in ("time", "q", "v", "wheel_gaps")]
     with Recorder(tmp_path / "run.h5", channels, describe(sim, "a test"), terrain=sim.terrain) as recorder:
         row = sampler.row(sim)

@@ -11,14 +11,14 @@ import pytest
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
 from rover_gym.extras import MissingExtraError
-from rover_gym.recording import Channel, Recorder, RecordingError, Sampler, read_trajectory
+from rover_gym.record import Channel, Recorder, RecordingError, RoverSampler, read_trajectory
 
 TIME = Channel("time", "s", "time since the start")
 POINT = Channel("point", "m", "a point, world", (3,), ("x", "y", "z"))
 
 KILLED = """
 import os, signal, sys
-from rover_gym.recording import Channel, Recorder
+from rover_gym.record import Channel, Recorder
 
 recorder = Recorder(sys.argv[1], [Channel("time", "s", "time")], {"title": "to be killed"}, rows_per_flush=10)
 for i in range(57):
@@ -45,7 +45,7 @@ def test_rows_come_back_with_units_and_attributes(tmp_path: Path) -> None:
 
 def test_every_data_set_of_a_simulation_says_what_it_is(tmp_path: Path) -> None:
     sim = Simulation(RoverModel())
-    sampler = Sampler(sim.model)
+    sampler = RoverSampler(sim.model)
     with Recorder(tmp_path / "run.h5", sampler.channels) as recorder:
         recorder.append(sampler.row(sim))
         sim.step()

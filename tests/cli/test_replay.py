@@ -16,21 +16,20 @@ import trimesh
 from typer.testing import CliRunner, Result
 
 from rover_gym import Plane, RoverModel, SphereField
-from rover_gym.appearance import rover_parts
 from rover_gym.cli import app
 from rover_gym.figures import draw_run
-from rover_gym.recording import RecordingError, Trajectory
+from rover_gym.record import RecordingError, RoverRun, Trajectory, read_run
+from rover_gym.rendering.appearance import rover_parts
 from rover_gym.replay import write_gltf, write_page, write_vrml
 from rover_gym.replay.rotation import axis_angles, continuous, quaternions
 from rover_gym.replay.scenery import ground_tiles, identifiers, sphere_mesh
-from rover_gym.run import Run, read_run
 
 SLOPE = Plane((-0.1, 1.0, 0.05), 0.2)
 FIELD = SphereField([[1.0, 0.1, -0.5], [2.0, 0.0, 0.7]], [0.2, 0.3], SLOPE)
 PILE = SphereField([[0.0, -0.5, 0.0], [1.0, -0.5, 0.0]], [0.5, 0.6])
 
 
-def turning_run(terrain: Plane | SphereField = FIELD, n: int = 41) -> Run:
+def turning_run(terrain: Plane | SphereField = FIELD, n: int = 41) -> RoverRun:
     """A rover that turns once about y, through pi exactly, while its wheels turn thrice and it drives a little."""
     model = RoverModel()
     turn = np.linspace(0.0, 1.0, n)
@@ -45,7 +44,7 @@ def turning_run(terrain: Plane | SphereField = FIELD, n: int = 41) -> Run:
         "wheel_forces": np.ones((n, 6, 3)),
         "wheel_gaps": np.full((n, 6), np.inf),
     }
-    return Run(Trajectory(data, {}, {}, terrain), model, terrain, (3.0, -1.0), 'a "test" & <more>')
+    return RoverRun(Trajectory(data, {}, {}, terrain), model, terrain, (3.0, -1.0), 'a "test" & <more>')
 
 
 def matrices(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
@@ -393,7 +392,7 @@ UNKIND = (
 )
 
 
-def renamed_run(title: str) -> Run:
+def renamed_run(title: str) -> RoverRun:
     """A run whose solids, wheels and title are what no format must read as its own."""
     plain = RoverModel().to_dict()
     old = [solid["name"] for solid in plain["solids"]]

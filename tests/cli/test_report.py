@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rover_gym import report as scene
-from rover_gym import rug
 from rover_gym.cli import app
-from rover_gym.recording import read_trajectory
+from rover_gym.record import read_trajectory
+from rover_gym.reproduction import inclined_plane, report_rover, sphere_rug
 
 FIGURES = (
     "figure-6.2-wheel-traces.png",
@@ -30,7 +29,7 @@ def test_the_scene_is_recorded_and_drawn(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     trajectory = read_trajectory(tmp_path / "trajectory.h5")
     assert trajectory.attributes["complete"]
-    assert trajectory.attributes["solver"]["gravity"] == list(scene.GRAVITY)
+    assert trajectory.attributes["solver"]["gravity"] == list(inclined_plane.GRAVITY)
     assert trajectory["time"][-1] == pytest.approx(12.0)
     for name in FIGURES:
         head = (tmp_path / name).read_bytes()[:24]
@@ -44,8 +43,8 @@ def test_the_scene_is_recorded_and_drawn(tmp_path: Path) -> None:
 
 def test_the_run_lands_where_siconos_does(tmp_path: Path) -> None:
     # Without stabilisation the scheme is Siconos' own, so at its step the two differ by impact times alone.
-    scene.run(tmp_path / "run.h5", duration=10.0, time_step=0.005, variant="newton", stabilisation="none")
-    rows = scene.distance_to_siconos(read_trajectory(tmp_path / "run.h5"))
+    inclined_plane.run(tmp_path / "run.h5", duration=10.0, time_step=0.005, variant="newton", stabilisation="none")
+    rows = inclined_plane.distance_to_siconos(read_trajectory(tmp_path / "run.h5"))
     assert [step for step, _, _ in rows] == [0.005, 0.0002]
     assert rows[0][2] < 0.001  # m; 0.2 mm when written
     assert rows[1][2] < 0.01  # m, the tolerance at 5 ms
@@ -53,15 +52,15 @@ def test_the_run_lands_where_siconos_does(tmp_path: Path) -> None:
 
 def test_the_scene_starts_as_the_reference_does() -> None:
     # The gaps at the start, from the Siconos run: they fix plane, wheel radius, geometry and attitude.
-    reference = scene.reference_data()["siconos"][0]
-    assert scene.scene().wheel_gaps == pytest.approx(np.array(reference["gap"][0]), abs=1e-6)
+    reference = inclined_plane.reference_data()["siconos"][0]
+    assert inclined_plane.simulation().wheel_gaps == pytest.approx(np.array(reference["gap"][0]), abs=1e-6)
 
 
 def test_the_rover_drives_over_the_rug(tmp_path: Path) -> None:
-    result = rug.run(tmp_path / "rug.h5", duration=20.0)
+    result = sphere_rug.run(tmp_path / "rug.h5", duration=20.0)
     trajectory = read_trajectory(result.path)
     assert trajectory.attributes["scene"]["terrain"]["kind"] == "sphere_field"
-    assert trajectory["q"][0, :3] == pytest.approx(rug.START)
+    assert trajectory["q"][0, :3] == pytest.approx(sphere_rug.START)
     assert np.isfinite(trajectory["q"]).all()
     assert result.first_contact is not None
     assert result.unconverged_steps == 0
@@ -69,7 +68,7 @@ def test_the_rover_drives_over_the_rug(tmp_path: Path) -> None:
 
 
 def test_gaps_on_the_rug_are_those_of_points_on_the_rim() -> None:
-    sim = rug.scene()
+    sim = sphere_rug.simulation()
     field = sim.terrain
     turn = np.linspace(0.0, 2.0 * np.pi, 20_001)
     for _ in range(5):
@@ -77,7 +76,9 @@ def test_gaps_on_the_rug_are_those_of_points_on_the_rim() -> None:
         poses = sim.poses()
         for wheel, gap in zip(sim.model.to_dict()["wheels"], sim.wheel_gaps, strict=True):
             centre, rotation = poses[wheel["solid"]]
-            rim = centre + scene.WHEEL_RADIUS * np.stack((np.cos(turn), np.sin(turn)), axis=1) @ rotation[:, :2].T
+            rim = (
+                centre + report_rover.WHEEL_RADIUS * np.stack((np.cos(turn), np.sin(turn)), axis=1) @ rotation[:, :2].T
+            )
             near = field.centres[np.linalg.norm(field.centres - centre, axis=1) < 1.5]
             distance = np.linalg.norm(rim[:, None] - near, axis=2).min() - 0.5
             assert gap == pytest.approx(distance, abs=1e-7)

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField, report, rug
+from rover_gym import OptionError, Plane, RoverModel, Simulation, SphereField
 from rover_gym.cli import app
-from rover_gym.recording import Recorder, RecordingError, Sampler, describe
-from rover_gym.run import read_run
+from rover_gym.record import Recorder, RecordingError, RoverSampler, describe, read_run
+from rover_gym.reproduction import inclined_plane, sphere_rug
 
 KILLED = """
 import os, signal, sys
-from rover_gym import report
-from rover_gym.recording import Recorder, Sampler, describe
+from rover_gym.reproduction import inclined_plane
+from rover_gym.record import Recorder, RoverSampler, describe
 
-sim = report.scene()
-sampler = Sampler(sim.model)
+sim = inclined_plane.simulation()
+sampler = RoverSampler(sim.model)
 recorder = Recorder(
     sys.argv[1], sampler.channels, describe(sim, "to be killed"), terrain=sim.terrain, rows_per_flush=10
 )
@@ -32,7 +32,7 @@ os.kill(os.getpid(), signal.SIGKILL)
 
 
 def record(sim: Simulation, path: Path, steps: int = 20) -> Path:
-    sampler = Sampler(sim.model)
+    sampler = RoverSampler(sim.model)
     with Recorder(path, sampler.channels, describe(sim, "a test"), terrain=sim.terrain) as recorder:
         recorder.append(sampler.row(sim))
         for _ in range(steps):
@@ -42,7 +42,7 @@ def record(sim: Simulation, path: Path, steps: int = 20) -> Path:
 
 
 def test_poses_are_those_of_the_simulation(tmp_path: Path) -> None:
-    sim = report.scene()
+    sim = inclined_plane.simulation()
     run = read_run(record(sim, tmp_path / "run.h5"))
     assert run.n_frames == 21
     assert run.positions.shape == (21, 16, 3)
@@ -59,7 +59,7 @@ def test_poses_are_those_of_the_simulation(tmp_path: Path) -> None:
 
 
 def test_the_wheels_recorded_gaps_are_those_over_the_ground_that_is_read(tmp_path: Path) -> None:
-    for name, sim in (("plane", report.scene()), ("rug", rug.scene())):
+    for name, sim in (("plane", inclined_plane.simulation()), ("rug", sphere_rug.simulation())):
         run = read_run(record(sim, tmp_path / f"{name}.h5"))
         for q, gaps in zip(run.trajectory["q"], run.trajectory["wheel_gaps"], strict=True):
             assert run.model.wheel_gaps(q, run.terrain, "state") == pytest.approx(gaps, abs=1e-12)
@@ -78,7 +78,7 @@ def test_an_episode_is_read_back_with_its_goal(terrain: str, tmp_path: Path) -> 
 
 
 def test_both_sections_of_the_report_are_read_back(tmp_path: Path) -> None:
-    for scene in (report, rug):
+    for scene in (inclined_plane, sphere_rug):
         result = scene.run(tmp_path / "run.h5", duration=0.1)
         assert read_run(result.path).n_frames == 21
 
@@ -90,7 +90,7 @@ def test_a_killed_run_is_read_back_as_far_as_it_came(tmp_path: Path) -> None:
     run = read_run(path)
     assert run.n_frames == 50
     assert not run.trajectory.attributes["complete"]
-    sim = report.scene()
+    sim = inclined_plane.simulation()
     sim.step(50)
     trunk = run.model.solid_names.index("trunk")
     assert run.positions[-1, trunk] == pytest.approx(sim.poses()["trunk"][0], abs=1e-12)
@@ -104,7 +104,7 @@ def test_a_killed_run_is_read_back_as_far_as_it_came(tmp_path: Path) -> None:
 
 
 def test_frames_are_the_samples_nearest_to_a_films_times(tmp_path: Path) -> None:
-    run = read_run(record(report.scene(), tmp_path / "run.h5", steps=100))  # 0.5 s at 200 samples a second
+    run = read_run(record(inclined_plane.simulation(), tmp_path / "run.h5", steps=100))  # 0.5 s at 200 samples a second
     film = run.resample(30.0)
     assert film.n_frames == 16
     assert np.abs(film.time - np.arange(16) / 30.0).max() <= 0.0025 + 1e-12
@@ -118,7 +118,7 @@ def test_frames_are_the_samples_nearest_to_a_films_times(tmp_path: Path) -> None
 
 def test_a_run_without_rover_ground_or_samples_is_refused(tmp_path: Path) -> None:
     sim = Simulation(RoverModel())
-    sampler = Sampler(sim.model)
+    sampler = RoverSampler(sim.model)
 
     def refusal(path: Path) -> str:
         with pytest.raises(RecordingError) as caught:

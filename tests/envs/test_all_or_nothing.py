@@ -20,10 +20,10 @@ from rover_gym import (
     SphereField,
     StateError,
     TerrainError,
-    beginning,
 )
-from rover_gym.sb3 import RoverVecEnv
+from rover_gym.env import beginning
 from rover_gym.vector import RoverVectorEnv
+from rover_gym.vector.sb3 import RoverVecEnv
 
 FORWARD = np.concatenate((np.full(6, 0.2), np.zeros(6))).astype(np.float32)
 

@@ -8,9 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from rover_gym import RoverEnv, rewards
-from rover_gym.observation import build_layout
-from rover_gym.scene import RESET_OPTIONS
+from rover_gym import OptionError, RoverEnv, RoverGymError
+from rover_gym.env import ARGUMENTS, rewards
+from rover_gym.env.argument_checks import shortest
+from rover_gym.env.episode_scene import RESET_OPTIONS
+from rover_gym.env.observation import build_layout
+from rover_gym.vector import RoverBatch, RoverVectorEnv
+from rover_gym.vector.sb3 import RoverVecEnv
 
 
 @cache
@@ -83,10 +87,59 @@ def test_reward_table_is_the_reward(env: RoverEnv) -> None:
 
 def test_argument_table_is_the_signature() -> None:
     parameters = inspect.signature(RoverEnv).parameters
-    rows = {name: default for name, default, _ in table("Arguments")}
+    rows = {name: default for name, default, *_ in table("Arguments")}
     assert list(rows) == list(parameters)
     for name, default in rows.items():
         assert ast.literal_eval(default) == parameters[name].default
+
+
+def test_every_environment_has_the_arguments_of_the_list() -> None:
+    expected = inspect.signature(RoverEnv).parameters
+    for cls in (RoverBatch, RoverVectorEnv, RoverVecEnv):
+        parameters = inspect.signature(cls).parameters
+        assert {name: parameters[name] for name in ARGUMENTS} == dict(expected)
+        assert all(entry.kind is not inspect.Parameter.VAR_KEYWORD for entry in parameters.values())
+
+
+def test_a_subclass_shows_its_own_signature() -> None:
+    class Short(RoverEnv):
+        def __init__(self, friction: float) -> None:
+            super().__init__(friction=friction)
+
+    assert list(inspect.signature(Short).parameters) == ["friction"]
+
+
+@pytest.mark.parametrize("name", ARGUMENTS)
+def test_every_argument_passes_its_own_check(name: str) -> None:
+    """The default is allowed; what is out of the range that the table prints is refused by name."""
+    argument = ARGUMENTS[name]
+    if argument.default is not None:
+        argument.check(name, argument.default)
+    with pytest.raises(RoverGymError) as caught:
+        argument.check(name, {1, 2})
+    assert caught.value.field == name
+    assert caught.value.value == {1, 2}
+    for bound, step in (("at_least", -1.0), ("at_most", 1.0)):
+        edge = getattr(argument.check, bound, None)
+        if edge is not None:
+            argument.check(name, edge)
+            with pytest.raises(OptionError) as caught:
+                argument.check(name, np.nextafter(edge, edge + step))
+            assert caught.value.field == name
+            assert shortest(edge) in str(argument.check)
+
+
+def test_an_unknown_argument_is_refused_as_python_does() -> None:
+    with pytest.raises(TypeError, match=r"RoverEnv\.__init__\(\) got an unexpected keyword argument 'frictoin'"):
+        RoverEnv(frictoin=0.5)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(60.0, "60"), (0.05, "0.05"), (1e6, "1e6"), (1e-6, "1e-6"), (1e-3, "0.001")]
+)
+def test_numbers_are_printed_short(value: float, text: str) -> None:
+    assert shortest(value) == text
+    assert float(text) == value
 
 
 def test_card_names_every_reset_option() -> None:

@@ -10,7 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from rover_gym import RoverEnv, RoverModel, StepError, rewards
+from rover_gym import RoverEnv, RoverModel, StepError
+from rover_gym.env import rewards
 
 TORQUES, STEERING = slice(0, 6), slice(6, 12)
 

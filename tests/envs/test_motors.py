@@ -7,9 +7,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from rover_gym import RoverEnv, RoverModel, rewards
-from rover_gym.env import drive_signs
-from rover_gym.progress import Progress, advance
+from rover_gym import RoverEnv, RoverModel
+from rover_gym.env import drive_signs, rewards
+from rover_gym.env.control_period import advance
+from rover_gym.env.progress import Progress
 
 Array = npt.NDArray[np.float64]
 

@@ -16,15 +16,12 @@ import numpy as np
 import pytest
 
 from rover_gym import PDPolicy, RoverEnv, RoverGymError
-from rover_gym.command import CommandController, CommandLimits
-from rover_gym.features import Features
-from rover_gym.policy import PDGains
-from rover_gym.rewards import WEIGHTS
-from rover_gym.scene import RESET_OPTIONS
-from rover_gym.scene_plan import Scene, plan
-from rover_gym.task import SOLVER_OPTIONS
+from rover_gym.env.argument_checks import SOLVER_OPTIONS
+from rover_gym.env.episode_scene import RESET_OPTIONS
+from rover_gym.env.rewards import WEIGHTS
+from rover_gym.planning import Scene, plan
+from rover_gym.policy import CommandController, CommandLimits, DriveByCommand, Features, PDGains
 from rover_gym.vector import RoverVectorEnv
-from rover_gym.wrappers import DriveByCommand
 
 FORWARD = np.full(12, 0.5, np.float32)
 
@@ -148,7 +145,7 @@ def test_arguments_of_the_vector_environment(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["n_envs", "threads", "max_episode_steps", "friction"])
 def test_arguments_of_the_stable_baselines_environment(name: str) -> None:
-    sb3 = pytest.importorskip("rover_gym.sb3")
+    sb3 = pytest.importorskip("rover_gym.vector.sb3")
     assert throw(lambda value: sb3.RoverVecEnv(**{"n_envs": 1, "threads": 1, name: value})) > 50
 
 
@@ -245,7 +242,7 @@ def test_difficulties_and_snapshots() -> None:
 
 
 def test_stable_baselines_seeds_options_and_actions() -> None:
-    sb3 = pytest.importorskip("rover_gym.sb3")
+    sb3 = pytest.importorskip("rover_gym.vector.sb3")
     venv, twin = sb3.RoverVecEnv(2, threads=1), sb3.RoverVecEnv(2, threads=1)
     for one in (venv, twin):
         one.seed(2)

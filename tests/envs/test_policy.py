@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rover_gym import PDPolicy, RoverEnv
-from rover_gym.start import wheel_centres
+from rover_gym.env import wheel_centres
 
 POLICY = PDPolicy(RoverEnv())
 CENTRES = wheel_centres(RoverEnv().model)

@@ -20,11 +20,11 @@ from gymnasium.wrappers import RecordVideo
 
 import rover_gym
 from rover_gym import OptionError, Plane, RoverEnv, RoverModel, Simulation, SphereField
-from rover_gym import appearance as look
+from rover_gym.env import resting_pose, tilted_plane
 from rover_gym.extras import MissingExtraError
 from rover_gym.rendering import FrameRenderer
+from rover_gym.rendering import appearance as look
 from rover_gym.rendering.frames import contact_forces
-from rover_gym.start import resting_pose, tilted_plane
 
 Frame = npt.NDArray[np.uint8]
 SIZE = {"width": 160, "height": 120}
@@ -470,7 +470,7 @@ def test_an_optimizer_can_be_made_after_a_frame() -> None:
 
 
 def test_every_rover_of_a_batch_is_drawn_as_it_would_be_alone() -> None:
-    from rover_gym.sb3 import RoverVecEnv  # noqa: PLC0415 - after the warning filters of this file
+    from rover_gym.vector.sb3 import RoverVecEnv  # noqa: PLC0415 - after the warning filters of this file
 
     options = {"render_mode": "rgb_array", "render_options": {"width": 160, "height": 120}}
     alone = gym.make("Rover-v0", **options)

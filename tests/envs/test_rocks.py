@@ -15,16 +15,10 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from rover_gym import OptionError, PDPolicy, Plane, RoverEnv, RoverGymError, SphereField, TerrainError
-from rover_gym.baseline import ENDS, measure_baseline, wilson_interval
-from rover_gym.rocks import (
-    HARDEST_SLOPE_DEG,
-    MARGIN,
-    HeightScan,
-    RockDistribution,
-    clear_radius,
-    heights,
-    scan_points,
-)
+from rover_gym.env import HeightScan
+from rover_gym.env.rocks import HARDEST_SLOPE_DEG, MARGIN, RockDistribution, clear_radius, heights, scan_points
+from rover_gym.policy import measure_baseline, wilson_interval
+from rover_gym.policy.baseline import ENDS
 
 NAN, INF = float("nan"), float("inf")
 

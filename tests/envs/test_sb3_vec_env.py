@@ -12,7 +12,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize
 
 from rover_gym import CommandError, OptionError, PDPolicy, RoverEnv
-from rover_gym.sb3 import RoverVecEnv
+from rover_gym.vector.sb3 import RoverVecEnv
 
 LIMIT = 12
 SCENES: list[dict[str, Any]] = [

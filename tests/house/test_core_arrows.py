@@ -16,9 +16,9 @@ CHAPTERS = [
     "geometry",
     "contact",
     "integrator",
+    "planar",
     "system",
     "simulation",
-    "planar",
 ]
 
 # A path from the crate's root, and what it may name: `crate::law::coulomb`, `crate::{cone, law::coulomb}`.

@@ -114,12 +114,10 @@ fn brick() -> Slab {
 fn a_tumbling_box_keeps_its_momenta_to_second_order() {
     let drift = |step: f64| {
         let start = Vector3::new(0.0, 5.0, 0.0);
-        let mut simulation = SphereSimulation::new(KIND, Vec::new(), weightless(0.5, 0.0, step))
-            .unwrap()
-            .with_slab(brick(), start);
-        simulation
-            .v_mut()
-            .copy_from_slice(&[1.0, 0.2, -0.3, 2.0, 3.0, -1.0]);
+        let options = weightless(0.5, 0.0, step);
+        let mut simulation =
+            SphereSimulation::with_slab(KIND, Vec::new(), (brick(), start), options).unwrap();
+        simulation.start_with(|v| v.copy_from_slice(&[1.0, 0.2, -0.3, 2.0, 3.0, -1.0]));
         let (linear, angular) = (simulation.momentum(), simulation.angular_momentum());
         while simulation.time() < 1.0 - 0.5 * step {
             simulation.step(1).unwrap();
@@ -135,10 +133,10 @@ fn a_tumbling_box_keeps_its_momenta_to_second_order() {
 
 #[test]
 fn a_box_dropped_askew_comes_to_rest_on_a_face() {
-    let mut simulation = SphereSimulation::new(KIND, Vec::new(), options(0.5, 0.0, 1e-3))
-        .unwrap()
-        .with_slab(brick(), Vector3::new(0.0, 0.6, 0.0));
-    simulation.v_mut()[3..6].copy_from_slice(&[0.5, 0.1, 1.0]);
+    let slab = (brick(), Vector3::new(0.0, 0.6, 0.0));
+    let options = options(0.5, 0.0, 1e-3);
+    let mut simulation = SphereSimulation::with_slab(KIND, Vec::new(), slab, options).unwrap();
+    simulation.start_with(|v| v[3..6].copy_from_slice(&[0.5, 0.1, 1.0]));
     simulation.step(4000).unwrap();
     let height = simulation.centres()[0].y;
     // A contact that rests within what gravity falls in a step, g h²/2 = 4.9e-6 m, is left where it is.
@@ -160,11 +158,13 @@ fn impacts_in_flight_keep_the_momentum() {
         let middle = Vector3::new(0.0, 6.4, 0.0);
         let options = weightless(friction, restitution, 2e-3);
         let mut simulation = SphereSimulation::new(KIND, centres.clone(), options).unwrap();
-        for (v, x) in simulation.v_mut().chunks_exact_mut(6).zip(&centres) {
-            let inwards = (middle - x) * 2.0 + Vector3::new(0.1, -0.2, 0.3).cross(x);
-            v[..3].copy_from_slice(inwards.as_slice());
-            v[3..].copy_from_slice(&[1.0, -2.0, 0.5]);
-        }
+        simulation.start_with(|v| {
+            for (v, x) in v.chunks_exact_mut(6).zip(&centres) {
+                let inwards = (middle - x) * 2.0 + Vector3::new(0.1, -0.2, 0.3).cross(x);
+                v[..3].copy_from_slice(inwards.as_slice());
+                v[3..].copy_from_slice(&[1.0, -2.0, 0.5]);
+            }
+        });
         let start = (simulation.momentum(), simulation.angular_momentum());
         let before = simulation.energy();
         let mut struck = 0;
@@ -220,7 +220,7 @@ fn a_sliding_sphere_comes_to_roll_at_five_sevenths() {
     };
     let start = vec![Vector3::new(0.0, 0.2, 0.0)];
     let mut simulation = SphereSimulation::new(kind, start, options(0.3, 0.0, 1e-3)).unwrap();
-    simulation.v_mut()[0] = 1.0;
+    simulation.start_with(|v| v[0] = 1.0);
     simulation.step(200).unwrap();
     assert!((simulation.v()[0] - 5.0 / 7.0).abs() < 1e-9);
     assert!(

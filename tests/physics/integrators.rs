@@ -108,12 +108,9 @@ fn the_others_pass_the_zeno_point_and_rest() {
             "{}: {last_move} s of {zeno} s",
             scheme.name
         );
-        assert!(
-            simulation.v().norm() < 3.0 * G * h,
-            "{}: {}",
-            scheme.name,
-            simulation.v()
-        );
+        let v = simulation.v();
+        let speed = v.iter().map(|v| v * v).sum::<f64>().sqrt();
+        assert!(speed < 3.0 * G * h, "{}: {v:?}", scheme.name);
         assert!(simulation.gaps()[0].abs() < 1e-3);
     }
 }
@@ -260,5 +257,10 @@ fn the_closed_form_of_the_flight_starts_where_the_flight_does() {
     assert!((simulation.q() - flight_at(0.0).unwrap()).amax() < 1e-13);
     let dt = 1e-6;
     let rate = (flight_at(dt).unwrap() - flight_at(-dt).unwrap()) / (2.0 * dt);
-    assert!((simulation.v() - rate).amax() < 1e-7);
+    let errors = simulation
+        .v()
+        .iter()
+        .zip(&rate)
+        .map(|(v, rate)| (v - rate).abs());
+    assert!(errors.fold(0.0, f64::max) < 1e-7);
 }

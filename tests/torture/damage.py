@@ -24,21 +24,11 @@ from rover_gym import (
     StepError,
     solve_friction_contact,
 )
-from rover_gym.planar import (
-    BallSimulation,
-    Line,
-    PlanarSnapshot,
-    Polyline,
-    Sine,
-    SoilSimulation,
-    SoilSnapshot,
-    Spline,
-    TwoWheelRoverSimulation,
-    soil_packing,
-)
-from rover_gym.recording import Recorder, Sampler, describe
-from rover_gym.run import read_run
-from rover_gym.trained import FOLDER, TrainedPolicy
+from rover_gym.planar import BallSimulation, Line, PlanarSnapshot, Polyline, Sine, Spline, TwoWheelRoverSimulation
+from rover_gym.policy import TrainedPolicy
+from rover_gym.policy.shipped import FOLDER
+from rover_gym.record import Recorder, RoverSampler, describe, read_run
+from rover_gym.soil import SoilSimulation, SoilSnapshot, soil_packing
 from torture.ledger import Ledger
 from torture.mutate import UNKIND_NUMBERS, UNKIND_TEXT, mutate_bytes, mutate_hdf5, mutate_json, mutate_npz, mutate_value
 from torture.regime import Bounds, Regime
@@ -57,7 +47,7 @@ def _folder() -> Path:
 def _sound_run() -> bytes:
     """A recorded run of the rover, 25 rows."""
     sim = Simulation(RoverModel())
-    sampler = Sampler(sim.model)
+    sampler = RoverSampler(sim.model)
     path = _folder() / "sound.h5"
     with Recorder(path, sampler.channels, describe(sim, "a drop"), terrain=sim.terrain, rows_per_flush=10) as recorder:
         for _ in range(25):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rover_gym import Plane, RoverModel, Simulation, SphereField
-from rover_gym.start import resting_pose, tilted_plane
+from rover_gym.env import resting_pose, tilted_plane
 from torture.audit import Array, Audit
 from torture.ledger import Ledger
 from torture.regime import Bounds, Regime

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from rover_gym import Simulation, SphereField
-from rover_gym.recording import Channel, Recorder, RecordingError, read_trajectory
+from rover_gym.record import Channel, Recorder, RecordingError, read_trajectory
 from rover_gym.vector import RoverVectorEnv
 from torture.ledger import Ledger
 from torture.regime import Bounds, Regime
@@ -26,7 +26,7 @@ Random = np.random.Generator
 #: Records rows for ever, or until the disk is full, as large as the second argument says.
 RECORD = """
 import resource, sys
-from rover_gym.recording import Channel, Recorder, RecordingError
+from rover_gym.record import Channel, Recorder, RecordingError
 
 limit = int(sys.argv[2])
 if limit:

@@ -9,17 +9,16 @@ import numpy as np
 from rover_gym import StepError
 from rover_gym.planar import (
     BallSimulation,
-    Ground,
     Line,
     MirroredRoverSimulation,
+    PlanarGround,
     PlanarSimulation,
     Polyline,
     Sine,
-    SoilSimulation,
     Spline,
     TwoWheelRoverSimulation,
-    soil_packing,
 )
+from rover_gym.soil import SoilSimulation, soil_packing
 from torture.audit import BLOWN_UP, GAIN, Array
 from torture.drives import log_uniform, variant
 from torture.ledger import Ledger
@@ -28,7 +27,7 @@ from torture.regime import Bounds, Regime
 Random = np.random.Generator
 
 
-def ground(random: Random) -> Ground:
+def ground(random: Random) -> PlanarGround:
     """A line, a sine, a spline or a polyline."""
     kind = random.integers(4)
     if kind == 0:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from rover_gym import Plane, RoverEnv, RoverModel, Simulation, SphereField, solve_friction_contact
-from rover_gym.planar import BallSimulation, Line, Polyline, Sine, SoilSimulation, soil_packing
+from rover_gym.planar import BallSimulation, Line, Polyline, Sine
+from rover_gym.soil import SoilSimulation, soil_packing
 from torture.damage import attempt, use
 from torture.ledger import Ledger
 from torture.regime import Bounds, Regime

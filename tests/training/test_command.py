@@ -9,10 +9,15 @@ import numpy as np
 import pytest
 
 from rover_gym import OptionError, PDPolicy, Plane, RoverEnv, SphereField, StateError
-from rover_gym.command import CommandController, CommandLimits
-from rover_gym.features import Features
-from rover_gym.trained import Network, PolicyCard, TrainedPolicy
-from rover_gym.wrappers import DriveByCommand
+from rover_gym.policy import (
+    CommandController,
+    CommandLimits,
+    DriveByCommand,
+    Features,
+    Network,
+    PolicyCard,
+    TrainedPolicy,
+)
 
 ROVER = RoverEnv()
 RNG = np.random.default_rng(0)

@@ -10,7 +10,7 @@ from rover_gym import OptionError, RoverGymError
 pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
 
 from rover_gym.learning.build import build_env
-from rover_gym.learning.config import parse_config, read_config
+from rover_gym.learning.training_config import parse_config, read_config
 
 CONFIGS = Path(__file__).parents[2] / "training" / "configs"
 SMALLEST: dict[str, Any] = {"environment": {"terrain": "plane"}, "total_steps": 100}

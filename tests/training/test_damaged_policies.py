@@ -13,7 +13,8 @@ import pytest
 from torture.mutate import mutate_bytes, mutate_json, mutate_npz
 
 from rover_gym import RoverEnv
-from rover_gym.trained import FOLDER, Network, PolicyCard, PolicyError, TrainedPolicy, find_policy
+from rover_gym.policy import Network, PolicyCard, PolicyError, TrainedPolicy, find_policy
+from rover_gym.policy.shipped import FOLDER
 
 
 @pytest.fixture

@@ -8,13 +8,20 @@ import numpy as np
 import pytest
 
 from rover_gym import OptionError, PDPolicy
-from rover_gym.baseline import measure_baseline, wilson_interval
-from rover_gym.episodes import run_episode
-from rover_gym.evaluation import Drive, drive_all, mean_estimate, ratio_estimate, summarise
+from rover_gym.policy import (
+    EvaluatedEpisode,
+    drive_all,
+    mean_estimate,
+    measure_baseline,
+    ratio_estimate,
+    run_episode,
+    summarise,
+    wilson_interval,
+)
 
 
-def a_drive(seed: int, end: str, time: float = 1.0, distance: float = 1.0, energy: float = 1.0) -> Drive:
-    return Drive(seed, end, time, distance, energy, slip=0.1, tilt=math.radians(2.0), max_tilt=0.1)
+def a_drive(seed: int, end: str, time: float = 1.0, distance: float = 1.0, energy: float = 1.0) -> EvaluatedEpisode:
+    return EvaluatedEpisode(seed, end, time, distance, energy, slip=0.1, tilt=math.radians(2.0), max_tilt=0.1)
 
 
 @pytest.mark.parametrize(("successes", "n"), [(0, 20), (7, 20), (445, 1000), (20, 20)])

@@ -9,8 +9,7 @@ from typer.testing import CliRunner
 
 from rover_gym import OptionError, PDPolicy
 from rover_gym.cli import app
-from rover_gym.evaluation import drive_all
-from rover_gym.trained import TrainedPolicy, policy_arguments, policy_folder
+from rover_gym.policy import TrainedPolicy, drive_all, policy_arguments, policy_folder
 
 # Neither trained on nor part of the evaluation that was written down.
 SEEDS = range(5_000_000, 5_000_020)

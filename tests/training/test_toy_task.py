@@ -10,11 +10,10 @@ pytest.importorskip("stable_baselines3", reason="the extra train is not installe
 import torch
 from stable_baselines3 import PPO
 
-from rover_gym.evaluation import drive_all, summarise
 from rover_gym.learning.build import build_env, normalised
-from rover_gym.learning.config import parse_config
 from rover_gym.learning.export import export
-from rover_gym.trained import PolicyCard, TrainedPolicy
+from rover_gym.learning.training_config import parse_config
+from rover_gym.policy import PolicyCard, TrainedPolicy, drive_all, summarise
 
 TOY = parse_config(
     {

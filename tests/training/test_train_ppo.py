@@ -17,8 +17,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 from rover_gym.learning.build import build_env
-from rover_gym.learning.config import read_config
-from rover_gym.trained import Network, TrainedPolicy
+from rover_gym.learning.training_config import read_config
+from rover_gym.policy import Network, TrainedPolicy
 
 Script = Callable[..., Any]
 

@@ -1,6 +1,6 @@
 """Columns of disks that are let go: how far they run out.
 
-Source: Staron, Hinch 2005, *Study of the collapse of granular columns using two-dimensional discrete-grain
+Source: Staron and Hinch 2005, *Study of the collapse of granular columns using two-dimensional discrete-grain
 simulation*, J. Fluid Mech. 545, 1-27.
 """
 

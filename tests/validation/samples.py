@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym._core import SoilSimulation, soil_packing
+from rover_gym.mechanics import SoilSimulation, soil_packing
 from validation.watch import GRAVITY, Watched
 
 Array = npt.NDArray[np.float64]

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from rover_gym._core import SoilSimulation
+from rover_gym.mechanics import SoilSimulation
 
 GRAVITY = 9.81
 

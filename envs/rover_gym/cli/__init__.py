@@ -5,16 +5,16 @@ from typing import Annotated
 
 import typer
 
-from rover_gym._core import __version__
-from rover_gym.cli.baseline import baseline
+from rover_gym.cli.baseline_command import baseline
 from rover_gym.cli.console import DEBUG, one_line
-from rover_gym.cli.drive import drive
-from rover_gym.cli.planar import planar
-from rover_gym.cli.plot import plot
-from rover_gym.cli.replay import replay
-from rover_gym.cli.report import report
-from rover_gym.cli.scene import scene
-from rover_gym.cli.speed import speed
+from rover_gym.cli.drive_command import drive
+from rover_gym.cli.planar_commands import planar
+from rover_gym.cli.plot_command import plot
+from rover_gym.cli.replay_command import replay
+from rover_gym.cli.report_command import report
+from rover_gym.cli.scene_command import scene
+from rover_gym.cli.speed_command import speed
+from rover_gym.mechanics import __version__
 
 app = typer.Typer(
     help="Drive a six-wheel Mars rover in a nonsmooth simulator.",
@@ -42,7 +42,7 @@ def _print_version(wanted: bool) -> None:
 @app.callback()
 def rover(
     _version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and stop.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """Drive a six-wheel Mars rover in a nonsmooth simulator."""

@@ -15,8 +15,8 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from rover_gym._core import OptionError, RoverGymError
 from rover_gym.extras import MissingExtraError
+from rover_gym.mechanics import OptionError, RoverGymError
 from rover_gym.validation import refuse
 
 P = ParamSpec("P")

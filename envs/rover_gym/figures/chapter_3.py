@@ -1,72 +1,28 @@
 """Figures 3.2 to 3.5 of the report: the ball on a line and on a sine.
 
-The report's text states other parameters than its figures were made with. These are the figures' own, SI: a ball of
-3 kg, radius 1.5 m, inertia 4.05 kg m2, restitution 0.7, g = 9.8, step 0.5 ms; first y = -x/2 + 1/2 from (5, 10), then
-y = sin x from (-2.5, 1). In both the ball's *centre* stops at the ground ("centre_height"); beside it stands the same
-ball touching with its rim.
+Beside the report's ball, whose centre stops at the ground, stands the same ball touching with its rim.
 """
 
 from __future__ import annotations
 
-import json
-from functools import cache
-from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.figures.planar_run import FRICTION, GROUND, OURS, speed_of
 from rover_gym.figures.saving import save_figures
-from rover_gym.planar import BallSimulation, Line, Sine, describe, record
-from rover_gym.recording import Trajectory, read_trajectory
+from rover_gym.planar.planar_recording import describe_planar, record_planar
+from rover_gym.record.trajectory import Trajectory, read_trajectory
+from rover_gym.reproduction.chapter_3_balls import ball_on_incline, ball_on_sine, published
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-BALL: dict[str, Any] = {
-    "mass": 3.0,
-    "radius": 1.5,
-    "inertia": 4.05,
-    "gravity": (0.0, -9.8),
-    "restitution": 0.7,
-    "time_step": 0.0005,
-}
 STEP = 0.0005  # s, of the report's runs
 RIM, PUBLISHED = "#009E73", "0.55"
-
-
-@cache
-def published() -> dict[str, Any]:
-    """The report's curves of figures 3.2 to 3.5, by figure and curve."""
-    text = resources.files("rover_gym").joinpath("data/chapter_3.json").read_text(encoding="utf-8")
-    data: dict[str, Any] = json.loads(text)
-    return data["published"]  # type: ignore[no-any-return]
-
-
-def incline(contact: str = "centre_height") -> tuple[BallSimulation, float]:
-    """The ball of figures 3.2 and 3.3 at its start, and how long it runs, s.
-
-    Args:
-        contact: "centre_height" as the report's, or "nearest".
-    """
-    sim = BallSimulation(Line(-0.5, 0.5), friction=0.6, contact=contact, stabilisation="none", **BALL)
-    sim.set_state([5.0, 10.0, 0.0])
-    return sim, 12.0
-
-
-def sine(contact: str = "centre_height") -> tuple[BallSimulation, float]:
-    """The ball of figures 3.4 and 3.5 at its start, and how long it runs, s.
-
-    Args:
-        contact: "centre_height" as the report's, or "nearest": then the ball starts higher by its radius.
-    """
-    ground = Sine(1.0, 2.0 * np.pi)
-    sim = BallSimulation(ground, friction=0.5, contact=contact, stabilisation="none", **BALL)
-    sim.set_state([-2.5, 1.0 if contact == "centre_height" else 2.5, 0.0])
-    return sim, 10.0
 
 
 def draw_chapter_3(folder: str | Path) -> list[Path]:
@@ -77,7 +33,7 @@ def draw_chapter_3(folder: str | Path) -> list[Path]:
     """
     folder = Path(folder)
     runs: dict[str, tuple[Trajectory, Trajectory]] = {}
-    for name, scene in (("incline", incline), ("sine", sine)):
+    for name, scene in (("incline", ball_on_incline), ("sine", ball_on_sine)):
         pair = []
         for contact in ("centre_height", "nearest"):
             sim, duration = scene(contact)
@@ -85,7 +41,7 @@ def draw_chapter_3(folder: str | Path) -> list[Path]:
             # The impulses are those of a row's last step, and drawn of the report's rule only.
             steps_per_row = 1 if contact == "centre_height" else 10
             title = f"chapter 3 of the report: ball, {name}"
-            record(sim, path, describe(sim, title), duration=duration, steps_per_row=steps_per_row)
+            record_planar(sim, path, describe_planar(sim, title), duration=duration, steps_per_row=steps_per_row)
             pair.append(read_trajectory(path))
         runs[name] = (pair[0], pair[1])
     return save_figures(

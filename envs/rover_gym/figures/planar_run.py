@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from rover_gym.figures.saving import save_figures
 from rover_gym.figures.style import circle, plain
-from rover_gym.planar import PlanarSimulation, Polyline
-from rover_gym.recording import Trajectory, read_trajectory
+from rover_gym.mechanics import PlanarSimulation, Polyline
+from rover_gym.record.trajectory import Trajectory, read_trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

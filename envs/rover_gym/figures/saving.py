@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rover_gym._core import OptionError
 from rover_gym.extras import require
 from rover_gym.figures.style import STYLE, WIDTH
+from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from rover_gym.figures.saving import save_figures
 from rover_gym.figures.style import COLOURS, NAMES, QUANTITY_COLOURS, WHEELS, plot_wheels, step_size
-from rover_gym.recording import Trajectory, read_trajectory
-from rover_gym.report import reference_data
+from rover_gym.record.trajectory import Trajectory, read_trajectory
+from rover_gym.reproduction.inclined_plane import reference_data
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 PUBLISHED_STEP = 0.02  # s, of the runs behind the report's figures (inferred from the figures themselves)
 
 
-def draw_all(recording: str | Path, folder: str | Path) -> list[Path]:
+def draw_section_6_1(recording: str | Path, folder: str | Path) -> list[Path]:
     """Draws the report's figures 6.2 to 6.5, and our way beside Siconos', as PNG files and returns their paths.
 
     Raises:

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rover_gym._core import SphereField
 from rover_gym.figures.saving import save_figures
 from rover_gym.figures.signals import SMOOTHED, linear_then_log, plot_raw_and_smooth
 from rover_gym.figures.style import COLOURS, NAMES, SIDES, WHEELS, circle, close_up, plot_wheels, step_size
-from rover_gym.recording import Trajectory, read_trajectory
-from rover_gym.report import WHEEL_RADIUS, report_model
+from rover_gym.mechanics import SphereField
+from rover_gym.record.trajectory import Trajectory, read_trajectory
+from rover_gym.reproduction.report_rover import WHEEL_RADIUS, report_model
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def draw_rug(recording: str | Path, folder: str | Path) -> list[Path]:
+def draw_section_6_2(recording: str | Path, folder: str | Path) -> list[Path]:
     """Draws the figures of the run over the rug as PNG files into the folder and returns their paths.
 
     Raises:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rover_gym.figures.derived import Array, smooth
+from rover_gym.figures.derived_signals import Array, smooth
 from rover_gym.figures.style import COLOURS, WHEELS, plot_wheels
 
 if TYPE_CHECKING:

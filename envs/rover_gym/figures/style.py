@@ -9,13 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.extras import require
-from rover_gym.recording import Trajectory
+from rover_gym.record.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from rover_gym.run import Run
+    from rover_gym.record.rover_run import RoverRun
 
     #: A figure, or a part of a page.
     Sheet: TypeAlias = Figure | SubFigure
@@ -62,7 +62,7 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def title(figure: Sheet, what: str, run: Run) -> None:
+def title(figure: Sheet, what: str, run: RoverRun) -> None:
     """Writes over a figure what it shows, and of which run."""
     broken_off = "" if run.trajectory.attributes.get("complete", True) else " (the recording was broken off)"
     figure.suptitle(f"{what}\n{plain(run.title)}{broken_off}")

@@ -6,11 +6,11 @@ from typing import Any
 
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
-from rover_gym.command import CommandController
-from rover_gym.features import Features
-from rover_gym.learning.config import TrainingConfig, environment_arguments
-from rover_gym.learning.vec_env import CommandVecEnv
-from rover_gym.sb3 import RoverVecEnv
+from rover_gym.learning.command_vec_env import CommandVecEnv
+from rover_gym.learning.training_config import TrainingConfig, environment_arguments
+from rover_gym.policy.command import CommandController
+from rover_gym.policy.features import Features
+from rover_gym.vector.sb3 import RoverVecEnv
 
 
 def build_env(

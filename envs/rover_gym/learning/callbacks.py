@@ -8,7 +8,7 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
 from stable_baselines3.common.vec_env import VecNormalize
 
-from rover_gym.learning.config import Curriculum
+from rover_gym.learning.training_config import CurriculumConfig
 
 
 class CurriculumCallback(BaseCallback):
@@ -19,7 +19,7 @@ class CurriculumCallback(BaseCallback):
         hardest: Hardest difficulty to begin with, where it is not the curriculum's start.
     """
 
-    def __init__(self, curriculum: Curriculum, hardest: float | None = None) -> None:
+    def __init__(self, curriculum: CurriculumConfig, hardest: float | None = None) -> None:
         super().__init__()
         self.curriculum = curriculum
         self.hardest = curriculum.start if hardest is None else hardest

@@ -10,8 +10,9 @@ from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecNormalize
 
-from rover_gym.learning.config import TrainingConfig, rover
-from rover_gym.trained import Network, PolicyCard
+from rover_gym.learning.training_config import TrainingConfig, rover
+from rover_gym.policy.network import Network
+from rover_gym.policy.policy_card import PolicyCard
 
 
 def network_of(model: OnPolicyAlgorithm, normalisation: VecNormalize) -> Network:
@@ -37,7 +38,7 @@ def export(
     folder: Path,
     source: Mapping[str, Any],
 ) -> None:
-    """Writes the policy that `rover_gym.trained` reads."""
+    """Writes the policy that `rover_gym.policy.TrainedPolicy` reads."""
     folder.mkdir(parents=True, exist_ok=True)
     network_of(model, normalisation).save(folder / "policy.npz")
     seen = {name: value for name, value in config.environment.items() if name == "height_scan"}

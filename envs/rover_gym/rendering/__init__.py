@@ -1,15 +1,29 @@
-"""Frames of a simulation as arrays of pixels, drawn by VTK off screen: no display and no graphics card are needed.
+"""What a rover looks like: its parts, frames of a simulation as arrays of pixels, and video.
 
-Importing this imports VTK; `rover_gym.render_options` and `rover_gym.appearance` do not.
+Frames are drawn by VTK off screen: no display and no graphics card are needed. VTK is imported when `FrameRenderer` is
+asked for; everything else here does without.
 """
 
+from typing import TYPE_CHECKING, Any
+
 from rover_gym.extras import MissingExtraError
+from rover_gym.rendering.render_options import RenderOptions
+from rover_gym.rendering.video import VideoWriter
 
-try:
+if TYPE_CHECKING:
     from rover_gym.rendering.frames import FrameRenderer
-except ModuleNotFoundError as error:
-    if (error.name or "").partition(".")[0] != "vtkmodules":
-        raise
-    raise MissingExtraError("vtk", "render") from error
 
-__all__ = ["FrameRenderer"]
+__all__ = ["FrameRenderer", "RenderOptions", "VideoWriter"]
+
+
+def __getattr__(name: str) -> Any:
+    """`FrameRenderer`, imported with VTK now that it is asked for."""
+    if name != "FrameRenderer":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    try:
+        from rover_gym.rendering.frames import FrameRenderer  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "vtkmodules":
+            raise
+        raise MissingExtraError("vtk", "render") from error
+    return FrameRenderer

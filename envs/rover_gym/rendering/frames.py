@@ -17,11 +17,11 @@ from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkFiltersSources import vtkArrowSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkRenderer, vtkRenderWindow
 
-from rover_gym import appearance as look
-from rover_gym._core import Plane, RoverModel, Simulation, SphereField
-from rover_gym.render_options import Camera, check_render_options
+from rover_gym.mechanics import Plane, RoverModel, Simulation, SphereField
+from rover_gym.rendering import appearance as look
 from rover_gym.rendering.meshes import Array, Faces, actor_of, actor_with, level, mesh, set_points, set_pose
-from rover_gym.rendering.scenery import FAR, Goal, Ground, RockActors, flag, headlight, shadow_of, sky, sun
+from rover_gym.rendering.render_options import Camera, check_render_options
+from rover_gym.rendering.scenery_actors import FAR, Goal, GroundActors, RockActors, flag, headlight, shadow_of, sky, sun
 
 FORCE_LENGTH = 0.45  # m, of the arrow of a wheel's mean share of the weight
 
@@ -113,7 +113,7 @@ class FrameRenderer:
             self._scene.RemoveActor(actor)
         plane = terrain if isinstance(terrain, Plane) else terrain.ground
         self._plane = plane
-        self._ground = None if plane is None else Ground(plane)
+        self._ground = None if plane is None else GroundActors(plane)
         self._rocks = RockActors(terrain, self._ground) if isinstance(terrain, SphereField) else None
         self._shadows: dict[str, vtkActor] = {}
         self._stage = [] if self._rocks is None else list(self._rocks.actors)

@@ -12,21 +12,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym._core import __version__
-from rover_gym.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR, Colour, Part
 from rover_gym.extras import require
+from rover_gym.mechanics import __version__
+from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR, Colour, Part
 from rover_gym.replay.rotation import continuous, quaternions
 from rover_gym.replay.scenery import coloured_meshes, goal_parts, ground_tiles, parts_by_solid, sphere_mesh, spheres
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from rover_gym.run import Run
+    from rover_gym.record.rover_run import RoverRun
 
 Array = npt.NDArray[Any]
 
 
-def write_gltf(run: Run, path: str | Path) -> Path:
+def write_gltf(run: RoverRun, path: str | Path) -> Path:
     """Writes a run as binary glTF.
 
     Args:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR
+from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR
 from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, rounded, shortened, with_panel
 from rover_gym.replay.rotation import continuous, quaternions
 from rover_gym.replay.scenery import (
@@ -25,7 +25,7 @@ from rover_gym.replay.scenery import (
 )
 
 if TYPE_CHECKING:
-    from rover_gym.run import Run
+    from rover_gym.record.rover_run import RoverRun
 
 #: One colour a wheel, Okabe and Ito's, told apart by colour-blind readers too.
 WHEEL_COLOURS = ("#0072B2", "#56B4E9", "#009E73", "#D55E00", "#CC79A7", "#E69F00")
@@ -36,7 +36,7 @@ FOLLOW_TIME = 1.0  # s, over which the path that the eye follows is smoothed
 Array = npt.NDArray[np.float64]
 
 
-def write_page(run: Run, path: str | Path, *, follow: bool = True) -> Path:
+def write_page(run: RoverRun, path: str | Path, *, follow: bool = True) -> Path:
     """Writes a run as one page for the browser.
 
     Args:
@@ -70,7 +70,7 @@ def write_page(run: Run, path: str | Path, *, follow: bool = True) -> Path:
     return path
 
 
-def _build(run: Run, scene: Any) -> tuple[Any, list[Any]]:
+def _build(run: RoverRun, scene: Any) -> tuple[Any, list[Any]]:
     """Builds the scene and returns what moves: the frame of the whole world, and those of the solids."""
     add_surroundings(scene)
     world = scene.add_frame("/world", show_axes=False)
@@ -108,7 +108,7 @@ def _build(run: Run, scene: Any) -> tuple[Any, list[Any]]:
     return world, solids
 
 
-def _followed(run: Run) -> Array:
+def _followed(run: RoverRun) -> Array:
     """(n, 3) the trunk's path, smoothed, so that the eye does not shake with the rover."""
     path = trunk_path(run)
     spans = np.abs(run.time[:, None] - run.time) <= FOLLOW_TIME / 2
@@ -116,7 +116,7 @@ def _followed(run: Run) -> Array:
     return result
 
 
-def _curves(run: Run) -> dict[str, Any]:
+def _curves(run: RoverRun) -> dict[str, Any]:
     """What the panel draws: its title, the time, and for each chart a curve a wheel."""
     data, wheels = run.trajectory, run.model.wheel_names
     charts = [

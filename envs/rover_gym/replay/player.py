@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.appearance import GROUND_COLOUR, SKY_COLOUR, SKY_COLOUR_2, Colour
 from rover_gym.extras import require
+from rover_gym.rendering.appearance import GROUND_COLOUR, SKY_COLOUR, SKY_COLOUR_2, Colour
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

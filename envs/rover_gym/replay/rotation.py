@@ -1,7 +1,7 @@
 """Rotations as the formats want them: unit quaternions, and axis with angle; safe at angle 0 and at angle pi.
 
 An axis taken from the skew part of a matrix is lost at both: there the skew part vanishes. A quaternion is taken from
-the largest of its four components instead [Shepperd 1978], and the axis from the quaternion's vector part, which is
+the largest of its four components instead (Shepperd 1978), and the axis from the quaternion's vector part, which is
 small only where the rotation is small and then still has its direction.
 """
 

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym._core import Plane, SphereField
-from rover_gym.appearance import GOAL_COLOUR, Colour, Part, part_mesh, rover_parts
+from rover_gym.mechanics import Plane, SphereField
+from rover_gym.rendering.appearance import GOAL_COLOUR, Colour, Part, part_mesh, rover_parts
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from rover_gym.run import Run
+    from rover_gym.record.rover_run import RoverRun
 
 TILE = 0.5  # m, edge of the ground's squares, doubled until the ground has not too many
 MOST_TILES = 20_000
@@ -59,25 +59,25 @@ def identifiers(names: Iterable[str], taken: Iterable[str] = (), endings: Iterab
     return result
 
 
-def trunk_path(run: Run) -> Array:
+def trunk_path(run: RoverRun) -> Array:
     """(n, 3) origin of the trunk, world, m."""
     path: Array = run.trajectory["q"][:, :3]
     return path
 
 
-def ground_plane(run: Run) -> Plane | None:
+def ground_plane(run: RoverRun) -> Plane | None:
     """The plane of the ground, if there is one."""
     return run.terrain if isinstance(run.terrain, Plane) else run.terrain.ground
 
 
-def spheres(run: Run) -> tuple[Array, Array]:
+def spheres(run: RoverRun) -> tuple[Array, Array]:
     """Centres (n, 3) and radii (n,) of the ground's spheres, m."""
     if isinstance(run.terrain, SphereField):
         return run.terrain.centres, run.terrain.radii
     return np.empty((0, 3)), np.empty(0)
 
 
-def ground_tiles(run: Run) -> tuple[Array, Triangles, Triangles] | None:
+def ground_tiles(run: RoverRun) -> tuple[Array, Triangles, Triangles] | None:
     """Squares of the plane about path and goal: vertices (n, 3), m, and the triangles of both colours.
 
     Each square has vertices of its own: two triangles, counter-clockwise seen from above. None without a plane.
@@ -109,7 +109,7 @@ def ground_tiles(run: Run) -> tuple[Array, Triangles, Triangles] | None:
     return vertices, triangles[~dark].reshape(-1, 3), triangles[dark].reshape(-1, 3)
 
 
-def goal_parts(run: Run) -> tuple[Part, ...]:
+def goal_parts(run: RoverRun) -> tuple[Part, ...]:
     """A pole with a knob at the goal, in the world's frame; none where there is no goal."""
     if run.goal is None:
         return ()
@@ -135,7 +135,7 @@ def coloured_meshes(parts: tuple[Part, ...]) -> Iterator[tuple[Colour, Array, Tr
         yield colour, np.vstack(vertices), np.vstack(triangles).astype(np.int32)
 
 
-def parts_by_solid(run: Run) -> dict[str, tuple[Part, ...]]:
+def parts_by_solid(run: RoverRun) -> dict[str, tuple[Part, ...]]:
     """The rover's parts, by the solid that they ride on; every solid has its entry."""
     parts = rover_parts(run.model)
     return {name: tuple(part for part in parts if part.solid == name) for name in run.model.solid_names}
@@ -156,7 +156,7 @@ def sphere_mesh(rings: int = 8) -> tuple[Array, Triangles]:
     return vertices.reshape(-1, 3), triangles[proper].astype(np.int32)
 
 
-def first_view(run: Run, distance: float = 4.0) -> View:
+def first_view(run: RoverRun, distance: float = 4.0) -> View:
     """From beside and a little behind the rover at its start, so that it drives away from the eye."""
     path = trunk_path(run)
     way = (path[-1] - path[0])[[0, 2]]

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.appearance import (
+from rover_gym.extras import require
+from rover_gym.rendering.appearance import (
     AXLE_COLOUR,
     FORCE_COLOUR,
     GROUND_COLOUR,
@@ -19,11 +20,10 @@ from rover_gym.appearance import (
     Part,
     part_mesh,
 )
-from rover_gym.extras import require
 from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, rounded, shortened, with_panel
 
 if TYPE_CHECKING:
-    from rover_gym.soil_run import SoilRun
+    from rover_gym.soil.soil_run import SoilRun
 
 #: Curves of the back and of the front wheel.
 WHEEL_COLOURS = ("#0072B2", "#D55E00")

@@ -12,14 +12,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR, SKY_COLOUR, SKY_COLOUR_2, Colour, Part
+from rover_gym.rendering.appearance import (
+    GROUND_COLOUR,
+    GROUND_COLOUR_2,
+    ROCK_COLOUR,
+    SKY_COLOUR,
+    SKY_COLOUR_2,
+    Colour,
+    Part,
+)
 from rover_gym.replay.rotation import axis_angles, continuous, quaternions
 from rover_gym.replay.scenery import first_view, goal_parts, ground_tiles, identifiers, parts_by_solid, spheres
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from rover_gym.run import Run
+    from rover_gym.record.rover_run import RoverRun
 
 #: Words that name no node: VRML's own, and what is defined below.
 TAKEN = (
@@ -30,7 +38,7 @@ TAKEN = (
 Array = npt.NDArray[np.float64]
 
 
-def write_vrml(run: Run, path: str | Path) -> Path:
+def write_vrml(run: RoverRun, path: str | Path) -> Path:
     """Writes a run as VRML97.
 
     Args:
@@ -48,7 +56,7 @@ def write_vrml(run: Run, path: str | Path) -> Path:
     return path
 
 
-def _lines(run: Run) -> Iterator[str]:
+def _lines(run: RoverRun) -> Iterator[str]:
     yield "#VRML V2.0 utf8"
     yield f"WorldInfo {{ title {_string(run.title)} }}"
     yield 'NavigationInfo { type [ "EXAMINE", "ANY" ] }'
@@ -87,7 +95,7 @@ def _lines(run: Run) -> Iterator[str]:
             yield f"ROUTE {solid}_{interpolator}.value_changed TO {solid}.set_{field}"
 
 
-def _ground(run: Run) -> Iterator[str]:
+def _ground(run: RoverRun) -> Iterator[str]:
     tiles = ground_tiles(run)
     if tiles is not None:
         vertices, light, dark = tiles

@@ -188,7 +188,7 @@ pub(crate) fn spin(v: &[f64], body: usize) -> Vector3<f64> {
 #[derive(Clone, Debug, Default)]
 pub struct SphereScratch {
     middle: Placement,
-    end: Placement,
+    pub(crate) end: Placement,
     grid: CellGrid,
     rows: Vec<PairContact<3, NV>>,
     inverse_masses: Vec<[f64; NV]>,

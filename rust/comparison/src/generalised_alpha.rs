@@ -12,7 +12,7 @@
 //! original only bilateral constraints enter it, and unilateral contact is of order 1. Both inherit Painlevé's paradox from
 //! that level. The implicit equations are solved by iterating on ã⁺, which contracts by O(h): no stiff forces.
 //!
-//! Source: Chen, Acary, Virlez, Brüls 2013, IJNME 96, 487–511; Brüls, Acary, Cardona 2014; Schindler, Acary 2014 for λ.
+//! Source: Chen, Acary, Virlez and Brüls 2013, IJNME 96, 487–511; Brüls, Acary and Cardona 2014; Schindler and Acary 2014 for λ.
 
 use std::cell::RefCell;
 

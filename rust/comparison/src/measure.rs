@@ -6,10 +6,9 @@ use std::time::Instant;
 
 use rover_core::integrator::{OptionsError, StepError};
 use rover_core::multibody::StateError;
-use rover_core::planar::{
-    Ball, BallSimulation, ContactRule, Line, PlanarError, PlanarMachine, PlanarSimulation,
-};
-use rover_core::simulation::CommandError;
+use rover_core::planar::{Ball, ContactRule, Line, PlanarError, PlanarMachine};
+use rover_core::simulation::{BallSimulation, CommandError, PlanarSimulation};
+
 use serde::Serialize;
 use thiserror::Error;
 
@@ -113,7 +112,7 @@ pub const DURATION: f64 = 0.64;
 /// Steps of the reference over the duration.
 const REFERENCE: usize = 4096;
 
-fn run<const NV: usize, M: PlanarMachine<NV>>(
+fn run<const NV: usize, M: PlanarMachine<NV> + Clone + 'static>(
     mut simulation: PlanarSimulation<NV, M>,
     stepper: &Stepper,
     n: usize,
@@ -259,7 +258,8 @@ pub fn drop_and_rest(scheme: &Scheme) -> Result<(f64, f64), MeasureError> {
         simulation.step_with(&stepper, 1)?;
         growth = growth.max(simulation.energy().total() - before);
     }
-    Ok((growth / (MASS * G), simulation.v().norm()))
+    let v = rover_core::nalgebra::Vector3::from_column_slice(simulation.v());
+    Ok((growth / (MASS * G), v.norm()))
 }
 
 /// Change of the energy of a ball that rolls to and fro in a valley, relative to that of a descent by 0.2 m.

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::{SVector, Vector2, Vector3};
 use rover_core::planar::{
-    Ball, BallSimulation, ContactRule, Curve, Ground, Line, PlanarError, PlanarWheel, Sine,
-    TwoWheelRover, TwoWheelRoverSimulation,
+    Ball, ContactRule, Curve, Ground, Line, PlanarError, PlanarWheel, Sine, TwoWheelRover,
 };
+use rover_core::simulation::{BallSimulation, TwoWheelRoverSimulation};
 
 use crate::Scheme;
 use crate::measure::MeasureError;

@@ -10,7 +10,7 @@
 //!
 //! The state's v is v_{k+½} where a contact acts, and otherwise moved on by half a step to the time of q.
 //!
-//! Source: Paoli, Schatzman 2002, SIAM J. Numer. Anal. 40, 702–733; friction as in Acary, Brogliato 2008, ch. 10.
+//! Source: Paoli and Schatzman 2002, SIAM J. Numer. Anal. 40, 702–733; friction as in Acary and Brogliato 2008, ch. 10.
 
 use std::cell::RefCell;
 

@@ -266,10 +266,10 @@ impl Scene {
             forecast: if self == Self::Block { 1.0 } else { 0.5 },
             ..options(self.friction(), self.restitution(), time_step)
         };
-        let mut simulation = SphereSimulation::new(self.kind(), self.centres(), options)?;
-        if let Some((slab, centre)) = self.slab() {
-            simulation = simulation.with_slab(slab, centre);
-        }
+        let mut simulation = match self.slab() {
+            Some(slab) => SphereSimulation::with_slab(self.kind(), self.centres(), slab, options)?,
+            None => SphereSimulation::new(self.kind(), self.centres(), options)?,
+        };
         if treatment == Treatment::Convergence {
             let stepper = Stepper::ProjectedToConvergence(ProjectedToConvergence::default());
             simulation = simulation.with_stepper(stepper);

@@ -1,11 +1,12 @@
 //! Free spheres, and perhaps a box among them, stepped through time.
 
-use rover_core::integrator::{
-    Integrator, NoProbe, OptionsError, Scratch, StateMut, StepError, StepOptions, StepReport,
-    WarmStart,
-};
+use std::hash::{DefaultHasher, Hasher};
+
+use rover_core::integrator::{OptionsError, StepError, StepOptions, StepReport};
+use rover_core::multibody::Energy;
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::problem::BlockSparseDelassus;
+use rover_core::simulation::{ActiveContact, LocatedContact, Scene, Simulation, Snapshot, State};
 
 use crate::Stepper;
 use crate::cell_grid::CellGrid;
@@ -24,18 +25,101 @@ pub struct Penetration {
     pub deepest: f64,
 }
 
-/// Bodies over the plane y = 0, stepped through time.
+impl LocatedContact for SphereContact {
+    type Vector = [f64; 3];
+
+    fn normal(&self) -> [f64; 3] {
+        self.frame.rows()[0].into()
+    }
+
+    fn is_finite(&self) -> bool {
+        let [n, t, b] = self.frame.rows();
+        let [first, second] = &self.arms;
+        let numbers = [&n, &t, &b, first, second].into_iter().flatten();
+        numbers.chain([&self.gap]).all(|x| x.is_finite())
+    }
+}
+
+impl Scene for Bodies {
+    type Configuration = Placement;
+    type Contact = SphereContact;
+    type Command = ();
+    type Memory = ();
+    type Parts = SphereScratch;
+    type System<'a> = SphereSystem<'a>;
+
+    fn nv(&self) -> usize {
+        NV * self.count()
+    }
+
+    fn command(&self) {}
+
+    fn memory(&self) {}
+
+    fn parts(&self) -> SphereScratch {
+        SphereScratch::default()
+    }
+
+    fn contact_capacity(&self) -> usize {
+        4 * self.n
+    }
+
+    fn system<'a>(
+        &'a self,
+        (): &'a (),
+        (): &'a (),
+        parts: &'a mut SphereScratch,
+    ) -> SphereSystem<'a> {
+        SphereSystem {
+            bodies: self,
+            parts,
+        }
+    }
+
+    fn position(&self, parts: &SphereScratch, contact: &SphereContact) -> [f64; 3] {
+        let body = contact.bodies[0].unwrap_or(self.n);
+        (parts.end.centres[body] + contact.arms[0]).into()
+    }
+
+    /// The potential is 0 with all centres in the plane.
+    fn energy(&self, options: &StepOptions, state: &State<Placement>) -> Energy {
+        let mut energy = Energy::default();
+        for (body, centre) in state.configuration.centres.iter().enumerate() {
+            let masses = self.masses(body);
+            let v = &state.v[NV * body..NV * (body + 1)];
+            energy.kinetic += (0..NV).map(|k| 0.5 * masses[k] * v[k] * v[k]).sum::<f64>();
+            energy.potential -= masses[0] * options.gravity.dot(centre);
+        }
+        energy
+    }
+
+    fn fingerprint(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        for x in (0..self.count()).flat_map(|body| self.masses(body)) {
+            hasher.write_u64(x.to_bits());
+        }
+        hasher.finish()
+    }
+
+    fn admits(&self, snapshot: &Snapshot<Self>) -> bool {
+        let Placement { centres, turn } = &snapshot.state.configuration;
+        let mut numbers = centres.iter().flatten().chain(turn.coords.iter());
+        let mut bodies = snapshot
+            .active
+            .iter()
+            .flat_map(|a| a.contact.bodies)
+            .flatten();
+        centres.len() == self.count()
+            && numbers.all(|x| x.is_finite())
+            && bodies.all(|body| body < self.count())
+    }
+}
+
+/// Bodies over the plane y = 0, stepped through time by one of the schemes that are compared.
 #[derive(Debug)]
 pub struct SphereSimulation {
-    bodies: Bodies,
-    options: StepOptions,
+    inner: Simulation<Bodies>,
     stepper: Stepper,
-    placement: Placement,
-    v: Vec<f64>,
-    time: f64,
-    warm_start: WarmStart<(u32, u32)>,
-    parts: SphereScratch,
-    scratch: Scratch<Placement, SphereContact>,
     grid: CellGrid,
 }
 
@@ -49,41 +133,38 @@ impl SphereSimulation {
         centres: Vec<Vector3<f64>>,
         options: StepOptions,
     ) -> Result<Self, OptionsError> {
-        options.check()?;
         let n = centres.len();
-        let bodies = Bodies {
-            kind,
-            n,
-            slab: None,
-        };
-        let placement = Placement {
-            centres,
-            turn: UnitQuaternion::identity(),
-        };
-        Ok(Self {
-            stepper: Stepper::MoreauJean(options.variant),
-            bodies,
-            options,
-            v: vec![0.0; NV * n],
-            time: 0.0,
-            warm_start: WarmStart::default(),
-            parts: SphereScratch::default(),
-            scratch: Scratch::new(&placement, NV * n, 4 * n, 3),
-            grid: CellGrid::default(),
-            placement,
-        })
+        let slab = None;
+        Self::of(Bodies { kind, n, slab }, centres, options)
     }
 
-    /// With a box among the spheres, upright and at rest with its centre (m) here.
-    #[must_use]
-    pub fn with_slab(mut self, slab: Slab, centre: Vector3<f64>) -> Self {
-        self.bodies.slab = Some(slab);
-        self.placement.centres.truncate(self.bodies.n);
-        self.placement.centres.push(centre);
-        self.v.resize(NV * self.bodies.count(), 0.0);
-        self.warm_start.clear();
-        self.parts = SphereScratch::default();
-        self
+    /// With a box among the spheres, upright and at rest with its centre (m) last.
+    ///
+    /// # Errors
+    /// An option out of its range.
+    pub fn with_slab(
+        kind: SphereKind,
+        mut centres: Vec<Vector3<f64>>,
+        (slab, centre): (Slab, Vector3<f64>),
+        options: StepOptions,
+    ) -> Result<Self, OptionsError> {
+        let n = centres.len();
+        centres.push(centre);
+        let slab = Some(slab);
+        Self::of(Bodies { kind, n, slab }, centres, options)
+    }
+
+    fn of(
+        bodies: Bodies,
+        centres: Vec<Vector3<f64>>,
+        options: StepOptions,
+    ) -> Result<Self, OptionsError> {
+        let turn = UnitQuaternion::identity();
+        Ok(Self {
+            stepper: Stepper::MoreauJean(options.variant),
+            inner: Simulation::of(bodies, Placement { centres, turn }, options)?,
+            grid: CellGrid::default(),
+        })
     }
 
     /// Stepped by another scheme than the options' variant.
@@ -93,52 +174,57 @@ impl SphereSimulation {
         self
     }
 
+    fn bodies(&self) -> &Bodies {
+        self.inner.scene()
+    }
+
     /// Centres of the spheres, and of the box last, m.
     #[must_use]
     pub fn centres(&self) -> &[Vector3<f64>] {
-        &self.placement.centres
+        &self.inner.q().centres
     }
 
     /// Attitude of the box.
     #[must_use]
     pub fn turn(&self) -> &UnitQuaternion<f64> {
-        &self.placement.turn
+        &self.inner.q().turn
     }
 
     /// Six velocities of each body, the box last, m/s and rad/s; the box's spin is in its own axes.
     #[must_use]
     pub fn v(&self) -> &[f64] {
-        &self.v
+        self.inner.v()
     }
 
-    /// The same, to be set.
-    pub fn v_mut(&mut self) -> &mut [f64] {
-        self.warm_start.clear();
-        &mut self.v
+    /// Starts anew where it is, with other velocities.
+    pub fn start_with(&mut self, change: impl FnOnce(&mut [f64])) {
+        let mut v = self.v().to_vec();
+        change(&mut v);
+        self.inner.place(self.inner.q().clone(), v);
     }
 
     /// Velocity of a body's centre, m/s.
     #[must_use]
     pub fn velocity(&self, body: usize) -> Vector3<f64> {
-        linear(&self.v, body)
+        linear(self.v(), body)
     }
 
     /// s.
     #[must_use]
     pub fn time(&self) -> f64 {
-        self.time
+        self.inner.time()
     }
 
     /// The last step's operator W, 1/kg.
     #[must_use]
     pub fn operator(&self) -> &BlockSparseDelassus {
-        &self.parts.W
+        &self.inner.parts().W
     }
 
     /// Contacts of the last step.
     #[must_use]
-    pub fn contacts(&self) -> &[SphereContact] {
-        self.scratch.contacts()
+    pub fn contacts(&self) -> &[ActiveContact<SphereContact>] {
+        self.inner.contacts()
     }
 
     /// Takes `n` steps, or stops at the first that fails, keeping the state before it.
@@ -146,63 +232,36 @@ impl SphereSimulation {
     /// # Errors
     /// See [`StepError`]. A solver that did not converge is no error: see the report.
     pub fn step(&mut self, n: usize) -> Result<StepReport, StepError> {
-        let mut total = StepReport::default();
-        for _ in 0..n {
-            let mut system = SphereSystem {
-                bodies: &self.bodies,
-                parts: &mut self.parts,
-            };
-            let state = StateMut {
-                configuration: &mut self.placement,
-                v: &mut self.v,
-                time: &mut self.time,
-            };
-            let report = self.stepper.step(
-                &mut system,
-                &self.options,
-                state,
-                &mut self.warm_start,
-                &mut self.scratch,
-                &mut NoProbe,
-            )?;
-            total.merge(&report);
-        }
-        Ok(total)
+        self.inner.step_with(&self.stepper, n)
     }
 
-    /// Kinetic and potential energy (0 with all centres in the plane), J.
+    /// Kinetic and potential energy now, J.
     #[must_use]
     pub fn energy(&self) -> f64 {
-        let of_body = |body: usize| {
-            let masses = self.bodies.masses(body);
-            let v = &self.v[NV * body..NV * (body + 1)];
-            let kinetic: f64 = (0..NV).map(|k| 0.5 * masses[k] * v[k] * v[k]).sum();
-            kinetic - masses[0] * self.options.gravity.dot(&self.placement.centres[body])
-        };
-        (0..self.bodies.count()).map(of_body).sum()
+        self.inner.energy().total()
     }
 
     /// Linear momentum, N s.
     #[must_use]
     pub fn momentum(&self) -> Vector3<f64> {
-        let of_body = |body| linear(&self.v, body) * self.bodies.masses(body)[0];
-        (0..self.bodies.count()).map(of_body).sum()
+        let of_body = |body| linear(self.v(), body) * self.bodies().masses(body)[0];
+        (0..self.bodies().count()).map(of_body).sum()
     }
 
     /// Angular momentum about the origin, N m s.
     #[must_use]
     pub fn angular_momentum(&self) -> Vector3<f64> {
         let of_body = |body: usize| {
-            let [m, _, _, x, y, z] = self.bodies.masses(body);
-            let own = spin(&self.v, body).component_mul(&Vector3::new(x, y, z));
-            let own = if body < self.bodies.n {
+            let [m, _, _, x, y, z] = self.bodies().masses(body);
+            let own = spin(self.v(), body).component_mul(&Vector3::new(x, y, z));
+            let own = if body < self.bodies().n {
                 own
             } else {
-                self.placement.turn * own
+                self.turn() * own
             };
-            self.placement.centres[body].cross(&(linear(&self.v, body) * m)) + own
+            self.centres()[body].cross(&(linear(self.v(), body) * m)) + own
         };
-        (0..self.bodies.count()).map(of_body).sum()
+        (0..self.bodies().count()).map(of_body).sum()
     }
 
     /// Every overlap now, of bodies that were contacts or not.
@@ -214,12 +273,13 @@ impl SphereSimulation {
                 found.deepest = found.deepest.max(depth);
             }
         };
-        let (n, radius) = (self.bodies.n, self.bodies.kind.radius);
-        let Placement { centres, turn } = &self.placement;
+        let bodies = self.inner.scene();
+        let (n, radius) = (bodies.n, bodies.kind.radius);
+        let Placement { centres, turn } = self.inner.q();
         for x in &centres[..n] {
             enter(radius - x.y);
         }
-        if let Some(slab) = &self.bodies.slab {
+        if let Some(slab) = &bodies.slab {
             for x in &centres[..n] {
                 let own = turn.inverse_transform_vector(&(x - centres[n]));
                 enter(radius - slab.nearest(&own).1);

@@ -9,9 +9,8 @@ use std::time::Instant;
 
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
-use rover_core::planar::soil::{
-    Packing, SoilFriction, SoilScene, SoilSimulation, Wall, soil_options,
-};
+use rover_core::planar::soil::{Packing, SoilFriction, SoilScene, Wall};
+use rover_core::simulation::{SoilSimulation, soil_options};
 
 /// CPU seconds of this thread, wall seconds where /proc does not tell.
 fn cpu_seconds(start: Instant) -> f64 {
@@ -45,7 +44,7 @@ fn bed(count: usize) -> SoilSimulation {
     // Until it rests, or for 12 s.
     for _ in 0..120 {
         soil.step(100).expect("finite");
-        let mass: f64 = soil.scene().disks.mass().iter().sum();
+        let mass: f64 = soil.soil().disks.mass().iter().sum();
         if 2.0 * soil.energy().kinetic < 1e-10 * mass {
             break;
         }
@@ -61,7 +60,7 @@ fn go_on(bed: &SoilSimulation, tilt: f64, tolerance: f64) -> SoilSimulation {
     let angle = tilt.to_radians();
     options.gravity = 9.81 * Vector3::new(angle.sin(), -angle.cos(), 0.0);
     let mut run =
-        SoilSimulation::new(bed.scene().clone(), options, None, bed.q().to_vec()).expect("a soil");
+        SoilSimulation::new(bed.soil().clone(), options, None, bed.q().clone()).expect("a soil");
     run.set_state(bed.q(), bed.v()).expect("a state");
     run
 }
@@ -81,7 +80,7 @@ fn measure(name: &str, soil: &mut SoilSimulation, steps: usize) {
         converged += usize::from(report.is_converged());
     }
     let time = cpu_seconds(Instant::now()) - before;
-    let disks = soil.scene().disks.len();
+    let disks = soil.soil().disks.len();
     println!(
         "{disks:6} {:8.0e}   {name:5}  {:12.2e}  {:11.1}  {contacts:8}  {:9.2}  {:17.1}  {:13.4}  {gain:9.1e}",
         soil.options().solver.tolerance,
@@ -89,7 +88,7 @@ fn measure(name: &str, soil: &mut SoilSimulation, steps: usize) {
         sweeps as f64 / steps as f64,
         converged as f64 / steps as f64,
         1e9 * time / visits as f64,
-        soil.penetration() / soil.scene().disks.smallest(),
+        soil.penetration() / soil.soil().disks.smallest(),
     );
 }
 

@@ -16,7 +16,7 @@ use rover_core::geometry::{Plane, Rocks, SphereField, Terrain};
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Configuration, Hold, Model, ModelDescription};
 use rover_core::nalgebra;
-use rover_core::simulation::Simulation;
+use rover_core::simulation::RoverSimulation;
 
 const BATCHES: usize = 21;
 
@@ -25,8 +25,8 @@ fn simulation(
     terrain: Arc<dyn Terrain>,
     options: StepOptions,
     position: Vector3<f64>,
-) -> Simulation {
-    let mut simulation = Simulation::new(model.clone(), terrain, options).unwrap();
+) -> RoverSimulation {
+    let mut simulation = RoverSimulation::new(model.clone(), terrain, options).unwrap();
     let mut start = Configuration::zero(model);
     start.position = position;
     simulation.set_state(start, vec![0.0; model.nv()]);
@@ -124,7 +124,13 @@ fn report_machine() -> Model {
 }
 
 /// Prints mean, median of batches and what the solver said of a run in batches.
-fn run(name: &str, mut simulation: Simulation, batch: usize, batches: usize, speed: Option<f64>) {
+fn run(
+    name: &str,
+    mut simulation: RoverSimulation,
+    batch: usize,
+    batches: usize,
+    speed: Option<f64>,
+) {
     let (mut times, mut contacts, mut unsolved, mut iterations) = (Vec::new(), 0, 0, 0);
     let mut worst = 0.0_f64;
     for _ in 0..batches {

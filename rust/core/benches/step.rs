@@ -11,7 +11,7 @@ use std::time::Instant;
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepError, StepOptions, Variant};
 use rover_core::multibody::{Configuration, Model};
-use rover_core::simulation::Simulation;
+use rover_core::simulation::RoverSimulation;
 
 /// A scene: its name, driving torque (N m), front and back steering (rad), time step factor.
 const SCENES: [(&str, f64, f64); 3] = [
@@ -20,7 +20,7 @@ const SCENES: [(&str, f64, f64); 3] = [
     ("drive in a curve, six contacts", 20.0, 0.1),
 ];
 
-fn scene(variant: Variant, torque: f64, steering: f64, height: f64) -> Option<Simulation> {
+fn scene(variant: Variant, torque: f64, steering: f64, height: f64) -> Option<RoverSimulation> {
     let model = Arc::new(Model::rover());
     let mut start = Configuration::zero(&model);
     start.position.y = height;
@@ -28,7 +28,8 @@ fn scene(variant: Variant, torque: f64, steering: f64, height: f64) -> Option<Si
         variant,
         ..StepOptions::default()
     };
-    let mut simulation = Simulation::new(model.clone(), Arc::new(Plane::ground()), options).ok()?;
+    let mut simulation =
+        RoverSimulation::new(model.clone(), Arc::new(Plane::ground()), options).ok()?;
     simulation.set_state(start, vec![0.0; model.nv()]);
     if torque == 0.0 {
         simulation.brake();
@@ -40,7 +41,7 @@ fn scene(variant: Variant, torque: f64, steering: f64, height: f64) -> Option<Si
     Some(simulation)
 }
 
-fn median_microseconds(simulation: &Simulation) -> Result<(f64, f64), StepError> {
+fn median_microseconds(simulation: &RoverSimulation) -> Result<(f64, f64), StepError> {
     let mut times = Vec::new();
     for _ in 0..21 {
         let mut copy = simulation.clone();

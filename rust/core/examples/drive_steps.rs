@@ -8,7 +8,7 @@ use std::sync::Arc;
 use rover_core::geometry::{Plane, SphereField, Terrain};
 use rover_core::integrator::{StepError, StepOptions, Variant};
 use rover_core::multibody::{Configuration, Model};
-use rover_core::simulation::Simulation;
+use rover_core::simulation::RoverSimulation;
 
 /// A plane, with spheres of 5 cm in rows half a metre apart, 1 mm below it.
 fn ground(n_spheres: u32) -> Option<Arc<dyn Terrain>> {
@@ -49,7 +49,7 @@ fn main() -> Result<(), StepError> {
     let Some(terrain) = ground(n_spheres) else {
         return Ok(());
     };
-    let Ok(mut simulation) = Simulation::new(model.clone(), terrain, options) else {
+    let Ok(mut simulation) = RoverSimulation::new(model.clone(), terrain, options) else {
         return Ok(());
     };
     simulation.set_state(start, vec![0.0; model.nv()]);

@@ -14,9 +14,9 @@
 //! - [`multibody`]: model, state, kinematics, mass matrix, bias, energy, momentum;
 //! - [`geometry`]: the ground; [`contact`]: points, frames, gaps, Delassus operator;
 //! - [`cone`], [`law`], [`problem`], [`solver`]: the friction-contact problem, which sees only (W, q, μ);
-//! - [`integrator`]: one step of any mechanical system; [`system`]: the tree of solids as one;
-//! - [`simulation`]: many steps;
-//! - [`planar`]: a ball and a two-wheel rover on a curve, through the same step.
+//! - [`integrator`]: one step of any mechanical system;
+//! - [`planar`]: grounds and machines of the plane; [`system`]: what the steps move, such as the tree of solids;
+//! - [`simulation`]: many steps of any scene.
 #![forbid(unsafe_code)]
 
 pub use nalgebra;

@@ -6,7 +6,7 @@ use rover_core::integrator::Accuracy;
 
 use crate::arguments::{number, refused};
 use crate::errors::Kind;
-use crate::simulation::{VARIANTS, name_of};
+use crate::options::{VARIANTS, name_of};
 
 const PRESETS: [(&str, Accuracy); 3] = [
     ("fast", Accuracy::FAST),
@@ -35,7 +35,17 @@ pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<Accuracy> {
     Ok(Accuracy::for_error(metres).ok_or_else(too_fine)?)
 }
 
-/// The keyword arguments `time_step`, `variant` and `tolerance` of `Simulation` that an accuracy stands for.
+/// The options of `Simulation` that an accuracy stands for.
+///
+/// Args:
+///     accuracy: "fast", "balanced" or "reference", or the error allowed on a path of 20 m on flat
+///         ground, m.
+///
+/// Returns:
+///     The keyword arguments `time_step` (s), `variant` and `tolerance`.
+///
+/// Raises:
+///     OptionError: The name is unknown, or the error is finer than any choice of options gives.
 #[pyfunction]
 pub fn accuracy_options<'py>(
     py: Python<'py>,

@@ -3,7 +3,7 @@
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::simulation::{Batch, Simulation as CoreSimulation};
+use rover_core::simulation::{Batch, RoverSimulation as CoreSimulation};
 
 use crate::arguments::{Given, count, flags, refused};
 use crate::arrays::array;
@@ -12,8 +12,21 @@ use crate::reading::{place, scan_points, slices};
 use crate::shared::{Shared, Watch};
 use crate::simulation::{Origin, Simulation};
 
-/// Many rovers stepped side by side on several threads.
-#[pyclass(module = "rover_gym._core", frozen)]
+/// Many rovers stepped side by side on several threads, each bit for bit as it would be alone.
+///
+/// The batch copies the simulations. One call at a time: a call during another one raises
+/// BusyError.
+///
+/// Args:
+///     simulations: Simulations of models with equally many coordinates.
+///     scan: Points of the height scan ahead and to the right of the trunk's origin in the heading
+///         frame, (n, 2), m; none by default.
+///     threads: Number of threads; one a core by default.
+///
+/// Raises:
+///     OptionError: There are no simulations or their models differ in size, `scan` has a wrong
+///         shape, or `threads` is out of its range.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct SimulationBatch(Shared<Inner>);
 
 struct Inner {
@@ -111,16 +124,36 @@ impl SimulationBatch {
         Ok(Self(Shared::new(Inner { inner, origins })))
     }
 
+    /// Number of threads.
     #[getter]
     fn threads(&self) -> PyResult<usize> {
         Ok(self.0.open()?.inner.threads())
     }
 
+    /// Place of each quantity in a row of readings; `Simulation.reading_layout` lists them.
     #[getter]
     fn reading_layout<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         slices(py, self.0.open()?.inner.layout())
     }
 
+    /// Sets the commands of all rovers and takes n steps.
+    ///
+    /// Ctrl-C ends the call after a whole step of each rover, which need not be the same one.
+    ///
+    /// Args:
+    ///     torques: Commands as of `Simulation.set_wheel_torques`, (n_rovers, n_wheels), N m.
+    ///     set_points: Commands as of `Simulation.set_steering`, (n_rovers, n_wheels), rad.
+    ///     n: Number of steps.
+    ///     active: Which rovers move, (n_rovers,); all by default. The others stay as they are.
+    ///
+    /// Returns:
+    ///     A row of readings for each rover, (n_rovers, size), and the message of the StepError of
+    ///     each rover that could not take a step, by its index. The other rovers go on.
+    ///
+    /// Raises:
+    ///     CommandError: An array has a wrong shape or an entry that a rover refuses. No rover has
+    ///         moved.
+    ///     OptionError: `n` or `active` is invalid.
     #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     #[pyo3(signature = (torques, set_points, n = Given::MISSING, *, active = None),
         text_signature = "($self, torques, set_points, n=1, *, active=None)")]
@@ -160,6 +193,7 @@ impl SimulationBatch {
         Ok((rows, errors))
     }
 
+    /// The readings of all rovers now, (n_rovers, size).
     fn readings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let held = self.0.open()?;
         let shape = [held.inner.rovers().len(), held.inner.layout().size()];
@@ -168,6 +202,16 @@ impl SimulationBatch {
         Ok(rows)
     }
 
+    /// Puts a copy of a simulation, with its own terrain, in the place of a rover.
+    ///
+    /// Args:
+    ///     index: Index of the rover.
+    ///     simulation: Its replacement, a model with equally many coordinates.
+    ///     target: The place (x, z) on the map that its readings refer to, m; the origin by
+    ///         default.
+    ///
+    /// Raises:
+    ///     OptionError: There is no such rover, or an argument is invalid. Nothing has changed.
     #[pyo3(signature = (index, simulation, target = None))]
     fn replace(
         &self,
@@ -186,7 +230,16 @@ impl SimulationBatch {
         Ok(())
     }
 
-    /// A copy of one rover, to look at.
+    /// Returns a copy of one rover.
+    ///
+    /// Args:
+    ///     index: Index of the rover.
+    ///
+    /// Returns:
+    ///     The copy; stepping it does not move the rover.
+    ///
+    /// Raises:
+    ///     OptionError: There is no such rover.
     fn simulation(&self, index: &Bound<'_, PyAny>) -> PyResult<Simulation> {
         let held = self.0.open()?;
         let rovers = held.inner.rovers();

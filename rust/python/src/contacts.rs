@@ -1,93 +1,278 @@
-//! `Contacts`: the contacts of the last step as arrays.
+//! `Contacts`, `PlanarContacts`, `SoilContacts`: the contacts of the last step as arrays.
 
-use numpy::{PyArray1, PyArray2, PyArray3};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
-use rover_core::contact::Part;
+use rover_core::contact::{Contact, Part};
 use rover_core::multibody::Model;
-use rover_core::system::ActiveContact;
+use rover_core::planar::soil::SoilContact;
+use rover_core::simulation::{ActiveContact, Components, LocatedContact};
+use rover_core::system::PlanarContact;
 
-use crate::arrays::{fresh_blocks, fresh_rows};
+use crate::arrays::fresh_blocks;
 
-/// The contacts of the last step, as fresh arrays with one row a contact.
-#[pyclass(module = "rover_gym._core", frozen)]
+/// What all lists of contacts have: columns with one row a contact.
+struct Columns<C: LocatedContact>(Vec<ActiveContact<C>>);
+
+impl<C: LocatedContact> Columns<C> {
+    fn rows<'py>(
+        &self,
+        py: Python<'py>,
+        f: impl Fn(&ActiveContact<C>) -> C::Vector,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let rows: Vec<C::Vector> = self.0.iter().map(f).collect();
+        let numbers = rows.iter().flat_map(AsRef::as_ref).copied();
+        PyArray1::from_iter(py, numbers).reshape([rows.len(), C::Vector::N])
+    }
+
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.rows(py, |a| a.position)
+    }
+
+    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.rows(py, |a| a.contact.normal())
+    }
+
+    fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.rows(py, |a| a.impulse)
+    }
+
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.rows(py, |a| a.velocity)
+    }
+
+    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.0.iter().map(|a| a.contact.gap()))
+    }
+}
+
+/// The contacts of a rover's last step, as new arrays with one row a contact.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Contacts {
-    active: Vec<ActiveContact>,
+    active: Columns<Contact>,
     bodies: Vec<String>,
 }
 
 impl Contacts {
-    pub fn new(model: &Model, active: &[ActiveContact]) -> Self {
-        let name = |a: &ActiveContact| match a.contact.part {
+    pub fn new(model: &Model, active: &[ActiveContact<Contact>]) -> Self {
+        let name = |a: &ActiveContact<Contact>| match a.contact.part {
             Part::Wheel(i) => model.description().wheels[i].solid.clone(),
             Part::Box(i) => model.boxes()[i].name.clone(),
         };
         Self {
-            active: active.to_vec(),
+            active: Columns(active.to_vec()),
             bodies: active.iter().map(name).collect(),
         }
-    }
-
-    fn rows<'py>(
-        &self,
-        py: Python<'py>,
-        f: impl Fn(&ActiveContact) -> [f64; 3],
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        fresh_rows(py, &self.active.iter().map(f).collect::<Vec<_>>())
     }
 }
 
 #[pymethods]
 impl Contacts {
+    /// Names of the solids that touch the ground.
     #[getter]
     fn bodies(&self) -> Vec<String> {
         self.bodies.clone()
     }
 
+    /// Indices of the wheels that touch, (n,); -1 where it is another solid.
     #[getter]
     fn wheels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        let index = |a: &ActiveContact| match a.contact.part {
+        let index = |a: &ActiveContact<Contact>| match a.contact.part {
             Part::Wheel(i) => i64::try_from(i).unwrap_or(-1),
             Part::Box(_) => -1,
         };
-        PyArray1::from_iter(py, self.active.iter().map(index))
+        PyArray1::from_iter(py, self.active.0.iter().map(index))
     }
 
+    /// Contact points, world frame, (n, 3), m.
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.position.into())
+        self.active.points(py)
     }
 
+    /// Contact frames, world frame, (n, 3, 3).
+    ///
+    /// Rows are the unit vectors n (normal), t (rolling direction) and b (lateral).
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
         let values = self
             .active
+            .0
             .iter()
             .flat_map(|a| a.contact.frame.rows().map(<[f64; 3]>::from))
             .flatten()
             .collect();
-        fresh_blocks(py, values, [self.active.len(), 3, 3])
+        fresh_blocks(py, values, [self.active.0.len(), 3, 3])
     }
 
+    /// Gaps, (n,), m, at the configuration where the step evaluated the contacts.
     #[getter]
     fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_iter(py, self.active.iter().map(|a| a.contact.gap))
+        self.active.gaps(py)
     }
 
+    /// Impulses of the step along n, t, b, (n, 3), N s.
     #[getter]
     fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.impulse)
+        self.active.impulses(py)
     }
 
+    /// Relative velocities after the step along n, t, b, (n, 3), m/s.
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.velocity)
+        self.active.velocities(py)
     }
 
     fn __len__(&self) -> usize {
-        self.active.len()
+        self.active.0.len()
     }
 
     fn __repr__(&self) -> String {
         format!("Contacts({})", self.bodies.join(", "))
+    }
+}
+
+/// The contacts of a planar simulation's last step, as new arrays with one row a contact.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
+pub struct PlanarContacts {
+    active: Columns<PlanarContact>,
+}
+
+impl PlanarContacts {
+    pub fn new(active: &[ActiveContact<PlanarContact>]) -> Self {
+        Self {
+            active: Columns(active.to_vec()),
+        }
+    }
+}
+
+#[pymethods]
+impl PlanarContacts {
+    /// Indices of the discs that touch, (n,); 0 is the ball or wheel A, 1 wheel B.
+    #[getter]
+    fn discs<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_iter(
+            py,
+            self.active.0.iter().map(|a| i64::from(a.contact.key.disc)),
+        )
+    }
+
+    /// Points of the ground, world frame, (n, 2), m.
+    #[getter]
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.active.points(py)
+    }
+
+    /// Unit normals out of the ground, (n, 2); the tangent is (n_y, -n_x).
+    #[getter]
+    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.active.normals(py)
+    }
+
+    /// Gaps, (n,), m.
+    #[getter]
+    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.active.gaps(py)
+    }
+
+    /// Impulses of the step along normal and tangent, (n, 2), N s.
+    #[getter]
+    fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.active.impulses(py)
+    }
+
+    /// Velocities of the rim after the step along normal and tangent, (n, 2), m/s.
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.active.velocities(py)
+    }
+
+    fn __len__(&self) -> usize {
+        self.active.0.len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("PlanarContacts({})", self.active.0.len())
+    }
+}
+
+/// The contacts of a soil's last step, as new arrays with one row a contact.
+///
+/// Contacts between sleeping disks are left out.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
+pub struct SoilContacts {
+    active: Columns<SoilContact>,
+    n_moving: usize,
+}
+
+impl SoilContacts {
+    /// `n_moving`: number of disks and wheels.
+    pub fn new(active: &[ActiveContact<SoilContact>], n_moving: usize) -> Self {
+        Self {
+            active: Columns(active.to_vec()),
+            n_moving,
+        }
+    }
+}
+
+#[pymethods]
+impl SoilContacts {
+    /// Numbers of both bodies, (n, 2), disks from 0, then the wheels; -1 for a wall or the ground.
+    #[getter]
+    fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let name = |body: u32| {
+            let is_fixed = body as usize >= self.n_moving;
+            if is_fixed { -1 } else { i64::from(body) }
+        };
+        let keys = self.active.0.iter().map(|a| a.contact.key);
+        let flat = PyArray1::from_iter(py, keys.flat_map(|k| [name(k.a), name(k.b)]));
+        flat.call_method1("reshape", (self.active.0.len(), 2))
+    }
+
+    /// Points of the first body's rim, (n, 2), m.
+    #[getter]
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.active.points(py)
+    }
+
+    /// Unit normals from the second body into the first, (n, 2).
+    #[getter]
+    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.active.normals(py)
+    }
+
+    /// Gaps at the start of the step, (n,), m; negative where bodies overlap.
+    #[getter]
+    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.active.0.iter().map(|a| a.contact.gap_start))
+    }
+
+    /// Impulses on the first body along the normal and the tangent (n_y, -n_x), (n, 2), N s.
+    #[getter]
+    fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.active.impulses(py)
+    }
+
+    /// Relative velocities after the step along normal and tangent, (n, 2), m/s.
+    ///
+    /// Of the first body against the second.
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.active.velocities(py)
+    }
+
+    /// Impulses on the first body along x and y, (n, 2), N s.
+    #[getter]
+    fn world_impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.active.rows(py, |a| {
+            (a.contact.n * a.impulse[0] + a.contact.t() * a.impulse[1]).into()
+        })
+    }
+
+    fn __len__(&self) -> usize {
+        self.active.0.len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("SoilContacts({})", self.active.0.len())
     }
 }

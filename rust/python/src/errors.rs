@@ -13,6 +13,14 @@ use rover_core::simulation::{BatchError, CommandError, SnapshotError};
 /// Characters of an exception's message.
 const LONGEST_MESSAGE: usize = 1000;
 
+/// Docstring of the root.
+const ROOT: &str = "Root of every error that rover-gym raises.
+
+Attributes:
+    field: Name of the argument at fault, with the index of the entry; None where there is none.
+    value: What was given there, or None.
+";
+
 /// Which exception.
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {
@@ -64,7 +72,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
     let make = |name: &str, bases: Bound<'_, PyTuple>, doc: &str| -> PyResult<Py<PyType>> {
         let body = PyDict::new(py);
-        body.set_item("__module__", "rover_gym._core")?;
+        body.set_item("__module__", "rover_gym.mechanics")?;
         body.set_item("__doc__", doc)?;
         body.set_item("field", py.None())?;
         body.set_item("value", py.None())?;
@@ -76,53 +84,49 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
         Ok(class.unbind())
     };
     let exception = PyTuple::new(py, [py.get_type::<PyException>()])?;
-    let root = make(
-        "RoverGymError",
-        exception,
-        "Root of every error that rover-gym raises. `field` names the culprit, `value` is what was given.",
-    )?;
+    let root = make("RoverGymError", exception, ROOT)?;
     let root = root.bind(py);
     let value_error = || PyTuple::new(py, [root.clone(), py.get_type::<PyValueError>()]);
     let classes = Classes {
         model: make(
             "ModelError",
             value_error()?,
-            "A model description is not physical or not readable.",
+            "A model's description is unreadable or not physical.",
         )?,
         state: make(
             "StateError",
             value_error()?,
-            "A state has a wrong shape or a non-finite entry.",
+            "A state or a snapshot has a wrong shape or an entry that is not finite.",
         )?,
         terrain: make(
             "TerrainError",
             value_error()?,
-            "A terrain description is invalid.",
+            "A terrain's description is invalid.",
         )?,
         option: make(
             "OptionError",
             value_error()?,
-            "An option or an argument is out of its range.",
+            "An option or another argument is out of its range.",
         )?,
         command: make(
             "CommandError",
             value_error()?,
-            "A torque, set-point or action is invalid.",
+            "A torque, a set-point or an action is invalid.",
         )?,
         problem: make(
             "ProblemError",
             value_error()?,
-            "A friction-contact problem has wrong shapes or entries.",
+            "A friction-contact problem has a wrong shape or an invalid entry.",
         )?,
         step: make(
             "StepError",
             PyTuple::new(py, [root.clone(), py.get_type::<PyRuntimeError>()])?,
-            "A time step could not be taken; the state is as it was before the call's failing step.",
+            "A time step could not be taken; the state is as it was before that step.",
         )?,
         busy: make(
             "BusyError",
             PyTuple::new(py, [root.clone(), py.get_type::<PyRuntimeError>()])?,
-            "An object was used while another call on it was still going on; nothing has changed.",
+            "An object was used while another call on it was still going on. Nothing has changed.",
         )?,
     };
     let _ = CLASSES.set(py, classes);

@@ -12,8 +12,8 @@ use crate::arguments::Given;
 use crate::arrays::{array, fresh, vector};
 use crate::errors::{BorderError, Kind, Value};
 
-/// What a solver says of its answer.
-#[pyclass(module = "rover_gym._core", frozen)]
+/// How the contact solver ended.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 #[derive(Clone)]
 pub struct SolverReport {
     inner: SolveReport,
@@ -21,6 +21,10 @@ pub struct SolverReport {
 
 #[pymethods]
 impl SolverReport {
+    /// One of "converged", "relaxed", "not_converged" and "budget_exhausted".
+    ///
+    /// "relaxed": the convex relaxation is solved, which is not Coulomb's law. "budget_exhausted":
+    /// the work that `budget` allows is done, and the answer is the best one found.
     #[getter]
     fn status(&self) -> &'static str {
         match self.inner.status {
@@ -31,36 +35,46 @@ impl SolverReport {
         }
     }
 
+    /// Whether Coulomb's law holds to the tolerance.
     #[getter]
     fn is_converged(&self) -> bool {
         self.inner.is_converged()
     }
 
+    /// Iterations of the stage that answered.
     #[getter]
     fn iterations(&self) -> usize {
         self.inner.iterations
     }
 
+    /// Violation of Signorini's and Coulomb's laws by the returned impulses, relative to the data.
     #[getter]
     fn residual(&self) -> f64 {
         self.inner.residual
     }
 
+    /// Largest violation of Signorini's and Coulomb's laws at one contact, m/s.
     #[getter]
     fn velocity_error(&self) -> f64 {
         self.inner.velocity_error
     }
 
+    /// Name of the method that answered; never "auto".
     #[getter]
     fn solver(&self) -> &'static str {
         self.inner.method.name()
     }
 
+    /// Name of the stage that answered; "at_rest" where q = 0 left nothing to do.
     #[getter]
     fn stage(&self) -> &'static str {
         self.inner.stage.name()
     }
 
+    /// Every stage that was tried, in order, with the reason for its end and its iterations.
+    ///
+    /// Reasons are "converged", "max_iterations", "stalled", "budget_exhausted", "non_finite" and
+    /// "relaxed".
     #[getter]
     fn stages(&self) -> Vec<(&'static str, &'static str, usize)> {
         let rungs = self.inner.rungs.as_slice().iter();
@@ -69,11 +83,13 @@ impl SolverReport {
             .collect()
     }
 
+    /// Work done, in the unit of the argument `budget`.
     #[getter]
     fn work(&self) -> u64 {
         self.inner.work
     }
 
+    /// The law that the answer obeys, "coulomb" or "relaxed".
     #[getter]
     fn law(&self) -> &'static str {
         match self.inner.method.law() {
@@ -93,8 +109,8 @@ impl SolverReport {
     }
 }
 
-/// Impulses, velocities and the solver's report.
-#[pyclass(module = "rover_gym._core", frozen)]
+/// The solution of a friction-contact problem.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct FrictionContactSolution {
     p: Vec<f64>,
     u: Vec<f64>,
@@ -104,16 +120,19 @@ pub struct FrictionContactSolution {
 
 #[pymethods]
 impl FrictionContactSolution {
+    /// Impulses p, (n_c, d), N s, along the normal and the tangents.
     #[getter]
     fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         fresh(py, &self.p).reshape([self.p.len() / self.dimension, self.dimension])
     }
 
+    /// Velocities u = W p + q, (n_c, d), m/s, along the normal and the tangents.
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         fresh(py, &self.u).reshape([self.u.len() / self.dimension, self.dimension])
     }
 
+    /// How the solver ended.
     #[getter]
     fn report(&self) -> SolverReport {
         self.report.clone()
@@ -229,7 +248,37 @@ fn problem_error(field: &str, message: String, value: Value) -> BorderError {
     }
 }
 
-/// Solves K* contains W p + q + mu |u_T| n, perpendicular to p in K.
+/// Solves the friction-contact problem K* contains W p + q + mu |u_T| n, orthogonal to p in K.
+///
+/// Args:
+///     W: Delassus operator, (n_c d, n_c d), 1/kg, used as it is: it may be singular or
+///         unsymmetric. For many contacts its block rows `(indptr, indices, data)` of shapes
+///         (n_c + 1,), (n_blocks,), (n_blocks, d, d), each row ascending and with its diagonal
+///         block.
+///     q: Free velocity, (n_c d,), m/s, contact by contact: normal, tangents.
+///     mu: Friction coefficients, (n_c,).
+///     tolerance: Largest relative residual of a converged answer; its velocities are right to
+///         max(tolerance, 1e-9) m/s as well.
+///     dimension: Components d of a contact, 2 or 3.
+///     solver: "auto" tries cheap methods first and robust ones last; "nsgs", "newton", "proximal"
+///         and "admm" are single methods for Coulomb's law; "relaxed" solves its convex relaxation,
+///         another law, and never counts as converged.
+///     max_iterations: Largest number of Newton steps, sweeps or ADMM iterations.
+///     initial: Impulses from which the solver starts, (n_c d,), N s; zero by default.
+///     budget: Largest amount of work, counted and not timed: a unit is one multiplication and
+///         addition in a product with W. The default takes about 0.3 s. What exceeds it is left
+///         undone, and the report says so.
+///
+/// Returns:
+///     Impulses, velocities and the solver's report. Not converging is no error: see
+///     `report.status`.
+///
+/// Raises:
+///     ProblemError: An array has a wrong shape or an invalid entry.
+///     OptionError: The solver or the dimension is unknown, or `tolerance`, `max_iterations` or
+///         `budget` is out of its range.
+///
+/// Source: Acary and Brogliato 2008; Acary, Brémond and Huber 2018.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
 #[pyo3(signature = (

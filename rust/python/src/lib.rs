@@ -11,19 +11,26 @@ mod files;
 mod friction_contact;
 mod model;
 mod motor;
+mod options;
 mod planar;
 mod planar_ground;
+mod planar_machines;
 mod planar_soil;
 mod plane;
 mod reading;
+mod report;
 mod shared;
 mod simulation;
 mod snapshot;
 mod sphere_field;
+mod stepping;
 
 use pyo3::prelude::*;
 
-/// Compiled core of rover-gym.
+/// Compiled core of rover-gym: the border to the Rust mechanics (`rover-core`).
+///
+/// SI units and radians everywhere. World frame: x forward, y up, z to the right. Wheels are always
+/// listed FL, FR, ML, BL, MR, BR. Every array returned is new.
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
@@ -35,8 +42,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<contacts::Contacts>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<batch::SimulationBatch>()?;
-    module.add_class::<simulation::StepReport>()?;
-    module.add_class::<simulation::Energy>()?;
+    module.add_class::<report::StepReport>()?;
+    module.add_class::<report::Energy>()?;
     module.add_class::<snapshot::Snapshot>()?;
     module.add_class::<friction_contact::SolverReport>()?;
     module.add_class::<friction_contact::FrictionContactSolution>()?;

@@ -24,8 +24,15 @@ use crate::sphere_field::Ground;
 /// A pair of fresh vectors.
 pub type Pair<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
-/// A tree of solids under a free base, read from data. Immutable.
-#[pyclass(module = "rover_gym._core", frozen, from_py_object)]
+/// A machine: a tree of solids under a free base, read from data. Immutable.
+///
+/// `RoverModel()` is the built-in six-wheel rover. The other constructors are `from_file`,
+/// `from_text` and `from_dict`.
+///
+/// Methods that take coordinates understand two sets of them, by the argument `coordinates`:
+/// "state", the `q` and `v` of `Simulation`, and "report", the Cardan angles of the 2010 report and
+/// their rates.
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct RoverModel {
     pub inner: Arc<Model>,
@@ -176,7 +183,17 @@ impl RoverModel {
         }
     }
 
-    /// Reads a model file (TOML). Raises ModelError, or OSError where there is no such file; both name the path.
+    /// Reads a model file (TOML).
+    ///
+    /// Args:
+    ///     path: Path of the file.
+    ///
+    /// Returns:
+    ///     The model.
+    ///
+    /// Raises:
+    ///     ModelError: The file does not describe a model; the message names the path.
+    ///     OSError: The file cannot be read.
     #[staticmethod]
     fn from_file(path: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = path.py();
@@ -189,13 +206,31 @@ impl RoverModel {
     }
 
     /// Reads a model from TOML text.
+    ///
+    /// Args:
+    ///     text: What a model file holds.
+    ///
+    /// Returns:
+    ///     The model.
+    ///
+    /// Raises:
+    ///     ModelError: The text does not describe a model.
     #[staticmethod]
     fn from_text(text: &Bound<'_, PyAny>) -> PyResult<Self> {
         let text = arguments::text(text, Kind::Model, "text")?;
         Self::wrap(ModelDescription::from_toml(&text).and_then(Model::from_description))
     }
 
-    /// Reads a model from nested dictionaries and lists, as `to_dict` gives them.
+    /// Reads a model from nested dictionaries and lists.
+    ///
+    /// Args:
+    ///     description: What `to_dict` returns.
+    ///
+    /// Returns:
+    ///     The model.
+    ///
+    /// Raises:
+    ///     ModelError: The dictionaries do not describe a model.
     #[staticmethod]
     fn from_dict(description: &Bound<'_, PyAny>) -> PyResult<Self> {
         let py = description.py();
@@ -218,13 +253,19 @@ impl RoverModel {
         Self::from_json(&text)
     }
 
-    /// Writes a model file (TOML), locked joints and all.
+    /// Writes a model file (TOML), with locked joints.
+    ///
+    /// Args:
+    ///     path: Path of the file.
+    ///
+    /// Raises:
+    ///     OSError: The file cannot be written.
     fn to_file(&self, path: &Bound<'_, PyAny>) -> PyResult<()> {
         let py = path.py();
         write_text(py, &files::path(path, Kind::Model)?, &self.to_text()?)
     }
 
-    /// The description as TOML text.
+    /// The description as TOML text, as `from_text` reads it.
     fn to_text(&self) -> PyResult<String> {
         Ok(self
             .inner
@@ -233,7 +274,7 @@ impl RoverModel {
             .map_err(BorderError::from)?)
     }
 
-    /// The description as nested dictionaries and lists.
+    /// The description as nested dictionaries and lists, as `from_dict` reads it.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let text = self
             .inner
@@ -243,7 +284,27 @@ impl RoverModel {
         py.import("json")?.call_method1("loads", (text,))
     }
 
-    /// The same machine with some of its data changed.
+    /// Returns a model that differs in what is given.
+    ///
+    /// Args:
+    ///     wheel_radius: Radius of all wheels, m: shape, inertia and contact change together.
+    ///     contact_radius: Radius at which the wheels touch the ground, m; shape and inertia stay
+    ///         as they are.
+    ///     masses: Masses by name of the solid, or one for each solid, kg. Inertias scale with
+    ///         them.
+    ///     steering_stiffness: Stiffness of every steering controller, N m/rad.
+    ///     steering_damping: Damping of every steering controller, N m s/rad.
+    ///     wheel_torque_limit: Largest torque of every wheel, N m.
+    ///     mass_scale: Factor of all masses and inertias.
+    ///     motor: The motor of all wheels: a `Motor`, its fields by name, or None for wheels that
+    ///         give their command at any speed. Left out, the motors stay.
+    ///
+    /// Returns:
+    ///     The new model; this one stays as it is.
+    ///
+    /// Raises:
+    ///     ModelError: A number is out of its range, a solid has no such name, or a wheel radius is
+    ///         given where a wheel's solid is no disc.
     #[pyo3(signature = (*, wheel_radius = None, contact_radius = None, masses = None, steering_stiffness = None, steering_damping = None,
         wheel_torque_limit = None, mass_scale = None, motor = Given::MISSING),
         text_signature = "($self, *, wheel_radius=None, contact_radius=None, masses=None, steering_stiffness=None, steering_damping=None, \
@@ -308,7 +369,16 @@ impl RoverModel {
         Self::wrap(Ok(model))
     }
 
-    /// The same machine with joints locked (at 0, or at the given angles in rad): their coordinates are gone.
+    /// Returns the same machine with joints locked; their coordinates are gone.
+    ///
+    /// Args:
+    ///     joints: Names of joints, which are locked at 0, or a mapping of names to angles, rad.
+    ///
+    /// Returns:
+    ///     The new model. The locks are kept in its files and dictionaries.
+    ///
+    /// Raises:
+    ///     ModelError: There is no such joint, or an angle is not finite.
     fn weld(&self, joints: &Bound<'_, PyAny>) -> PyResult<Self> {
         let joints: Vec<(String, f64)> = if let Ok(map) = joints.cast::<PyMapping>() {
             let angle = |item: Bound<'_, PyAny>| -> PyResult<(String, f64)> {
@@ -325,26 +395,31 @@ impl RoverModel {
         Self::wrap(self.inner.with_locked_joints(&joints))
     }
 
+    /// Name of the model.
     #[getter]
     fn name(&self) -> &str {
         &self.inner.description().name
     }
 
+    /// Number of coordinates.
     #[getter]
     fn nq(&self) -> usize {
         self.inner.nv()
     }
 
+    /// Number of velocities.
     #[getter]
     fn nv(&self) -> usize {
         self.inner.nv()
     }
 
+    /// Total mass, kg.
     #[getter]
     fn mass(&self) -> f64 {
         self.inner.mass()
     }
 
+    /// Names of the coordinates, x, y, z, roll, heading, pitch, then the joints.
     #[getter]
     fn dof_names(&self) -> Vec<String> {
         let model = &self.inner;
@@ -371,6 +446,7 @@ impl RoverModel {
         names
     }
 
+    /// Names of the joints that are not locked, in the order of q.
     #[getter]
     fn joint_names(&self) -> Vec<String> {
         let joints = self.inner.joints().iter();
@@ -379,32 +455,38 @@ impl RoverModel {
             .collect()
     }
 
+    /// Names of the solids.
     #[getter]
     fn solid_names(&self) -> Vec<String> {
         self.inner.frames().iter().map(|f| f.name.clone()).collect()
     }
 
+    /// Names of the wheels, in the order of every array with one entry a wheel.
     #[getter]
     fn wheel_names(&self) -> Vec<String> {
         self.inner.wheels().iter().map(|w| w.name.clone()).collect()
     }
 
+    /// Radius at which each wheel touches the ground, (n_wheels,), m.
     #[getter]
     fn wheel_radii<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_iter(py, self.inner.wheels().iter().map(|w| w.radius))
     }
 
+    /// Largest torque of each wheel, (n_wheels,), N m.
     #[getter]
     fn wheel_torque_limits<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_iter(py, self.inner.wheels().iter().map(|w| w.torque_limit))
     }
 
+    /// The motor of each wheel; None where the torque is the command at any speed.
     #[getter]
     fn motors(&self) -> Vec<Option<Motor>> {
         let wheels = self.inner.wheels().iter();
         wheels.map(|wheel| wheel.motor.map(Motor::from)).collect()
     }
 
+    /// Index in q of each wheel's rotation; -1 where it is locked.
     #[getter]
     fn wheel_joint_indices(&self) -> Vec<i64> {
         self.inner
@@ -414,6 +496,7 @@ impl RoverModel {
             .collect()
     }
 
+    /// Index in q of each wheel's steering joint; -1 where there is none or it is locked.
     #[getter]
     fn steering_joint_indices(&self) -> Vec<i64> {
         self.inner
@@ -423,6 +506,7 @@ impl RoverModel {
             .collect()
     }
 
+    /// Largest steering set-point either way, rad.
     #[getter]
     fn steering_limit(&self) -> f64 {
         self.inner
@@ -432,7 +516,20 @@ impl RoverModel {
             .fold(0.0, f64::max)
     }
 
-    /// M(q), (nv, nv). Source: Featherstone 2008, ch. 6.
+    /// The mass matrix M(q).
+    ///
+    /// Args:
+    ///     q: Coordinates, (nq,).
+    ///     coordinates: "state" or "report".
+    ///
+    /// Returns:
+    ///     (nv, nv), in kg, kg m and kg m².
+    ///
+    /// Raises:
+    ///     StateError: `q` has a wrong length or an entry that is not finite.
+    ///     OptionError: `coordinates` is neither of the two.
+    ///
+    /// Source: Featherstone 2008, ch. 6.
     #[pyo3(signature = (q, coordinates = Given::MISSING), text_signature = "($self, q, coordinates='state')")]
     fn mass_matrix<'py>(
         &self,
@@ -451,7 +548,23 @@ impl RoverModel {
         }
     }
 
-    /// N(q, v) v + G(q), (nv,): M q̈ + bias = generalized forces.
+    /// The bias N(q, v) v + G(q) of the equations of motion, M dv/dt + bias = generalized forces.
+    ///
+    /// Args:
+    ///     q: Coordinates, (nq,).
+    ///     qdot: Velocity in the same coordinates, (nv,).
+    ///     gravity: Gravity, world frame, (3,), m/s²; (0, -9.81, 0) by default.
+    ///     coordinates: "state" or "report".
+    ///
+    /// Returns:
+    ///     (nv,), in N and N m.
+    ///
+    /// Raises:
+    ///     StateError: `q` or `qdot` has a wrong length or an entry that is not finite.
+    ///     OptionError: `gravity` is not three finite numbers, or `coordinates` is neither of the
+    ///         two.
+    ///
+    /// Source: Featherstone 2008, ch. 5.
     #[pyo3(signature = (q, qdot, gravity = None, coordinates = Given::MISSING), text_signature = "($self, q, qdot, gravity=None, coordinates='state')")]
     fn bias<'py>(
         &self,
@@ -484,7 +597,11 @@ impl RoverModel {
         Ok(fresh(py, pulled.as_slice()))
     }
 
-    /// T, (nv, 2 n_wheels): generalized forces of wheel torques (positive forward), then of steering torques.
+    /// The matrix that maps wheel torques and steering torques to generalized forces.
+    ///
+    /// Returns:
+    ///     (nv, 2 n_wheels): a column for each wheel's torque, positive forward, then one for each
+    ///     steering torque.
     fn actuation_matrix<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let wheels = self.inner.wheels();
         let mut T = DMatrix::zeros(self.inner.nv(), 2 * wheels.len());
@@ -499,7 +616,19 @@ impl RoverModel {
         fresh_matrix(py, &T)
     }
 
-    /// ½ vᵀ M v, J.
+    /// The kinetic energy, half of v · M v.
+    ///
+    /// Args:
+    ///     q: Coordinates, (nq,).
+    ///     qdot: Velocity in the same coordinates, (nv,).
+    ///     coordinates: "state" or "report".
+    ///
+    /// Returns:
+    ///     The energy, J.
+    ///
+    /// Raises:
+    ///     StateError: `q` or `qdot` has a wrong length or an entry that is not finite.
+    ///     OptionError: `coordinates` is neither of the two.
     #[pyo3(signature = (q, qdot, coordinates = Given::MISSING), text_signature = "($self, q, qdot, coordinates='state')")]
     fn kinetic_energy(
         &self,
@@ -512,7 +641,19 @@ impl RoverModel {
         Ok(momentum::energy(&self.inner, &kinematics, &v, &Vector3::zeros()).kinetic)
     }
 
-    /// {name: (3,)}: origins of the solids and the model's tags (m), unit axles `axle_FL`, ..., and `centre_of_mass`, world.
+    /// Named points and axes of the machine in the world frame.
+    ///
+    /// Args:
+    ///     q: Coordinates, (nq,).
+    ///     coordinates: "state" or "report".
+    ///
+    /// Returns:
+    ///     Vectors (3,) by name: the origin of every solid and the tags of the model, m; the unit
+    ///     axle of every wheel, `axle_FL` and so on; the mass centre, `centre_of_mass`, m.
+    ///
+    /// Raises:
+    ///     StateError: `q` has a wrong length or an entry that is not finite.
+    ///     OptionError: `coordinates` is neither of the two.
     #[pyo3(signature = (q, coordinates = Given::MISSING), text_signature = "($self, q, coordinates='state')")]
     fn tags<'py>(
         &self,
@@ -523,7 +664,18 @@ impl RoverModel {
         tags(py, &self.inner, &self.placed(q, coordinates)?.2)
     }
 
-    /// {name: ((3,), (3, 3))}: origin and rotation matrix of every solid, world.
+    /// The pose of every solid in the world frame.
+    ///
+    /// Args:
+    ///     q: Coordinates, (nq,).
+    ///     coordinates: "state" or "report".
+    ///
+    /// Returns:
+    ///     Origin (3,), m, and rotation matrix (3, 3) by name of the solid.
+    ///
+    /// Raises:
+    ///     StateError: `q` has a wrong length or an entry that is not finite.
+    ///     OptionError: `coordinates` is neither of the two.
     #[pyo3(signature = (q, coordinates = Given::MISSING), text_signature = "($self, q, coordinates='state')")]
     fn poses<'py>(
         &self,
@@ -534,7 +686,20 @@ impl RoverModel {
         poses(py, &self.inner, &self.placed(q, coordinates)?.2)
     }
 
-    /// (n_wheels,) m, positive when apart.
+    /// The distance of each wheel to the terrain.
+    ///
+    /// Args:
+    ///     q: Coordinates, (nq,).
+    ///     terrain: A `Plane` or a `SphereField`.
+    ///     coordinates: "state" or "report".
+    ///
+    /// Returns:
+    ///     (n_wheels,), m, positive when apart.
+    ///
+    /// Raises:
+    ///     StateError: `q` has a wrong length or an entry that is not finite.
+    ///     TerrainError: `terrain` is not a terrain.
+    ///     OptionError: `coordinates` is neither of the two.
     #[pyo3(signature = (q, terrain, coordinates = Given::MISSING), text_signature = "($self, q, terrain, coordinates='state')")]
     fn wheel_gaps<'py>(
         &self,
@@ -547,7 +712,20 @@ impl RoverModel {
         Ok(PyArray1::from_iter(py, contacts.iter().map(|c| c.gap)))
     }
 
-    /// (n_wheels, 3) m: the rim point nearest to the terrain, world.
+    /// The point of each wheel's rim that is nearest to the terrain.
+    ///
+    /// Args:
+    ///     q: Coordinates, (nq,).
+    ///     terrain: A `Plane` or a `SphereField`.
+    ///     coordinates: "state" or "report".
+    ///
+    /// Returns:
+    ///     (n_wheels, 3), world frame, m.
+    ///
+    /// Raises:
+    ///     StateError: `q` has a wrong length or an entry that is not finite.
+    ///     TerrainError: `terrain` is not a terrain.
+    ///     OptionError: `coordinates` is neither of the two.
     #[pyo3(signature = (q, terrain, coordinates = Given::MISSING), text_signature = "($self, q, terrain, coordinates='state')")]
     fn wheel_contact_points<'py>(
         &self,
@@ -564,7 +742,21 @@ impl RoverModel {
         fresh_rows(py, &rows)
     }
 
-    /// (n_wheels, 3, nv): rows n, t, b of the contact point's velocity per unit of each velocity.
+    /// The contact Jacobian of each wheel: u = J v is the velocity of its contact point.
+    ///
+    /// Args:
+    ///     q: Coordinates, (nq,).
+    ///     terrain: A `Plane` or a `SphereField`.
+    ///     coordinates: "state" or "report".
+    ///
+    /// Returns:
+    ///     (n_wheels, 3, nv): rows along the normal, the rolling direction and the lateral
+    ///     direction.
+    ///
+    /// Raises:
+    ///     StateError: `q` has a wrong length or an entry that is not finite.
+    ///     TerrainError: `terrain` is not a terrain.
+    ///     OptionError: `coordinates` is neither of the two.
     #[pyo3(signature = (q, terrain, coordinates = Given::MISSING), text_signature = "($self, q, terrain, coordinates='state')")]
     fn wheel_jacobians<'py>(
         &self,
@@ -601,7 +793,18 @@ impl RoverModel {
         fresh_blocks(py, rows, [contacts.len(), 3, nv])
     }
 
-    /// Public q and state velocity to the report's q and qdot.
+    /// Converts a state to the report's coordinates.
+    ///
+    /// Args:
+    ///     q: Coordinates as `Simulation.q`, (nq,).
+    ///     v: Velocity as `Simulation.v`, (nv,).
+    ///
+    /// Returns:
+    ///     The report's q, (nq,), and its rate, (nv,).
+    ///
+    /// Raises:
+    ///     StateError: An array has a wrong length or an entry that is not finite, or the heading
+    ///         is ±90 degrees, where the report's angles are singular.
     fn to_report<'py>(
         &self,
         py: Python<'py>,
@@ -617,7 +820,17 @@ impl RoverModel {
         Ok((fresh(py, &q), fresh(py, &qdot)))
     }
 
-    /// The report's q and qdot to public q and state velocity.
+    /// Converts the report's coordinates to a state.
+    ///
+    /// Args:
+    ///     q: The report's coordinates, (nq,).
+    ///     qdot: Their rates, (nv,).
+    ///
+    /// Returns:
+    ///     Coordinates as `Simulation.q`, (nq,), and velocity as `Simulation.v`, (nv,).
+    ///
+    /// Raises:
+    ///     StateError: An array has a wrong length or an entry that is not finite.
     #[allow(clippy::wrong_self_convention)] // the Python name: from the report's coordinates
     fn from_report<'py>(
         &self,

@@ -10,8 +10,22 @@ use crate::errors::{BorderError, Kind, Value};
 /// What `replace(motor=...)` takes, in words.
 const WHAT: &str = "a Motor, a mapping of its fields, or None";
 
-/// Torque–speed line of a wheel's motor. Immutable.
-#[pyclass(module = "rover_gym._core", frozen, eq, from_py_object)]
+/// The torque-speed line of a wheel's motor. Immutable.
+///
+/// The torque is the command, but at most `stall_torque * (1 - speed / no_load_speed)` forwards and
+/// `stall_torque * (1 + speed / no_load_speed)` backwards, and at most `stall_torque` either way.
+///
+/// Args:
+///     stall_torque: Torque of the line at rest, N m.
+///     no_load_speed: Speed at which the line reaches zero, rad/s. If infinite, the torque does not
+///         depend on the speed.
+///     regenerating: Whether the motor brakes when it is driven faster than `no_load_speed`, along
+///         the line and with at most the stall torque. Otherwise it turns freely there.
+///
+/// Raises:
+///     ModelError: `stall_torque` is not from 1e-9 to 1e9 N m, or `no_load_speed` is neither from
+///         1e-6 to 1e9 rad/s nor infinite.
+#[pyclass(module = "rover_gym.mechanics", frozen, eq, from_py_object)]
 #[derive(Clone, Copy, PartialEq)]
 pub struct Motor {
     inner: CoreMotor,
@@ -95,22 +109,35 @@ impl Motor {
         Ok(Self { inner })
     }
 
+    /// Torque of the line at rest, N m.
     #[getter]
     fn stall_torque(&self) -> f64 {
         self.inner.stall_torque
     }
 
+    /// Speed at which the line reaches zero, rad/s; may be infinite.
     #[getter]
     fn no_load_speed(&self) -> f64 {
         self.inner.no_load_speed
     }
 
+    /// Whether the motor brakes when it is driven faster than `no_load_speed`.
     #[getter]
     fn regenerating(&self) -> bool {
         self.inner.regenerating
     }
 
-    /// Torque (N m) that a command (N m) gives at a speed (rad/s).
+    /// The torque that the motor gives under a command at a speed.
+    ///
+    /// Args:
+    ///     command: Commanded torque, N m.
+    ///     speed: Speed of the wheel in the direction of positive torque, rad/s.
+    ///
+    /// Returns:
+    ///     The torque, N m.
+    ///
+    /// Raises:
+    ///     CommandError: A number is not finite.
     fn torque(&self, command: &Bound<'_, PyAny>, speed: &Bound<'_, PyAny>) -> PyResult<f64> {
         let finite = |given: &Bound<'_, PyAny>, field| {
             let value = number(given, Kind::Command, field)?;

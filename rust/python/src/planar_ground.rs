@@ -53,8 +53,15 @@ fn heights<'py>(ground: &dyn Ground, x: &Bound<'py, PyAny>) -> PyResult<Bound<'p
     Ok(fresh(py, &heights).into_any())
 }
 
-/// The ground y = slope x + offset.
-#[pyclass(module = "rover_gym._core", frozen)]
+/// The ground y = slope x + offset of a planar scene: x forward, y up.
+///
+/// Args:
+///     slope: Tangent of the inclination.
+///     offset: Height at x = 0, m.
+///
+/// Raises:
+///     TerrainError: A number is not finite, the slope is beyond 1000 or the offset beyond 1e6 m.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Line {
     inner: CoreLine,
 }
@@ -71,16 +78,28 @@ impl Line {
         })
     }
 
+    /// Tangent of the inclination.
     #[getter]
     fn slope(&self) -> f64 {
         self.inner.slope()
     }
 
+    /// Height at x = 0, m.
     #[getter]
     fn offset(&self) -> f64 {
         self.inner.offset()
     }
 
+    /// The height of the ground at one place or at many.
+    ///
+    /// Args:
+    ///     x: Places, a number or (m,), m.
+    ///
+    /// Returns:
+    ///     Heights, a number or (m,), m.
+    ///
+    /// Raises:
+    ///     OptionError: `x` is not a number or an array of one dimension.
     fn height<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         heights(&self.inner, x)
     }
@@ -95,8 +114,18 @@ impl Line {
     }
 }
 
-/// The ground y = amplitude sin(2 pi x / wavelength + phase) + offset.
-#[pyclass(module = "rover_gym._core", frozen)]
+/// The ground y = amplitude sin(2 pi x / wavelength + phase) + offset of a planar scene.
+///
+/// Args:
+///     amplitude: Amplitude, m.
+///     wavelength: Wavelength, m.
+///     phase: Phase at x = 0, rad.
+///     offset: Mean height, m.
+///
+/// Raises:
+///     TerrainError: A number is not finite, the wavelength is below 1e-3 m, or the slope 2 pi
+///         amplitude / wavelength is beyond 1000.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Sine {
     inner: CoreSine,
 }
@@ -121,26 +150,40 @@ impl Sine {
         })
     }
 
+    /// Amplitude, m.
     #[getter]
     fn amplitude(&self) -> f64 {
         self.inner.parameters()[0]
     }
 
+    /// Wavelength, m.
     #[getter]
     fn wavelength(&self) -> f64 {
         self.inner.parameters()[1]
     }
 
+    /// Phase at x = 0, rad.
     #[getter]
     fn phase(&self) -> f64 {
         self.inner.parameters()[2]
     }
 
+    /// Mean height, m.
     #[getter]
     fn offset(&self) -> f64 {
         self.inner.parameters()[3]
     }
 
+    /// The height of the ground at one place or at many.
+    ///
+    /// Args:
+    ///     x: Places, a number or (m,), m.
+    ///
+    /// Returns:
+    ///     Heights, a number or (m,), m.
+    ///
+    /// Raises:
+    ///     OptionError: `x` is not a number or an array of one dimension.
     fn height<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         heights(&self.inner, x)
     }
@@ -160,8 +203,18 @@ impl Sine {
     }
 }
 
-/// The natural cubic spline through points, continued by its tangents: a ground with continuous curvature.
-#[pyclass(module = "rover_gym._core", frozen)]
+/// The natural cubic spline through points: a ground with continuous curvature.
+///
+/// It goes on along its tangents beyond the first and the last point.
+///
+/// Args:
+///     x: Places of the points, (n,), m, increasing.
+///     y: Their heights, (n,), m.
+///
+/// Raises:
+///     TerrainError: There are fewer than two points or more than 2 000 000, the lengths differ, an
+///         entry is not finite or beyond 1e6 m, or x does not increase.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Spline {
     inner: CoreSpline,
 }
@@ -179,16 +232,28 @@ impl Spline {
         })
     }
 
+    /// Places of the points, (n,), m.
     #[getter]
     fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         fresh(py, self.inner.x()).into_any()
     }
 
+    /// Heights of the points, (n,), m.
     #[getter]
     fn y<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         fresh(py, self.inner.y()).into_any()
     }
 
+    /// The height of the ground at one place or at many.
+    ///
+    /// Args:
+    ///     x: Places, a number or (m,), m.
+    ///
+    /// Returns:
+    ///     Heights, a number or (m,), m.
+    ///
+    /// Raises:
+    ///     OptionError: `x` is not a number or an array of one dimension.
     fn height<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         heights(&self.inner, x)
     }
@@ -206,8 +271,18 @@ impl Spline {
     }
 }
 
-/// Straight pieces between points, which may stand above each other: steps, ramps, kerbs.
-#[pyclass(module = "rover_gym._core", frozen)]
+/// Straight pieces between points, with corners: a ground of steps, ramps and kerbs.
+///
+/// Two points may stand above each other.
+///
+/// Args:
+///     x: Places of the points, (n,), m, not decreasing.
+///     y: Their heights, (n,), m.
+///
+/// Raises:
+///     TerrainError: There are fewer than two points or more than 2 000 000, the lengths differ, an
+///         entry is not finite or beyond 1e6 m, x decreases, or a point is given twice.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Polyline {
     inner: CorePolyline,
 }
@@ -225,7 +300,17 @@ impl Polyline {
         })
     }
 
-    /// Level ground with a step up (or down) at x.
+    /// Level ground at height 0 with one step.
+    ///
+    /// Args:
+    ///     x: Place of the step, m.
+    ///     height: Height of the ground beyond it, m; negative for a step down.
+    ///
+    /// Returns:
+    ///     The ground.
+    ///
+    /// Raises:
+    ///     TerrainError: A number is not finite or beyond 1e6 m, or the step has no height.
     #[staticmethod]
     fn step(x: &Bound<'_, PyAny>, height: &Bound<'_, PyAny>) -> PyResult<Self> {
         let x = number(x, Kind::Terrain, "x")?;
@@ -235,18 +320,30 @@ impl Polyline {
         })
     }
 
+    /// Places of the points, (n,), m.
     #[getter]
     fn x<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         let x: Vec<f64> = self.inner.points().iter().map(|p| p.x).collect();
         fresh(py, &x).into_any()
     }
 
+    /// Heights of the points, (n,), m.
     #[getter]
     fn y<'py>(&self, py: Python<'py>) -> Bound<'py, PyAny> {
         let y: Vec<f64> = self.inner.points().iter().map(|p| p.y).collect();
         fresh(py, &y).into_any()
     }
 
+    /// The height of the ground at one place or at many.
+    ///
+    /// Args:
+    ///     x: Places, a number or (m,), m.
+    ///
+    /// Returns:
+    ///     Heights, a number or (m,), m.
+    ///
+    /// Raises:
+    ///     OptionError: `x` is not a number or an array of one dimension.
     fn height<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         heights(&self.inner, x)
     }

@@ -2,25 +2,28 @@
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyDict};
+use pyo3::types::PyDict;
 use rover_core::integrator::Stabilisation;
 use rover_core::nalgebra::Vector2;
+use rover_core::planar::Ground;
 use rover_core::planar::soil::{
-    Disks, Machine, Packing, SleepOptions, SoilActiveContact, SoilError, SoilFriction, SoilScene,
-    SoilSetupError, SoilSimulation as Core, SoilSnapshot as CoreSnapshot, Wall, WheelRig,
-    soil_options,
+    Disks, Machine, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, Wall, WheelRig,
 };
-use rover_core::planar::{Ground, PlanarWheel, TwoWheelRover};
+use rover_core::simulation::{SoilSetupError, SoilSimulation as Core, soil_options};
 use std::sync::{Arc, MutexGuard};
 
-use crate::arguments::{Given, flags, number, text};
+use crate::arguments::{Given, flags, text};
 use crate::arrays::{array, fresh, fresh_rows, vector};
+use crate::contacts::SoilContacts;
 use crate::errors::{BorderError, Kind, Value};
-use crate::planar::{one_or_two, pair};
+use crate::options::{STABILISATIONS, choice, name_of};
+use crate::planar::pair;
 use crate::planar_ground::{border, parse};
-use crate::shared::{Shared, Watch};
-use crate::simulation::{Energy, STABILISATIONS, StepReport, choice, name_of};
-use crate::snapshot::{belonging, damaged, read};
+use crate::planar_machines::two_wheel_rover;
+use crate::report::{Energy, StepReport};
+use crate::shared::Shared;
+use crate::snapshot::{SoilSnapshot, belonging};
+use crate::stepping::step;
 
 /// Radii, masses and centres of a packing.
 type Packed<'py> = (
@@ -80,146 +83,54 @@ fn rows(value: &Bound<'_, PyAny>, kind: Kind, field: &str, width: usize) -> PyRe
     Ok(view.iter().copied().collect())
 }
 
-/// Two numbers out of a mapping, or one for both.
-fn both(given: &Bound<'_, PyDict>, field: &str, default: [f64; 2]) -> PyResult<[f64; 2]> {
-    match given.get_item(field)? {
-        None => Ok(default),
-        Some(value) => one_or_two(&value, field),
-    }
-}
-
-/// The two-wheel rover of the keyword arguments that `TwoWheelRoverSimulation` takes.
-fn rover(given: &Bound<'_, PyDict>) -> PyResult<TwoWheelRover> {
-    let optional = |field: &str| -> PyResult<Option<f64>> {
-        given
-            .get_item(field)?
-            .map(|x| number(&x, Kind::Model, field))
-            .transpose()
-    };
-    let masses = both(given, "wheel_mass", [60.0; 2])?;
-    let radii = both(given, "wheel_radius", [0.2; 2])?;
-    let of_disc = |i: usize| 0.5 * masses[i] * radii[i] * radii[i];
-    let inertias = both(given, "wheel_inertia", [of_disc(0), of_disc(1)])?;
-    let axles = [
-        both(given, "axle_a", [-0.4, 0.0])?,
-        both(given, "axle_b", [0.4, 0.0])?,
-    ]
-    .map(Vector2::from);
-    let mass = optional("mass")?.unwrap_or(130.0);
-    let rod = mass * (axles[1] - axles[0]).norm_squared() / 12.0;
-    let wheel = |i: usize| PlanarWheel {
-        mass: masses[i],
-        radius: radii[i],
-        inertia: inertias[i],
-        axle: axles[i],
-    };
-    let inertia = optional("inertia")?.unwrap_or(rod);
-    let made = TwoWheelRover::new(mass, inertia, wheel(0), wheel(1));
-    Ok(made.map_err(|e| border(Kind::Model, &e))?)
-}
-
-/// The contacts of the last step of a soil, as fresh arrays with one row a contact.
-#[pyclass(module = "rover_gym._core", frozen)]
-pub struct SoilContacts {
-    active: Vec<SoilActiveContact>,
-    /// Number of disks and of disks with wheels.
-    counts: [usize; 2],
-}
-
-impl SoilContacts {
-    fn rows<'py>(
-        &self,
-        py: Python<'py>,
-        f: impl Fn(&SoilActiveContact) -> [f64; 2],
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        fresh_rows(py, &self.active.iter().map(f).collect::<Vec<_>>())
-    }
-}
-
-#[pymethods]
-impl SoilContacts {
-    /// Numbers of both bodies: disks from 0, then wheels; -1 for a wall or the ground.
-    #[getter]
-    fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let name = |body: u32| {
-            let is_fixed = body as usize >= self.counts[1];
-            if is_fixed { -1 } else { i64::from(body) }
-        };
-        let keys = self.active.iter().map(|a| a.contact.key);
-        let flat = PyArray1::from_iter(py, keys.flat_map(|k| [name(k.a), name(k.b)]));
-        flat.call_method1("reshape", (self.active.len(), 2))
-    }
-
-    #[getter]
-    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.contact.point.into())
-    }
-
-    #[getter]
-    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.contact.n.into())
-    }
-
-    #[getter]
-    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_iter(py, self.active.iter().map(|a| a.contact.gap_start))
-    }
-
-    #[getter]
-    fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.impulse)
-    }
-
-    #[getter]
-    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| a.velocity)
-    }
-
-    /// Impulses on the first body in the world's axes.
-    #[getter]
-    fn world_impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        self.rows(py, |a| {
-            (a.contact.n * a.impulse[0] + a.contact.t() * a.impulse[1]).into()
-        })
-    }
-
-    fn __len__(&self) -> usize {
-        self.active.len()
-    }
-
-    fn __repr__(&self) -> String {
-        format!("SoilContacts({})", self.active.len())
-    }
-}
-
-/// Everything that a soil needs to continue bit for bit; picklable.
-#[pyclass(module = "rover_gym._core", frozen)]
-pub struct SoilSnapshot {
-    inner: CoreSnapshot,
-}
-
-#[pymethods]
-impl SoilSnapshot {
-    #[staticmethod]
-    fn from_bytes(data: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(Self { inner: read(data)? })
-    }
-
-    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let bytes = postcard::to_stdvec(&self.inner).map_err(|e| damaged(&e))?;
-        Ok(PyBytes::new(py, &bytes))
-    }
-
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
-        let bytes = slf.get().to_bytes(slf.py())?;
-        Ok((slf.get_type().getattr("from_bytes")?, (bytes,)))
-    }
-}
-
-/// A soil of free disks, with walls, a ground and perhaps a machine on it.
-#[pyclass(module = "rover_gym._core", frozen)]
+/// A granular soil of disks, and a machine that drives on it.
+///
+/// The disks are free, with friction, between walls or on a ground.
+///
+/// One call at a time: a call during another one, from another thread or a signal handler, raises
+/// BusyError.
+///
+/// Args:
+///     radius: Radii of the disks, (n,), m.
+///     mass: Masses of the disks, (n,), kg; they are homogeneous.
+///     position: Centres, (n, 2), m, or centres and angles, (n, 3), m and rad.
+///     kinematic: Disks whose velocity no force changes, (n,), such as grains glued to a rough
+///         floor, or a piston with the velocity that `set_state` gives it; none by default. They
+///         may overlap one another and walls.
+///     walls: A point of each wall and the normal to its free side, (n, 4), m; none by default.
+///     ground: A `Line`, `Sine`, `Spline` or `Polyline` below the disks; none by default.
+///     rover: Keyword arguments of `TwoWheelRoverSimulation` that describe a rover, such as its
+///         `parameters`; none by default.
+///     rig: Mass (kg) and radius (m) of a single wheel whose forward speed and turning rate no
+///         force changes; none by default.
+///     machine: Coordinates of the rover (x, y, theta, theta_A, theta_B) or of the rig (x, y, -,
+///         theta, -), (5,), m and rad.
+///     friction: Coulomb's coefficient between disks.
+///     wall_friction: Coulomb's coefficient of disks on walls and ground.
+///     wheel_friction: Coulomb's coefficient of wheels.
+///     restitution: Newton's coefficient of all contacts, in [0, 1].
+///     gravity: Gravity, (2,), m/s²; (0, -9.81) by default.
+///     time_step: Time step, s.
+///     tolerance: Largest relative residual of the contact problem. Its velocities are also right
+///         to ten times that in m/s, times the square root of gravity over 9.81 m/s².
+///     max_iterations: Largest number of sweeps of the contact solver in a step.
+///     stabilisation: "projection" moves overlapping bodies apart, which may add energy by lifting
+///         those above; "none" leaves them. By default "none" without restitution and "projection"
+///         with it.
+///     penetration_tolerance: Overlap that projection leaves alone, m; 0.5% of the smallest radius
+///         by default.
+///     sleep: Whether disks at rest far from anything that moves are left out of the step.
+///     sleep_speed: Speed below which a disk is at rest, m/s; 5e-4 by default.
+///     sleep_distance: Distance within which nothing may move for a disk to sleep, m; 0.2 by
+///         default.
+///
+/// Raises:
+///     ModelError: A radius or mass is not finite and positive, or the machine's data are invalid.
+///     StateError: Positions have a wrong shape or an entry that is not finite, or disks, walls or
+///         wheels overlap.
+///     TerrainError: A wall has no direction, or `ground` is not a ground.
+///     OptionError: An option is out of its range, or both `rover` and `rig` are given.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct SoilSimulation {
     inner: Shared<Core>,
 }
@@ -236,7 +147,7 @@ impl SoilSimulation {
 }
 
 fn n_disks(inner: &Core) -> usize {
-    inner.scene().disks.len()
+    inner.soil().disks.len()
 }
 
 /// Positions with an angle where none was given.
@@ -365,7 +276,7 @@ impl SoilSimulation {
         let ground: Option<Arc<dyn Ground>> = ground.map(parse).transpose()?;
         let rover = rover.object::<Bound<'_, PyDict>>(Kind::Model, "rover", "a dict")?;
         let who: Option<Arc<Machine>> = match (&rover, rig) {
-            (Some(given), None) => Some(Arc::new(self::rover(given)?)),
+            (Some(given), None) => Some(Arc::new(two_wheel_rover(&given.copy()?)?)),
             (None, Some(given)) => {
                 let given = pair(given, Kind::Model, "rig")?;
                 let rig = WheelRig::new(given.x, given.y);
@@ -407,71 +318,78 @@ impl SoilSimulation {
         })
     }
 
+    /// Time since the last call of `set_state`, s.
     #[getter]
     fn time(&self) -> PyResult<f64> {
-        let inner = self.open()?;
-        Ok(inner.time())
+        Ok(self.open()?.time())
     }
 
+    /// Time step, s.
     #[getter]
     fn time_step(&self) -> PyResult<f64> {
-        let inner = self.open()?;
-        Ok(inner.options().time_step)
+        Ok(self.open()?.options().time_step)
     }
 
+    /// Radii of the disks, (n,), m.
     #[getter]
     fn radius<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let inner = self.open()?;
-        Ok(fresh(py, inner.scene().disks.radius()))
+        Ok(fresh(py, self.open()?.soil().disks.radius()))
     }
 
+    /// Masses of the disks, (n,), kg.
     #[getter]
     fn mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let inner = self.open()?;
-        Ok(fresh(py, inner.scene().disks.mass()))
+        Ok(fresh(py, self.open()?.soil().disks.mass()))
     }
 
+    /// Centres and angles of the disks, (n, 3), m and rad.
     #[getter]
     fn position<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let inner = self.open()?;
         fresh_rows(py, &Self::disks(inner.q(), n_disks(&inner)))
     }
 
+    /// Rates of `position`, (n, 3), m/s and rad/s.
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let inner = self.open()?;
         fresh_rows(py, &Self::disks(inner.v(), n_disks(&inner)))
     }
 
+    /// Which disks are kinematic, (n,).
     #[getter]
     fn kinematic<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let inner = self.open()?;
-        Ok(PyArray1::from_slice(py, inner.scene().disks.kinematic()))
+        Ok(PyArray1::from_slice(
+            py,
+            self.open()?.soil().disks.kinematic(),
+        ))
     }
 
+    /// Which disks sleep, (n,); kinematic ones always do.
     #[getter]
     fn asleep<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
-        let inner = self.open()?;
-        Ok(PyArray1::from_slice(py, inner.asleep()))
+        Ok(PyArray1::from_slice(py, self.open()?.asleep()))
     }
 
+    /// Coordinates of the machine, (5,), m and rad; empty without one.
     #[getter]
     fn machine<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let inner = self.open()?;
         Ok(fresh(py, &inner.q()[3 * n_disks(&inner)..]))
     }
 
+    /// Rates of the machine's coordinates, (5,), m/s and rad/s; empty without one.
     #[getter]
     fn machine_rate<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let inner = self.open()?;
         Ok(fresh(py, &inner.v()[3 * n_disks(&inner)..]))
     }
 
-    /// Centre (x, y) and radius of each wheel.
+    /// Centre and radius of each wheel, (n_wheels, 3), m.
     #[getter]
     fn wheels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let inner = self.open()?;
-        let Some(machine) = &inner.scene().machine else {
+        let Some(machine) = &inner.soil().machine else {
             return fresh_rows::<3>(py, &[]);
         };
         let own = &inner.q()[3 * n_disks(&inner)..];
@@ -483,24 +401,25 @@ impl SoilSimulation {
         fresh_rows(py, &(0..machine.n_discs()).map(row).collect::<Vec<_>>())
     }
 
+    /// Commanded torques of the rover's wheels, (2,), N m, positive forward; empty without a rover.
     #[getter]
     fn torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let inner = self.open()?;
-        Ok(fresh(py, inner.inputs()))
+        Ok(fresh(py, &self.open()?.command().torques))
     }
 
+    /// Force at the machine's centre along x and y, N.
     #[getter]
     fn pull(&self) -> PyResult<(f64, f64)> {
         let inner = self.open()?;
-        let pull = inner.pull();
+        let pull = inner.command().pull;
         Ok((pull.x, pull.y))
     }
 
-    /// Numbers and names of the options.
+    /// The options of contacts, gravity and solver, by the names of the arguments.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let inner = self.open()?;
-        let (o, friction) = (inner.options(), &inner.scene().friction);
+        let (o, friction) = (inner.options(), &inner.soil().friction);
         let settings = PyDict::new(py);
         settings.set_item("friction", friction.disks)?;
         settings.set_item("wall_friction", friction.walls)?;
@@ -515,6 +434,18 @@ impl SoilSimulation {
         Ok(settings)
     }
 
+    /// Sets positions and rates; time starts at 0.
+    ///
+    /// Args:
+    ///     position: Centres, (n, 2), m, or centres and angles, (n, 3), m and rad.
+    ///     velocity: Rates, (n, 2), m/s, or (n, 3), m/s and rad/s; at rest by default.
+    ///     machine: Coordinates of the machine, (5,), m and rad; where it is by default.
+    ///     machine_rate: Rates of the machine's coordinates, (5,), m/s and rad/s; at rest by
+    ///         default.
+    ///
+    /// Raises:
+    ///     StateError: An array has a wrong shape or an entry that is not finite, or bodies
+    ///         overlap. Nothing has changed.
     #[pyo3(signature = (position, velocity = None, machine = None, machine_rate = None))]
     fn set_state(
         &self,
@@ -541,12 +472,27 @@ impl SoilSimulation {
         Ok(inner.set_state(&q, &v).map_err(|e| soil_error(&e))?)
     }
 
+    /// Takes disks out; the others keep their order.
+    ///
+    /// Args:
+    ///     which: Which disks go, (n,) truth values.
+    ///
+    /// Raises:
+    ///     ModelError: The number of truth values differs, or no disk would be left. Nothing has
+    ///         changed.
     fn remove(&self, which: &Bound<'_, PyAny>) -> PyResult<()> {
         let mut inner = self.open()?;
         let which = flags(which, Kind::Model, "which")?;
         Ok(inner.remove(&which).map_err(|e| soil_error(&e))?)
     }
 
+    /// Sets the torques of the rover's wheels.
+    ///
+    /// Args:
+    ///     torques: Torques of wheels A and B, (2,), N m, positive forward.
+    ///
+    /// Raises:
+    ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
     fn set_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
         let torques = vector(torques, Kind::Command, "torques")?;
         Ok(self
@@ -555,6 +501,13 @@ impl SoilSimulation {
             .map_err(|e| soil_error(&e))?)
     }
 
+    /// Sets the force at the machine's centre, such as that of a drawbar.
+    ///
+    /// Args:
+    ///     pull: Force along x and y, (2,), N.
+    ///
+    /// Raises:
+    ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
     fn set_pull(&self, pull: &Bound<'_, PyAny>) -> PyResult<()> {
         let pull = pair(pull, Kind::Command, "pull")?;
         Ok(self
@@ -563,55 +516,63 @@ impl SoilSimulation {
             .map_err(|e| soil_error(&e))?)
     }
 
+    /// Takes n steps, as `Simulation.step` does.
+    ///
+    /// Args:
+    ///     n: Number of steps.
+    ///
+    /// Returns:
+    ///     How the steps went.
+    ///
+    /// Raises:
+    ///     StepError: A step could not be taken; the state before it stays.
+    ///     OptionError: `n` is not a count.
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
     fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
         let steps = n.count(1, Kind::Option, "n")?;
-        let mut held = self.open()?;
-        let (inner, mut watch) = (&mut *held, Watch::new());
-        let report = py.detach(|| inner.step_while(steps, &mut || watch.go_on()));
-        Ok(watch.result(report)?.into())
+        step(py, &mut *self.open()?, steps)
     }
 
+    /// The contacts of the last step.
     #[getter]
     fn contacts(&self) -> PyResult<SoilContacts> {
         let inner = self.open()?;
-        let n = n_disks(&inner);
-        let wheels = inner.scene().machine.as_ref().map_or(0, |m| m.n_discs());
-        Ok(SoilContacts {
-            active: inner.contacts().collect(),
-            counts: [n, n + wheels],
-        })
+        let wheels = inner.soil().machine.as_ref().map_or(0, |m| m.n_discs());
+        Ok(SoilContacts::new(
+            inner.contacts(),
+            n_disks(&inner) + wheels,
+        ))
     }
 
+    /// Kinetic and potential energy now.
     fn energy(&self) -> PyResult<Energy> {
-        let inner = self.open()?;
-        Ok(inner.energy().into())
+        Ok(self.open()?.energy().into())
     }
 
-    /// Momentum of the disks (x, y) and their moment of momentum about the origin.
+    /// Momentum of the disks, (3,): along x and y, kg m/s, and about the origin, kg m²/s.
+    ///
+    /// Kinematic disks do not count.
     fn momentum<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let inner = self.open()?;
-        Ok(fresh(py, &inner.momentum()))
+        Ok(fresh(py, &self.open()?.momentum()))
     }
 
-    /// Impulse of the last step's contacts on the wheels.
+    /// Sum of the last step's contact impulses on the wheels, along x and y, (2,), N s.
     fn impulse_on_wheels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let inner = self.open()?;
-        Ok(fresh(py, &inner.impulse_on_wheels()))
+        Ok(fresh(py, &self.open()?.impulse_on_wheels()))
     }
 
-    /// Deepest overlap now.
+    /// Deepest overlap now, m.
     fn penetration(&self) -> PyResult<f64> {
-        let inner = self.open()?;
-        Ok(inner.penetration())
+        Ok(self.open()?.penetration())
     }
 
+    /// Wakes all disks.
     fn wake(&self) -> PyResult<()> {
-        let mut inner = self.open()?;
-        inner.wake();
+        self.open()?.wake();
         Ok(())
     }
 
+    /// Everything that is needed to continue bit for bit.
     fn snapshot(&self) -> PyResult<SoilSnapshot> {
         let inner = self.open()?;
         Ok(SoilSnapshot {
@@ -619,6 +580,13 @@ impl SoilSimulation {
         })
     }
 
+    /// Goes back to a snapshot.
+    ///
+    /// Args:
+    ///     snapshot: A snapshot of the same soil.
+    ///
+    /// Raises:
+    ///     StateError: The snapshot belongs to another soil or is damaged. Nothing has changed.
     fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
         let mut inner = self.open()?;
         let snapshot = belonging::<SoilSnapshot>(snapshot, "a SoilSnapshot")?;
@@ -635,7 +603,27 @@ impl SoilSimulation {
     }
 }
 
-/// Radii, masses and centres of disks in rows, without overlap.
+/// Disks in loose rows over a width, without overlap: where a soil starts from.
+///
+/// The radii are drawn evenly from their range. The defaults are the soil of the 2010 report: three
+/// layers of 74.
+///
+/// Args:
+///     count: Number of disks, at most 1 000 000.
+///     radius_min: Smallest radius, m.
+///     radius_max: Largest radius, m.
+///     mass: Mass of a disk of the mean radius, kg; the others' go with their area.
+///     left: Left edge, m.
+///     width: Width of the rows, m.
+///     bottom: Height of the lower edge, m.
+///     seed: Seed of the random numbers; equal seeds give equal disks.
+///
+/// Returns:
+///     Radii, (n,), m, masses, (n,), kg, and centres, (n, 2), m.
+///
+/// Raises:
+///     ModelError: A number is not finite or out of its range, the radii are the wrong way round,
+///         or a disk does not fit.
 #[pyfunction]
 #[pyo3(signature = (count = Given::MISSING, *, radius_min = Given::MISSING, radius_max = Given::MISSING, mass = Given::MISSING,
     left = Given::MISSING, width = Given::MISSING, bottom = Given::MISSING, seed = Given::MISSING),

@@ -10,8 +10,20 @@ use crate::errors::{BorderError, Kind, Value};
 
 type Normal = (f64, f64, f64);
 
-/// The half-space n.x + offset >= 0 is free; the ground is below. `normal` is normalised.
-#[pyclass(module = "rover_gym._core", frozen, from_py_object)]
+/// A plane as ground: the half-space `normal · x + offset >= 0` is free, the ground lies below.
+///
+/// A normal of unit length is taken as it is, so a plane's own `normal` and `offset` make the same
+/// plane to the bit.
+///
+/// Args:
+///     normal: Direction out of the ground, (3,), of any length; straight up by default.
+///     offset: Gap between the world's origin and the plane, m; flat ground at height y has the
+///         offset -y.
+///
+/// Raises:
+///     TerrainError: A number is not finite, the normal has no direction, or the offset is beyond
+///         1e6 m.
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct Plane {
     pub inner: CorePlane,
@@ -29,17 +41,29 @@ impl Plane {
         })
     }
 
+    /// Unit normal out of the ground, (3,).
     #[getter]
     fn normal<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         fresh(py, self.inner.normal().as_slice())
     }
 
+    /// Gap between the world's origin and the plane, m; flat ground at height y has the offset -y.
     #[getter]
     fn offset(&self) -> f64 {
         self.inner.offset()
     }
 
-    /// Height y of the plane at (x, z), m.
+    /// The height of the plane at a place.
+    ///
+    /// Args:
+    ///     x: Coordinate forward, m.
+    ///     z: Coordinate to the right, m.
+    ///
+    /// Returns:
+    ///     The height y, m.
+    ///
+    /// Raises:
+    ///     TerrainError: The plane is vertical, or an argument is not a number.
     fn height(&self, x: &Bound<'_, PyAny>, z: &Bound<'_, PyAny>) -> PyResult<f64> {
         let x = number(x, Kind::Terrain, "x")?;
         let z = number(z, Kind::Terrain, "z")?;

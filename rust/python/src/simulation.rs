@@ -3,140 +3,61 @@
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use rover_core::integrator::{
-    Accuracy, Stabilisation, StepOptions, StepReport as CoreReport, Variant,
-};
-use rover_core::multibody::{Energy as CoreEnergy, Model, coordinates};
+use rover_core::integrator::{Accuracy, StepOptions};
+use rover_core::multibody::{Model, coordinates};
 use rover_core::nalgebra::DMatrix;
-use rover_core::simulation::{Look, ReadingLayout, Simulation as CoreSimulation};
+use rover_core::simulation::{Look, ReadingLayout, RoverSimulation as CoreSimulation};
+use rover_core::solver::SolverOptions;
 use std::sync::{Arc, MutexGuard};
 
 use crate::accuracy;
-use crate::arguments::{Given, number, text, texts};
+use crate::arguments::{Given, number, texts};
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Value};
-use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
+use crate::options::{Options, SolverWords, settings};
 use crate::plane::Plane;
 use crate::reading::{place, scan_points, slices};
+use crate::report::{Energy, StepReport};
 use crate::shared::{Shared, Watch};
 use crate::snapshot::{Snapshot, belonging};
 use crate::sphere_field::Ground;
-
-/// What the solver says of the steps just taken (worst over the steps of one call).
-#[pyclass(module = "rover_gym._core", frozen)]
-pub struct StepReport {
-    inner: CoreReport,
-}
-
-#[pymethods]
-impl StepReport {
-    #[getter]
-    fn status(&self) -> &'static str {
-        if self.inner.is_converged() {
-            "converged"
-        } else {
-            "not_converged"
-        }
-    }
-
-    #[getter]
-    fn is_converged(&self) -> bool {
-        self.inner.is_converged()
-    }
-
-    #[getter]
-    fn steps(&self) -> usize {
-        self.inner.steps
-    }
-
-    #[getter]
-    fn iterations(&self) -> usize {
-        self.inner.iterations
-    }
-
-    #[getter]
-    fn newton_iterations(&self) -> usize {
-        self.inner.newton_iterations
-    }
-
-    #[getter]
-    fn residual(&self) -> f64 {
-        self.inner.residual
-    }
-
-    #[getter]
-    fn n_contacts(&self) -> usize {
-        self.inner.n_contacts
-    }
-
-    #[getter]
-    fn retaken(&self) -> usize {
-        self.inner.retaken
-    }
-
-    #[getter]
-    fn energy_gain(&self) -> f64 {
-        self.inner.energy_gain
-    }
-
-    #[getter]
-    fn energy_removed(&self) -> f64 {
-        self.inner.energy_removed
-    }
-
-    #[getter]
-    fn energy_lifted(&self) -> f64 {
-        self.inner.energy_lifted
-    }
-
-    fn __repr__(&self) -> String {
-        let r = &self.inner;
-        format!(
-            "StepReport(status={:?}, steps={}, iterations={}, residual={:.3e}, n_contacts={})",
-            self.status(),
-            r.steps,
-            r.iterations,
-            r.residual,
-            r.n_contacts
-        )
-    }
-}
-
-/// Kinetic and potential energy, J.
-#[pyclass(module = "rover_gym._core", frozen)]
-pub struct Energy {
-    inner: CoreEnergy,
-}
-
-#[pymethods]
-impl Energy {
-    #[getter]
-    fn kinetic(&self) -> f64 {
-        self.inner.kinetic
-    }
-
-    #[getter]
-    fn potential(&self) -> f64 {
-        self.inner.potential
-    }
-
-    #[getter]
-    fn total(&self) -> f64 {
-        self.inner.total()
-    }
-
-    fn __repr__(&self) -> String {
-        format!(
-            "Energy(kinetic={}, potential={})",
-            self.inner.kinetic, self.inner.potential
-        )
-    }
-}
+use crate::stepping::{Problem, problem, step};
 
 /// A rover on a terrain, stepped through time.
-#[pyclass(module = "rover_gym._core", frozen)]
+///
+/// It starts at rest with all coordinates 0, with its steering held at 0 and every other joint
+/// free. One call at a time: a call during another one, from another thread or a signal handler,
+/// raises BusyError.
+///
+/// Args:
+///     model: The machine; the built-in rover by default.
+///     terrain: A `Plane` or a `SphereField`; flat ground at height 0 by default.
+///     gravity: Gravity, world frame, (3,), m/s²; (0, -9.81, 0) by default.
+///     friction: Coulomb's coefficient of every contact.
+///     restitution: Newton's coefficient of every contact, in [0, 1].
+///     time_step: Time step, s, from 1e-9 to 1000; 0.005 by default.
+///     variant: "linearised" evaluates the forces once a step; "newton" solves for those at its
+///         end. "linearised" by default.
+///     theta: Weight of the end of the step in the time stepping, in [0.5, 1].
+///     forecast: A contact takes part in a step where gap + forecast * time_step * u_N <= 0, with
+///         u_N its normal velocity; in [0, 1].
+///     solver: Method for the contact problem, as in `solve_friction_contact`.
+///     tolerance: Largest relative residual of the contact problem; 1e-12 by default.
+///     max_iterations: Largest number of iterations of the contact solver in a step.
+///     stabilisation: What is done about penetration: "projection" moves the bodies out of it,
+///         "none" leaves it.
+///     warm_start: Whether the contact solver starts from the last step's impulses.
+///     accuracy: Chooses `time_step`, `variant` and `tolerance`, which then cannot be given, as
+///         `accuracy_options` does: "fast", "balanced", "reference", or the error allowed on a path
+///         of 20 m on flat ground, m.
+///
+/// Raises:
+///     ModelError: `model` is not a RoverModel.
+///     TerrainError: `terrain` is not a terrain.
+///     OptionError: An option is out of its range, or is given beside `accuracy`.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct Simulation {
     inner: Shared<CoreSimulation>,
     model: Arc<Model>,
@@ -148,66 +69,11 @@ pub struct Simulation {
 #[derive(Clone)]
 pub struct Origin {
     terrain: Ground,
-    solver: String,
-    max_iterations: usize,
+    words: SolverWords,
 }
-
-/// W, free velocity and friction coefficients.
-pub type Problem<'py> = (
-    Bound<'py, PyArray2<f64>>,
-    Bound<'py, PyArray1<f64>>,
-    Bound<'py, PyArray1<f64>>,
-);
 
 fn names(joints: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
     texts(joints, Kind::Command, "joints")
-}
-
-/// The value that a word stands for.
-pub fn choice<T: Copy>(field: &str, given: &str, choices: &[(&str, T)]) -> Result<T, BorderError> {
-    let found = choices
-        .iter()
-        .find(|(name, _)| *name == given)
-        .map(|(_, value)| *value);
-    found.ok_or_else(|| {
-        let known: Vec<String> = choices
-            .iter()
-            .map(|(name, _)| format!("{name:?}"))
-            .collect();
-        let message = format!("{field}: must be one of {}, is {given:?}", known.join(", "));
-        BorderError::option(field, message, Value::Text(given.to_owned()))
-    })
-}
-
-/// Schemes by name.
-pub const VARIANTS: [(&str, Variant); 2] = [
-    ("linearised", Variant::Linearised),
-    ("newton", Variant::Newton),
-];
-/// Stabilisations by name.
-pub const STABILISATIONS: [(&str, Stabilisation); 2] = [
-    ("projection", Stabilisation::Projection),
-    ("none", Stabilisation::None),
-];
-
-/// The word that stands for a value.
-pub fn name_of<T: PartialEq + Copy>(value: T, choices: &[(&'static str, T)]) -> &'static str {
-    choices
-        .iter()
-        .find(|(_, v)| *v == value)
-        .map_or("", |(name, _)| name)
-}
-
-impl From<CoreReport> for StepReport {
-    fn from(inner: CoreReport) -> Self {
-        Self { inner }
-    }
-}
-
-impl From<CoreEnergy> for Energy {
-    fn from(inner: CoreEnergy) -> Self {
-        Self { inner }
-    }
 }
 
 impl Simulation {
@@ -258,17 +124,22 @@ impl Simulation {
         warm_start: Given<'_>,
         accuracy: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let option = Kind::Option;
-        let time_step = time_step.maybe(option, "time_step")?;
-        let tolerance = tolerance.maybe(option, "tolerance")?;
-        let variant = (variant.some())
-            .map(|v| {
-                choice("variant", &text(&v, option, "variant")?, &VARIANTS).map_err(PyErr::from)
-            })
-            .transpose()?;
-        let solver = solver.text("auto", option, "solver")?;
-        let max_iterations = max_iterations.count(1000, option, "max_iterations")?;
-        let stabilisation = stabilisation.text("projection", option, "stabilisation")?;
+        let free = [
+            ("time_step", time_step.some()),
+            ("variant", variant.some()),
+            ("tolerance", tolerance.some()),
+        ];
+        let clash = free.iter().find(|(_, given)| given.is_some());
+        let given = [
+            ("friction", friction.given()),
+            ("restitution", restitution.given()),
+            ("theta", theta.given()),
+            ("forecast", forecast.given()),
+            ("solver", solver.given()),
+            ("max_iterations", max_iterations.given()),
+            ("stabilisation", stabilisation.given()),
+            ("warm_start", warm_start.given()),
+        ];
         let model = model.object::<RoverModel>(Kind::Model, "model", "a RoverModel")?;
         let model = model.map_or_else(|| Arc::new(Model::rover()), |m| m.inner);
         let terrain = match terrain {
@@ -277,47 +148,37 @@ impl Simulation {
             }),
             Some(given) => Ground::parse(given)?,
         };
-        let chosen = match accuracy {
-            None => Accuracy::BALANCED,
-            Some(given) => {
-                let chosen = accuracy::parse(given)?;
-                let clash = [
-                    ("time_step", time_step.is_some()),
-                    ("variant", variant.is_some()),
-                    ("tolerance", tolerance.is_some()),
-                ];
-                if let Some((field, _)) = clash.iter().find(|(_, given)| *given) {
-                    let message =
-                        format!("{field}: accuracy chooses it, so it cannot be given beside");
-                    return Err(BorderError::option(field, message, Value::Nothing).into());
-                }
-                chosen
+        let chosen = match (accuracy, clash) {
+            (None, _) => Accuracy::BALANCED,
+            (Some(given), None) => accuracy::parse(given)?,
+            (Some(_), Some((field, _))) => {
+                let message = format!("{field}: accuracy chooses it, so it cannot be given beside");
+                return Err(BorderError::option(field, message, Value::Nothing).into());
             }
         };
-        let tolerance = tolerance.unwrap_or(chosen.tolerance);
-        let options = StepOptions {
+        let mut options = Options::of(StepOptions {
             gravity: checked_gravity(gravity)?,
-            friction_coefficient: friction.number(0.7, option, "friction")?,
-            restitution: restitution.number(0.0, option, "restitution")?,
-            time_step: time_step.unwrap_or(chosen.time_step),
-            theta: theta.number(0.5, option, "theta")?,
-            forecast: forecast.number(0.5, option, "forecast")?,
-            variant: variant.unwrap_or(chosen.variant),
-            stabilisation: choice("stabilisation", &stabilisation, &STABILISATIONS)?,
-            warm_start: warm_start.flag(true, option, "warm_start")?,
-            solver: solver_options(&solver, tolerance, max_iterations, &SIMULATION_SOLVERS)?,
+            time_step: chosen.time_step,
+            variant: chosen.variant,
+            solver: SolverOptions {
+                tolerance: chosen.tolerance,
+                ..SolverOptions::default()
+            },
             ..StepOptions::default()
-        };
+        });
+        for (field, value) in free.iter().chain(&given) {
+            if let Some(value) = value {
+                options.take(field, value)?;
+            }
+        }
+        let (options, words) = options.finish()?;
         let inner =
             CoreSimulation::new(model, terrain.terrain(), options).map_err(BorderError::from)?;
-        let origin = Origin {
-            terrain,
-            solver,
-            max_iterations,
-        };
+        let origin = Origin { terrain, words };
         Ok(Self::of(inner, origin))
     }
 
+    /// The machine.
     #[getter]
     fn model(&self) -> RoverModel {
         RoverModel {
@@ -325,56 +186,53 @@ impl Simulation {
         }
     }
 
+    /// The ground.
     #[getter]
     fn terrain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.origin.terrain.to_object(py)
     }
 
+    /// Time since the last call of `set_state`, s.
     #[getter]
     fn time(&self) -> PyResult<f64> {
         Ok(self.open()?.state().time)
     }
 
+    /// Time step, s.
     #[getter]
     fn time_step(&self) -> f64 {
         self.options.time_step
     }
 
+    /// Gravity, world frame, (3,), m/s².
     #[getter]
     fn gravity<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         fresh(py, self.options.gravity.as_slice())
     }
 
+    /// Coulomb's coefficient of every contact.
     #[getter]
     fn friction(&self) -> f64 {
         self.options.friction_coefficient
     }
 
+    /// Newton's coefficient of every contact.
     #[getter]
     fn restitution(&self) -> f64 {
         self.options.restitution
     }
 
-    /// The keyword arguments that make a simulation with these options.
+    /// The keyword arguments that make a simulation with the same options.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let o = &self.options;
-        let settings = PyDict::new(py);
-        settings.set_item("gravity", (o.gravity.x, o.gravity.y, o.gravity.z))?;
-        settings.set_item("friction", o.friction_coefficient)?;
-        settings.set_item("restitution", o.restitution)?;
-        settings.set_item("time_step", o.time_step)?;
-        settings.set_item("variant", name_of(o.variant, &VARIANTS))?;
-        settings.set_item("theta", o.theta)?;
-        settings.set_item("forecast", o.forecast)?;
-        settings.set_item("solver", &self.origin.solver)?;
-        settings.set_item("tolerance", o.solver.tolerance)?;
-        settings.set_item("max_iterations", self.origin.max_iterations)?;
-        settings.set_item("stabilisation", name_of(o.stabilisation, &STABILISATIONS))?;
-        settings.set_item("warm_start", o.warm_start)?;
-        Ok(settings)
+        let gravity = &self.options.gravity;
+        let gravity = (gravity.x, gravity.y, gravity.z).into_pyobject(py)?;
+        settings(&gravity, &self.options, &self.origin.words)
     }
 
+    /// Coordinates, (nq,), m and rad.
+    ///
+    /// x, y, z of the trunk's origin; roll, heading, pitch; joints.
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let q = {
@@ -384,11 +242,15 @@ impl Simulation {
         Ok(fresh(py, &q))
     }
 
+    /// Velocities, (nv,), m/s and rad/s.
+    ///
+    /// Velocity of the trunk, world frame; its angular velocity, world frame; joint rates.
     #[getter]
     fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         Ok(fresh(py, &self.open()?.state().v))
     }
 
+    /// Rotation matrix R_WB, (3, 3), from coordinates in the trunk to coordinates in the world.
     #[getter]
     fn rotation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let R = self
@@ -403,6 +265,19 @@ impl Simulation {
         )
     }
 
+    /// Sets coordinates and velocities.
+    ///
+    /// Time starts at 0, and the next step has no warm start.
+    ///
+    /// Args:
+    ///     q: Coordinates, (nq,).
+    ///     qdot: Velocity in the same coordinates, (nv,); at rest by default.
+    ///     coordinates: "state", as `q` and `v` return them, or "report".
+    ///
+    /// Raises:
+    ///     StateError: An array has a wrong length or an entry that is not finite. Nothing has
+    ///         changed.
+    ///     OptionError: `coordinates` is neither of the two.
     #[pyo3(signature = (q, qdot = None, *, coordinates = Given::MISSING), text_signature = "($self, q, qdot=None, *, coordinates='state')")]
     fn set_state(
         &self,
@@ -422,6 +297,13 @@ impl Simulation {
         Ok(())
     }
 
+    /// The state in the report's coordinates.
+    ///
+    /// Returns:
+    ///     The report's q, (nq,), and its rate, (nv,).
+    ///
+    /// Raises:
+    ///     StateError: The heading is ±90 degrees, where these coordinates are singular.
     fn report_state<'py>(&self, py: Python<'py>) -> PyResult<Pair<'py>> {
         let held = self.open()?;
         let state = held.state();
@@ -430,16 +312,27 @@ impl Simulation {
         Ok((fresh(py, &q), fresh(py, &qdot)))
     }
 
+    /// Commanded torques, within the model's limits, (n_wheels,), N m, positive forward.
     #[getter]
     fn wheel_torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         Ok(fresh(py, self.open()?.wheel_torques()))
     }
 
+    /// Mean torques of the drives over the last step, (n_wheels,), N m, positive forward.
+    ///
+    /// Each is the command within the line of the wheel's `Motor`; 0 before any step.
     #[getter]
     fn motor_torques<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         Ok(fresh(py, self.open()?.motor_torques()))
     }
 
+    /// Sets the driving torques; each saturates at its wheel's limit.
+    ///
+    /// Args:
+    ///     torques: Torques, (n_wheels,), N m, positive forward.
+    ///
+    /// Raises:
+    ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
     fn set_wheel_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
         let torques = vector(torques, Kind::Command, "torques")?;
         Ok(self
@@ -448,11 +341,20 @@ impl Simulation {
             .map_err(BorderError::from)?)
     }
 
+    /// Steering set-points, (n_wheels,), rad; 0 for wheels whose steering is not held.
     #[getter]
     fn steering<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         Ok(fresh(py, &self.open()?.steering()))
     }
 
+    /// Sets the steering set-points, which an implicit PD controller holds with the model's gains.
+    ///
+    /// Args:
+    ///     set_points: Angles, (n_wheels,), rad.
+    ///
+    /// Raises:
+    ///     CommandError: A wrong length, an entry that is not finite or beyond the wheel's limit,
+    ///         or one that is not 0 for a wheel that cannot be steered. Nothing has changed.
     fn set_steering(&self, set_points: &Bound<'_, PyAny>) -> PyResult<()> {
         let set_points = vector(set_points, Kind::Command, "set_points")?;
         Ok(self
@@ -461,6 +363,14 @@ impl Simulation {
             .map_err(BorderError::from)?)
     }
 
+    /// Sets torques and steering together: both, or neither where either is refused.
+    ///
+    /// Args:
+    ///     torques: As of `set_wheel_torques`, (n_wheels,), N m.
+    ///     set_points: As of `set_steering`, (n_wheels,), rad.
+    ///
+    /// Raises:
+    ///     CommandError: As of these two methods. Nothing has changed.
     fn set_commands(
         &self,
         torques: &Bound<'_, PyAny>,
@@ -474,6 +384,13 @@ impl Simulation {
             .map_err(BorderError::from)?)
     }
 
+    /// Sets torques about the joint axes, added to the wheels' and without a limit.
+    ///
+    /// Args:
+    ///     torques: Torques, (n_joints,), N m, in the order of `RoverModel.joint_names`.
+    ///
+    /// Raises:
+    ///     CommandError: A wrong length, or an entry that is not finite. Nothing has changed.
     fn set_joint_torques(&self, torques: &Bound<'_, PyAny>) -> PyResult<()> {
         let torques = vector(torques, Kind::Command, "torques")?;
         Ok(self
@@ -482,6 +399,17 @@ impl Simulation {
             .map_err(BorderError::from)?)
     }
 
+    /// Holds joints at set-points by an implicit PD controller.
+    ///
+    /// Args:
+    ///     joints: Name of a joint, or names.
+    ///     set_points: Angles, one for each joint, rad; where they are now by default.
+    ///     stiffness: Stiffness of the controllers, N m/rad; the model's by default.
+    ///     damping: Damping of the controllers, N m s/rad; the model's by default.
+    ///
+    /// Raises:
+    ///     CommandError: There is no such joint, the number of set-points differs, or a number is
+    ///         negative or not finite where it must not be. Nothing has changed.
     #[pyo3(signature = (joints, set_points = None, *, stiffness = None, damping = None))]
     fn hold(
         &self,
@@ -504,6 +432,13 @@ impl Simulation {
         Ok(held.map_err(BorderError::from)?)
     }
 
+    /// Releases joints that are held.
+    ///
+    /// Args:
+    ///     joints: Name of a joint, or names.
+    ///
+    /// Raises:
+    ///     CommandError: There is no such joint. Nothing has changed.
     fn release(&self, joints: &Bound<'_, PyAny>) -> PyResult<()> {
         Ok(self
             .open()?
@@ -511,46 +446,81 @@ impl Simulation {
             .map_err(BorderError::from)?)
     }
 
+    /// Holds all wheels where they are, as `hold` does, and sets their torques to 0.
     fn brake(&self) -> PyResult<()> {
         self.open()?.brake();
         Ok(())
     }
 
+    /// Takes n steps.
+    ///
+    /// Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
+    /// after a whole step, whose state stays. A contact solver that does not converge is no error:
+    /// the report says so.
+    ///
+    /// Args:
+    ///     n: Number of steps.
+    ///
+    /// Returns:
+    ///     How the steps went.
+    ///
+    /// Raises:
+    ///     StepError: A step could not be taken; the state before it stays.
+    ///     OptionError: `n` is not a count.
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
     fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
         let steps = n.count(1, Kind::Option, "n")?;
-        let mut held = self.open()?;
-        let (inner, mut watch) = (&mut *held, Watch::new());
-        let report = py.detach(|| inner.step_while(steps, &mut || watch.go_on()));
-        Ok(watch.result(report)?.into())
+        step(py, &mut *self.open()?, steps)
     }
 
+    /// The contacts of the last step.
     #[getter]
     fn contacts(&self) -> PyResult<Contacts> {
         Ok(Contacts::new(&self.model, self.open()?.contacts()))
     }
 
+    /// Gap of each wheel now, (n_wheels,), m, positive when apart.
     #[getter]
     fn wheel_gaps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let contacts = self.open()?.wheel_contacts();
         Ok(PyArray1::from_iter(py, contacts.iter().map(|c| c.gap)))
     }
 
+    /// Mean contact force on each wheel over the last step, (n_wheels, 3), N.
+    ///
+    /// Along n, t, b of the wheel's contact frame.
     #[getter]
     fn wheel_forces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         fresh_rows(py, &self.open()?.wheel_forces())
     }
 
+    /// Mean normal force over the last step on all solids but the wheels, N.
+    ///
+    /// It is large when the rover is high-centred.
     #[getter]
     fn trunk_force(&self) -> PyResult<f64> {
         Ok(self.open()?.body_force())
     }
 
+    /// Deepest overlap of a wheel or a box with the ground now, as a gap, m; 0 without overlap.
     #[getter]
     fn deepest_overlap(&self) -> PyResult<f64> {
         Ok(self.open()?.deepest_overlap())
     }
 
+    /// Everything that a controller looks at, as one new row.
+    ///
+    /// Args:
+    ///     target: The place (x, z) on the map that the entry `target` refers to, m; the origin by
+    ///         default.
+    ///     scan: Points of the height scan ahead and to the right of the trunk's origin in the
+    ///         heading frame, (n, 2), m; none by default.
+    ///
+    /// Returns:
+    ///     The row, whose parts `reading_layout` names.
+    ///
+    /// Raises:
+    ///     OptionError: An argument has a wrong shape or an entry that is not finite.
     #[pyo3(signature = (target = None, scan = None))]
     fn reading<'py>(
         &self,
@@ -568,6 +538,38 @@ impl Simulation {
         Ok(PyArray1::from_vec(py, row))
     }
 
+    /// The place of each quantity in a reading.
+    ///
+    /// - `pose`: q, with the angles of the wheels wrapped to one turn
+    /// - `body_velocity`: linear and angular velocity of the trunk in its own frame, m/s and rad/s
+    /// - `joint_rates`: rad/s
+    /// - `wheel_gaps`: m, positive when apart
+    /// - `wheel_contacts`: 1 where the wheel touches the ground, within 1 mm, else 0
+    /// - `normal_forces`: mean over the last step, N
+    /// - `tangential_forces`: mean over the last step, rolling and lateral for each wheel, N
+    /// - `ground_normal`: normal of the ground plane in the trunk's frame; 0 without one
+    /// - `target`: how far ahead of the trunk's origin and to its right the target is, and how far
+    ///   away, all horizontal, m
+    /// - `cos_tilt`: cosine of the angle between the trunk's y axis and up
+    /// - `speed`: horizontal speed of the trunk's origin, m/s
+    /// - `trunk_force`: as the property, N
+    /// - `slip_ratio`: mean over the wheels in contact of slip over the faster of rim and ground
+    /// - `work`: work through the wheel motors in the last call of `step`, driving or braking, J
+    /// - `positive_work`: the driving part of it, J
+    /// - `time`: s
+    /// - `solver`: of the last call of `step`: 1 if it did not converge, iterations, residual,
+    ///   contacts
+    /// - `heights`: height of the ground at the points of the scan above the trunk's origin, m; nan
+    ///   where there is no ground
+    ///
+    /// Args:
+    ///     n_scan: Number of points of the height scan.
+    ///
+    /// Returns:
+    ///     Slices by name.
+    ///
+    /// Raises:
+    ///     OptionError: `n_scan` is not a count.
     #[pyo3(signature = (n_scan = Given::MISSING), text_signature = "($self, n_scan=0)")]
     #[allow(clippy::needless_pass_by_value)] // what pyo3 hands over
     fn reading_layout<'py>(
@@ -579,10 +581,16 @@ impl Simulation {
         slices(py, &ReadingLayout::new(&self.model, n_scan))
     }
 
+    /// Kinetic and potential energy now.
     fn energy(&self) -> PyResult<Energy> {
         Ok(self.open()?.energy().into())
     }
 
+    /// Momentum of the rover.
+    ///
+    /// Returns:
+    ///     Linear momentum, (3,), kg m/s, and angular momentum about the origin, (3,), kg m²/s,
+    ///     world frame.
     fn momentum<'py>(&self, py: Python<'py>) -> PyResult<Pair<'py>> {
         let momentum = self.open()?.momentum();
         Ok((
@@ -591,40 +599,61 @@ impl Simulation {
         ))
     }
 
+    /// Mass centre, world frame, (3,), m.
     fn centre_of_mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         Ok(fresh(py, self.open()?.centre_of_mass().as_slice()))
     }
 
+    /// Named points and axes of the machine now, world frame, (3,) by name, as `RoverModel.tags`.
     fn tags<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         tags(py, &self.model, &self.open()?.kinematics())
     }
 
+    /// Origin (3,), m, and rotation matrix (3, 3) of every solid now, world frame, by name.
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         poses(py, &self.model, &self.open()?.kinematics())
     }
 
+    /// Everything that is needed to continue bit for bit.
     fn snapshot(&self) -> PyResult<Snapshot> {
         Ok(Snapshot {
             inner: self.open()?.snapshot(),
         })
     }
 
+    /// Goes back to a snapshot.
+    ///
+    /// Args:
+    ///     snapshot: A snapshot of a simulation of the same model.
+    ///
+    /// Raises:
+    ///     StateError: The snapshot belongs to another model or is damaged. Nothing has changed.
     fn restore(&self, snapshot: &Bound<'_, PyAny>) -> PyResult<()> {
         let snapshot = belonging::<Snapshot>(snapshot, "a Snapshot")?;
         let restored = self.open()?.restore(&snapshot.get().inner);
         Ok(restored.map_err(BorderError::from)?)
     }
 
-    /// W (n, n), free velocity (n,) and friction (n_c,) of the last step's friction-contact problem.
+    /// The friction-contact problem of the last step.
+    ///
+    /// Returns:
+    ///     Delassus operator W, (3 n_c, 3 n_c), 1/kg; free velocity, (3 n_c,), m/s; friction
+    ///     coefficients, (n_c,).
     fn last_problem<'py>(&self, py: Python<'py>) -> PyResult<Problem<'py>> {
-        let held = self.open()?;
-        let (W, q, mu) = held.last_problem();
-        let (n, size) = (mu.len(), 3 * mu.len());
-        let q = if n == 0 { &q[..0] } else { q };
-        let W = DMatrix::from_row_slice(size, size, &W[..size * size]);
-        Ok((fresh_matrix(py, &W)?, fresh(py, q), fresh(py, mu)))
+        problem(py, &*self.open()?)
     }
 
+    /// Measures where the time of a step goes, on a copy of this simulation.
+    ///
+    /// Args:
+    ///     n: Number of steps.
+    ///
+    /// Returns:
+    ///     Mean time a step of each part (`kinematics`, `mass_matrix`, `solve` and so on), µs.
+    ///
+    /// Raises:
+    ///     StepError: A step could not be taken.
+    ///     OptionError: `n` is not a count.
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1000)")]
     fn profile<'py>(&self, py: Python<'py>, n: Given<'_>) -> PyResult<Bound<'py, PyDict>> {
         let steps = n.count(1000, Kind::Option, "n")?;

@@ -1,25 +1,15 @@
-//! `Snapshot`.
+//! `Snapshot`, `PlanarSnapshot`, `SoilSnapshot`.
 
 use pyo3::PyTypeInfo;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use rover_core::simulation::Snapshot as CoreSnapshot;
+use rover_core::planar::{Ball, MirroredRover, TwoWheelRover};
+use rover_core::simulation::{GrainBed, PlanarScene, RoverScene, Snapshot as SnapshotOf};
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
 use crate::arguments;
 use crate::errors::{BorderError, Kind, Value};
-
-/// Everything that a simulation needs to continue bit for bit; picklable.
-#[pyclass(module = "rover_gym._core", frozen)]
-pub struct Snapshot {
-    pub inner: CoreSnapshot,
-}
-
-impl Snapshot {
-    fn bytes(&self) -> PyResult<Vec<u8>> {
-        postcard::to_stdvec(&self.inner).map_err(|e| damaged(&e).into())
-    }
-}
 
 /// A snapshot of the class that a simulation takes. `what`: the class with its article.
 pub fn belonging<'a, 'py, T: PyTypeInfo>(
@@ -31,7 +21,7 @@ pub fn belonging<'a, 'py, T: PyTypeInfo>(
 }
 
 /// Reads a snapshot from exactly these bytes.
-pub fn read<T: DeserializeOwned>(data: &Bound<'_, PyAny>) -> Result<T, BorderError> {
+fn read<T: DeserializeOwned>(data: &Bound<'_, PyAny>) -> Result<T, BorderError> {
     let data: &[u8] = data
         .extract()
         .map_err(|_| arguments::refused(data, Kind::State, "data", "bytes"))?;
@@ -43,7 +33,7 @@ pub fn read<T: DeserializeOwned>(data: &Bound<'_, PyAny>) -> Result<T, BorderErr
 }
 
 /// A snapshot whose bytes cannot be read.
-pub fn damaged(e: &postcard::Error) -> BorderError {
+fn damaged(e: &postcard::Error) -> BorderError {
     refused(&e.to_string())
 }
 
@@ -57,34 +47,79 @@ fn refused(reason: &str) -> BorderError {
     }
 }
 
-#[pymethods]
-impl Snapshot {
-    #[staticmethod]
-    fn from_bytes(data: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(Self { inner: read(data)? })
-    }
+/// A snapshot of a planar simulation, by its machine.
+#[derive(PartialEq, Serialize, Deserialize)]
+pub enum OfPlanar {
+    Ball(SnapshotOf<PlanarScene<3, Ball>>),
+    TwoWheelRover(SnapshotOf<PlanarScene<5, TwoWheelRover>>),
+    MirroredRover(SnapshotOf<PlanarScene<7, MirroredRover<7>>>),
+}
 
-    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        Ok(PyBytes::new(py, &self.bytes()?))
-    }
+/// A class of snapshots: all of them are read, written, compared and pickled alike.
+macro_rules! snapshot_class {
+    ($(#[doc = $doc:literal])* $class:ident, $inner:ty) => {
+        $(#[doc = $doc])*
+        #[pyclass(module = "rover_gym.mechanics", frozen)]
+        pub struct $class {
+            pub inner: $inner,
+        }
 
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other
-            .cast::<Self>()
-            .is_ok_and(|o| o.get().inner == self.inner)
-    }
+        #[pymethods]
+        impl $class {
+            /// Reads a snapshot.
+            ///
+            /// Args:
+            ///     data: What `to_bytes` returned.
+            ///
+            /// Returns:
+            ///     The snapshot.
+            ///
+            /// Raises:
+            ///     StateError: The bytes are not those of a snapshot.
+            #[staticmethod]
+            fn from_bytes(data: &Bound<'_, PyAny>) -> PyResult<Self> {
+                Ok(Self { inner: read(data)? })
+            }
 
-    fn __hash__(&self) -> PyResult<u64> {
-        use std::hash::{DefaultHasher, Hasher};
-        let mut hasher = DefaultHasher::new();
-        hasher.write(&self.bytes()?);
-        Ok(hasher.finish())
-    }
+            /// The snapshot as bytes, as `from_bytes` reads them.
+            fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+                let bytes = postcard::to_stdvec(&self.inner).map_err(|e| damaged(&e))?;
+                Ok(PyBytes::new(py, &bytes))
+            }
 
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
-        let bytes = slf.get().to_bytes(slf.py())?;
-        Ok((slf.get_type().getattr("from_bytes")?, (bytes,)))
-    }
+            fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+                let other = other.cast::<Self>();
+                other.is_ok_and(|o| o.get().inner == self.inner)
+            }
+
+            fn __hash__(&self) -> PyResult<u64> {
+                use std::hash::{DefaultHasher, Hasher};
+                let mut hasher = DefaultHasher::new();
+                hasher.write(&postcard::to_stdvec(&self.inner).map_err(|e| damaged(&e))?);
+                Ok(hasher.finish())
+            }
+
+            fn __reduce__<'py>(
+                slf: &Bound<'py, Self>,
+            ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+                let bytes = slf.get().to_bytes(slf.py())?;
+                Ok((slf.get_type().getattr("from_bytes")?, (bytes,)))
+            }
+        }
+    };
+}
+
+snapshot_class! {
+    /// Everything that a simulation needs to continue bit for bit. Picklable.
+    Snapshot, SnapshotOf<RoverScene>
+}
+
+snapshot_class! {
+    /// Everything that a planar simulation needs to continue bit for bit. Picklable.
+    PlanarSnapshot, OfPlanar
+}
+
+snapshot_class! {
+    /// Everything that a soil needs to continue bit for bit. Picklable.
+    SoilSnapshot, SnapshotOf<GrainBed>
 }

@@ -16,7 +16,16 @@ use crate::plane::Plane;
 const MAX_FILE: usize = 1 << 28;
 
 /// Fixed spheres, with or without a plane under them. Immutable.
-#[pyclass(module = "rover_gym._core", frozen, from_py_object)]
+///
+/// Args:
+///     centres: Centres of the spheres, (n, 3), m.
+///     radii: Their radii, (n,), m.
+///     ground: The plane under them; none by default.
+///
+/// Raises:
+///     TerrainError: An array has a wrong shape, an entry is not finite or out of its range, or
+///         there are no spheres or too many of them.
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct SphereField {
     pub inner: Arc<CoreField>,
@@ -135,7 +144,18 @@ impl SphereField {
         Ok(build(py, &centres, &radii, plane(ground)?)?)
     }
 
-    /// Reads a CSV file with the header x,y,z,radius (m).
+    /// Reads spheres from a CSV file with the header `x,y,z,radius`, in m.
+    ///
+    /// Args:
+    ///     path: Path of the file.
+    ///     ground: The plane under the spheres; none by default.
+    ///
+    /// Returns:
+    ///     The field.
+    ///
+    /// Raises:
+    ///     TerrainError: The file does not describe spheres; the message names the path.
+    ///     OSError: The file cannot be read.
     #[staticmethod]
     #[pyo3(signature = (path, ground = None))]
     fn from_file(
@@ -191,7 +211,11 @@ impl SphereField {
         build(py, &centres, &radii, ground).map_err(|e| in_file(e, &path).into())
     }
 
-    /// The report's Fig. 6.6: 50 x 25 spheres of radius 0.5 m on a wave, without a plane.
+    /// The wavy ground of the 2010 report's Fig. 6.6.
+    ///
+    /// 50 x 25 spheres of radius 0.5 m, without a plane.
+    ///
+    /// Source: Yang 2010, Fig. 6.6.
     #[staticmethod]
     fn rug() -> Self {
         Self {
@@ -199,7 +223,27 @@ impl SphereField {
         }
     }
 
-    /// Rocks with the size-frequency distribution of Mars (Golombek and Rapp 1997) on a plane.
+    /// Rocks on a plane, with the size-frequency distribution of rocks on Mars.
+    ///
+    /// Args:
+    ///     abundance: Fraction of the ground that rocks of all sizes cover, 0 to 0.5.
+    ///     area: Corners x_min, z_min, x_max, z_max of the rectangle, m.
+    ///     seed: Seed of the random numbers; equal seeds give equal rocks.
+    ///     max_diameter: Largest diameter, m.
+    ///     min_diameter: Smallest diameter, m; the number of rocks grows without bound as it
+    ///         shrinks.
+    ///     burial: Fraction of its diameter that a rock is sunk into the ground, 0 to 0.5, or a
+    ///         range from which it is drawn for each rock; 0.5 by default.
+    ///     ground: The plane; flat ground at height 0 by default.
+    ///     clear: Circles x, z, radius that no rock reaches into, (n, 3), m; none by default.
+    ///
+    /// Returns:
+    ///     The field.
+    ///
+    /// Raises:
+    ///     TerrainError: An argument is out of its range.
+    ///
+    /// Source: Golombek and Rapp 1997.
     #[staticmethod]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
     #[pyo3(signature = (abundance, area, seed, *, max_diameter = Given::MISSING, min_diameter = Given::MISSING, burial = None, ground = None,
@@ -244,6 +288,7 @@ impl SphereField {
         })
     }
 
+    /// Centres of the spheres, (n, 3), m.
     #[getter]
     fn centres<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let centres: Vec<[f64; 3]> = self
@@ -255,17 +300,28 @@ impl SphereField {
         fresh_rows(py, &centres)
     }
 
+    /// Radii of the spheres, (n,), m.
     #[getter]
     fn radii<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_iter(py, self.inner.spheres().iter().map(|s| s.radius))
     }
 
+    /// The plane under the spheres, or None.
     #[getter]
     fn ground(&self) -> Option<Plane> {
         self.inner.ground().map(|plane| Plane { inner: *plane })
     }
 
-    /// (m,) height y of the visible surface at the points (x, z) (m, 2); nan where there is none.
+    /// The height of the visible surface at places of the map.
+    ///
+    /// Args:
+    ///     points: Places (x, z), (m, 2), m.
+    ///
+    /// Returns:
+    ///     Heights y, (m,), m; nan where there is no ground.
+    ///
+    /// Raises:
+    ///     TerrainError: `points` has a wrong shape.
     fn heights<'py>(
         &self,
         py: Python<'py>,

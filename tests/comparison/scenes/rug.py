@@ -9,8 +9,8 @@ import numpy as np
 
 from comparison.scene import Array, Phase, RoverScene, Trace
 from rover_gym import SphereField
-from rover_gym.report import FRONT_STEERING, GRAVITY, report_model
-from rover_gym.rug import FRICTION, START, WHEEL_TORQUE
+from rover_gym.reproduction.report_rover import FRONT_STEERING, GRAVITY, report_model
+from rover_gym.reproduction.sphere_rug import FRICTION, START, WHEEL_TORQUE
 
 
 def scene() -> RoverScene:

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use rover_core::geometry::{SphereField, Terrain};
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{Configuration, JointKind, Model, ModelDescription, SolidDescription};
-use rover_core::simulation::Simulation;
+use rover_core::simulation::RoverSimulation;
 
 /// A solid of 1 kg with a joint; everything else by default.
 pub fn solid(name: &str, parent: Option<&str>, joint: JointKind) -> SolidDescription {
@@ -50,8 +50,8 @@ pub fn options(time_step: f64, variant: Variant) -> StepOptions {
     }
 }
 
-pub fn simulation(model: Model, options: StepOptions) -> Simulation {
-    Simulation::new(Arc::new(model), nothing(), options).unwrap()
+pub fn simulation(model: Model, options: StepOptions) -> RoverSimulation {
+    RoverSimulation::new(Arc::new(model), nothing(), options).unwrap()
 }
 
 /// A machine somewhere, moving somehow: smooth functions of the seed.
@@ -116,7 +116,7 @@ pub const ROOTS: [JointKind; 5] = [
 ];
 
 /// Total energy with gravity g, J.
-pub fn energy(simulation: &Simulation) -> f64 {
+pub fn energy(simulation: &RoverSimulation) -> f64 {
     simulation.energy().total()
 }
 

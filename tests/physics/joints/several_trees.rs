@@ -78,7 +78,7 @@ fn a_stone_lies_beside_a_rover() {
     let model = Arc::new(Model::from_description(description).unwrap());
     assert_eq!(model.nv(), 27);
     let ground = Arc::new(Plane::ground());
-    let mut run = rover_core::simulation::Simulation::new(
+    let mut run = rover_core::simulation::RoverSimulation::new(
         model.clone(),
         ground,
         options(5e-3, Variant::Linearised),

@@ -9,10 +9,8 @@ use rover_core::multibody::bias::BiasScratch;
 use rover_core::multibody::{
     Kinematics, MassMatrix, Model, ModelDescription, Motor, bias, coordinates,
 };
-use rover_core::planar::{
-    ContactRule, Line, MirroredRover, MirroredRoverSimulation, PlanarError, PlanarMachine, Sine,
-};
-use rover_core::simulation::Simulation;
+use rover_core::planar::{ContactRule, Line, MirroredRover, PlanarError, PlanarMachine, Sine};
+use rover_core::simulation::{MirroredRoverSimulation, RoverSimulation};
 
 use crate::scenes::{G, VARIANTS, options};
 
@@ -110,7 +108,7 @@ fn largest_distance(
     q[1] = 0.4 * (1.0 + slope * slope).sqrt();
     q[2] = slope.atan();
     let start = &P * q;
-    let mut full = Simulation::new(
+    let mut full = RoverSimulation::new(
         model,
         Arc::new(Plane::new(normal.into(), 0.0).unwrap()),
         options.clone(),
@@ -191,7 +189,7 @@ fn the_torques_are_those_that_the_motors_can_give() {
         MirroredRoverSimulation::new(planar(), ground, rule, options(G, 0.7, 0.0, 0.005)).unwrap();
     rover.set_inputs(&[1e3, -1e3, 10.0]).unwrap();
     // Once they stood there as they were given, and what acted was another torque.
-    assert_eq!(rover.inputs(), [150.0, -150.0, 10.0]);
+    assert_eq!(*rover.command(), [150.0, -150.0, 10.0]);
 }
 
 /// Wheels in the valleys of a steep wave, held by friction, were to bounce off both slopes at once: no velocity does, and thousands of

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use rover_core::integrator::{Stabilisation, StepOptions, Variant};
-use rover_core::planar::{Ball, BallSimulation, ContactRule, Ground, Line};
+use rover_core::planar::{Ball, ContactRule, Ground, Line};
+use rover_core::simulation::BallSimulation;
 
 pub const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
 pub const G: f64 = 9.81;
@@ -43,4 +44,9 @@ pub fn count(duration: f64, time_step: f64) -> usize {
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let n = (duration / time_step).round() as usize;
     n
+}
+
+/// Length of a velocity.
+pub fn speed(v: &[f64]) -> f64 {
+    v.iter().map(|v| v * v).sum::<f64>().sqrt()
 }

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use rover_core::integrator::{StepOptions, Variant};
-use rover_core::planar::{Ball, BallSimulation, ContactRule, Ground, Line, Sine};
+use rover_core::planar::{Ball, ContactRule, Ground, Line, Sine};
+use rover_core::simulation::BallSimulation;
 
 use crate::scenes::{count, options, unprojected};
 

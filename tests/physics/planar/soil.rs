@@ -5,10 +5,10 @@ use std::sync::Arc;
 use rover_core::integrator::{Stabilisation, StepOptions};
 use rover_core::nalgebra::{Vector2, Vector3};
 use rover_core::planar::soil::{
-    Disks, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, SoilSetupError,
-    SoilSimulation, Wall, soil_options,
+    Disks, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, Wall,
 };
 use rover_core::planar::{Line, PlanarWheel, TwoWheelRover};
+use rover_core::simulation::{SoilSetupError, SoilSimulation, soil_options};
 use rover_core::solver::Method;
 
 fn box_of(width: f64) -> Vec<Wall> {
@@ -46,7 +46,7 @@ fn soil(
 /// Velocities drawn from a recurrence, in [−speed, speed].
 fn shake(soil: &mut SoilSimulation, speed: f64) {
     let mut x = 0.37_f64;
-    let n = 3 * soil.scene().disks.len();
+    let n = 3 * soil.soil().disks.len();
     let v: Vec<f64> = (0..n)
         .map(|k| {
             x = 3.99 * x * (1.0 - x);
@@ -54,7 +54,7 @@ fn shake(soil: &mut SoilSimulation, speed: f64) {
             arm * speed * (2.0 * x - 1.0)
         })
         .collect();
-    let q = soil.q().to_vec();
+    let q = soil.q().clone();
     soil.set_state(&q, &v).expect("a state");
 }
 
@@ -147,7 +147,7 @@ fn disks_that_are_shaken_and_fall_stay_out_of_one_another() {
     shake(&mut soil, 0.5);
     for step in 0..300 {
         soil.step(1).expect("finite");
-        let share = soil.penetration() / soil.scene().disks.smallest();
+        let share = soil.penetration() / soil.soil().disks.smallest();
         assert!(share < 0.01, "step {step}: {share}");
     }
 }
@@ -244,9 +244,10 @@ fn a_disk_on_a_slope_rolls_below_and_slides_above_three_times_the_friction() {
 fn the_floor_carries_the_weight() {
     let mut soil = soil(&packing(200, 12, 4), |_, _| {});
     soil.step(800).expect("finite");
-    let weight: f64 = 9.81 * soil.scene().disks.mass().iter().sum::<f64>();
+    let weight: f64 = 9.81 * soil.soil().disks.mass().iter().sum::<f64>();
     let force: f64 = soil
         .contacts()
+        .iter()
         .filter(|c| !c.contact.is_with_disk())
         .map(|c| (c.contact.n * c.impulse[0] + c.contact.t() * c.impulse[1]).y * 1e3)
         .sum();
@@ -283,16 +284,16 @@ fn dropped(sleep: Option<SleepOptions>) -> (SoilSimulation, usize) {
     let mut bed = soil(&packing, |options, _| options.solver.tolerance = 1e-6);
     bed.step(700).expect("finite");
     let (mut radius, mut mass) = (
-        bed.scene().disks.radius().to_vec(),
-        bed.scene().disks.mass().to_vec(),
+        bed.soil().disks.radius().to_vec(),
+        bed.soil().disks.mass().to_vec(),
     );
     radius.push(0.03);
     mass.push(3.0);
-    let mut q = bed.q().to_vec();
+    let mut q = bed.q().clone();
     q.extend([0.2, 0.6, 0.0]);
     let scene = SoilScene {
         disks: Disks::new(radius, mass).expect("disks"),
-        ..(**bed.scene()).clone()
+        ..(**bed.soil()).clone()
     };
     let options = bed.options().clone();
     let mut soil = SoilSimulation::new(Arc::new(scene), options, sleep, q).expect("a soil");
@@ -326,10 +327,10 @@ fn sleeping_costs_less() {
     let mut soil = soil(&packing, |_, _| {});
     soil.step(1200).expect("finite");
     let mut sleeping = SoilSimulation::new(
-        soil.scene().clone(),
+        soil.soil().clone(),
         soil.options().clone(),
         Some(SleepOptions::default()),
-        soil.q().to_vec(),
+        soil.q().clone(),
     )
     .expect("a soil");
     sleeping.step(400).expect("finite");
@@ -341,7 +342,7 @@ fn sleeping_costs_less() {
         contacts < 250,
         "{contacts} of more than 400 contacts are left"
     );
-    let before = sleeping.q().to_vec();
+    let before = sleeping.q().clone();
     sleeping.wake();
     assert!(sleeping.asleep().iter().all(|a| !a));
     sleeping.step(5).expect("finite");
@@ -362,10 +363,10 @@ fn what_is_left_after_a_removal_keeps_its_load_and_old_snapshots_do_not_fit() {
         let mut bed = soil(&packing, |_, _| {});
         bed.step(900).expect("finite");
         let mut soil = SoilSimulation::new(
-            bed.scene().clone(),
+            bed.soil().clone(),
             bed.options().clone(),
             sleep,
-            bed.q().to_vec(),
+            bed.q().clone(),
         )
         .expect("a soil");
         soil.step(300).expect("finite");
@@ -383,7 +384,7 @@ fn what_is_left_after_a_removal_keeps_its_load_and_old_snapshots_do_not_fit() {
             .map(|i| [soil.q()[3 * i], soil.q()[3 * i + 1]])
             .collect();
         soil.remove(&marked).expect("others are left");
-        assert_eq!(soil.scene().disks.len(), 119);
+        assert_eq!(soil.soil().disks.len(), 119);
         assert!(soil.restore(&snapshot).is_err(), "of another soil");
         soil.step(20).expect("finite");
         for before in lowest {
@@ -392,7 +393,7 @@ fn what_is_left_after_a_removal_keeps_its_load_and_old_snapshots_do_not_fit() {
             assert!(nearest.fold(f64::MAX, f64::min) < 1e-4, "it stays");
         }
         assert!(soil.remove(&[true; 119]).is_err(), "one must be left");
-        assert_eq!(soil.scene().disks.len(), 119);
+        assert_eq!(soil.soil().disks.len(), 119);
     }
 }
 
@@ -419,11 +420,11 @@ fn the_rover_drives_over_the_original_soil() {
     };
     let mut bed = SoilSimulation::new(Arc::new(scene), options.clone(), None, q).expect("a soil");
     bed.step(300).expect("finite");
-    let mut q = bed.q().to_vec();
+    let mut q = bed.q().clone();
     q.extend([0.7, 0.31, 0.0, 0.0, 0.0]);
     let scene = SoilScene {
         machine: Some(Arc::new(rover())),
-        ..(**bed.scene()).clone()
+        ..(**bed.soil()).clone()
     };
     let mut soil = SoilSimulation::new(Arc::new(scene), options, None, q).expect("a soil");
     soil.step(300).expect("finite");
@@ -438,7 +439,7 @@ fn the_rover_drives_over_the_original_soil() {
         "{weight} N"
     );
     soil.set_inputs(&[50.0, 50.0]).expect("torques");
-    let n = 3 * soil.scene().disks.len();
+    let n = 3 * soil.soil().disks.len();
     let from = soil.q()[n];
     let snapshot = soil.snapshot();
     soil.step(500).expect("finite");
@@ -448,10 +449,10 @@ fn the_rover_drives_over_the_original_soil() {
         soil.q()[n] - from
     );
     assert!(soil.penetration() < 0.01 * 0.016);
-    let end = soil.q().to_vec();
+    let end = soil.q().clone();
     soil.restore(&snapshot).expect("its own");
     soil.step(500).expect("finite");
-    assert_eq!(soil.q(), end, "a snapshot continues bit for bit");
+    assert_eq!(*soil.q(), end, "a snapshot continues bit for bit");
 }
 
 #[test]

@@ -5,13 +5,15 @@ use std::sync::Arc;
 use rover_core::geometry::{Plane, Rocks, SphereField, Terrain};
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Configuration, Model};
-use rover_core::simulation::{Batch, BatchError, CommandError, Look, ReadingLayout, Simulation};
+use rover_core::simulation::{
+    Batch, BatchError, CommandError, Look, ReadingLayout, RoverSimulation,
+};
 
 const SCAN: [[f64; 2]; 3] = [[1.0, -0.5], [0.0, 0.0], [-0.3, 0.8]];
 const TARGET: [f64; 2] = [3.0, -4.0];
 
 /// A rover at rest on its own ground, a field of rocks for odd numbers.
-fn rover(model: &Arc<Model>, i: usize) -> Simulation {
+fn rover(model: &Arc<Model>, i: usize) -> RoverSimulation {
     let field = Rocks {
         abundance: 0.1,
         area: [20.0, 20.0],
@@ -27,14 +29,14 @@ fn rover(model: &Arc<Model>, i: usize) -> Simulation {
         friction_coefficient: 0.5 + 0.05 * i as f64,
         ..StepOptions::default()
     };
-    let mut simulation = Simulation::new(model.clone(), terrain, options).unwrap();
+    let mut simulation = RoverSimulation::new(model.clone(), terrain, options).unwrap();
     let mut start = Configuration::zero(model);
     start.position.y = 0.8;
     simulation.set_state(start, vec![0.0; model.nv()]);
     simulation
 }
 
-fn rovers(n: usize) -> Vec<Simulation> {
+fn rovers(n: usize) -> Vec<RoverSimulation> {
     let model = Arc::new(Model::rover());
     (0..n).map(|i| rover(&model, i)).collect()
 }
@@ -142,7 +144,11 @@ fn rovers_that_are_not_active_keep_still() {
 #[test]
 fn a_bad_command_moves_nobody() {
     let mut batch = batch(2, 2);
-    let before: Vec<_> = batch.rovers().iter().map(Simulation::snapshot).collect();
+    let before: Vec<_> = batch
+        .rovers()
+        .iter()
+        .map(RoverSimulation::snapshot)
+        .collect();
     let mut tau = vec![0.0; 12];
     tau[9] = f64::NAN;
     let mut rows = vec![0.0; 2 * batch.layout().size()];
@@ -154,7 +160,11 @@ fn a_bad_command_moves_nobody() {
     };
     assert_eq!(index, 1);
     assert!(matches!(error, CommandError::NotFinite { index: 3, .. }));
-    let after: Vec<_> = batch.rovers().iter().map(Simulation::snapshot).collect();
+    let after: Vec<_> = batch
+        .rovers()
+        .iter()
+        .map(RoverSimulation::snapshot)
+        .collect();
     assert_eq!(before, after);
 }
 
@@ -263,7 +273,7 @@ fn the_work_of_the_motors_is_the_energy_gained() {
         time_step: 1e-4,
         ..StepOptions::default()
     };
-    let mut sim = Simulation::new(model.clone(), Arc::new(Plane::ground()), options).unwrap();
+    let mut sim = RoverSimulation::new(model.clone(), Arc::new(Plane::ground()), options).unwrap();
     let mut start = Configuration::zero(&model);
     start.position.y = 100.0;
     sim.set_state(start, vec![0.0; model.nv()]);

@@ -4,12 +4,12 @@ use nalgebra::Vector3;
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{Model, coordinates};
-use rover_core::simulation::Simulation;
+use rover_core::simulation::RoverSimulation;
 
 use crate::scenes::{VARIANTS, count, order, simulation};
 
 /// The rover tumbling high above the ground with all joints turning.
-fn tumbling(variant: Variant, time_step: f64, gravity: Vector3<f64>) -> Simulation {
+fn tumbling(variant: Variant, time_step: f64, gravity: Vector3<f64>) -> RoverSimulation {
     let options = StepOptions {
         variant,
         time_step,

@@ -1,12 +1,12 @@
 //! The report's section 6.1 against Siconos (`tests/golden/siconos_plane_*.json`; the scene is in their `meta`).
 
 use rover_core::integrator::{Stabilisation, Variant};
-use rover_core::simulation::Simulation;
+use rover_core::simulation::RoverSimulation;
 
 use crate::scenes::{VARIANTS, count, golden, numbers, report_scene};
 
 /// Distance (m) of the trunk from the reference's at the end of 10 s, and the deepest gap on the way.
-fn run(mut simulation: Simulation, reference: &str) -> (f64, f64) {
+fn run(mut simulation: RoverSimulation, reference: &str) -> (f64, f64) {
     let steps = count(10.0, simulation.options().time_step);
     let mut deepest = 0.0_f64;
     for _ in 0..200 {

@@ -9,7 +9,7 @@ use rover_core::multibody::{
     MAX_SOLIDS, Model, ModelDescription, ModelError, Shape, SolidDescription,
 };
 use rover_core::nalgebra::{Quaternion, UnitQuaternion};
-use rover_core::simulation::{Simulation, SnapshotError};
+use rover_core::simulation::{RoverSimulation, SnapshotError};
 
 /// Any double that a description may hold as a place, the shortest and the longest to write among them.
 fn place() -> impl Strategy<Value = f64> {
@@ -56,9 +56,9 @@ proptest! {
     }
 }
 
-fn standing(model: Model) -> Simulation {
+fn standing(model: Model) -> RoverSimulation {
     let ground = Arc::new(Plane::ground());
-    Simulation::new(Arc::new(model), ground, StepOptions::default()).unwrap()
+    RoverSimulation::new(Arc::new(model), ground, StepOptions::default()).unwrap()
 }
 
 /// Every number of a description tells a machine from others: a snapshot of one is none of the other.

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use rover_core::geometry::Plane;
 use rover_core::integrator::{Stabilisation, StepOptions, StepReport, Variant};
 use rover_core::multibody::{Hold, Model, ModelDescription, coordinates};
-use rover_core::simulation::Simulation;
+use rover_core::simulation::RoverSimulation;
 
 /// Both time-stepping schemes.
 pub const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
@@ -35,22 +35,22 @@ pub fn simulation(
     options: StepOptions,
     q: &[f64],
     v: &[f64],
-) -> Simulation {
-    let mut simulation = Simulation::new(Arc::new(model), Arc::new(plane), options).unwrap();
+) -> RoverSimulation {
+    let mut simulation = RoverSimulation::new(Arc::new(model), Arc::new(plane), options).unwrap();
     let configuration = coordinates::from_public(simulation.model(), q).unwrap();
     simulation.set_state(configuration, v.to_vec());
     simulation
 }
 
 /// The rover at rest on flat ground, touching it.
-pub fn at_rest(options: StepOptions) -> Simulation {
+pub fn at_rest(options: StepOptions) -> RoverSimulation {
     let mut q = [0.0; 21];
     q[1] = 0.35;
     simulation(Model::rover(), Plane::ground(), options, &q, &[0.0; 21])
 }
 
 /// The rover on a slope that rises along x, touching it.
-pub fn on_slope(degrees: f64, options: StepOptions) -> Simulation {
+pub fn on_slope(degrees: f64, options: StepOptions) -> RoverSimulation {
     let a = degrees.to_radians();
     let mut q = [0.0; 21];
     (q[0], q[1], q[5]) = (-0.35 * a.sin(), 0.35 * a.cos(), a);
@@ -110,7 +110,11 @@ fn set_steering_gains(description: &mut ModelDescription, stiffness: f64, dampin
 }
 
 /// The report's section 6.1, motors on.
-pub fn report_scene(variant: Variant, time_step: f64, stabilisation: Stabilisation) -> Simulation {
+pub fn report_scene(
+    variant: Variant,
+    time_step: f64,
+    stabilisation: Stabilisation,
+) -> RoverSimulation {
     let plane = Plane::new(
         [
             -0.099_334_665_397_530_61,

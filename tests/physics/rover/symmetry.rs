@@ -4,11 +4,11 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rover_core::geometry::Plane;
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Configuration, Model};
-use rover_core::simulation::Simulation;
+use rover_core::simulation::RoverSimulation;
 
 use crate::scenes::simulation;
 
-fn driving(heading: f64, steering: f64) -> Simulation {
+fn driving(heading: f64, steering: f64) -> RoverSimulation {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), heading);
     let n = turn * Vector3::new(-0.1, 1.0, 0.0);
     let plane = Plane::new(n.into(), 0.0).unwrap();

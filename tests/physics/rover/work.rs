@@ -5,11 +5,11 @@ use std::sync::Arc;
 use rover_core::geometry::Plane;
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Configuration, Model, ModelDescription};
-use rover_core::simulation::{Simulation, SnapshotError};
+use rover_core::simulation::{RoverSimulation, SnapshotError};
 
 use crate::scenes::{VARIANTS, at_rest, on_slope};
 
-fn driving(options: StepOptions) -> Simulation {
+fn driving(options: StepOptions) -> RoverSimulation {
     let mut simulation = at_rest(options);
     simulation
         .set_steering(&[-0.2, -0.2, 0.0, 0.2, 0.0, 0.2])
@@ -47,7 +47,7 @@ fn driving_takes_few_solver_iterations() {
 }
 
 /// The rover on a slope of 10 degrees with all wheels steered about one centre at a distance of 1 / curvature.
-fn turning(curvature: f64, options: StepOptions) -> Simulation {
+fn turning(curvature: f64, options: StepOptions) -> RoverSimulation {
     let mut simulation = on_slope(10.0, options);
     let places = [
         (0.66, -0.53),
@@ -100,7 +100,7 @@ fn every_tolerance_comes_to_an_end() {
         simulation.set_wheel_torques(&[45.0; 6]).unwrap();
         let report = simulation.step(100).unwrap();
         assert!(report.iterations < 100 * 600, "{tolerance}: {report:?}");
-        assert!(simulation.state().is_finite());
+        assert!(simulation.state().configuration.is_finite());
     }
 }
 
@@ -144,7 +144,8 @@ fn a_snapshot_of_another_machine_is_refused() {
             .with_locked_joints(&[("front_axle".into(), 0.0)])
             .unwrap(),
     );
-    let other = Simulation::new(welded, Arc::new(Plane::ground()), StepOptions::default()).unwrap();
+    let other =
+        RoverSimulation::new(welded, Arc::new(Plane::ground()), StepOptions::default()).unwrap();
     let before = simulation.snapshot();
     assert_eq!(
         simulation.restore(&other.snapshot()),
@@ -154,7 +155,8 @@ fn a_snapshot_of_another_machine_is_refused() {
     let mut description = ModelDescription::rover();
     description.wheels[0].contact_radius = Some(0.2);
     let model = Arc::new(Model::from_description(description).unwrap());
-    let other = Simulation::new(model, Arc::new(Plane::ground()), StepOptions::default()).unwrap();
+    let other =
+        RoverSimulation::new(model, Arc::new(Plane::ground()), StepOptions::default()).unwrap();
     assert_eq!(
         simulation.restore(&other.snapshot()),
         Err(SnapshotError::OtherModel)
@@ -173,7 +175,7 @@ fn models_and_terrains_are_shared_between_threads() {
             let (model, ground) = (model.clone(), ground.clone());
             std::thread::spawn(move || {
                 let mut simulation =
-                    Simulation::new(model.clone(), ground, StepOptions::default()).unwrap();
+                    RoverSimulation::new(model.clone(), ground, StepOptions::default()).unwrap();
                 let mut start = Configuration::zero(&model);
                 start.position.y = 0.35;
                 simulation.set_state(start, vec![0.0; model.nv()]);

@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use rover_core::geometry::{Plane, SphereField};
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Model, ModelDescription};
-use rover_core::simulation::Simulation;
+use rover_core::simulation::RoverSimulation;
 
 use crate::scenes::simulation;
 
@@ -58,7 +58,7 @@ fn climbs(height: f64, mu: f64) -> bool {
     let up = R - height + EDGE;
     let back = ((R + EDGE).powi(2) - up * up).sqrt();
     let model = driven_wheel();
-    let mut wheel: Simulation = simulation(
+    let mut wheel: RoverSimulation = simulation(
         model,
         Plane::ground(),
         options.clone(),
@@ -67,7 +67,8 @@ fn climbs(height: f64, mu: f64) -> bool {
     );
     let mut start = wheel.state().configuration.clone();
     start.position = Vector3::new(-back, R - height, 0.0);
-    wheel = Simulation::new(wheel.model().clone(), std::sync::Arc::new(field), options).unwrap();
+    wheel =
+        RoverSimulation::new(wheel.model().clone(), std::sync::Arc::new(field), options).unwrap();
     wheel.set_state(start, vec![0.0; 7]);
     // A little more torque than holds the wheel on the edge
     let sine = back / (R + EDGE);

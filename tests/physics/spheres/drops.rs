@@ -6,7 +6,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rover_core::geometry::SphereField;
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Configuration, Model};
-use rover_core::simulation::Simulation;
+use rover_core::simulation::RoverSimulation;
 
 use crate::sphere_scenes::{Random, rocks};
 
@@ -23,7 +23,7 @@ struct Worst {
 }
 
 /// Work of the last step's impulses, J: the kinetic energy that they make, `pᵀ (u⁺ + u_free) / 2 = pᵀ u⁺ − pᵀ W p / 2`.
-fn contact_work(simulation: &Simulation) -> f64 {
+fn contact_work(simulation: &RoverSimulation) -> f64 {
     let active = simulation.contacts();
     let (W, _, _) = simulation.last_problem();
     let p: Vec<f64> = active.iter().flat_map(|a| a.impulse).collect();
@@ -55,7 +55,7 @@ fn drop_often(drops: u64, restitution: f64, friction_coefficient: f64) -> Worst 
     };
     for _ in 0..drops {
         let mut simulation =
-            Simulation::new(model.clone(), field.clone(), options.clone()).unwrap();
+            RoverSimulation::new(model.clone(), field.clone(), options.clone()).unwrap();
         let tilt = [
             random.between(-0.6, 0.6),
             random.between(-3.1, 3.1),
@@ -71,7 +71,7 @@ fn drop_often(drops: u64, restitution: f64, friction_coefficient: f64) -> Worst 
             ),
             attitude,
             joints: (0..15).map(|_| random.between(-0.2, 0.2)).collect(),
-            ..Configuration::zero(&Model::rover())
+            ..Configuration::zero(&model)
         };
         let mut v: Vec<f64> = (0..21).map(|_| random.between(-0.5, 0.5)).collect();
         v[1] = random.between(-4.0, -2.0);

@@ -5,7 +5,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 use rover_core::integrator::StepOptions;
-use rover_core::simulation::Simulation;
+use rover_core::simulation::RoverSimulation;
 
 use crate::scenes::VARIANTS;
 use crate::sphere_scenes::{WHEEL_MASS, WHEEL_RADIUS, field, lone_wheel, placed};
@@ -14,7 +14,7 @@ const R: f64 = WHEEL_RADIUS;
 const G: f64 = 9.81;
 
 /// Mean normal forces of the last step by primitive, N.
-fn normal_forces(simulation: &Simulation) -> Vec<(u32, f64)> {
+fn normal_forces(simulation: &RoverSimulation) -> Vec<(u32, f64)> {
     let h = simulation.options().time_step;
     let mut forces: Vec<(u32, f64)> = simulation
         .contacts()

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use rover_core::geometry::{Rocks, SphereField, Terrain};
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Configuration, Model, ModelDescription};
-use rover_core::simulation::Simulation;
+use rover_core::simulation::RoverSimulation;
 
 /// Mass of the lone wheel, kg.
 pub const WHEEL_MASS: f64 = 30.0;
@@ -48,8 +48,8 @@ pub fn placed(
     terrain: impl Terrain + 'static,
     options: StepOptions,
     position: Vector3<f64>,
-) -> Simulation {
-    let mut simulation = Simulation::new(Arc::new(model), Arc::new(terrain), options).unwrap();
+) -> RoverSimulation {
+    let mut simulation = RoverSimulation::new(Arc::new(model), Arc::new(terrain), options).unwrap();
     let mut start = Configuration::zero(simulation.model());
     start.position = position;
     let v = vec![0.0; simulation.model().nv()];
@@ -69,7 +69,7 @@ pub fn rocks(seed: u64) -> Rocks {
 }
 
 /// Deepest gap of any wheel now, m.
-pub fn deepest(simulation: &Simulation) -> f64 {
+pub fn deepest(simulation: &RoverSimulation) -> f64 {
     let gaps = simulation.wheel_contacts();
     gaps.iter().fold(f64::INFINITY, |m, c| m.min(c.gap))
 }

@@ -6,7 +6,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rover_core::geometry::{Plane, SphereField, Terrain};
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Configuration, Model};
-use rover_core::simulation::Simulation;
+use rover_core::simulation::RoverSimulation;
 
 use crate::sphere_scenes::Random;
 
@@ -27,7 +27,7 @@ fn stones(seed: u64) -> Vec<[f64; 4]> {
 }
 
 /// The rover driven over stones; the whole scene turned about gravity by `heading`.
-fn driven(stones: &[[f64; 4]], heading: f64, steps: usize) -> Simulation {
+fn driven(stones: &[[f64; 4]], heading: f64, steps: usize) -> RoverSimulation {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), heading);
     let centres: Vec<[f64; 3]> = stones
         .iter()
@@ -36,11 +36,12 @@ fn driven(stones: &[[f64; 4]], heading: f64, steps: usize) -> Simulation {
     let radii: Vec<f64> = stones.iter().map(|s| s[3]).collect();
     let field = SphereField::new(&centres, &radii, Some(Plane::ground())).unwrap();
     let model = Arc::new(Model::rover());
-    let mut simulation = Simulation::new(model, Arc::new(field), StepOptions::default()).unwrap();
+    let mut simulation =
+        RoverSimulation::new(model, Arc::new(field), StepOptions::default()).unwrap();
     let start = Configuration {
         position: turn * Vector3::new(0.0, 0.35, 0.0),
         attitude: turn,
-        joints: vec![0.0; 15],
+        ..simulation.state().configuration.clone()
     };
     simulation.set_state(start, vec![0.0; 21]);
     simulation.set_wheel_torques(&[35.0; 6]).unwrap();

@@ -5,7 +5,7 @@
 //! down, `log₂ n` comparisons: what is far away is not looked at. Unlike a grid the tree asks for no cell size: pebbles beside boulders,
 //! heaps, and one stray ball a kilometre off cost the same.
 //!
-//! Source: Wächter, Keller 2006, *Instant ray tracing: the bounding interval hierarchy*.
+//! Source: Wächter and Keller 2006, *Instant ray tracing: the bounding interval hierarchy*.
 
 use nalgebra::Vector3;
 

@@ -10,7 +10,7 @@
 //! `n(D) = 4 k q exp(−q D) / (π D²)` rocks per m² of ground and m of diameter. In `y = 1/D` the density `4 k q exp(−q/y)/π` is bounded and smooth:
 //! its integral is tabulated and inverted.
 //!
-//! Source: Golombek, Rapp 1997, *Size–frequency distributions of rocks on Mars and Earth analog sites*, JGR 102 (E2), 4117–4129.
+//! Source: Golombek and Rapp 1997, *Size–frequency distributions of rocks on Mars and Earth analog sites*, JGR 102 (E2), 4117–4129.
 
 use std::f64::consts::PI;
 
@@ -273,7 +273,7 @@ impl Rocks {
     }
 }
 
-/// SplitMix64 (Steele, Lea, Flood 2014): ten lines that no update of a library can change under a seed.
+/// SplitMix64 (Steele, Lea and Flood 2014): ten lines that no update of a library can change under a seed.
 pub(crate) struct Random(u64);
 
 impl Random {

@@ -115,7 +115,7 @@ pub trait MechanicalSystem {
     /// `out = M v` (nv), kg m/s and kg m²/s: asked for between `update_mass_matrix` and `factorise`, which may add implicit terms.
     fn multiply_mass(&self, v: &[f64], out: &mut [f64]);
 
-    /// `y = h F(q_m, v_mean)` (nv), N s and N m s: the impulse of all forces but the contacts' over the step.
+    /// `impulse = h F(q_m, v_mean)` (nv), N s and N m s: that of all forces but the contacts' over the step.
     ///
     /// Forces taken implicitly enter with their value extrapolated from the start's velocity.
     fn load(
@@ -123,7 +123,7 @@ pub trait MechanicalSystem {
         options: &StepOptions,
         start: Start<'_, Self::Configuration>,
         v_mean: &[f64],
-        y: &mut [f64],
+        impulse: &mut [f64],
     );
 
     /// Whether gyroscopic terms are too fast for the step to take them explicitly. By default never.
@@ -205,12 +205,12 @@ pub trait MechanicalSystem {
         start: Start<'_, Self::Configuration>,
         _v_end: &[f64],
         v_mean: &[f64],
-        y: &mut [f64],
+        impulse: &mut [f64],
     ) {
-        self.load(options, start, v_mean, y);
+        self.load(options, start, v_mean, impulse);
     }
 
-    /// `y = h F − Δ(M v)` (nv): what the iterate `v_end` leaves of the balance over the step without contacts.
+    /// `impulse = h F − Δ(M v)` (nv): what the iterate `v_end` leaves of the balance over the step without contacts.
     ///
     /// The default is the rule at the middle, `h F(q_m, v_mean) − M(q_m) (v_end − v)`, of order 2 for θ = ½.
     /// `scratch` (nv) may be overwritten.
@@ -221,22 +221,22 @@ pub trait MechanicalSystem {
         v_end: &[f64],
         v_mean: &[f64],
         scratch: &mut [f64],
-        y: &mut [f64],
+        impulse: &mut [f64],
     ) {
-        for ((change, end), begin) in y.iter_mut().zip(v_end).zip(start.v) {
+        for ((change, end), begin) in impulse.iter_mut().zip(v_end).zip(start.v) {
             *change = end - begin;
         }
-        self.multiply_mass(y, scratch);
-        self.load_at_end(options, start, v_end, v_mean, y);
-        for (y, momentum) in y.iter_mut().zip(&*scratch) {
-            *y -= momentum;
+        self.multiply_mass(impulse, scratch);
+        self.load_at_end(options, start, v_end, v_mean, impulse);
+        for (impulse, momentum) in impulse.iter_mut().zip(&*scratch) {
+            *impulse -= momentum;
         }
     }
 
-    /// `y ← F⁻ᵀ y`: an impulse into factor coordinates.
-    fn half_solve(&self, y: &mut [f64]);
+    /// `y = F⁻ᵀ impulse`, in place: an impulse (nv) into factor coordinates.
+    fn half_solve(&self, impulse: &mut [f64]);
 
-    /// `y ← F⁻¹ y`: factor coordinates into a velocity.
+    /// `Δv = F⁻¹ y`, in place: factor coordinates (nv) into a change of the velocity.
     fn half_solve_back(&self, y: &mut [f64]);
 
     /// Builds H, Z and W of the contacts at the end's pose, and `u = Hᵀ v` (d n_c), m/s.

@@ -20,7 +20,7 @@
 //! The PD of a held joint is implicit with an exponentially fitted θ_j ([`crate::system::fitted_theta`]), so no gain and
 //! no step make it unstable. Contacts enter by the forecast `gap + γ h u_N ≤ 0`, measured from q_m.
 //!
-//! Source: Moreau 1988; Jean 1999; Acary, Brogliato 2008, ch. 10.
+//! Source: Moreau 1988; Jean 1999; Acary and Brogliato 2008, ch. 10.
 
 use super::energy_audit::{Audit, GAIN, Verdict, count_lift, energy_before};
 use super::error::StepError;
@@ -274,15 +274,15 @@ fn load_explicitly<S: MechanicalSystem>(
 ) {
     ws.v_mean.copy_from_slice(start.v);
     for is_last in [false, true] {
-        system.load(options, start, &ws.v_mean, &mut ws.y);
-        system.half_solve(&mut ws.y);
+        system.load(options, start, &ws.v_mean, &mut ws.impulse);
+        ws.half_solve(|impulse| system.half_solve(impulse));
         if !is_last {
             // An impact's impulses say nothing of this step's: with them v_m would be far off, and the bias is quadratic in it.
             if is_persistent(options, warm_start, &ws.contacts) {
                 system.add_impulses(&ws.p, &mut ws.y);
             }
-            system.half_solve_back(&mut ws.y);
-            for (mean, change) in ws.v_mean.iter_mut().zip(&ws.y) {
+            ws.half_solve_back(|y| system.half_solve_back(y));
+            for (mean, change) in ws.v_mean.iter_mut().zip(&ws.dv) {
                 *mean += (1.0 - options.theta) * change;
             }
         }
@@ -310,8 +310,8 @@ fn load_implicitly<S: MechanicalSystem>(
             if is_persistent {
                 system.add_impulses(&ws.p, &mut ws.y);
             }
-            system.half_solve_back(&mut ws.y);
-            for ((mean, change), v) in ws.v_mean.iter_mut().zip(&ws.y).zip(start.v) {
+            ws.half_solve_back(|y| system.half_solve_back(y));
+            for ((mean, change), v) in ws.v_mean.iter_mut().zip(&ws.dv).zip(start.v) {
                 *mean = v + (1.0 - options.theta) * change;
             }
         }
@@ -405,7 +405,7 @@ pub(super) fn add_correction<S: MechanicalSystem>(
     }
 }
 
-/// Solves the assembled contacts for the free change `ws.y` (factor coordinates) from `ws.v`, and adds both to `ws.v`.
+/// Solves the assembled contacts for the free change `ws.y` (factor coordinates) from `ws.v`, and adds both, as `ws.dv`, to `ws.v`.
 ///
 /// Newton's law of restitution with friction may have no answer: a wheel that two slopes hold by friction can not leave both. Where the solver
 /// finds none the impact is inelastic, which always has one, since on a ground at rest standing still is admissible.
@@ -459,8 +459,8 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
         system.add_impulses(&ws.p, &mut ws.y);
         probe.end(Phase::Solve);
     }
-    system.half_solve_back(&mut ws.y);
-    for (v, dv) in ws.v.iter_mut().zip(&ws.y) {
+    ws.half_solve_back(|y| system.half_solve_back(y));
+    for (v, dv) in ws.v.iter_mut().zip(&ws.dv) {
         *v += dv;
     }
     report

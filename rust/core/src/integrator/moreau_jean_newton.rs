@@ -13,7 +13,7 @@
 //! and does not drift, and the audit ([`super::energy_audit`]) lets it, since taking it out would cost the momentum. The iteration uses M̂(q_m) as its matrix, which
 //! differs from the true Jacobian by O(h) and converges by that factor.
 //!
-//! Source: the discrete d'Alembert principle, as in Simo, Wong 1991 for one body; contacts and the
+//! Source: the discrete d'Alembert principle, as in Simo and Wong 1991 for one body; contacts and the
 //! correction r as in [`super::moreau_jean`].
 
 use super::energy_audit::{Audit, GAIN, Verdict, energy_before};
@@ -95,8 +95,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
             if unsolved == MOST_UNSOLVED {
                 break;
             }
-            // ws.y is now the change of v in this iteration.
-            let change = ws.y.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            let change = ws.dv.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let size = ws.v.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
             // Settled, or as settled as rounding allows: no longer shrinking, and small.
             let is_small = change <= options.newton_tolerance * size;
@@ -156,7 +155,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
     }
 }
 
-/// One iteration: `ws.v` moves by `ws.y`. None where the mass matrix cannot be factored: the iterate has run away.
+/// One iteration: `ws.v` moves by `ws.dv`. None where the mass matrix cannot be factored: the iterate has run away.
 fn iterate<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -191,13 +190,13 @@ fn iterate<S: MechanicalSystem>(
         &ws.v,
         &ws.v_mean,
         &mut ws.correction,
-        &mut ws.y,
+        &mut ws.impulse,
     );
     probe.end(Phase::Bias);
     if !system.factorise(options) {
         return None;
     }
-    system.half_solve(&mut ws.y);
+    ws.half_solve(|impulse| system.half_solve(impulse));
     probe.end(Phase::Factor);
     assemble_contacts(system, options, start.v, warm_start, ws);
     add_correction(system, options, warm_start, ws);

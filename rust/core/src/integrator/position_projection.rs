@@ -60,14 +60,14 @@ pub(super) fn project<S: MechanicalSystem>(
     }
     note(report, &solved);
     let share = (limit / size(system, ws)).min(1.0);
-    system.advance(&mut ws.end, &ws.y, share);
+    system.advance(&mut ws.end, &ws.dv, share);
     true
 }
 
 /// Compliance of the ground where nothing else frees a wedged machine, relative to W's own.
 const COMPLIANCE: f64 = 1e-2;
 
-/// Solves for the displacement `ws.y` with the coefficients in `ws.mu`, on ground of a compliance relative to W's mean.
+/// Solves for the displacement `ws.dv` with the coefficients in `ws.mu`, on ground of a compliance relative to W's mean.
 fn displace<S: MechanicalSystem>(
     system: &S,
     options: &StepOptions,
@@ -104,7 +104,7 @@ fn displace<S: MechanicalSystem>(
     ws.work_left = ws.work_left.saturating_sub(solved.work);
     ws.y.fill(0.0);
     system.add_impulses(&ws.p_position, &mut ws.y);
-    system.half_solve_back(&mut ws.y);
+    ws.half_solve_back(|y| system.half_solve_back(y));
     solved
 }
 
@@ -112,7 +112,7 @@ fn displace<S: MechanicalSystem>(
 fn size<S: MechanicalSystem>(system: &S, ws: &ScratchOf<S>) -> f64 {
     // d = W λ is what the answer u = d + (gap, 0, 0) holds beside the gaps.
     let points = ws.u_position.iter().zip(&ws.q_free).map(|(u, q)| u - q);
-    let elsewhere = system.displacement(&ws.y);
+    let elsewhere = system.displacement(&ws.dv);
     points.fold(elsewhere, |m, d| m.max(d.abs()))
 }
 

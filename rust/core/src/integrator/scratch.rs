@@ -10,9 +10,17 @@ use crate::solver::{SolverOptions, SolverWorkspace};
 pub struct Scratch<Q, C> {
     pub(super) middle: Q,
     pub(super) end: Q,
+    /// A generalized impulse (nv), N s and N m s, until it is turned into factor coordinates.
+    pub(super) impulse: Vec<f64>,
+    /// The change of the velocity in factor coordinates (nv), `y = F Δv`.
     pub(super) y: Vec<f64>,
+    /// The change of the velocity itself (nv), m/s and rad/s, or a displacement, m and rad.
+    pub(super) dv: Vec<f64>,
+    /// The deferred correction r, an impulse (nv) that is half solved in place.
     pub(super) correction: Vec<f64>,
+    /// Forecast of the contacts' generalized impulse (nv).
     pub(super) forecast: Vec<f64>,
+    /// Velocity at the end of the step (nv), and where forces are evaluated.
     pub(super) v: Vec<f64>,
     pub(super) v_mean: Vec<f64>,
     pub(super) contacts: Vec<C>,
@@ -43,7 +51,9 @@ impl<Q: Clone, C> Scratch<Q, C> {
         Self {
             middle: q.clone(),
             end: q.clone(),
+            impulse: vec![0.0; nv],
             y: vec![0.0; nv],
+            dv: vec![0.0; nv],
             correction: vec![0.0; nv],
             forecast: vec![0.0; nv],
             v: vec![0.0; nv],
@@ -67,7 +77,9 @@ impl<Q: Clone, C> Scratch<Q, C> {
     /// Makes the velocities' vectors fit a system whose nv may have changed since the last step.
     pub(super) fn fit(&mut self, nv: usize) {
         for vector in [
+            &mut self.impulse,
             &mut self.y,
+            &mut self.dv,
             &mut self.correction,
             &mut self.forecast,
             &mut self.v,
@@ -75,6 +87,20 @@ impl<Q: Clone, C> Scratch<Q, C> {
         ] {
             vector.resize(nv, 0.0);
         }
+    }
+
+    /// `y = F⁻ᵀ impulse`: the impulse into factor coordinates. What `impulse` holds then is of no use.
+    #[inline]
+    pub(super) fn half_solve(&mut self, half_solve: impl FnOnce(&mut [f64])) {
+        half_solve(&mut self.impulse);
+        std::mem::swap(&mut self.impulse, &mut self.y);
+    }
+
+    /// `dv = F⁻¹ y`: factor coordinates into a velocity. What `y` holds then is of no use.
+    #[inline]
+    pub(super) fn half_solve_back(&mut self, half_solve_back: impl FnOnce(&mut [f64])) {
+        half_solve_back(&mut self.y);
+        std::mem::swap(&mut self.y, &mut self.dv);
     }
 
     /// Grants a new step its work: a share of a solve's, where it may solve several times.

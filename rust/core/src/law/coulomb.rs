@@ -89,25 +89,6 @@ pub fn violation<const D: usize>(
     violation
 }
 
-/// The mode that the pair `(p, u)` of a solved contact shows.
-///
-/// `threshold`: impulses below it count as none, N s. Sliding is reported when the impulse reaches the cone's surface
-/// up to `threshold`, which includes the limit case of a contact about to slide.
-#[must_use]
-pub fn observed_mode<const D: usize>(
-    p: &[f64; D],
-    friction_coefficient: f64,
-    threshold: f64,
-) -> ContactMode {
-    if p[0] <= threshold {
-        ContactMode::Open
-    } else if tangential_norm(p) < friction_coefficient * p[0] - threshold {
-        ContactMode::Stick
-    } else {
-        ContactMode::Slide
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -163,21 +144,5 @@ mod tests {
         // Lifts off with μ|u_T|, as convex relaxations do.
         let violation = length(natural_map(&[2.0, -1.0], &[0.5 * 3.0, 3.0], 0.5, 1.0));
         assert!(violation > 0.1);
-    }
-
-    #[test]
-    fn modes_are_read_from_the_impulse() {
-        assert_eq!(
-            observed_mode(&[0.0, 0.0, 0.0], 0.5, 1e-12),
-            ContactMode::Open
-        );
-        assert_eq!(
-            observed_mode(&[1.0, 0.1, 0.2], 0.5, 1e-12),
-            ContactMode::Stick
-        );
-        assert_eq!(
-            observed_mode(&[1.0, 0.3, 0.4], 0.5, 1e-12),
-            ContactMode::Slide
-        );
     }
 }

@@ -1,6 +1,6 @@
 //! Bias `N(q, v) v + G(q)` by recursive Newton–Euler: what must be pushed to keep all accelerations zero.
 //!
-//! Source: Luh, Walker, Paul 1980; here in world axes about each tree's origin of places.
+//! Source: Luh, Walker and Paul 1980; here in world axes about each tree's origin of places.
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -18,7 +18,7 @@
 //!
 //! so that a body and all that it carries have sums of a few 3-vectors and symmetric matrices.
 //!
-//! Source: Echeandia, Wensing 2021, *Numerical methods to compute the Coriolis matrix and Christoffel symbols for rigid-body systems*,
+//! Source: Echeandia and Wensing 2021, *Numerical methods to compute the Coriolis matrix and Christoffel symbols for rigid-body systems*,
 //! J. Comput. Nonlinear Dynam. 16, 091004.
 
 use std::ops::{Add, AddAssign, Mul, Range};

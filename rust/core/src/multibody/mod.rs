@@ -33,4 +33,4 @@ pub use model::{
 };
 pub use momentum::{Energy, EnergyScratch, Momentum};
 pub use motor::{DriveTrial, Motor, MotorRegime};
-pub use state::{Configuration, State};
+pub use state::Configuration;

@@ -1,4 +1,4 @@
-//! Configuration and state: small, cloneable, without any scratch.
+//! The configuration: small, cloneable, without any scratch.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -150,36 +150,5 @@ impl Configuration {
             .chain(self.attitudes().flat_map(|q| q.coords.iter()))
             .chain(&self.joints)
             .all(|x| x.is_finite())
-    }
-}
-
-/// Configuration and velocity at a time.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct State {
-    /// Where it is.
-    pub configuration: Configuration,
-    /// Velocity (nv), in the order of the joints; a free body's is that of its origin and its angular velocity, world axes.
-    pub v: Vec<f64>,
-    /// s.
-    pub time: f64,
-}
-
-impl State {
-    /// At rest in the zero configuration at time 0.
-    #[must_use]
-    pub fn zero(model: &Model) -> Self {
-        Self {
-            configuration: Configuration::zero(model),
-            v: vec![0.0; model.nv()],
-            time: 0.0,
-        }
-    }
-
-    /// Whether every entry is finite.
-    #[must_use]
-    pub fn is_finite(&self) -> bool {
-        self.configuration.is_finite()
-            && self.time.is_finite()
-            && self.v.iter().all(|x| x.is_finite())
     }
 }

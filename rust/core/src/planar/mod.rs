@@ -1,12 +1,12 @@
 //! The planar systems of the report's chapter 3: a ball, a two-wheel rover, and the ground they run on.
 //!
 //! - [`ground`], [`curve`], [`polyline`]: what lies below a curve, and where a disc touches it;
-//! - [`machine`]: machines with few coordinates as mechanical systems with one tangent a contact;
+//! - [`machine`]: what a machine with few coordinates says of itself;
 //! - [`ball`], [`two_wheel_rover`]: two of them; [`mirrored_rover`]: the six-wheel rover driven straight;
 //! - [`soil`]: thousands of free disks, and a machine that drives over them;
-//! - [`simulation`]: one of the machines on a ground, through time.
 //!
-//! Nothing of time stepping, contact law or solver is here: [`crate::integrator`] steps these systems as it steps the rover.
+//! Nothing of time stepping, contact law or solver is here: [`crate::system::planar`] makes a mechanical system of a machine on a ground, and
+//! [`crate::simulation`] steps it as it steps the rover.
 //! x points forward, y up, angles turn to the left.
 
 pub mod ball;
@@ -16,7 +16,6 @@ pub mod ground;
 pub mod machine;
 pub mod mirrored_rover;
 pub mod polyline;
-pub mod simulation;
 pub mod soil;
 pub mod two_wheel_rover;
 
@@ -24,14 +23,7 @@ pub use ball::Ball;
 pub use curve::{Curve, Line, Sine, Spline};
 pub use error::PlanarError;
 pub use ground::{ContactRule, Facing, Ground, MAX_FACING};
-pub use machine::{
-    Disc, PlanarContact, PlanarKey, PlanarMachine, PlanarMotor, PlanarScratch, PlanarSystem,
-    contact_rows,
-};
+pub use machine::{Disc, PlanarMachine, PlanarMotor};
 pub use mirrored_rover::MirroredRover;
 pub use polyline::Polyline;
-pub use simulation::{
-    BallSimulation, MirroredRoverSimulation, PlanarActiveContact, PlanarSimulation, PlanarSnapshot,
-    TwoWheelRoverSimulation,
-};
 pub use two_wheel_rover::{PlanarWheel, TwoWheelRover};

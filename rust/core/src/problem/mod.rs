@@ -7,18 +7,27 @@
 //! u = W p + q,    ũ = u + μ|u_T| n,    K_μ* ∋ ũ ⊥ p ∈ K_μ    at every contact.
 //! ```
 //!
-//! [`FrictionContactProblem`] states it, with `W` dense or, for many contacts, as [`BlockSparseDelassus`]; [`Residual`] judges an answer. Nothing here knows a body, so a problem read
-//! from a file is as good as one from a rover.
+//! - `friction_contact`: [`FrictionContactProblem`] states it. It knows no body, so a problem read from a file is as good as one from a rover.
+//! - `operator`: `W`, dense or, for many contacts, as [`BlockSparseDelassus`]; for very many free bodies [`BodyPairs`] instead.
+//! - `scales`: what turns the velocity of a contact into an impulse.
+//! - `residual`: [`Residual`] judges an answer.
+//! - `prepared`: a problem with its scales at hand, as iterations want it.
+//! - `passivity`: an approximate answer shortened until it adds no energy.
 
-mod block_sparse;
 mod friction_contact;
 mod operator;
+mod passivity;
+mod prepared;
 mod residual;
+mod scales;
 
-pub use block_sparse::{BlockSparseDelassus, PairContact};
 pub use friction_contact::{Dimension, FrictionContactProblem, ProblemError};
-pub use operator::Operator;
-pub use residual::{
-    ContactScales, Residual, contact_scales, evaluate, evaluate_into, local_velocity,
+pub use operator::{
+    BlockSparseDelassus, BodyPairs, DiscPair, Operator, PairContact, WIDE, WidePair,
 };
-pub(crate) use residual::{Magnitudes, Violations, dot, evaluate_contact, power_of_two};
+pub(crate) use operator::{Storage, dot};
+pub(crate) use passivity::passive_share;
+pub(crate) use prepared::{Prepared, Proximal};
+pub(crate) use residual::{Magnitudes, Violations, evaluate_contact};
+pub use residual::{Residual, evaluate, evaluate_into};
+pub(crate) use scales::{Scales, power_of_two};

@@ -8,6 +8,7 @@
 //!   heavy one cannot hide): the error against what the free velocity asks for;
 //! - `velocity = max_i |v_i|` in m/s.
 
+use super::scales::{contact_scales, power_of_two};
 use super::{Dimension, FrictionContactProblem};
 use crate::law::coulomb::violation;
 
@@ -35,80 +36,11 @@ impl Residual {
     }
 }
 
-/// Rows of a product that are computed together.
-const ROWS: usize = 3;
-
-/// Scalar product with four partial sums, so that it runs in vector registers.
-#[inline]
-#[must_use]
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let n = a.len().min(b.len());
-    let (a, b) = (&a[..n], &b[..n]);
-    let mut sums = [0.0; 4];
-    let (mut chunks_a, mut chunks_b) = (a.chunks_exact(4), b.chunks_exact(4));
-    for (x, y) in chunks_a.by_ref().zip(chunks_b.by_ref()) {
-        for k in 0..4 {
-            sums[k] += x[k] * y[k];
-        }
-    }
-    let mut tail = 0.0;
-    for (x, y) in chunks_a.remainder().iter().zip(chunks_b.remainder()) {
-        tail += x * y;
-    }
-    (sums[0] + sums[2]) + (sums[1] + sums[3]) + tail
-}
-
-/// `out = A x + b` for a row-major square matrix `A`; of up to six contacts the size is known to the compiler.
-#[inline]
-pub(crate) fn multiply_add(A: &[f64], x: &[f64], b: &[f64], out: &mut [f64]) {
-    match x.len() {
-        0 => {}
-        3 => multiply_add_of(3, A, x, b, out),
-        6 => multiply_add_of(6, A, x, b, out),
-        9 => multiply_add_of(9, A, x, b, out),
-        12 => multiply_add_of(12, A, x, b, out),
-        15 => multiply_add_of(15, A, x, b, out),
-        18 => multiply_add_of(18, A, x, b, out),
-        n => multiply_add_of(n, A, x, b, out),
-    }
-}
-
-/// Three rows at a time, so that `x` is loaded once for them.
-#[allow(clippy::inline_always)] // the known size has to reach the loops
-#[inline(always)]
-fn multiply_add_of(n: usize, A: &[f64], x: &[f64], b: &[f64], out: &mut [f64]) {
-    let (x, b, out) = (&x[..n], &b[..n], &mut out[..n]);
-    let (pairs, last) = x.as_chunks::<2>();
-    let results = out.chunks_exact_mut(ROWS).zip(b.chunks_exact(ROWS));
-    for (group, (out, b)) in A.chunks_exact(ROWS * n).zip(results) {
-        let rows: [&[f64]; ROWS] = std::array::from_fn(|r| &group[r * n..(r + 1) * n]);
-        let chunks = rows.map(|row| &row.as_chunks::<2>().0[..pairs.len()]);
-        let mut sums = [[0.0; 2]; ROWS];
-        for (i, x) in pairs.iter().enumerate() {
-            for (sum, row) in sums.iter_mut().zip(chunks) {
-                sum[0] += row[i][0] * x[0];
-                sum[1] += row[i][1] * x[1];
-            }
-        }
-        if let [x] = last {
-            for (sum, row) in sums.iter_mut().zip(rows) {
-                sum[0] += row[n - 1] * x;
-            }
-        }
-        for r in 0..ROWS {
-            out[r] = (sums[r][0] + sums[r][1]) + b[r];
-        }
-    }
-    for r in n - n % ROWS..n {
-        out[r] = dot(&A[r * n..(r + 1) * n], x) + b[r];
-    }
-}
-
 /// Local velocity `u = W p + q` (n), m/s, of the impulses `p` (n), N s.
 ///
 /// # Panics
 /// If `p` or `u` has not the problem's number of unknowns.
-pub fn local_velocity(problem: &FrictionContactProblem<'_>, p: &[f64], u: &mut [f64]) {
+fn local_velocity(problem: &FrictionContactProblem<'_>, p: &[f64], u: &mut [f64]) {
     assert!(
         p.len() == problem.n_unknowns(),
         "p must have one entry per unknown"
@@ -120,45 +52,6 @@ pub fn local_velocity(problem: &FrictionContactProblem<'_>, p: &[f64], u: &mut [
     problem
         .operator()
         .multiply_add(p, problem.free_velocity(), u);
-}
-
-/// The scales of one contact, kg.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ContactScales {
-    /// `ρ = d / tr W_ii`; 1 where the block has no positive trace.
-    pub mass: f64,
-    /// `[ρ_N, ρ_T]`: inverse of `W_NN` and of the mean tangential diagonal; `ρ` where that is not positive.
-    pub modes: [f64; 2],
-}
-
-impl ContactScales {
-    /// From `W_NN` and the sum of the tangential diagonal entries, 1/kg.
-    #[inline]
-    pub(crate) fn new<const D: usize>(normal: f64, tangential: f64) -> Self {
-        let (own, mean) = (normal + tangential, tangential / (D - 1) as f64);
-        let mass = if own > 0.0 { D as f64 / own } else { 1.0 };
-        let inverse = |x: f64| if x > 0.0 { 1.0 / x } else { mass };
-        Self {
-            mass,
-            modes: [inverse(normal), inverse(mean)],
-        }
-    }
-}
-
-/// The scales of contact `contact`, kg.
-#[inline]
-#[must_use]
-pub fn contact_scales(problem: &FrictionContactProblem<'_>, contact: usize) -> ContactScales {
-    let (dimension, n, W) = (
-        problem.dimension(),
-        problem.n_unknowns(),
-        problem.operator(),
-    );
-    let entry = |k| W.diagonal(dimension, n, contact, k);
-    match dimension {
-        Dimension::Two => ContactScales::new::<2>(entry(0), entry(1)),
-        Dimension::Three => ContactScales::new::<3>(entry(0), entry(1) + entry(2)),
-    }
 }
 
 /// Violation of the contact that starts at `offset`: square in (m/s)².
@@ -245,17 +138,6 @@ impl Magnitudes {
     }
 }
 
-/// The largest power of two within `x`, for exact scaling; 1 for what is not positive and finite.
-#[inline]
-pub(crate) fn power_of_two(x: f64) -> f64 {
-    const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
-    if x > 0.0 && x.is_finite() {
-        f64::from_bits(x.to_bits() & EXPONENT).max(f64::MIN_POSITIVE)
-    } else {
-        1.0
-    }
-}
-
 /// In units of the largest free velocity and the largest mass, so that no square overflows or vanishes.
 fn evaluate_in<const D: usize>(
     problem: &FrictionContactProblem<'_>,
@@ -316,15 +198,6 @@ pub fn evaluate(problem: &FrictionContactProblem<'_>, p: &[f64]) -> Residual {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn scalar_product_of_every_length() {
-        for n in 0..12 {
-            let a: Vec<f64> = (0..n).map(|k| f64::from(k) + 1.0).collect();
-            let expected: f64 = a.iter().map(|x| x * x).sum();
-            assert!((dot(&a, &a) - expected).abs() < 1e-12);
-        }
-    }
 
     #[test]
     fn a_resting_block_has_no_residual_and_a_floating_one_its_velocity() {

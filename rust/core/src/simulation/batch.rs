@@ -13,7 +13,7 @@ use rayon::slice::ParallelSliceMut;
 use super::error::BatchError;
 use super::pool::Pool;
 use super::reading::{Look, ReadingLayout};
-use super::rover::Simulation;
+use super::rover::RoverSimulation;
 use crate::integrator::StepError;
 
 /// How often the calling thread asks whether to go on while others step.
@@ -22,7 +22,7 @@ const ASKING: Duration = Duration::from_millis(20);
 /// One rover with the places for its error and its reading.
 type Place<'a> = (
     (
-        (&'a mut Simulation, &'a mut Option<StepError>),
+        (&'a mut RoverSimulation, &'a mut Option<StepError>),
         &'a [f64; 2],
     ),
     &'a mut [f64],
@@ -30,7 +30,7 @@ type Place<'a> = (
 
 /// Rovers with the threads that step them.
 pub struct Batch {
-    rovers: Vec<Simulation>,
+    rovers: Vec<RoverSimulation>,
     targets: Vec<[f64; 2]>,
     scan: Vec<[f64; 2]>,
     layout: ReadingLayout,
@@ -43,12 +43,12 @@ pub struct Batch {
 impl Batch {
     /// From rovers of models of one size.
     ///
-    /// `scan`: points of the height scan, see [`Simulation::read`]. `threads`: None for one a core.
+    /// `scan`: points of the height scan, see [`RoverSimulation::read`]. `threads`: None for one a core.
     ///
     /// # Errors
     /// `Empty`, `Differs`, `Threads`.
     pub fn new(
-        rovers: Vec<Simulation>,
+        rovers: Vec<RoverSimulation>,
         scan: Vec<[f64; 2]>,
         threads: Option<usize>,
     ) -> Result<Self, BatchError> {
@@ -74,7 +74,7 @@ impl Batch {
         Ok(batch)
     }
 
-    fn check(&self, index: usize, rover: &Simulation) -> Result<(), BatchError> {
+    fn check(&self, index: usize, rover: &RoverSimulation) -> Result<(), BatchError> {
         let own = ReadingLayout::new(rover.model(), self.scan.len());
         if own == self.layout {
             return Ok(());
@@ -88,7 +88,7 @@ impl Batch {
 
     /// The rovers.
     #[must_use]
-    pub fn rovers(&self) -> &[Simulation] {
+    pub fn rovers(&self) -> &[RoverSimulation] {
         &self.rovers
     }
 
@@ -111,7 +111,7 @@ impl Batch {
     pub fn replace(
         &mut self,
         index: usize,
-        rover: Simulation,
+        rover: RoverSimulation,
         target: [f64; 2],
     ) -> Result<(), BatchError> {
         let len = self.rovers.len();
@@ -126,8 +126,8 @@ impl Batch {
 
     /// Gives every rover its commands, takes `n` steps and writes the readings (n_rovers × layout's size, row-major).
     ///
-    /// `torques` and `set_points`: n_rovers × n_wheels, row-major, as [`Simulation::set_wheel_torques`] and
-    /// [`Simulation::set_steering`] take them. `active`: rovers that are to move; the others keep still, commands too.
+    /// `torques` and `set_points`: n_rovers × n_wheels, row-major, as [`RoverSimulation::set_wheel_torques`] and
+    /// [`RoverSimulation::set_steering`] take them. `active`: rovers that are to move; the others keep still, commands too.
     /// A step that a rover cannot take is that rover's own: see [`Self::errors`].
     ///
     /// # Errors
@@ -244,7 +244,7 @@ impl Batch {
 
 /// All commands are looked at before any is given.
 fn give_commands(
-    rovers: &mut [Simulation],
+    rovers: &mut [RoverSimulation],
     torques: &[f64],
     set_points: &[f64],
     is_active: impl Fn(usize) -> bool,

@@ -1,16 +1,38 @@
-//! A machine on a terrain, stepped through time.
+//! A scene stepped through time.
+//!
+//! - [`scene`]: what can be simulated; [`stepping`]: the one simulation of all scenes;
+//! - [`state`], [`snapshot`], [`active_contact`]: what it holds, what it needs to continue, what it reports;
+//! - [`rover`]: a rover on a terrain, with its [commands](rover_command), its [contacts](rover_contacts) and its [`reading`];
+//! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains, perhaps with a machine on it;
+//! - [`batch`]: many rovers side by side; [`profile`]: where the time goes.
 
+pub mod active_contact;
 pub mod batch;
 pub mod error;
+pub mod grains;
+pub mod planar;
 mod pool;
 pub mod profile;
 pub mod reading;
 pub mod rover;
+pub mod rover_command;
+pub mod rover_contacts;
+pub mod scene;
 pub mod snapshot;
+pub mod state;
+pub mod stepping;
 
+pub use active_contact::{ActiveContact, Components, LocatedContact};
 pub use batch::Batch;
 pub use error::{BatchError, CommandError, SnapshotError};
+pub use grains::{BedCommand, BedMemory, GrainBed, SoilSetupError, SoilSimulation, soil_options};
+pub use planar::{
+    BallSimulation, MirroredRoverSimulation, PlanarScene, PlanarSimulation, TwoWheelRoverSimulation,
+};
 pub use reading::{Look, ReadingLayout};
-pub use rover::Simulation;
-pub(crate) use rover::check as check_command;
+pub use rover::{LastCall, RoverScene, RoverSimulation};
+pub use rover_command::RoverCommand;
+pub use scene::{DenseOperator, Scene, SceneKey, SceneScratch, StepTaken};
 pub use snapshot::Snapshot;
+pub use state::State;
+pub use stepping::Simulation;

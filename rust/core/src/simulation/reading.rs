@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use super::rover::Simulation;
+use super::rover::RoverSimulation;
 use crate::contact::Part;
 use crate::integrator::StepStatus;
 use crate::multibody::{Model, coordinates};
@@ -114,7 +114,7 @@ impl Row<'_> {
     }
 }
 
-impl Simulation {
+impl RoverSimulation {
     /// Writes a reading in the order of [`ReadingLayout`].
     ///
     /// # Panics

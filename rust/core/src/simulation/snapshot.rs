@@ -2,27 +2,56 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::active_contact::{ActiveContact, LocatedContact};
+use super::scene::{Scene, SceneKey};
+use super::state::State;
 use crate::integrator::WarmStart;
-use crate::multibody::State;
-use crate::system::{ActiveContact, Command};
 
-/// State, commands, the solver's starting point and the last step's contacts.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Snapshot {
-    /// [`crate::multibody::Model::fingerprint`] of the machine.
-    pub model: u64,
+/// State, command, memory, the solver's starting point and the last step's contacts.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(bound(
+    serialize = "S::Configuration: Serialize, S::Command: Serialize, S::Memory: Serialize, SceneKey<S>: Serialize, \
+                 S::Contact: Serialize, <S::Contact as LocatedContact>::Vector: Serialize",
+    deserialize = "S::Configuration: Deserialize<'de>, S::Command: Deserialize<'de>, S::Memory: Deserialize<'de>, \
+                   SceneKey<S>: Deserialize<'de>, S::Contact: Deserialize<'de>, \
+                   <S::Contact as LocatedContact>::Vector: Deserialize<'de>"
+))]
+pub struct Snapshot<S: Scene> {
+    /// [`Scene::fingerprint`] of the scene that it was taken of.
+    pub scene: u64,
     /// Where and how fast.
-    pub state: State,
-    /// Torques and held joints.
-    pub command: Command,
-    /// Driving torque of each wheel, positive forward, N m.
-    pub wheel_torque: Vec<f64>,
-    /// Torque about each joint's axis that comes on top, N m.
-    pub joint_torque: Vec<f64>,
-    /// Mean torque of each wheel's drive in the last step, positive forward, N m.
-    pub motor_torque: Vec<f64>,
+    pub state: State<S::Configuration>,
+    /// What was commanded.
+    pub command: S::Command,
+    /// What the scene remembers.
+    pub memory: S::Memory,
     /// Where the next solve starts.
-    pub warm_start: WarmStart,
+    pub warm_start: WarmStart<SceneKey<S>>,
     /// Contacts of the last step.
-    pub active: Vec<ActiveContact>,
+    pub active: Vec<ActiveContact<S::Contact>>,
+}
+
+impl<S: Scene> PartialEq for Snapshot<S> {
+    fn eq(&self, other: &Self) -> bool {
+        self.scene == other.scene
+            && self.state == other.state
+            && self.command == other.command
+            && self.memory == other.memory
+            && self.warm_start == other.warm_start
+            && self.active == other.active
+    }
+}
+
+impl<S: Scene> Snapshot<S> {
+    /// Whether it has the sizes of a scene with so many velocities, and nothing but finite numbers.
+    pub(super) fn is_sound(&self, nv: usize) -> bool {
+        let warm = &self.warm_start;
+        let impulses = warm.impulses.iter().flat_map(|(_, p)| p);
+        let mut numbers = self.state.v.iter().chain(&warm.persistent).chain(impulses);
+        self.state.v.len() == nv
+            && [0, nv].contains(&warm.persistent.len())
+            && self.state.time.is_finite()
+            && numbers.all(|x| x.is_finite())
+            && self.active.iter().all(ActiveContact::is_finite)
+    }
 }

@@ -1,6 +1,15 @@
 //! What the caller may choose about a solve.
 
-use super::methods::{self, ContactLaw, Solver};
+use crate::problem::Residual;
+
+/// The contact law that an answer obeys.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ContactLaw {
+    /// Signorini's condition with Coulomb's friction, `K* ∋ u + μ|u_T| n ⊥ p ∈ K`.
+    Coulomb,
+    /// The convex relaxation `K* ∋ u ⊥ p ∈ K`: a sliding contact parts with `μ|u_T|`.
+    Relaxed,
+}
 
 /// Which algorithm solves the problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
@@ -59,19 +68,6 @@ impl Method {
             _ => ContactLaw::Coulomb,
         }
     }
-
-    /// The solver behind the trait.
-    #[must_use]
-    pub const fn solver(self) -> &'static dyn Solver {
-        match self {
-            Self::Auto => &methods::Automatic,
-            Self::GaussSeidel => &methods::GaussSeidel,
-            Self::Newton => &methods::Newton,
-            Self::ProximalPoint => &methods::ProximalPoint,
-            Self::Admm => &methods::Admm,
-            Self::Relaxed => &methods::Relaxed,
-        }
-    }
 }
 
 /// Options of [`solve`](crate::solver::solve).
@@ -107,6 +103,17 @@ pub struct SolverOptions {
 impl SolverOptions {
     /// About 0.3 s on a processor of 2024.
     pub const DEFAULT_BUDGET: u64 = 300_000_000;
+
+    /// Whether both tolerances hold.
+    #[inline]
+    pub(super) fn accepts(&self, residual: Residual) -> bool {
+        residual.relative <= self.tolerance && residual.velocity <= self.velocity_tolerance
+    }
+
+    /// How far a residual is above the tolerances, as a factor.
+    pub(super) fn excess(&self, residual: Residual) -> f64 {
+        (residual.relative / self.tolerance).max(residual.velocity / self.velocity_tolerance)
+    }
 }
 
 impl Default for SolverOptions {

@@ -1,6 +1,7 @@
 //! How a solve ended.
 
-use super::Method;
+use super::options::Method;
+use crate::problem::Residual;
 
 /// Why a solve, or one of its stages, stopped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -86,6 +87,36 @@ impl Stage {
             Self::Relaxed => "relaxed",
         }
     }
+
+    /// The method that the stage belongs to; an answer by islands is of the method that the hardest of them took.
+    #[must_use]
+    pub const fn method(self) -> Method {
+        match self {
+            Self::Sweeps | Self::BodySweeps | Self::Islands => Method::GaussSeidel,
+            Self::AtRest
+            | Self::WarmNewton
+            | Self::Pivoting
+            | Self::GuidedNewton
+            | Self::Newton
+            | Self::Restarts => Method::Newton,
+            Self::ProximalPoint => Method::ProximalPoint,
+            Self::Admm => Method::Admm,
+            Self::Relaxed => Method::Relaxed,
+        }
+    }
+}
+
+/// What the stages hand to the judge.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outcome {
+    /// The method that answered.
+    pub method: Method,
+    /// Its stage.
+    pub stage: Stage,
+    /// Why it stopped.
+    pub status: SolveStatus,
+    /// Its residual under Coulomb's law.
+    pub residual: Residual,
 }
 
 /// A stage that was tried.
@@ -108,7 +139,7 @@ pub struct Rungs {
 
 impl Rungs {
     /// Most stages of one solve; later ones would not be listed.
-    const MOST: usize = 6;
+    const MOST: usize = 7;
 
     /// Adds a stage.
     #[inline]
@@ -116,6 +147,13 @@ impl Rungs {
         if let Some(place) = self.list.get_mut(self.len) {
             *place = rung;
             self.len += 1;
+        }
+    }
+
+    /// Says of the last stage that its answer was not accepted after all.
+    pub(super) fn amend(&mut self, status: SolveStatus) {
+        if let Some(last) = self.list[..self.len].last_mut() {
+            last.status = status;
         }
     }
 
@@ -141,7 +179,7 @@ pub struct SolveReport {
     pub iterations: usize,
     /// Work done, in the unit of [`budget`](super::SolverOptions::budget).
     pub work: u64,
-    /// Violation of the law relative to the data, dimensionless, see [`Residual`](crate::problem::Residual).
+    /// Violation of the law relative to the data, dimensionless, see [`Residual`].
     pub residual: f64,
     /// Largest violation at one contact, m/s.
     pub velocity_error: f64,
@@ -154,6 +192,12 @@ pub struct SolveReport {
 }
 
 impl SolveReport {
+    /// Ends with another reason than the last stage gave.
+    pub(super) fn amend(&mut self, status: SolveStatus) {
+        self.status = status;
+        self.rungs.amend(status);
+    }
+
     /// Whether the answer meets the tolerances.
     #[must_use]
     pub fn is_converged(&self) -> bool {

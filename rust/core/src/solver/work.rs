@@ -3,10 +3,6 @@
 //! The unit is one multiplication with its addition in a product with `W`. Dense factors run in vector registers and are counted at a fraction, so that a unit
 //! takes about as long everywhere: a little more than a nanosecond on a shared server of 2.5 GHz.
 
-use super::report::{Rung, SolveStatus, Stage};
-use super::workspace::SolverWorkspace;
-use crate::problem::Operator;
-
 /// Units of one contact solved exactly, beside its row of the product.
 const ONE_CONTACT: u64 = 200;
 /// Multiplications of a dense factorisation in one unit.
@@ -14,7 +10,7 @@ const DENSE: u64 = 4;
 
 /// What a solve has spent of its budget.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Work {
+pub(in crate::solver) struct Work {
     /// Units spent.
     pub spent: u64,
     /// Units allowed.
@@ -46,59 +42,23 @@ impl Work {
     }
 }
 
-/// Units of one product with `W`, the judgement of its contacts included.
-pub(super) fn product(W: Operator<'_>, n: usize) -> u64 {
-    let entries = match W {
-        Operator::Dense(_) => n * n,
-        Operator::BlockSparse(W) => W.components().pow(2) * W.n_blocks(),
-    };
-    (entries + 20 * n) as u64
-}
-
 /// Units of one Gauss–Seidel sweep over `n_contacts` contacts.
-pub(super) fn sweep(product: u64, n_contacts: usize) -> u64 {
+pub(in crate::solver) fn sweep(product: u64, n_contacts: usize) -> u64 {
     product + ONE_CONTACT * n_contacts as u64
 }
 
 /// Units of a dense LU of `m` unknowns, or of half of it.
-pub(super) fn dense(m: usize, is_symmetric: bool) -> u64 {
+pub(in crate::solver) fn dense(m: usize, is_symmetric: bool) -> u64 {
     let m = m as u64;
     let shares = if is_symmetric { 6 } else { 3 };
     m * m * m / (shares * DENSE) + m * m
 }
 
-impl SolverWorkspace {
-    /// Lists a stage that ended, and says how: for want of budget, where it left something undone.
-    #[inline]
-    pub(super) fn list_stage(
-        &mut self,
-        stage: Stage,
-        status: SolveStatus,
-        iterations: usize,
-    ) -> SolveStatus {
-        let status = match status {
-            SolveStatus::MaxIterations | SolveStatus::Stalled if self.work.is_exhausted => {
-                SolveStatus::BudgetExhausted
-            }
-            status => status,
-        };
-        self.rungs.push(Rung {
-            stage,
-            status,
-            iterations,
-        });
-        status
-    }
-
-    /// Spends the work of a product and so many sweeps, or says that it is too much.
-    #[inline]
-    pub(super) fn affords_sweeps(
-        &mut self,
-        product: u64,
-        n_contacts: usize,
-        sweeps: usize,
-    ) -> bool {
-        self.work
-            .affords(product + sweeps as u64 * sweep(product, n_contacts))
-    }
+/// How long to sweep, and when to give up.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::solver) struct SweepBudget {
+    /// Most sweeps.
+    pub sweeps: usize,
+    /// Whether to stop as soon as the rate of the last sweeps would not reach the tolerance within the budget.
+    pub predict: bool,
 }

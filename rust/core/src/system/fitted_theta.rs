@@ -4,7 +4,7 @@
 //! since θ − ½ = z/12) where the step resolves the decay, and to 1 where the PD is stiffer than the step: there the
 //! trapezoidal rule would ring from one step to the next for seconds.
 //!
-//! Source: Liniger, Willoughby 1970, *SIAM J. Numer. Anal.* 7, 47–66.
+//! Source: Liniger and Willoughby 1970, *SIAM J. Numer. Anal.* 7, 47–66.
 
 /// θ(z) in [½, 1] for `z ≥ 0`.
 #[must_use]

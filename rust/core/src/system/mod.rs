@@ -1,16 +1,20 @@
 //! Mechanical systems: what the time-stepping schemes of [`crate::integrator`] step.
 //!
-//! - [`tree`]: a tree of solids on a terrain, under a [`command`]; [`tree_workspace`]: its scratch;
+//! - [`tree`]: a tree of solids on a terrain, under a [`command`];
+//! - [`planar`]: a planar machine on a ground;
+//! - [`composite`]: two systems as one, with contacts between them;
 //! - [`gyroscopic`]: its gyroscopic terms, implicit; `motor_branch`: the line that a motor is on in a step, taken implicitly with
 //!   [`fitted_theta`].
 
 pub mod command;
+pub mod composite;
 pub mod fitted_theta;
 pub mod gyroscopic;
 pub(crate) mod motor_branch;
+pub mod planar;
 pub mod tree;
-pub mod tree_workspace;
 
 pub use command::{Command, Drive, HeldJoint};
+pub use composite::{Apart, Composite, CompositeParts, Coupling};
+pub use planar::{PlanarContact, PlanarKey, PlanarScratch, PlanarSystem, contact_rows};
 pub use tree::{DriveAction, TreeScratch, TreeSystem};
-pub use tree_workspace::{ActiveContact, Workspace};

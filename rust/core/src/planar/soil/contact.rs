@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use crate::integrator::UnilateralContact;
 
 /// From here on a second body is a wall.
-pub(super) const WALL: u32 = 1 << 31;
+pub(crate) const WALL: u32 = 1 << 31;
 /// From here on a second body is the ground.
-pub(super) const GROUND: u32 = (1 << 31) | (1 << 30);
+pub(crate) const GROUND: u32 = (1 << 31) | (1 << 30);
 
 /// Names a contact by its two bodies: disks 0 to n − 1, then the machine's wheels; then walls, then points of the ground.
 ///

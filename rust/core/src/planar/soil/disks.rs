@@ -8,7 +8,7 @@ use super::removal::Renumbering;
 pub const MAX_DISKS: usize = 1_000_000;
 
 /// Refuses more disks than a soil may have, before anything is allocated for them.
-pub(super) fn check_count(count: usize) -> Result<(), SoilError> {
+pub(crate) fn check_count(count: usize) -> Result<(), SoilError> {
     if count > MAX_DISKS {
         return Err(SoilError::TooMany {
             count,
@@ -25,11 +25,11 @@ pub struct Disks {
     radius: Vec<f64>,
     mass: Vec<f64>,
     /// `1/√m`.
-    pub(super) linear: Vec<f64>,
+    pub(crate) linear: Vec<f64>,
     /// `r/√J = √(2/m)`.
-    pub(super) angular: Vec<f64>,
+    pub(crate) angular: Vec<f64>,
     /// `√m`, `√J`.
-    pub(super) roots: Vec<[f64; 2]>,
+    pub(crate) roots: Vec<[f64; 2]>,
     kinematic: Vec<bool>,
     largest: f64,
     smallest: f64,
@@ -88,7 +88,7 @@ impl Disks {
     }
 
     /// Those that stay.
-    pub(super) fn without(&self, renumbering: &Renumbering) -> Result<Self, SoilError> {
+    pub(crate) fn without(&self, renumbering: &Renumbering) -> Result<Self, SoilError> {
         let [radius, mass] = [&self.radius, &self.mass].map(|all| renumbering.keep(all, 1));
         Self::new(radius, mass)?.with_kinematic(renumbering.keep(&self.kinematic, 1))
     }

@@ -3,7 +3,7 @@
 //! - [`disks`], [`wall`], [`scene`]: what there is; [`packing`]: where disks start, without overlap, from a seed;
 //! - [`grid`]: which disks are near which; [`contact`]: a contact and its name; contacts come and go with the disks;
 //! - [`system`]: the soil as a mechanical system, stepped by [`crate::integrator`] as everything else;
-//! - [`sleep`]: disks that rest far from anything that moves are left out; [`simulation`]: a scene through time, from which disks can be
+//! - [`sleep`]: disks that rest far from anything that moves are left out; [`crate::simulation::grains`]: a bed through time, from which disks can be
 //!   taken;
 //! - [`rig`]: one wheel at a given slip, for the drawbar pull.
 //!
@@ -12,17 +12,16 @@
 //! adds energy. What rounding and the solver's tolerance leave of penetration grows by their error in velocity; where it passes a
 //! tolerance the common projection removes it.
 //!
-//! Source: Moreau 1999; Staron, Hinch 2005 (contact dynamics of disks); Anitescu, Potra 1997 (the gap in the velocity's law).
+//! Source: Moreau 1999; Staron and Hinch 2005 (contact dynamics of disks); Anitescu and Potra 1997 (the gap in the velocity's law).
 
 pub mod contact;
 pub mod disks;
 pub mod error;
 pub mod grid;
 pub mod packing;
-mod removal;
+pub(crate) mod removal;
 pub mod rig;
 pub mod scene;
-pub mod simulation;
 pub mod sleep;
 pub mod system;
 pub mod wall;
@@ -33,9 +32,6 @@ pub use error::SoilError;
 pub use packing::Packing;
 pub use rig::WheelRig;
 pub use scene::{Machine, SoilFriction, SoilScene};
-pub use simulation::{
-    SoilActiveContact, SoilSetupError, SoilSimulation, SoilSnapshot, soil_options,
-};
 pub use sleep::SleepOptions;
 pub use system::{SoilParts, SoilSystem};
 pub use wall::Wall;

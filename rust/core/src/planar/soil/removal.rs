@@ -4,7 +4,7 @@ use super::contact::{SoilKey, WALL};
 
 /// New numbers of bodies after disks were taken out; the order stays.
 #[derive(Clone, Debug)]
-pub(super) struct Renumbering {
+pub(crate) struct Renumbering {
     /// New number of each disk (n), if it stays.
     disks: Vec<Option<u32>>,
     /// How many disks stay.
@@ -13,7 +13,7 @@ pub(super) struct Renumbering {
 
 impl Renumbering {
     /// Without the disks that are marked (n).
-    pub(super) fn without(marked: &[bool]) -> Self {
+    pub(crate) fn without(marked: &[bool]) -> Self {
         let mut left = 0;
         let disks = marked
             .iter()
@@ -27,12 +27,12 @@ impl Renumbering {
     }
 
     /// How many disks stay.
-    pub(super) fn left(&self) -> usize {
+    pub(crate) fn left(&self) -> usize {
         self.left as usize
     }
 
     /// The same contact's new name, if both of its bodies stay.
-    pub(super) fn key(&self, key: SoilKey) -> Option<SoilKey> {
+    pub(crate) fn key(&self, key: SoilKey) -> Option<SoilKey> {
         Some(SoilKey {
             a: self.body(key.a)?,
             b: self.body(key.b)?,
@@ -52,7 +52,7 @@ impl Renumbering {
     }
 
     /// The rows (`width` entries each) of the disks that stay, and whatever follows them.
-    pub(super) fn keep<T: Copy>(&self, rows: &[T], width: usize) -> Vec<T> {
+    pub(crate) fn keep<T: Copy>(&self, rows: &[T], width: usize) -> Vec<T> {
         let (own, rest) = rows.split_at(width * self.disks.len());
         let kept = own.chunks_exact(width).zip(&self.disks);
         let mut out: Vec<T> = kept

@@ -86,7 +86,7 @@ const MOST_CELLS: i64 = 1000;
 const EVERY: usize = 5;
 
 /// What sleep looks at after a step.
-pub(super) struct StepTaken<'a> {
+pub(crate) struct StepTaken<'a> {
     pub scene: &'a SoilScene,
     pub weight_impulse: f64,
     pub q: &'a [f64],
@@ -98,7 +98,7 @@ pub(super) struct StepTaken<'a> {
 
 impl Sleep {
     /// All disks awake that are not kinematic (n).
-    pub(super) fn new(kinematic: &[bool]) -> Self {
+    pub(crate) fn new(kinematic: &[bool]) -> Self {
         Self {
             still: vec![0; kinematic.len()],
             asleep: kinematic.to_vec(),
@@ -107,7 +107,7 @@ impl Sleep {
     }
 
     /// Of the disks that stay.
-    pub(super) fn without(&self, renumbering: &Renumbering) -> Self {
+    pub(crate) fn without(&self, renumbering: &Renumbering) -> Self {
         let dormant = self.dormant.iter();
         Self {
             still: renumbering.keep(&self.still, 1),
@@ -131,7 +131,7 @@ impl Sleep {
     }
 
     /// Whether this is the sleep of these disks (n).
-    pub(super) fn is_of(&self, kinematic: &[bool]) -> bool {
+    pub(crate) fn is_of(&self, kinematic: &[bool]) -> bool {
         self.still.len() == kinematic.len()
             && self.asleep.len() == kinematic.len()
             && self.asleep.iter().zip(kinematic).all(|(s, k)| *s || !k)
@@ -143,7 +143,7 @@ impl Sleep {
     }
 
     /// Wakes all that are not kinematic (n).
-    pub(super) fn wake_all(&mut self, kinematic: &[bool], warm_start: &mut WarmStart<SoilKey>) {
+    pub(crate) fn wake_all(&mut self, kinematic: &[bool], warm_start: &mut WarmStart<SoilKey>) {
         if self.asleep != kinematic {
             let before = std::mem::replace(&mut self.asleep, kinematic.to_vec());
             self.exchange(kinematic, &before, warm_start);
@@ -152,7 +152,7 @@ impl Sleep {
     }
 
     /// Lets disks sleep and wake after a step.
-    pub(super) fn update(
+    pub(crate) fn update(
         &mut self,
         options: &SleepOptions,
         step: StepTaken<'_>,

@@ -11,28 +11,16 @@ use super::scene::SoilScene;
 use crate::contact::Activation;
 use crate::integrator::{MechanicalSystem, Start, StepOptions};
 use crate::problem::{
-    BlockSparseDelassus, Dimension, FrictionContactProblem, PairContact, Residual, dot,
-    evaluate_into,
+    BlockSparseDelassus, BodyPairs, Dimension, DiscPair, FrictionContactProblem, PairContact, WIDE,
+    WidePair,
 };
-use crate::solver::body_pairs::{BodyPairs, DiscPair, WIDE, WidePair};
-use crate::solver::body_sweeps::solve_body_pairs;
-use crate::solver::passivity::passive_share;
-use crate::solver::{Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, solve};
+use crate::solver::{ManyBodies, SolveReport, SolverOptions, SolverWorkspace, solve_many_bodies};
 
 /// Gap up to which a pair is taken as a contact though it is not forecast to close, as a share of the smallest radius: its neighbours may push it.
 const SKIN: f64 = 0.01;
 
 /// Largest such gap, as a share of the smallest radius: a blow that throws farther in one step is a step that is too long.
 const FARTHEST_SKIN: f64 = 0.2;
-
-/// Contacts up to which an answer that the sweeps did not reach is sought by factorisation: a step costs some 3 µs a contact there.
-const FEW: usize = 1000;
-
-/// Factorisations of such a search; wedged wheels have taken 77.
-const ESCALATION_STEPS: usize = 200;
-
-/// Such searches for one step, each after all the sweeps that are allowed.
-const ESCALATIONS: usize = 3;
 
 /// A place that holds nothing that moves: c = s = 0 there.
 const NOWHERE: u32 = 0;
@@ -192,46 +180,6 @@ impl SoilSystem<'_> {
             friction.walls
         } else {
             friction.disks
-        }
-    }
-
-    /// Goes on from where the sweeps stopped by the proximal-point method. The better of both answers stays, and adds no energy.
-    fn escalate(
-        &self,
-        q: &[f64],
-        mu: &[f64],
-        options: &SolverOptions,
-        (p, u): (&mut [f64], &mut [f64]),
-        report: SolveReport,
-        workspace: &mut SolverWorkspace,
-    ) -> SolveReport {
-        let proximal = SolverOptions {
-            method: Method::ProximalPoint,
-            max_newton_steps: ESCALATION_STEPS,
-            ..*options
-        };
-        let (p_swept, u_swept) = (p.to_vec(), u.to_vec());
-        let problem = self.problem(q, mu);
-        let mut found = solve(&problem, &proximal, p, u, workspace);
-        found.iterations += report.iterations;
-        if let Some(share) = passive_share(dot(p, u), dot(p, q)) {
-            for p in &mut *p {
-                *p *= share;
-            }
-            let Residual { relative, velocity } = evaluate_into(&problem, p, u);
-            (found.residual, found.velocity_error) = (relative, velocity);
-            if excess(options, &found) > 1.0 {
-                found.status = SolveStatus::Stalled;
-            }
-        }
-        if found.is_converged() || excess(options, &found) < excess(options, &report) {
-            return found;
-        }
-        p.copy_from_slice(&p_swept);
-        u.copy_from_slice(&u_swept);
-        SolveReport {
-            iterations: found.iterations,
-            ..report
         }
     }
 
@@ -678,41 +626,13 @@ impl MechanicalSystem for SoilSystem<'_> {
         u: &mut [f64],
         workspace: &mut SolverWorkspace,
     ) -> SolveReport {
-        let sweep = |p: &mut [f64], u: &mut [f64], workspace: &mut SolverWorkspace| {
-            let scratch = &mut workspace.body_sweeps;
-            solve_body_pairs(&self.parts.pairs, q, mu, options, p, u, scratch)
+        let bodies = ManyBodies {
+            pairs: &self.parts.pairs,
+            q,
+            mu,
+            operator: &|| self.operator(),
         };
-        match options.method {
-            Method::GaussSeidel => sweep(p, u, workspace),
-            Method::Auto => {
-                let mut report = sweep(p, u, workspace);
-                for _ in 0..ESCALATIONS {
-                    if report.status != SolveStatus::MaxIterations || mu.len() > FEW {
-                        break;
-                    }
-                    report = self.escalate(q, mu, options, (p, u), report, workspace);
-                    if report.is_converged() {
-                        break;
-                    }
-                    let (p_before, u_before) = (p.to_vec(), u.to_vec());
-                    let swept = sweep(p, u, workspace);
-                    let iterations = report.iterations + swept.iterations;
-                    if !swept.is_converged() && excess(options, &report) < excess(options, &swept) {
-                        // The sweeps led away from the nearest answer so far, and would again.
-                        p.copy_from_slice(&p_before);
-                        u.copy_from_slice(&u_before);
-                        report.iterations = iterations;
-                        break;
-                    }
-                    report = SolveReport {
-                        iterations,
-                        ..swept
-                    };
-                }
-                report
-            }
-            _ => solve(&self.problem(q, mu), options, p, u, workspace),
-        }
+        solve_many_bodies(&bodies, options, p, u, workspace)
     }
 
     fn displacement(&self, y: &[f64]) -> f64 {
@@ -723,11 +643,6 @@ impl MechanicalSystem for SoilSystem<'_> {
         let own = self.own(y).iter().zip(&arms);
         own.map(|(y, arm)| (y * arm).abs()).fold(0.0, f64::max)
     }
-}
-
-/// How far an answer is above the tolerances, as a factor.
-fn excess(options: &SolverOptions, report: &SolveReport) -> f64 {
-    (report.residual / options.tolerance).max(report.velocity_error / options.velocity_tolerance)
 }
 
 /// `y ← L⁻¹ y`.

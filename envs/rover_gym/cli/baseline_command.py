@@ -1,0 +1,97 @@
+"""`rover baseline`: success of the PD baseline among rocks, by difficulty."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from rover_gym.cli.console import INTERRUPTED, LARGEST_SEED, MOST_EPISODES, console, plain_errors, progress_bar
+from rover_gym.policy.baseline import DIFFICULTIES, BaselineInterrupt, BaselineRow, measure_baseline
+
+CAUSES = {"time": "time limit", "high_centred": "high centred", "roll_over": "roll over", "step_failed": "step failed"}
+
+
+@plain_errors
+def baseline(
+    difficulty: Annotated[
+        list[float] | None,
+        typer.Option(help="Difficulty from 0 to 1; repeat for several. Default: five of them."),
+    ] = None,
+    episodes: Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="Episodes at each difficulty.")] = 200,
+    seed: Annotated[
+        int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the first episode; the others count up from it.")
+    ] = 0,
+    policy: Annotated[
+        str,
+        typer.Option(
+            help="'pd' for the baseline, 'trained' for the trained policy of the package, or a trained policy's folder."
+        ),
+    ] = "pd",
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+) -> None:
+    """Drive RoverRocks-v0 with the PD baseline or a trained policy and print how often it reached the goal.
+
+    The interval is Wilson's, 95%. Time is the mean of the episodes that reached the goal; energy the work through
+    the wheel motors over the way driven. Ctrl-C ends the measurement: what is finished is printed.
+    """
+    difficulties = tuple(difficulty) if difficulty else DIFFICULTIES
+    with progress_bar() as bar:
+        task = bar.add_task("baseline", total=episodes * len(difficulties), state="")
+        interrupted = False
+        try:
+            rows = measure_baseline(
+                difficulties,
+                episodes=episodes,
+                seed=seed,
+                policy=policy,
+                progress=lambda level, done: bar.update(
+                    task, advance=1, state=f"difficulty {level:g}, {done} of {episodes}"
+                ),
+            )
+        except BaselineInterrupt as interrupt:
+            interrupted, rows = True, interrupt.rows
+    if as_json:
+        # JSON knows no NaN: where no episode reached the goal, its time is null.
+        plain = [
+            {
+                name: None if isinstance(value, float) and math.isnan(value) else value
+                for name, value in asdict(row).items()
+            }
+            for row in rows
+        ]
+        typer.echo(
+            json.dumps({"environment": "RoverRocks-v0", "policy": policy, "seed": seed, "rows": plain}, indent=2)
+        )
+    elif rows:
+        console().print(_table(rows, seed, policy))
+    if interrupted:
+        done = sum(row.episodes for row in rows)
+        typer.echo(f"interrupted: {done} of {episodes * len(difficulties)} episodes are done", err=True)
+        raise typer.Exit(INTERRUPTED)
+
+
+def _table(rows: Sequence[BaselineRow], seed: int, policy: str) -> Table:
+    last = seed + rows[0].episodes - 1
+    name = "the PD baseline" if policy == "pd" else "a trained policy"
+    title = f"RoverRocks-v0 with {name}, {rows[0].episodes} episodes a row, seeds {seed} to {last}"
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    for heading in ("difficulty", "success", "95% interval", "time to goal", "energy"):
+        table.add_column(heading, justify="right")
+    table.add_column("other ends")
+    for row in rows:
+        low, high = row.interval
+        others = [f"{CAUSES[end]} {n}" for end, n in row.ends.items() if n and end != "goal"]
+        table.add_row(
+            f"{row.difficulty:g}",
+            f"{row.success_rate:.1%}",
+            f"{100.0 * low:.0f} to {high:.0%}",
+            "-" if math.isnan(row.time_to_goal) else f"{row.time_to_goal:.1f} s",
+            "-" if math.isnan(row.energy_per_metre) else f"{row.energy_per_metre:.0f} J/m",
+            ", ".join(others),
+        )
+    return table

@@ -1,0 +1,251 @@
+"""`rover drive`: episodes of `Rover-v0` with the PD baseline or a trained policy."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import gymnasium as gym
+import numpy as np
+import typer
+from rich.progress import Progress
+from rich.table import Table
+
+from rover_gym.cli.console import (
+    INTERRUPTED,
+    LARGEST_SEED,
+    MOST_EPISODES,
+    check_file,
+    check_folder,
+    console,
+    plain_errors,
+    progress_bar,
+    say_path,
+)
+from rover_gym.env.rewards import WEIGHTS
+from rover_gym.env.rover_env import RoverEnv
+from rover_gym.mechanics import OptionError
+from rover_gym.policy.episodes import Episode, Policy, run_episode
+from rover_gym.policy.pd_policy import PDPolicy
+from rover_gym.policy.shipped import find_policy, policy_arguments
+from rover_gym.policy.trained_policy import TrainedPolicy
+from rover_gym.record.channels import Channel, RoverSampler
+from rover_gym.record.facts import describe
+from rover_gym.record.recorder import Recorder
+from rover_gym.rendering.video import VideoWriter
+from rover_gym.validation import number, refuse
+
+CONTROL_PERIOD = 0.05  # s, of Rover-v0
+SHORTEST_STEP = 1e-5  # s: a shorter one makes no episode end
+
+
+@plain_errors
+def drive(
+    *,
+    terrain: Annotated[str, typer.Option(help="The ground: 'plane', or 'sphere_field' for rocks.")] = "plane",
+    difficulty: Annotated[
+        float | None, typer.Option(help="Difficulty of the rocks, from 0 to 1. Default: 0.5.")
+    ] = None,
+    slope: Annotated[
+        float | None, typer.Option(help="Slope of the ground, degrees. Default: 0; on rocks, by the difficulty.")
+    ] = None,
+    uphill: Annotated[
+        float | None, typer.Option(help="Direction of steepest ascent, degrees to the left of x. Default: random.")
+    ] = None,
+    heading: Annotated[
+        float | None, typer.Option(help="Start heading, degrees to the left of x. Default: random.")
+    ] = None,
+    goal: Annotated[
+        tuple[float, float] | None, typer.Option(metavar="X Z", help="Goal on the map, m. Default: random.")
+    ] = None,
+    policy: Annotated[
+        str,
+        typer.Option(
+            help="'pd' for the baseline, 'trained' for the trained policy of the package, or a trained policy's folder."
+        ),
+    ] = "pd",
+    friction: Annotated[float, typer.Option(help="Friction coefficient.")] = 0.7,
+    time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
+    time_limit: Annotated[float, typer.Option(min=CONTROL_PERIOD, max=1e6, help="Time limit of an episode, s.")] = 60.0,
+    episodes: Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="Number of episodes.")] = 1,
+    seed: Annotated[
+        int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the first episode; the others count up from it.")
+    ] = 0,
+    output: Annotated[
+        Path | None,
+        typer.Option(file_okay=False, help="Folder for trajectories (HDF5) and summary.json. Default: save nothing."),
+    ] = None,
+    video: Annotated[
+        Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes one after the other.")
+    ] = None,
+) -> None:
+    """Drive Rover-v0 to its goal with the PD baseline or a trained policy and print the results of the episodes.
+
+    Ctrl-C ends the drive: finished episodes are printed, and what was recorded and filmed is kept.
+    """
+    _check_time_step(time_step)
+    check_folder("output", output)
+    check_file("video", video)
+    arguments: dict[str, Any] = {
+        "terrain": terrain,
+        "friction": friction,
+        "time_step": time_step,
+    }
+    arguments |= {} if difficulty is None else {"difficulty": difficulty}
+    arguments |= {} if slope is None else {"slope_deg": slope}
+    arguments |= {} if uphill is None else {"uphill_deg": uphill}
+    arguments |= {} if heading is None else {"heading_deg": heading}
+    options = {} if goal is None else {"goal": goal}
+    folder = find_policy(policy, terrain)
+    arguments |= {} if folder is None else policy_arguments(folder)
+    filming: dict[str, Any] = {}
+    if video is not None:
+        filming = {"render_mode": "rgb_array", "render_options": {"antialiasing": True}}
+    env = gym.make("Rover-v0", max_episode_steps=round(time_limit / CONTROL_PERIOD), **arguments, **filming)
+    driver: Policy = PDPolicy(env) if folder is None else TrainedPolicy.load(env, folder)
+    name = "the PD baseline" if folder is None else "a trained policy"
+
+    results: list[Episode] = []
+    paths: list[Path] = []
+    interrupted = False
+    with progress_bar() as bar, ExitStack() as stack:
+        stack.callback(env.close)
+        film = None if video is None else stack.enter_context(VideoWriter(video, env.metadata["render_fps"]))
+        try:
+            for now in range(seed, seed + episodes):
+                path = None if output is None else output / f"episode-{now}.h5"
+                paths += [path] if path else []
+                results.append(_drive_one(env, driver, name, now, arguments, options, path, bar, film))
+        except KeyboardInterrupt:
+            interrupted = True
+
+    if results:
+        console().print(_table(results, name))
+    if output is not None:
+        summary = {
+            "policy": policy,
+            "arguments": arguments | options,
+            "episodes": [asdict(episode) for episode in results],
+        }
+        paths.append(output / "summary.json")
+        paths[-1].write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    paths += [] if video is None else [video]
+    for path in paths:
+        if path.exists():
+            say_path("written", path)
+    if interrupted:
+        typer.echo(f"interrupted: {len(results)} of {episodes} episodes are done", err=True)
+        raise typer.Exit(INTERRUPTED)
+
+
+def _check_time_step(time_step: float) -> None:
+    """Refuses a step of which no whole number makes a control period."""
+    number("time_step", time_step, at_least=SHORTEST_STEP)
+    steps = CONTROL_PERIOD / time_step
+    if not (round(steps) >= 1 and math.isclose(steps, round(steps), rel_tol=1e-9)):
+        reason = f"must divide the control period of {CONTROL_PERIOD:g} s into a whole number of steps"
+        refuse(OptionError, "time_step", time_step, reason)
+
+
+def _drive_one(
+    env: gym.Env[Any, Any],
+    policy: Policy,
+    name: str,
+    seed: int,
+    arguments: Mapping[str, Any],
+    options: Mapping[str, Any],
+    path: Path | None,
+    bar: Progress,
+    film: VideoWriter | None,
+) -> Episode:
+    """One episode, recorded if there is a path, filmed if there is a film."""
+    task = bar.add_task(f"seed {seed}", total=None, state="")
+    with ExitStack() as stack:
+        tape: _Tape | None = None
+
+        def on_step(rover: RoverEnv, info: Mapping[str, Any]) -> None:
+            nonlocal tape
+            bar.update(task, state=f"{info['time']:.1f} s, {info['distance_to_goal']:.1f} m to go")
+            if path is not None:
+                if tape is None:  # after the reset, when the start is known
+                    tape = _Tape(path, rover, name, seed, arguments)
+                    stack.enter_context(tape.recorder)
+                tape.append(rover, info)
+            if film is not None and (frame := rover.render()) is not None:
+                film.append(frame)
+
+        episode = run_episode(env, policy, seed, options=options, on_step=on_step)
+    bar.remove_task(task)
+    return episode
+
+
+class _Tape:
+    """Records an episode: the simulation, and what the environment makes of it."""
+
+    def __init__(self, path: Path, rover: RoverEnv, policy: str, seed: int, arguments: Mapping[str, Any]) -> None:
+        self._sampler = RoverSampler(rover.model)
+        channels = (
+            *self._sampler.channels,
+            Channel("distance_to_goal", "m", "horizontal distance from the trunk's origin to the goal"),
+            Channel("slip_ratio", "1", "mean over the wheels in contact of rim slip over the faster of rim and ground"),
+            Channel("motor_energy", "J", "work through the wheel motors since the start, driving or braking"),
+            Channel("reward_terms", "1", "terms of the step's reward", (len(WEIGHTS),), tuple(WEIGHTS)),
+        )
+        scene = {**arguments, **asdict(rover.start), **_rocks(rover), "control_period": rover.dt}
+        title = f"an episode of Rover-v0 with {policy}"
+        attributes = describe(rover.simulation, title, scene, seed=seed)
+        self.recorder = Recorder(path, channels, attributes, terrain=rover.simulation.terrain)
+
+    def append(self, rover: RoverEnv, info: Mapping[str, Any]) -> None:
+        """Adds the environment's present state."""
+        solver = info["solver"]
+        self.recorder.append(
+            {
+                **self._sampler.row(rover.simulation, residual=solver["residual"], iterations=solver["iterations"]),
+                "distance_to_goal": info["distance_to_goal"],
+                "slip_ratio": info["slip_ratio"],
+                "motor_energy": info["energy"],
+                "reward_terms": [info["reward_terms"][name] for name in WEIGHTS],
+            }
+        )
+
+
+def _rocks(rover: RoverEnv) -> dict[str, Any]:
+    """What `SphereField.rocks` was made from, for a scene's description."""
+    return {} if rover.rocks is None else {"rocks": asdict(rover.rocks)}
+
+
+def _table(results: Sequence[Episode], name: str) -> Table:
+    table = Table(title=f"Rover-v0 with {name}", title_justify="left")
+    for heading in ("seed", "success", "distance", "time", "energy", "slip", "real-time factor"):
+        table.add_column(heading, justify="right")
+    for episode in results:
+        table.add_row(
+            str(episode.seed),
+            "yes" if episode.success else f"no: {episode.end}",
+            f"{episode.distance:.2f} m",
+            f"{episode.time:.2f} s",
+            f"{episode.energy:.0f} J",
+            f"{episode.slip:.2%}",
+            f"{episode.real_time_factor:.0f}",
+        )
+    if len(results) > 1:
+        table.add_section()
+        table.add_row(
+            "mean",
+            f"{sum(episode.success for episode in results)} of {len(results)}",
+            *(
+                form.format(np.mean([getattr(episode, name) for episode in results]))
+                for name, form in (
+                    ("distance", "{:.2f} m"),
+                    ("time", "{:.2f} s"),
+                    ("energy", "{:.0f} J"),
+                    ("slip", "{:.2%}"),
+                    ("real_time_factor", "{:.0f}"),
+                )
+            ),
+        )
+    return table

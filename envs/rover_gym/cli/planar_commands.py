@@ -1,0 +1,196 @@
+"""`rover planar ball|rover|soil`: the planar systems of the report's chapter 3."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.table import Table
+
+from rover_gym.cli.console import check_folder, console, keeping, plain_errors, progress_bar, say_path
+from rover_gym.cli.soil_command import soil
+from rover_gym.mechanics import (
+    BallSimulation,
+    Line,
+    OptionError,
+    PlanarSimulation,
+    Polyline,
+    Sine,
+    Spline,
+    TwoWheelRoverSimulation,
+)
+from rover_gym.planar.planar_recording import PlanarGround, describe_planar, record_planar
+from rover_gym.record.trajectory import read_trajectory
+from rover_gym.validation import number, refuse
+
+planar = typer.Typer(
+    help="Planar systems of the report's chapter 3: a ball, a two-wheel rover, granular soil.", no_args_is_help=True
+)
+
+
+STEEPEST = 89.0  # degrees: an upright line is no ground
+LARGEST_TABLE = 1 << 26  # bytes
+
+
+class PlanarGroundKind(StrEnum):
+    """Grounds that can be chosen by name."""
+
+    line = "line"
+    sine = "sine"
+    step = "step"
+    table = "table"
+
+
+GroundOption = Annotated[PlanarGroundKind, typer.Option("--ground", help="The ground.")]
+Slope = Annotated[float, typer.Option(help="Slope of the line, degrees, rising forward.")]
+Amplitude = Annotated[float, typer.Option(help="Amplitude of the sine, m.")]
+Wavelength = Annotated[float, typer.Option(help="Wavelength of the sine, m.")]
+Height = Annotated[float, typer.Option(help="Height of the step at x = 2 m.")]
+TableFile = Annotated[
+    Path | None, typer.Option(exists=True, dir_okay=False, help="Text file with columns x and y, m, for 'table'.")
+]
+Friction = Annotated[float, typer.Option(help="Friction coefficient.")]
+Restitution = Annotated[float, typer.Option(help="Coefficient of restitution.")]
+TimeStep = Annotated[float, typer.Option(help="Time step, s.")]
+Duration = Annotated[float, typer.Option(min=0.01, max=1000.0, help="Time to simulate, s.")]
+Speed = Annotated[float, typer.Option(min=-1e4, max=1e4, help="Forward speed at the start, m/s.")]
+Output = Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)]
+
+
+@planar.command()
+@plain_errors
+def ball(
+    *,
+    ground: GroundOption = PlanarGroundKind.line,
+    slope: Slope = -10.0,
+    amplitude: Amplitude = 0.5,
+    wavelength: Wavelength = 4.0,
+    height: Height = 0.05,
+    table: TableFile = None,
+    radius: Annotated[float, typer.Option(help="Radius, m.")] = 0.3,
+    mass: Annotated[float, typer.Option(help="Mass, kg.")] = 3.0,
+    drop: Annotated[float, typer.Option(min=0.0, help="Height of the start over the ground, m.")] = 1.0,
+    speed: Speed = 0.0,
+    friction: Friction = 0.7,
+    restitution: Restitution = 0.5,
+    time_step: TimeStep = 0.002,
+    duration: Duration = 10.0,
+    output: Output = Path("runs/planar"),
+) -> None:
+    """Drop a ball on a line, a sine, a step or a table of points; record and draw its path."""
+    check_folder("output", output)
+    sim = BallSimulation(
+        _ground(ground, slope, amplitude, wavelength, height, table),
+        mass=mass,
+        radius=radius,
+        friction=friction,
+        restitution=restitution,
+        time_step=time_step,
+    )
+    sim.set_state([0.0, sim.ground.height(0.0) + radius + drop, 0.0], [speed, 0.0, 0.0])
+    _lift(sim, drop)
+    _run(sim, "a ball", duration, output / "ball.h5")
+
+
+@planar.command()
+@plain_errors
+def rover(
+    *,
+    ground: GroundOption = PlanarGroundKind.sine,
+    slope: Slope = 10.0,
+    amplitude: Amplitude = 0.08,
+    wavelength: Wavelength = 1.5,
+    height: Height = 0.05,
+    table: TableFile = None,
+    torque: Annotated[float, typer.Option(help="Torque of each wheel, N m, positive forward.")] = 50.0,
+    speed: Speed = 0.0,
+    friction: Friction = 0.9,
+    restitution: Restitution = 0.0,
+    time_step: TimeStep = 0.002,
+    duration: Duration = 10.0,
+    output: Output = Path("runs/planar"),
+) -> None:
+    """Drive the two-wheel rover over a line, a sine, a step or a table of points; record and draw its path."""
+    check_folder("output", output)
+    sim = TwoWheelRoverSimulation(
+        _ground(ground, slope, amplitude, wavelength, height, table),
+        friction=friction,
+        restitution=restitution,
+        time_step=time_step,
+    )
+    # Along the chord between the grounds under its two axles.
+    low, high = (sim.ground.height(x) for x in (-0.4, 0.4))
+    angle = float(np.arctan2(high - low, 0.8))
+    sim.set_state([0.0, sim.ground.height(0.0) + 0.2, angle, 0.0, 0.0], [speed, 0.0, 0.0, -speed / 0.2, -speed / 0.2])
+    _lift(sim, 0.0)
+    sim.set_torques([torque, torque])
+    _run(sim, "the two-wheel rover", duration, output / "rover.h5")
+
+
+planar.command()(soil)
+
+
+def _ground(
+    kind: PlanarGroundKind, slope: float, amplitude: float, wavelength: float, height: float, table: Path | None
+) -> PlanarGround:
+    if kind is PlanarGroundKind.line:
+        return Line(float(np.tan(np.radians(number("slope", slope, at_least=-STEEPEST, at_most=STEEPEST)))))
+    if kind is PlanarGroundKind.sine:
+        return Sine(amplitude, wavelength)
+    if kind is PlanarGroundKind.step:
+        return Polyline.step(2.0, height)
+    if table is None:
+        refuse(OptionError, "table", None, "the ground 'table' needs a file")
+    if not table.is_file() or table.stat().st_size > LARGEST_TABLE:  # a device has no end
+        refuse(OptionError, "table", str(table), f"must be a regular file of at most {LARGEST_TABLE} bytes")
+    try:
+        points = np.loadtxt(table, ndmin=2)
+        x, y = points[:, 0], points[:, 1]
+    except (ValueError, IndexError):
+        refuse(OptionError, "table", str(table), "does not hold two columns of numbers")
+    return Spline(x, y)
+
+
+def _lift(sim: PlanarSimulation, clearance: float) -> None:
+    """Moves the machine up until its smallest gap is at least `clearance`, m (0: it touches)."""
+    for _ in range(200):
+        short = clearance - float(sim.gaps.min())
+        if short <= 1e-12:
+            return
+        q, v = sim.q, sim.v
+        q[1] += short
+        sim.set_state(q, v)
+
+
+def _words(ground: PlanarGround) -> str:
+    if isinstance(ground, Line):
+        return f"a line of {np.degrees(np.arctan(ground.slope)):g} degrees"
+    if isinstance(ground, Sine):
+        return f"a sine of {ground.amplitude:g} m, {ground.wavelength:g} m long"
+    return "a step" if isinstance(ground, Polyline) else "a table of points"
+
+
+def _run(sim: PlanarSimulation, who: str, duration: float, path: Path) -> None:
+    title = f"{who} on {_words(sim.ground)}"
+    with keeping("trajectory", path), progress_bar() as bar:
+        task = bar.add_task(who, total=duration, state="")
+        rows = record_planar(
+            sim,
+            path,
+            describe_planar(sim, title),
+            duration=duration,
+            progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
+        )
+    trajectory = read_trajectory(path)
+    table = Table(title=title, show_header=False, title_justify="left")
+    x, y = sim.q[:2]
+    table.add_row("at the end", f"x = {x:.3f} m, y = {y:.3f} m after {sim.time:g} s")
+    table.add_row("speed at the end", f"{np.hypot(*sim.v[:2]):.3f} m/s")
+    table.add_row("smallest gap", f"{1e3 * trajectory['gaps'].min():.4f} mm")
+    table.add_row("steps not converged", str(rows))
+    console().print(table)
+    say_path("trajectory", path)
+    from rover_gym.figures.planar_run import draw_planar_run  # noqa: PLC0415 - matplotlib is slow to load
+
+    say_path("figure", draw_planar_run(sim, path, path.with_suffix(".png")))

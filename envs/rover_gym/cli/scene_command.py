@@ -1,0 +1,171 @@
+"""`rover scene`: what is built for a scene, why, and what that costs and saves."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from enum import StrEnum
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from rover_gym.cli.console import LARGEST_SEED, console, plain_errors, progress_bar
+from rover_gym.env.rocks import clear_radius
+from rover_gym.env.start import tilted_plane
+from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField
+from rover_gym.planning.economy import Economy, measure_economies
+from rover_gym.planning.planner import plan
+from rover_gym.planning.scene import Accuracy, Scene
+from rover_gym.planning.scene_plan import ScenePlan
+from rover_gym.reproduction.sphere_rug import START
+from rover_gym.validation import number, refuse
+
+#: Radius of the ground without rocks around the start, beyond the rover itself, m.
+CLEARING = 3.0
+
+
+class SceneTerrain(StrEnum):
+    """Grounds that can be chosen by name."""
+
+    plane = "plane"
+    rocks = "rocks"
+    rug = "rug"
+
+
+@plain_errors
+def scene(
+    *,
+    terrain: Annotated[SceneTerrain, typer.Option(help="The ground.")] = SceneTerrain.plane,
+    slope: Annotated[float, typer.Option(help="Slope of the plane or rocks, degrees, rising along x.")] = 0.0,
+    heading: Annotated[float, typer.Option(help="Start heading, degrees to the left of x.")] = 0.0,
+    straight: Annotated[
+        bool, typer.Option("--straight/--steered", help="Promise no steering and equal torques, or allow any command.")
+    ] = False,
+    held: Annotated[bool, typer.Option("--held", help="Wheels may be braked and joints held.")] = False,
+    tumbles: Annotated[bool, typer.Option("--tumbles", help="The rover may turn over in free flight.")] = False,
+    reach: Annotated[float | None, typer.Option(help="The rover stays within this distance of its start, m.")] = None,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the rocks.")] = 1,
+    accuracy: Annotated[
+        str, typer.Option(help="'fast', 'balanced', 'reference', or the error allowed on 20 m of flat ground, m.")
+    ] = "balanced",
+    planar: Annotated[bool, typer.Option("--planar/--no-planar", help="Allow a planar model.")] = True,
+    explain: Annotated[bool, typer.Option("--explain", help="Print what was built and why.")] = False,
+    measure: Annotated[
+        bool, typer.Option("--measure", help="Drive straight with and without each economy; print cost and error.")
+    ] = False,
+    torque: Annotated[float, typer.Option(help="Torque of every wheel in the measured drive, N m.")] = 15.0,
+    duration: Annotated[float, typer.Option(min=0.1, max=600.0, help="Duration of the measured drive, s.")] = 10.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
+) -> None:
+    """Print what is built for a scene: model, ground, scheme, solver and step, each with its reason.
+
+    What is not known never to happen is built: steering is welded only with --straight, and so on. Without --explain
+    and --measure one line is printed.
+    """
+    number("torque", torque)
+    made = plan(
+        _scene(terrain, slope, heading, straight, held, tumbles, reach, seed), _accuracy(accuracy), planar=planar
+    )
+    economies: list[Economy] = []
+    if measure:
+        with progress_bar() as bar:
+            task = bar.add_task("scene", total=1.0, state="")
+            economies = measure_economies(
+                made, torque=torque, duration=duration, progress=lambda done: bar.update(task, completed=done)
+            )
+    if as_json:
+        rows = [{**asdict(e), "ratio": e.ratio} for e in economies]
+        report = {"model": made.kind, "dofs": _dofs(made), "error": made.error, "parts": made.explain()}
+        typer.echo(json.dumps({**report, "measured": rows} if measure else report, indent=2))
+        return
+    out = console()
+    dofs = _dofs(made)
+    out.print(
+        f"{made.kind} model of {dofs} degrees of freedom, within {made.error:.0e} m of the full one in 10 s"
+        if made.kind != "full"
+        else f"full model of {dofs} degrees of freedom"
+    )
+    if explain:
+        out.print(_explained(made))
+    if measure:
+        out.print(_measured(economies, made, duration))
+
+
+def _dofs(made: ScenePlan) -> int:
+    return len(made.simulation().v)
+
+
+def _accuracy(text: str) -> Accuracy:
+    if text in ("fast", "balanced", "reference"):
+        return text  # type: ignore[return-value]
+    try:
+        metres = float(text)
+    except ValueError:
+        refuse(OptionError, "accuracy", text, "must be fast, balanced, reference or a number of metres")
+    return number("accuracy", metres, above=0.0)
+
+
+def _scene(
+    terrain: SceneTerrain,
+    slope: float,
+    heading: float,
+    straight: bool,
+    held: bool,
+    tumbles: bool,
+    reach: float | None,
+    seed: int,
+) -> Scene:
+    steepness = math.radians(number("slope", slope, at_least=-60.0, at_most=60.0))
+    plane = tilted_plane(steepness, 0.0) if steepness else Plane()
+    model = RoverModel()
+    ground: Plane | SphereField = plane
+    start = None
+    if terrain is SceneTerrain.rocks:
+        clear = ((0.0, 0.0, CLEARING + clear_radius(model)),)
+        ground = SphereField.rocks(
+            0.1, (-4.0, -4.0, 26.0, 4.0), seed, max_diameter=0.2, ground=plane, clear=np.array(clear)
+        )
+    elif terrain is SceneTerrain.rug:
+        if slope:
+            refuse(OptionError, "slope", slope, "the rug has no slope to choose")
+        ground = SphereField.rug()
+        start = np.zeros(model.nq)
+        start[:3] = START
+        start[4] = math.radians(number("heading", heading))
+    return Scene(
+        ground,
+        model,
+        start,
+        math.radians(number("heading", heading)),
+        steered=not straight,
+        equal_torques=straight,
+        held=held,
+        tumbles=tumbles,
+        reach=reach,
+    )
+
+
+def _explained(made: ScenePlan) -> Table:
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for heading in ("part", "built", "why"):
+        table.add_column(heading)
+    table.add_column("error in 10 s", justify="right", no_wrap=True)
+    for decision in made.decisions:
+        error = "-" if decision.error is None else "none" if decision.error == 0.0 else f"< {decision.error:.0e} m"
+        table.add_row(decision.part, decision.built, decision.reason, error)
+    return table
+
+
+def _measured(economies: Sequence[Economy], made: ScenePlan, duration: float) -> Table:
+    title = f"{duration:g} s straight ahead at {1e3 * made.options['time_step']:g} ms, CPU time a step"
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column("economy")
+    for heading in ("without", "with", "ratio", "error", "stated"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    for e in economies:
+        bound = "-" if e.bound is None else f"{e.bound:.0e} m"
+        table.add_row(e.name, f"{e.before:.2f} us", f"{e.after:.2f} us", f"{e.ratio:.2f}", f"{e.error:.1e} m", bound)
+    return table

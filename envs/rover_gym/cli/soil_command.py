@@ -1,0 +1,256 @@
+"""`rover planar soil`: the two-wheel rover on granular soil, a crossing or a sweep of trials."""
+
+import json
+import math
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+from rich.table import Table
+
+from rover_gym.cli.console import (
+    INTERRUPTED,
+    LARGEST_SEED,
+    check_folder,
+    console,
+    keeping,
+    plain_errors,
+    progress_bar,
+    say_path,
+)
+from rover_gym.mechanics import OptionError
+from rover_gym.validation import refuse
+
+if TYPE_CHECKING:
+    from rover_gym.soil.traction import Traction
+
+EARTH = 9.81  # m/s^2
+FRAMES = 25.0  # of the video, a second at EARTH
+END = 0.02  # m between front wheel and wall at which a crossing ends
+
+#: Width of a bed on which the rover, and the pulling wheel on its way, have room, m.
+CROSSING, PULLING = 1.3, 2.1
+
+#: Sweeps: torques of each wheel (N m, at EARTH); slips, loads (kg) and rim's speed (m/s, at EARTH) of a pulling wheel.
+TORQUES = (5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 65.0, 80.0, 100.0)
+SLIPS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+LOADS = (10.0,)
+RIM_SPEED = 0.3
+#: Radii of the disks on which the wheel pulls, m: unequal, so that they do not lie in rows.
+UNEQUAL = {"radius_min": 0.013, "radius_max": 0.0195}
+
+
+@plain_errors
+def soil(
+    *,
+    disks: Annotated[
+        int | None, typer.Option(min=30, max=20_000, help="Number of disks. Default: 222; in a sweep, 444.")
+    ] = None,
+    layers: Annotated[int, typer.Option(min=1, max=100, help="Layers of disks.")] = 3,
+    torque: Annotated[float, typer.Option(help="Torque of each wheel, N m, positive forward.")] = 50.0,
+    gravity: Annotated[
+        float, typer.Option(min=1e-3, max=1e3, help="Gravity, m/s^2; the original run had 0.0981.")
+    ] = EARTH,
+    friction: Annotated[float, typer.Option(help="Friction coefficient between disks.")] = 0.5,
+    wheel_friction: Annotated[float, typer.Option(help="Friction coefficient at the wheels.")] = 0.9,
+    time_step: Annotated[
+        float | None,
+        typer.Option(help="Time step, s. Default: 1 ms (in a sweep 2 ms) at 9.81 m/s^2, longer under weaker gravity."),
+    ] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(
+            min=0.01,
+            max=1000.0,
+            help="Time to simulate, s. Default: 4 s at 9.81 m/s^2, longer under weaker gravity. "
+            "The run ends early where the soil ends.",
+        ),
+    ] = None,
+    seed: Annotated[
+        int,
+        typer.Option(
+            min=0, max=LARGEST_SEED - 100, help="Seed of the disks' radii and positions; in a sweep, the first seed."
+        ),
+    ] = 0,
+    video: Annotated[bool, typer.Option(help="Write a video, soil.mp4.")] = True,
+    sweep: Annotated[
+        bool,
+        typer.Option(
+            "--sweep",
+            help="Instead of a crossing: slip and sinkage against torque, drawbar pull against slip; takes minutes.",
+        ),
+    ] = False,
+    seeds: Annotated[int, typer.Option(min=1, max=100, help="Sweep: number of beds for each trial.")] = 4,
+    pull_disks: Annotated[
+        int, typer.Option(min=30, max=20_000, help="Sweep: number of disks under the pulling wheel.")
+    ] = 480,
+    pull_layers: Annotated[int, typer.Option(min=1, max=100, help="Sweep: layers of those disks.")] = 6,
+    output: Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)] = Path("runs/planar"),
+) -> None:
+    """Drive the two-wheel rover over granular soil of disks; record, draw and film it."""
+    check_folder("output", output)
+    slowness = float(np.sqrt(EARTH / gravity))
+    options: dict[str, Any] = {
+        "gravity": (0.0, -gravity),
+        "friction": friction,
+        "time_step": (2e-3 if sweep else 1e-3) * slowness if time_step is None else time_step,
+    }
+    if sweep:
+        beds = range(seed, seed + seeds)
+        _sweep(disks or 444, layers, pull_disks, pull_layers, beds, wheel_friction, options, output)
+    else:
+        seconds = 4.0 * slowness if duration is None else duration
+        _cross(disks or 222, layers, torque, seconds, seed, wheel_friction, options, output, video=video)
+
+
+def _cross(
+    disks: int,
+    layers: int,
+    torque: float,
+    duration: float,
+    seed: int,
+    wheel_friction: float,
+    options: dict[str, Any],
+    output: Path,
+    *,
+    video: bool,
+) -> None:
+    from rover_gym.figures.soil_frames import draw_soil, film_soil  # noqa: PLC0415 - matplotlib is slow to load
+    from rover_gym.soil.bed import settled_bed  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.soil.soil_recording import record_soil  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.soil.soil_rover import rover_on_soil  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.soil.soil_run import read_soil_run  # noqa: PLC0415 - as above
+
+    _check_width("disks", disks, layers, CROSSING)
+    bed = settled_bed(disks, layers, seed=seed, **options)
+    sim = rover_on_soil(bed, wheel_friction=wheel_friction, **options)
+    sim.set_torques([torque, torque])
+    title = f"the two-wheel rover on a soil of {disks} disks"
+    path = output / "soil.h5"
+    rate = FRAMES * float(np.sqrt(-options["gravity"][1] / EARTH))
+    with keeping("trajectory", path), progress_bar() as bar:
+        task = bar.add_task("soil", total=duration, state="")
+        rows = record_soil(
+            sim,
+            path,
+            title,
+            duration=duration,
+            steps_per_row=max(1, round(0.5 / rate / sim.time_step)),
+            walls=bed.walls,
+            until=lambda now: bool(now.wheels[-1, 0] + now.wheels[-1, 2] > bed.width - END),
+            progress=lambda time: bar.update(task, completed=time, state=f"{time:.1f} s"),
+        )
+    run = read_soil_run(path)
+    machine = run.trajectory["machine"]
+    distance, rims = (
+        machine[-1, 0] - machine[0, 0],
+        -float((run.wheels[0, :, 2] * (machine[-1] - machine[0])[3:]).mean()),
+    )
+    table = Table(title=title, show_header=False, title_justify="left")
+    table.add_row("distance", f"{distance:.3f} m in {sim.time:g} s")
+    table.add_row("slip", f"{1.0 - distance / rims:.3f}" if rims > 0.01 else "the wheels stand")
+    table.add_row("mean sinkage", f"{1e3 * run.sinkage.mean():.1f} mm")
+    table.add_row("contacts at the end", str(len(sim.contacts)))
+    share = float(run.trajectory["penetration"].max()) / float(sim.radius.min())
+    table.add_row("deepest overlap", f"{100.0 * share:.3f}% of the smallest radius")
+    table.add_row("rows not converged", f"{rows} of {run.n_frames - 1}")
+    console().print(table)
+    say_path("trajectory", path)
+    say_path("figure", draw_soil(run, output / "soil.png", row=run.n_frames // 2))
+    if video:
+        with console().status("drawing the video"):
+            film = film_soil(run.resample(rate), output / "soil.mp4", frames_per_second=round(FRAMES))
+        say_path("video", film)
+
+
+def _check_width(option: str, disks: int, layers: int, needed: float, radius_max: float = 0.0165) -> None:
+    """Refuses a bed that is too narrow, m, before it is settled."""
+    from rover_gym.soil.bed import bed_width  # noqa: PLC0415 - h5py is slow to load
+
+    width = bed_width(disks, layers, radius_max)
+    if width < needed:
+        enough = layers * math.ceil(needed / bed_width(1, 1, radius_max))
+        reason = f"in {layers} layers make a bed {width:.2f} m wide, and the machine needs {needed:g} m:"
+        refuse(OptionError, option, disks, f"{reason} take at least {enough}")
+
+
+def _sweep(
+    disks: int,
+    layers: int,
+    pull_disks: int,
+    pull_layers: int,
+    seeds: range,
+    wheel_friction: float,
+    options: dict[str, Any],
+    output: Path,
+) -> None:
+    from rover_gym.figures.trial_curves import draw_curves  # noqa: PLC0415 - matplotlib is slow to load
+    from rover_gym.soil.bed import settled_bed  # noqa: PLC0415 - h5py is slow to load
+    from rover_gym.soil.soil_trials import drawbar_pull, drive_on_soil, over_beds  # noqa: PLC0415 - as above
+    from rover_gym.soil.traction import fit_traction  # noqa: PLC0415 - as above
+
+    _check_width("disks", disks, layers, CROSSING)
+    _check_width("pull_disks", pull_disks, pull_layers, PULLING, UNEQUAL["radius_max"])
+    scale = -options["gravity"][1] / EARTH
+    slowness = float(scale**-0.5)
+    # Means over seconds and beds need no closer solution, and most of a bed lies still.
+    cheap = {"tolerance": 1e-3, "sleep": True, "sleep_speed": 5e-4 / slowness}
+    rest = {**options, **cheap, "wheel_friction": wheel_friction}
+    drive = partial(drive_on_soil, run_in=0.5 * slowness, duration=2.0 * slowness, **rest)
+    with progress_bar() as bar:
+        total = len(seeds) * (2 + len(TORQUES) + len(LOADS) * len(SLIPS))
+        task = bar.add_task("trials", total=total, state="")
+        done = 0
+
+        def advance(_: int) -> None:
+            nonlocal done
+            done += 1
+            bar.update(task, completed=done, state=f"{done} of {total}")
+
+        beds, pull_beds = [], []
+        for seed in seeds:
+            beds.append(settled_bed(disks, layers, seed=seed, **options))
+            advance(1)
+            pull_beds.append(settled_bed(pull_disks, pull_layers, seed=seed, **UNEQUAL, **options))
+            advance(1)
+        pulls, drives, interrupted = {}, [], False
+        try:
+            for load in LOADS:
+                pull = partial(drawbar_pull, load=load, rim_speed=RIM_SPEED / slowness, **rest)
+                pulls[load] = over_beds(pull, SLIPS, pull_beds, progress=advance)
+            drives = over_beds(drive, [scale * torque for torque in TORQUES], beds, progress=advance)
+        except KeyboardInterrupt:
+            interrupted = True
+    if interrupted and not pulls:
+        raise KeyboardInterrupt
+    fits = {load: fit_traction(rows) for load, rows in pulls.items()}
+    _say_fits(fits)
+    output.mkdir(parents=True, exist_ok=True)
+    numbers = {
+        "drives": [[asdict(drive) for drive in row] for row in drives],
+        "pulls": {str(load): [[asdict(pull) for pull in row] for row in rows] for load, rows in pulls.items()},
+        "fits": {str(load): asdict(fit) for load, fit in fits.items()},
+    }
+    path = output / "soil-curves.json"
+    # JSON knows no nan: the slip of wheels that stood is null, and so is the standard error of one bed.
+    path.write_text(json.dumps(numbers, indent=1).replace("NaN", "null") + "\n", encoding="utf-8")
+    say_path("numbers", path)
+    if interrupted:
+        typer.echo("interrupted: the pulls are done, the drives are not", err=True)
+        raise typer.Exit(INTERRUPTED)
+    say_path("curves", draw_curves(drives, pulls, fits, output / "soil-curves.png"))
+
+
+def _say_fits(fits: dict[float, "Traction"]) -> None:
+    """The numbers of the pull's curve for each load."""
+    first = next(iter(fits.values())).first
+    table = Table(title="pull / load = A (1 - exp(-(s - s₀) / K)) of the slip s", title_justify="left")
+    for column in ("load", "A", "s₀", "K", f"slope from s = {first:g} on"):
+        table.add_column(column)
+    for load, fit in fits.items():
+        numbers = (fit.limit, fit.free_slip, fit.scale, fit.last_slope)
+        table.add_row(f"{load:g} kg", *map(str, numbers))
+    console().print(table)

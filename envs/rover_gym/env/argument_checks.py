@@ -1,0 +1,138 @@
+"""What an argument of the environment may be: checks that say so, and refuse everything else by name.
+
+A check is called with the argument's name and value. It returns the value in its plain form or raises one of the
+package's errors; as a string it is what the card prints under "may be".
+"""
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rover_gym.env import rewards
+from rover_gym.env.wheels import N_WHEELS
+from rover_gym.mechanics import ModelError, OptionError, RoverModel, SphereField, TerrainError
+from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector
+
+TERRAINS = ("plane", "sphere_field")
+SOLVER_OPTIONS = (
+    "variant",
+    "theta",
+    "forecast",
+    "solver",
+    "tolerance",
+    "max_iterations",
+    "stabilisation",
+    "warm_start",
+)
+
+#: Steeper ground than this is a wall to a wheel.
+MAX_SLOPE_DEG = 60.0
+
+#: Ranges far beyond any rover, within which all sums stay finite: m, m/s2, factors, and the rest as named.
+MAX_DISTANCE = 1e6
+MAX_FRICTION = 1e3
+GRAVITIES = (1e-3, 1e3)
+SCALES = (1e-3, 1e3)
+MAX_WEIGHT = 1e6
+MIN_TIME_STEP = 1e-6  # s
+MIN_STEERING_DEG = 0.01
+
+
+def shortest(value: float) -> str:
+    """A number as the card prints it: 60 for 60.0, 1e6 for a million."""
+    return re.sub(r"e([+-])0?", lambda found: "e" + found[1].replace("+", ""), f"{value:g}")
+
+
+@dataclass(frozen=True)
+class Number:
+    """A finite number within bounds."""
+
+    above: float | None = None
+    at_least: float | None = None
+    at_most: float | None = None
+
+    def __call__(self, field: str, value: object) -> float:
+        """The number as a float."""
+        return number(field, value, above=self.above, at_least=self.at_least, at_most=self.at_most)
+
+    def __str__(self) -> str:
+        if self.at_least is not None and self.at_most is not None:
+            return f"{shortest(self.at_least)} to {shortest(self.at_most)}"
+        bounds = (("above", self.above), ("at least", self.at_least), ("at most", self.at_most))
+        return ", ".join(f"{word} {shortest(bound)}" for word, bound in bounds if bound is not None) or "any number"
+
+
+@dataclass(frozen=True)
+class NumberOrRange(Number):
+    """A finite number within bounds, or a pair (low, high) of them to draw from."""
+
+    def __call__(self, field: str, value: object) -> Range:  # type: ignore[override] # a number is a range of one
+        """The range, of one number where one was given."""
+        return span(field, value, above=self.above, at_least=self.at_least, at_most=self.at_most)
+
+    def __str__(self) -> str:
+        return f"{super().__str__()}, or a range"
+
+
+@dataclass(frozen=True)
+class Special:
+    """A check in the words of its own function."""
+
+    words: str
+    check: Callable[[str, Any], Any]
+
+    def __call__(self, field: str, value: object) -> Any:
+        """The value, checked."""
+        return self.check(field, value)
+
+    def __str__(self) -> str:
+        return self.words
+
+
+def check_terrain(field: str, value: object) -> str | SphereField:
+    """The name of a terrain, or a field of spheres."""
+    if not (isinstance(value, SphereField) or (isinstance(value, str) and value in TERRAINS)):
+        refuse(TerrainError, field, value, f"unknown; known are {', '.join(TERRAINS)} and a SphereField")
+    return value
+
+
+def check_gravity(field: str, value: object) -> tuple[float, ...]:
+    """(3,) m/s2, not so weak or strong that a rover could not stand."""
+    gravity = vector(field, value, 3)
+    magnitude = math.hypot(*gravity)
+    if not magnitude > 0.0:
+        refuse(OptionError, field, value, "must not vanish: it says where up is")
+    if not GRAVITIES[0] <= magnitude <= GRAVITIES[1]:
+        refuse(OptionError, field, value, "must have a magnitude of {:g} to {:g} m/s2".format(*GRAVITIES))
+    return gravity
+
+
+def check_model(field: str, value: object) -> RoverModel:
+    """A model that has what the action drives."""
+    if not isinstance(value, RoverModel):
+        refuse(ModelError, field, value, "must be a RoverModel")
+    for name, indices in (
+        ("wheel_joint_indices", value.wheel_joint_indices),
+        ("steering_joint_indices", value.steering_joint_indices),
+    ):
+        if len(indices) != N_WHEELS or min(indices) < 0:
+            refuse(ModelError, f"{field}.{name}", indices, f"must be {N_WHEELS} joints that move")
+    return value
+
+
+def check_solver_options(field: str, value: object) -> Mapping[str, Any]:
+    """Options by their names; the core checks their values."""
+    options = mapping(field, value)
+    known_keys(field, options, SOLVER_OPTIONS)
+    return options
+
+
+def check_reward_weights(field: str, value: object) -> dict[str, float]:
+    """The weight of every term, those that are given instead of the default ones."""
+    weights = dict(rewards.WEIGHTS)
+    for name, weight in mapping(field, value).items():
+        known_keys(field, (name,), rewards.WEIGHTS)
+        weights[name] = number(f"{field}.{name}", weight, at_least=-MAX_WEIGHT, at_most=MAX_WEIGHT)
+    return weights

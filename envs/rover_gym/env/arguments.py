@@ -1,0 +1,266 @@
+"""The arguments of the environment, listed once.
+
+`RoverArguments` is that list: the name, the type, the default, the unit, what each may be and what it means. All else
+is made from it: the signatures of `RoverEnv` and of the vector environments, the checks, and the table of the card.
+"""
+
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, TypedDict, TypeVar, get_args, get_type_hints
+
+from rover_gym.env.argument_checks import (
+    MAX_DISTANCE,
+    MAX_FRICTION,
+    MAX_SLOPE_DEG,
+    MIN_STEERING_DEG,
+    MIN_TIME_STEP,
+    SCALES,
+    Number,
+    NumberOrRange,
+    Special,
+    check_gravity,
+    check_model,
+    check_reward_weights,
+    check_solver_options,
+    check_terrain,
+    shortest,
+)
+from rover_gym.env.rocks import MAX_ABUNDANCE, ROCK_RADII, check_scan
+from rover_gym.mechanics import RoverModel, SphereField
+from rover_gym.rendering.render_options import check_render_mode, check_render_options
+from rover_gym.validation import Range, mapping
+
+F = TypeVar("F", bound=Callable[..., Any])
+C = TypeVar("C", bound=type)
+
+
+@dataclass(frozen=True)
+class Argument:
+    """What is known of one argument.
+
+    Attributes:
+        default: Its default. Where that is None, None is allowed, and passes unchecked.
+        check: What it may be.
+        meaning: What it means, in a few words.
+        unit: SI, "deg", or "" for a pure number or none.
+    """
+
+    default: Any
+    check: Number | Special
+    meaning: str
+    unit: str = ""
+
+
+class RoverArguments(TypedDict, total=False):
+    """The keyword arguments of `RoverEnv`."""
+
+    terrain: Annotated[
+        str | SphereField,
+        Argument(
+            "plane", Special('"plane", "sphere_field" or a `SphereField` on a plane', check_terrain), "the ground"
+        ),
+    ]
+    difficulty: Annotated[
+        float | Range | None, Argument(None, NumberOrRange(at_least=0.0, at_most=1.0), "of the rocks; None: 0.5")
+    ]
+    rock_abundance: Annotated[
+        float | None,
+        Argument(
+            None,
+            Number(at_least=0.0, at_most=MAX_ABUNDANCE),
+            "fraction of the ground that rocks cover; None: by the difficulty",
+        ),
+    ]
+    max_rock_radius: Annotated[
+        float | None,
+        Argument(
+            None,
+            Number(at_least=ROCK_RADII[0], at_most=ROCK_RADII[1]),
+            "of the largest rocks; None: by the difficulty",
+            "wheel radii",
+        ),
+    ]
+    height_scan: Annotated[
+        bool | tuple[int, int, float],
+        Argument(False, Special("True, False or (rows, columns, spacing in m)", check_scan), "observe heights"),
+    ]
+    slope_deg: Annotated[
+        float | Range | None,
+        Argument(
+            None,
+            NumberOrRange(at_least=0.0, at_most=MAX_SLOPE_DEG),
+            "slope of the plane; None: 0, among rocks by the difficulty",
+            "deg",
+        ),
+    ]
+    uphill_deg: Annotated[
+        float | Range, Argument((-180.0, 180.0), NumberOrRange(), "direction of steepest ascent", "deg")
+    ]
+    heading_deg: Annotated[float | Range, Argument((-180.0, 180.0), NumberOrRange(), "start heading", "deg")]
+    goal_distance: Annotated[
+        float | Range,
+        Argument(
+            (5.0, 10.0),
+            NumberOrRange(above=0.0, at_most=MAX_DISTANCE),
+            "of the goal from the start; among rocks at most 100",
+            "m",
+        ),
+    ]
+    goal_bearing_deg: Annotated[
+        float | Range,
+        Argument((-90.0, 90.0), NumberOrRange(), "direction of the goal from the start heading", "deg"),
+    ]
+    goal_tolerance: Annotated[
+        float,
+        Argument(
+            0.5, Number(above=0.0, at_most=MAX_DISTANCE), "the goal is reached within it; among rocks at most 100", "m"
+        ),
+    ]
+    max_steering_deg: Annotated[
+        float | None,
+        Argument(
+            None,
+            Number(at_least=MIN_STEERING_DEG),
+            "set-point of a steering action of 1; None, and at most: the model's limit",
+            "deg",
+        ),
+    ]
+    max_tilt_deg: Annotated[float, Argument(60.0, Number(above=0.0, at_most=180.0), "roll-over beyond", "deg")]
+    stuck_time: Annotated[
+        float, Argument(2.0, Number(at_least=MIN_TIME_STEP), "until a high-centred rover ends the episode", "s")
+    ]
+    friction: Annotated[
+        float | Range, Argument(0.7, NumberOrRange(at_least=0.0, at_most=MAX_FRICTION), "friction coefficient")
+    ]
+    restitution: Annotated[float, Argument(0.0, Number(at_least=0.0, at_most=1.0), "coefficient of restitution")]
+    gravity: Annotated[
+        tuple[float, float, float],
+        Argument(
+            (0.0, -9.81, 0.0),
+            Special("(x, y, z) of magnitude 0.001 to 1000", check_gravity),
+            "Mars is (0, -3.72, 0)",
+            "m/s2",
+        ),
+    ]
+    mass_scale: Annotated[
+        float | Range,
+        Argument(1.0, NumberOrRange(at_least=SCALES[0], at_most=SCALES[1]), "masses and inertias over the model's"),
+    ]
+    actuator_gain: Annotated[
+        float | Range,
+        Argument(
+            1.0, NumberOrRange(at_least=0.0, at_most=SCALES[1]), "torque given over torque asked, up to the limit"
+        ),
+    ]
+    gravity_scale: Annotated[
+        float | Range, Argument(1.0, NumberOrRange(at_least=SCALES[0], at_most=SCALES[1]), "gravity over `gravity`")
+    ]
+    observation_noise: Annotated[
+        float,
+        Argument(
+            0.0, Number(at_least=0.0, at_most=MAX_DISTANCE), "standard deviation, in units of the observation's entries"
+        ),
+    ]
+    control_frequency: Annotated[
+        float, Argument(20.0, Number(above=0.0), "of actions; a whole number of physics steps a period", "Hz")
+    ]
+    time_step: Annotated[float, Argument(0.005, Number(at_least=MIN_TIME_STEP, at_most=1.0), "of the physics", "s")]
+    model: Annotated[
+        RoverModel | None,
+        Argument(None, Special("a `RoverModel` with six driven, steered wheels", check_model), "None: `RoverModel()`"),
+    ]
+    solver_options: Annotated[
+        Mapping[str, Any] | None,
+        Argument(None, Special("a mapping", check_solver_options), "further options of `Simulation`, by name"),
+    ]
+    reward_weights: Annotated[
+        Mapping[str, float] | None,
+        Argument(None, Special("a mapping", check_reward_weights), "weights to replace, by term"),
+    ]
+    render_mode: Annotated[
+        str | None,
+        Argument(None, Special('"rgb_array"', check_render_mode), "`render()` returns a frame"),
+    ]
+    render_options: Annotated[
+        Mapping[str, Any] | None,
+        Argument(
+            None,
+            Special("a mapping", lambda field, value: check_render_options(field, mapping(field, value))),
+            "width, height, camera, show_forces, antialiasing, by name",
+        ),
+    ]
+
+
+def _listed() -> Iterator[tuple[str, Any, Argument]]:
+    """Name, type and `Argument` of each, in the order of the list."""
+    for name, hint in get_type_hints(RoverArguments, include_extras=True).items():
+        kind, argument = get_args(hint)
+        yield name, kind, argument
+
+
+#: What is known of each argument, by name.
+ARGUMENTS: Mapping[str, Argument] = {name: argument for name, _, argument in _listed()}
+
+PARAMETERS = tuple(
+    inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=argument.default, annotation=kind)
+    for name, kind, argument in _listed()
+)
+
+
+def check_arguments(caller: str, given: Mapping[str, object]) -> dict[str, Any]:
+    """Every argument in its plain form, the default where none is given.
+
+    Args:
+        caller: The class whose arguments they are.
+        given: By name.
+
+    Raises:
+        TypeError: A name is unknown.
+        RoverGymError: A value is out of its range; `field` names the argument.
+    """
+    for name in given:
+        if name not in ARGUMENTS:
+            raise TypeError(f"{caller}.__init__() got an unexpected keyword argument {name!r}")
+    checked = {}
+    for name, argument in ARGUMENTS.items():
+        value = given.get(name, argument.default)
+        checked[name] = None if value is None and argument.default is None else argument.check(name, value)
+    return checked
+
+
+def takes_arguments(function: F) -> F:
+    """Shows the list in the signature of a function that takes it as `**arguments`."""
+    own = inspect.signature(function)
+    kept = [entry for entry in own.parameters.values() if entry.kind is not inspect.Parameter.VAR_KEYWORD]
+    function.__signature__ = own.replace(parameters=[*kept, *PARAMETERS])  # type: ignore[attr-defined]
+    return function
+
+
+def with_argument_table(cls: C) -> C:
+    """Puts the list as a table where a class' docstring says {arguments}."""
+    if cls.__doc__ is not None:  # under `python -OO` there is none
+        before, place, after = cls.__doc__.partition("{arguments}")
+        if place:
+            margin = before.rpartition("\n")[2]
+            cls.__doc__ = before + argument_table(margin) + after
+    return cls
+
+
+def argument_table(indent: str = "") -> str:
+    """The list as a table in Markdown: name, default, unit, what it may be, meaning."""
+    rows = [("name", "default", "unit", "may be", "meaning")]
+    rows += [(name, _plain(a.default), a.unit, str(a.check), a.meaning) for name, a in ARGUMENTS.items()]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = [" | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
+    lines.insert(1, "-|-".join("-" * width for width in widths))
+    return f"\n{indent}".join(f"|-{line}-|" if line.startswith("---") else f"| {line} |" for line in lines)
+
+
+def _plain(default: object) -> str:
+    """A default as it is written: strings in double quotes, 60.0 as 60."""
+    if isinstance(default, str):
+        return f'"{default}"'
+    if isinstance(default, tuple):
+        return f"({', '.join(map(_plain, default))})"
+    return shortest(default) if isinstance(default, float) else repr(default)

@@ -1,0 +1,59 @@
+"""Everything that a `RoverEnv` needs to continue bit for bit."""
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rover_gym.env.episode_scene import EpisodeScene
+from rover_gym.env.progress import Progress
+from rover_gym.env.task import Task
+from rover_gym.mechanics import Snapshot, StateError
+from rover_gym.validation import Range, refuse
+
+
+@dataclass(frozen=True)
+class EnvSnapshot:
+    """Everything that `RoverEnv` needs to continue bit for bit; picklable.
+
+    A time limit is a wrapper's business, so the wrapper's count of steps is not in here.
+    """
+
+    simulation: Snapshot
+    scene: EpisodeScene
+    progress: Progress
+    difficulty: Range | None
+    random_state: Mapping[str, Any]
+
+
+def check_snapshot(task: Task, snapshot: object) -> None:
+    """Refuses what is no snapshot of an environment with this task.
+
+    Raises:
+        StateError: It is none, or a damaged one, or one of other arguments.
+    """
+    if not isinstance(snapshot, EnvSnapshot):
+        refuse(StateError, "snapshot", snapshot, "must come from RoverEnv.snapshot()")
+    for name, kind in (("scene", EpisodeScene), ("progress", Progress), ("simulation", Snapshot)):
+        part = getattr(snapshot, name)
+        if not isinstance(part, kind):
+            refuse(StateError, f"snapshot.{name}", part, f"must be of the class {kind.__name__}")
+    if not snapshot.progress.is_of(task):
+        refuse(StateError, "snapshot.progress", snapshot.progress, "must be of an environment with these arguments")
+
+
+def check_random_state(generator: np.random.Generator, given: Mapping[str, Any]) -> dict[str, Any]:
+    """A copy of a random generator's state, once a generator of that kind has taken it.
+
+    Raises:
+        StateError: It is no such state.
+    """
+    trial = type(generator.bit_generator)()
+    try:
+        state = copy.deepcopy(dict(given))
+        trial.state = state
+    except (TypeError, ValueError, KeyError, AttributeError, OverflowError) as error:
+        refuse(StateError, "snapshot.random_state", given, f"is no state of {type(trial).__name__} ({error!r})")
+    return state

@@ -1,0 +1,97 @@
+"""What an episode remembers beside the simulation's state: for one rover, or for n at once."""
+
+import copy
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from rover_gym.env.episode_scene import EpisodeScene
+from rover_gym.env.quantities import Array, Observations, Quantity
+from rover_gym.env.randomisation import Domain
+from rover_gym.env.readings import ReadingScalars, observe
+from rover_gym.env.task import Task
+from rover_gym.env.wheels import N_ACTIONS
+
+DOMAIN = tuple(entry.name for entry in fields(Domain))
+
+
+@dataclass
+class Progress:
+    """What episodes remember beside the simulations' states: of one rover, or one row a rover.
+
+    Attributes:
+        distance: Horizontal, to the goal, m.
+        previous_action: `(..., 12)`.
+        energy: J, braking counted.
+        energy_positive: J, driving only.
+        stuck_time: s.
+        domain: `(..., 4)` what `Domain` holds, in its order.
+        trunk_load_limit: N.
+        difficulty: Of the rocks.
+        observation: `(..., size) float32`, the last one.
+    """
+
+    distance: Quantity
+    previous_action: Array
+    energy: Quantity
+    energy_positive: Quantity
+    stuck_time: Quantity
+    domain: Array
+    trunk_load_limit: Quantity
+    difficulty: Quantity
+    observation: Observations
+
+    @classmethod
+    def of(cls, task: Task, n: int) -> "Progress":
+        """Of n rovers that have not begun."""
+        distance, energy, energy_positive, stuck_time, trunk_load_limit, difficulty = np.zeros((6, n))
+        return cls(
+            distance=distance,
+            previous_action=np.zeros((n, N_ACTIONS)),
+            energy=energy,
+            energy_positive=energy_positive,
+            stuck_time=stuck_time,
+            domain=np.ones((n, len(DOMAIN))),
+            trunk_load_limit=trunk_load_limit,
+            difficulty=difficulty,
+            observation=np.zeros((n, task.layout.size), np.float32),
+        )
+
+    @classmethod
+    def begin(cls, task: Task, scene: EpisodeScene, reading: Array, noise: Array | None) -> "Progress | None":
+        """Of one rover at the start of an episode; None where float32 cannot hold its observation."""
+        previous_action = np.zeros(N_ACTIONS)
+        with np.errstate(over="ignore", invalid="ignore"):
+            observation, finite = observe(task, reading, previous_action, 0.0, noise)
+        if not finite:
+            return None
+        return cls(
+            distance=ReadingScalars.of(task, reading).distance,
+            previous_action=previous_action,
+            energy=0.0,
+            energy_positive=0.0,
+            stuck_time=0.0,
+            domain=np.array(list(scene.domain.as_info().values())),
+            trunk_load_limit=task.trunk_load_limit(scene.domain),
+            difficulty=scene.difficulty,
+            observation=observation,
+        )
+
+    def put(self, i: int, one: "Progress") -> None:
+        """Makes one rover's progress that of rover i."""
+        for name, value in vars(self).items():
+            value[i] = getattr(one, name)
+
+    def is_of(self, task: Task) -> bool:
+        """Whether this can be the progress of one rover with a task: its shapes and that all of it is finite."""
+        shapes = {"previous_action": (N_ACTIONS,), "domain": (len(DOMAIN),), "observation": (task.layout.size,)}
+        return all(
+            isinstance(value, np.ndarray if name in shapes else (float, int))
+            and np.shape(value) == shapes.get(name, ())
+            and bool(np.isfinite(value).all())
+            for name, value in vars(self).items()
+        )
+
+    def copy(self) -> "Progress":
+        """A deep copy."""
+        return copy.deepcopy(self)

@@ -1,0 +1,71 @@
+"""What the core reads off a rover, as scalars and as an observation, for one rover or for n at once."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rover_gym.env.quantities import Array, Observations, Quantity
+from rover_gym.env.task import Task
+from rover_gym.env.wheels import N_ACTIONS
+
+
+class ReadingScalars(NamedTuple):
+    """What a reading says in single numbers, by the names of the core, in its order."""
+
+    distance: Quantity
+    cos_tilt: Quantity
+    speed: Quantity
+    trunk_force: Quantity
+    slip_ratio: Quantity
+    work: Quantity
+    positive_work: Quantity
+    time: Quantity
+    not_converged: Quantity
+    iterations: Quantity
+    residual: Quantity
+    n_contacts: Quantity
+
+    @classmethod
+    def of(cls, task: Task, readings: Array) -> "ReadingScalars":
+        """From a reading `(size,)` or n of them."""
+        columns = readings[..., task.scalars]
+        return cls(*(columns.tolist() if columns.ndim == 1 else columns.T.copy()))
+
+
+def observe(
+    task: Task, readings: Array, previous_action: Array, stuck_time: Quantity, noise: Array | None
+) -> tuple[Observations, Any]:
+    """Observations `(..., size)`, and which of them float32 can hold; the others are zero."""
+    values = np.empty((*readings.shape[:-1], task.layout.size))
+    # A reading begins as an observation does.
+    n = task.n_shared
+    values[..., :n] = readings[..., :n]
+    values[..., n : n + N_ACTIONS] = previous_action
+    values[..., n + N_ACTIONS] = np.minimum(stuck_time / task.stuck_time, 1.0)
+    if task.scan is not None:
+        values[..., n + N_ACTIONS + 1 :] = readings[..., task.places["heights"]]
+    values *= task.inverse_scale
+    if noise is not None:
+        values += noise
+    observation = values.astype(np.float32)
+    finite = np.isfinite(observation).all(axis=-1)
+    if not finite.all():
+        observation[~finite] = 0.0
+    return observation, finite
+
+
+def draw_noise(task: Task, generators: Sequence[np.random.Generator | None]) -> Array | None:
+    """`(n, size)` noise of the observations, each rover's from its own generator; None without noise."""
+    if task.noisy is None:
+        return None
+    noise = np.zeros((len(generators), task.layout.size))
+    for row, generator in zip(noise, generators, strict=True):
+        if generator is not None:
+            row[:] = generator.standard_normal(task.layout.size) * task.noisy
+    return noise
+
+
+def tilt_of(cos_tilt: Quantity) -> Quantity:
+    """Angle from the vertical, rad."""
+    return np.arccos(np.minimum(np.maximum(cos_tilt, -1.0), 1.0))

@@ -1,0 +1,165 @@
+"""Fields of rocks by difficulty, and the grid by which a rover looks at the ground.
+
+One number in [0, 1] says how hard an episode is:
+
+    abundance    k = 0.2 d           fraction of the ground that rocks cover
+    largest rock r = (0.5 + 1.1 d) R in wheel radii R; half of a rock is below the ground
+    slope          0 to 10 d         degrees
+
+What an argument fixes does not follow the difficulty.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.env.start import Point, Start
+from rover_gym.env.wheels import wheel_centres
+from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField
+from rover_gym.validation import Range, number, refuse, vector
+
+#: At difficulty 1; landing sites on Mars have 0.03 to 0.2 (Golombek and Rapp 1997).
+HARDEST_ABUNDANCE = 0.2
+#: Largest rock at difficulty 0 and at difficulty 1, in wheel radii.
+LARGEST_ROCK = (0.5, 1.6)
+#: Steepest slope at difficulty 1, degrees.
+HARDEST_SLOPE_DEG = 10.0
+DEFAULT_DIFFICULTY = 0.5
+
+#: The law's own range, so that a field stays a field of rocks.
+MAX_ABUNDANCE = 0.5
+#: In wheel radii. Below the smallest a field would be gravel, beyond the largest hills.
+ROCK_RADII = (0.3, 10.0)
+#: Rocks lie up to this far beyond start and goal, m.
+MARGIN = 4.0
+#: No goal is farther from its start, m: a field between them would not fit.
+MAX_GOAL_DISTANCE = 100.0
+#: Of a height scan's points, m.
+SPACINGS = (1e-3, 10.0)
+#: Room that the clearings leave around the rover, m.
+CLEARANCE = 0.1
+
+
+@dataclass(frozen=True)
+class RockDistribution:
+    """What `sample` draws from: a range of difficulties, and what does not follow the difficulty."""
+
+    difficulty: Range = (DEFAULT_DIFFICULTY, DEFAULT_DIFFICULTY)
+    abundance: float | None = None
+    max_radius: float | None = None
+
+    def sample(self, rng: np.random.Generator, difficulty: float | None = None) -> "Rocks":
+        """Draws the rocks of one episode. A given difficulty is taken, yet the draws are the same."""
+        drawn = float(rng.uniform(*self.difficulty))
+        d = drawn if difficulty is None else difficulty
+        smallest, largest = LARGEST_ROCK
+        return Rocks(
+            difficulty=d,
+            abundance=HARDEST_ABUNDANCE * d if self.abundance is None else self.abundance,
+            max_radius=smallest + (largest - smallest) * d if self.max_radius is None else self.max_radius,
+            seed=int(rng.integers(2**63)),
+        )
+
+
+@dataclass(frozen=True)
+class Rocks:
+    """The rocks of one episode.
+
+    Attributes:
+        difficulty: In [0, 1].
+        abundance: Fraction of the ground that rocks cover.
+        max_radius: Radius of the largest rocks, in wheel radii.
+        seed: Of sizes and places.
+    """
+
+    difficulty: float
+    abundance: float
+    max_radius: float
+    seed: int
+
+    @property
+    def slope(self) -> Range:
+        """Range of the ground's slope, rad."""
+        return (0.0, math.radians(HARDEST_SLOPE_DEG) * self.difficulty)
+
+    def lay_out(self, model: RoverModel, start: Start, ground: Plane, goal_tolerance: float) -> SphereField:
+        """The field around start and goal, with clearings at both in which the rover has room to turn."""
+        (x, z), (goal_x, goal_z) = start.position, start.goal
+        radius = clear_radius(model)
+        return SphereField.rocks(
+            self.abundance,
+            (min(x, goal_x) - MARGIN, min(z, goal_z) - MARGIN, max(x, goal_x) + MARGIN, max(z, goal_z) + MARGIN),
+            self.seed,
+            max_diameter=2.0 * self.max_radius * float(model.wheel_radii.max()),
+            ground=ground,
+            clear=((x, z, radius), (goal_x, goal_z, max(radius, goal_tolerance))),
+        )
+
+
+def clear_radius(model: RoverModel) -> float:
+    """Radius of the clearings, m: the wheels reach no farther from the trunk's origin, and a little room."""
+    reach = np.linalg.norm(wheel_centres(model), axis=1) + model.wheel_radii
+    return float(reach.max()) + CLEARANCE
+
+
+@dataclass(frozen=True)
+class HeightScan:
+    """A grid of points around the trunk's origin in the heading frame, at which the ground's height is looked up.
+
+    Attributes:
+        rows: Along the heading, listed from the front.
+        columns: Across, listed from the left.
+        spacing: Between neighbours, m.
+    """
+
+    rows: int = 13
+    columns: int = 9
+    spacing: float = 0.25
+
+    @property
+    def offsets(self) -> npt.NDArray[np.float64]:
+        """`(rows * columns, 2)` ahead and to the right of the trunk's origin, m."""
+        ahead = self.spacing * (0.5 * (self.rows - 1) - np.arange(self.rows))
+        right = self.spacing * (np.arange(self.columns) - 0.5 * (self.columns - 1))
+        return np.stack(np.meshgrid(ahead, right, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def scan_points(offsets: npt.NDArray[np.float64], position: Point, heading: float) -> npt.NDArray[np.float64]:
+    """`(n, 2)` x and z of the scan's points, m."""
+    c, s = math.cos(heading), math.sin(heading)
+    points: npt.NDArray[np.float64] = offsets @ np.array([[c, -s], [s, c]]) + position
+    return points
+
+
+def heights(terrain: Plane | SphereField, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """`(n,)` height of the visible ground at (x, z), m."""
+    if isinstance(terrain, Plane):
+        n = terrain.normal
+        return np.asarray(-(points @ n[[0, 2]] + terrain.offset) / n[1])
+    return terrain.heights(points)
+
+
+def rock_distribution(difficulty: Range | None, abundance: float | None, max_radius: float | None) -> RockDistribution:
+    """The distribution that checked arguments ask for; None takes the default."""
+    return RockDistribution(
+        difficulty=(DEFAULT_DIFFICULTY, DEFAULT_DIFFICULTY) if difficulty is None else difficulty,
+        abundance=abundance,
+        max_radius=max_radius,
+    )
+
+
+def check_scan(field: str, value: object) -> HeightScan | None:
+    """The scan that an argument asks for: False, True, or (rows, columns, spacing)."""
+    if value is None or value is False:
+        return None
+    if value is True:
+        return HeightScan()
+    rows, columns, spacing = vector(field, value, 3)
+    for i, count in enumerate((rows, columns)):
+        if not (count.is_integer() and 1.0 <= count <= 200.0):
+            refuse(OptionError, f"{field}[{i}]", count, "must be a whole number from 1 to 200")
+    return HeightScan(
+        int(rows), int(columns), number(f"{field}[2]", spacing, at_least=SPACINGS[0], at_most=SPACINGS[1])
+    )

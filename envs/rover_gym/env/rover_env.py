@@ -1,0 +1,370 @@
+"""`Rover-v0`: drive a six-wheel rover to a goal. The class docstring is the environment's card."""
+
+import copy
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any, Unpack
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+from gymnasium.error import ResetNeeded
+
+from rover_gym.env.arguments import RoverArguments, check_arguments, takes_arguments, with_argument_table
+from rover_gym.env.beginning import check_seed, draw_beginning, put_back, seeded
+from rover_gym.env.control_period import advance, motor_commands
+from rover_gym.env.env_snapshot import EnvSnapshot, check_random_state, check_snapshot
+from rover_gym.env.episode_scene import EpisodeScene, check_difficulty, check_reset_options
+from rover_gym.env.observation import ObservationLayout
+from rover_gym.env.progress import Progress
+from rover_gym.env.randomisation import Domain
+from rover_gym.env.readings import draw_noise
+from rover_gym.env.rocks import Rocks
+from rover_gym.env.start import Start
+from rover_gym.env.task import Task, check_actions, make_task
+from rover_gym.env.wheels import N_ACTIONS
+from rover_gym.mechanics import Plane, Simulation, StepError
+from rover_gym.rendering.render_options import RENDER_MODES, RenderOptions
+from rover_gym.validation import Range
+
+if TYPE_CHECKING:
+    from rover_gym.rendering import FrameRenderer
+
+
+@with_argument_table
+class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
+    """Drive a six-wheel, 21-dof rover with six motors and six steered wheels to a goal on the map.
+
+    The world has x forward, y up and z to the right; heading is the angle about +y, positive to the
+    left. Wheels are listed FL, FR, ML, BL, MR, BR (front, middle, back; left, right). Units are SI
+    and radians, except for arguments and options whose name ends in `_deg`. Over one control period the
+    motors hold their commands, and the steering PD, which is part of the physics, its set-points.
+
+    ## Action
+
+    `Box(-1, 1, (12,), float32)`. An action that is outside the box or not finite is refused with
+    `CommandError`, and nothing changes.
+
+    | index | meaning                                             | range   | one stands for      | unit |
+    |-------|-----------------------------------------------------|---------|---------------------|------|
+    | 0     | torque of wheel FL, positive drives forward         | [-1, 1] | wheel torque limit  | N m  |
+    | 1     | torque of wheel FR, positive drives forward         | [-1, 1] | wheel torque limit  | N m  |
+    | 2     | torque of wheel ML, positive drives forward         | [-1, 1] | wheel torque limit  | N m  |
+    | 3     | torque of wheel BL, positive drives forward         | [-1, 1] | wheel torque limit  | N m  |
+    | 4     | torque of wheel MR, positive drives forward         | [-1, 1] | wheel torque limit  | N m  |
+    | 5     | torque of wheel BR, positive drives forward         | [-1, 1] | wheel torque limit  | N m  |
+    | 6     | steering set-point of FL, positive turns the wheel left | [-1, 1] | max_steering_deg | rad  |
+    | 7     | steering set-point of FR, positive turns the wheel left | [-1, 1] | max_steering_deg | rad  |
+    | 8     | steering set-point of ML, positive turns the wheel left | [-1, 1] | max_steering_deg | rad  |
+    | 9     | steering set-point of BL, positive turns the wheel left | [-1, 1] | max_steering_deg | rad  |
+    | 10    | steering set-point of MR, positive turns the wheel left | [-1, 1] | max_steering_deg | rad  |
+    | 11    | steering set-point of BR, positive turns the wheel left | [-1, 1] | max_steering_deg | rad  |
+
+    ## Motors
+
+    A motor delivers its command within its torque-speed line. At a wheel speed omega that is at most
+    `stall_torque (1 - omega / no_load_speed)` forwards and `stall_torque (1 + omega / no_load_speed)` backwards, and never more
+    than `stall_torque`. Driven faster than `no_load_speed`, a `regenerating` motor brakes along its line; any other turns freely.
+    The rover's six motors are identical:
+
+    | quantity       | value | unit  | meaning                                                |
+    |----------------|-------|-------|--------------------------------------------------------|
+    | torque limit   | 150   | N m   | of the command: an action of 1                         |
+    | stall_torque   | 300   | N m   | of the line, at rest                                   |
+    | no_load_speed  | 30    | rad/s | where the line reaches zero: 3 m/s of the rim          |
+    | regenerating   | True  |       | whether it brakes when it is driven faster             |
+
+    The full command is therefore available up to half the no-load speed, and the top speed on level ground is 3 m/s.
+    `model=RoverModel().replace(motor=Motor(...))` changes the motors; with `motor=None` a wheel gets its command at any speed.
+
+    ## Observation
+
+    `Box((91,), float32)`, each entry its value divided by a fixed scale; `observation_layout` names
+    the slices and converts the values back to SI units. Observations are never clipped. The bounds of
+    unbounded entries are float32's largest numbers: the space holds every finite observation and nothing else.
+
+    | index | field            | meaning                                                   | unit       | scale        |
+    |-------|------------------|-----------------------------------------------------------|------------|--------------|
+    | 0-20  | q                | trunk x, y, z, roll, heading, pitch; joint angles         | m, rad     | 1            |
+    | 21-41 | velocity         | trunk linear and angular in the trunk frame; joint rates  | m/s, rad/s | 1, wheels 10 |
+    | 42-47 | wheel_gap        | distance of each wheel to ground and rocks                | m          | 0.1          |
+    | 48-53 | wheel_contact    | 1 where the gap is at most 1 mm, else 0                   |            | 1            |
+    | 54-59 | normal_force     | ground or rock on wheel, along the contact's normal       | N          | m g / 6      |
+    | 60-71 | tangential_force | the same, rolling then lateral, wheel by wheel            | N          | m g / 6      |
+    | 72-74 | ground_normal    | the normal of the ground plane in the trunk frame         |            | 1            |
+    | 75-76 | goal             | goal ahead and to the right of the trunk, horizontal      | m          | 10           |
+    | 77    | goal_distance    | horizontal distance from the trunk's origin to the goal   | m          | 10           |
+    | 78-89 | previous_action  | the action before this observation, 0 at reset            |            | 1            |
+    | 90    | stuck            | fraction of the time to high-centring that has passed     |            | 1            |
+
+    The trunk frame is x forward, y up, z to the right of the trunk. `q` is the simulation's, with the
+    wheels' angles wrapped to one turn. Forces are those of the last physics step, zero at reset.
+
+    `height_scan` adds one more field, `height_scan`: the heights (m, scale 1) of the visible ground, rocks included,
+    relative to the trunk's origin, on a grid of points around it in the heading frame. The first entries are the
+    row farthest ahead, from left to right; the last are the row farthest behind. True stands for 13 rows of 9
+    points, 0.25 m apart: 117 entries, 1.5 m ahead and behind, 1 m to either side.
+
+    ## Reward
+
+    The reward is the sum of the terms below, which `info["reward_terms"]` lists; `dt` is the control period.
+    `reward_weights` replaces weights by name.
+
+    | term            | formula                                                        | weight w |
+    |-----------------|----------------------------------------------------------------|----------|
+    | progress        | w (d_before - d_after), d the horizontal distance to the goal  | 1        |
+    | time            | w dt                                                           | -0.05    |
+    | energy          | w sum_i abs(tau_i dphi_i), torque given times angle turned     | -5e-05   |
+    | slip            | w s dt, s the mean slip ratio                                  | -0.1     |
+    | tilt            | w (1 - cos(tilt)) dt                                           | -0.1     |
+    | torque_change   | w sum_i (a_i - a_i_before)^2 / 6, i in 0-5                     | -0.02    |
+    | steering_change | w sum_i (a_i - a_i_before)^2 / 6, i in 6-11                    | -0.02    |
+    | success         | w on the step that reaches the goal                            | 10       |
+    | failure         | w on a step that ends in failure                               | -10      |
+
+    If the physics could not take a step, only `failure` counts. The quantities of one step are bounded, whatever the
+    physics did: 30 m of progress either way, 4e5 J of work, 60 s of `dt`, a slip ratio of 2. With these weights the
+    reward of a step therefore never exceeds 90 in magnitude.
+
+    ## Start
+
+    The ground is a plane through the origin with slope and direction of steepest ascent drawn
+    uniformly from `slope_deg` and `uphill_deg`. The rover rests on it at the origin, joints at zero,
+    heading drawn from `heading_deg`; the goal lies at a distance from `goal_distance` in a direction
+    from `goal_bearing_deg`, relative to the heading. The rover has no brakes: without torque it rolls downhill.
+    A scene in which the rover would penetrate the ground or a sphere is drawn again; after 100 scenes
+    `reset` raises `TerrainError`. A refused reset, whatever the reason, changes nothing.
+
+    `reset(options=...)` fixes what it names: `difficulty`, `slope_deg`, `uphill_deg`, `position` (x, z),
+    `heading_deg`, `goal` (x, z), or the whole state as `q` (21,) with `v` (21,), as
+    `Simulation.set_state` takes them. Unknown names are refused with `OptionError`.
+
+    ## Rocks
+
+    With `terrain="sphere_field"`, as in `RoverRocks-v0`, fixed spheres lie on the plane, half below the
+    ground, with the sizes that Golombek and Rapp (1997) found on Mars, the smallest 5 cm wide. They lie at
+    random up to 4 m beyond the rectangle that start and goal span. Two circles, around start and goal,
+    stay clear, so that the rover has room to turn. Each reset draws a new field. A single number d, the
+    difficulty, sets how hard it is; `reset(options={"difficulty": 0.3})` sets it for one episode. An argument
+    that is not None overrides what the difficulty would set.
+
+    | quantity        | at difficulty d      | meaning                                          |
+    |-----------------|----------------------|--------------------------------------------------|
+    | rock_abundance  | 0.2 d                | fraction of the ground that rocks of all sizes cover |
+    | max_rock_radius | 0.5 + 1.1 d          | radius of the largest rocks, in wheel radii      |
+    | slope_deg       | uniform, 0 to 10 d   | slope of the plane                               |
+
+    ## End
+
+    `terminated`, with `info["termination"]`:
+    `"goal"`, the trunk's origin is within `goal_tolerance` of the goal, horizontally;
+    `"roll_over"`, the trunk leans more than `max_tilt_deg` from the vertical;
+    `"high_centred"`, for `stuck_time` seconds the trunk has carried more than a tenth of the weight
+    while the rover moved slower than 0.05 m/s; `"step_failed"`, the physics could not take a step:
+    the observation is then the last finite one, and `info["solver"]` says what happened.
+    `truncated`: after 1200 steps (60 s), by Gymnasium's time limit. Change it with
+    `gymnasium.make(..., max_episode_steps=...)`. The environment itself never truncates.
+
+    ## Randomisation
+
+    `friction`, `mass_scale`, `actuator_gain` and `gravity_scale` are drawn uniformly at each reset where they are
+    ranges, and fixed where they are numbers. `observation_noise` is Gaussian, drawn anew each step for every
+    unbounded entry; flags, fractions, unit vectors, the distance and the action stay exact.
+    `set_difficulty` changes the rocks' difficulty, or its range, from the next reset on.
+
+    ## Info
+
+    `time` (s), `success` and `is_success` (the name stable-baselines3 looks for), `termination` ("" while
+    the episode runs), `distance_to_goal` (m), `energy` (J, wheel motors, braking counted) and
+    `energy_positive` (J, driving only) since reset, `slip_ratio` (mean over wheels in contact of
+    rim slip over the faster of rim and ground, 0 to 2), `tilt` (rad), `difficulty` (of the rocks, 0 where none
+    are drawn), `domain` (the randomised properties, by argument), `reward_terms`, and `solver` (`status`,
+    `iterations`, `residual`, `n_contacts`, `message`): the worst of the physics steps.
+
+    ## Arguments
+
+    {arguments}
+
+    ## Frames
+
+    With `render_mode="rgb_array"`, `render()` returns the current state as (height, width, 3) uint8, 640 x 480 by
+    default; `gymnasium.make(..., render_mode="human")` shows the same in a window. Both need `rover-gym[render]`; the
+    first needs no display. The cameras "follow", "side" and "top" move with the rover; a pair of points (eye, target) is
+    a fixed camera. `show_forces` draws the contact forces of the last physics step as arrows.
+    `metadata["render_fps"]` is the control frequency, so that a video runs in real time.
+
+    ## Version history
+
+    - v0: plane ground and rocks. Numbers may change until the first release.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 20}  # noqa: RUF012 - as Gymnasium declares it
+
+    @takes_arguments
+    def __init__(self, **arguments: Unpack[RoverArguments]) -> None:
+        given = check_arguments(type(self).__name__, arguments)
+        self.task: Task = make_task(given)
+        self.model = self.task.model
+        self.gravity = self.task.gravity
+        self.dt = self.task.dt
+        self.goal_tolerance = self.task.goal_tolerance
+        self.max_steering = self.task.max_steering
+        self.observation_layout: ObservationLayout = self.task.layout
+        self.observation_space = gym.spaces.Box(
+            self.observation_layout.low, self.observation_layout.high, dtype=np.float32
+        )
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (N_ACTIONS,), np.float32)
+        self._simulation = Simulation(self.model, Plane(), **self.task.simulation_options)
+        self._scene: EpisodeScene | None = None
+        self._progress: Progress
+        self._difficulty: Range | None = None
+
+        self.render_mode: str | None = given["render_mode"]
+        self.render_options: RenderOptions = given["render_options"] or RenderOptions()
+        fps = round(1.0 / self.dt, 9)
+        self.metadata = {**type(self).metadata, "render_fps": int(fps) if fps.is_integer() else fps}
+        self._renderer: FrameRenderer | None = None
+
+    @property
+    def simulation(self) -> Simulation:
+        """The simulation behind the environment, replaced at each reset. Look, do not step."""
+        return self._simulation
+
+    @property
+    def goal(self) -> tuple[float, float]:
+        """The episode's goal (x, z), m."""
+        return self._running().start.goal
+
+    @property
+    def start(self) -> Start:
+        """The episode's slope, pose and goal as they were drawn."""
+        return self._running().start
+
+    @property
+    def rocks(self) -> Rocks | None:
+        """The episode's difficulty and rocks as they were drawn; None on the plane."""
+        return self._running().rocks
+
+    @property
+    def domain(self) -> Domain:
+        """The episode's properties of rover and world as they were drawn."""
+        return self._running().domain
+
+    @property
+    def difficulty(self) -> float | None:
+        """The episode's difficulty; None on the plane."""
+        rocks = self.rocks
+        return None if rocks is None else rocks.difficulty
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
+        """Starts an episode; the class docstring lists the options.
+
+        A reset that is refused changes nothing: the running episode goes on, and the random generator stands where it
+        stood.
+
+        Raises:
+            OptionError: The seed is no whole number from 0, or an option is unknown or out of its range.
+            StateError: `q` or `v` has a wrong shape or an entry that is not finite, or cannot be observed.
+            TerrainError: The rover would stand in the ground or in a sphere, in each of 100 scenes that were drawn.
+        """
+        checked = check_reset_options(self.task, options)
+        chosen = check_seed(seed)
+        generator, used = (self.np_random, self._np_random_seed) if chosen is None else seeded(chosen)
+        with put_back((generator,)):
+            beginning = draw_beginning(self.task, generator, self._difficulty, checked)
+        self._np_random, self._np_random_seed = generator, used
+        self._simulation, self._scene, self._progress = beginning.simulation, beginning.scene, beginning.progress
+        outcome = beginning.report(self.task)
+        return outcome.observation, outcome.info()
+
+    def step(
+        self, action: npt.NDArray[np.float32]
+    ) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Applies an action for one control period.
+
+        Raises:
+            CommandError: The action has a wrong shape or an entry that is not finite or outside
+                [-1, 1]; nothing has changed.
+            ResetNeeded: The environment has not been reset.
+        """
+        goal = self._running().start.goal
+        simulation = self._simulation
+        command = check_actions(action, (N_ACTIONS,))
+        torques, set_points = motor_commands(self.task, self._progress, command)
+        simulation.set_commands(torques, set_points)
+        messages: dict[int, str] = {}
+        try:
+            simulation.step(self.task.substeps)
+        except StepError as error:
+            messages[0] = str(error)
+        reading = simulation.reading(goal, self.task.scan)
+        noise = draw_noise(self.task, (self.np_random,))
+        outcome = advance(self.task, self._progress, command, reading, messages, None if noise is None else noise[0])
+        return outcome.observation, float(outcome.reward), bool(outcome.termination), False, outcome.info()
+
+    def set_difficulty(self, difficulty: float | Range) -> None:
+        """Sets the rocks' difficulty, or the range it is drawn from, from the next reset on.
+
+        Raises:
+            OptionError: It is not within 0 to 1, or there are no rocks; nothing has changed.
+        """
+        self._difficulty = check_difficulty(self.task, difficulty)
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """The present state as a frame, (height, width, 3) uint8; None, with a warning, without a render mode.
+
+        Raises:
+            ResetNeeded: The environment has not been reset.
+            OSError: No OpenGL library works on this machine; the message names the packages that bring one.
+        """
+        if self.render_mode is None:
+            gym.logger.warn('RoverEnv: render() needs render_mode="rgb_array" when the environment is made')
+            return None
+        scene = self._running()
+        if self._renderer is None:
+            self._renderer = self.make_renderer(scene)
+        self._renderer.set_scene(scene.terrain, goal=scene.start.goal, goal_tolerance=self.goal_tolerance)
+        return self._renderer.render(self._simulation)
+
+    def make_renderer(self, scene: EpisodeScene) -> "FrameRenderer":
+        """A renderer with this environment's `render_options`, which whoever asked for it closes."""
+        from rover_gym.rendering import FrameRenderer  # noqa: PLC0415 - only who looks needs a renderer
+
+        return FrameRenderer(self.model, scene.terrain, **asdict(self.render_options))
+
+    def close(self) -> None:
+        """Frees the renderer, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def snapshot(self) -> EnvSnapshot:
+        """The state of the environment and of its random generator, to `restore` later."""
+        return EnvSnapshot(
+            scene=self._running(),
+            simulation=self._simulation.snapshot(),
+            progress=self._progress.copy(),
+            difficulty=self._difficulty,
+            random_state=copy.deepcopy(self.np_random.bit_generator.state),
+        )
+
+    def restore(self, snapshot: EnvSnapshot) -> None:
+        """Continues from a snapshot, bit for bit, taken from an environment with the same arguments.
+
+        Raises:
+            StateError: This is no snapshot, or a damaged one, or one of other arguments; nothing has changed.
+        """
+        check_snapshot(self.task, snapshot)
+        state = check_random_state(self.np_random, snapshot.random_state)
+        difficulty = None if snapshot.difficulty is None else check_difficulty(self.task, snapshot.difficulty)
+        simulation = self.task.simulate(snapshot.scene.terrain, snapshot.scene.domain)
+        simulation.restore(snapshot.simulation)
+        self.np_random.bit_generator.state = state
+        self._simulation, self._scene = simulation, snapshot.scene
+        self._progress, self._difficulty = snapshot.progress.copy(), difficulty
+
+    def _running(self) -> EpisodeScene:
+        if self._scene is None:
+            raise ResetNeeded("RoverEnv: call reset() first")
+        return self._scene

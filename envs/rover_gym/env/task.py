@@ -1,0 +1,223 @@
+"""The task: the arguments of `Rover-v0` once they are checked, shared by all episodes and all rovers of a batch."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.env import rewards
+from rover_gym.env.observation import ObservationLayout, build_layout
+from rover_gym.env.randomisation import Domain, DomainDistribution
+from rover_gym.env.rocks import MAX_GOAL_DISTANCE, RockDistribution, rock_distribution
+from rover_gym.env.start import StartDistribution, slope_of
+from rover_gym.mechanics import (
+    CommandError,
+    OptionError,
+    Plane,
+    RoverModel,
+    Simulation,
+    SphereField,
+)
+from rover_gym.validation import Range, array, number, refuse, span
+
+#: Steps until truncation: 60 s at the default control frequency of 20 Hz.
+MAX_EPISODE_STEPS = 1200
+
+#: Physics steps a control period, at most.
+MAX_SUBSTEPS = 10_000
+
+#: High-centring: the trunk carries this share of the weight.
+TRUNK_LOAD = 0.1
+
+
+@dataclass(frozen=True)
+class Task:
+    """What `RoverEnv`'s arguments come to. Angles in radians.
+
+    Attributes:
+        model: The rover, before its masses are scaled.
+        field: A field that was given, the ground of every episode.
+        rocks: What fields of rocks are drawn from; None where none are.
+        slope_by_difficulty: Whether the rocks' difficulty says how steep the ground is.
+        scan: `(n, 2)` the height scan's points in the heading frame, m; None without one.
+        start: What starts are drawn from.
+        domain: What rover and world are drawn from.
+        goal_tolerance: m.
+        cos_max_tilt: A smaller cosine of the tilt is a roll-over.
+        stuck_time: s.
+        gravity: m/s2, before it is scaled.
+        substeps: Physics steps a control period.
+        dt: Control period, s.
+        reward_weights: By term.
+        simulation_options: Keyword arguments of `Simulation`.
+        max_steering: Set-point of a steering action of 1.
+        torque_limits: `(6,)` torque of a torque action of 1, N m.
+        layout: Of the observation.
+        inverse_scale: `(size,)` entries of the observation per SI unit.
+        noisy: `(size,)` standard deviation of each entry's noise; None without noise.
+        places: Where things lie in a reading.
+        n_shared: So many entries a reading and an observation begin with, in the same order.
+        scalars: Where single numbers lie in a reading: the distance to the target and what follows.
+    """
+
+    model: RoverModel
+    field: SphereField | None
+    rocks: RockDistribution | None
+    slope_by_difficulty: bool
+    scan: npt.NDArray[np.float64] | None
+    start: StartDistribution
+    domain: DomainDistribution
+    goal_tolerance: float
+    cos_max_tilt: float
+    stuck_time: float
+    gravity: tuple[float, ...]
+    substeps: int
+    dt: float
+    reward_weights: Mapping[str, float]
+    simulation_options: Mapping[str, Any]
+    max_steering: float
+    torque_limits: npt.NDArray[np.float64]
+    layout: ObservationLayout
+    inverse_scale: npt.NDArray[np.float64]
+    noisy: npt.NDArray[np.float64] | None
+    places: Mapping[str, slice]
+    n_shared: int
+    scalars: slice
+
+    def simulate(self, terrain: Plane | SphereField, domain: Domain) -> Simulation:
+        """A rover on a terrain, at rest in the zero configuration."""
+        model = self.model if domain.mass_scale == 1.0 else self.model.replace(mass_scale=domain.mass_scale)
+        options = dict(self.simulation_options, friction=domain.friction)
+        if domain.gravity_scale != 1.0:
+            options["gravity"] = tuple(domain.gravity_scale * g for g in self.gravity)
+        return Simulation(model, terrain, **options)
+
+    def trunk_load_limit(self, domain: Domain) -> float:
+        """Force on the trunk beyond which it is high-centred, N."""
+        weight = self.model.mass * math.hypot(*self.gravity)
+        return TRUNK_LOAD * weight * domain.mass_scale * domain.gravity_scale
+
+
+def make_task(given: Mapping[str, Any]) -> Task:
+    """The task that arguments come to, each of which `check_arguments` has passed: here they must fit together.
+
+    Raises:
+        OptionError: Two of them do not go together, or the core refuses an option; `field` names one.
+        TerrainError: The field has no ground that a rover could stand on.
+    """
+    terrain, model, scan = given["terrain"], given["model"], given["height_scan"]
+    field = terrain if isinstance(terrain, SphereField) else None
+    rocks: RockDistribution | None = None
+    if terrain == "sphere_field":
+        rocks = rock_distribution(given["difficulty"], given["rock_abundance"], given["max_rock_radius"])
+        nearest, farthest = given["goal_distance"]
+        distance = nearest if nearest == farthest else (nearest, farthest)
+        span("goal_distance", distance, at_most=MAX_GOAL_DISTANCE)
+        number("goal_tolerance", given["goal_tolerance"], at_most=MAX_GOAL_DISTANCE)
+    else:
+        for name in ("difficulty", "rock_abundance", "max_rock_radius"):
+            if given[name] is not None:
+                refuse(OptionError, name, given[name], "needs terrain 'sphere_field'")
+    slope_deg = given["slope_deg"]
+    start = StartDistribution(
+        slope=_radians((0.0, 0.0) if slope_deg is None else slope_deg),
+        uphill=_radians(given["uphill_deg"]),
+        heading=_radians(given["heading_deg"]),
+        goal_distance=given["goal_distance"],
+        goal_bearing=_radians(given["goal_bearing_deg"]),
+    )
+    if field is not None:
+        if slope_deg is not None:
+            refuse(OptionError, "slope_deg", slope_deg, "is the given field's own")
+        slope, uphill = slope_of(field)
+        start = replace(start, slope=(slope, slope), uphill=(uphill, uphill))
+    domain = DomainDistribution(
+        mass_scale=given["mass_scale"],
+        friction=given["friction"],
+        actuator_gain=given["actuator_gain"],
+        gravity_scale=given["gravity_scale"],
+        observation_noise=given["observation_noise"],
+    )
+    step = given["time_step"]
+    substeps = _substeps(given["control_frequency"], step)
+    rover = RoverModel() if model is None else model
+    gravity = given["gravity"]
+    options = {
+        "gravity": gravity,
+        "friction": domain.friction[0],
+        "restitution": given["restitution"],
+        "time_step": step,
+        **(given["solver_options"] or {}),
+    }
+    n_scan = 0 if scan is None else len(scan.offsets)
+    # The core validates what it takes.
+    places = Simulation(rover, Plane(), **options).reading_layout(n_scan)
+    layout = build_layout(rover, math.hypot(*gravity), n_scan)
+    return Task(
+        model=rover,
+        field=field,
+        rocks=rocks,
+        slope_by_difficulty=slope_deg is None and rocks is not None,
+        scan=None if scan is None else scan.offsets,
+        start=start,
+        domain=domain,
+        goal_tolerance=given["goal_tolerance"],
+        cos_max_tilt=math.cos(math.radians(given["max_tilt_deg"])),
+        stuck_time=given["stuck_time"],
+        gravity=gravity,
+        substeps=substeps,
+        dt=substeps * step,
+        reward_weights=dict(rewards.WEIGHTS) if given["reward_weights"] is None else given["reward_weights"],
+        simulation_options=options,
+        max_steering=_steering_limit(rover, given["max_steering_deg"]),
+        torque_limits=rover.wheel_torque_limits,
+        layout=layout,
+        inverse_scale=1.0 / layout.scale,
+        noisy=None if domain.observation_noise == 0.0 else domain.observation_noise * layout.unbounded,
+        places=places,
+        n_shared=places["target"].stop,
+        scalars=slice(places["target"].stop - 1, places["solver"].stop),
+    )
+
+
+def _substeps(frequency: float, step: float) -> int:
+    """Physics steps a control period, which must come out even."""
+    if frequency * step < (1.0 - 1e-9) / MAX_SUBSTEPS:
+        reason = f"must give at most {MAX_SUBSTEPS} physics steps of {step:g} s a period"
+        refuse(OptionError, "control_frequency", frequency, reason)
+    substeps = round(1.0 / (frequency * step))
+    if substeps < 1 or not math.isclose(substeps * frequency * step, 1.0, rel_tol=1e-9):
+        reason = f"must give a whole number of physics steps of {step:g} s a period"
+        refuse(OptionError, "control_frequency", frequency, reason)
+    return substeps
+
+
+def _steering_limit(rover: RoverModel, asked_deg: float | None) -> float:
+    """Set-point of a steering action of 1, rad: what it stands for must be within every wheel's limit."""
+    limit: float = min(wheel["steering_limit"] for wheel in rover.to_dict()["wheels"])
+    if asked_deg is None:
+        return limit
+    if math.radians(asked_deg) > limit * (1.0 + 1e-12):
+        reason = f"must be at most the model's limit, {math.degrees(limit):g}"
+        refuse(OptionError, "max_steering_deg", asked_deg, reason)
+    return min(limit, math.radians(asked_deg))
+
+
+def check_actions(actions: object, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+    """The actions `(12,)` or `(n, 12)` as floats of their own, within [-1, 1]."""
+    commands = array("action", actions, error=CommandError)
+    if commands.shape != shape:
+        refuse(CommandError, "action", commands.shape, f"must have shape {shape}")
+    # Written so that a NaN fails too.
+    if not np.abs(commands).max() <= 1.0:
+        for index, entry in np.ndenumerate(commands):
+            if not abs(entry) <= 1.0:
+                refuse(CommandError, f"action[{', '.join(map(str, index))}]", entry, "must be within [-1, 1]")
+    return commands
+
+
+def _radians(degrees: Range) -> Range:
+    return (math.radians(degrees[0]), math.radians(degrees[1]))

@@ -1,0 +1,158 @@
+"""The way of a recorded run from above, over the ground that it drove on."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from rover_gym.extras import require
+from rover_gym.figures.derived_signals import Array
+from rover_gym.figures.style import COLOURS, NESTED_WIDTHS, WHEELS, title, wheel_legend
+from rover_gym.mechanics import Plane, SphereField
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from rover_gym.figures.style import Sheet
+    from rover_gym.record.rover_run import RoverRun
+
+MARGIN = 0.1  # shown around the way, of its larger extent
+RATIO = 1.5  # of the map, width to height
+HEADING_DISTANCE = 1.8  # between the arrows that show the heading, in their lengths
+ARROW = 0.045  # of the map's width
+
+
+class Footprints(NamedTuple):
+    """What shows of the spheres of a field, from above.
+
+    Attributes:
+        centres: (n, 2) x and z, m.
+        radii: (n,) of the circles where the spheres leave the ground, m.
+        heights: (n,) of the spheres' tops, above the ground or, without one, above the world's origin, m.
+    """
+
+    centres: Array
+    radii: Array
+    heights: Array
+
+
+def path_from_above(figure: Sheet, run: RoverRun) -> None:
+    """The way of trunk and wheels, start, goal and heading; spheres as circles, by the height of their tops."""
+    axes = figure.subplots()
+    trajectory = run.trajectory
+    trunk, centres = trajectory["q"][:, :3], trajectory["wheel_centres"]
+    _show_extent(axes, run)
+    others: dict[str, dict[str, Any]] = {}
+    if isinstance(run.terrain, SphereField):
+        _draw_spheres(figure, axes, run.terrain)
+    for wheel in reversed(WHEELS):  # the tracks of the wheels behind wide, those ahead narrow over them
+        x, _, z = centres[:, WHEELS.index(wheel)].T
+        axes.plot(z, x, color=COLOURS[wheel], linewidth=NESTED_WIDTHS[wheel[0]], label=f"_{wheel} track")
+    axes.plot(trunk[:, 2], trunk[:, 0], color="black", linewidth=1.0, label="_trunk")
+    others["trunk's origin"] = {"color": "black", "linewidth": 1.0}
+    axes.plot(trunk[0, 2], trunk[0, 0], "o", color="black", markersize=6, zorder=4, label="_start")
+    others["start"] = {"marker": "o", "color": "black", "linestyle": "none"}
+    if run.goal is not None:
+        style: dict[str, Any] = {"marker": "*", "color": "#DDCC00", "markeredgecolor": "black", "markersize": 15}
+        axes.plot(run.goal[1], run.goal[0], zorder=5, label="_goal", **style)
+        others["goal"] = {**style, "markersize": 10, "linestyle": "none"}
+    _draw_headings(axes, trajectory["q"])
+    others["heading"] = {"marker": "$\u2192$", "color": "black", "linestyle": "none", "markersize": 9}
+    axes.set(xlabel="to the right, z (m)", ylabel="forward, x (m)")
+    title(figure, f"The way from above, {run.time[-1] - run.time[0]:.3g} s{_slope(run.terrain)}", run)
+    wheel_legend(figure, others)
+
+
+def footprints(field: SphereField) -> Footprints:
+    """What shows of a field's spheres above its ground."""
+    centres, radii, ground = field.centres, field.radii, field.ground
+    if ground is None:
+        return Footprints(centres[:, [0, 2]], radii, centres[:, 1] + radii)
+    distance = centres @ ground.normal + ground.offset  # of the centres from the ground
+    at_ground = np.sqrt(np.maximum(radii**2 - np.minimum(distance, 0.0) ** 2, 0.0))
+    return Footprints(centres[:, [0, 2]], at_ground, distance + radii)
+
+
+def _draw_spheres(figure: Sheet, axes: Axes, field: SphereField) -> None:
+    collections = require("matplotlib.collections", "demo")
+    prints = _within(axes, footprints(field))
+    if len(prints.radii) == 0:
+        return
+    upward = np.argsort(prints.heights)  # the highest last, so that it covers the others
+    diameters = 2.0 * prints.radii[upward]
+    circles = collections.EllipseCollection(
+        diameters,
+        diameters,
+        np.zeros(len(diameters)),
+        units="xy",
+        offsets=prints.centres[upward][:, ::-1],
+        offset_transform=axes.transData,
+        cmap="Greys",
+        edgecolors="0.55",
+        linewidths=0.3,
+        zorder=1,
+    )
+    circles.set_array(prints.heights[upward])
+    low = 0.0 if field.ground is not None else float(prints.heights.min())
+    span = max(float(prints.heights.max()) - low, 1e-6)
+    circles.set_clim(low - 0.1 * span, low + 2.2 * span)  # light greys only, so that the tracks stand out
+    axes.add_collection(circles, autolim=False)
+    above = "the ground" if field.ground is not None else "y = 0"
+    bar = figure.colorbar(circles, ax=axes, shrink=0.8, pad=0.02, label=f"top of the sphere above {above} (m)")
+    bar.ax.set_ylim(low, low + span)
+
+
+def _within(axes: Axes, prints: Footprints) -> Footprints:
+    """The spheres that the axes show."""
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    x, z = prints.centres.T
+    r = prints.radii
+    seen = (z + r > left) & (z - r < right) & (x + r > bottom) & (x - r < top) & (r > 0.0)
+    return Footprints(*(values[seen] for values in prints))
+
+
+def _draw_headings(axes: Axes, q: Array) -> None:
+    """Arrows along the heading, none near another: a rover that rocks to and fro would blacken the map."""
+    length = ARROW * float(np.ptp(axes.get_xlim()))
+    rows = [0]
+    for row, place in enumerate(q[:, [0, 2]]):
+        if np.hypot(*(q[rows][:, [0, 2]] - place).T).min() > HEADING_DISTANCE * length:
+            rows.append(row)
+    heading = q[rows, 4]
+    axes.quiver(
+        q[rows, 2],
+        q[rows, 0],
+        -length * np.sin(heading),
+        length * np.cos(heading),
+        angles="xy",
+        scale_units="xy",
+        scale=1.0,
+        width=0.0045,
+        color="black",
+        zorder=3,
+    )
+
+
+def _show_extent(axes: Axes, run: RoverRun) -> None:
+    """Shows way and goal with a margin, at one scale, and no more of the ground than fills the axes."""
+    places = [run.trajectory["wheel_centres"][..., [2, 0]].reshape(-1, 2)]
+    if run.goal is not None:
+        places.append(np.array([[run.goal[1], run.goal[0]]]))
+    seen = np.concatenate(places)
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    extent = (high - low).max() * 2.0 * MARGIN + (high - low)
+    height = max(extent[1], extent[0] / RATIO)
+    half = 0.5 * height * np.array([RATIO, 1.0])
+    (left, bottom), (right, top) = 0.5 * (low + high) - half, 0.5 * (low + high) + half
+    axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
+    axes.set_autoscale_on(False)
+
+
+def _slope(terrain: Plane | SphereField) -> str:
+    """The slope of the ground, where there is one."""
+    ground = terrain if isinstance(terrain, Plane) else terrain.ground
+    if ground is None:
+        return ""
+    degrees = float(np.degrees(np.arccos(np.clip(ground.normal[1], -1.0, 1.0))))
+    return f"; the ground slopes by {degrees:.1f}°" if degrees > 0.05 else ""

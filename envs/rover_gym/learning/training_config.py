@@ -1,0 +1,246 @@
+"""The configuration of a training: a YAML file, every key of which is known and checked.
+
+environment    arguments of `RoverEnv`; randomisation and reward weights among them
+command        what the policy's actions stand for (`rover_gym.policy.command`)
+curriculum     difficulty of the rocks by what has been learned; none on the plane
+ppo            hyperparameters of stable-baselines3's PPO
+evaluation     of the policy while it learns, on an environment of its own
+"""
+
+import dataclasses
+import types
+from collections.abc import Mapping
+from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
+from pathlib import Path
+from typing import Any, TypeVar, get_args, get_type_hints
+
+import yaml
+
+from rover_gym.env.arguments import ARGUMENTS
+from rover_gym.env.rover_env import RoverEnv
+from rover_gym.mechanics import OptionError
+from rover_gym.policy.command import CommandLimits
+from rover_gym.policy.features import Features
+from rover_gym.validation import number, refuse
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class CurriculumConfig:
+    """Raises the difficulty as the rover learns.
+
+    Attributes:
+        start: Hardest difficulty at first.
+        end: Hardest difficulty at last.
+        step: What a raise adds.
+        width: Difficulties are drawn from [hardest - width, hardest].
+        success: A raise follows when this share of the episodes of the last rollouts succeeded.
+        episodes: So many episodes are looked at, at least.
+    """
+
+    start: float
+    end: float = 1.0
+    step: float = 0.1
+    width: float = 0.2
+    success: float = 0.75
+    episodes: int = 100
+
+    def __post_init__(self) -> None:
+        for name in ("start", "end", "width", "success"):
+            number(f"curriculum.{name}", getattr(self, name), at_least=0.0, at_most=1.0)
+        number("curriculum.step", self.step, above=0.0)
+        number("curriculum.episodes", self.episodes, at_least=1)
+
+
+@dataclass(frozen=True)
+class PPOConfig:
+    """Hyperparameters of stable-baselines3's PPO, by its names.
+
+    `learning_rate` falls linearly to `final_learning_rate`. `n_steps` counts decisions of each environment.
+    """
+
+    n_steps: int = 64
+    batch_size: int = 512
+    n_epochs: int = 6
+    learning_rate: float = 3e-4
+    final_learning_rate: float = 3e-4
+    gamma: float = 0.98
+    gae_lambda: float = 0.95
+    clip_range: float = 0.2
+    ent_coef: float = 0.0
+    vf_coef: float = 0.5
+    max_grad_norm: float = 0.5
+    net_arch: tuple[int, ...] = (64, 64)
+    log_std_init: float = -1.5
+
+    def __post_init__(self) -> None:
+        for name in ("n_steps", "batch_size", "n_epochs", "learning_rate", "clip_range", "max_grad_norm"):
+            number(f"ppo.{name}", getattr(self, name), above=0.0)
+        for name in ("gamma", "gae_lambda"):
+            number(f"ppo.{name}", getattr(self, name), at_least=0.0, at_most=1.0)
+
+
+@dataclass(frozen=True)
+class EvaluationConfig:
+    """How the policy is watched while it learns.
+
+    Attributes:
+        every: Decisions, of all environments together, between two evaluations.
+        episodes: Of each evaluation; the same ones every time.
+        seed: Of their fields. Training's own are below a million.
+        environment: Arguments that differ from training's.
+    """
+
+    every: int = 50_000
+    episodes: int = 50
+    seed: int = 2_000_000
+    environment: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        number("evaluation.every", self.every, at_least=1)
+        number("evaluation.episodes", self.episodes, at_least=1)
+
+
+@dataclass(frozen=True)
+class TrainingConfig:
+    """A whole training.
+
+    Attributes:
+        environment: Arguments of `RoverEnv`.
+        total_steps: Decisions of all environments together.
+        num_envs: How many rovers drive at once.
+        threads: That step them.
+        max_episode_steps: Control periods until an episode is cut.
+        repeat: Control periods for which a command holds.
+        pool: Cells of the height scan are so many points long and wide.
+        guided: Whether actions are offsets to the guide's command.
+        command: What a command of one stands for.
+        ppo: Hyperparameters.
+        evaluation: While it learns.
+        curriculum: Of the rocks' difficulty; None leaves `environment`'s.
+        checkpoint_every: Decisions between two checkpoints.
+    """
+
+    environment: Mapping[str, Any]
+    total_steps: int
+    num_envs: int = 32
+    threads: int = 1
+    max_episode_steps: int = 600
+    repeat: int = 2
+    pool: int = 1
+    guided: bool = True
+    command: CommandLimits = field(default_factory=CommandLimits)
+    ppo: PPOConfig = field(default_factory=PPOConfig)
+    evaluation: EvaluationConfig = field(default_factory=EvaluationConfig)
+    curriculum: CurriculumConfig | None = None
+    checkpoint_every: int = 100_000
+
+    def __post_init__(self) -> None:
+        for name in ("total_steps", "num_envs", "threads", "max_episode_steps", "repeat", "pool", "checkpoint_every"):
+            number(name, getattr(self, name), at_least=1)
+        if self.curriculum is not None and self.environment.get("terrain") != "sphere_field":
+            refuse(OptionError, "curriculum", self.curriculum, "needs environment.terrain 'sphere_field'")
+        for arguments in (self.environment, {**self.environment, **self.evaluation.environment}):
+            Features(rover(arguments), self.pool)
+
+    def to_yaml(self) -> str:
+        """The configuration as `read_config` reads it."""
+        text: str = yaml.safe_dump(_plain(asdict(self)), sort_keys=False)
+        return text
+
+
+def rover(arguments: Mapping[str, Any]) -> RoverEnv:
+    """The environment of these arguments, as YAML gives them.
+
+    Raises:
+        OptionError: One of them is unknown.
+        RoverGymError: One of them is out of its range.
+    """
+    return RoverEnv(**environment_arguments(arguments))
+
+
+def environment_arguments(arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of `RoverEnv`: YAML's lists become pairs, and an unknown name is refused."""
+    for name in arguments:
+        if name not in ARGUMENTS:
+            refuse(OptionError, f"environment.{name}", name, f"unknown; known are {', '.join(sorted(ARGUMENTS))}")
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in arguments.items()}
+
+
+def read_config(path: str | Path) -> TrainingConfig:
+    """The configuration of a YAML file.
+
+    Raises:
+        OptionError: A key is unknown or missing, or a value is of the wrong kind or out of range; `field` names it.
+    """
+    try:
+        given = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+        refuse(OptionError, "config", str(path), f"is not YAML: {error}")
+    return parse_config(given)
+
+
+def parse_config(given: object) -> TrainingConfig:
+    """The configuration of what a YAML file holds."""
+    return _build(TrainingConfig, given, "")
+
+
+def _build(cls: type[T], given: object, prefix: str) -> T:
+    """A dataclass of a mapping."""
+    if not isinstance(given, Mapping):
+        refuse(OptionError, prefix.rstrip(".") or "config", given, "must be a mapping")
+    assert is_dataclass(cls)  # noqa: S101 - the dataclasses of this file
+    known = {entry.name: entry for entry in fields(cls)}
+    hints = get_type_hints(cls)
+    for name in given:
+        if name not in known:
+            refuse(OptionError, f"{prefix}{name}", name, f"unknown; known are {', '.join(known)}")
+    for name, entry in known.items():
+        if name not in given and entry.default is MISSING and entry.default_factory is MISSING:
+            refuse(OptionError, f"{prefix}{name}", None, "must be given")
+    values = {name: _value(hints[name], value, f"{prefix}{name}") for name, value in given.items()}
+    return cls(**values)
+
+
+def _value(kind: Any, given: object, name: str) -> Any:
+    """A value of a field's kind."""
+    if isinstance(kind, types.UnionType):  # X | None
+        return None if given is None else _value(get_args(kind)[0], given, name)
+    if dataclasses.is_dataclass(kind):
+        return _build(kind, given, f"{name}.")  # type: ignore[arg-type]
+    if kind is bool:
+        if not isinstance(given, bool):
+            refuse(OptionError, name, given, "must be true or false")
+        return given
+    if kind is int:
+        whole = number(name, given)
+        if not whole.is_integer():
+            refuse(OptionError, name, given, "must be a whole number")
+        return int(whole)
+    if kind is float:
+        # YAML 1.1 reads 3e-4 as a string.
+        return number(name, _as_float(given))
+    if kind == tuple[int, ...]:
+        if not isinstance(given, list):
+            refuse(OptionError, name, given, "must be a list")
+        return tuple(_value(int, entry, f"{name}[{i}]") for i, entry in enumerate(given))
+    if not isinstance(given, Mapping):
+        refuse(OptionError, name, given, "must be a mapping")
+    return {key: _as_float(value) if isinstance(value, str) else value for key, value in given.items()}
+
+
+def _as_float(given: object) -> object:
+    try:
+        return float(given) if isinstance(given, str) else given
+    except ValueError:
+        return given
+
+
+def _plain(value: Any) -> Any:
+    """Tuples as lists, for YAML."""
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(entry) for entry in value]
+    return value

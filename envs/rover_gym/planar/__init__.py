@@ -1,0 +1,42 @@
+"""The planar systems of the report's chapter 3: a ball and a two-wheel rover on a line, a curve or a step.
+
+They are stepped by the rover's own schemes, laws and contact solver. x points forward, y up, angles turn to the left; a
+positive torque drives forward.
+
+    >>> from rover_gym.planar import BallSimulation, Line
+    >>> ball = BallSimulation(Line(slope=-0.2), radius=0.3)
+    >>> ball.set_state([0.0, 1.0, 0.0])
+    >>> ball.step(400).is_converged
+    True
+"""
+
+from rover_gym.mechanics import (
+    BallSimulation,
+    Line,
+    MirroredRoverSimulation,
+    PlanarContacts,
+    PlanarSimulation,
+    PlanarSnapshot,
+    Polyline,
+    Sine,
+    Spline,
+    TwoWheelRoverSimulation,
+)
+from rover_gym.planar.planar_recording import PlanarGround, PlanarSampler, describe_planar, record_planar
+
+__all__ = [
+    "BallSimulation",
+    "Line",
+    "MirroredRoverSimulation",
+    "PlanarContacts",
+    "PlanarGround",
+    "PlanarSampler",
+    "PlanarSimulation",
+    "PlanarSnapshot",
+    "Polyline",
+    "Sine",
+    "Spline",
+    "TwoWheelRoverSimulation",
+    "describe_planar",
+    "record_planar",
+]

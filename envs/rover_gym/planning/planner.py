@@ -1,0 +1,233 @@
+"""Decides what is built for a scene: model, ground, scheme and step, each with its reason."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from rover_gym.env.start import resting_pose
+from rover_gym.mechanics import (
+    Line,
+    MirroredRoverSimulation,
+    ModelError,
+    OptionError,
+    Plane,
+    RoverModel,
+    Simulation,
+    SphereField,
+    StateError,
+    TerrainError,
+    accuracy_options,
+)
+from rover_gym.planning.scene import Accuracy, Array, Scene, check_scene, gravity_of, steering_joints
+from rover_gym.planning.scene_plan import Decision, Kind, ScenePlan
+from rover_gym.validation import flag, number, refuse, vector
+
+# The bounds are for 10 s from rest on a plane while the wheels do not slip; `docs/economy.md` has what was measured.
+#: Largest distance of the trunk from that of the full model with its steering held by the PD, m. On a plane a wheel
+#: touches on its steering axis and nothing turns it. Largest measured: 2.6e-7.
+WELD_ERROR = 1e-6
+#: The same for the planar model against the welded one, m: rounding, the solver's tolerance. Largest measured: 1.9e-8.
+PLANAR_ERROR = 1e-7
+#: Linearised against Newton scheme over the step squared, m/s2, on the same drives. Largest measured: 3.3e-3.
+LINEARISED_ERROR = 1e-2
+#: Gap of a wheel (m) up to which the start counts as resting on the plane.
+RESTING = 1e-6
+_STRAIGHT = 1e-12  # rad or m: what counts as symmetric, a few roundings away from it
+
+
+def plan(scene: Scene, accuracy: Accuracy = "balanced", *, planar: bool = True) -> ScenePlan:
+    """Decides what is built for a scene.
+
+    Args:
+        scene: What the rover will meet and be told.
+        accuracy: As for `Simulation`: a name, or an error in metres.
+        planar: Whether a planar model is welcome; without, the tree is built.
+
+    Raises:
+        OptionError: The accuracy, reach or heading is out of its range; a scene that contradicts itself, or is none.
+        StateError: The start has a wrong shape or an entry that is not finite.
+        TerrainError: No start was given, and the terrain has no plane to stand on.
+    """
+    check_scene(scene)
+    planar = flag("planar", planar)
+    terrain, terrain_decision = _ground(scene)
+    start = _start(scene)
+    chosen = accuracy_options(accuracy)
+    weld, weld_decision = _steering(scene, terrain, start)
+    obstacle = None if planar else "not wanted"
+    if obstacle is None:
+        obstacle = _obstacle(scene, terrain, start, welded=weld)
+    kind: Kind = "full"
+    model = scene.model
+    if weld:
+        kind = "welded"
+        model = model.weld(steering_joints(model))
+    if obstacle is None:
+        kind = "planar"
+        base = Decision(
+            "base",
+            "planar: 3 coordinates, pairs of wheels as one",
+            "ground, torques and start are symmetric about the vertical plane through the heading",
+            PLANAR_ERROR,
+        )
+    else:
+        base = Decision("base", "free: 6 coordinates", f"no planar model: {obstacle}")
+    variant, variant_decision = _variant(scene, chosen, calm=weld)
+    options = {**scene.options, **chosen, "variant": variant}
+    # Wrong options are refused here, not when the simulation is built.
+    Simulation(model, terrain, **options)
+    decisions = (
+        terrain_decision,
+        weld_decision,
+        base,
+        variant_decision,
+        Decision(
+            "contact solver",
+            "auto, with one tangent a contact" if kind == "planar" else "auto, with two tangents a contact",
+            "starts from the last impulses and escalates to Newton's method only where the cheap method stalls",
+        ),
+        Decision(
+            "step",
+            f"{1e3 * options['time_step']:g} ms, tolerance {options['tolerance']:g}",
+            f"accuracy {accuracy!r}",
+        ),
+    )
+    return ScenePlan(scene, kind, model, terrain, start, options, decisions)
+
+
+def _start(scene: Scene) -> Array:
+    model = scene.model
+    if scene.start is not None:
+        return np.array(vector("start", scene.start, model.nq, error=StateError))
+    heading = number("heading", scene.heading)
+    plane = scene.terrain if isinstance(scene.terrain, Plane) else scene.terrain.ground
+    if plane is None or plane.normal[1] <= 0.0:
+        refuse(TerrainError, "terrain", scene.terrain, "has no plane to stand on: give a start")
+    return resting_pose(model, plane, (0.0, 0.0), heading)
+
+
+def _ground(scene: Scene) -> tuple[Plane | SphereField, Decision]:
+    reach = None if scene.reach is None else number("reach", scene.reach, above=0.0)
+    terrain = scene.terrain
+    if isinstance(terrain, Plane):
+        return terrain, Decision("ground", "plane, no search", "there are no spheres")
+    centres, radii, plane = terrain.centres, terrain.radii, terrain.ground
+    shown = np.ones(len(radii), dtype=bool)
+    if plane is not None:
+        shown = centres @ plane.normal + plane.offset + radii > 0.0
+    buried = int(len(radii) - shown.sum())
+    far = 0
+    if reach is not None:
+        start = _start(scene)
+        # From the trunk's origin to the farthest rim of the rover, in any pose.
+        own = float(np.linalg.norm(np.abs(_extent(scene.model)).max(axis=0)) + scene.model.wheel_radii.max())
+        near = np.hypot(centres[:, 0] - start[0], centres[:, 2] - start[2]) - radii <= reach + own
+        far = int((shown & ~near).sum())
+        shown &= near
+    left = int(shown.sum())
+    dropped = ", ".join(
+        text for count, text in ((buried, f"{buried} are under the plane"), (far, f"{far} out of reach")) if count
+    )
+    if left == 0 and plane is not None:
+        why = f"of {len(radii)} spheres {dropped}" if len(radii) else "there are no spheres"
+        return plane, Decision("ground", "plane, no search", why, 0.0)
+    if left == len(radii):
+        search = "spheres may be anywhere near the rover" if reach is None else "all spheres are within reach"
+        return terrain, Decision("ground", f"{left} spheres in a ball tree", search)
+    if left == 0:
+        refuse(OptionError, "reach", scene.reach, "leaves the rover without any ground")
+    kept = SphereField(centres[shown], radii[shown], plane)
+    return kept, Decision("ground", f"{left} spheres in a ball tree", f"of {len(radii)} spheres {dropped}")
+
+
+def _extent(model: RoverModel) -> Array:
+    """`(n, 3)` origins of the solids and of the wheels' lowest points relative to the trunk, joints at zero, m."""
+    origins = [origin for origin, _ in model.poses(np.zeros(model.nq), coordinates="state").values()]
+    rims = model.wheel_contact_points(np.zeros(model.nq), Plane(), coordinates="state")
+    return np.concatenate([np.array(origins), rims])
+
+
+def _steering(scene: Scene, terrain: Plane | SphereField, start: Array) -> tuple[bool, Decision]:
+    joints = steering_joints(scene.model)
+    held = f"{len(joints)} joints held by the PD"
+    if not joints:
+        return False, Decision("steering", "none", "the model has no free steering joint")
+    angles = start[[i for i in scene.model.steering_joint_indices if i >= 0]]
+    if scene.steered:
+        return False, Decision("steering", held, "steering may be commanded")
+    if np.any(angles):
+        refuse(OptionError, "steered", scene.steered, "the start has turned wheels, which no set-point keeps turned")
+    if isinstance(terrain, SphereField):
+        why = "not commanded, but on spheres the PD gives way enough to change which sphere a wheel climbs"
+        return False, Decision("steering", held, why)
+    if not _rests(scene, terrain, start):
+        why = "not commanded, but in a landing wheels strike at an angle and turn"
+        return False, Decision("steering", held, why)
+    if _steering_offset(scene.model) > _STRAIGHT:
+        why = "not commanded, but the wheels touch beside their steering axes and turn"
+        return False, Decision("steering", held, why)
+    why = "never commanded, and every wheel touches on its steering axis, so nothing else turns it"
+    return True, Decision("steering", f"{len(joints)} joints welded at zero", why, WELD_ERROR)
+
+
+def _rests(scene: Scene, terrain: Plane, start: Array) -> bool:
+    """Whether all wheels touch the plane at the start."""
+    gaps = scene.model.wheel_gaps(start, terrain, coordinates="state")
+    return float(np.abs(gaps).max()) <= RESTING
+
+
+def _steering_offset(model: RoverModel) -> float:
+    """Largest distance of a wheel's centre from its steering axis, straight ahead, m."""
+    description = model.to_dict()
+    axes = {solid["name"]: np.array(solid.get("axis", (0.0, 0.0, 0.0)), dtype=float) for solid in description["solids"]}
+    poses = model.poses(np.zeros(model.nq), coordinates="state")
+    offsets = [0.0]
+    for wheel in description["wheels"]:
+        if (name := wheel.get("steering")) in model.dof_names:
+            arm = poses[wheel["solid"]][0] - poses[name][0]
+            axis = poses[name][1] @ axes[name]
+            offsets.append(float(np.linalg.norm(np.cross(arm, axis)) / np.linalg.norm(axis)))
+            # On a plane it touches straight below its centre.
+            offsets.append(float(np.hypot(axis[0], axis[2])))
+    return max(offsets)
+
+
+def _obstacle(scene: Scene, terrain: Plane | SphereField, start: Array, *, welded: bool) -> str | None:
+    """Why there is no planar model; None if there is."""
+    if isinstance(terrain, SphereField):
+        return "spheres are not the same left and right"
+    if not welded:
+        return "steering is free"
+    if not scene.equal_torques:
+        return "torques may differ from left to right"
+    if scene.held:
+        return "joints may be held"
+    if scene.tumbles:
+        return "the rover may turn out of the plane in flight"
+    n, heading = terrain.normal, start[4]
+    if abs(n[0] * math.sin(heading) + n[2] * math.cos(heading)) > _STRAIGHT:
+        return "the ground slopes across the heading"
+    gravity = gravity_of(scene)
+    if gravity[0] or gravity[2]:
+        return "gravity is not along y"
+    try:
+        image = MirroredRoverSimulation(Line(), model=scene.model)
+    except ModelError as error:
+        return str(error)
+    names = scene.model.dof_names
+    pairs = [[names.index(name) for name in pair] for pair in image.joints]
+    free = {0, 1, 2, 4, 5, *(i for pair in pairs for i in pair)}
+    still = [i for i in range(scene.model.nq) if i not in free]
+    apart = [np.ptp(start[pair]) for pair in pairs]
+    if np.abs(start[still]).max(initial=0.0) > _STRAIGHT or max(apart) > _STRAIGHT:
+        return "the start is not symmetric"
+    return None
+
+
+def _variant(scene: Scene, chosen: dict[str, Any], *, calm: bool) -> tuple[str, Decision]:
+    if scene.tumbles:
+        return "newton", Decision("scheme", "Newton", "keeps angular momentum in free flight to rounding")
+    why = "Newton pays in free flight: on the ground it moves the path by less than the step's own error"
+    error = LINEARISED_ERROR * chosen["time_step"] ** 2 if calm else None
+    return "linearised", Decision("scheme", "linearised", why, error)

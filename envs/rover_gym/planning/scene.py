@@ -1,0 +1,81 @@
+"""A scene as its user describes it: what the rover will meet, and what it will never be told."""
+
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.mechanics import ModelError, OptionError, Plane, RoverModel, SphereField, TerrainError
+from rover_gym.validation import flag, known_keys, refuse, vector
+
+Array: TypeAlias = npt.NDArray[np.float64]
+Accuracy: TypeAlias = Literal["fast", "balanced", "reference"] | float
+
+#: Keyword arguments of `Simulation` that a scene may hold: all but those that the plan chooses.
+OPTIONS = (
+    "gravity",
+    "friction",
+    "restitution",
+    "theta",
+    "forecast",
+    "solver",
+    "max_iterations",
+    "stabilisation",
+    "warm_start",
+)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a rover will meet and be told.
+
+    Attributes:
+        terrain: The ground.
+        model: The machine.
+        start: `(nq,)` public coordinates; at rest on the terrain's plane at x = z = 0 if not given.
+        heading: Of the start that is made if none is given, rad.
+        steered: Whether a steering set-point other than zero may ever be given.
+        equal_torques: Whether the two wheels of each axle always get the same torque.
+        held: Whether joints may be held or wheels braked.
+        tumbles: Whether the rover turns over in free flight, so that its angular momentum matters.
+        reach: The rover stays within this distance of its start on the map, m; None promises nothing.
+        options: Keyword arguments of `Simulation` that describe the scene: gravity, friction, restitution.
+    """
+
+    terrain: Plane | SphereField = field(default_factory=Plane)
+    model: RoverModel = field(default_factory=RoverModel)
+    start: npt.ArrayLike | None = None
+    heading: float = 0.0
+    steered: bool = True
+    equal_torques: bool = False
+    held: bool = False
+    tumbles: bool = False
+    reach: float | None = None
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+def check_scene(scene: Scene) -> None:
+    """Refuses a scene whose parts are not what they must be."""
+    if not isinstance(scene, Scene):
+        refuse(OptionError, "scene", scene, "must be a Scene")
+    if not isinstance(scene.terrain, (Plane, SphereField)):
+        refuse(TerrainError, "terrain", scene.terrain, "must be a Plane or a SphereField")
+    if not isinstance(scene.model, RoverModel):
+        refuse(ModelError, "model", scene.model, "must be a RoverModel")
+    for name in ("steered", "equal_torques", "held", "tumbles"):
+        flag(name, getattr(scene, name))
+    if not isinstance(scene.options, dict):
+        refuse(OptionError, "options", scene.options, "must be a dict")
+    known_keys("options", scene.options, OPTIONS)
+
+
+def steering_joints(model: RoverModel) -> list[str]:
+    """Names of the joints that steer a wheel."""
+    return [model.dof_names[i] for i in model.steering_joint_indices if i >= 0]
+
+
+def gravity_of(scene: Scene) -> Array:
+    """(3,) the scene's gravity, m/s2; the Earth's where it names none."""
+    gravity = scene.options.get("gravity")
+    return np.array(vector("gravity", (0.0, -9.81, 0.0) if gravity is None else gravity, 3))

@@ -1,0 +1,198 @@
+"""What is built for a scene, part by part with its reason, and the rover that comes of it."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.mechanics import (
+    CommandError,
+    Line,
+    MirroredRoverSimulation,
+    Plane,
+    RoverModel,
+    Simulation,
+    SphereField,
+    StepError,
+    StepReport,
+)
+from rover_gym.planning.scene import Array, Scene, gravity_of
+from rover_gym.validation import refuse, vector
+
+Kind: TypeAlias = Literal["full", "welded", "planar"]
+
+#: CPU time of a step on a plane, relative to the full model, as measured.
+COST: dict[Kind, float] = {"full": 1.0, "welded": 0.75, "planar": 0.3}
+#: The planar model's trunk does not touch the ground; this far from parallel to it (rad) it might.
+LARGEST_TILT = 0.2
+
+
+@dataclass(frozen=True)
+class Decision:
+    """One part of what is built.
+
+    Attributes:
+        part: What was decided about.
+        built: What is built.
+        reason: Why.
+        error: Bound on what it changes in the trunk's place in 10 s, m; None where nothing was left out.
+    """
+
+    part: str
+    built: str
+    reason: str
+    error: float | None = None
+
+
+@dataclass(frozen=True)
+class ScenePlan:
+    """What is built for a scene.
+
+    Attributes:
+        scene: The scene as it was described.
+        kind: The model: the full tree, the tree with its steering welded, or its planar image.
+        model: The machine as it is built (for the planar image the tree that it is made of).
+        terrain: The ground as it is built.
+        start: `(21,)` public coordinates of the full model.
+        options: Keyword arguments of the simulation.
+        decisions: Every part and why it is as it is.
+    """
+
+    scene: Scene
+    kind: Kind
+    model: RoverModel
+    terrain: Plane | SphereField
+    start: Array
+    options: dict[str, Any]
+    decisions: tuple[Decision, ...]
+
+    @property
+    def error(self) -> float:
+        """Bound on the distance of the trunk from the full model's at the same step, 10 s of a drive, m."""
+        return sum(decision.error or 0.0 for decision in self.decisions)
+
+    @property
+    def cost(self) -> float:
+        """CPU time to expect of a step, relative to the full model on the same ground."""
+        return COST[self.kind]
+
+    def explain(self) -> list[dict[str, Any]]:
+        """Rows of what was built and why: part, built, reason, error (m or None)."""
+        return [{"part": d.part, "built": d.built, "reason": d.reason, "error": d.error} for d in self.decisions]
+
+    def rover(self) -> "PlannedRover":
+        """The rover at its start."""
+        return PlannedRover(self)
+
+    def simulation(self) -> Simulation | MirroredRoverSimulation:
+        """The bare simulation at its start: `rover` wraps it so that all kinds are used alike."""
+        if self.kind == "planar":
+            return self._planar()
+        sim = Simulation(self.model, self.terrain, **self.options)
+        names = self.scene.model.dof_names
+        sim.set_state(self.start[[names.index(name) for name in self.model.dof_names]])
+        return sim
+
+    def _planar(self) -> MirroredRoverSimulation:
+        plane = self.terrain
+        assert isinstance(plane, Plane)  # noqa: S101 - `plan` makes no planar plan without
+        heading = self.start[4]
+        n = plane.normal
+        slope = -(n[0] * math.cos(heading) - n[2] * math.sin(heading)) / n[1]
+        x, z = self.start[[0, 2]]
+        options = dict(self.options)
+        options["gravity"] = gravity_of(self.scene)[:2]
+        sim = MirroredRoverSimulation(Line(slope, plane.height(x, z)), model=self.model, **options)
+        names = self.scene.model.dof_names
+        joints = [self.start[names.index(pair[0])] for pair in sim.joints]
+        sim.set_state([0.0, self.start[1], self.start[5], *joints])
+        return sim
+
+
+class PlannedRover:
+    """A rover of any plan under the full rover's commands and coordinates.
+
+    Args:
+        plan: What to build.
+    """
+
+    def __init__(self, plan: ScenePlan) -> None:
+        self.plan = plan
+        self.simulation = plan.simulation()
+        names, wheels = plan.scene.model.dof_names, plan.scene.model.wheel_names
+        self._pairs: list[list[int]] = []
+        if isinstance(self.simulation, MirroredRoverSimulation):
+            # x runs along the heading, so it is put in its place by itself.
+            joints = [[names.index(name) for name in pair] for pair in self.simulation.joints]
+            self._places = [[], [1], [5], *joints]
+            self._pairs = [[wheels.index(name) for name in pair] for pair in self.simulation.wheels]
+        else:
+            self._places = [[names.index(name)] for name in plan.model.dof_names]
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self.simulation.time
+
+    @property
+    def q(self) -> Array:
+        """`(21,)` public coordinates of the full model."""
+        q = self.plan.start.copy()
+        own = self.simulation.q
+        for value, places in zip(own, self._places, strict=True):
+            q[places] = value
+        if isinstance(self.simulation, MirroredRoverSimulation):
+            heading = self.plan.start[4]
+            q[0] += own[0] * math.cos(heading)
+            q[2] -= own[0] * math.sin(heading)
+        return q
+
+    def set_wheel_torques(self, torques: npt.ArrayLike) -> None:
+        """`(6,)` N m, positive drives forward.
+
+        Raises:
+            CommandError: Not six finite numbers, or unequal on an axle of a planar model.
+        """
+        if isinstance(self.simulation, Simulation):
+            self.simulation.set_wheel_torques(torques)
+            return
+        values = vector("torques", torques, len(self.plan.scene.model.wheel_names), error=CommandError)
+        for pair in self._pairs:
+            if len({values[i] for i in pair}) > 1:
+                refuse(CommandError, "torques", values, "the scene was planned with equal torques on each axle")
+        self.simulation.set_torques([values[pair[0]] for pair in self._pairs])
+
+    def set_steering(self, set_points: npt.ArrayLike) -> None:
+        """`(6,)` rad.
+
+        Raises:
+            CommandError: Not six finite numbers, or not zero although the scene was planned without steering.
+        """
+        if self.plan.kind == "full" and isinstance(self.simulation, Simulation):
+            self.simulation.set_steering(set_points)
+            return
+        values = vector("steering", set_points, len(self.plan.scene.model.wheel_names), error=CommandError)
+        if any(values):
+            refuse(CommandError, "steering", values, "the scene was planned without steering")
+
+    def step(self, n: int = 1) -> StepReport:
+        """Takes n steps.
+
+        Raises:
+            StepError: A step could not be taken, a planar rover has tilted so far that it may touch with its trunk, or
+                the rover has left the scene's reach.
+        """
+        report = self.simulation.step(n)
+        reach = self.plan.scene.reach
+        if reach is not None:
+            way = self.q[[0, 2]] - self.plan.start[[0, 2]]
+            if (distance := float(np.hypot(*way))) > reach:
+                refuse(StepError, "reach", distance, f"the rover has left the reach of {reach:g} m it was planned with")
+        if isinstance(self.simulation, MirroredRoverSimulation):
+            ground = self.simulation.ground
+            tilt = float(self.simulation.q[2]) - (math.atan(ground.slope) if isinstance(ground, Line) else 0.0)
+            if abs(math.remainder(tilt, math.tau)) > LARGEST_TILT:
+                refuse(StepError, "pitch", tilt, "the trunk may touch the ground, which the planar model does not know")
+        return report

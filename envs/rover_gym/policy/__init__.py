@@ -1,0 +1,53 @@
+"""Who drives: the baseline, trained policies, the commands and features they share, and how far each gets."""
+
+from rover_gym.policy.baseline import ENDS, BaselineInterrupt, BaselineRow, measure_baseline, wilson_interval
+from rover_gym.policy.command import CommandController, CommandLimits
+from rover_gym.policy.drive_by_command import DriveByCommand
+from rover_gym.policy.episodes import Episode, Policy, run_episode
+from rover_gym.policy.evaluation import (
+    EvaluatedEpisode,
+    IntervalEstimate,
+    PolicySummary,
+    drive_all,
+    mean_estimate,
+    ratio_estimate,
+    summarise,
+)
+from rover_gym.policy.features import Features
+from rover_gym.policy.network import Network
+from rover_gym.policy.pd_policy import PDGains, PDPolicy
+from rover_gym.policy.policy_card import PolicyCard
+from rover_gym.policy.policy_files import PolicyError
+from rover_gym.policy.shipped import find_policy, policy_arguments, policy_folder
+from rover_gym.policy.trained_policy import TrainedPolicy
+
+__all__ = [
+    "ENDS",
+    "BaselineInterrupt",
+    "BaselineRow",
+    "CommandController",
+    "CommandLimits",
+    "DriveByCommand",
+    "Episode",
+    "EvaluatedEpisode",
+    "Features",
+    "IntervalEstimate",
+    "Network",
+    "PDGains",
+    "PDPolicy",
+    "Policy",
+    "PolicyCard",
+    "PolicyError",
+    "PolicySummary",
+    "TrainedPolicy",
+    "drive_all",
+    "find_policy",
+    "mean_estimate",
+    "measure_baseline",
+    "policy_arguments",
+    "policy_folder",
+    "ratio_estimate",
+    "run_episode",
+    "summarise",
+    "wilson_interval",
+]

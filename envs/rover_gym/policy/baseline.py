@@ -1,0 +1,134 @@
+"""How far the PD baseline gets among the rocks: its success rate by difficulty."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import gymnasium as gym
+
+from rover_gym.mechanics import OptionError
+from rover_gym.policy.episodes import Episode, Policy, run_episode
+from rover_gym.policy.pd_policy import PDPolicy
+from rover_gym.policy.shipped import find_policy, policy_arguments
+from rover_gym.policy.trained_policy import TrainedPolicy
+from rover_gym.validation import number, refuse, whole
+
+DIFFICULTIES = (0.0, 0.25, 0.5, 0.75, 1.0)
+ENDS = ("goal", "time", "high_centred", "roll_over", "step_failed")
+
+
+@dataclass(frozen=True)
+class BaselineRow:
+    """What the episodes at one difficulty came to.
+
+    Attributes:
+        difficulty: In [0, 1].
+        episodes: How many.
+        successes: How many reached the goal.
+        success_rate: The share of them.
+        interval: Wilson's 95% interval of the success rate.
+        time_to_goal: Mean over the episodes that reached it, s; NaN where none did.
+        energy_per_metre: Work through the wheel motors over way driven, all episodes, J/m.
+        ends: How often episodes ended for each cause.
+    """
+
+    difficulty: float
+    episodes: int
+    successes: int
+    success_rate: float
+    interval: tuple[float, float]
+    time_to_goal: float
+    energy_per_metre: float
+    ends: dict[str, int]
+
+
+class BaselineInterrupt(KeyboardInterrupt):
+    """The user ended a measurement.
+
+    Attributes:
+        rows: Of the episodes that are done; the last may have fewer than the others.
+    """
+
+    def __init__(self, rows: list[BaselineRow]) -> None:
+        super().__init__()
+        self.rows = rows
+
+
+def measure_baseline(
+    difficulties: Sequence[float] = DIFFICULTIES,
+    *,
+    episodes: int = 200,
+    seed: int = 0,
+    policy: str = "pd",
+    progress: Callable[[float, int], None] = lambda _difficulty, _done: None,
+) -> list[BaselineRow]:
+    """Drives `RoverRocks-v0` with the PD baseline, or another policy, the same seeds at every difficulty.
+
+    Args:
+        difficulties: Each in [0, 1].
+        episodes: How many at each difficulty.
+        seed: Seed of the first; the next ones count up.
+        policy: "pd", "trained" for the package's own, or the folder of a trained one.
+        progress: Called with the difficulty and the number of episodes done, after each.
+
+    Raises:
+        OptionError: A difficulty is out of its range, there is no such policy, or `episodes` or `seed` is no whole
+            number or out of its range.
+        BaselineInterrupt: The user interrupted it; the episodes that are done are in it.
+    """
+    episodes, seed = whole("episodes", episodes, at_least=1), whole("seed", seed)
+    difficulties = tuple(number("difficulty", level, at_least=0.0, at_most=1.0) for level in difficulties)
+    folder = find_policy(policy, "sphere_field")
+    env = gym.make("RoverRocks-v0", **({} if folder is None else policy_arguments(folder)))
+    driver: Policy = PDPolicy(env) if folder is None else TrainedPolicy.load(env, folder)
+    rows: list[BaselineRow] = []
+    results: list[Episode] = []
+    try:
+        for difficulty in difficulties:
+            results = []
+            for now in range(seed, seed + episodes):
+                results.append(run_episode(env, driver, now, options={"difficulty": difficulty}))
+                progress(difficulty, len(results))
+            rows.append(_summarise(difficulty, results))
+    except KeyboardInterrupt as interrupt:
+        if len(rows) < len(difficulties) and 0 < len(results) < episodes:
+            rows.append(_summarise(difficulties[len(rows)], results))
+        raise BaselineInterrupt(rows) from interrupt
+    return rows
+
+
+def wilson_interval(successes: int, n: int, z: float = 1.959963984540054) -> tuple[float, float]:
+    """Wilson's score interval of a proportion: unlike the normal one it stays within [0, 1] and has width at 0 and 1.
+
+    Args:
+        successes: How many of the trials succeeded.
+        n: How many trials; at least one.
+        z: Quantile of the normal distribution; the default makes it a 95% interval.
+
+    Raises:
+        OptionError: There are no trials, or more successes than trials.
+    """
+    n = whole("n", n, at_least=1)
+    if not 0 <= successes <= n:
+        refuse(OptionError, "successes", successes, f"must be from 0 to {n}, the number of trials")
+    share = successes / n
+    centre = (share + z * z / (2 * n)) / (1 + z * z / n)
+    half = z / (1 + z * z / n) * math.sqrt(share * (1 - share) / n + z * z / (4 * n * n))
+    return (max(0.0, centre - half), min(1.0, centre + half))
+
+
+def _summarise(difficulty: float, results: Sequence[Episode]) -> BaselineRow:
+    times = [episode.time for episode in results if episode.success]
+    way = sum(episode.distance for episode in results)
+    counts = Counter(episode.end for episode in results)
+    return BaselineRow(
+        difficulty=difficulty,
+        episodes=len(results),
+        successes=len(times),
+        success_rate=len(times) / len(results),
+        interval=wilson_interval(len(times), len(results)),
+        time_to_goal=sum(times) / len(times) if times else math.nan,
+        energy_per_metre=sum(episode.energy for episode in results) / way if way > 0.0 else math.nan,
+        ends={end: counts[end] for end in ENDS},
+    )

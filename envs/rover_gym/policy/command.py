@@ -1,0 +1,119 @@
+"""Driving by three numbers: how fast, how sharply, how far sideways; for many rovers at once.
+
+A command says how the point in the middle of the wheelbase shall move: with speed `v` in a direction `beta` off
+the trunk's x axis while the trunk turns by `kappa` per metre of way, both positive to the left. A wheel at
+`(x, z)` from that point then moves, over `v`,
+
+    ahead    a = cos(beta) + kappa z
+    left     l = sin(beta) + kappa x
+
+so it is steered to `delta = atan2(l, a)`, as far as the steering reaches, and its rim turns at
+`v (a cos(delta) + l sin(delta))`. With beta = 0 these are `PDPolicy`'s formulas. Torques come from the same
+regulator of wheel speeds, with the force that holds the rover on a slope.
+
+A policy's action is the command itself, or an offset to the command of a guide that knows nothing of rocks: full
+speed along the circle that is tangential to the heading and meets the goal (pure pursuit).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.env.rover_env import RoverEnv
+from rover_gym.env.wheels import N_ACTIONS, N_WHEELS, drive_signs, wheel_centres
+from rover_gym.mechanics import OptionError
+from rover_gym.validation import flag, number, refuse
+
+Array = npt.NDArray[np.float64]
+
+#: Entries of a command: speed, curvature, sideways.
+N_COMMANDS = 3
+
+#: What an action of one adds to the guide's command.
+OFFSET = np.array([2.0, 2.0, 1.0])
+
+
+@dataclass(frozen=True)
+class CommandLimits:
+    """What a command of one stands for, and how hard speeds are regulated.
+
+    speed: m/s. curvature: 1/m. sideways_deg: direction of travel off the trunk's axis, degrees. response: s, time
+    constant of the speed regulator for the whole rover's mass; a quarter of `PDPolicy`'s, so that a rover that is
+    held by a rock soon pushes with all its torque.
+    """
+
+    speed: float = 1.2
+    curvature: float = 0.75
+    sideways_deg: float = 35.0
+    response: float = 0.2
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            number(f"command.{name}", value, at_least=1e-3, at_most=180.0 if name == "sideways_deg" else 1e3)
+
+
+class CommandController:
+    """Turns commands `(n, 3)` in [-1, 1] into actions `(n, 12)` of `Rover-v0`.
+
+    Args:
+        rover: The environment, read once for the layout and the rover's constants.
+        limits: What a command of one stands for.
+        guided: Whether actions are offsets to the guide's command.
+    """
+
+    def __init__(self, rover: RoverEnv, limits: CommandLimits | None = None, *, guided: bool = True) -> None:
+        if limits is not None and not isinstance(limits, CommandLimits):
+            refuse(OptionError, "limits", limits, "must be CommandLimits")
+        self.limits = CommandLimits() if limits is None else limits
+        self.guided = flag("guided", guided)
+        layout, model = rover.observation_layout, rover.model
+        q, velocity = layout["q"].start, layout["velocity"].start
+        self._pitch = q + 5
+        self._goal = layout["goal"]
+        self._goal_scale = layout.scale[self._goal]
+        self._steering = np.array([q + i for i in model.steering_joint_indices])
+        self._rates = np.array([velocity + i for i in model.wheel_joint_indices])
+        self._rate_scale = layout.scale[self._rates]
+        centres = wheel_centres(model)
+        self._x = centres[:, 0] - 0.5 * (centres[:, 0].min() + centres[:, 0].max())
+        self._z = centres[:, 1]
+        self._rim_per_rate = model.wheel_radii * drive_signs(model)
+        self._lever = model.wheel_radii / model.wheel_torque_limits
+        self._max_steering = rover.max_steering
+        self._inertia = model.mass / N_WHEELS / self.limits.response
+        self._load = model.mass * math.hypot(*rover.gravity) / N_WHEELS
+
+    def act(self, observations: npt.NDArray[Any], commands: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
+        """The actions `(n, 12)` for observations `(n, size)`, scaled as the environment gives them."""
+        seen = observations.astype(np.float64, copy=False)
+        command = np.clip(commands.astype(np.float64, copy=False), -1.0, 1.0)
+        if self.guided:
+            command = np.clip(self.guide(seen) + OFFSET * command, -1.0, 1.0)
+        speed = self.limits.speed * command[:, :1]
+        curvature = self.limits.curvature * command[:, 1:2]
+        sideways = math.radians(self.limits.sideways_deg) * command[:, 2:3]
+
+        ahead = np.cos(sideways) + curvature * self._z
+        left = np.sin(sideways) + curvature * self._x
+        angles = np.clip(np.arctan2(left, ahead), -self._max_steering, self._max_steering)
+        # Wait for the wheels to stand right: they would scrub, and the way would be another.
+        off = np.abs(angles - seen[:, self._steering]).max(axis=1, keepdims=True)
+        speed = speed * np.maximum(0.2, 1.0 - 2.0 * off)
+        wanted = speed * (ahead * np.cos(angles) + left * np.sin(angles))
+
+        rim = self._rim_per_rate * self._rate_scale * seen[:, self._rates]
+        hold = self._load * np.sin(seen[:, self._pitch, None])
+        actions = np.empty((len(seen), N_ACTIONS), dtype=np.float32)
+        actions[:, :N_WHEELS] = np.clip(self._lever * (hold + self._inertia * (wanted - rim)), -1.0, 1.0)
+        actions[:, N_WHEELS:] = np.clip(angles / self._max_steering, -1.0, 1.0)
+        return actions
+
+    def guide(self, seen: Array) -> Array:
+        """The guide's commands `(n, 3)`: pure pursuit of the goal, as sharply as can be where it lies behind."""
+        ahead, right = (seen[:, self._goal] * self._goal_scale).T
+        curvature = -2.0 * right / np.maximum(ahead * ahead + right * right, 1e-6) / self.limits.curvature
+        curvature = np.where(ahead > 0.0, np.clip(curvature, -1.0, 1.0), np.where(right > 0.0, -1.0, 1.0))
+        return np.stack((np.ones_like(curvature), curvature, np.zeros_like(curvature)), axis=1)

@@ -1,0 +1,77 @@
+"""`Rover-v0` driven by commands and seen through features, as one Gymnasium environment."""
+
+from dataclasses import fields
+from typing import Any, SupportsFloat
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.mechanics import CommandError
+from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
+from rover_gym.policy.features import LARGEST_FEATURE, Features
+from rover_gym.policy.pd_policy import find_rover_env
+from rover_gym.validation import known_keys, vector, whole
+
+Array = npt.NDArray[np.float32]
+
+#: Steps for which a command may hold, some minutes.
+MAX_REPEAT = 10_000
+
+
+class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
+    """Holds a command for some steps of the rover; the rewards are summed.
+
+    The same actions and observations as `rover_gym.learning` trains with, for libraries that take single environments.
+
+    Args:
+        env: A `Rover-v0`, wrapped or not.
+        repeat: Steps for which a command holds.
+        guided: Whether actions are offsets to the guide's command.
+        pool: Cells of the height scan are so many points long and wide.
+        **limits: Those of `CommandLimits`.
+
+    Raises:
+        OptionError: An argument is out of its range.
+    """
+
+    def __init__(
+        self, env: gym.Env[Array, Array], repeat: int = 4, guided: bool = False, pool: int = 1, **limits: float
+    ) -> None:
+        repeat = whole("repeat", repeat, at_least=1, at_most=MAX_REPEAT)
+        known_keys("limits", limits, [field.name for field in fields(CommandLimits)])
+        rover = find_rover_env(env)
+        super().__init__(env)
+        self._features = Features(rover, pool)
+        self._controller = CommandController(rover, CommandLimits(**limits), guided=guided)
+        self._repeat = repeat
+        self._seen = np.zeros((1, rover.observation_layout.size), np.float32)
+        self.observation_space = gym.spaces.Box(-LARGEST_FEATURE, LARGEST_FEATURE, (self._features.size,), np.float32)
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (N_COMMANDS,), np.float32)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
+        """Starts an episode."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        self._seen = observation[None]
+        return self._features(self._seen)[0], info
+
+    def step(self, action: Array) -> tuple[Array, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Holds a command until its time or the episode is over; beyond [-1, 1] it is cut.
+
+        Raises:
+            CommandError: The command is not three finite numbers; nothing has changed.
+            ResetNeeded: The environment has not been reset.
+        """
+        total = 0.0
+        command = np.array(vector("action", action, N_COMMANDS, error=CommandError))[None]
+        terminated = truncated = False
+        info: dict[str, Any] = {}
+        for _ in range(self._repeat):
+            observation, reward, terminated, truncated, info = self.env.step(
+                self._controller.act(self._seen, command)[0]
+            )
+            self._seen = observation[None]
+            total += float(reward)
+            if terminated or truncated:
+                break
+        return self._features(self._seen)[0], total, terminated, truncated, info

@@ -1,0 +1,226 @@
+"""Policies on the same seeded episodes, many at a time, and what the episodes came to."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.env.readings import tilt_of
+from rover_gym.env.task import MAX_EPISODE_STEPS
+from rover_gym.mechanics import OptionError
+from rover_gym.policy.baseline import ENDS, wilson_interval
+from rover_gym.policy.episodes import Policy
+from rover_gym.validation import number, refuse
+from rover_gym.vector.batch import RoverBatch
+
+Interval = tuple[float, float]
+
+#: Quantile of the normal distribution for 95%.
+Z95 = 1.959963984540054
+
+
+@dataclass(frozen=True)
+class EvaluatedEpisode:
+    """What one episode came to.
+
+    Attributes:
+        seed: Seed of its reset.
+        end: Why it ended: the environment's termination, or "time".
+        time: Simulated time, s.
+        distance: Way of the trunk's origin over the map, m.
+        energy: Work through the wheel motors, driving or braking, J.
+        slip: Mean slip ratio.
+        tilt: Mean tilt, rad.
+        max_tilt: Largest tilt, rad.
+    """
+
+    seed: int
+    end: str
+    time: float
+    distance: float
+    energy: float
+    slip: float
+    tilt: float
+    max_tilt: float
+
+    @property
+    def success(self) -> bool:
+        """Whether the goal was reached."""
+        return self.end == "goal"
+
+
+def drive_all(
+    make_policy: Callable[[Any], Policy],
+    seeds: Sequence[int],
+    *,
+    arguments: Mapping[str, Any],
+    max_episode_steps: int | None = None,
+    num_envs: int = 32,
+    threads: int | None = 1,
+    progress: Callable[[int], None] = lambda _done: None,
+) -> list[EvaluatedEpisode]:
+    """One episode a seed.
+
+    An episode depends on its seed and the policy alone, but for the rounding of a network's batches.
+
+    Args:
+        make_policy: From an environment, to read layout and constants from, to a policy.
+        seeds: Of the resets.
+        arguments: Of `RoverEnv`.
+        max_episode_steps: Control periods until an episode is cut; None for 60 s.
+        num_envs: Episodes at a time.
+        threads: That step them; None for one a core.
+        progress: Called with the number of episodes done.
+
+    Raises:
+        OptionError: `num_envs` or `max_episode_steps` is less than one, or an argument is out of its range.
+    """
+    number("num_envs", num_envs, at_least=1.0)
+    if max_episode_steps is not None:
+        number("max_episode_steps", max_episode_steps, at_least=1.0)
+    waiting = list(reversed(seeds))
+    n = min(num_envs, len(waiting))
+    if n == 0:
+        return []
+    batch = RoverBatch(n, threads=threads, **arguments)
+    policy = make_policy(batch.prototype)
+    limit = max_episode_steps or round(MAX_EPISODE_STEPS * 0.05 / batch.task.dt)
+
+    running = [waiting.pop() for _ in range(n)]
+    for i, seed in enumerate(running):
+        batch.reset(i, seed)
+    active = np.ones(n, np.bool_)
+    sums = np.zeros((n, 4))  # way, slip, tilt, largest tilt
+    steps = np.zeros(n, np.int64)
+    observation = batch.observation
+    places = _places(batch, observation)
+    done: dict[int, EvaluatedEpisode] = {}
+    state = None
+    while active.any():
+        actions, state = policy.predict(observation, state, steps == 0)
+        outcome, terminated, _ = batch.step(actions, active)
+        observation = outcome.observation
+        now = _places(batch, observation)
+        sums[:, 0] += np.linalg.norm(now - places, axis=1)
+        tilt = tilt_of(outcome.scalars.cos_tilt)
+        sums[:, 1] += outcome.scalars.slip_ratio
+        sums[:, 2] += tilt
+        np.maximum(sums[:, 3], tilt, out=sums[:, 3])
+        places = now
+        steps += 1
+        for i in np.flatnonzero(active & (terminated | (steps >= limit))).tolist():
+            info = outcome.info(i)
+            way, slip, lean, largest = sums[i].tolist()
+            done[running[i]] = EvaluatedEpisode(
+                seed=running[i],
+                end=info["termination"] or "time",
+                time=info["time"],
+                distance=way,
+                energy=info["energy"],
+                slip=slip / steps[i].item(),
+                tilt=lean / steps[i].item(),
+                max_tilt=largest,
+            )
+            progress(len(done))
+            sums[i], steps[i] = 0.0, 0
+            if waiting:
+                running[i] = waiting.pop()
+                batch.reset(i, running[i])
+                observation[i] = batch.observation[i]
+                places[i] = _places(batch, observation[i : i + 1])[0]
+            else:
+                active[i] = False
+    return [done[seed] for seed in seeds]
+
+
+@dataclass(frozen=True)
+class IntervalEstimate:
+    """A figure over episodes and its 95% interval."""
+
+    value: float
+    interval: Interval
+
+
+@dataclass(frozen=True)
+class PolicySummary:
+    """What a policy's episodes came to.
+
+    Attributes:
+        policy: Its name.
+        episodes: How many.
+        successes: How many reached the goal.
+        success: The share of them, with Wilson's interval.
+        time: Mean over the episodes that reached the goal, s.
+        energy_per_metre: Work through the wheel motors over way driven, all episodes, J/m.
+        slip: Mean over the episodes of their mean slip ratio.
+        tilt: Mean over the episodes of their mean tilt, degrees.
+        ends: How often episodes ended for each cause.
+    """
+
+    policy: str
+    episodes: int
+    successes: int
+    success: IntervalEstimate
+    time: IntervalEstimate
+    energy_per_metre: IntervalEstimate
+    slip: IntervalEstimate
+    tilt: IntervalEstimate
+    ends: dict[str, int]
+
+
+def summarise(policy: str, drives: Sequence[EvaluatedEpisode]) -> PolicySummary:
+    """The figures with their intervals: Wilson's for success, the normal one for means, linearised for the ratio.
+
+    Raises:
+        OptionError: There are no drives.
+    """
+    if not drives:
+        refuse(OptionError, "drives", len(drives), "must hold an episode or more")
+    successes = sum(drive.success for drive in drives)
+    counts = Counter(drive.end for drive in drives)
+    return PolicySummary(
+        policy=policy,
+        episodes=len(drives),
+        successes=successes,
+        success=IntervalEstimate(successes / len(drives), wilson_interval(successes, len(drives))),
+        time=mean_estimate([drive.time for drive in drives if drive.success]),
+        energy_per_metre=ratio_estimate([drive.energy for drive in drives], [drive.distance for drive in drives]),
+        slip=mean_estimate([drive.slip for drive in drives]),
+        tilt=mean_estimate([math.degrees(drive.tilt) for drive in drives]),
+        ends={end: counts[end] for end in ENDS},
+    )
+
+
+def mean_estimate(values: Sequence[float]) -> IntervalEstimate:
+    """Mean with its 95% interval, `mean +- z s / sqrt(n)`; NaN where there are too few values."""
+    n = len(values)
+    if n == 0:
+        return IntervalEstimate(math.nan, (math.nan, math.nan))
+    mean = math.fsum(values) / n
+    if n == 1:
+        return IntervalEstimate(mean, (math.nan, math.nan))
+    half = Z95 * math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (n - 1) / n)
+    return IntervalEstimate(mean, (mean - half, mean + half))
+
+
+def ratio_estimate(over: Sequence[float], under: Sequence[float]) -> IntervalEstimate:
+    """`sum(over) / sum(under)` with its 95% interval by linearisation: the spread of `over - ratio under`."""
+    n, total = len(under), math.fsum(under)
+    if n == 0 or not total > 0.0:
+        return IntervalEstimate(math.nan, (math.nan, math.nan))
+    ratio = math.fsum(over) / total
+    if n == 1:
+        return IntervalEstimate(ratio, (math.nan, math.nan))
+    spread = math.fsum((a - ratio * b) ** 2 for a, b in zip(over, under, strict=True))
+    half = Z95 * math.sqrt(spread / (n - 1) * n) / total
+    return IntervalEstimate(ratio, (ratio - half, ratio + half))
+
+
+def _places(batch: RoverBatch, observation: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
+    """`(n, 2)` the trunks' places on the map, m, as they are observed."""
+    q = batch.task.layout["q"].start
+    return observation[:, [q, q + 2]].astype(np.float64)

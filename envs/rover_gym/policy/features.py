@@ -1,0 +1,98 @@
+"""What a learned policy looks at: the observation without what does not carry over to another place.
+
+Place on the map, heading and the wheels' angles say nothing about the way ahead, so they are left out. The goal
+is a direction and a distance, and the height scan becomes heights over the ground plane, so that rocks look alike
+on any slope. Of a fine scan the highest point in each cell of some neighbours is shown: what matters of a rock is
+how tall it is, which a coarse scan that meets its flank does not tell.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.env.rover_env import RoverEnv
+from rover_gym.mechanics import OptionError
+from rover_gym.validation import refuse, whole
+
+# Entries beyond this are cut: they come from impacts and free wheels.
+LARGEST_FEATURE = 5.0
+
+# Rows of the height scan farther behind than this, m, are left out.
+BEHIND = 1.05
+
+
+class Features:
+    """Maps observations `(n, observation size)` to features `(n, size)`.
+
+    Args:
+        rover: The environment, read once for the layout.
+        pool: Cells of the scan are so many points long and wide; the scan's rows and columns must be multiples.
+    """
+
+    def __init__(self, rover: RoverEnv, pool: int = 1) -> None:
+        pool = whole("pool", pool, at_least=1)
+        layout = rover.observation_layout
+        q, velocity = layout["q"].start, layout["velocity"].start
+        wheels = set(rover.model.wheel_joint_indices)
+        joints = [i for i in range(6, rover.model.nq) if i not in wheels]
+        self._roll, self._pitch = q + 3, q + 5
+        self._normal = layout["ground_normal"]
+        self._goal = layout["goal"]
+        self._distance = layout["goal_distance"].start
+        self._goal_scale = float(layout.scale[self._distance])
+        taken = [q + i for i in (3, 5, *joints)]
+        taken += list(range(velocity, velocity + rover.model.nv))
+        for name in ("wheel_gap", "wheel_contact", "normal_force", "tangential_force", "previous_action", "stuck"):
+            taken += list(range(layout[name].start, layout[name].stop))
+        self._taken = np.array(taken)
+        self._scan = layout.get("height_scan")
+        offsets = rover.task.scan
+        self._offsets = np.zeros((0, 2)) if offsets is None else offsets
+        self._cells = _cells(self._offsets, pool)
+        self.size = len(self._taken) + 7 + (0 if self._scan is None else 1 + len(self._cells))
+
+    def __call__(self, observations: npt.NDArray[np.floating]) -> npt.NDArray[np.float32]:
+        """The features of observations, scaled as the environment gives them."""
+        seen = observations
+        distance = seen[:, self._distance] * self._goal_scale
+        goal = seen[:, self._goal] * self._goal_scale / np.maximum(distance, 0.1)[:, None]
+        slope = self._slope(seen)
+        parts = [
+            seen[:, self._taken],
+            goal,
+            np.stack((np.minimum(distance, 10.0) / 5.0, np.exp(-distance)), axis=1),
+            slope * 5.0,
+            np.abs(goal[:, 1:]),
+        ]
+        if self._scan is not None:
+            # Over the ground plane, whose level the lowest point of the scan tells.
+            rocks = seen[:, self._scan] - slope @ self._offsets.T
+            level = rocks.min(axis=1, keepdims=True)
+            parts += [-level, 10.0 * ((rocks - level)[:, self._cells].max(axis=2))]
+        features: npt.NDArray[np.float32] = np.concatenate(parts, axis=1).astype(np.float32)
+        return features.clip(-LARGEST_FEATURE, LARGEST_FEATURE)
+
+    def _slope(self, seen: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
+        """`(n, 2)` rise of the ground plane per metre ahead and to the right, in the heading frame."""
+        n = seen[:, self._normal]
+        roll, pitch = seen[:, self._roll], seen[:, self._pitch]
+        # The normal in the heading frame is Rz(pitch) Rx(roll) n.
+        y = np.cos(roll) * n[:, 1] - np.sin(roll) * n[:, 2]
+        right = np.sin(roll) * n[:, 1] + np.cos(roll) * n[:, 2]
+        ahead = np.cos(pitch) * n[:, 0] - np.sin(pitch) * y
+        up = np.sin(pitch) * n[:, 0] + np.cos(pitch) * y
+        rise: npt.NDArray[np.floating] = -np.stack((ahead, right), axis=1) / np.maximum(up, 0.1)[:, None]
+        return rise
+
+
+def _cells(offsets: npt.NDArray[np.float64], pool: int) -> npt.NDArray[np.intp]:
+    """`(cells, pool * pool)` the points of each cell that is not too far behind."""
+    if len(offsets) == 0:
+        return np.zeros((0, 1), np.intp)
+    columns = int(np.count_nonzero(offsets[:, 0] == offsets[0, 0]))
+    rows = len(offsets) // columns
+    if rows % pool or columns % pool:
+        refuse(OptionError, "pool", pool, f"must divide the scan's {rows} rows and {columns} columns")
+    points = np.arange(rows * columns).reshape(rows // pool, pool, columns // pool, pool)
+    cells = points.transpose(0, 2, 1, 3).reshape(-1, pool * pool)
+    seen: npt.NDArray[np.intp] = cells[offsets[cells, 0].mean(axis=1) >= -BEHIND]
+    return seen

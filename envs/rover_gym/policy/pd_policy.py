@@ -1,0 +1,208 @@
+"""A baseline that drives by the observation alone: one turning centre, regulated wheel speeds.
+
+All six wheels stand tangentially to circles about one turning centre at `(x_c, -1/kappa)` in the
+trunk's (x, z), `kappa` the curvature, positive to the left. A wheel at `(x, z)` then asks for
+
+    steering  tan(delta) = kappa (x - x_c) / (1 + kappa z)
+    speed     v_i = v sqrt((1 + kappa z)^2 + (kappa (x - x_c))^2)
+
+with `v` the speed of the point `(x_c, 0)`.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.env.rover_env import RoverEnv
+from rover_gym.env.wheels import N_ACTIONS, N_WHEELS, drive_signs, wheel_centres
+from rover_gym.mechanics import OptionError, StateError
+from rover_gym.validation import array, number, refuse
+
+_Row = Sequence[float]
+
+
+@dataclass(frozen=True)
+class PDGains:
+    """The policy's tuning.
+
+    speed: m/s on a straight way. lateral_acceleration: m/s2, slows turns. braking: m/s2, slows
+    the approach. final_speed: m/s at the goal. response: s, time constant of the speed regulator
+    for the whole rover's mass. reverse_cost: a way driven backwards counts so much longer.
+    switch_cost: m of way that a change of direction at `speed` counts.
+    """
+
+    speed: float = 1.0
+    lateral_acceleration: float = 0.5
+    braking: float = 0.4
+    final_speed: float = 0.3
+    response: float = 0.5
+    reverse_cost: float = 1.3
+    switch_cost: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            number(f"gains.{name}", value, at_least=1e-3, at_most=1e3)
+
+
+class PDPolicy:
+    """Drives `Rover-v0` to its goal; stateless, with stable-baselines3's `predict`.
+
+    The way is the shortest of four: forward or backward, turning to the left or to the right as
+    tightly as the steering allows, then straight. Within the way the curvature is that of the circle
+    through the goal (pure pursuit) where it can be steered.
+
+    Args:
+        env: A `Rover-v0`, wrapped or not, or a vector of them. It is read once, for the layout and
+            the rover's constants.
+        gains: The tuning.
+    """
+
+    def __init__(self, env: Any, gains: PDGains | None = None) -> None:
+        rover = find_rover_env(env)
+        if gains is not None and not isinstance(gains, PDGains):
+            refuse(OptionError, "gains", gains, "must be PDGains")
+        self.gains = PDGains() if gains is None else gains
+        layout, model = rover.observation_layout, rover.model
+        self._size = layout.size
+        self._scale = layout.scale
+        self._roll = layout["q"].start + 3
+        self._pitch = layout["q"].start + 5
+        self._steering = [layout["q"].start + i for i in model.steering_joint_indices]
+        self._rates = [layout["velocity"].start + i for i in model.wheel_joint_indices]
+        self._forward_speed = layout["velocity"].start
+        self._goal = layout["goal"].start
+
+        centres = wheel_centres(model)
+        self._x_c = 0.5 * (centres[:, 0].min() + centres[:, 0].max())
+        self._wheels: list[tuple[float, float]] = [(float(x - self._x_c), float(z)) for x, z in centres]
+        self._radii: list[float] = model.wheel_radii.tolist()
+        self._rim_per_rate: list[float] = (model.wheel_radii * drive_signs(model)).tolist()
+        self._torque_limits: list[float] = model.wheel_torque_limits.tolist()
+        self._max_steering = rover.max_steering
+        self._mass = model.mass
+        self._weight = model.mass * math.hypot(*rover.gravity)
+        self.max_curvature = self._find_max_curvature()
+
+    def predict(
+        self,
+        observation: npt.NDArray[np.float32],
+        state: tuple[npt.NDArray[Any], ...] | None = None,
+        episode_start: npt.NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...] | None]:
+        """The action for an observation `(size,)`, or the actions `(n, 12)` for a batch `(n, size)`.
+
+        The signature is stable-baselines3's; the policy has no state, so `state` comes back as it
+        went in, and neither `episode_start` nor `deterministic` changes anything.
+
+        Raises:
+            StateError: The observation has a wrong shape or an entry that is not finite.
+        """
+        given = array("observation", observation, error=StateError)
+        if given.ndim not in (1, 2) or given.shape[-1] != self._size:
+            refuse(StateError, "observation", given.shape, f"must be (..., {self._size})")
+        if not np.isfinite(given).all():
+            refuse(StateError, "observation", observation, "must be finite")
+        values = given * self._scale
+        if values.ndim == 1:
+            return np.array(self._act(values.tolist()), dtype=np.float32), state
+        actions = np.empty((len(values), N_ACTIONS), dtype=np.float32)
+        for action, row in zip(actions, values.tolist(), strict=True):
+            action[:] = self._act(row)
+        return actions, state
+
+    def steering_angles(self, curvature: float) -> list[float]:
+        """The six steering angles, rad, whose axles meet in the turning centre of a curvature, 1/m."""
+        return [math.atan2(curvature * x, 1.0 + curvature * z) for x, z in self._wheels]
+
+    def _act(self, row: _Row) -> list[float]:
+        """The action for one observation in SI units."""
+        gains = self.gains
+        speed_now = row[self._forward_speed]
+        ahead, right = row[self._goal], row[self._goal + 1]
+        direction, curvature = self._way(ahead - self._x_c, -right, speed_now)
+        angles = self.steering_angles(curvature)
+
+        distance = math.hypot(ahead, right)
+        speed = min(
+            gains.speed,
+            math.sqrt(gains.lateral_acceleration / max(abs(curvature), 1e-9)),
+            math.sqrt(gains.final_speed**2 + 2.0 * gains.braking * distance),
+        )
+        # Wait for the wheels to stand right: they would scrub, and the way would be another.
+        off = max(abs(angle - row[i]) for angle, i in zip(angles, self._steering, strict=True))
+        speed *= direction * max(0.2, 1.0 - 2.0 * off)
+
+        # Force that holds the rover on the slope, and the regulator's mass per wheel.
+        hold = self._weight * math.sin(row[self._pitch]) / N_WHEELS
+        inertia = self._mass / N_WHEELS / gains.response
+        action = [0.0] * N_ACTIONS
+        for i, (x, z) in enumerate(self._wheels):
+            wanted = speed * math.hypot(1.0 + curvature * z, curvature * x)
+            rim = self._rim_per_rate[i] * row[self._rates[i]]
+            torque = self._radii[i] * (hold + inertia * (wanted - rim))
+            action[i] = _clip(torque / self._torque_limits[i])
+            action[N_WHEELS + i] = _clip(angles[i] / self._max_steering)
+        return action
+
+    def _way(self, ahead: float, left: float, speed_now: float) -> tuple[float, float]:
+        """Direction (1 forward, -1 backward) and curvature of the way that costs least."""
+        radius = 1.0 / self.max_curvature
+        best, best_cost = (1.0, 0.0), math.inf
+        for direction in (1.0, -1.0):
+            factor = 1.0 if direction > 0.0 else self.gains.reverse_cost
+            switch = self.gains.switch_cost * max(0.0, -direction * speed_now) / self.gains.speed
+            for side in (1.0, -1.0):
+                length = _turn_and_straight(direction * ahead, side * left, radius)
+                cost = factor * length + switch
+                if cost < best_cost:
+                    best, best_cost = (direction, side), cost
+        direction, side = best
+        if side * left > 0.0 and direction * ahead > 0.0:
+            pursuit = 2.0 * side * left / (ahead * ahead + left * left)
+            return direction, side * min(pursuit, self.max_curvature)
+        return direction, side * self.max_curvature
+
+    def _find_max_curvature(self) -> float:
+        """The largest curvature that keeps every wheel within the steering limit.
+
+        tan(delta) = kappa |x| / (1 - kappa |z|) for the inner wheels, solved for kappa; a wheel
+        between the turning centre and the trunk would have to turn round, so delta < 90 degrees.
+        """
+        tangent = math.tan(min(self._max_steering, math.radians(89.0)))
+        return min(tangent / (abs(x) + abs(z) * tangent) for x, z in self._wheels)
+
+
+def _turn_and_straight(ahead: float, left: float, radius: float) -> float:
+    """Length of a left turn of a radius followed by a straight to the goal; inf inside the circle."""
+    # From the turning centre, (0, radius) in (ahead, left), the goal is at distance `reach`.
+    x, y = ahead, left - radius
+    reach = math.hypot(x, y)
+    if reach < radius:
+        return math.inf
+    straight = math.sqrt(reach * reach - radius * radius)
+    # Angle of the goal about the centre, from the start at -90 degrees, less that of the tangent.
+    turn = (math.atan2(y, x) + 0.5 * math.pi - math.acos(radius / reach)) % math.tau
+    if turn > math.tau - 1e-6:  # a goal straight ahead, seen through round-off
+        turn = 0.0
+    return radius * turn + straight
+
+
+def _clip(value: float) -> float:
+    return min(1.0, max(-1.0, value))
+
+
+def find_rover_env(env: Any) -> RoverEnv:
+    """The `RoverEnv` inside wrappers, or the first one inside a vector environment."""
+    inner = getattr(env, "unwrapped", env)
+    within = getattr(inner, "envs", None)
+    if not isinstance(inner, RoverEnv) and isinstance(within, (list, tuple)) and within:
+        inner = getattr(within[0], "unwrapped", within[0])
+    inner = getattr(inner, "prototype", inner)  # what the rovers of a native batch are made like
+    if not isinstance(inner, RoverEnv):
+        refuse(OptionError, "env", env, "must be a Rover-v0, wrapped or not, or a vector of them")
+    return inner

@@ -1,0 +1,51 @@
+"""Where policies lie: those that come with the package, by terrain, and anybody's, by folder."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rover_gym.policy.policy_card import PolicyCard
+from rover_gym.policy.policy_files import PolicyError, is_there
+from rover_gym.validation import refuse
+
+#: The policies that come with the package, by terrain.
+SHIPPED: Mapping[str, str] = {"plane": "plane", "sphere_field": "rocks"}
+FOLDER = Path(__file__).parents[1] / "data" / "policies"
+
+
+def policy_folder(terrain: str) -> Path:
+    """The folder of the policy that comes with the package for a terrain.
+
+    Raises:
+        PolicyError: There is none.
+    """
+    if terrain not in SHIPPED:
+        refuse(PolicyError, "policy", terrain, f"none was trained; there are some for {', '.join(SHIPPED)}")
+    return FOLDER / SHIPPED[terrain]
+
+
+def find_policy(policy: str, terrain: str) -> Path | None:
+    """The folder of "trained", the package's own for a terrain, or of a path; None for "pd", the baseline.
+
+    Raises:
+        PolicyError: There is no policy.
+    """
+    if policy == "pd":
+        return None
+    folder = policy_folder(terrain) if policy == "trained" else Path(policy)
+    if not is_there(folder / "policy.json"):
+        refuse(PolicyError, "policy", policy, "must be 'pd', 'trained' or the folder of a trained policy")
+    return folder
+
+
+def policy_arguments(folder: Path) -> dict[str, Any]:
+    """The arguments with which a policy's environment must be made.
+
+    Raises:
+        PolicyError: The folder holds no sound policy.
+        OSError: The file may not be read.
+    """
+    arguments = dict(PolicyCard.read(folder / "policy.json").environment)
+    if isinstance(arguments.get("height_scan"), list):
+        arguments["height_scan"] = tuple(arguments["height_scan"])
+    return arguments

@@ -1,0 +1,21 @@
+"""Trajectories in HDF5: recorded row by row, read back, and as the run of a rover."""
+
+from rover_gym.record.channels import Channel, RoverSampler
+from rover_gym.record.facts import describe, row_count
+from rover_gym.record.recorder import Recorder
+from rover_gym.record.rover_run import RoverRun, read_run
+from rover_gym.record.trajectory import Trajectory, read_trajectory
+from rover_gym.record.trajectory_format import RecordingError
+
+__all__ = [
+    "Channel",
+    "Recorder",
+    "RecordingError",
+    "RoverRun",
+    "RoverSampler",
+    "Trajectory",
+    "describe",
+    "read_run",
+    "read_trajectory",
+    "row_count",
+]

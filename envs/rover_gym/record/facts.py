@@ -1,0 +1,160 @@
+"""The facts that a recording carries beside its rows: what was run, on which ground, by which versions."""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.mechanics import OptionError, Plane, Simulation, SphereField, __version__
+from rover_gym.record.trajectory_format import (
+    FORMAT,
+    FORMAT_VERSION,
+    RecordingError,
+    import_h5py,
+)
+from rover_gym.validation import number, refuse
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import h5py
+
+
+#: Rows of a run; more, and neither the disk nor the user's patience holds them.
+MOST_ROWS = 10_000_000
+
+
+def versions() -> dict[str, Any]:
+    """The format of the file, and the versions of what wrote it."""
+    return {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "rover_gym_version": __version__,
+        "numpy_version": np.__version__,
+        "gymnasium_version": gymnasium.__version__,
+        "python_version": platform.python_version(),
+    }
+
+
+def storable(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Facts in a form that HDF5 takes: strings, numbers, arrays of numbers, and JSON for the rest."""
+    result: dict[str, Any] = {}
+    for key, value in attributes.items():
+        plain = isinstance(value, (str, float, np.number)) or (
+            (isinstance(value, int) and -(2**63) <= value < 2**63)
+            or (isinstance(value, np.ndarray) and value.dtype.kind in "biuf")
+        )
+        try:
+            stored = value if plain else json.dumps(value, default=_to_plain)
+            if isinstance(stored, str):
+                stored.encode()
+        except (TypeError, ValueError, RecursionError) as error:
+            refuse(RecordingError, str(key), value, f"cannot be stored ({error})")
+        if isinstance(stored, str) and "\0" in stored:
+            refuse(RecordingError, str(key), value, "must not hold the character NUL")
+        result[key] = stored
+    return result
+
+
+def row_count(duration: float, time_step: float, steps_per_row: int = 1) -> int:
+    """How many rows a run has after its first.
+
+    Args:
+        duration: s.
+        time_step: s.
+        steps_per_row: From one row to the next.
+
+    Raises:
+        OptionError: `duration` is no positive number, `steps_per_row` no positive whole number, or the rows are more
+            than `MOST_ROWS`.
+    """
+    seconds = number("duration", duration, above=0.0)
+    per_row = number("steps_per_row", steps_per_row, at_least=1.0)
+    if per_row != math.floor(per_row):
+        refuse(OptionError, "steps_per_row", steps_per_row, "must be a whole number")
+    rows = seconds / time_step / per_row
+    if not rows <= MOST_ROWS:
+        reason = f"at a step of {time_step:g} s makes more than {MOST_ROWS} rows"
+        refuse(OptionError, "duration", duration, reason)
+    return round(rows)
+
+
+def describe(
+    sim: Simulation, title: str, scene: Mapping[str, Any] | None = None, *, seed: int | str = "none"
+) -> dict[str, Any]:
+    """The attributes of a recording, from the simulation at its start.
+
+    Args:
+        sim: The simulation; its model, state, commands and settings are described.
+        title: What is run, in words.
+        scene: What else the scene was made from.
+        seed: Seed of the run, or why there is none.
+    """
+    return {
+        "title": title,
+        "scene": {
+            **(scene or {}),
+            "model": sim.model.to_dict(),
+            "q": sim.q,
+            "steering": sim.steering,
+            "wheel_torques": sim.wheel_torques,
+        },
+        "seed": seed,
+        "solver": sim.settings,
+    }
+
+
+def write_attribute(item: Any, key: str, value: Any) -> None:
+    """Stores an attribute: text in UTF-8, of a fixed length."""
+    if isinstance(value, str):
+        text = value.encode()
+        item.attrs.create(key, text, dtype=import_h5py().string_dtype("utf-8", max(1, len(text))))
+    else:
+        item.attrs[key] = value
+
+
+def write_description(data: h5py.Dataset, unit: str, description: str, columns: Sequence[str]) -> None:
+    """Says in a data set what it holds."""
+    write_attribute(data, "unit", unit)
+    write_attribute(data, "description", description)
+    if columns:
+        names = [name.encode() for name in columns]
+        data.attrs.create("columns", names, dtype=import_h5py().string_dtype("utf-8", max(1, *map(len, names))))
+
+
+def write_terrain(group: h5py.Group, terrain: Plane | SphereField) -> None:
+    """Stores a ground in its group."""
+
+    def write(name: str, value: npt.ArrayLike, unit: str, description: str, columns: Sequence[str] = ()) -> None:
+        values = np.asarray(value, dtype=np.float64)
+        data = group.create_dataset(name, data=values, **({"fletcher32": True} if values.size and values.ndim else {}))
+        write_description(data, unit, description, columns)
+
+    field = terrain if isinstance(terrain, SphereField) else None
+    plane = terrain if isinstance(terrain, Plane) else terrain.ground
+    write_attribute(group, "kind", "plane" if field is None else "sphere_field")
+    write_attribute(
+        group, "description", "the ground, fixed; free is what lies outside all spheres and above the plane"
+    )
+    axes = ("x", "y", "z")
+    if plane is not None:
+        write("plane_normal", plane.normal, "1", "unit normal n of the plane, to the free side, world", axes)
+        write("plane_offset", plane.offset, "m", "d of the plane n.x + d = 0")
+    if field is not None:
+        write("sphere_centres", field.centres, "m", "centres of the spheres, world", axes)
+        write("sphere_radii", field.radii, "m", "radii of the spheres")
+
+
+def _to_plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"{type(value).__name__} cannot be stored in a trajectory's attributes")

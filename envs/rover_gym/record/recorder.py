@@ -1,0 +1,243 @@
+"""Trajectories in HDF5, an open format that any language reads.
+
+A file describes itself: each data set carries `unit` and `description` (and `columns` where its columns have names),
+the file carries the scene, the ground, the seed, the versions and the solver settings. Rows reach the disk while the
+run goes, and between two flushes the file is at rest, so a run that is killed, or that fills the disk, keeps all but
+the last rows. A file is read only after its kind, its links, its types and its sizes have been checked.
+"""
+
+from __future__ import annotations
+
+import os
+import weakref
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.mechanics import Plane, SphereField
+from rover_gym.record.channels import Channel
+from rover_gym.record.facts import storable, versions, write_attribute, write_description, write_terrain
+from rover_gym.record.steady_file import FileInUseError, SteadyFile
+from rover_gym.record.trajectory import read_trajectory
+from rover_gym.record.trajectory_format import (
+    LIBRARY,
+    TERRAIN,
+    RecordingError,
+    file_path,
+    import_h5py,
+)
+from rover_gym.validation import refuse, whole
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import h5py
+
+
+class Recorder:
+    """Appends rows to an HDF5 file; a context manager.
+
+    Rows are kept in memory and written `rows_per_flush` at a time. Between two flushes nothing is pending in the file,
+    so a process killed there leaves a readable file (attribute `complete` false). A full disk ends the recording with
+    an error, and the file stays as the flush before left it. The file is locked until the recorder is closed.
+
+    Args:
+        path: The file to make; an existing one is replaced, unless it is being recorded or read. Its folder is made.
+        channels: What a row holds.
+        attributes: Facts about the run, stored at the root: strings, numbers and arrays as they are, the rest as JSON;
+            `describe` makes them of a simulation.
+        terrain: The ground, stored in the group `terrain`; a replay needs it.
+        rows_per_flush: How many rows may be lost at a kill.
+
+    Raises:
+        RecordingError: A channel or an attribute cannot be stored, or the file is in use. It was not changed.
+        OSError: The file cannot be made.
+        MissingExtraError: h5py is not installed.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        channels: Sequence[Channel],
+        attributes: Mapping[str, Any] | None = None,
+        *,
+        terrain: Plane | SphereField | None = None,
+        rows_per_flush: int = 200,
+    ) -> None:
+        hdf5 = import_h5py()
+        self.path = file_path(path)
+        self._rows_per_flush = whole(
+            "rows_per_flush", rows_per_flush, at_least=1, at_most=1_000_000, error=RecordingError
+        )
+        channels = _checked_channels(channels)
+        facts = {**versions(), **storable(attributes or {}), "complete": False}
+        self._pending: dict[str, list[npt.NDArray[np.float64]]] = {channel.name: [] for channel in channels}
+        self._shapes = {channel.name: channel.shape for channel in channels}
+        self._process = os.getpid()
+        self._disk = _new_file(self.path)
+        self._file: h5py.File = hdf5.File(self._disk, "w", libver=(LIBRARY, LIBRARY))
+        # The file must be closed before the interpreter ends, as HDF5 would call what is no longer there.
+        self._release = weakref.finalize(self, _release, self._file, self._disk)
+        try:
+            self._begin(channels, facts, terrain)
+        except BaseException:
+            self._release()
+            raise
+
+    def _begin(
+        self, channels: Sequence[Channel], facts: Mapping[str, Any], terrain: Plane | SphereField | None
+    ) -> None:
+        for key, value in facts.items():
+            write_attribute(self._file, key, value)
+        for channel in channels:
+            data = self._file.create_dataset(
+                channel.name,
+                shape=(0, *channel.shape),
+                # HDF5 knows no empty chunk: a channel of nothing (the wheels of a soil without a machine) may grow.
+                maxshape=(None, *(n or None for n in channel.shape)),
+                chunks=(self._rows_per_flush, *(n or 1 for n in channel.shape)),
+                dtype="f8",
+                fletcher32=True,  # a checksum, so that damage is no motion
+            )
+            write_description(data, channel.unit, channel.description, channel.columns)
+        if terrain is not None:
+            write_terrain(self._file.create_group(TERRAIN), terrain)
+        self._commit()
+
+    def append(self, row: Mapping[str, npt.ArrayLike]) -> None:
+        """Adds one row, with a value for every channel.
+
+        Raises:
+            RecordingError: A channel is missing, unknown, not numbers or of another shape, or the recorder is closed:
+                nothing was added. Or the rows cannot be written: the recorder is closed.
+        """
+        self._must_be_open()
+        if row.keys() != self._shapes.keys():
+            odd = sorted(map(str, row.keys() ^ self._shapes.keys()))
+            refuse(RecordingError, "row", odd, "row and channels differ")
+        values = {}
+        for name, value in row.items():
+            values[name] = _numbers(name, value)
+        for name, value in values.items():
+            if value.shape != self._shapes[name]:
+                refuse(RecordingError, name, value.shape, f"must have its channel's shape {self._shapes[name]}")
+        for name, value in values.items():
+            self._pending[name].append(value)
+        if len(next(iter(self._pending.values()))) >= self._rows_per_flush:
+            self.flush()
+
+    def flush(self) -> None:
+        """Brings all rows to the disk.
+
+        Raises:
+            RecordingError: They cannot be written, and the recorder is now closed; or it was closed before.
+        """
+        self._must_be_open()
+        for name, rows in self._pending.items():
+            if rows:
+                data = self._file[name]
+                data.resize(data.shape[0] + len(rows), axis=0)
+                data[-len(rows) :] = np.array(rows)
+                rows.clear()
+        self._commit()
+
+    def note(self, **attributes: str | float) -> None:
+        """Stores facts that are known only now, at the root.
+
+        Raises:
+            RecordingError: A fact cannot be stored, or the recorder is closed.
+        """
+        self._must_be_open()
+        for key, value in storable(attributes).items():
+            write_attribute(self._file, key, value)
+
+    def close(self) -> None:
+        """Writes what is pending and marks the file complete; nothing where that was done.
+
+        Raises:
+            RecordingError: The last rows cannot be written; what was written before stays.
+        """
+        if self._release.alive:
+            self.flush()
+            self._file.attrs["complete"] = True
+            self._commit()
+            self._release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            self.close()
+        elif self._release.alive:  # what was recorded stays, and stays marked incomplete
+            self.flush()
+            self._release()
+
+    def _must_be_open(self) -> None:
+        if not self._release.alive:
+            refuse(RecordingError, "recorder", str(self.path), "is closed: a run that is finished takes no more")
+        if os.getpid() != self._process:
+            refuse(RecordingError, "recorder", str(self.path), "belongs to the process that opened it")
+
+    def _commit(self) -> None:
+        try:
+            self._file.flush()
+            self._disk.commit()
+        except OSError as error:
+            self._release()
+            reason = error.strerror or str(error)
+            stopped = RecordingError(
+                f"{self.path}: the recording stopped: {reason}; {_rows_on_disk(self.path)} rows are on the disk"
+            )
+            stopped.field, stopped.value = "path", str(self.path)
+            raise stopped from error
+
+
+def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """A copy of a channel's value."""
+    try:
+        given = np.asarray(value)
+    except ValueError:  # rows of unequal length
+        refuse(RecordingError, name, value, "must be numbers")
+    if given.dtype.kind not in "biuf":
+        refuse(RecordingError, name, value, "must be numbers")
+    return given.astype(np.float64)
+
+
+def _new_file(path: Path) -> SteadyFile:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        return SteadyFile(path)
+    except FileInUseError:
+        refuse(RecordingError, "path", str(path), "is in use: another recorder writes it, or someone reads it")
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def _release(file: h5py.File, disk: SteadyFile) -> None:
+    """Closes a file, and leaves on the disk what the last commit wrote."""
+    file.close()
+    disk.close()
+
+
+def _rows_on_disk(path: Path) -> int:
+    try:
+        return max(map(len, read_trajectory(path).data.values()))
+    except (RecordingError, OSError):
+        return 0
+
+
+def _checked_channels(channels: Sequence[Channel]) -> tuple[Channel, ...]:
+    result = tuple(channels)
+    names = [channel.name for channel in result]
+    if not names:
+        refuse(RecordingError, "channels", names, "must not be empty")
+    for i, name in enumerate(names):
+        if not name or "/" in name or "\0" in name or name in (".", TERRAIN) or name in names[:i]:
+            refuse(RecordingError, "channels", name, f"must be names of their own, without / and not {TERRAIN!r}")
+    return result

@@ -1,0 +1,214 @@
+"""A saved run, read back: where every solid of the rover was, over the ground that it drove on.
+
+run = read_run("episode-0.h5").resample(25.0)
+run.positions[-1, run.model.solid_names.index("trunk")]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.mechanics import Plane, RoverModel, SphereField
+from rover_gym.record.channels import RoverSampler
+from rover_gym.record.trajectory import Trajectory, read_trajectory
+from rover_gym.record.trajectory_format import RecordingError, sound
+from rover_gym.validation import number, refuse, vector
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+LARGEST = 1e9  # m, rad or s: what is drawn and written in single precision must have places left
+LONGEST_TITLE = 200
+#: What `rover drive` records besides the simulation, and the shape of its rows.
+OF_EPISODES: Mapping[str, tuple[int, ...]] = {"distance_to_goal": (), "slip_ratio": (), "motor_energy": ()}
+
+
+@dataclass(frozen=True)
+class RoverRun:
+    """A recorded run with its rover and its ground.
+
+    Attributes:
+        trajectory: The data sets and attributes of the file.
+        model: The rover that drove.
+        terrain: The ground.
+        goal: Goal on the map, (x, z), m, or None where the run had none.
+        title: What was run, in words.
+    """
+
+    trajectory: Trajectory
+    model: RoverModel
+    terrain: Plane | SphereField
+    goal: tuple[float, float] | None
+    title: str
+
+    @property
+    def n_frames(self) -> int:
+        """How many samples the run has."""
+        return len(self.time)
+
+    @property
+    def time(self) -> npt.NDArray[np.float64]:
+        """(n,) time of the samples, s."""
+        return self.trajectory["time"]
+
+    @property
+    def positions(self) -> npt.NDArray[np.float64]:
+        """(n, n_solids, 3) origins of the solids, world, m, in the order of `model.solid_names`."""
+        return self._poses[0]
+
+    @property
+    def rotations(self) -> npt.NDArray[np.float64]:
+        """(n, n_solids, 3, 3) rotation matrices that turn the solids' coordinates into the world's."""
+        return self._poses[1]
+
+    @cached_property
+    def _poses(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        names = self.model.solid_names
+        positions = np.empty((self.n_frames, len(names), 3))
+        rotations = np.empty((self.n_frames, len(names), 3, 3))
+        for row, q in enumerate(self.trajectory["q"]):
+            poses = self.model.poses(q, "state")
+            for i, name in enumerate(names):
+                positions[row, i], rotations[row, i] = poses[name]
+        return positions, rotations
+
+    def resample(self, fps: float) -> RoverRun:
+        """The run with the samples that lie nearest to the times of a film's frames, none of them twice.
+
+        Args:
+            fps: Frames a second; where the run has fewer, it keeps all that it has.
+
+        Raises:
+            OptionError: `fps` is not a positive number.
+        """
+        rows = film_rows(self.time, fps)
+        data = {name: values[rows] for name, values in self.trajectory.data.items()}
+        return replace(self, trajectory=replace(self.trajectory, data=data))
+
+
+def film_rows(time: npt.NDArray[np.float64], fps: float) -> npt.NDArray[np.int64]:
+    """Numbers of the samples that lie nearest to the times of a film's frames, none of them twice.
+
+    Args:
+        time: (n,) of the samples, s.
+        fps: Frames a second.
+
+    Raises:
+        OptionError: `fps` is not a positive number.
+    """
+    fps = number("fps", fps, above=0.0)
+    frames = np.floor((time[-1] - time[0]) * fps + 1e-6)  # a run of 2 s that ends at 1.999999999 s has its last
+    # How many of the frames' times k / fps lie before the middle between a sample and the next: no frame is counted
+    # one by one, as a damaged run may last for ages.
+    before = np.floor((0.5 * (time[1:] + time[:-1]) - time[0]) * fps) + 1.0
+    before = np.append(np.minimum(before, frames + 1.0), frames + 1.0)
+    return np.flatnonzero(np.diff(before, prepend=0.0) > 0.0)
+
+
+def read_run(path: str | Path) -> RoverRun:
+    """Reads a run that `rover drive --output` or `rover report` saved, complete or not.
+
+    Raises:
+        RecordingError: The file is no sound trajectory, or holds no samples, rover or ground.
+        OSError: The file is not there or cannot be read.
+        MissingExtraError: h5py is not installed.
+    """
+    return run_of(read_trajectory(path), path)
+
+
+def run_of(trajectory: Trajectory, path: str | Path) -> RoverRun:
+    """The run in a trajectory that was read from `path`.
+
+    Raises:
+        RecordingError: It holds no samples, rover or ground, or what it holds does not fit together.
+    """
+    scene = trajectory.attributes.get("scene")
+    if "q" not in trajectory.data or not isinstance(scene, dict) or not isinstance(scene.get("model"), dict):
+        refuse(RecordingError, "path", str(path), "holds no rover: neither `q` nor `scene.model` may be missing")
+    if trajectory.terrain is None:
+        refuse(RecordingError, "path", str(path), "holds no ground: the group `terrain` is missing")
+    check_time(trajectory, path)
+    with sound(path, "scene.model"):
+        model = RoverModel.from_dict(scene["model"])
+    _check_solver(trajectory.attributes.get("solver", {}), path)
+    shapes = {channel.name: channel.shape for channel in RoverSampler(model).channels}
+    check_rows(trajectory, path, {**shapes, **OF_EPISODES}, bounded=("q", "wheel_centres"))
+    return RoverRun(
+        trajectory=trajectory,
+        model=model,
+        terrain=trajectory.terrain,
+        goal=_goal(scene.get("goal"), path),
+        title=title_of(trajectory),
+    )
+
+
+def title_of(trajectory: Trajectory) -> str:
+    """What was run, in words: one line that can be printed."""
+    title = str(trajectory.attributes.get("title", "a run"))[:LONGEST_TITLE]
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in title).split())
+
+
+def check_time(trajectory: Trajectory, path: str | Path) -> None:
+    """Refuses a trajectory without samples, or whose time does not run forward.
+
+    Raises:
+        RecordingError: It is such a one.
+    """
+    if "time" not in trajectory.data or len(trajectory["time"]) == 0:
+        refuse(RecordingError, "path", str(path), "holds no samples: the run was killed before the first were written")
+    check_rows(trajectory, path, {"time": ()}, bounded=("time",))
+    backward = np.flatnonzero(np.diff(trajectory["time"]) < 0.0)
+    if len(backward):
+        row = int(backward[0]) + 1
+        refuse(RecordingError, f"{path}: time[{row}]", float(trajectory["time"][row]), "must not run backward")
+
+
+def check_rows(
+    trajectory: Trajectory, path: str | Path, shapes: Mapping[str, tuple[int, ...]], *, bounded: tuple[str, ...]
+) -> None:
+    """Refuses data sets whose rows have other shapes, or whose values cannot be drawn.
+
+    Args:
+        trajectory: The data sets; those that it lacks are not looked for.
+        path: The file, for the message.
+        shapes: Shape of a row, by data set.
+        bounded: Those whose values must be finite and within `LARGEST`.
+
+    Raises:
+        RecordingError: A data set is not as it must be.
+    """
+    for name, shape in shapes.items():
+        values = trajectory.data.get(name)
+        if values is None:
+            continue
+        if values.shape[1:] != shape:
+            refuse(RecordingError, f"{path}: {name}", values.shape[1:], f"must have rows of shape {shape}")
+        if name in bounded and not (np.abs(values) <= LARGEST).all():
+            worst = float(values[~(np.abs(values) <= LARGEST)][0])
+            refuse(RecordingError, f"{path}: {name}", worst, f"must be finite and within {LARGEST:g}")
+
+
+def _check_solver(solver: object, path: str | Path) -> None:
+    """Refuses settings that the figures cannot show."""
+    if not isinstance(solver, dict):
+        refuse(RecordingError, f"{path}: solver", solver, "must be an object")
+    for name in ("time_step", "tolerance"):
+        if name in solver:
+            number(f"{path}: solver.{name}", solver[name], above=0.0, at_most=LARGEST, error=RecordingError)
+    if "gravity" in solver:
+        vector(f"{path}: solver.gravity", solver["gravity"], 3, error=RecordingError)
+
+
+def _goal(goal: object, path: str | Path) -> tuple[float, float] | None:
+    if goal is None:
+        return None
+    x, z = vector(f"{path}: scene.goal", goal, 2, error=RecordingError)
+    if max(abs(x), abs(z)) > LARGEST:
+        refuse(RecordingError, f"{path}: scene.goal", goal, f"must lie within {LARGEST:g} m")
+    return (x, z)

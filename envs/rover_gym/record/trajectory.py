@@ -1,0 +1,238 @@
+"""Trajectories read back: nothing is taken from a file that was not checked first."""
+
+from __future__ import annotations
+
+import json
+import math
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.mechanics import Plane, RoverGymError, SphereField
+from rover_gym.record.steady_file import FileInUseError, lock
+from rover_gym.record.trajectory_format import (
+    FORMAT,
+    FORMAT_VERSION,
+    OBJECTS,
+    SIGNATURE,
+    TERRAIN,
+    RecordingError,
+    file_path,
+    import_h5py,
+    refuse_field,
+    sound,
+)
+from rover_gym.validation import refuse
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import h5py
+
+
+#: What a file says it holds is at most so many times as large as the file: packed files are read, bombs are not.
+LARGEST_EXPANSION = 100
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A recorded run in memory.
+
+    Attributes:
+        data: The data sets by name, (n, ...) float64.
+        units: Their units.
+        attributes: What the file says of the run; JSON values are decoded.
+        terrain: The ground, or None where the file holds none.
+    """
+
+    data: Mapping[str, npt.NDArray[np.float64]]
+    units: Mapping[str, str]
+    attributes: Mapping[str, Any]
+    terrain: Plane | SphereField | None = None
+
+    def __getitem__(self, name: str) -> npt.NDArray[np.float64]:
+        """The data set of that name.
+
+        Raises:
+            RecordingError: There is none.
+        """
+        if name not in self.data:
+            refuse(RecordingError, name, sorted(self.data), "the run holds no such data set; it holds")
+        return self.data[name]
+
+
+def read_trajectory(path: str | Path) -> Trajectory:
+    """Reads a file that `Recorder` wrote, complete or not.
+
+    Nothing is followed out of the file: links, external storage and virtual data sets are refused. Neither is anything
+    read that is larger than `LARGEST_EXPANSION` times the file.
+
+    Raises:
+        RecordingError: The file is no sound trajectory of this format and version, or is being recorded.
+        OSError: The file is not there or may not be read.
+        MissingExtraError: h5py is not installed.
+    """
+    h5py = import_h5py()
+    path = file_path(path)
+    size = _check_bytes(path)
+    with sound(path), h5py.File(path, "r") as file:
+        return _Reader(h5py, path, size).trajectory(file)
+
+
+class _Reader:
+    """Reads one file, and only what it has checked."""
+
+    def __init__(self, h5py: Any, path: Path, size: int) -> None:
+        self._h5py, self._path, self._size = h5py, path, size
+        self._room = LARGEST_EXPANSION * size  # bytes that may still be read
+
+    def trajectory(self, file: h5py.File) -> Trajectory:
+        if "format" not in file.attrs or "format_version" not in file.attrs:
+            refuse(RecordingError, "path", str(self._path), f"is no {FORMAT}")
+        version = self._attribute(file, "format_version")
+        if version != FORMAT_VERSION:
+            reason = f"is a {FORMAT} of version {version}, this rover-gym reads {FORMAT_VERSION}: record it again"
+            refuse(RecordingError, "path", str(self._path), reason)
+        if self._attribute(file, "format") != FORMAT:
+            refuse(RecordingError, "path", str(self._path), f"is no {FORMAT}")
+        sets, terrain = {}, None
+        for name in file:
+            item = self._item(file, name)
+            if isinstance(item, self._h5py.Dataset):
+                self._check(name, item, least_dimensions=1)
+                sets[name] = item
+            elif name == TERRAIN:
+                terrain = self._terrain(item)
+        if not sets:
+            refuse_field(self._path, "file", None, "holds no data set")
+        rows = min(len(data) for data in sets.values())  # a kill within a flush leaves some a few rows longer
+        units = {name: self._attribute(data, "unit") for name, data in sets.items()}
+        for name, unit in units.items():
+            if not isinstance(unit, str):
+                refuse_field(self._path, f"{name}.unit", unit, "must be text")
+        return Trajectory(
+            data={name: np.asarray(data[:rows], dtype=np.float64) for name, data in sets.items()},
+            units=units,
+            attributes={key: self._decoded(key, self._attribute(file, key)) for key in file.attrs},
+            terrain=terrain,
+        )
+
+    def _item(self, group: h5py.Group, name: str) -> Any:
+        """What is in the file under a name; what is elsewhere is refused."""
+        field = f"{group.name.strip('/')}/{name}".strip("/")
+        link = group.get(name, getlink=True)
+        if not isinstance(link, self._h5py.HardLink):
+            refuse_field(self._path, field, type(link).__name__, "must be in the file itself, and not a link")
+        item = group[name]
+        if isinstance(item, self._h5py.Dataset) and (item.external or item.is_virtual):
+            kind = "external storage" if item.external else "a virtual data set"
+            refuse_field(self._path, field, kind, "must be in the file itself")
+        return item
+
+    def _check(self, field: str, data: h5py.Dataset, *, least_dimensions: int = 0) -> None:
+        """Refuses what is no array of float64, or larger than the file can hold."""
+        if data.shape is None or data.dtype.kind != "f" or data.dtype.itemsize != 8:
+            refuse_field(self._path, field, str(data.dtype), "must be an array of float64")
+        if not least_dimensions <= len(data.shape) <= 3:
+            refuse_field(self._path, field, data.shape, f"must have {least_dimensions} to 3 dimensions")
+        self._take(field, data.shape, 8)
+        if data.chunks is not None:
+            self._take(f"{field}, one chunk", data.chunks, 8)
+            self._check_chunks(field, data)
+
+    def _check_chunks(self, field: str, data: h5py.Dataset) -> None:
+        """Refuses chunks whose place or size cannot be: HDF5 reads the checksum at the end of what has none."""
+        whole = math.prod(data.chunks) * 8 + 4 * data.fletcher32
+        packed = data.compression is not None
+        wrong: list[int] = []
+
+        def look(chunk: Any) -> None:
+            fits = 4 < chunk.size <= self._size if packed else chunk.size == whole
+            if not fits or chunk.byte_offset + chunk.size > self._size:
+                wrong.append(chunk.size)
+
+        data.id.chunk_iter(look)
+        if wrong:
+            refuse_field(self._path, field, wrong[0], "has a chunk that is not in the file, of so many bytes")
+
+    def _take(self, field: str, shape: tuple[int, ...], itemsize: int) -> None:
+        size = math.prod(shape) * itemsize
+        if size > self._room:
+            reason = f"is too large for a file of this size, {size} bytes, with the shape"
+            refuse_field(self._path, field, shape, reason)
+        self._room -= size
+
+    def _attribute(self, item: Any, key: str) -> Any:
+        """An attribute's value, a string, a number or an array of them; None where there is none."""
+        if key not in item.attrs:
+            return None
+        kind = item.attrs.get_id(key)
+        field = f"{item.name.strip('/')}.{key}".strip(".")
+        # Text of no fixed length lies elsewhere in the file, and HDF5 believes whatever length is stated.
+        if kind.dtype.kind not in "biufS":
+            refuse_field(self._path, field, str(kind.dtype), "must be numbers or text of a fixed length")
+        self._take(field, kind.shape or (), kind.dtype.itemsize)
+        value = item.attrs[key]
+        if isinstance(value, bytes):
+            return value.decode()
+        if isinstance(value, np.ndarray) and value.dtype.kind == "S":
+            return [entry.decode() for entry in value.ravel().tolist()]
+        return value.item() if isinstance(value, np.generic) else value
+
+    def _decoded(self, key: str, value: Any) -> Any:
+        """A value that was stored as JSON, as it was."""
+        if not isinstance(value, str) or key == "title":
+            return value
+        if value[:1] in ("{", "["):
+            try:
+                result = json.loads(value)
+                if "\\u" in value:
+                    json.dumps(result, ensure_ascii=False).encode()  # half a pair of surrogates is no text
+            except (ValueError, RecursionError) as error:
+                refuse_field(self._path, key, value[:40], f"is no JSON ({error}), beginning with")
+            if isinstance(result, dict) or key not in OBJECTS:
+                return result
+        if key in OBJECTS:
+            refuse_field(self._path, key, value[:40], "must be a JSON object, beginning with")
+        return value
+
+    def _terrain(self, group: h5py.Group) -> Plane | SphereField:
+        names = ("plane_normal", "plane_offset", "sphere_centres", "sphere_radii")
+        given = {}
+        for name in names:
+            if name in group:
+                data = self._item(group, name)
+                if not isinstance(data, self._h5py.Dataset):
+                    refuse_field(self._path, f"{TERRAIN}/{name}", "a group", "must be an array of float64")
+                self._check(f"{TERRAIN}/{name}", data)
+                given[name] = np.asarray(data[()], dtype=np.float64)
+        try:
+            plane = None
+            if "plane_normal" in given:
+                plane = Plane(given["plane_normal"], given["plane_offset"].item())
+            if "sphere_centres" in given:
+                return SphereField(given["sphere_centres"], given["sphere_radii"], plane)
+        except (RoverGymError, ValueError, TypeError, KeyError) as error:
+            refuse_field(self._path, TERRAIN, sorted(given), f"is no ground ({error}), from")
+        if plane is None:
+            refuse_field(self._path, TERRAIN, sorted(given), "holds neither a plane nor spheres")
+        return plane
+
+
+def _check_bytes(path: Path) -> int:
+    """Checks what can be without HDF5, and returns the file's size."""
+    if not stat.S_ISREG(path.stat().st_mode):  # one that is not there says so itself; to open a pipe would wait
+        refuse(RecordingError, "path", str(path), "is no regular file")
+    with path.open("rb") as file:
+        try:
+            lock(file.fileno(), shared=True)
+        except FileInUseError:
+            refuse(RecordingError, "path", str(path), "is being recorded: it can be read when the recorder is closed")
+        begin = file.read(len(SIGNATURE))
+    if begin != SIGNATURE:
+        refuse(RecordingError, "path", str(path), f"is no {FORMAT}: not HDF5")
+    return path.stat().st_size

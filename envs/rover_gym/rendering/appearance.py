@@ -1,0 +1,251 @@
+"""What the rover looks like: boxes and cylinders on its solids, made from the model's own shapes.
+
+No renderer is imported here, so that frames, the browser page and the exported scenes all show the same rover. Each
+part rides on one solid: a point `x` of the part lies in the world at `o + R (position + rotation x)`, with `(o, R)` the
+solid's entry in `RoverModel.poses`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from rover_gym.mechanics import RoverModel
+
+Colour: TypeAlias = tuple[float, float, float]
+Vector: TypeAlias = tuple[float, float, float]
+
+#: Colours, red, green, blue from 0 to 1: warm ground, cool rover.
+GROUND_COLOUR: Colour = (0.72, 0.45, 0.30)
+GROUND_COLOUR_2: Colour = (0.65, 0.39, 0.26)  # the other fields of the checkered ground
+ROCK_COLOUR: Colour = (0.50, 0.33, 0.25)
+SKY_COLOUR: Colour = (0.89, 0.77, 0.65)  # at the horizon
+SKY_COLOUR_2: Colour = (0.50, 0.58, 0.68)  # overhead
+GOAL_COLOUR: Colour = (0.10, 0.62, 0.36)
+FORCE_COLOUR: Colour = (0.85, 0.10, 0.35)
+TRUNK_COLOUR: Colour = (0.90, 0.90, 0.88)
+DECK_COLOUR: Colour = (0.13, 0.22, 0.42)
+NOSE_COLOUR: Colour = (0.96, 0.72, 0.12)
+AXLE_COLOUR: Colour = (0.28, 0.45, 0.66)  # a beam that turns about x
+BOGIE_COLOUR: Colour = (0.22, 0.56, 0.55)  # a beam that turns about another axis
+COLUMN_COLOUR: Colour = (0.55, 0.57, 0.60)
+TYRE_COLOUR: Colour = (0.16, 0.16, 0.18)
+TREAD_COLOUR: Colour = (0.40, 0.40, 0.43)
+HUB_COLOUR: Colour = (0.74, 0.75, 0.77)
+SPOKE_COLOUR: Colour = (0.25, 0.26, 0.29)
+
+# A wheel's contact is the rim of a thin disc; a wheel is drawn this wide, in radii, about that disc.
+WHEEL_WIDTH = 0.7
+TREAD_BARS = 4  # across the diameter: each shows at both of its ends
+PLATE = 0.012  # m, thickness of what is laid on a surface, and of the forks' plates
+
+
+@dataclass(frozen=True)
+class Part:
+    """A box or a cylinder on a solid.
+
+    Attributes:
+        solid: The solid whose frame it rides on, a key of `RoverModel.poses`.
+        kind: "box" or "cylinder".
+        size: m. A box: edge lengths along the part's x, y, z. A cylinder: radius, and height along the part's y.
+        position: Centre in the solid's frame, m.
+        rotation: (3, 3), columns are the part's axes in the solid's frame.
+        colour: Red, green, blue, 0 to 1.
+    """
+
+    solid: str
+    kind: Literal["box", "cylinder"]
+    size: tuple[float, ...]
+    position: Vector
+    rotation: npt.NDArray[np.float64]
+    colour: Colour
+
+
+def rover_parts(model: RoverModel) -> tuple[Part, ...]:
+    """The parts of a rover: its solids' shapes, and the marks that tell front from back and show that wheels turn.
+
+    Solids without a shape are not drawn, unless a wheel is fixed to them. Wheels have the contact's radius.
+    """
+    description = model.to_dict()
+    solids = {solid["name"]: solid for solid in description["solids"]}
+    wheels = {wheel["solid"]: wheel for wheel in description["wheels"]}
+    parts: list[Part] = []
+    for name, solid in solids.items():
+        if name in wheels:
+            parts += _wheel_parts(wheels[name])
+            parts += _fork_parts(solid, wheels[name])
+        elif "shape" in solid:
+            parts += _shape_parts(solid)
+    return tuple(parts)
+
+
+def part_mesh(part: Part, resolution: int = 24) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
+    """The part's surface as triangles, with vertices of their own on each flat side, so that edges stay sharp.
+
+    Args:
+        part: A box or a cylinder.
+        resolution: Number of flat sides that a cylinder's mantle is made of, at least 3.
+
+    Returns:
+        Vertices (n, 3) in the part's frame, m, and triangles (m, 3), indices of vertices, counter-clockwise seen from
+        outside.
+    """
+    if part.kind == "box":
+        return _box_mesh(part.size)
+    radius, height = part.size
+    return _cylinder_mesh(radius, height, resolution)
+
+
+def _shape_parts(solid: Mapping[str, Any]) -> Iterator[Part]:
+    name, shape = solid["name"], solid["shape"]
+    centre = tuple(solid.get("centre_of_mass", (0.0, 0.0, 0.0)))
+    if shape["kind"] == "box":
+        size = tuple(shape["size"])
+        if "parent" not in solid:
+            yield _box(name, size, centre, TRUNK_COLOUR)
+            yield from _trunk_marks(name, size, centre)
+        else:
+            about_x = abs(solid["axis"][0]) > 0.5
+            yield _box(name, size, centre, AXLE_COLOUR if about_x else BOGIE_COLOUR)
+    elif shape["kind"] == "cylinder":
+        size = (shape["radius"], shape["height"])
+        yield Part(name, "cylinder", size, centre, np.eye(3), COLUMN_COLOUR)
+    else:  # a thin disc about z that is no wheel
+        turn = _turn_to(np.array([0.0, 0.0, 1.0]))
+        yield Part(name, "cylinder", (shape["radius"], PLATE), centre, turn, HUB_COLOUR)
+
+
+def _trunk_marks(name: str, size: tuple[float, ...], centre: Vector) -> Iterator[Part]:
+    """A coloured strip over the front edge, seen from before and behind, and a dark deck of panels on the rest."""
+    x, y, z = size
+    front, top = centre[0] + x / 2, centre[1] + y / 2
+    yield _box(name, (PLATE, 0.25 * y, 0.8 * z), (front, top - 0.125 * y + PLATE / 4, centre[2]), NOSE_COLOUR)
+    yield _box(name, (0.06 * x, PLATE, 0.8 * z), (front - 0.03 * x, top, centre[2]), NOSE_COLOUR)
+    rows, columns, gap = 3, 2, 0.03
+    length, width = 0.82 * x / rows, 0.92 * z / columns
+    for row in range(rows):
+        for column in range(columns):
+            place = (
+                centre[0] - 0.05 * x + (row - (rows - 1) / 2) * length,
+                centre[1] + y / 2,
+                centre[2] + (column - (columns - 1) / 2) * width,
+            )
+            yield _box(name, (length - gap * x, PLATE, width - gap * x), place, DECK_COLOUR)
+
+
+def _rim(wheel: Mapping[str, Any]) -> float:
+    """Radius at which a wheel of a description touches the ground, m."""
+    return float(wheel.get("contact_radius", wheel["radius"]))
+
+
+def _wheel_parts(wheel: Mapping[str, Any]) -> Iterator[Part]:
+    """Tyre with treads, hub, and spokes of which one arm has the colour of the nose, so that a turn shows."""
+    name, radius = wheel["solid"], _rim(wheel)
+    width = WHEEL_WIDTH * radius
+    turn = _turn_to(np.array(wheel["axle"], dtype=np.float64))
+    centre = (0.0, 0.0, 0.0)
+    yield Part(name, "cylinder", (radius, width), centre, turn, TYRE_COLOUR)
+    yield Part(name, "cylinder", (0.72 * radius, width + 0.04 * radius), centre, turn, HUB_COLOUR)
+    for bar in range(TREAD_BARS):
+        spin = turn @ _about_y(np.pi * (bar + 0.5) / TREAD_BARS)
+        # The tread stands out just enough to be seen: it does not touch.
+        yield Part(name, "box", (2.02 * radius, width, 0.1 * radius), centre, spin, TREAD_COLOUR)
+    for spoke, spin in enumerate(turn @ _about_y(angle) for angle in (0.0, np.pi / 2)):
+        size = (1.44 * radius, width + 0.06 * radius, 0.12 * radius)
+        yield Part(name, "box", size, centre, spin, SPOKE_COLOUR)
+        if spoke == 0:
+            size = (0.72 * radius, width + 0.08 * radius, 0.2 * radius)
+            arm = spin @ np.array([0.36 * radius, 0.0, 0.0])
+            yield Part(name, "box", size, (float(arm[0]), float(arm[1]), float(arm[2])), spin, NOSE_COLOUR)
+
+
+def _fork_parts(solid: Mapping[str, Any], wheel: Mapping[str, Any]) -> Iterator[Part]:
+    """Two plates and a bridge from the steering column down to the axle, on the wheel's parent."""
+    arm = np.array(solid.get("position", (0.0, 0.0, 0.0)), dtype=np.float64)
+    length, radius = float(np.linalg.norm(arm)), _rim(wheel)
+    clearance = length - 1.1 * radius
+    if "parent" not in solid or clearance <= 0.0:
+        return
+    # The part's x lies along the axle, its y up the fork.
+    axle = np.array(wheel["axle"], dtype=np.float64)
+    up = -arm / length
+    side = np.cross(axle, up)
+    if float(np.linalg.norm(side)) < 0.9:  # the wheel hangs along its own axle: no fork holds that
+        return
+    side /= np.linalg.norm(side)
+    rotation = np.column_stack((np.cross(up, side), up, side))
+    half = 0.5 * (WHEEL_WIDTH + 0.12) * radius + 0.5 * PLATE
+    plate = length - clearance
+    for sign in (-1.0, 1.0):
+        centre = arm + rotation @ np.array([sign * half, plate / 2, 0.0])
+        yield _fork_box(solid["parent"], (PLATE, plate + 0.1 * radius, 0.22 * radius), centre, rotation)
+    bridge = arm + rotation @ np.array([0.0, plate, 0.0])
+    yield _fork_box(solid["parent"], (2.0 * half + PLATE, PLATE, 0.3 * radius), bridge, rotation)
+
+
+def _fork_box(
+    name: str, size: tuple[float, ...], centre: npt.NDArray[np.float64], rotation: npt.NDArray[np.float64]
+) -> Part:
+    return Part(name, "box", size, (float(centre[0]), float(centre[1]), float(centre[2])), rotation, COLUMN_COLOUR)
+
+
+def _box(name: str, size: tuple[float, ...], centre: Vector, colour: Colour) -> Part:
+    return Part(name, "box", size, centre, np.eye(3), colour)
+
+
+def _turn_to(axis: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """A rotation whose y axis is the given direction; its x axis lies as near to the solid's x as it can."""
+    y = axis / np.linalg.norm(axis)
+    near = np.eye(3)[0] if abs(y[0]) < 0.9 else np.eye(3)[1]
+    z = np.cross(near, y)
+    z /= np.linalg.norm(z)
+    return np.column_stack((np.cross(y, z), y, z))
+
+
+def _about_y(angle: float) -> npt.NDArray[np.float64]:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+
+
+def _box_mesh(size: tuple[float, ...]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
+    vertices: list[list[npt.NDArray[np.float64]]] = []
+    triangles: list[list[list[int]]] = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            n, u = sign * np.eye(3)[axis], np.eye(3)[(axis + 1) % 3]
+            v = np.cross(n, u)
+            first = 4 * len(triangles)
+            vertices.append([n - u - v, n + u - v, n + u + v, n - u + v])
+            triangles.append([[first, first + 1, first + 2], [first, first + 2, first + 3]])
+    return (
+        np.reshape(vertices, (-1, 3)) * (np.array(size, dtype=np.float64) / 2.0),
+        np.reshape(triangles, (-1, 3)).astype(np.int32),
+    )
+
+
+def _cylinder_mesh(
+    radius: float, height: float, resolution: int
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
+    angle = np.arange(resolution) * (2.0 * np.pi / resolution)
+    ring = np.column_stack((radius * np.cos(angle), np.zeros(resolution), radius * np.sin(angle)))
+    up = np.array([0.0, height / 2.0, 0.0])
+    # Twice the rim above and below: for the mantle, and for the caps with their centres.
+    vertices = np.vstack((ring + up, ring - up, ring + up, ring - up, up, -up))
+    k = np.arange(resolution)
+    following = (k + 1) % resolution
+    top, bottom = 2 * resolution, 3 * resolution
+    triangles = np.vstack(
+        (
+            np.column_stack((k, following, k + resolution)),
+            np.column_stack((following, following + resolution, k + resolution)),
+            np.column_stack((top + following, top + k, np.full(resolution, 4 * resolution))),
+            np.column_stack((bottom + k, bottom + following, np.full(resolution, 4 * resolution + 1))),
+        )
+    )
+    return vertices, triangles.astype(np.int32)

@@ -1,0 +1,94 @@
+"""What a frame shall show, checked without importing a renderer."""
+
+import importlib.util
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, TypeAlias
+
+from rover_gym.extras import MissingExtraError
+from rover_gym.mechanics import OptionError
+from rover_gym.validation import known_keys, refuse, vector, whole
+
+RENDER_MODES = ("rgb_array",)
+CAMERAS = ("follow", "side", "top")
+
+Camera: TypeAlias = str | tuple[tuple[float, ...], tuple[float, ...]]
+
+# A frame must hold something, and fit into a video and into memory.
+SMALLEST, LARGEST = 16, 8192
+
+
+@dataclass(frozen=True)
+class RenderOptions:
+    """Options of `FrameRenderer`, by name.
+
+    Attributes:
+        width: Pixels, even: a video's frames must be.
+        height: Pixels, even.
+        camera: "follow" looks from behind, above and the right and turns smoothly with the rover; "side" looks from
+            its right, low above the ground; "top" from straight above, x up. A pair (eye, target) of points in the
+            world, m, stands still.
+        show_forces: Draws contact forces as arrows, in front of everything.
+        antialiasing: Smooths edges; in software a frame then takes about twice as long.
+    """
+
+    width: int = 640
+    height: int = 480
+    camera: Camera = "follow"
+    show_forces: bool = False
+    antialiasing: bool = False
+
+
+def check_render_options(field: str, given: Mapping[str, Any]) -> RenderOptions:
+    """The options with their defaults.
+
+    Args:
+        field: The argument's name, which errors name before the option's; may be empty.
+        given: Attributes of `RenderOptions` by name.
+
+    Raises:
+        OptionError: A name is unknown or a value out of its range.
+    """
+    known_keys(field or "options", given, [entry.name for entry in fields(RenderOptions)])
+    options = dict(given)
+    prefix = f"{field}." if field else ""
+    for name in ("width", "height"):
+        if name in options:
+            size = whole(prefix + name, options[name], at_least=SMALLEST, at_most=LARGEST)
+            if size % 2:
+                refuse(OptionError, prefix + name, options[name], "must be an even whole number")
+            options[name] = size
+    if "camera" in options:
+        options["camera"] = _check_camera(prefix + "camera", options["camera"])
+    for name in ("show_forces", "antialiasing"):
+        if not isinstance(options.get(name, False), bool):
+            refuse(OptionError, prefix + name, options[name], "must be True or False")
+    return RenderOptions(**options)
+
+
+def check_render_mode(field: str, render_mode: object) -> str:
+    """A mode that the environment can render, and whose packages are installed.
+
+    Raises:
+        OptionError: The mode is unknown.
+        MissingExtraError: The renderer is not installed.
+    """
+    if not (isinstance(render_mode, str) and render_mode in RENDER_MODES):
+        reason = f"unknown; known is {', '.join(RENDER_MODES)}, and gymnasium.make adds 'human', a window"
+        refuse(OptionError, field, render_mode, reason)
+    if importlib.util.find_spec("vtkmodules") is None:
+        raise MissingExtraError("vtk", "render")
+    return render_mode
+
+
+def _check_camera(field: str, value: object) -> Camera:
+    if isinstance(value, str):
+        if value not in CAMERAS:
+            refuse(OptionError, field, value, f"unknown; known are {', '.join(CAMERAS)} and a pair of points")
+        return value
+    if not isinstance(value, tuple | list) or len(value) != 2:
+        refuse(OptionError, field, value, "must be a name or a pair (eye, target) of points")
+    eye, target = (vector(f"{field}[{i}]", point, 3) for i, point in enumerate(value))
+    if eye == target:
+        refuse(OptionError, field, value, "must look from one point to another")
+    return (eye, target)

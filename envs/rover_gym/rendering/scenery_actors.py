@@ -1,0 +1,228 @@
+"""What stands around the rover: sun and sky, checkered ground, rocks, shadows and the goal's flag."""
+
+import math
+
+import numpy as np
+from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonDataModel import vtkPolyData
+from vtkmodules.vtkFiltersSources import vtkSphereSource
+from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkLight, vtkPolyDataMapper
+
+from rover_gym.mechanics import Plane, SphereField
+from rover_gym.rendering import appearance as look
+from rover_gym.rendering.meshes import (
+    Array,
+    actor_of,
+    actor_with,
+    lattice,
+    level,
+    mesh,
+    set_colours,
+    set_points,
+    set_pose,
+)
+
+# The sun stands still: direction to it, x forward, y up, z right.
+SUN = np.array([-0.35, 0.80, 0.50]) / math.sqrt(0.35**2 + 0.80**2 + 0.50**2)
+SHADOW = 0.55  # brightness of ground in the shadow
+LIFT = 0.004  # m, of shadows above the ground and of the goal's ring above shadows, so that they do not flicker
+
+TILE = 0.5  # m, of the checkered ground
+NEAR, FAR = 20.0, 160.0  # m, half edges of the checkered ground and of the ground beyond
+HAZE = 12.0, 60.0  # m, where it begins and where the ground has the horizon's colour
+
+# Spheres are drawn with as many facets as their size in the picture deserves, since most of a frame's time goes into
+# facets: (within this many radii of the rover, but at most so many m; facets around; with a shadow).
+SPHERE_RANGES = ((40.0, 4.0, 18, True), (250.0, 12.0, 8, True), (math.inf, math.inf, 6, False))
+
+Goal = tuple[float, float]
+
+
+def sun(intensity: float) -> vtkLight:
+    """The light that throws the shadows."""
+    light = vtkLight()
+    light.SetLightTypeToSceneLight()
+    light.PositionalOff()
+    light.SetPosition(*SUN)
+    light.SetFocalPoint(0.0, 0.0, 0.0)
+    light.SetColor(1.0, 0.96, 0.90)
+    light.SetIntensity(intensity)
+    return light
+
+
+def headlight(intensity: float) -> vtkLight:
+    """A weak light from the eye, so that no side is black."""
+    light = vtkLight()
+    light.SetLightTypeToHeadlight()
+    light.SetIntensity(intensity)
+    return light
+
+
+def sky() -> vtkActor:
+    """A dome around the origin, y up, coloured by elevation; below the horizon it is haze."""
+    elevation = np.radians([-90.0, 0.0, 2.0, 5.0, 10.0, 20.0, 45.0, 90.0])
+    share = np.array([0.0, 0.0, 0.12, 0.3, 0.52, 0.75, 0.92, 1.0])[:, None]
+    bands = np.array(look.SKY_COLOUR) + share * (np.array(look.SKY_COLOUR_2) - look.SKY_COLOUR)
+    around = 24
+    a, e = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, around, endpoint=False), elevation)
+    vertices = np.column_stack(((np.cos(e) * np.cos(a)).ravel(), np.sin(e).ravel(), (np.cos(e) * np.sin(a)).ravel()))
+    colours = np.repeat(bands, around, axis=0)
+    faces = lattice(len(elevation) - 1, around)
+    return actor_of(mesh(2.0 * FAR * vertices, faces, colours, smooth=False), lit=False)
+
+
+class GroundActors:
+    """A checkered plane that fades into the horizon's colour.
+
+    Attributes:
+        actor: What VTK draws.
+        flatten: (4, 4), brings a point along the sun's rays onto the plane, a hair above it; shadows are made with it.
+    """
+
+    def __init__(self, plane: Plane) -> None:
+        n = plane.normal
+        ahead = level(np.array([1.0, 0.0, 0.0]), n)
+        self._along = np.column_stack((ahead, np.cross(ahead, n)))
+        self._foot = np.array([0.0, plane.height(0.0, 0.0), 0.0])
+        across = float(n @ SUN)
+        self.flatten = np.eye(4)
+        self.flatten[:3, :3] -= np.outer(SUN, n) / across
+        self.flatten[:3, 3] = -(plane.offset - LIFT) / across * SUN
+        self.actor = self._draw(brightness=0.45 + 0.55 * across / float(SUN[1]))
+
+    def follow(self, position: Array) -> None:
+        """Moves the mesh near to a place by whole pairs of tiles: the checkers stay where they are in the world."""
+        pairs = np.round((position - self._foot) @ self._along / (2.0 * TILE))
+        shift = np.eye(4)
+        shift[:3, 3] = self._along @ (2.0 * TILE * pairs)
+        set_pose(self.actor, shift)
+
+    def _draw(self, brightness: float) -> vtkActor:
+        count = round(2.0 * NEAR / TILE)
+        column, row = (index.ravel() for index in np.meshgrid(np.arange(count), np.arange(count)))
+        corners = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])
+        tiles = ((np.column_stack((column, row))[:, None, :] + corners) * TILE - NEAR).reshape(-1, 2)
+        # Beyond: rings of squares, as coarse as their distance allows.
+        edges = np.array([NEAR, 30.0, 45.0, 70.0, FAR])
+        square = np.array([[-1, -1], [-1, 1], [1, 1], [1, -1]])
+        steps = np.linspace(0.0, 1.0, 8, endpoint=False)[:, None]
+        rim = np.vstack([square[i] + steps * (square[(i + 1) % 4] - square[i]) for i in range(4)])
+        beyond = (edges[:, None, None] * rim).reshape(-1, 2)
+        flat = np.vstack((tiles, beyond))
+        faces = np.vstack(
+            (np.arange(len(tiles)).reshape(-1, 4), len(tiles) + lattice(len(edges) - 1, len(rim))),
+        )
+
+        light, dark = np.array(look.GROUND_COLOUR), np.array(look.GROUND_COLOUR_2)
+        mean = 0.5 * (light + dark)
+        distance = np.linalg.norm(flat, axis=1)[:, None]
+        odd = np.repeat((column + row) % 2, 4)[:, None] == 1
+        colours = np.vstack((np.where(odd, dark, light), np.broadcast_to(mean, (len(beyond), 3))))
+        colours = mean + np.clip(1.0 - distance / NEAR, 0.0, 1.0) * (colours - mean)
+        colours *= brightness  # lit here, once, since haze has no light of its own
+        haze = np.clip((distance - HAZE[0]) / (HAZE[1] - HAZE[0]), 0.0, 1.0)
+        haze = haze * haze * (3.0 - 2.0 * haze)
+        colours += haze * (np.array(look.SKY_COLOUR) - colours)
+        vertices = flat @ self._along.T + self._foot
+        return actor_of(mesh(vertices, faces, colours, smooth=False), lit=False)
+
+
+class RockActors:
+    """All spheres of a terrain, finer near the rover, with their shadows on the ground.
+
+    Attributes:
+        actors: What VTK draws.
+    """
+
+    def __init__(self, terrain: SphereField, ground: GroundActors | None) -> None:
+        self._centres, self._radii = terrain.centres, terrain.radii
+        # No two rocks are quite alike: the golden ratio spreads the shades evenly.
+        shade = 0.86 + 0.28 * (np.arange(len(self._radii)) * 0.6180339887 % 1.0)
+        self._colours = shade[:, None] * np.array(look.ROCK_COLOUR)
+        self._place: tuple[float, ...] | None = None
+        self._sets = [vtkPolyData() for _ in SPHERE_RANGES]
+        self.actors: list[vtkActor] = []
+        for points, (_, _, facets, shadowed) in zip(self._sets, SPHERE_RANGES, strict=True):
+            self.actors.append(actor_with(_spheres(points, facets, coloured=True)))
+            if shadowed and ground is not None:
+                self.actors.append(_shadow(actor_with(_spheres(points, min(facets, 10), coloured=False)), ground))
+
+    def follow(self, position: Array) -> None:
+        """Sorts the spheres by their distance from a place."""
+        place = tuple(np.round(position).tolist())
+        if place == self._place:
+            return
+        self._place = place
+        distance = np.linalg.norm(self._centres - place, axis=1) - self._radii
+        left = np.full(len(distance), True)
+        for points, (radii_away, reach, _, _) in zip(self._sets, SPHERE_RANGES, strict=True):
+            chosen = left & (distance <= np.minimum(radii_away * self._radii, reach))
+            left &= ~chosen
+            set_points(points, self._centres[chosen])
+            set_colours(points, self._colours[chosen])
+            radii = numpy_to_vtk(self._radii[chosen], deep=True)
+            radii.SetName("radius")
+            points.GetPointData().AddArray(radii)
+            points.Modified()
+
+
+def shadow_of(actor: vtkActor, ground: GroundActors) -> vtkActor:
+    """The same surface, dark and flattened onto the ground, where `set_pose` does not move it."""
+    mapper = vtkPolyDataMapper()
+    mapper.SetInputDataObject(actor.GetMapper().GetInputDataObject(0, 0))
+    mapper.ScalarVisibilityOff()
+    return _shadow(actor_with(mapper), ground)
+
+
+def flag(goal: Goal, tolerance: float, terrain: Plane | SphereField, ground: GroundActors | None) -> list[vtkActor]:
+    """A pole with a pennant, and on a plane the ring within which the goal is reached."""
+    x, z = goal
+    height = terrain.height(x, z) if isinstance(terrain, Plane) else float(terrain.heights([[x, z]])[0])
+    foot = np.array([x, 0.0 if math.isnan(height) else height, z])
+    pole = look.Part("", "cylinder", (0.022, 1.5), (0.0, 0.75, 0.0), np.eye(3), look.COLUMN_COLOUR)
+    vertices, triangles = look.part_mesh(pole)
+    vertices = vertices + pole.position
+    cloth = np.array([[0.0, 1.48, 0.0], [0.0, 1.02, 0.0], [0.38, 1.25, 0.38]])
+    n = len(vertices)
+    surface = mesh(
+        foot + np.vstack((vertices, cloth, cloth)),
+        np.vstack((triangles, [[n, n + 1, n + 2], [n + 3, n + 5, n + 4]])),
+        np.vstack((np.broadcast_to(look.COLUMN_COLOUR, vertices.shape), np.broadcast_to(look.GOAL_COLOUR, (6, 3)))),
+    )
+    standing = actor_of(surface)
+    plane = terrain if isinstance(terrain, Plane) else terrain.ground
+    if plane is None or ground is None:
+        return [standing]
+    return [standing, shadow_of(standing, ground), _ring(foot, tolerance, plane)]
+
+
+def _ring(centre: Array, radius: float, plane: Plane) -> vtkActor:
+    """Where a point of the plane has the radius as its horizontal distance."""
+    n, around = plane.normal, 64
+    angle = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
+    circle = np.column_stack((np.cos(angle), np.zeros(around), np.sin(angle)))
+    circle[:, 1] = -(circle @ n) / n[1]
+    outer = centre + 2.0 * LIFT * n + radius * circle
+    inner = outer - 0.1 * radius * circle
+    colours = np.broadcast_to(np.array(look.GOAL_COLOUR), (2 * around, 3))
+    return actor_of(mesh(np.vstack((outer, inner)), lattice(1, around), colours, smooth=False), lit=False)
+
+
+def _spheres(points: vtkPolyData, facets: int, *, coloured: bool) -> vtkGlyph3DMapper:
+    sphere = vtkSphereSource(radius=1.0, theta_resolution=facets, phi_resolution=facets)
+    mapper = vtkGlyph3DMapper()
+    mapper.SetInputData(points)
+    mapper.SetSourceConnection(sphere.GetOutputPort())
+    mapper.SetScaleArray("radius")
+    mapper.SetScaleModeToScaleByMagnitude()
+    mapper.OrientOff()
+    mapper.SetScalarVisibility(coloured)
+    return mapper
+
+
+def _shadow(actor: vtkActor, ground: GroundActors) -> vtkActor:
+    actor.GetProperty().LightingOff()
+    colour = SHADOW * 0.5 * (np.array(look.GROUND_COLOUR) + look.GROUND_COLOUR_2)
+    actor.GetProperty().SetColor(*colour)
+    set_pose(actor, ground.flatten)
+    return actor

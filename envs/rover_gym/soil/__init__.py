@@ -1,0 +1,38 @@
+"""Granular soil: settled beds, the two-wheel rover on them, recordings, and trials with their statistics.
+
+>>> from rover_gym.soil import rover_on_soil
+>>> sim = rover_on_soil(count=222, layers=3)
+>>> sim.set_torques([50.0, 50.0])
+>>> sim.step(100).steps
+100
+"""
+
+from rover_gym.mechanics import SoilContacts, SoilSimulation, SoilSnapshot, soil_packing
+from rover_gym.soil.bed import Bed, settled_bed
+from rover_gym.soil.soil_recording import SoilSampler, record_soil
+from rover_gym.soil.soil_rover import rover_on_soil
+from rover_gym.soil.soil_run import SoilRun, read_soil_run
+from rover_gym.soil.soil_trials import Pull, SoilDrive, drawbar_pull, drive_on_soil, over_beds
+from rover_gym.soil.traction import BedEstimate, Traction, fit_traction
+
+__all__ = [
+    "Bed",
+    "BedEstimate",
+    "Pull",
+    "SoilContacts",
+    "SoilDrive",
+    "SoilRun",
+    "SoilSampler",
+    "SoilSimulation",
+    "SoilSnapshot",
+    "Traction",
+    "drawbar_pull",
+    "drive_on_soil",
+    "fit_traction",
+    "over_beds",
+    "read_soil_run",
+    "record_soil",
+    "rover_on_soil",
+    "settled_bed",
+    "soil_packing",
+]

@@ -1,0 +1,139 @@
+"""Beds of granular soil: disks that fell into a box and came to rest."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.mechanics import OptionError, SoilSimulation, soil_packing
+from rover_gym.validation import number, refuse
+
+#: The original's disk: mean radius (m) and mass (kg); other disks have its density.
+DISK_RADIUS, DISK_MASS = 0.01625, 0.7
+EARTH = 9.81  # m/s^2
+MOST_DISKS = 1_000_000
+MOST_STEPS = 100_000_000  # of one call: more would not end
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Bed:
+    """Disks at rest between two walls.
+
+    Attributes:
+        radius: (n,) m.
+        mass: (n,) kg.
+        position: (n, 3) m and rad.
+        walls: (3, 4) floor, left and right: a point and the normal to the free side.
+        width: m.
+    """
+
+    radius: Array
+    mass: Array
+    position: Array
+    walls: Array
+    width: float
+
+    @property
+    def surface(self) -> float:
+        """Mean height of the surface, m."""
+        return surface_height(self.radius, self.position)
+
+    def clear_height(self, x: float, radius: float) -> float:
+        """Lowest height of a wheel's centre at `x` that touches no disk, m."""
+        reach = radius + self.radius
+        across = self.position[:, 0] - x
+        near = np.abs(across) < reach
+        heights = self.position[near, 1] + np.sqrt(reach[near] ** 2 - across[near] ** 2)
+        return max(radius, float(heights.max(initial=radius)))
+
+
+def surface_height(radius: Array, position: Array) -> float:
+    """Mean height of a bed's surface: of the highest rim in each of the strips, 2.5 largest radii wide, that it has, m.
+
+    Args:
+        radius: (n,) m.
+        position: (n, 2) or (n, 3) centres, m.
+    """
+    x, top = position[:, 0], position[:, 1] + radius
+    left, right = float((x - radius).min()), float((x + radius).max())
+    edges = np.linspace(left, right, 1 + max(1, int((right - left) / (2.5 * radius.max()))))
+    heights = [float(top[(x + radius > a) & (x - radius < b)].max(initial=0.0)) for a, b in itertools.pairwise(edges)]
+    return float(np.mean(heights))
+
+
+def settled_bed(
+    count: int = 222,
+    layers: int = 3,
+    *,
+    radius_min: float = 0.016,
+    radius_max: float = 0.0165,
+    mass: float | None = None,
+    seed: int = 0,
+    settle: float | None = None,
+    **options: Any,
+) -> Bed:
+    """Lets disks fall into a box.
+
+    Disks of nearly one size, as the original's, keep the rows that they fell in; radii from 13 to 19.5 mm do not.
+
+    Args:
+        count: How many disks.
+        layers: How many lie upon one another; the box is as wide as that needs.
+        radius_min: m.
+        radius_max: m.
+        mass: Of a disk of the mean radius, kg; the density is that of the original's, 0.7 kg at 16.25 mm, if not given.
+        seed: Of radii and places.
+        settle: How long they may fall, s; half a second at 9.81 m/s^2, and longer as gravity is weaker, if not given.
+        **options: Of `SoilSimulation`.
+
+    Raises:
+        OptionError: `count` or `layers` is no positive whole number or more than a million, a radius is not positive,
+            or `settle` is negative or takes more than a hundred million steps.
+        ModelError: A mass cannot be.
+    """
+    count, layers = _whole("count", count), _whole("layers", layers)
+    radius_min = number("radius_min", radius_min, above=0.0)
+    radius_max = number("radius_max", radius_max, at_least=radius_min)
+    if mass is None:
+        mass = DISK_MASS * (0.5 * (radius_min + radius_max) / DISK_RADIUS) ** 2
+    width = bed_width(count, layers, radius_max)
+    radius, masses, centres = soil_packing(
+        count, radius_min=radius_min, radius_max=radius_max, mass=mass, width=width, seed=seed
+    )
+    walls = np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0], [width, 0.0, -1.0, 0.0]])
+    sim = SoilSimulation(radius, masses, centres, walls=walls, **options)
+    duration = 0.5 * slowness(sim) if settle is None else number("settle", settle, at_least=0.0)
+    sim.step(step_count("settle", duration, sim.time_step))
+    return Bed(radius, masses, sim.position, walls, width)
+
+
+def bed_width(count: int, layers: int, radius_max: float) -> float:
+    """Width of the box into which `settled_bed` lets so many disks fall, m."""
+    return -(-count // layers) * 2.0 * radius_max * 1.004
+
+
+def step_count(field: str, duration: float, time_step: float) -> int:
+    """How many steps a time takes; an OptionError that names `field` where they would not end."""
+    steps = duration / time_step
+    if not steps <= MOST_STEPS:
+        refuse(OptionError, field, duration, f"must take at most {MOST_STEPS} steps of {time_step:g} s")
+    return round(steps)
+
+
+def _whole(field: str, value: object) -> int:
+    result = number(field, value, at_least=1.0, at_most=MOST_DISKS)
+    if result != round(result):
+        refuse(OptionError, field, value, "must be a whole number")
+    return round(result)
+
+
+def slowness(sim: SoilSimulation) -> float:
+    """By how much a fall takes longer than at 9.81 m/s^2."""
+    gravity = float(np.hypot(*sim.settings["gravity"]))
+    return float(np.sqrt(EARTH / gravity)) if gravity > 0.0 else 1.0

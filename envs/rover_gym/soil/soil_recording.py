@@ -1,0 +1,200 @@
+"""Recordings of a soil: where its disks are, what it does to the wheels, its strongest contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.mechanics import SoilSimulation
+from rover_gym.record.channels import Channel
+from rover_gym.record.facts import row_count
+from rover_gym.record.recorder import Recorder
+from rover_gym.soil.bed import Array
+
+MOST_CHAINS = 2000  # contacts of a row that are kept, the strongest
+
+
+class _MeanForces:
+    """Mean forces of a soil's contacts over some steps: single steps carry knocks."""
+
+    def __init__(self, sim: SoilSimulation) -> None:
+        self._n, self._wheels = len(sim.radius), len(sim.wheels)
+        self.clear()
+
+    def clear(self) -> None:
+        """Begins anew."""
+        self._steps = 0
+        self._pairs: list[npt.NDArray[np.int64]] = []
+        self._points: list[Array] = []
+        self._impulses: list[Array] = []
+
+    def add(self, sim: SoilSimulation) -> None:
+        """Adds the last step's contacts."""
+        contacts = sim.contacts
+        pairs, normals = contacts.bodies, contacts.normals
+        steep = np.abs(normals[:, 0]) > np.abs(normals[:, 1])
+        pairs[:, 1] -= (pairs[:, 1] < 0) & steep  # floor and walls are two things
+        self._steps += 1
+        self._pairs.append(pairs)
+        self._points.append(contacts.points)
+        self._impulses.append(contacts.world_impulses)
+
+    def read(self, sim: SoilSimulation, n_chains: int) -> tuple[Array, Array]:
+        """(n_chains, 5) the strongest as lines x, y to x, y with a force, zeros where there are fewer; (wheels, 2)."""
+        chains, on_wheels = np.zeros((n_chains, 5)), np.zeros((self._wheels, 2))
+        if not self._pairs or sum(map(len, self._pairs)) == 0:
+            return chains, on_wheels
+        duration = self._steps * sim.time_step
+        points, impulses = np.concatenate(self._points), np.concatenate(self._impulses)
+        # The last of a pair's places is its place now.
+        _, last, which = np.unique(np.concatenate(self._pairs)[::-1], axis=0, return_index=True, return_inverse=True)
+        which, last = which.ravel()[::-1], len(which) - 1 - last
+        pairs = np.concatenate(self._pairs)[last]
+        forces = np.stack([np.bincount(which, impulses[:, k]) for k in range(2)], axis=1) / duration
+        for wheel in range(self._wheels):
+            on_wheels[wheel] = forces[pairs[:, 0] == self._n + wheel].sum(axis=0)
+        strengths = np.linalg.norm(forces, axis=1)
+        kept = np.argsort(-strengths, kind="stable")[:n_chains]
+        kept = kept[strengths[kept] > 0.0]
+        centres = np.concatenate((sim.position[:, :2], sim.wheels[:, :2]))
+        (a, b), places = pairs[kept].T, points[last[kept]]
+        chains[: len(kept), :2] = np.where(a[:, None] >= self._n, places, centres[a])
+        chains[: len(kept), 2:4] = np.where(b[:, None] < 0, places, centres[b])
+        chains[: len(kept), 4] = strengths[kept]
+        return chains, on_wheels
+
+
+class SoilSampler:
+    """Makes rows of a soil for a `Recorder`; steps it from row to row.
+
+    Args:
+        sim: The soil.
+    """
+
+    def __init__(self, sim: SoilSimulation) -> None:
+        n, wheels = len(sim.radius), len(sim.wheels)
+        self._sim, self._forces = sim, _MeanForces(sim)
+        self._n_chains = min(n + wheels, MOST_CHAINS)
+        self._residual = 0.0
+        self.channels = (
+            Channel("time", "s", "time since the run's start"),
+            Channel("position", "m, rad", "x forward, y up, angle of each disk", (n, 3)),
+            Channel("velocity", "m/s, rad/s", "their rates", (n, 3)),
+            Channel("asleep", "1", "1 where the disk sleeps", (n,)),
+            Channel("machine", "m, rad", "coordinates of the machine", (len(sim.machine),)),
+            Channel("machine_rate", "m/s, rad/s", "their rates", (len(sim.machine),)),
+            Channel("wheels", "m", "centre x, y and radius of each wheel", (wheels, 3)),
+            Channel("wheel_forces", "N", "x and y of the soil on each wheel, mean since the last row", (wheels, 2)),
+            Channel(
+                "force_chains",
+                "m, N",
+                "strongest contacts: from x, y to x, y (m), mean force since the last row (N); zeros where none are",
+                (self._n_chains, 5),
+            ),
+            Channel("kinetic_energy", "J", "kinetic energy of all"),
+            Channel("potential_energy", "J", "potential energy, zero with all mass centres at height 0"),
+            Channel("n_contacts", "1", "contacts of the last step"),
+            Channel("penetration", "m", "deepest overlap"),
+            Channel("solver_residual", "1", "largest residual of the contact solver since the last row"),
+        )
+
+    def step(self, n: int) -> bool:
+        """Takes steps that the next row tells of; returns whether all of them were solved to the tolerance.
+
+        Raises:
+            StepError: A step could not be taken.
+        """
+        converged = True
+        for _ in range(n):
+            report = self._sim.step()
+            self._forces.add(self._sim)
+            self._residual = max(self._residual, report.residual)
+            converged &= report.is_converged
+        return converged
+
+    def row(self) -> dict[str, npt.ArrayLike]:
+        """One row of `channels`: the state now, and means since the row before."""
+        sim = self._sim
+        energy = sim.energy()
+        chains, on_wheels = self._forces.read(sim, self._n_chains)
+        residual, self._residual = self._residual, 0.0
+        self._forces.clear()
+        return {
+            "time": sim.time,
+            "position": sim.position,
+            "velocity": sim.velocity,
+            "asleep": sim.asleep.astype(np.float64),
+            "machine": sim.machine,
+            "machine_rate": sim.machine_rate,
+            "wheels": sim.wheels,
+            "wheel_forces": on_wheels,
+            "force_chains": chains,
+            "kinetic_energy": energy.kinetic,
+            "potential_energy": energy.potential,
+            "n_contacts": len(sim.contacts),
+            "penetration": sim.penetration(),
+            "solver_residual": residual,
+        }
+
+
+def record_soil(
+    sim: SoilSimulation,
+    path: str | Path,
+    title: str,
+    *,
+    duration: float,
+    steps_per_row: int = 20,
+    walls: npt.ArrayLike | None = None,
+    until: Callable[[SoilSimulation], bool] = lambda _: False,
+    progress: Callable[[float], None] = lambda _: None,
+) -> int:
+    """Runs a soil from its present state and records it.
+
+    Args:
+        sim: The soil.
+        path: HDF5 file to write.
+        title: Of the recording.
+        duration: Time to simulate, s.
+        steps_per_row: Steps from one row to the next.
+        walls: (n, 4) the soil's walls, for pictures.
+        until: Asked after each row whether to stop.
+        progress: Called with the simulated time after each row.
+
+    Returns:
+        How many rows' steps were not solved to the tolerance.
+
+    Raises:
+        OptionError: `duration` or `steps_per_row` is not positive, or there would be too many rows.
+        RecordingError: The file is in use, or the disk is full.
+        MissingExtraError: h5py is not installed.
+        StepError: A step could not be taken; what came before is on the disk.
+    """
+    rows, steps_per_row = row_count(duration, sim.time_step, steps_per_row), int(steps_per_row)
+    sampler = SoilSampler(sim)
+    scene = {
+        "kind": "SoilSimulation",
+        "radius": sim.radius,
+        "mass": sim.mass,
+        "walls": np.empty((0, 4)) if walls is None else np.asarray(walls, dtype=np.float64),
+        "torques": sim.torques,
+    }
+    attributes = {
+        "title": title,
+        "scene": scene,
+        "seed": "the start's positions are the first row",
+        "solver": sim.settings,
+    }
+    unconverged = 0
+    with Recorder(path, sampler.channels, attributes) as recorder:
+        recorder.append(sampler.row())
+        for _ in range(rows):
+            unconverged += not sampler.step(steps_per_row)
+            recorder.append(sampler.row())
+            progress(sim.time)
+            if until(sim):
+                break
+        recorder.note(unconverged_rows=unconverged)
+    return unconverged

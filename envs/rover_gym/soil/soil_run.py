@@ -1,0 +1,172 @@
+"""A saved run on a soil, read back: where every disk and wheel was, and what the soil did to the wheels.
+
+run = read_soil_run("soil.h5").resample(25.0)
+run.wheels[-1, 0, :2]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.record.rover_run import LARGEST, check_rows, check_time, film_rows, title_of
+from rover_gym.record.trajectory import Trajectory, read_trajectory
+from rover_gym.record.trajectory_format import RecordingError, sound
+from rover_gym.soil.bed import surface_height
+from rover_gym.validation import refuse
+
+__all__ = ["SoilRun", "is_soil", "read_soil_run", "soil_run_of"]
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SoilRun:
+    """A recorded run on a soil of disks.
+
+    Attributes:
+        trajectory: The data sets and attributes of the file.
+        radius: (n_disks,) m.
+        walls: (n_walls, 4) a point of each wall and the normal to its free side.
+        surface: Mean height of the soil's surface at the start, m.
+        title: What was run, in words.
+    """
+
+    trajectory: Trajectory
+    radius: Array
+    walls: Array
+    surface: float
+    title: str
+
+    @property
+    def n_frames(self) -> int:
+        """How many samples the run has."""
+        return len(self.time)
+
+    @property
+    def time(self) -> Array:
+        """(n,) time of the samples, s."""
+        return self.trajectory["time"]
+
+    @property
+    def positions(self) -> Array:
+        """(n, n_disks, 3) x, y (m) and angle (rad) of the disks."""
+        return self.trajectory["position"]
+
+    @property
+    def asleep(self) -> npt.NDArray[np.bool_]:
+        """(n, n_disks) which disks slept."""
+        return self.trajectory["asleep"] > 0.0
+
+    @property
+    def wheels(self) -> Array:
+        """(n, n_wheels, 3) centre and radius of the wheels, back to front, m."""
+        return self.trajectory["wheels"]
+
+    @property
+    def wheel_angles(self) -> Array:
+        """(n, n_wheels) angles of the wheels, rad, positive to the left."""
+        return self.trajectory["machine"][:, 3 : 3 + self.wheels.shape[1]]
+
+    @property
+    def wheel_forces(self) -> Array:
+        """(n, n_wheels, 2) x and y of the soil on the wheels, mean since the row before, N."""
+        return self.trajectory["wheel_forces"]
+
+    @property
+    def force_chains(self) -> Array:
+        """(n, n_chains, 5) contacts as lines x, y to x, y (m) with their mean force since the row before (N)."""
+        return self.trajectory["force_chains"]
+
+    @property
+    def sinkage(self) -> Array:
+        """(n, n_wheels) how far the wheels' lowest points are below the surface, m."""
+        result: Array = self.surface - (self.wheels[..., 1] - self.wheels[..., 2])
+        return result
+
+    @property
+    def slip_speeds(self) -> Array:
+        """(n, n_wheels) how much faster the rims turn than the machine drives, m/s."""
+        rates = self.trajectory["machine_rate"]
+        rims = -rates[:, 3 : 3 + self.wheels.shape[1]] * self.wheels[..., 2]
+        result: Array = rims - rates[:, :1]
+        return result
+
+    def resample(self, fps: float) -> SoilRun:
+        """The run with the samples that lie nearest to the times of a film's frames, none of them twice.
+
+        Args:
+            fps: Frames a second; where the run has fewer, it keeps all that it has.
+
+        Raises:
+            OptionError: `fps` is not a positive number.
+        """
+        rows = film_rows(self.time, fps)
+        data = {name: values[rows] for name, values in self.trajectory.data.items()}
+        return replace(self, trajectory=replace(self.trajectory, data=data))
+
+
+def is_soil(trajectory: Trajectory) -> bool:
+    """Whether a trajectory is one of a soil."""
+    scene = trajectory.attributes.get("scene")
+    return isinstance(scene, dict) and scene.get("kind") == "SoilSimulation"
+
+
+def read_soil_run(path: str | Path) -> SoilRun:
+    """Reads a run that `record_soil` saved, complete or not.
+
+    Raises:
+        RecordingError: The file is no trajectory, or not one of a soil, or holds no samples.
+        OSError: The file is not there or cannot be read.
+        MissingExtraError: h5py is not installed.
+    """
+    return soil_run_of(read_trajectory(path), path)
+
+
+def soil_run_of(trajectory: Trajectory, path: str | Path) -> SoilRun:
+    """The run in a trajectory that was read from `path`.
+
+    Raises:
+        RecordingError: It is not one of a soil, or holds no samples.
+    """
+    if not is_soil(trajectory) or "force_chains" not in trajectory.data:
+        refuse(RecordingError, "path", str(path), "holds no soil: `rover planar soil` writes one")
+    check_time(trajectory, path)
+    scene = trajectory.attributes["scene"]
+    with sound(path, "scene"):
+        radius = np.array(scene["radius"], dtype=np.float64).reshape(-1)
+        walls = np.array(scene["walls"], dtype=np.float64).reshape(-1, 4)
+    if not len(radius) or not ((radius > 0.0) & (radius <= LARGEST)).all():
+        refuse(RecordingError, f"{path}: scene.radius", len(radius), "must be a positive radius for each of the disks")
+    if not (np.abs(walls) <= LARGEST).all() or not np.hypot(*walls[:, 2:].T).all():
+        refuse(RecordingError, f"{path}: scene.walls", len(walls), "must be points with normals, for each of the walls")
+    check_rows(trajectory, path, _shapes(trajectory, path, len(radius)), bounded=("position", "wheels", "machine"))
+    return SoilRun(
+        trajectory=trajectory,
+        radius=radius,
+        walls=walls,
+        surface=surface_height(radius, trajectory["position"][0]),
+        title=title_of(trajectory),
+    )
+
+
+def _shapes(trajectory: Trajectory, path: str | Path, disks: int) -> dict[str, tuple[int, ...]]:
+    """What the rows of a soil's data sets must be."""
+    wheels, machine = (trajectory[name].shape[1] if trajectory[name].ndim > 1 else 0 for name in ("wheels", "machine"))
+    if wheels > 2 or machine < 3 * bool(wheels) + wheels:
+        refuse(RecordingError, f"{path}: wheels", wheels, "must be none, one or two, with their machine's coordinates")
+    chains = trajectory["force_chains"]
+    return {
+        "position": (disks, 3),
+        "velocity": (disks, 3),
+        "asleep": (disks,),
+        "machine": (machine,),
+        "machine_rate": (machine,),
+        "wheels": (wheels, 3),
+        "wheel_forces": (wheels, 2),
+        "force_chains": (chains.shape[1] if chains.ndim == 3 else 0, 5),
+        **dict.fromkeys(("kinetic_energy", "potential_energy", "n_contacts", "penetration", "solver_residual"), ()),
+    }

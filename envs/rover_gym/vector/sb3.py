@@ -1,0 +1,203 @@
+"""`RoverVecEnv`: many rovers as one vector environment of stable-baselines3.
+
+from rover_gym.vector.sb3 import RoverVecEnv
+
+venv = RoverVecEnv(64, terrain="sphere_field", height_scan=True)
+model = stable_baselines3.PPO("MlpPolicy", VecMonitor(venv))
+"""
+
+import copy
+from collections.abc import Sequence
+from contextlib import ExitStack
+from typing import Any, Unpack
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.env.arguments import RoverArguments, takes_arguments
+from rover_gym.env.beginning import check_seed
+from rover_gym.env.observation import LARGEST
+from rover_gym.env.rover_env import RoverEnv
+from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
+from rover_gym.env.wheels import N_ACTIONS
+from rover_gym.extras import MissingExtraError
+from rover_gym.mechanics import OptionError, RoverGymError
+from rover_gym.validation import refuse
+from rover_gym.vector.batch import BatchRover, RoverBatch
+
+try:
+    from stable_baselines3.common.vec_env import VecEnv
+    from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
+except ImportError as error:
+    raise MissingExtraError("stable-baselines3", "train") from error
+
+
+class RoverVecEnv(VecEnv):
+    """Rovers that are stepped by the compiled core, many at a time, on several threads.
+
+    Each goes bit for bit as a `RoverEnv` of the same arguments and seed would, inside a `TimeLimit` and a
+    `DummyVecEnv`: an episode that ends is followed by the next at once, the last observation is in
+    `info["terminal_observation"]`, and `info["TimeLimit.truncated"]` says whether only the time was up. For speed the
+    infos are whole only where an episode ends; before that they hold `TimeLimit.truncated` and nothing else.
+
+    Example:
+        >>> venv = RoverVecEnv(64, terrain="sphere_field", height_scan=True)
+        >>> model = stable_baselines3.PPO("MlpPolicy", VecMonitor(venv))
+
+    Args:
+        n_envs: How many rovers.
+        threads: That step them; None for one a core.
+        max_episode_steps: Steps until truncation; None for never.
+        **arguments: Those of `RoverEnv`.
+    """
+
+    @takes_arguments
+    def __init__(
+        self,
+        n_envs: int,
+        *,
+        threads: int | None = None,
+        max_episode_steps: int | None = MAX_EPISODE_STEPS,
+        **arguments: Unpack[RoverArguments],
+    ) -> None:
+        self.batch = RoverBatch(n_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments)
+        self._actions: npt.NDArray[np.float64] | None = None
+        #: Rovers whose next episode was refused when the last one ended.
+        self._waiting: list[int] = []
+        prototype = self.prototype
+        super().__init__(self.batch.n, prototype.observation_space, prototype.action_space)
+
+    @property
+    def prototype(self) -> RoverEnv:
+        """An environment with the same arguments, never stepped: for its layout, model and limits."""
+        return self.batch.prototype
+
+    def reset(self) -> VecEnvObs:
+        """Starts an episode of every rover, with the seeds and options that were set for this once.
+
+        Raises:
+            StateError: As `RoverEnv.reset`; nothing has changed.
+            TerrainError: As `RoverEnv.reset`; nothing has changed.
+        """
+        options = [self.batch.check_options(given) for given in self._options]
+        with ExitStack() as stack:
+            drawn = [
+                stack.enter_context(self.batch.beginnings([i], [seed], fixed))[0]
+                for i, (seed, fixed) in enumerate(zip(self._seeds, options, strict=True))
+            ]
+            for i, one in enumerate(drawn):
+                self.reset_infos[i] = self.batch.begin(i, one)
+        self._waiting = []
+        self._reset_seeds()
+        self._reset_options()
+        return self.batch.observation
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Sets the seeds of the next reset: of the first rover, then one more from rover to rover.
+
+        Raises:
+            OptionError: It is neither None nor a whole number from 0; nothing has changed.
+        """
+        return super().seed(check_seed(seed))
+
+    def set_options(self, options: list[dict[str, Any]] | dict[str, Any] | None = None) -> None:
+        """Sets the options of the next reset: those of `RoverEnv.reset`, for every rover, or one mapping a rover.
+
+        Raises:
+            OptionError: They are neither, or one is unknown or out of its range; nothing has changed.
+            StateError: As `RoverEnv.reset`.
+        """
+        given = options if isinstance(options, list) else [options] * self.num_envs
+        if len(given) != self.num_envs:
+            refuse(OptionError, "options", options, f"must be one mapping, or a list of {self.num_envs}")
+        for one in given:
+            self.batch.check_options(one)
+        self._options = [copy.deepcopy(dict(one or {})) for one in given]
+
+    def step_async(self, actions: npt.NDArray[np.float32]) -> None:
+        """Takes the actions `(n_envs, 12)`.
+
+        Raises:
+            CommandError: They have a wrong shape or an entry outside [-1, 1]; nothing has changed.
+        """
+        self._actions = check_actions(actions, (self.num_envs, N_ACTIONS))
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Applies them for one control period; rovers whose episode ends start the next.
+
+        A next episode that cannot begin is refused by the step after, before anything moves.
+
+        Raises:
+            TerrainError: A rover's next episode cannot begin, as `RoverEnv.reset` says; nothing has changed. A reset
+                with another seed or other options helps.
+        """
+        if self._waiting:
+            self._restart(self._waiting)
+            self._waiting = []
+        outcome, terminated, timed_out = self.batch.step(self._actions)
+        observation = outcome.observation
+        dones = terminated | timed_out
+        infos: list[dict[str, Any]] = [{"TimeLimit.truncated": False} for _ in range(self.num_envs)]
+        if dones.any():
+            ended = np.flatnonzero(dones).tolist()
+            for i in ended:
+                last = outcome.info(i)
+                last["TimeLimit.truncated"] = bool(timed_out[i] and not terminated[i])
+                last["terminal_observation"] = observation[i].copy()
+                infos[i] = last
+            try:
+                self._restart(ended)
+            except RoverGymError:
+                self._waiting = ended
+            else:
+                observation[ended] = self.batch.observation[ended]
+        # Only a rover that flies off with 1e37 m/s earns what float32 cannot hold.
+        reward = np.clip(outcome.reward, -LARGEST, LARGEST).astype(np.float32)
+        return observation, reward, dones, infos
+
+    def _restart(self, chosen: list[int]) -> None:
+        with self.batch.beginnings(chosen) as drawn:
+            for i, one in zip(chosen, drawn, strict=True):
+                self.reset_infos[i] = self.batch.begin(i, one)
+
+    def close(self) -> None:
+        """Frees the renderers, if there are any."""
+        for rover in self.batch.rovers:
+            rover.close()
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """An attribute of the rovers, or of the environment that they are made like."""
+        return [self._find(rover, attr_name) for rover in self._chosen(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
+        """Sets an attribute of the rovers' views; those that `RoverEnv` has are not to be set.
+
+        Raises:
+            AttributeError: The attribute is one that `RoverEnv` has.
+        """
+        for rover in self._chosen(indices):
+            if attr_name in vars(self.prototype) or hasattr(RoverEnv, attr_name) or hasattr(BatchRover, attr_name):
+                raise AttributeError(f"{attr_name} of a rover cannot be set; env_method('set_difficulty', ...) can")
+            setattr(rover, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Calls a method of the rovers, such as `set_difficulty`."""
+        return [getattr(rover, method_name)(*method_args, **method_kwargs) for rover in self._chosen(indices)]
+
+    def env_is_wrapped(self, wrapper_class: type[Any], indices: VecEnvIndices = None) -> list[bool]:  # noqa: ARG002
+        """No rover is."""
+        return [False for _ in self._chosen(indices)]
+
+    def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
+        """A frame of every rover, with `render_mode="rgb_array"`; `render()` puts them side by side."""
+        return [rover.render() for rover in self.batch.rovers]
+
+    def _chosen(self, indices: VecEnvIndices) -> list[BatchRover]:
+        return [self.batch.rovers[i] for i in self._get_indices(indices)]
+
+    def _find(self, rover: BatchRover, name: str) -> Any:
+        # Not by hasattr, which would call a property.
+        owner = rover if name in vars(rover) or name in vars(BatchRover) else self.prototype
+        return getattr(owner, name)

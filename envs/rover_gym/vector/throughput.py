@@ -1,0 +1,147 @@
+"""How fast a batch of rovers is, and where its time goes.
+
+Machines are rarely quiet, so everything is measured in many short rounds, one variant after the other, and the fastest
+round of each counts.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Unpack
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.env.arguments import RoverArguments, takes_arguments
+from rover_gym.vector.batch import RoverBatch
+from rover_gym.vector.vector_env import RoverVectorEnv
+
+#: Torques within a fifth of the limit, so that rovers drive about and few turn over.
+_EFFORT = 0.2
+
+
+@dataclass(frozen=True)
+class VectorSpeed:
+    """What was measured; times are those of the fastest round, a step of the whole batch.
+
+    Attributes:
+        num_envs: Rovers.
+        threads: Of the batch.
+        step: A step of `RoverVectorEnv`, automatic resets included, s.
+        physics: Of it, inside the compiled core, s.
+        one_thread: The core's part with one thread, s.
+        all_threads: The core's part with all threads, its own fastest, s.
+        sync: The same of `SyncVectorEnv` over `RoverEnv`, s.
+        reset: Of one rover, s.
+    """
+
+    num_envs: int
+    threads: int
+    step: float
+    physics: float
+    one_thread: float
+    all_threads: float
+    sync: float
+    reset: float
+
+    @property
+    def physics_share(self) -> float:
+        """Of the batch's time."""
+        return self.physics / self.step
+
+    @property
+    def speed_up(self) -> float:
+        """Of the physics, from the further threads."""
+        return self.one_thread / self.all_threads
+
+    @property
+    def gain(self) -> float:
+        """Over `SyncVectorEnv`."""
+        return self.sync / self.step
+
+    @property
+    def steps_per_second(self) -> float:
+        """Environment steps a second."""
+        return self.num_envs / self.step
+
+
+class _TimedSimulations:
+    """Stands before a batch's simulations and adds up the time of their steps."""
+
+    def __init__(self, batch: RoverBatch) -> None:
+        self._inner = batch.simulations
+        self.elapsed = 0.0
+
+    def step(self, *args: Any, **kwargs: Any) -> Any:
+        start = time.perf_counter()
+        result = self._inner.step(*args, **kwargs)
+        self.elapsed += time.perf_counter() - start
+        return result
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._inner, name)
+
+
+@takes_arguments
+def measure_speed(
+    num_envs: int = 64,
+    threads: int | None = None,
+    *,
+    rounds: int = 200,
+    steps: int = 1,
+    progress: Callable[[], object] = lambda: None,
+    **arguments: Unpack[RoverArguments],
+) -> VectorSpeed:
+    """Steps batches with one thread and with more, and a `SyncVectorEnv`, by the same actions.
+
+    Args:
+        num_envs: Rovers.
+        threads: Of the batch; None for one a core.
+        rounds: How often each is measured.
+        steps: In a round.
+        progress: Called after each round.
+        **arguments: Those of `RoverEnv`.
+    """
+    several = RoverVectorEnv(num_envs, threads=threads, **arguments)
+    single = RoverVectorEnv(num_envs, threads=1, **arguments)
+    sync = gym.make_vec("Rover-v0", num_envs=num_envs, vectorization_mode="sync", **arguments)
+    watches = []
+    for env in (several, single):
+        watch: Any = _TimedSimulations(env.batch)
+        env.batch.simulations = watch
+        watches.append(watch)
+    start = time.perf_counter()
+    several.reset(seed=0)
+    reset = (time.perf_counter() - start) / num_envs
+    single.reset(seed=0)
+    sync.reset(seed=0)
+    rng = np.random.default_rng(0)
+    times: list[tuple[float, float, float, float]] = []
+    for _ in range(rounds + 1):
+        actions = rng.uniform(-_EFFORT, _EFFORT, (steps, num_envs, 12)).astype(np.float32)
+        for watch in watches:
+            watch.elapsed = 0.0
+        whole, _, of_sync = (_mean_step(env, actions) for env in (several, single, sync))
+        times.append((whole, watches[0].elapsed / steps, watches[1].elapsed / steps, of_sync))
+        progress()
+    # The first round warms up. Share and total are of one round, the fastest.
+    measured = times[1:]
+    step, physics, _, _ = min(measured)
+    return VectorSpeed(
+        num_envs=num_envs,
+        threads=several.batch.simulations.threads,
+        step=step,
+        physics=physics,
+        one_thread=min(row[2] for row in measured),
+        all_threads=min(row[1] for row in measured),
+        sync=min(row[3] for row in measured),
+        reset=reset,
+    )
+
+
+def _mean_step(env: gym.vector.VectorEnv[Any, Any, Any], actions: npt.NDArray[np.float32]) -> float:
+    start = time.perf_counter()
+    for action in actions:
+        env.step(action)
+    return (time.perf_counter() - start) / len(actions)

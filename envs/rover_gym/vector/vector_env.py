@@ -1,0 +1,175 @@
+"""`RoverVectorEnv`: many rovers as one vector environment of Gymnasium, what `gymnasium.make_vec` makes."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any, Unpack
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from rover_gym.env.arguments import RoverArguments, takes_arguments
+from rover_gym.env.beginning import spread_seeds
+from rover_gym.env.quantities import Array, Mask, Observations
+from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
+from rover_gym.env.wheels import N_ACTIONS
+from rover_gym.mechanics import OptionError, RoverGymError
+from rover_gym.validation import mapping, refuse
+from rover_gym.vector.batch import RoverBatch
+
+_Info = dict[str, Any]
+
+
+class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
+    """Rovers that are stepped by the compiled core, many at a time, on several threads.
+
+    Each goes bit for bit as a `RoverEnv` of the same arguments and seed would, inside a `TimeLimit` and a
+    `SyncVectorEnv`, which gives the same arrays and infos, only slower.
+
+    Args:
+        num_envs: How many rovers.
+        threads: That step them; None for one a core.
+        max_episode_steps: Steps until truncation; None for never.
+        autoreset_mode: `"NextStep"`, `"SameStep"` or `"Disabled"`, as Gymnasium defines them.
+        **arguments: Those of `RoverEnv`.
+    """
+
+    @takes_arguments
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        threads: int | None = None,
+        max_episode_steps: int | None = MAX_EPISODE_STEPS,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        **arguments: Unpack[RoverArguments],
+    ) -> None:
+        super().__init__()
+        self.autoreset_mode = _check_mode(autoreset_mode)
+        self.batch = RoverBatch(num_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments)
+        self.prototype = self.batch.prototype
+        self.num_envs = self.batch.n
+        self.metadata = {**self.prototype.metadata, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = self.prototype.render_mode
+        self.single_observation_space = self.prototype.observation_space
+        self.single_action_space = self.prototype.action_space
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._ended: Mask = np.zeros(self.num_envs, np.bool_)
+
+    @property  # type: ignore[override] # as SyncVectorEnv's
+    def np_random(self) -> tuple[np.random.Generator, ...]:
+        """The rovers' random generators."""
+        return self.get_attr("np_random")
+
+    @np_random.setter
+    def np_random(self, value: object) -> None:  # noqa: ARG002 - a setter must take it
+        raise AttributeError("the rovers have random generators of their own: reset(seed=...) makes them anew")
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The seeds that they were made from."""
+        return self.get_attr("np_random_seed")
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: _Info | None = None
+    ) -> tuple[Observations, _Info]:
+        """Starts episodes.
+
+        Args:
+            seed: Of the first rover, then one more from rover to rover; or one a rover.
+            options: Those of `RoverEnv.reset`, for every rover, and `reset_mask`, `(num_envs,)` bool: the rovers to
+                reset, where it is not all; the others go on.
+
+        A reset that is refused changes nothing, of no rover.
+
+        Raises:
+            OptionError: A seed is no whole number from 0, or an option is unknown or out of its range.
+            StateError: As `RoverEnv.reset`.
+            TerrainError: As `RoverEnv.reset`.
+        """
+        seeds = spread_seeds(seed, self.num_envs)
+        given = dict(mapping("options", options))
+        chosen = self._check_mask(given.pop("reset_mask")) if "reset_mask" in given else list(range(self.num_envs))
+        fixed = self.batch.check_options(given)
+        infos: _Info = {}
+        with self.batch.beginnings(chosen, [seeds[i] for i in chosen], fixed) as drawn:
+            for i, one in zip(chosen, drawn, strict=True):
+                infos = self._add_info(infos, self.batch.begin(i, one), i)
+                self._ended[i] = False
+        return self.batch.observation, infos
+
+    def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observations, Array, Mask, Mask, _Info]:
+        """Applies actions `(num_envs, 12)` for one control period.
+
+        An episode that cannot begin is refused before anything moves; with autoreset in the same step, that is by the
+        step after.
+
+        Raises:
+            CommandError: The actions have a wrong shape or an entry that is not finite or outside [-1, 1]; nothing
+                has changed.
+            TerrainError: A rover's next episode cannot begin, as `RoverEnv.reset` says; nothing has changed. A reset
+                with another seed or other options helps.
+            ResetNeeded: A rover has not been reset, or, where autoreset is disabled, its episode has ended.
+        """
+        commands = check_actions(actions, (self.num_envs, N_ACTIONS))
+        # These do not move: their episode starts in this step.
+        starting: list[int] = np.flatnonzero(self._ended).tolist()
+        if starting and self.autoreset_mode == AutoresetMode.DISABLED:
+            raise ResetNeeded(f"rovers {starting}: call reset() with reset_mask first")
+        with self.batch.beginnings(starting) as drawn:
+            outcome, terminated, truncated = self.batch.step(commands, ~self._ended if starting else None)
+            observation, reward, infos = outcome.observation, outcome.reward, outcome.vector_info()
+            for i, one in zip(starting, drawn, strict=True):
+                reward[i], terminated[i], truncated[i] = 0.0, False, False
+                self._add_info(infos, self.batch.begin(i, one), i)
+        self._ended = terminated | truncated
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
+            ended: list[int] = np.flatnonzero(self._ended).tolist()
+            last = [outcome.info(i) for i in ended]
+            for i, info in zip(ended, last, strict=True):
+                self._add_info(infos, {"final_obs": observation[i].copy(), "final_info": info}, i)
+            # What is refused here stays ended, and the next step raises it.
+            with suppress(RoverGymError), self.batch.beginnings(ended) as drawn:
+                for i, one in zip(ended, drawn, strict=True):
+                    self._add_info(infos, self.batch.begin(i, one), i)
+                self._ended = np.zeros(self.num_envs, np.bool_)
+                starting += ended
+        if starting:
+            observation[starting] = self.batch.observation[starting]
+        return observation, reward, terminated, truncated, infos
+
+    def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
+        """A frame of every rover, with `render_mode="rgb_array"`; None without."""
+        frames = tuple(frame for rover in self.batch.rovers if (frame := rover.render()) is not None)
+        return frames or None
+
+    def close_extras(self, **kwargs: Any) -> None:  # noqa: ARG002 - Gymnasium's signature
+        """Frees the renderers, if there are any."""
+        for rover in self.batch.rovers:
+            rover.close()
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Calls a method of every rover, such as `set_difficulty`, or gets an attribute."""
+        found = [getattr(rover, name) for rover in self.batch.rovers]
+        return tuple(each(*args, **kwargs) if callable(each) else each for each in found)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """An attribute of every rover, by the names that `RoverEnv` has."""
+        return tuple(getattr(rover, name) for rover in self.batch.rovers)
+
+    def _check_mask(self, mask: object) -> list[int]:
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
+            refuse(OptionError, "options.reset_mask", mask, f"must be an array of {self.num_envs} bool")
+        return [int(i) for i in np.flatnonzero(mask)]
+
+
+def _check_mode(mode: object) -> AutoresetMode:
+    if isinstance(mode, AutoresetMode):
+        return mode
+    modes = {known.value: known for known in AutoresetMode}
+    if not (isinstance(mode, str) and mode in modes):
+        refuse(OptionError, "autoreset_mode", mode, f"must be one of {', '.join(modes)}")
+    return modes[mode]

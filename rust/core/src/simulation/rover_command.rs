@@ -1,0 +1,311 @@
+//! What a rover is told: wheel torques, steering, held joints, brakes.
+
+use serde::{Deserialize, Serialize};
+
+use super::error::CommandError;
+use super::rover::RoverSimulation;
+use crate::multibody::Model;
+use crate::system::{Command, Drive, HeldJoint};
+
+/// Torques and set-points of a rover.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RoverCommand {
+    /// What the actuators do.
+    pub actuators: Command,
+    /// Driving torque of each wheel, positive forward, N m.
+    pub wheel_torque: Vec<f64>,
+    /// Torque about each joint's axis that comes on top, N m.
+    pub joint_torque: Vec<f64>,
+}
+
+impl RoverCommand {
+    /// No torque; steering joints held at zero with the model's gains, all others free.
+    #[must_use]
+    pub fn idle(model: &Model) -> Self {
+        let mut actuators = Command::idle(model);
+        for wheel in model.wheels() {
+            if let Some(j) = wheel.joint {
+                actuators.drives[j] = Some(Drive {
+                    torque: 0.0,
+                    motor: wheel.motor,
+                });
+            }
+            if let Some(j) = wheel.steering {
+                let hold = model.hold(j);
+                actuators.held[j] = Some(HeldJoint {
+                    set_point: 0.0,
+                    stiffness: hold.stiffness,
+                    damping: hold.damping,
+                });
+            }
+        }
+        Self {
+            actuators,
+            wheel_torque: vec![0.0; model.wheels().len()],
+            joint_torque: vec![0.0; model.n_joints()],
+        }
+    }
+
+    /// Whether it is of this model, its motors are the model's, and all of its numbers are finite.
+    pub(super) fn is_of(&self, model: &Model) -> bool {
+        let own = Self::idle(model);
+        let Command {
+            torque,
+            drives,
+            held,
+        } = &self.actuators;
+        let is_drive = |(theirs, own): (&Option<Drive>, &Option<Drive>)| {
+            theirs.is_some() == own.is_some()
+                && theirs.is_none_or(|d| d.torque.is_finite())
+                && theirs.and_then(|d| d.motor) == own.and_then(|d| d.motor)
+        };
+        let gains = held.iter().flatten();
+        let gains = gains.flat_map(|h| [h.set_point, h.stiffness, h.damping]);
+        let torques = [torque, &self.wheel_torque, &self.joint_torque];
+        self.wheel_torque.len() == own.wheel_torque.len()
+            && [
+                torque.len(),
+                self.joint_torque.len(),
+                held.len(),
+                drives.len(),
+            ] == [model.n_joints(); 4]
+            && drives.iter().zip(&own.actuators.drives).all(is_drive)
+            && torques.into_iter().flatten().all(|x| x.is_finite())
+            && gains.into_iter().all(f64::is_finite)
+    }
+}
+
+impl RoverSimulation {
+    /// Commanded driving torque of each wheel, positive forward, within its limit (N m).
+    #[must_use]
+    pub fn wheel_torques(&self) -> &[f64] {
+        &self.command.wheel_torque
+    }
+
+    /// Sets the driving torques (N m, positive forward); each saturates at its wheel's limit.
+    ///
+    /// # Errors
+    /// Wrong length or an entry that is not finite; nothing is changed then.
+    pub fn set_wheel_torques(&mut self, torques: &[f64]) -> Result<(), CommandError> {
+        check("torques", torques, self.scene.model.wheels().len())?;
+        for ((own, torque), wheel) in self
+            .command
+            .wheel_torque
+            .iter_mut()
+            .zip(torques)
+            .zip(self.scene.model.wheels())
+        {
+            *own = torque.clamp(-wheel.torque_limit, wheel.torque_limit);
+        }
+        self.combine_torques();
+        Ok(())
+    }
+
+    /// Sets torques about the joint axes (n_joints, N m) that come on top of the wheels' and have no limit.
+    ///
+    /// # Errors
+    /// Wrong length or an entry that is not finite; nothing is changed then.
+    pub fn set_joint_torques(&mut self, torques: &[f64]) -> Result<(), CommandError> {
+        check("torques", torques, self.scene.model.n_joints())?;
+        self.command.joint_torque.copy_from_slice(torques);
+        self.combine_torques();
+        Ok(())
+    }
+
+    fn combine_torques(&mut self) {
+        self.command
+            .actuators
+            .torque
+            .copy_from_slice(&self.command.joint_torque);
+        for drive in self.command.actuators.drives.iter_mut().flatten() {
+            drive.torque = 0.0;
+        }
+        for (wheel, torque) in self
+            .scene
+            .model
+            .wheels()
+            .iter()
+            .zip(&self.command.wheel_torque)
+        {
+            if let Some(drive) = wheel
+                .joint
+                .and_then(|j| self.command.actuators.drives[j].as_mut())
+            {
+                drive.torque += wheel.drive_sign * torque;
+            }
+        }
+    }
+
+    /// Steering set-point of each wheel, rad; 0 where its steering is not held or is locked.
+    #[must_use]
+    pub fn steering(&self) -> Vec<f64> {
+        let of = |j: usize| self.command.actuators.held[j].map_or(0.0, |h| h.set_point);
+        self.model()
+            .wheels()
+            .iter()
+            .map(|w| w.steering.map_or(0.0, of))
+            .collect()
+    }
+
+    /// Holds the steering joints at set-points (rad, one a wheel) with the model's gains.
+    ///
+    /// # Errors
+    /// Wrong length, not finite, beyond the wheel's limit, or nonzero where there is no free steering joint.
+    pub fn set_steering(&mut self, set_points: &[f64]) -> Result<(), CommandError> {
+        self.check_steering(set_points)?;
+        for (&set_point, wheel) in set_points.iter().zip(self.scene.model.wheels()) {
+            if let Some(j) = wheel.steering {
+                let hold = self.scene.model.hold(j);
+                let held = self.command.actuators.held[j];
+                let (stiffness, damping) =
+                    held.map_or((hold.stiffness, hold.damping), |h| (h.stiffness, h.damping));
+                self.command.actuators.held[j] = Some(HeldJoint {
+                    set_point,
+                    stiffness,
+                    damping,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_steering(&self, set_points: &[f64]) -> Result<(), CommandError> {
+        check("set_points", set_points, self.scene.model.wheels().len())?;
+        for (index, (&value, wheel)) in set_points.iter().zip(self.scene.model.wheels()).enumerate()
+        {
+            let limit = if wheel.steering.is_some() {
+                wheel.steering_limit
+            } else {
+                0.0
+            };
+            if value.abs() > limit * (1.0 + 1e-12) {
+                return Err(CommandError::BeyondLimit {
+                    field: "set_points",
+                    index,
+                    value,
+                    limit,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// [`Self::set_wheel_torques`] and [`Self::set_steering`] in one: both or neither.
+    ///
+    /// # Errors
+    /// As these two; nothing is changed then.
+    pub fn set_commands(
+        &mut self,
+        torques: &[f64],
+        set_points: &[f64],
+    ) -> Result<(), CommandError> {
+        self.check_commands(torques, set_points)?;
+        self.set_wheel_torques(torques)?;
+        self.set_steering(set_points)
+    }
+
+    /// Whether [`Self::set_wheel_torques`] and [`Self::set_steering`] would take these.
+    ///
+    /// # Errors
+    /// As these two.
+    pub fn check_commands(&self, torques: &[f64], set_points: &[f64]) -> Result<(), CommandError> {
+        check("torques", torques, self.scene.model.wheels().len())?;
+        self.check_steering(set_points)
+    }
+
+    /// Holds joints by name; set-points default to where they are, gains to the model's.
+    ///
+    /// # Errors
+    /// An unknown joint, a wrong number of set-points, a gain that is negative or not finite; nothing is changed then.
+    pub fn hold(
+        &mut self,
+        joints: &[String],
+        set_points: Option<&[f64]>,
+        stiffness: Option<f64>,
+        damping: Option<f64>,
+    ) -> Result<(), CommandError> {
+        let indices = self.joint_indices(joints)?;
+        if let Some(points) = set_points {
+            check("set_points", points, joints.len())?;
+        }
+        for (field, gain) in [("stiffness", stiffness), ("damping", damping)] {
+            if let Some(value) = gain {
+                check(field, &[value], 1)?;
+                if value < 0.0 {
+                    return Err(CommandError::Negative { field, value });
+                }
+            }
+        }
+        for (i, &j) in indices.iter().enumerate() {
+            let hold = self.scene.model.hold(j);
+            self.command.actuators.held[j] = Some(HeldJoint {
+                set_point: set_points.map_or(self.state.configuration.joints[j], |p| p[i]),
+                stiffness: stiffness.unwrap_or(hold.stiffness),
+                damping: damping.unwrap_or(hold.damping),
+            });
+        }
+        Ok(())
+    }
+
+    /// Lets joints go by name.
+    ///
+    /// # Errors
+    /// An unknown joint; nothing is changed then.
+    pub fn release(&mut self, joints: &[String]) -> Result<(), CommandError> {
+        for j in self.joint_indices(joints)? {
+            self.command.actuators.held[j] = None;
+        }
+        Ok(())
+    }
+
+    /// Holds all wheels where they are and takes their torques away.
+    pub fn brake(&mut self) {
+        self.command.wheel_torque.fill(0.0);
+        self.combine_torques();
+        for wheel in self.scene.model.wheels() {
+            if let Some(j) = wheel.joint {
+                let hold = self.scene.model.hold(j);
+                let set_point = self.state.configuration.joints[j];
+                self.command.actuators.held[j] = Some(HeldJoint {
+                    set_point,
+                    stiffness: hold.stiffness,
+                    damping: hold.damping,
+                });
+            }
+        }
+    }
+
+    fn joint_indices(&self, joints: &[String]) -> Result<Vec<usize>, CommandError> {
+        let index = |name: &String| {
+            let found = self.scene.model.joint_index(name);
+            found.ok_or_else(|| CommandError::UnknownJoint {
+                field: "joints",
+                name: name.clone(),
+            })
+        };
+        joints.iter().map(index).collect()
+    }
+}
+
+/// A command of `expected` finite entries.
+pub(super) fn check(
+    field: &'static str,
+    values: &[f64],
+    expected: usize,
+) -> Result<(), CommandError> {
+    if values.len() != expected {
+        return Err(CommandError::Length {
+            field,
+            expected,
+            actual: values.len(),
+        });
+    }
+    match values.iter().position(|x| !x.is_finite()) {
+        Some(index) => Err(CommandError::NotFinite {
+            field,
+            index,
+            value: values[index],
+        }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,63 @@
+//! Where a rover touches the ground, and how hard.
+
+use super::rover::RoverSimulation;
+use crate::contact::{Activation, Contact, ContactFrame, Part, detect, detection::wheel_contacts};
+
+impl RoverSimulation {
+    /// Nearest point, frame and gap of every wheel now.
+    #[must_use]
+    pub fn wheel_contacts(&self) -> Vec<Contact> {
+        wheel_contacts(self.model(), &self.kinematics(), &**self.terrain())
+    }
+
+    /// Deepest gap (m) of any wheel or box with the ground now: 0 where nothing overlaps, else negative.
+    #[must_use]
+    pub fn deepest_overlap(&self) -> f64 {
+        let mut contacts = Vec::new();
+        let (kinematics, at_rest) = (self.kinematics(), vec![0.0; self.model().nv()]);
+        let touching = Activation::default();
+        detect(
+            self.model(),
+            &kinematics,
+            &kinematics,
+            &**self.terrain(),
+            &at_rest,
+            &touching,
+            &mut contacts,
+        );
+        contacts
+            .iter()
+            .fold(0.0, |deepest, contact| deepest.min(contact.gap))
+    }
+
+    /// Mean contact force of the last step on every wheel along its frame's n, t, b, N.
+    ///
+    /// Several contacts of one wheel are summed in the frame of its first.
+    #[must_use]
+    pub fn wheel_forces(&self) -> Vec<[f64; 3]> {
+        let mut forces = vec![[0.0; 3]; self.model().wheels().len()];
+        let mut frames: Vec<Option<ContactFrame>> = vec![None; forces.len()];
+        for active in &self.active {
+            if let Part::Wheel(i) = active.contact.part {
+                let [n, t, b] = active.contact.frame.rows();
+                let [p_n, p_t, p_b] = active.impulse;
+                let impulse = n * p_n + t * p_t + b * p_b;
+                let frame = frames[i].get_or_insert(active.contact.frame);
+                for (force, d) in forces[i].iter_mut().zip(frame.rows()) {
+                    *force += impulse.dot(&d) / self.options.time_step;
+                }
+            }
+        }
+        forces
+    }
+
+    /// Mean normal force of the last step on all that is no wheel, N.
+    #[must_use]
+    pub fn body_force(&self) -> f64 {
+        let boxes = self
+            .active
+            .iter()
+            .filter(|a| matches!(a.contact.part, Part::Box(_)));
+        boxes.map(|a| a.impulse[0]).sum::<f64>() / self.options.time_step
+    }
+}

@@ -1,0 +1,326 @@
+//! A scene through time.
+
+use super::active_contact::{ActiveContact, Components, LocatedContact};
+use super::error::SnapshotError;
+use super::profile::Stopwatch;
+use super::scene::{DenseOperator, Scene, SceneKey, SceneScratch, StepTaken};
+use super::snapshot::Snapshot;
+use super::state::State;
+use crate::integrator::{
+    Integrator, NoProbe, OptionsError, Probe, Scratch, StepError, StepOptions, StepReport,
+    WarmStart,
+};
+use crate::multibody::Energy;
+
+/// Steps of a copy that a profile takes before it measures.
+const WARM_UP: usize = 10;
+
+/// A scene, its state and its scratch. What a scene shares, its copies share; everything else is a simulation's own.
+#[derive(Clone, Debug)]
+pub struct Simulation<S: Scene> {
+    pub(super) scene: S,
+    pub(super) options: StepOptions,
+    pub(super) state: State<S::Configuration>,
+    pub(super) command: S::Command,
+    pub(super) memory: S::Memory,
+    pub(super) warm_start: WarmStart<SceneKey<S>>,
+    pub(super) parts: S::Parts,
+    pub(super) scratch: SceneScratch<S>,
+    pub(super) active: Vec<ActiveContact<S::Contact>>,
+    last_report: StepReport,
+}
+
+impl<S: Scene> Simulation<S> {
+    /// At rest in a configuration, with the scene's first command.
+    ///
+    /// # Errors
+    /// An option out of its range.
+    pub fn of(
+        scene: S,
+        configuration: S::Configuration,
+        options: StepOptions,
+    ) -> Result<Self, OptionsError> {
+        options.check()?;
+        let (nv, n) = (scene.nv(), scene.contact_capacity());
+        let d = <S::Contact as LocatedContact>::Vector::N;
+        Ok(Self {
+            command: scene.command(),
+            memory: scene.memory(),
+            parts: scene.parts(),
+            scratch: Scratch::new(&configuration, nv, n, d),
+            state: State::at_rest(configuration, nv),
+            warm_start: WarmStart::with_capacity(n, nv),
+            active: Vec::with_capacity(n),
+            last_report: StepReport::default(),
+            scene,
+            options,
+        })
+    }
+
+    /// The description.
+    #[must_use]
+    pub fn scene(&self) -> &S {
+        &self.scene
+    }
+
+    /// Options of every step.
+    #[must_use]
+    pub fn options(&self) -> &StepOptions {
+        &self.options
+    }
+
+    /// Where it is and how fast.
+    #[must_use]
+    pub fn state(&self) -> &State<S::Configuration> {
+        &self.state
+    }
+
+    /// Configuration.
+    #[must_use]
+    pub fn q(&self) -> &S::Configuration {
+        &self.state.configuration
+    }
+
+    /// Velocity (nv).
+    #[must_use]
+    pub fn v(&self) -> &[f64] {
+        &self.state.v
+    }
+
+    /// s.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.state.time
+    }
+
+    /// What is commanded.
+    #[must_use]
+    pub fn command(&self) -> &S::Command {
+        &self.command
+    }
+
+    /// Matrices of the last step.
+    #[must_use]
+    pub fn parts(&self) -> &S::Parts {
+        &self.parts
+    }
+
+    /// Contacts of the last step.
+    #[must_use]
+    pub fn contacts(&self) -> &[ActiveContact<S::Contact>] {
+        &self.active
+    }
+
+    /// Report of the last call of [`Self::step`]; empty before any, and where one could not be taken.
+    #[must_use]
+    pub fn last_report(&self) -> &StepReport {
+        &self.last_report
+    }
+
+    /// Kinetic and potential energy now, J.
+    #[must_use]
+    pub fn energy(&self) -> Energy {
+        self.scene.energy(&self.options, &self.state)
+    }
+
+    /// Sets configuration and velocity; time 0, warm start and memory forgotten, the command kept.
+    ///
+    /// # Panics
+    /// If the velocity is another scene's.
+    pub fn place(&mut self, configuration: S::Configuration, v: Vec<f64>) {
+        assert_eq!(
+            v.len(),
+            self.scene.nv(),
+            "invariant: a velocity of this scene"
+        );
+        self.state = State {
+            configuration,
+            v,
+            time: 0.0,
+        };
+        self.memory = self.scene.memory();
+        self.warm_start.clear();
+        self.forget_last_call();
+    }
+
+    /// Forgets what the last call of [`Self::step`] came to.
+    pub(super) fn forget_last_call(&mut self) {
+        self.active.clear();
+        self.scene.begin_call(&mut self.parts);
+        self.last_report = StepReport::default();
+    }
+
+    /// Takes `n` steps, or stops at the first that fails, keeping the state before it.
+    ///
+    /// # Errors
+    /// See [`StepError`]. A solver that did not converge is no error: see the report.
+    pub fn step(&mut self, n: usize) -> Result<StepReport, StepError> {
+        self.step_while(n, &mut || true)
+    }
+
+    /// The same, but stops after a whole step once `go_on`, which is asked after each, says no.
+    ///
+    /// The report's `steps` says how many were taken.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_while(
+        &mut self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<StepReport, StepError> {
+        let variant = self.options.variant;
+        self.call(&variant, n, go_on, &mut NoProbe)
+    }
+
+    /// Takes `n` steps of another scheme, with the same options.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_with<I>(&mut self, integrator: &I, n: usize) -> Result<StepReport, StepError>
+    where
+        I: for<'a> Integrator<S::System<'a>>,
+    {
+        self.call(integrator, n, &mut || true, &mut NoProbe)
+    }
+
+    /// Takes `n` steps of a copy and says where their time went; `go_on` as for [`Self::step_while`].
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn profile(
+        &self,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<Stopwatch, StepError> {
+        let mut copy = self.clone();
+        let variant = copy.options.variant;
+        copy.call(&variant, n.min(WARM_UP), go_on, &mut NoProbe)?;
+        let mut stopwatch = Stopwatch::start();
+        let report = copy.call(&variant, n, go_on, &mut stopwatch)?;
+        stopwatch.finish(report.steps);
+        Ok(stopwatch)
+    }
+
+    /// One call: its report is kept.
+    fn call<I>(
+        &mut self,
+        integrator: &I,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError>
+    where
+        I: for<'a> Integrator<S::System<'a>>,
+    {
+        self.scene.begin_call(&mut self.parts);
+        let result = self.steps(integrator, n, go_on, probe);
+        self.last_report = result.clone().unwrap_or_default();
+        result
+    }
+
+    fn steps<I>(
+        &mut self,
+        integrator: &I,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError>
+    where
+        I: for<'a> Integrator<S::System<'a>>,
+    {
+        let mut total = StepReport::default();
+        for _ in 0..n {
+            let mut system = self
+                .scene
+                .system(&self.command, &self.memory, &mut self.parts);
+            let report = integrator.step(
+                &mut system,
+                &self.options,
+                self.state.as_mut(),
+                &mut self.warm_start,
+                &mut self.scratch,
+                probe,
+            )?;
+            drop(system);
+            total.merge(&report);
+            self.list_active();
+            self.scene.after_step(StepTaken {
+                options: &self.options,
+                state: &mut self.state,
+                memory: &mut self.memory,
+                parts: &mut self.parts,
+                warm_start: &mut self.warm_start,
+                scratch: &self.scratch,
+            });
+            if !go_on() {
+                break;
+            }
+        }
+        Ok(total)
+    }
+
+    fn list_active(&mut self) {
+        let d = <S::Contact as LocatedContact>::Vector::N;
+        let (scene, parts) = (&self.scene, &self.parts);
+        let impulses = self.scratch.impulses().chunks_exact(d);
+        let local = impulses.zip(self.scratch.velocities().chunks_exact(d));
+        let active = |(contact, (p, u)): (&S::Contact, (&[f64], &[f64]))| ActiveContact {
+            contact: *contact,
+            position: scene.position(parts, contact),
+            impulse: Components::of(p),
+            velocity: Components::of(u),
+        };
+        self.active.clear();
+        self.active
+            .extend(self.scratch.contacts().iter().zip(local).map(active));
+    }
+
+    /// Everything that is needed to continue bit for bit.
+    #[must_use]
+    pub fn snapshot(&self) -> Snapshot<S> {
+        Snapshot {
+            scene: self.scene.fingerprint(),
+            state: self.state.clone(),
+            command: self.command.clone(),
+            memory: self.memory.clone(),
+            warm_start: self.warm_start.clone(),
+            active: self.active.clone(),
+        }
+    }
+
+    /// Goes back to a snapshot.
+    ///
+    /// # Errors
+    /// A snapshot of another scene or with damaged contents; nothing is changed then.
+    pub fn restore(&mut self, snapshot: &Snapshot<S>) -> Result<(), SnapshotError> {
+        if snapshot.scene != self.scene.fingerprint() {
+            return Err(SnapshotError::OtherModel);
+        }
+        if !(snapshot.is_sound(self.scene.nv()) && self.scene.admits(snapshot)) {
+            return Err(SnapshotError::Damaged);
+        }
+        self.state.clone_from(&snapshot.state);
+        self.command.clone_from(&snapshot.command);
+        self.memory.clone_from(&snapshot.memory);
+        self.warm_start.clone_from(&snapshot.warm_start);
+        self.forget_last_call();
+        self.active.clone_from(&snapshot.active);
+        Ok(())
+    }
+}
+
+impl<S: Scene> Simulation<S>
+where
+    S::Parts: DenseOperator,
+{
+    /// The last step's friction-contact problem: W (row-major), free velocity, friction.
+    #[must_use]
+    pub fn last_problem(&self) -> (&[f64], &[f64], &[f64]) {
+        (
+            self.parts.operator(),
+            self.scratch.free_velocity(),
+            self.scratch.friction_coefficients(),
+        )
+    }
+}

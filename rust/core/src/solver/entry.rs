@@ -1,0 +1,344 @@
+//! A solve from the caller's problem to the judged answer: dimension, storage, units, method, report.
+
+use super::options::{ContactLaw, Method, SolverOptions};
+use super::reference::relaxed;
+use super::report::{Outcome, Rung, Rungs, SolveReport, SolveStatus, Stage};
+use super::scratch::Scratch;
+use super::stage::{admm, gauss_seidel, newton, proximal};
+use super::strategy::auto;
+use super::strategy::islands::IslandSolver;
+use super::strategy::many_bodies::{self, ManyBodies};
+use super::work::{SweepBudget, Work};
+use super::workspace::SolverWorkspace;
+use crate::problem::{
+    Dimension, FrictionContactProblem, Operator, Prepared, evaluate_into, power_of_two,
+};
+
+/// Solves `K_μ* ∋ ũ ⊥ p ∈ K_μ`, `u = W p + q`.
+///
+/// `p` (n), N s: in, the warm start or zeros; out, the impulses, inside the friction cones up to the report's residual.
+/// `u` (n), m/s: out, `W p + q` of the returned `p`. `workspace` may have served any other problem before; it influences
+/// no bit of the answer, and allocates only when a problem is larger than all before.
+///
+/// From `p = 0` and few contacts the answer is the one next to zero (Tikhonov's limit), so a symmetric problem has a
+/// symmetric answer and the order of the contacts does not matter; from a warm start it is the one next to the warm start.
+///
+/// Not converged is an answer, see [`SolveStatus`]: then `p` is the best impulse met by any stage. The work is bounded, see
+/// [`SolverOptions::budget`]. Where `q = 0` the answer is zero, whatever the warm start. Data or warm start that are not finite
+/// never come out again: with bad data `p` and `u` are zero and the status is [`SolveStatus::NonFinite`]; a bad warm start
+/// counts as zeros.
+///
+/// # Panics
+/// If `p` or `u` has not the problem's number of unknowns.
+pub fn solve(
+    problem: &FrictionContactProblem<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    workspace: &mut SolverWorkspace,
+) -> SolveReport {
+    assert!(
+        p.len() == problem.n_unknowns(),
+        "p must have one entry per unknown"
+    );
+    assert!(
+        u.len() == problem.n_unknowns(),
+        "u must have one entry per unknown"
+    );
+    match problem.dimension() {
+        Dimension::Two => solve_in::<2>(problem, options, p, u, workspace),
+        Dimension::Three => solve_in::<3>(problem, options, p, u, workspace),
+    }
+}
+
+/// Solves the contacts of very many free bodies: [`Method::Auto`] and [`Method::GaussSeidel`] sweep over their pairs and need no `W`.
+///
+/// `p`, `u`, `workspace` and the report are as [`solve`]'s. The sweeps end at `max_sweeps`, the budget is that of what comes after them.
+///
+/// # Panics
+/// If a length does not fit.
+pub fn solve_many_bodies(
+    bodies: &ManyBodies<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    workspace: &mut SolverWorkspace,
+) -> SolveReport {
+    let mut sweeps = std::mem::take(&mut workspace.body_sweeps);
+    let mut solve_whole =
+        |problem: &FrictionContactProblem<'_>,
+         options: &SolverOptions,
+         p: &mut [f64],
+         u: &mut [f64]| solve(problem, options, p, u, workspace);
+    let report = many_bodies::solve(bodies, options, p, u, &mut sweeps, &mut solve_whole);
+    workspace.body_sweeps = sweeps;
+    report
+}
+
+/// Solves in dimension `D`, see [`solve`].
+fn solve_in<const D: usize>(
+    problem: &FrictionContactProblem<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    workspace: &mut SolverWorkspace,
+) -> SolveReport {
+    if p.iter().any(|x| !x.is_finite()) {
+        p.fill(0.0);
+    }
+    let q = problem.free_velocity();
+    if q.iter().all(|q| *q == 0.0) {
+        return at_rest(problem, options.method, p, u);
+    }
+    let report = solve_with_scales::<D>(problem, options, p, u, workspace, false);
+    match report {
+        Some(report) => report,
+        None => solve_scaled::<D>(problem, options, p, u, workspace),
+    }
+}
+
+/// Nothing moves and nothing is pushed: `p = 0` and `u = 0`.
+fn at_rest(
+    problem: &FrictionContactProblem<'_>,
+    method: Method,
+    p: &mut [f64],
+    u: &mut [f64],
+) -> SolveReport {
+    p.fill(0.0);
+    u.fill(0.0);
+    let is_finite = problem
+        .operator()
+        .first_non_finite(problem.n_unknowns())
+        .is_none();
+    let status = match method.law() {
+        _ if !is_finite => SolveStatus::NonFinite,
+        ContactLaw::Coulomb => SolveStatus::Converged,
+        ContactLaw::Relaxed => SolveStatus::SolvedRelaxed,
+    };
+    report_of(status, method)
+}
+
+/// A report of no work at all.
+fn report_of(status: SolveStatus, method: Method) -> SolveReport {
+    let residual = if status == SolveStatus::NonFinite {
+        f64::INFINITY
+    } else {
+        0.0
+    };
+    let mut rungs = Rungs::default();
+    rungs.push(Rung {
+        stage: Stage::AtRest,
+        status,
+        iterations: 0,
+    });
+    SolveReport {
+        status,
+        iterations: 0,
+        work: 0,
+        residual,
+        velocity_error: residual,
+        method: match method {
+            Method::Auto => Stage::AtRest.method(),
+            method => method,
+        },
+        stage: Stage::AtRest,
+        rungs,
+    }
+}
+
+/// Solves the problem as it is; `None`, and nothing done, where `|q|` or the mean diagonal of `W` is so large or small that squares
+/// overflow or vanish, unless `at_any_scale`.
+fn solve_with_scales<const D: usize>(
+    problem: &FrictionContactProblem<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    workspace: &mut SolverWorkspace,
+    at_any_scale: bool,
+) -> Option<SolveReport> {
+    const LARGEST: f64 = 1e60;
+    let SolverWorkspace {
+        scales,
+        storage,
+        scratch,
+        islands,
+        nested,
+        ..
+    } = workspace;
+    let (n_contacts, n) = (problem.n_contacts(), problem.n_unknowns());
+    let W = storage.choose(problem, options.direct_contacts);
+    scales.resize(n_contacts);
+    scratch.fit(n_contacts, n, W);
+    let data = Prepared::new::<D>(problem, W, scales);
+    let is_sound = [data.inverse_speed, data.mean_diagonal]
+        .iter()
+        .all(|x| *x > 1.0 / LARGEST && *x < LARGEST);
+    if !(is_sound || at_any_scale) {
+        return None;
+    }
+    let mut solve_island =
+        |problem: &FrictionContactProblem<'_>,
+         options: &SolverOptions,
+         p: &mut [f64],
+         u: &mut [f64]| solve(problem, options, p, u, nested.get_or_insert_default());
+    let islands = IslandSolver {
+        islands,
+        solve: &mut solve_island,
+    };
+    Some(judge::<D>(&data, options, p, u, scratch, islands))
+}
+
+/// Runs the method. `u` is `W p + q` on return; `iterations` is advanced by the sweeps and linear solves.
+fn run<const D: usize>(
+    data: &Prepared<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    islands: IslandSolver<'_>,
+    iterations: &mut usize,
+) -> Outcome {
+    let (stage, (status, residual)) = match options.method {
+        Method::Auto => {
+            return auto::escalate::<D>(data, options, p, u, scratch, islands, iterations);
+        }
+        Method::GaussSeidel => {
+            let budget = SweepBudget {
+                sweeps: options.max_sweeps,
+                predict: false,
+            };
+            scratch.start.copy_from_slice(p);
+            let found = gauss_seidel::sweeps::<D>(data, options, budget, p, u, scratch, iterations);
+            (Stage::Sweeps, found)
+        }
+        Method::Newton => {
+            let steps = options.max_newton_steps;
+            let found = newton::full_steps::<D>(data, options, steps, p, u, scratch, iterations);
+            (Stage::Newton, found)
+        }
+        Method::ProximalPoint => {
+            scratch.start.copy_from_slice(p);
+            let found = proximal::solve::<D>(data, options, p, u, scratch, iterations);
+            (Stage::ProximalPoint, found)
+        }
+        Method::Admm => {
+            let found = admm::solve::<D>(data, options, p, u, scratch, iterations);
+            (Stage::Admm, found)
+        }
+        Method::Relaxed => {
+            let found = relaxed::solve::<D>(data, options, p, u, scratch, iterations);
+            (Stage::Relaxed, found)
+        }
+    };
+    Outcome {
+        method: stage.method(),
+        stage,
+        status: scratch.list_stage(stage, status, *iterations),
+        residual,
+    }
+}
+
+/// Runs the method and judges what it returns.
+fn judge<const D: usize>(
+    data: &Prepared<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    islands: IslandSolver<'_>,
+) -> SolveReport {
+    let mut iterations = 0;
+    scratch.work = Work::new(options.budget);
+    scratch.rungs = Rungs::default();
+    let outcome = run::<D>(data, options, p, u, scratch, islands, &mut iterations);
+    let Outcome {
+        method,
+        stage,
+        status,
+        residual,
+    } = outcome;
+    let mut report = SolveReport {
+        status,
+        iterations,
+        work: scratch.work.spent,
+        residual: residual.relative,
+        velocity_error: residual.velocity,
+        method,
+        stage,
+        rungs: scratch.rungs,
+    };
+    // An infinite velocity can hide from the residual of an open contact.
+    let is_finite = residual.is_finite() && p.iter().chain(u.iter()).all(|x| x.is_finite());
+    if status == SolveStatus::NonFinite || !is_finite {
+        refuse(&mut report, p, u);
+    } else if status == SolveStatus::Converged && !data.is_resolved(p) {
+        report.amend(SolveStatus::Stalled);
+    }
+    report
+}
+
+/// The answer is not finite: none is given.
+fn refuse(report: &mut SolveReport, p: &mut [f64], u: &mut [f64]) {
+    p.fill(0.0);
+    u.fill(0.0);
+    (report.residual, report.velocity_error) = (f64::INFINITY, f64::INFINITY);
+    report.amend(SolveStatus::NonFinite);
+}
+
+/// Solves in units of the largest free velocity and the largest diagonal entry of `W`, both taken as powers of two, so that no digit is lost.
+fn solve_scaled<const D: usize>(
+    problem: &FrictionContactProblem<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    workspace: &mut SolverWorkspace,
+) -> SolveReport {
+    let (dimension, n, mu) = (
+        problem.dimension(),
+        problem.n_unknowns(),
+        problem.friction_coefficients(),
+    );
+    let largest = |values: &mut dyn Iterator<Item = f64>| {
+        power_of_two(values.fold(0.0, |m, x: f64| m.max(x.abs())))
+    };
+    let speed = largest(&mut problem.free_velocity().iter().copied());
+    let W = problem.operator();
+    let stiffness = largest(&mut (0..n).map(|k| W.diagonal(dimension, n, k / D, k % D)));
+    let q: Vec<f64> = problem.free_velocity().iter().map(|x| x / speed).collect();
+    let scaled_options = SolverOptions {
+        velocity_tolerance: options.velocity_tolerance / speed,
+        ..*options
+    };
+    for p in &mut *p {
+        *p = *p / speed * stiffness;
+    }
+    let solved = match W {
+        Operator::Dense(W) => {
+            let W: Vec<f64> = W.iter().map(|x| x / stiffness).collect();
+            let scaled = FrictionContactProblem::from_assembled(dimension, &W, &q, mu);
+            solve_with_scales::<D>(&scaled, &scaled_options, p, u, workspace, true)
+        }
+        Operator::BlockSparse(W) => {
+            let W = W.scaled(1.0 / stiffness);
+            let scaled = FrictionContactProblem::from_assembled_sparse(&W, &q, mu);
+            solve_with_scales::<D>(&scaled, &scaled_options, p, u, workspace, true)
+        }
+    };
+    for p in &mut *p {
+        *p = *p * speed / stiffness;
+    }
+    // In the caller's units the impulse may overflow or lose its digits.
+    let residual = evaluate_into(problem, p, u);
+    let is_finite = residual.is_finite() && p.iter().chain(&*u).all(|x| x.is_finite());
+    let mut report = solved.unwrap_or_else(|| report_of(SolveStatus::NonFinite, options.method));
+    if !is_finite {
+        refuse(&mut report, p, u);
+        return report;
+    }
+    let is_as_good = residual.relative <= 2.0 * report.residual.max(options.tolerance);
+    (report.residual, report.velocity_error) = (residual.relative, residual.velocity);
+    if report.status == SolveStatus::Converged && !is_as_good {
+        report.amend(SolveStatus::Stalled);
+    }
+    report
+}

@@ -1,0 +1,500 @@
+//! The linear system of a Newton step, over the unknowns that the predicted modes leave.
+//!
+//! - *open*: `p = 0`, no unknown;
+//! - *stick*: `û = 0`, the impulse's `d` unknowns;
+//! - *slide* along `e`, with `t = e⊥`: `û_N = 0`, `p_e = μ p_N` and `û_t + γ p_t = 0`, unknowns `(p_N, p_t)` (one in the plane).
+//!
+//! Written for the increment it reads `(Bᵀ (W + α I) C + γ) y = −Bᵀ û − γ p_t`, symmetric when nothing slides with friction.
+
+use super::block_lu::BlockLu;
+use super::dense::{self, Chunk, LANES};
+use crate::law::coulomb::ContactMode;
+use crate::problem::{BlockSparseDelassus, Operator, Prepared, Proximal};
+use crate::solver::local::modes::{Linearised, Prediction, n_unknowns};
+use crate::solver::work::{self, Work};
+
+/// Kept factors of the reduced system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::solver) enum Factors {
+    /// None, or outdated.
+    None,
+    /// Cholesky.
+    Symmetric,
+    /// LU.
+    General,
+    /// Block-sparse LU.
+    Sparse,
+}
+
+/// One Newton step with a factored system.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::solver) struct NewtonStep {
+    /// Regularisation that the factors were made with, 1/kg.
+    pub alpha: f64,
+    /// Number of unknowns.
+    pub m: usize,
+    /// Which factors there are.
+    pub factors: Factors,
+    /// Whether sliding impulses return radially to the cone after the step.
+    pub on_cone: bool,
+}
+
+/// The system with its linearisation and its factors, kept from step to step.
+#[derive(Clone, Debug, Default)]
+pub(in crate::solver) struct ReducedSystem {
+    /// Mode and frame of each contact in the current linearisation.
+    pub contacts: Vec<Linearised>,
+    /// Proximal centre (n), N s.
+    pub centre: Vec<f64>,
+    /// The Newton point (n), N s, and a velocity (n), m/s.
+    pub trial: Vec<f64>,
+    pub trial_velocity: Vec<f64>,
+    /// Right-hand side and solution, padded.
+    rhs: Vec<Chunk>,
+    /// Dense matrix, factored in place, and its row exchanges.
+    matrix: Vec<Chunk>,
+    pivots: Vec<usize>,
+    /// Factors of the block-sparse system, and whether their pattern is that of the present problem.
+    block_lu: BlockLu,
+    is_analysed: bool,
+}
+
+/// Puts `p` where the linearised constraints hold (`p = 0` if open, `p_e = μ p_N` if sliding); says whether that moved it.
+#[inline]
+fn snap<const D: usize>(mu: &[f64], contacts: &[Linearised], p: &mut [f64]) -> bool {
+    let mut moved = false;
+    for ((contact, &mu), p) in contacts.iter().zip(mu).zip(p.chunks_exact_mut(D)) {
+        match contact.mode {
+            ContactMode::Stick => {}
+            ContactMode::Open => {
+                for x in p {
+                    moved |= x.abs() > 0.0;
+                    *x = 0.0;
+                }
+            }
+            ContactMode::Slide => {
+                let wanted = mu * p[0];
+                let along = if D == 2 {
+                    p[1] * contact.e[0]
+                } else {
+                    p[1] * contact.e[0] + p[2] * contact.e[1]
+                };
+                let gap = wanted - along;
+                if gap.abs() > 1e-14 * wanted.abs() {
+                    moved = true;
+                    if mu > 0.0 {
+                        for k in 1..D {
+                            p[k] += gap * contact.e[k - 1];
+                        }
+                    } else {
+                        p[1..].fill(0.0);
+                    }
+                }
+            }
+        }
+    }
+    moved
+}
+
+/// Sets what a padded matrix of `m` unknowns has beyond them to the unit matrix.
+#[inline]
+fn pad(A: &mut [Chunk], m: usize) {
+    let size = dense::chunks(m);
+    if m == LANES * size {
+        return;
+    }
+    for column in A.chunks_exact_mut(size).take(m) {
+        column[size - 1][m % LANES..].fill(0.0);
+    }
+    for k in m..LANES * size {
+        let column = &mut A[k * size..(k + 1) * size];
+        column.fill([0.0; LANES]);
+        column[size - 1][k % LANES] = 1.0;
+    }
+}
+
+/// `W + α I` for a Cholesky factorisation, which reads the lower triangle of these columns: the rows of a symmetric `W`.
+#[inline]
+fn assemble_symmetric(W: &[f64], alpha: f64, n: usize, A: &mut [Chunk]) {
+    let size = dense::chunks(n);
+    pad(A, n);
+    for (k, (row, column)) in W.chunks_exact(n).zip(A.chunks_exact_mut(size)).enumerate() {
+        let column = column.as_flattened_mut();
+        column[..n].copy_from_slice(row);
+        column[k] += alpha;
+    }
+}
+
+/// `Bᵀ (W + α I) C + γ` of the predicted modes, `m × m`, padded.
+#[inline]
+fn assemble<const D: usize>(
+    mu: &[f64],
+    W: &[f64],
+    alpha: f64,
+    contacts: &[Linearised],
+    m: usize,
+    A: &mut [Chunk],
+) {
+    pad(A, m);
+    let n = D * contacts.len();
+    let height = LANES * dense::chunks(m);
+    let A = A.as_flattened_mut();
+    for ((contact, &mu_i), rows) in contacts.iter().zip(mu).zip(W.chunks_exact(D * n)) {
+        let rows: [&[[f64; D]]; D] =
+            std::array::from_fn(|r| rows[r * n..(r + 1) * n].as_chunks::<D>().0);
+        for k in 0..n_unknowns::<D>(contact.mode, mu_i) {
+            let column = &mut A[contact.start + k..];
+            let diagonal = (contact.start + k) * height;
+            if contact.mode == ContactMode::Slide && k == 1 {
+                let [e0, e1] = contact.e;
+                let turned = rows[1].iter().zip(rows[D - 1]);
+                let across = turned.map(|(x, y)| std::array::from_fn(|c| e0 * y[c] - e1 * x[c]));
+                combine_columns::<D>(across, mu, contacts, height, column);
+                column[diagonal] += contact.gamma;
+            } else {
+                combine_columns::<D>(rows[k].iter().copied(), mu, contacts, height, column);
+            }
+            column[diagonal] += alpha;
+        }
+    }
+}
+
+/// One row of `W C`, the columns that the unknowns of every contact act through, into every `height`-th entry of `target`.
+#[inline]
+fn combine_columns<const D: usize>(
+    row: impl Iterator<Item = [f64; D]>,
+    mu: &[f64],
+    contacts: &[Linearised],
+    height: usize,
+    target: &mut [f64],
+) {
+    let mut at = 0;
+    let mut push = |x: f64| {
+        target[at] = x;
+        at += height;
+    };
+    for ((w, contact), &mu) in row.zip(contacts).zip(mu) {
+        match contact.mode {
+            ContactMode::Open => {}
+            ContactMode::Stick => {
+                for x in w {
+                    push(x);
+                }
+            }
+            ContactMode::Slide => {
+                let [e0, e1] = contact.e;
+                let along = if D == 2 {
+                    w[1] * e0
+                } else {
+                    w[1] * e0 + w[2] * e1
+                };
+                push(w[0] + mu * along);
+                if D == 3 && mu > 0.0 {
+                    push(e0 * w[2] - e1 * w[1]);
+                }
+            }
+        }
+    }
+}
+
+/// Right-hand side: minus the linearised equations at `(p, û)`.
+#[inline]
+fn right_hand_side<const D: usize>(
+    data: &Prepared<'_>,
+    prox: Proximal<'_>,
+    contacts: &[Linearised],
+    p: &[f64],
+    u: &[f64],
+    rhs: &mut [f64],
+) {
+    for (i, contact) in contacts.iter().enumerate() {
+        let mut u_hat = [0.0; D];
+        for k in 0..D {
+            u_hat[k] = u[D * i + k] + prox.alpha * (p[D * i + k] - prox.centre[D * i + k]);
+        }
+        match contact.mode {
+            ContactMode::Open => {}
+            ContactMode::Stick => {
+                for k in 0..D {
+                    rhs[contact.start + k] = -u_hat[k];
+                }
+            }
+            ContactMode::Slide => {
+                rhs[contact.start] = -u_hat[0];
+                if D == 3 && data.mu[i] > 0.0 {
+                    let [e0, e1] = contact.e;
+                    let p_t = e0 * p[D * i + 2] - e1 * p[D * i + 1];
+                    rhs[contact.start + 1] =
+                        -(e0 * u_hat[D - 1] - e1 * u_hat[1] + contact.gamma * p_t);
+                }
+            }
+        }
+    }
+}
+
+/// Adds `C y` to `p`. With `on_cone` a sliding impulse returns radially to the cone's surface, a change of second order.
+#[inline]
+fn apply<const D: usize>(
+    mu: &[f64],
+    contacts: &[Linearised],
+    y: &[f64],
+    on_cone: bool,
+    p: &mut [f64],
+) {
+    for ((contact, &mu), p) in contacts.iter().zip(mu).zip(p.chunks_exact_mut(D)) {
+        match contact.mode {
+            ContactMode::Open => {}
+            ContactMode::Stick => {
+                for (x, y) in p.iter_mut().zip(&y[contact.start..]) {
+                    *x += y;
+                }
+            }
+            ContactMode::Slide => {
+                let y_N = y[contact.start];
+                p[0] += y_N;
+                if mu <= 0.0 {
+                    continue;
+                }
+                let [e0, e1] = contact.e;
+                p[1] += mu * y_N * e0;
+                if D == 3 {
+                    let y_t = y[contact.start + 1];
+                    p[1] -= y_t * e1;
+                    p[2] += mu * y_N * e1 + y_t * e0;
+                }
+                if on_cone && p[0] > 0.0 {
+                    let norm = crate::cone::tangential_norm::<D>(&std::array::from_fn(|k| p[k]));
+                    if norm > 0.0 {
+                        let scale = mu * p[0] / norm;
+                        for x in &mut p[1..] {
+                            *x *= scale;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl ReducedSystem {
+    /// Makes the memory of the factors fit `W` of `n` unknowns.
+    pub fn fit(&mut self, n: usize, W: Operator<'_>) {
+        match W {
+            Operator::Dense(_) => {
+                if self.pivots.len() != LANES * dense::chunks(n) {
+                    self.resize_dense(n);
+                }
+            }
+            Operator::BlockSparse(_) => self.is_analysed = false,
+        }
+    }
+
+    /// Makes room for dense factors of `n` unknowns.
+    pub fn resize_dense(&mut self, n: usize) {
+        let size = dense::chunks(n);
+        self.matrix.resize(LANES * size * size, [0.0; LANES]);
+        self.pivots.resize(LANES * size, 0);
+    }
+
+    /// Makes room for all but the factors.
+    pub fn resize(&mut self, n_contacts: usize, n: usize) {
+        self.contacts.resize(n_contacts, Linearised::default());
+        self.rhs.resize(dense::chunks(n), [0.0; LANES]);
+        for buffer in [&mut self.centre, &mut self.trial, &mut self.trial_velocity] {
+            buffer.resize(n, 0.0);
+        }
+    }
+
+    /// The proximal term with the present centre.
+    #[inline]
+    pub fn prox(&self, alpha: f64) -> Proximal<'_> {
+        Proximal {
+            alpha,
+            centre: &self.centre,
+        }
+    }
+
+    /// Whether the budget allows another sparse factorisation; finds its pattern at the first.
+    fn affords_sparse(&mut self, W: &BlockSparseDelassus, work: &mut Work) -> bool {
+        if !self.is_analysed {
+            self.block_lu.analyse(W);
+            self.is_analysed = true;
+        }
+        work.affords(self.block_lu.work())
+    }
+
+    /// Factors the system of the predicted modes; none where it is singular, or the budget does not allow it.
+    #[inline]
+    pub fn factorise<const D: usize>(
+        &mut self,
+        data: &Prepared<'_>,
+        alpha: f64,
+        prediction: Prediction,
+        allow_symmetric: bool,
+        work: &mut Work,
+    ) -> Factors {
+        let m = prediction.m;
+        let W = match data.W {
+            Operator::Dense(W) => W,
+            Operator::BlockSparse(W) => {
+                if !self.affords_sparse(W, work) {
+                    return Factors::None;
+                }
+                let is_regular =
+                    self.block_lu
+                        .factorise::<D>(W, data.mu, alpha, None, &self.contacts);
+                return if is_regular {
+                    Factors::Sparse
+                } else {
+                    Factors::None
+                };
+            }
+        };
+        let may_be_symmetric = !prediction.slides && allow_symmetric;
+        // A step costs two products and two substitutions beside its factors.
+        let cost = work::dense(m, may_be_symmetric) + 2 * data.product;
+        if !work.affords(cost) {
+            return Factors::None;
+        }
+        let size = dense::chunks(m);
+        let A = &mut self.matrix[..LANES * size * size];
+        if may_be_symmetric {
+            if m == data.n {
+                assemble_symmetric(W, alpha, m, A);
+            } else {
+                assemble::<D>(data.mu, W, alpha, &self.contacts, m, A);
+            }
+            if dense::cholesky(A, size) {
+                return Factors::Symmetric;
+            }
+        }
+        assemble::<D>(data.mu, W, alpha, &self.contacts, m, A);
+        if dense::lu(A, size, &mut self.pivots) {
+            Factors::General
+        } else {
+            Factors::None
+        }
+    }
+
+    /// Factors `W + σ diag(weights)`, one weight a contact; `false` where that fails, or the budget does not allow it.
+    pub fn factorise_weighted<const D: usize>(
+        &mut self,
+        data: &Prepared<'_>,
+        sigma: f64,
+        weights: &[f64],
+        work: &mut Work,
+    ) -> bool {
+        for (i, contact) in self.contacts.iter_mut().enumerate() {
+            *contact = Linearised {
+                mode: ContactMode::Stick,
+                start: D * i,
+                ..Linearised::default()
+            };
+        }
+        match data.W {
+            Operator::Dense(W) => {
+                let (n, size) = (data.n, dense::chunks(data.n));
+                if !work.affords(work::dense(n, false)) {
+                    return false;
+                }
+                assemble::<D>(data.mu, W, 0.0, &self.contacts, n, &mut self.matrix);
+                for k in 0..n {
+                    self.matrix[k * size + k / LANES][k % LANES] += sigma * weights[k / D];
+                }
+                dense::lu(&mut self.matrix, size, &mut self.pivots)
+            }
+            Operator::BlockSparse(W) => {
+                self.affords_sparse(W, work)
+                    && self.block_lu.factorise::<D>(
+                        W,
+                        data.mu,
+                        sigma,
+                        Some(weights),
+                        &self.contacts,
+                    )
+            }
+        }
+    }
+
+    /// Solves the system of [`factorise_weighted`](Self::factorise_weighted) for the right-hand side that `write` enters; returns the solution (n).
+    pub fn solve_weighted<const D: usize>(
+        &mut self,
+        data: &Prepared<'_>,
+        write: impl FnOnce(&mut [f64]),
+    ) -> &[f64] {
+        let n = data.n;
+        let rhs = self.rhs.as_flattened_mut();
+        write(&mut rhs[..n]);
+        rhs[n..].fill(0.0);
+        match data.W {
+            Operator::Dense(_) => {
+                dense::lu_solve(&self.matrix, dense::chunks(n), &self.pivots, &mut self.rhs);
+            }
+            Operator::BlockSparse(W) => self.block_lu.solve::<D>(W, &mut rhs[..n]),
+        }
+        &self.rhs.as_flattened()[..n]
+    }
+
+    /// Solves the factored system for the right-hand side at hand, in place.
+    #[inline]
+    fn back_substitute<const D: usize>(&mut self, data: &Prepared<'_>, factors: Factors, m: usize) {
+        if let (Factors::Sparse, Operator::BlockSparse(W)) = (factors, data.W) {
+            self.block_lu
+                .solve::<D>(W, &mut self.rhs.as_flattened_mut()[..data.n]);
+            return;
+        }
+        let size = dense::chunks(m);
+        let rhs = &mut self.rhs[..size];
+        let A = &self.matrix[..LANES * size * size];
+        rhs.as_flattened_mut()[m..].fill(0.0);
+        match factors {
+            Factors::None | Factors::Sparse => rhs.fill([0.0; LANES]),
+            Factors::Symmetric => dense::cholesky_solve(A, size, rhs),
+            Factors::General => dense::lu_solve(A, size, &self.pivots, rhs),
+        }
+    }
+
+    /// The Newton point of the regularised problem for the predicted modes, from `(p, u)`, into `trial`.
+    pub fn newton_point<const D: usize>(
+        &mut self,
+        data: &Prepared<'_>,
+        step: NewtonStep,
+        p: &[f64],
+        u: &[f64],
+    ) {
+        let Self {
+            trial,
+            trial_velocity,
+            contacts,
+            centre,
+            rhs,
+            ..
+        } = self;
+        trial.copy_from_slice(p);
+        if step.factors == Factors::Sparse {
+            // Every contact keeps its place there, and unknowns that its mode takes away are zero.
+            for (i, contact) in contacts.iter_mut().enumerate() {
+                contact.start = D * i;
+            }
+            rhs.fill([0.0; LANES]);
+        }
+        let mut u = u;
+        if snap::<D>(data.mu, contacts, trial) {
+            data.W.multiply_add(trial, data.q, trial_velocity);
+            u = trial_velocity;
+        }
+        let prox = Proximal {
+            alpha: step.alpha,
+            centre,
+        };
+        right_hand_side::<D>(data, prox, contacts, trial, u, rhs.as_flattened_mut());
+        self.back_substitute::<D>(data, step.factors, step.m);
+        apply::<D>(
+            data.mu,
+            &self.contacts,
+            self.rhs.as_flattened(),
+            step.on_cone,
+            &mut self.trial,
+        );
+    }
+}

@@ -1,0 +1,85 @@
+//! What the stages of a solve share and leave to one another, kept between solves so that none of them allocates.
+
+use super::linear::reduced_system::ReducedSystem;
+use super::report::{Rung, Rungs, SolveStatus, Stage};
+use super::work::{Work, sweep};
+use crate::problem::Operator;
+
+/// Impulses and velocities of the iterations (n each), the Newton system, and the record of the stages.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scratch {
+    /// The linear system of a Newton step with its linearisation.
+    pub system: ReducedSystem,
+    /// Inverse masses of the contacts, 1/kg: ADMM's penalty at `σ = 1`.
+    pub weights: Vec<f64>,
+    /// Impulse that the solve started from, N s.
+    pub start: Vec<f64>,
+    /// Best impulse of the present stage, N s.
+    pub best: Vec<f64>,
+    /// Nearest answer of all stages so far, N s.
+    pub nearest: Vec<f64>,
+    /// Last impulse that solved a proximal step, N s.
+    pub accepted: Vec<f64>,
+    /// Direction of a damped step, N s, and its image under `W`, m/s.
+    pub direction: Vec<f64>,
+    pub image: Vec<f64>,
+    /// Work done and allowed.
+    pub work: Work,
+    /// Stages tried.
+    pub rungs: Rungs,
+}
+
+impl Scratch {
+    /// Makes every buffer fit; the contents are unspecified.
+    pub fn fit(&mut self, n_contacts: usize, n: usize, W: Operator<'_>) {
+        if self.start.len() != n || self.weights.len() != n_contacts {
+            self.resize(n_contacts, n);
+        }
+        self.system.fit(n, W);
+    }
+
+    /// Makes room for `n` unknowns of `n_contacts` contacts.
+    pub fn resize(&mut self, n_contacts: usize, n: usize) {
+        self.weights.resize(n_contacts, 0.0);
+        self.system.resize(n_contacts, n);
+        for buffer in [
+            &mut self.start,
+            &mut self.best,
+            &mut self.nearest,
+            &mut self.accepted,
+            &mut self.direction,
+            &mut self.image,
+        ] {
+            buffer.resize(n, 0.0);
+        }
+    }
+
+    /// Lists a stage that ended, and says how: for want of budget, where it left something undone.
+    #[inline]
+    pub fn list_stage(
+        &mut self,
+        stage: Stage,
+        status: SolveStatus,
+        iterations: usize,
+    ) -> SolveStatus {
+        let status = match status {
+            SolveStatus::MaxIterations | SolveStatus::Stalled if self.work.is_exhausted => {
+                SolveStatus::BudgetExhausted
+            }
+            status => status,
+        };
+        self.rungs.push(Rung {
+            stage,
+            status,
+            iterations,
+        });
+        status
+    }
+
+    /// Spends the work of a product and so many sweeps, or says that it is too much.
+    #[inline]
+    pub fn affords_sweeps(&mut self, product: u64, n_contacts: usize, sweeps: usize) -> bool {
+        self.work
+            .affords(product + sweeps as u64 * sweep(product, n_contacts))
+    }
+}

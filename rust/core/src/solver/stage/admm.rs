@@ -1,0 +1,187 @@
+//! ADMM: a linear system with one matrix and a projection on the cones, in turn.
+//!
+//! With `R = σ diag(1/ρ_i)` (`ρ_i` the contact's own mass, so that a mass ratio does not set the pace) one iteration reads
+//!
+//! ```text
+//! (W + R) x = R z − y − q − s,    z ← Π_K(x̂ + R⁻¹ y),    y ← y + R (x̂ − z),    s_N = μ|y_T|,
+//! ```
+//!
+//! `x̂` being `x` over-relaxed. At rest `y = −ũ`, so De Saxcé's shift `s` is renewed from `y` itself. `W + R` is factored once, and again when
+//! `σ` changes: every so often it is balanced so that both residuals fall alike. Without the shift the same iteration solves the convex relaxation of
+//! Coulomb's law. Converges for any `W` whose symmetric part is positive semidefinite (it is a Douglas–Rachford splitting), in the convex case provably;
+//! linearly, so it is for moderate tolerances. Source: Boyd et al. 2011; for frictional contact Acary, Brémond and Huber 2018, Carpentier et al. 2024.
+
+use crate::cone::{SecondOrderCone, tangential_norm};
+use crate::problem::{Prepared, Residual};
+use crate::solver::options::SolverOptions;
+use crate::solver::report::SolveStatus;
+use crate::solver::scratch::Scratch;
+
+/// First `σ`, dimensionless; the balance finds the rest.
+const SIGMA: f64 = 0.1;
+/// Over-relaxation.
+const RELAXATION: f64 = 1.6;
+/// Iterations between two looks at the residual, and between two looks at the balance.
+const LOOK: usize = 5;
+const BALANCE: usize = 20;
+/// Imbalance of the residuals that changes `σ`, and its largest change.
+const IMBALANCE: f64 = 3.0;
+const LARGEST_CHANGE: f64 = 10.0;
+/// After so many changes `σ` is kept, so that the iteration cannot chase its own balance.
+const MAX_CHANGES: usize = 40;
+
+/// Factors `W + R`; `false` where that fails, or the budget does not allow it.
+fn factorise<const D: usize>(data: &Prepared<'_>, sigma: f64, scratch: &mut Scratch) -> bool {
+    for (weight, mass) in scratch.weights.iter_mut().zip(data.masses) {
+        *weight = 1.0 / mass;
+    }
+    scratch
+        .system
+        .factorise_weighted::<D>(data, sigma, &scratch.weights, &mut scratch.work)
+}
+
+/// One iteration after the linear solve: over-relaxation, projection, dual step. Squares of the primal and the dual change, in the norm of `R`.
+fn project<const D: usize>(
+    mu: &[f64],
+    sigma: f64,
+    weights: &[f64],
+    x: &[f64],
+    y: &mut [f64],
+    z: &mut [f64],
+) -> [f64; 2] {
+    let mut changes = [0.0; 2];
+    for (i, (&mu, weight)) in mu.iter().zip(weights).enumerate() {
+        let r = sigma * weight;
+        let range = D * i..D * (i + 1);
+        let (x, y, z) = (&x[range.clone()], &mut y[range.clone()], &mut z[range]);
+        let relaxed: [f64; D] =
+            std::array::from_fn(|k| RELAXATION * x[k] + (1.0 - RELAXATION) * z[k]);
+        let target: [f64; D] = std::array::from_fn(|k| relaxed[k] + y[k] / r);
+        let next = SecondOrderCone::new(mu).project(&target);
+        for k in 0..D {
+            changes[0] += r * (x[k] - next[k]).powi(2);
+            changes[1] += r * (next[k] - z[k]).powi(2);
+            y[k] += r * (relaxed[k] - next[k]);
+        }
+        z.copy_from_slice(&next);
+    }
+    changes
+}
+
+/// What an alternation solves: Coulomb's law or another that its matrix and its projection serve as well.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::solver) struct Law<M> {
+    /// Whether De Saxcé's shift is made.
+    pub shifts: bool,
+    /// Residual of `(p, u)` under the law.
+    pub measure: M,
+    /// How an answer within the tolerances is called.
+    pub solved: SolveStatus,
+}
+
+/// Alternates from `p` under Coulomb's law. `u` is `W p + q` on return.
+pub(in crate::solver) fn solve<const D: usize>(
+    data: &Prepared<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> (SolveStatus, Residual) {
+    let law = Law {
+        shifts: true,
+        measure: |p: &[f64], u: &[f64]| data.measure::<D>(p, u),
+        solved: SolveStatus::Converged,
+    };
+    alternate::<D, _>(data, options, &law, p, u, scratch, iterations)
+}
+
+/// Alternates from `p` under `law`. `u` is `W p + q` on return, and the residual is Coulomb's under either law.
+pub(in crate::solver) fn alternate<const D: usize, M: Fn(&[f64], &[f64]) -> Residual>(
+    data: &Prepared<'_>,
+    options: &SolverOptions,
+    law: &Law<M>,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> (SolveStatus, Residual) {
+    let mut sigma = SIGMA;
+    data.W.multiply_add(p, data.q, u);
+    // y = −ũ of the start, from inside the dual cone.
+    for (i, &mu) in data.mu.iter().enumerate() {
+        let mut shifted: [f64; D] = std::array::from_fn(|k| u[D * i + k]);
+        if law.shifts {
+            shifted[0] += mu * tangential_norm(&shifted);
+        }
+        let inside = SecondOrderCone::new(mu).dual().project(&shifted);
+        for k in 0..D {
+            scratch.direction[D * i + k] = -inside[k];
+        }
+    }
+    if !factorise::<D>(data, sigma, scratch) {
+        return (SolveStatus::Stalled, data.measure::<D>(p, u));
+    }
+    let mut best = Residual::UNSOLVED;
+    scratch.best.copy_from_slice(p);
+    let (mut step, mut changes_of_sigma) = (0, 0);
+    loop {
+        if step % LOOK == 0 || step == options.max_sweeps {
+            data.W.multiply_add(p, data.q, u);
+            let residual = (law.measure)(p, u);
+            if !residual.is_finite() && !best.is_finite() {
+                return (SolveStatus::NonFinite, residual);
+            }
+            if residual.relative < best.relative {
+                best = residual;
+                scratch.best.copy_from_slice(p);
+            }
+            let is_solved = options.accepts(residual);
+            // A substitution costs about as much as a product.
+            let is_spent = !scratch.work.affords(LOOK as u64 * 2 * data.product);
+            if is_solved || is_spent || step >= options.max_sweeps || !residual.is_finite() {
+                p.copy_from_slice(&scratch.best);
+                data.W.multiply_add(p, data.q, u);
+                let status = if is_solved {
+                    law.solved
+                } else {
+                    SolveStatus::MaxIterations
+                };
+                return (status, data.measure::<D>(p, u));
+            }
+        }
+        let Scratch {
+            system,
+            weights,
+            direction: dual,
+            ..
+        } = &mut *scratch;
+        let x = system.solve_weighted::<D>(data, |rhs| {
+            for (i, (&mu, weight)) in data.mu.iter().zip(&*weights).enumerate() {
+                let y: [f64; D] = std::array::from_fn(|k| dual[D * i + k]);
+                for k in 0..D {
+                    let at = D * i + k;
+                    rhs[at] = sigma * weight * p[at] - y[k] - data.q[at];
+                }
+                if law.shifts {
+                    rhs[D * i] -= mu * tangential_norm(&y);
+                }
+            }
+        });
+        let [primal, dual] = project::<D>(data.mu, sigma, weights, x, dual, p);
+        step += 1;
+        *iterations += 1;
+        let ratio = (primal / dual).sqrt();
+        let is_unbalanced = ratio.is_finite() && !(1.0 / IMBALANCE..=IMBALANCE).contains(&ratio);
+        if step % BALANCE == 0 && is_unbalanced && changes_of_sigma < MAX_CHANGES {
+            let change = ratio.clamp(1.0 / LARGEST_CHANGE, LARGEST_CHANGE);
+            let next = (sigma * change).clamp(1e-10, 1e6);
+            changes_of_sigma += 1;
+            if next.is_finite() && factorise::<D>(data, next, scratch) {
+                sigma = next;
+            } else if !factorise::<D>(data, sigma, scratch) {
+                step = options.max_sweeps;
+            }
+        }
+    }
+}

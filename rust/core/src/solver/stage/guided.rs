@@ -1,0 +1,169 @@
+//! Few contacts from rest: a few sweeps guess the modes, and Newton starts from zero with them.
+//!
+//! Sweeps depend on the order of the contacts; the answer does not, since only modes and sliding directions are taken from them. Where a mode is a
+//! matter of choice, or the guess was wrong, there is no answer here and the caller goes on.
+
+use crate::cone::tangential_norm;
+use crate::law::coulomb::ContactMode;
+use crate::problem::{Operator, Prepared, Residual};
+use crate::solver::linear::reduced_system::{Factors, NewtonStep};
+use crate::solver::local::modes::{self, Linearised};
+use crate::solver::local::one_contact::estimate_one_contact;
+use crate::solver::options::SolverOptions;
+use crate::solver::scratch::Scratch;
+
+/// Sweeps, and Newton steps that try their modes.
+const SWEEPS: usize = 4;
+const STEPS: usize = 6;
+
+/// A residual falling at least this much per step lets the old factors serve once more.
+const REUSE_CONTRACTION: f64 = 0.02;
+
+/// Steps after which the sliding directions are known.
+const SETTLED: usize = 1;
+
+/// Least gain of a step; with less, the modes are taken to be wrong.
+const LEAST_GAIN: f64 = 0.5;
+
+/// Residual below which a stop of progress may be the rounding of `W p + q`.
+const ROUNDING_ASKED: f64 = 1e-7;
+
+/// Slip or parting, relative to the largest free velocity, that decides a mode.
+const DECIDED: f64 = 1e-8;
+
+/// Whether every sliding contact slips and every open one parts. Where one does not, its mode is a matter of choice, a sweep's choice depends on the
+/// order of the contacts, and so would the loads of a mechanism that is statically indeterminate.
+fn is_decided<const D: usize>(data: &Prepared<'_>, contacts: &[Linearised], u: &[f64]) -> bool {
+    let largest = data.q.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    contacts
+        .iter()
+        .zip(u.chunks_exact(D))
+        .all(|(contact, u)| match contact.mode {
+            ContactMode::Stick => true,
+            ContactMode::Open => u[0] > DECIDED * largest,
+            ContactMode::Slide => {
+                let slip: [f64; D] = std::array::from_fn(|k| u[k]);
+                tangential_norm(&slip) > DECIDED * largest
+            }
+        })
+}
+
+/// One sweep of estimates, contact after contact.
+fn sweep<const D: usize>(
+    data: &Prepared<'_>,
+    W: &[f64],
+    contacts: &mut [Linearised],
+    p: &mut [f64],
+) {
+    let n = data.n;
+    let blocks = W.chunks_exact(D * n).zip(data.q.chunks_exact(D));
+    for (i, (((rows, q), &mu), contact)) in blocks.zip(data.mu).zip(contacts).enumerate() {
+        let at = D * i;
+        let rows: [&[f64]; D] = std::array::from_fn(|r| &rows[r * n..(r + 1) * n]);
+        let mut sums = [[0.0; 2]; D];
+        let (pairs, last) = p.as_chunks::<2>();
+        for (i, x) in pairs.iter().enumerate() {
+            for r in 0..D {
+                sums[r][0] += rows[r][2 * i] * x[0];
+                sums[r][1] += rows[r][2 * i + 1] * x[1];
+            }
+        }
+        let mut u: [f64; D] = std::array::from_fn(|r| sums[r][0] + sums[r][1] + q[r]);
+        if let [x] = last {
+            for r in 0..D {
+                u[r] += rows[r][n - 1] * x;
+            }
+        }
+        let block: [[f64; D]; D] = rows.map(|row| std::array::from_fn(|c| row[at + c]));
+        for r in 0..D {
+            for c in 0..D {
+                u[r] -= block[r][c] * p[at + c];
+            }
+        }
+        let estimate = estimate_one_contact(&block, &u, mu, contact.gamma);
+        if estimate.impulse.iter().all(|x| x.is_finite()) {
+            p[at..at + D].copy_from_slice(&estimate.impulse);
+            contact.gamma = estimate.kappa;
+        }
+    }
+}
+
+/// Solves from `p = 0`; `None` where the modes turn out wrong or undecided. `u` is `W p + q` on return, `iterations` is advanced by sweeps and linear
+/// solves.
+pub(in crate::solver) fn solve<const D: usize>(
+    data: &Prepared<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> Option<Residual> {
+    let Operator::Dense(W) = data.W else {
+        return None;
+    };
+    scratch.system.contacts.fill(Linearised::default());
+    for _ in 0..SWEEPS {
+        sweep::<D>(data, W, &mut scratch.system.contacts, p);
+    }
+    *iterations += SWEEPS;
+    data.W.multiply_add(p, data.q, u);
+    let prediction = modes::recall::<D>(data.mu, p, u, &mut scratch.system.contacts);
+    p.fill(0.0);
+    u.copy_from_slice(data.q);
+    let alpha = options.regularisation * data.mean_diagonal;
+    let mut factors = Factors::None;
+    let mut last = f64::INFINITY;
+    scratch.system.centre.fill(0.0);
+    for step in 0..STEPS.min(options.max_newton_steps) {
+        if factors == Factors::None {
+            factors =
+                scratch
+                    .system
+                    .factorise::<D>(data, alpha, prediction, true, &mut scratch.work);
+        }
+        if factors == Factors::None && prediction.m > 0 {
+            return None;
+        }
+        // Until the sliding directions are known, which the guess is not, the centre stays at zero, or the guess would stay in what W cannot see.
+        if step >= SETTLED {
+            scratch.system.centre.copy_from_slice(p);
+        }
+        let newton_step = NewtonStep {
+            alpha,
+            m: prediction.m,
+            factors,
+            on_cone: true,
+        };
+        scratch.system.newton_point::<D>(data, newton_step, p, u);
+        *iterations += 1;
+        p.copy_from_slice(&scratch.system.trial);
+        data.W.multiply_add(p, data.q, u);
+        let residual = data.measure::<D>(p, u);
+        let progress = residual.relative / last;
+        let is_solved = options.accepts(residual)
+            || (progress > LEAST_GAIN
+                && residual.relative < ROUNDING_ASKED
+                && data.is_within_rounding::<D>(p, u));
+        if is_solved {
+            return is_decided::<D>(data, &scratch.system.contacts, u).then_some(residual);
+        }
+        if step >= SETTLED && (progress > LEAST_GAIN || progress.is_nan()) {
+            return None;
+        }
+        if progress > REUSE_CONTRACTION {
+            factors = Factors::None;
+        }
+        last = residual.relative;
+        for (contact, (p, u)) in scratch
+            .system
+            .contacts
+            .iter_mut()
+            .zip(p.chunks_exact(D).zip(u.chunks_exact(D)))
+        {
+            if contact.mode == ContactMode::Slide {
+                modes::set_slide::<D>(contact, p, u);
+            }
+        }
+    }
+    None
+}

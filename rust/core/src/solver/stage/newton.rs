@@ -1,0 +1,232 @@
+//! Semismooth Newton on the contact modes.
+//!
+//! One step predicts each contact's mode ([`modes`]) for the regularised velocity `û = W p + q + α (p − c)` and solves
+//! the equations of those modes ([`ReducedSystem`]). Once the modes are right the convergence is quadratic, and
+//! finite when nothing slides. `α > 0` makes the system regular when `W` is not: every step is a proximal step, whose answer moves
+//! from the centre `c` no farther than `W` asks.
+
+use crate::problem::{Prepared, Proximal, Residual};
+use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
+use crate::solver::local::modes::{self, Prediction};
+use crate::solver::local::sweep;
+use crate::solver::options::SolverOptions;
+use crate::solver::report::SolveStatus;
+use crate::solver::scratch::Scratch;
+use crate::solver::work;
+
+/// Most full steps before the safeguarded method takes over. Measured on the recorded problems: modes that full steps find at
+/// all are found within about ten.
+pub(in crate::solver) const FULL_STEPS: usize = 24;
+
+/// Most full steps from a warm start before pivoting takes over. Measured on a rover that steers: 3 to 6 cost the same.
+pub(in crate::solver) const WARM_STEPS: usize = 3;
+
+/// Steps with changing modes after which a few sweeps break the cycle.
+const CYCLE: usize = 8;
+const CYCLE_SWEEPS: usize = 3;
+
+/// Residual below which a stop of progress may be the rounding of `W p + q`.
+const ROUNDING_ASKED: f64 = 1e-7;
+
+/// Smallest `α` relative to the mean diagonal.
+const SMALLEST: f64 = 1e-14;
+
+/// A residual falling at least this much per step lets the old factors serve once more.
+const REUSE_CONTRACTION: f64 = 0.02;
+
+/// A regularised step with settled modes should gain at least this much, or `α` hides what is left.
+const SLOW: f64 = 0.1;
+
+/// Relative natural map at which a proximal step counts as solved: its error is amplified by `1/α` in the directions that `W`
+/// cannot see.
+const SOLVED: f64 = 1e-15;
+
+/// Settled steps after which the centre moves even so.
+const PATIENCE: usize = 4;
+
+/// What one step of the iteration hands to the next.
+#[derive(Clone, Copy, Debug)]
+struct Course {
+    /// Current `α`, 1/kg.
+    alpha: f64,
+    /// Kept factors.
+    factors: Factors,
+    /// Whether a symmetric factorisation may serve.
+    allow_symmetric: bool,
+    /// Whether the modes changed at all, so that the exact predictor serves.
+    exact: bool,
+    /// Steps since the modes last changed.
+    settled: usize,
+    /// Residual before the last step.
+    last: f64,
+}
+
+impl Course {
+    /// Decides, from the last step's `progress` (ratio of residuals), whether the kept factors and `α` still serve.
+    #[inline]
+    fn revise(&mut self, progress: f64, prediction: Prediction, smallest: f64) {
+        if self.settled > 1 && progress > SLOW && self.factors != Factors::None {
+            if self.factors == Factors::Symmetric && self.allow_symmetric {
+                // Perhaps W is not symmetric and half of it is not good enough.
+                self.allow_symmetric = false;
+            } else {
+                self.alpha = (0.01 * self.alpha).max(smallest);
+            }
+            self.factors = Factors::None;
+        }
+        if prediction.changed || (prediction.slides && progress > REUSE_CONTRACTION) {
+            self.factors = Factors::None;
+        }
+    }
+}
+
+/// Predicts the modes; after the first change the exact predictor serves.
+#[inline]
+fn predict<const D: usize>(
+    data: &Prepared<'_>,
+    course: &mut Course,
+    p: &[f64],
+    u: &[f64],
+    scratch: &mut Scratch,
+) -> Prediction {
+    let ReducedSystem {
+        centre, contacts, ..
+    } = &mut scratch.system;
+    let prox = Proximal {
+        alpha: course.alpha,
+        centre,
+    };
+    let mut prediction = modes::predict::<D>(data, prox, course.exact, p, u, contacts);
+    if prediction.changed && !course.exact {
+        course.exact = true;
+        prediction = modes::predict::<D>(data, prox, true, p, u, contacts);
+        prediction.changed = true;
+    }
+    if prediction.changed {
+        course.settled = 0;
+        return prediction;
+    }
+    course.settled += 1;
+    // After a change of modes the centre waits for the answer of its own proximal step, or the transient would stay in the
+    // impulses that W cannot see. The modes of the warm start need no such care.
+    if !course.exact
+        || course.settled > PATIENCE
+        || data.merit::<D>(prox, p, u).sqrt() * data.inverse_data <= SOLVED
+    {
+        centre.copy_from_slice(p);
+    }
+    prediction
+}
+
+/// Ends without an answer: back to the best impulse met.
+fn give_best(
+    data: &Prepared<'_>,
+    best: Residual,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &Scratch,
+) -> (SolveStatus, Residual) {
+    p.copy_from_slice(&scratch.best);
+    data.W.multiply_add(p, data.q, u);
+    (SolveStatus::Stalled, best)
+}
+
+/// Full Newton steps from `p`; in steady motion two or three of them solve the step.
+///
+/// The proximal centre stays at the start until the modes settle and follows the iterate then, so that the last steps refine what the
+/// regularisation left. `u` is `W p + q` on return; `iterations` is advanced by the linear solves.
+pub(in crate::solver) fn full_steps<const D: usize>(
+    data: &Prepared<'_>,
+    options: &SolverOptions,
+    max_steps: usize,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> (SolveStatus, Residual) {
+    let mut course = Course {
+        alpha: options.regularisation * data.mean_diagonal,
+        factors: Factors::None,
+        allow_symmetric: true,
+        exact: false,
+        settled: 0,
+        last: f64::INFINITY,
+    };
+    data.W.multiply_add(p, data.q, u);
+    let recalled = modes::recall::<D>(data.mu, p, u, &mut scratch.system.contacts);
+    let is_warm = p.iter().any(|x| x.abs() > 0.0);
+    scratch.system.centre.copy_from_slice(p);
+    let mut step = 0;
+    let mut best = Residual::UNSOLVED;
+    loop {
+        let residual = data.measure::<D>(p, u);
+        if residual.relative < best.relative {
+            best = residual;
+            scratch.best.copy_from_slice(p);
+        }
+        if options.accepts(residual) {
+            return (SolveStatus::Converged, residual);
+        }
+        if !residual.is_finite() {
+            if best.is_finite() {
+                return give_best(data, best, p, u, scratch);
+            }
+            return (SolveStatus::NonFinite, residual);
+        }
+        let progress = residual.relative / course.last;
+        if progress > 0.5
+            && residual.relative < ROUNDING_ASKED
+            && data.is_within_rounding::<D>(p, u)
+        {
+            return (SolveStatus::Converged, residual);
+        }
+        if step == max_steps {
+            return give_best(data, best, p, u, scratch);
+        }
+        course.last = residual.relative;
+        let prediction = if step == 0 && is_warm {
+            recalled
+        } else {
+            predict::<D>(data, &mut course, p, u, scratch)
+        };
+        *iterations += 1;
+        if prediction.changed && step > 0 && step % CYCLE == 0 {
+            let prox = scratch.system.prox(course.alpha);
+            if !scratch
+                .work
+                .affords(CYCLE_SWEEPS as u64 * work::sweep(data.product, data.mu.len()))
+            {
+                return give_best(data, best, p, u, scratch);
+            }
+            for _ in 0..CYCLE_SWEEPS {
+                sweep::sweep::<D>(data, prox, p);
+            }
+            course.last = f64::INFINITY;
+            course.factors = Factors::None;
+        } else {
+            course.revise(progress, prediction, SMALLEST * data.mean_diagonal);
+            if course.factors == Factors::None {
+                course.factors = scratch.system.factorise::<D>(
+                    data,
+                    course.alpha,
+                    prediction,
+                    course.allow_symmetric,
+                    &mut scratch.work,
+                );
+                if course.factors == Factors::None && prediction.m > 0 {
+                    return give_best(data, best, p, u, scratch);
+                }
+            }
+            let newton_step = NewtonStep {
+                alpha: course.alpha,
+                m: prediction.m,
+                factors: course.factors,
+                on_cone: true,
+            };
+            scratch.system.newton_point::<D>(data, newton_step, p, u);
+            p.copy_from_slice(&scratch.system.trial);
+        }
+        data.W.multiply_add(p, data.q, u);
+        step += 1;
+    }
+}

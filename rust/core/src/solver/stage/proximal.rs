@@ -1,0 +1,365 @@
+//! Proximal point around Newton: a sequence of regularised problems, each with one well-behaved answer.
+//!
+//! The step from the centre `c` solves the problem with `W + α I` and `q − α c`; its fixed points are the solutions of the given
+//! problem, and it needs no full rank (Acary, Brémond and Huber 2018, section 8). `α` starts at the size of `W`, where the
+//! problem is easy, and shrinks with the centre held at the start, which traces Tikhonov's path to the answer nearest to the start.
+//! When a step fails, the last good answer becomes the centre and `α` grows again.
+//!
+//! Inside: Newton steps with backtracking on the natural map of the regularised problem, and Gauss–Seidel sweeps on the same
+//! problem when backtracking fails. Once a step is cheap, a sprint with a small `α` tries to end the search at Newton's speed.
+
+use crate::problem::{Prepared, Proximal, Residual};
+use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
+use crate::solver::local::{modes, sweep};
+use crate::solver::options::SolverOptions;
+use crate::solver::report::SolveStatus;
+use crate::solver::scratch::Scratch;
+use crate::solver::work;
+
+/// Most Newton steps for one value of `α`.
+const INNER_STEPS: usize = 30;
+/// Shrinking of `α` along Tikhonov's path.
+const PATH_SHRINK: f64 = 0.1;
+/// A proximal step that leaves more than this of the residual asks for a smaller `α`.
+const SLOW: f64 = 0.1;
+/// Steps of a sprint, and the steps of a proximal step that suggests one.
+const SPRINT: usize = 8;
+const CHEAP: usize = 3;
+/// Relative natural map asked of a step with a large `α`.
+const LOOSE: f64 = 1e-7;
+/// Relative natural map below which a failing descent is rounding.
+const ROUNDING: f64 = 1e-13;
+/// Halvings of a Newton step.
+const HALVINGS: usize = 6;
+/// Failed Newton steps in a row that end a descent, and the sweeps after each.
+const MAX_STUCK: usize = 4;
+const SWEEPS: usize = 10;
+/// Failures in a row after which the method gives up.
+const MAX_FAILURES: usize = 12;
+/// Smallest `α` relative to the mean diagonal.
+const SMALLEST: f64 = 1e-13;
+
+/// The choice of `α` from step to step.
+///
+/// A small `α` gains much per step, but below some bound the inner Newton fails, at ten times the cost of a step that succeeds. So after
+/// a failure the next attempt stays between the failed and the last proved value, and comes later.
+#[derive(Clone, Copy, Debug)]
+struct Course {
+    /// Current `α`, 1/kg.
+    alpha: f64,
+    /// Last `α` whose step succeeded, 1/kg.
+    proved: f64,
+    /// Whether the centre still is the start.
+    follows_path: bool,
+    /// Factor of the next reduction.
+    shrink: f64,
+    /// Successes since the last change of `α`.
+    successes: usize,
+    /// Successes that a reduction of `α` has to wait for.
+    patience: usize,
+    /// Failures in a row.
+    failures: usize,
+    /// Whether the last step was cheap.
+    cheap: bool,
+    /// Steps since the last sprint, and how many have to pass before the next.
+    since_sprint: usize,
+    sprint_wait: usize,
+}
+
+impl Course {
+    fn new(alpha: f64) -> Self {
+        Self {
+            alpha,
+            proved: f64::INFINITY,
+            follows_path: true,
+            shrink: PATH_SHRINK,
+            successes: 0,
+            patience: 1,
+            failures: 0,
+            cheap: false,
+            since_sprint: 0,
+            sprint_wait: 2,
+        }
+    }
+
+    /// Whether it is time for a sprint; Tikhonov's path is not left for one.
+    fn begins_sprint(&mut self) -> bool {
+        self.since_sprint += 1;
+        let begins = self.cheap && !self.follows_path && self.since_sprint > self.sprint_wait;
+        if begins {
+            self.since_sprint = 0;
+            self.cheap = false;
+        }
+        begins
+    }
+
+    fn succeed(&mut self, slow: bool, steps: usize, smallest: f64) {
+        self.follows_path = false;
+        self.failures = 0;
+        self.cheap = steps <= CHEAP;
+        if self.alpha < self.proved {
+            self.patience = (self.patience / 2).max(1);
+        }
+        self.proved = self.alpha;
+        // Steps of a single solve say that a smaller α would do.
+        self.successes += if steps <= 1 { 4 } else { 1 };
+        if slow && self.successes >= self.patience {
+            self.alpha = (self.alpha * self.shrink).max(smallest);
+            self.successes = 0;
+        }
+    }
+
+    /// Whether another attempt is worth it.
+    fn fail(&mut self, largest: f64) -> bool {
+        self.follows_path = false;
+        self.failures += 1;
+        self.successes = 0;
+        self.patience = (2 * self.patience).min(16);
+        if self.proved > self.alpha && self.proved.is_finite() && self.failures < 4 {
+            self.shrink = (self.alpha / self.proved).sqrt().min(0.8);
+            self.alpha = if self.shrink > 0.6 {
+                self.proved
+            } else {
+                self.alpha / self.shrink
+            };
+        } else {
+            self.alpha = (10.0 * self.alpha).min(largest);
+            self.proved = self.alpha;
+        }
+        self.failures <= MAX_FAILURES
+    }
+}
+
+/// One regularised problem to solve.
+#[derive(Clone, Copy, Debug)]
+struct Task {
+    /// `α`, 1/kg; the centre is in the scratch.
+    alpha: f64,
+    /// Relative natural map to reach.
+    tolerance: f64,
+    /// Whether the exact predictor begins.
+    exact: bool,
+    /// Most Newton steps.
+    steps: usize,
+}
+
+/// Moves from `(p, u)` towards `scratch.system.trial` until the natural map falls; `false`, and no move, if it does not.
+fn backtrack<const D: usize>(
+    data: &Prepared<'_>,
+    alpha: f64,
+    current: f64,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+) -> bool {
+    for ((d, t), x) in scratch
+        .direction
+        .iter_mut()
+        .zip(&scratch.system.trial)
+        .zip(&*p)
+    {
+        *d = t - x;
+    }
+    scratch.system.trial_velocity.fill(0.0);
+    data.W.multiply_add(
+        &scratch.direction,
+        &scratch.system.trial_velocity,
+        &mut scratch.image,
+    );
+    let mut t = 1.0;
+    for _ in 0..HALVINGS {
+        for k in 0..data.n {
+            scratch.system.trial[k] = p[k] + t * scratch.direction[k];
+            scratch.system.trial_velocity[k] = u[k] + t * scratch.image[k];
+        }
+        let (trial, velocity) = (&scratch.system.trial, &scratch.system.trial_velocity);
+        if data.merit::<D>(scratch.system.prox(alpha), trial, velocity) < (1.0 - 1e-3 * t) * current
+        {
+            p.copy_from_slice(trial);
+            u.copy_from_slice(velocity);
+            return true;
+        }
+        t *= 0.5;
+    }
+    false
+}
+
+/// Solves one regularised problem with the centre `scratch.system.centre`, from `p`; says whether its natural map fell below
+/// the tolerance. `u = W p + q` on return.
+fn descend<const D: usize>(
+    data: &Prepared<'_>,
+    task: Task,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> bool {
+    let Task {
+        alpha,
+        tolerance,
+        mut exact,
+        steps,
+    } = task;
+    data.W.multiply_add(p, data.q, u);
+    let threshold = (tolerance / data.inverse_data).powi(2);
+    let mut stuck = 0;
+    for step in 0..=steps {
+        let current = data.merit::<D>(scratch.system.prox(alpha), p, u);
+        if !current.is_finite() || step == steps {
+            return current <= threshold;
+        }
+        if current <= threshold {
+            break;
+        }
+        let ReducedSystem {
+            centre, contacts, ..
+        } = &mut scratch.system;
+        let prox = Proximal { alpha, centre };
+        let prediction = modes::predict::<D>(data, prox, exact, p, u, contacts);
+        let factors =
+            scratch
+                .system
+                .factorise::<D>(data, alpha, prediction, false, &mut scratch.work);
+        *iterations += 1;
+        let mut accepted = false;
+        if factors != Factors::None || prediction.m == 0 {
+            let newton_step = NewtonStep {
+                alpha,
+                m: prediction.m,
+                factors,
+                on_cone: false,
+            };
+            scratch.system.newton_point::<D>(data, newton_step, p, u);
+            accepted = backtrack::<D>(data, alpha, current, p, u, scratch);
+        }
+        if accepted {
+            stuck = 0;
+            continue;
+        }
+        if current.sqrt() * data.inverse_data < ROUNDING {
+            break;
+        }
+        // A contact that could open as well as carry has two exact answers; the projection stays with the one at hand.
+        exact = !exact;
+        stuck += 1;
+        if stuck > MAX_STUCK {
+            return false;
+        }
+        let prox = scratch.system.prox(alpha);
+        if !scratch
+            .work
+            .affords(SWEEPS as u64 * work::sweep(data.product, data.mu.len()))
+        {
+            return false;
+        }
+        for _ in 0..SWEEPS {
+            sweep::sweep::<D>(data, prox, p);
+        }
+        data.W.multiply_add(p, data.q, u);
+    }
+    data.W.multiply_add(p, data.q, u);
+    true
+}
+
+/// Proximal point from `p`. `u = W p + q` on return; the best impulse met is returned when nothing converges.
+pub(in crate::solver) fn solve<const D: usize>(
+    data: &Prepared<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> (SolveStatus, Residual) {
+    data.W.multiply_add(p, data.q, u);
+    let mut best = data.measure::<D>(p, u);
+    if options.accepts(best) {
+        return (SolveStatus::Converged, best);
+    }
+    if !best.is_finite() {
+        return (SolveStatus::NonFinite, best);
+    }
+    scratch.best.copy_from_slice(p);
+    scratch.accepted.copy_from_slice(p);
+    scratch.system.centre.copy_from_slice(p);
+    let target = options.regularisation * data.mean_diagonal;
+    let mut course = Course::new(data.mean_diagonal);
+    let mut last = f64::INFINITY;
+    // Asked of a step with the smallest α; tightened where it holds and the velocity is still off.
+    let mut asked = options.tolerance;
+    let limit = *iterations + options.max_newton_steps;
+    let mut status = SolveStatus::MaxIterations;
+    while *iterations < limit && !scratch.work.is_exhausted {
+        let sprints = course.begins_sprint();
+        let task = if sprints {
+            let tolerance = 1e-2 * asked;
+            scratch.system.centre.copy_from_slice(p);
+            Task {
+                alpha: target,
+                tolerance,
+                exact: false,
+                steps: SPRINT,
+            }
+        } else {
+            let coarse = course.alpha > target;
+            let tolerance = if coarse {
+                LOOSE.min(1e-2 * last)
+            } else {
+                1e-2 * asked
+            };
+            Task {
+                alpha: course.alpha,
+                tolerance,
+                exact: true,
+                steps: INNER_STEPS,
+            }
+        };
+        let before = *iterations;
+        let solved = descend::<D>(data, task, p, u, scratch, iterations);
+        // A round counts even where its start was its answer, so that the search ends.
+        *iterations = (*iterations).max(before + 1);
+        let residual = data.measure::<D>(p, u);
+        if options.accepts(residual)
+            || (residual.relative < LOOSE && data.is_within_rounding::<D>(p, u))
+        {
+            return (SolveStatus::Converged, residual);
+        }
+        if residual.relative <= asked {
+            asked *= 0.1;
+        }
+        if residual.relative < best.relative {
+            best = residual;
+            scratch.best.copy_from_slice(p);
+        }
+        if sprints {
+            if residual.relative < SLOW * last {
+                last = residual.relative;
+                scratch.accepted.copy_from_slice(p);
+            } else {
+                p.copy_from_slice(&scratch.accepted);
+                course.sprint_wait *= 2;
+            }
+            scratch.system.centre.copy_from_slice(p);
+        } else if solved {
+            scratch.accepted.copy_from_slice(p);
+            let slow = residual.relative > SLOW * last;
+            last = residual.relative;
+            if course.follows_path && course.alpha > target {
+                course.proved = course.alpha;
+                course.alpha = (course.alpha * PATH_SHRINK).max(target);
+            } else {
+                scratch.system.centre.copy_from_slice(p);
+                course.succeed(slow, *iterations - before, SMALLEST * data.mean_diagonal);
+            }
+        } else {
+            p.copy_from_slice(&scratch.accepted);
+            scratch.system.centre.copy_from_slice(p);
+            if !course.fail(100.0 * data.mean_diagonal) {
+                status = SolveStatus::Stalled;
+                break;
+            }
+        }
+    }
+    p.copy_from_slice(&scratch.best);
+    data.W.multiply_add(p, data.q, u);
+    (status, data.measure::<D>(p, u))
+}

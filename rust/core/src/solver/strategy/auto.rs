@@ -1,0 +1,220 @@
+//! [`Method::Auto`]: what is cheap first, what is robust last. The table of the [chapter](crate::solver) gives each rung its reason.
+
+use super::islands::{self, IslandSolver};
+use crate::problem::{Operator, Prepared, Residual};
+use crate::solver::options::{Method, SolverOptions};
+use crate::solver::report::{Outcome, SolveStatus, Stage};
+use crate::solver::scratch::Scratch;
+use crate::solver::stage::{admm, gauss_seidel, guided, newton, pivoting, proximal, restarts};
+use crate::solver::work::SweepBudget;
+
+/// Most sweeps over many contacts before Newton. Dense, a Newton step costs about as much as `n` sweeps; block-sparse the fill grows with the problem; 20, 50 and 200 were
+/// tried on the recorded ones.
+fn sweep_budget(data: &Prepared<'_>) -> usize {
+    match data.W {
+        Operator::Dense(_) => 2 * data.n,
+        Operator::BlockSparse(_) => (data.mu.len() / 20).max(50),
+    }
+}
+
+/// Alternations that bring many contacts near enough for the proximal point: on piles of 250 and 460 contacts it then takes a third to five sixths of the steps.
+const ALTERNATIONS: usize = 300;
+
+/// Residual below which few contacts are worth the proximal point once more, from the nearest answer. Problems without an answer mostly stay above.
+const NEAR: f64 = 1e-4;
+
+/// The stages of [`Method::Auto`] so far: what each came to, and the nearest answer.
+struct Ladder<'a> {
+    options: &'a SolverOptions,
+    /// Iterations before the present stage.
+    before: usize,
+    /// The nearest answer, whose impulse is in the scratch.
+    nearest: Outcome,
+}
+
+impl<'a> Ladder<'a> {
+    fn new(options: &'a SolverOptions) -> Self {
+        Self {
+            options,
+            before: 0,
+            nearest: Outcome {
+                method: Method::Newton,
+                stage: Stage::AtRest,
+                status: SolveStatus::Stalled,
+                residual: Residual::UNSOLVED,
+            },
+        }
+    }
+
+    /// Enters a stage that ended with `p`; an outcome if it is the answer.
+    #[inline]
+    fn enter(
+        &mut self,
+        stage: Stage,
+        found: (SolveStatus, Residual),
+        p: &[f64],
+        scratch: &mut Scratch,
+        iterations: usize,
+    ) -> Option<Outcome> {
+        self.enter_as(stage.method(), stage, found, p, scratch, iterations)
+    }
+
+    /// Enters a stage whose answer is another method's.
+    #[inline]
+    fn enter_as(
+        &mut self,
+        method: Method,
+        stage: Stage,
+        (status, residual): (SolveStatus, Residual),
+        p: &[f64],
+        scratch: &mut Scratch,
+        iterations: usize,
+    ) -> Option<Outcome> {
+        let status = scratch.list_stage(stage, status, iterations - self.before);
+        self.before = iterations;
+        let outcome = Outcome {
+            method,
+            stage,
+            status,
+            residual,
+        };
+        if status == SolveStatus::Converged {
+            return Some(outcome);
+        }
+        let is_nearer = self.options.excess(residual) < self.options.excess(self.nearest.residual);
+        if is_nearer {
+            self.nearest = outcome;
+            scratch.nearest.copy_from_slice(p);
+        }
+        None
+    }
+
+    /// Ends with the nearest answer, for the reason of the last stage. `u` is `W p + q` on return.
+    fn give_nearest<const D: usize>(
+        self,
+        data: &Prepared<'_>,
+        p: &mut [f64],
+        u: &mut [f64],
+        scratch: &Scratch,
+    ) -> Outcome {
+        if !self.nearest.residual.is_finite() {
+            return Outcome {
+                status: SolveStatus::NonFinite,
+                ..self.nearest
+            };
+        }
+        p.copy_from_slice(&scratch.nearest);
+        data.W.multiply_add(p, data.q, u);
+        Outcome {
+            status: scratch
+                .rungs
+                .as_slice()
+                .last()
+                .map_or(self.nearest.status, |rung| rung.status),
+            residual: data.measure::<D>(p, u),
+            ..self.nearest
+        }
+    }
+}
+
+/// [`Method::Auto`]: what is cheap first, what is robust last.
+pub(in crate::solver) fn escalate<const D: usize>(
+    data: &Prepared<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    islands: IslandSolver<'_>,
+    iterations: &mut usize,
+) -> Outcome {
+    let mut ladder = Ladder::new(options);
+    scratch.start.copy_from_slice(p);
+    let steps = newton::FULL_STEPS.min(options.max_newton_steps);
+    let is_few = data.mu.len() <= options.direct_contacts;
+    let is_warm = p.iter().any(|x| x.abs() > 0.0);
+    if !is_few {
+        let budget = SweepBudget {
+            sweeps: sweep_budget(data),
+            predict: true,
+        };
+        let found = gauss_seidel::sweeps::<D>(data, options, budget, p, u, scratch, iterations);
+        if let Some(outcome) = ladder.enter(Stage::Sweeps, found, p, scratch, *iterations) {
+            return outcome;
+        }
+        if found.0 == SolveStatus::NonFinite {
+            return ladder.give_nearest::<D>(data, p, u, scratch);
+        }
+        let work = &mut scratch.work;
+        if let Some((method, status, residual)) =
+            islands::solve::<D>(data, options, p, u, work, islands, iterations)
+        {
+            let (stage, found) = (Stage::Islands, (status, residual));
+            let entered = ladder.enter_as(method, stage, found, p, scratch, *iterations);
+            if let Some(outcome) = entered {
+                return outcome;
+            }
+        }
+        scratch.start.copy_from_slice(p);
+    } else if is_warm {
+        // Where the modes of the last step serve, this is the end; where they do not, more full steps seldom help.
+        let few = newton::WARM_STEPS.min(steps);
+        let found = newton::full_steps::<D>(data, options, few, p, u, scratch, iterations);
+        if let Some(outcome) = ladder.enter(Stage::WarmNewton, found, p, scratch, *iterations) {
+            return outcome;
+        }
+        p.copy_from_slice(&scratch.start);
+        let found = pivoting::pivots::<D>(data, options, p, u, scratch, iterations);
+        if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
+            return outcome;
+        }
+        // A warm start can mislead where zero does not.
+        p.fill(0.0);
+    } else if data.q.chunks_exact(D).any(|q| q[0] < 0.0) {
+        let found = match guided::solve::<D>(data, options, p, u, scratch, iterations) {
+            Some(residual) => (SolveStatus::Converged, residual),
+            None => (SolveStatus::Stalled, Residual::UNSOLVED),
+        };
+        if let Some(outcome) = ladder.enter(Stage::GuidedNewton, found, p, scratch, *iterations) {
+            return outcome;
+        }
+        p.fill(0.0);
+    }
+    let found = newton::full_steps::<D>(data, options, steps, p, u, scratch, iterations);
+    if let Some(outcome) = ladder.enter(Stage::Newton, found, p, scratch, *iterations) {
+        return outcome;
+    }
+    p.copy_from_slice(&scratch.start);
+    if !is_few {
+        let own = SolverOptions {
+            max_sweeps: ALTERNATIONS.min(options.max_sweeps),
+            ..*options
+        };
+        let found = admm::solve::<D>(data, &own, p, u, scratch, iterations);
+        if let Some(outcome) = ladder.enter(Stage::Admm, found, p, scratch, *iterations) {
+            return outcome;
+        }
+        if ladder.nearest.stage != Stage::Admm {
+            p.copy_from_slice(&scratch.start);
+        }
+    }
+    let found = proximal::solve::<D>(data, options, p, u, scratch, iterations);
+    if let Some(outcome) = ladder.enter(Stage::ProximalPoint, found, p, scratch, *iterations) {
+        return outcome;
+    }
+    if is_few && ladder.nearest.residual.is_finite() {
+        let found = restarts::solve::<D>(data, options, p, u, scratch, iterations);
+        if let Some(outcome) = ladder.enter(Stage::Restarts, found, p, scratch, *iterations) {
+            return outcome;
+        }
+        if ladder.nearest.residual.relative < NEAR {
+            p.copy_from_slice(&scratch.nearest);
+            let found = proximal::solve::<D>(data, options, p, u, scratch, iterations);
+            if let Some(outcome) =
+                ladder.enter(Stage::ProximalPoint, found, p, scratch, *iterations)
+            {
+                return outcome;
+            }
+        }
+    }
+    ladder.give_nearest::<D>(data, p, u, scratch)
+}

@@ -1,0 +1,171 @@
+//! Very many free bodies: sweeps on their velocities first, and what factors `W` where the sweeps do not end.
+//!
+//! A sweep's cost is the same for each contact, and it needs no `W`. Wedged bodies are what it crawls on: there the proximal point goes on from where it stopped, and
+//! where that does not reach the answer either, the sweeps go on from the better of both.
+
+use super::islands::SolvePart;
+use crate::problem::{
+    BlockSparseDelassus, BodyPairs, FrictionContactProblem, Residual, dot, evaluate_into,
+    passive_share,
+};
+use crate::solver::options::{Method, SolverOptions};
+use crate::solver::report::{Rung, Rungs, SolveReport, SolveStatus};
+use crate::solver::stage::body_sweeps::{BodySweeps, solve_body_pairs};
+
+/// Contacts up to which an answer that the sweeps did not reach is sought by factorisation: a step costs some 3 µs a contact there.
+const FEW: usize = 1000;
+
+/// Factorisations of such a search; wedged wheels have taken 77.
+const FACTORISATIONS: usize = 200;
+
+/// Such searches for one solve, each after all the sweeps that are allowed.
+const SEARCHES: usize = 3;
+
+/// The problem `u = Zᵀ Z p + q` of the contacts of free bodies, in the plane.
+#[derive(Clone, Copy)]
+pub struct ManyBodies<'a> {
+    /// What each contact reads and changes.
+    pub pairs: &'a BodyPairs,
+    /// Free velocity (2 `n_c`), m/s.
+    pub q: &'a [f64],
+    /// Friction coefficients (`n_c`).
+    pub mu: &'a [f64],
+    /// `W`, asked for only where the sweeps do not answer.
+    pub operator: &'a dyn Fn() -> &'a BlockSparseDelassus,
+}
+
+impl std::fmt::Debug for ManyBodies<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ManyBodies")
+            .field("n_contacts", &self.mu.len())
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a> ManyBodies<'a> {
+    /// The same problem with `W`.
+    fn problem(&self) -> FrictionContactProblem<'a> {
+        FrictionContactProblem::from_assembled_sparse((self.operator)(), self.q, self.mu)
+    }
+}
+
+/// Solves as the method asks; `solve` is the solver of a problem with `W`, which is above this page.
+pub(in crate::solver) fn solve(
+    bodies: &ManyBodies<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    sweeps: &mut BodySweeps,
+    solve: &mut SolvePart<'_>,
+) -> SolveReport {
+    match options.method {
+        Method::GaussSeidel => {
+            solve_body_pairs(bodies.pairs, bodies.q, bodies.mu, options, p, u, sweeps)
+        }
+        Method::Auto => escalate(bodies, options, p, u, sweeps, solve),
+        _ => solve(&bodies.problem(), options, p, u),
+    }
+}
+
+/// Sweeps, and searches by factorisation with sweeps between them.
+fn escalate(
+    bodies: &ManyBodies<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    sweeps: &mut BodySweeps,
+    solve: &mut SolvePart<'_>,
+) -> SolveReport {
+    let mut sweep = |p: &mut [f64], u: &mut [f64]| {
+        solve_body_pairs(bodies.pairs, bodies.q, bodies.mu, options, p, u, sweeps)
+    };
+    let mut report = sweep(p, u);
+    let mut rungs = report.rungs;
+    for _ in 0..SEARCHES {
+        if report.status != SolveStatus::MaxIterations || bodies.mu.len() > FEW {
+            break;
+        }
+        report = search(
+            bodies,
+            options,
+            (&mut *p, &mut *u),
+            report,
+            &mut rungs,
+            solve,
+        );
+        if report.is_converged() {
+            break;
+        }
+        let (p_before, u_before) = (p.to_vec(), u.to_vec());
+        let swept = sweep(p, u);
+        for rung in swept.rungs.as_slice() {
+            rungs.push(*rung);
+        }
+        let iterations = report.iterations + swept.iterations;
+        if !swept.is_converged() && excess(options, &report) < excess(options, &swept) {
+            // The sweeps led away from the nearest answer so far, and would again.
+            p.copy_from_slice(&p_before);
+            u.copy_from_slice(&u_before);
+            report.iterations = iterations;
+            break;
+        }
+        report = SolveReport {
+            iterations,
+            ..swept
+        };
+    }
+    report.rungs = rungs;
+    report
+}
+
+/// Goes on from where the sweeps stopped by the proximal-point method. The better of both answers stays, and adds no energy.
+fn search(
+    bodies: &ManyBodies<'_>,
+    options: &SolverOptions,
+    (p, u): (&mut [f64], &mut [f64]),
+    report: SolveReport,
+    rungs: &mut Rungs,
+    solve: &mut SolvePart<'_>,
+) -> SolveReport {
+    let proximal = SolverOptions {
+        method: Method::ProximalPoint,
+        max_newton_steps: FACTORISATIONS,
+        ..*options
+    };
+    let (p_swept, u_swept) = (p.to_vec(), u.to_vec());
+    let problem = bodies.problem();
+    let mut found = solve(&problem, &proximal, p, u);
+    if let Some(share) = passive_share(dot(p, u), dot(p, bodies.q)) {
+        for p in &mut *p {
+            *p *= share;
+        }
+        let Residual { relative, velocity } = evaluate_into(&problem, p, u);
+        (found.residual, found.velocity_error) = (relative, velocity);
+        if excess(options, &found) > 1.0 {
+            found.status = SolveStatus::Stalled;
+        }
+    }
+    rungs.push(Rung {
+        stage: found.stage,
+        status: found.status,
+        iterations: found.iterations,
+    });
+    found.iterations += report.iterations;
+    if found.is_converged() || excess(options, &found) < excess(options, &report) {
+        return found;
+    }
+    p.copy_from_slice(&p_swept);
+    u.copy_from_slice(&u_swept);
+    SolveReport {
+        iterations: found.iterations,
+        ..report
+    }
+}
+
+/// How far an answer is above the tolerances, as a factor.
+fn excess(options: &SolverOptions, report: &SolveReport) -> f64 {
+    options.excess(Residual {
+        relative: report.residual,
+        velocity: report.velocity_error,
+    })
+}

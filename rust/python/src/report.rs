@@ -1,0 +1,149 @@
+//! What a call of `step` and a question for the energy come back with.
+
+use pyo3::prelude::*;
+use rover_core::integrator::StepReport as CoreReport;
+use rover_core::multibody::Energy as CoreEnergy;
+
+/// How the steps of one call went: the worst of them, or their sum.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
+pub struct StepReport {
+    inner: CoreReport,
+}
+
+#[pymethods]
+impl StepReport {
+    /// Whether the steps "converged" or "not_converged".
+    ///
+    /// "converged" means that the contact solver met its tolerance in every step.
+    #[getter]
+    fn status(&self) -> &'static str {
+        if self.inner.is_converged() {
+            "converged"
+        } else {
+            "not_converged"
+        }
+    }
+
+    /// Whether the contact solver met its tolerance in every step.
+    #[getter]
+    fn is_converged(&self) -> bool {
+        self.inner.is_converged()
+    }
+
+    /// Number of steps taken.
+    #[getter]
+    fn steps(&self) -> usize {
+        self.inner.steps
+    }
+
+    /// Iterations of the contact solver, summed over the steps.
+    #[getter]
+    fn iterations(&self) -> usize {
+        self.inner.iterations
+    }
+
+    /// Newton iterations of the scheme, summed over the steps; 0 with the linearised scheme.
+    #[getter]
+    fn newton_iterations(&self) -> usize {
+        self.inner.newton_iterations
+    }
+
+    /// Largest relative residual of a step's contact problem, computed from its impulses.
+    #[getter]
+    fn residual(&self) -> f64 {
+        self.inner.residual
+    }
+
+    /// Largest number of contacts in a step.
+    #[getter]
+    fn n_contacts(&self) -> usize {
+        self.inner.n_contacts
+    }
+
+    /// Number of steps taken again.
+    ///
+    /// A step is taken again when a motor reached its torque-speed line, when the energy audit asks
+    /// for implicit gyroscopic terms, or when Newton's law of restitution had no solution.
+    #[getter]
+    fn retaken(&self) -> usize {
+        self.inner.retaken
+    }
+
+    /// Largest unexplained gain of energy in a step, relative to the kinetic energy.
+    ///
+    /// Unexplained is what exceeds the work of gravity and actuators.
+    #[getter]
+    fn energy_gain(&self) -> f64 {
+        self.inner.energy_gain
+    }
+
+    /// Energy that the scheme would have gained and the audit removed, summed over the steps, J.
+    #[getter]
+    fn energy_removed(&self) -> f64 {
+        self.inner.energy_removed
+    }
+
+    /// Potential energy gained by pushing bodies out of penetration, summed over the steps, J.
+    #[getter]
+    fn energy_lifted(&self) -> f64 {
+        self.inner.energy_lifted
+    }
+
+    fn __repr__(&self) -> String {
+        let r = &self.inner;
+        format!(
+            "StepReport(status={:?}, steps={}, iterations={}, residual={:.3e}, n_contacts={})",
+            self.status(),
+            r.steps,
+            r.iterations,
+            r.residual,
+            r.n_contacts
+        )
+    }
+}
+
+/// Kinetic and potential energy.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
+pub struct Energy {
+    inner: CoreEnergy,
+}
+
+#[pymethods]
+impl Energy {
+    /// Kinetic energy, J.
+    #[getter]
+    fn kinetic(&self) -> f64 {
+        self.inner.kinetic
+    }
+
+    /// Potential energy in gravity, J, zero at the world's origin.
+    #[getter]
+    fn potential(&self) -> f64 {
+        self.inner.potential
+    }
+
+    /// Sum of both, J.
+    #[getter]
+    fn total(&self) -> f64 {
+        self.inner.total()
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Energy(kinetic={}, potential={})",
+            self.inner.kinetic, self.inner.potential
+        )
+    }
+}
+
+impl From<CoreReport> for StepReport {
+    fn from(inner: CoreReport) -> Self {
+        Self { inner }
+    }
+}
+
+impl From<CoreEnergy> for Energy {
+    fn from(inner: CoreEnergy) -> Self {
+        Self { inner }
+    }
+}

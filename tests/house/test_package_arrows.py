@@ -1,0 +1,123 @@
+"""The rooms of the package know only those before them, and every public name means one thing."""
+
+import ast
+import re
+from collections import defaultdict
+from pathlib import Path
+
+import rover_gym
+
+PACKAGE = Path(rover_gym.__file__).parent
+
+#: In the order of the package's docstring: a room may use those before it.
+ROOMS = re.findall(r"^    (\w+)  +\S", rover_gym.__doc__ or "", flags=re.MULTILINE)
+
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+
+def room_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def used_modules(text: str) -> set[str]:
+    """What of the package a file imports, wherever in the file: `env.task`, `_core`, and `RoverEnv` of the package."""
+    found = set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "an import from a dot says less than its full name"
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return {name.removeprefix("rover_gym.") for name in found if name.startswith("rover_gym.")}
+
+
+def used_rooms(text: str) -> set[str]:
+    return {name.partition(".")[0] for name in used_modules(text)}
+
+
+def test_every_room_stands_in_the_order() -> None:
+    found = {room_of(path) for path in FILES} - {"__init__"}
+    assert len(ROOMS) == len(set(ROOMS))
+    assert found == set(ROOMS)
+
+
+def test_no_room_knows_a_later_one() -> None:
+    upward = []
+    for path in FILES:
+        if path == PACKAGE / "__init__.py":
+            continue
+        room = room_of(path)
+        allowed = {*ROOMS[: ROOMS.index(room) + 1], "_core"}
+        found = used_rooms(path.read_text(encoding="utf-8")) - allowed
+        upward += [f"{path.relative_to(PACKAGE)} uses {name}" for name in sorted(found)]
+    assert not upward
+
+
+def test_only_mechanics_knows_the_compiled_module() -> None:
+    users = [path.name for path in FILES if "_core" in used_rooms(path.read_text(encoding="utf-8"))]
+    assert users == ["mechanics.py"]
+
+
+def test_the_modules_of_a_room_import_one_another_one_way() -> None:
+    """Between modules, too, the arrows run one way: none reaches itself, whether at once or when it is called."""
+    modules = {".".join(path.relative_to(PACKAGE).with_suffix("").parts): path for path in FILES}
+    modules = {name: path for name, path in modules.items() if not name.endswith("__init__")}
+    arrows = {}
+    for name, path in modules.items():
+        used = used_modules(path.read_text(encoding="utf-8"))
+        arrows[name] = {other for other in modules if any(one == other or one.startswith(f"{other}.") for one in used)}
+    while leaves := {name for name, used in arrows.items() if not used & arrows.keys()}:
+        arrows = {name: used for name, used in arrows.items() if name not in leaves}
+    assert not arrows, "these stand in a circle, or above one"
+
+
+def test_the_reading_finds_all_forms_of_an_import() -> None:
+    text = """
+from rover_gym.env.task import Task
+from rover_gym import RoverEnv
+import rover_gym.vector.sb3
+import numpy
+
+def draw():
+    from rover_gym.figures import draw_run
+"""
+    assert used_modules(text) == {"env.task.Task", "RoverEnv", "vector.sb3", "figures.draw_run"}
+    assert used_rooms(text) == {"env", "RoverEnv", "vector", "figures"}
+
+
+def test_a_public_class_has_a_name_of_its_own() -> None:
+    classes = defaultdict(list)
+    for path in FILES:
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                classes[node.name].append(str(path.relative_to(PACKAGE)))
+    for name in rover_gym.mechanics.__all__:
+        classes[name].append("mechanics.py")
+    assert not {name: places for name, places in classes.items() if len(places) > 1}
+
+
+def test_a_module_has_a_name_of_its_own() -> None:
+    modules = defaultdict(list)
+    for path in FILES:
+        name = path.parent.name if path.name == "__init__.py" else path.stem
+        modules[name].append(str(path.relative_to(PACKAGE)))
+    assert not {name: places for name, places in modules.items() if len(places) > 1}
+
+
+def test_a_room_says_what_is_public() -> None:
+    """What a room re-exports it names in `__all__`; a room without, such as the one of the command, offers modules."""
+    for path in PACKAGE.glob("*/__init__.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        assert ast.get_docstring(tree), path
+        exported = [node for node in tree.body if isinstance(node, ast.Assign) and node.targets[0].id == "__all__"]
+        if path.parent.name in ("cli", "learning"):
+            assert not exported
+            continue
+        names = set(ast.literal_eval(exported[0].value))
+        imported = {
+            alias.asname or alias.name
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("rover_gym")
+            for alias in node.names
+        }
+        assert imported - {"MissingExtraError"} == names, path
