@@ -56,9 +56,13 @@ def _use_stub() -> None:
     sys.modules[name] = rover_gym.mechanics = stub
 
 
-def _card() -> str:
-    """The environment's docstring, which is Markdown."""
-    return f"# Rover-v0\n\n{inspect.getdoc(RoverEnv)}\n"
+#: Environments whose docstring is a card in Markdown, by name; each has a page of its own.
+CARDS = {"Rover-v0": RoverEnv}
+
+
+def _card(name: str) -> str:
+    """An environment's card."""
+    return f"# {name}\n\n{inspect.getdoc(CARDS[name])}\n"
 
 
 def _command_line() -> str:
@@ -73,13 +77,14 @@ def _command_line() -> str:
 
 def _write_generated(_app: Sphinx) -> None:
     GENERATED.mkdir(exist_ok=True)
-    for name, text in (("rover-v0.md", _card()), ("command-line.md", _command_line())):
+    pages = {f"{name.lower()}.md": _card(name) for name in CARDS}
+    for name, text in (pages | {"command-line.md": _command_line()}).items():
         (GENERATED / name).write_text(text, encoding="utf-8")
 
 
-def _mend_docstring(_app: Sphinx, _what: str, name: str, _obj: object, _options: object, lines: list[str]) -> None:
+def _mend_docstring(_app: Sphinx, _what: str, _name: str, obj: object, _options: object, lines: list[str]) -> None:
     """The card appears as its first line, since the whole has its own page; a bar is a norm, no substitution."""
-    if name == "rover_gym.env.RoverEnv":
+    if any(obj is environment for environment in CARDS.values()):
         lines[1:] = ["", "The environment's card has a page of its own."]
     lines[:] = [line.replace("|", r"\|") for line in lines]
 

@@ -1732,10 +1732,10 @@ class SoilSimulation:
         """Commanded torques of the rover's wheels, (2,), N m, positive forward; empty without a rover."""
     @property
     def pull(self) -> tuple[float, float]:
-        """Force at the machine's centre, (2,), N."""
+        """Force at the machine's centre along x and y, N."""
     @property
     def settings(self) -> dict[str, Any]:
-        """The options that have a number or a name, by the names of the arguments."""
+        """The options of contacts, gravity and solver, by the names of the arguments."""
     def set_state(
         self,
         position: npt.ArrayLike,

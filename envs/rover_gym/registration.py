@@ -1,23 +1,47 @@
 """Registers the environments of this package with Gymnasium."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import gymnasium as gym
 
 from rover_gym.env.task import MAX_EPISODE_STEPS
 
-#: One class, by name and arguments.
-ENVIRONMENTS: Mapping[str, Mapping[str, str]] = {"Rover-v0": {}, "RoverRocks-v0": {"terrain": "sphere_field"}}
+
+@dataclass(frozen=True)
+class Registration:
+    """What `gymnasium.make` needs to know of an environment.
+
+    Attributes:
+        entry_point: Its class, as "module:class".
+        vector_entry_point: The class of many of it, or None: then Gymnasium makes a vector of single ones.
+        max_episode_steps: Steps until truncation.
+        arguments: Those that differ from the class' defaults.
+    """
+
+    entry_point: str
+    vector_entry_point: str | None = None
+    max_episode_steps: int = MAX_EPISODE_STEPS
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+
+
+ENVIRONMENTS: Mapping[str, Registration] = {
+    "Rover-v0": Registration("rover_gym.env:RoverEnv", "rover_gym.vector:RoverVectorEnv"),
+    "RoverRocks-v0": Registration(
+        "rover_gym.env:RoverEnv", "rover_gym.vector:RoverVectorEnv", arguments={"terrain": "sphere_field"}
+    ),
+}
 
 
 def register_environments() -> None:
     """Makes the environments known to `gymnasium.make`; a second call changes nothing."""
-    for name, arguments in ENVIRONMENTS.items():
+    for name, known in ENVIRONMENTS.items():
         if name not in gym.registry:
             gym.register(
                 id=name,
-                entry_point="rover_gym.env:RoverEnv",
-                vector_entry_point="rover_gym.vector:RoverVectorEnv",
-                max_episode_steps=MAX_EPISODE_STEPS,
-                kwargs=dict(arguments),
+                entry_point=known.entry_point,
+                vector_entry_point=known.vector_entry_point,
+                max_episode_steps=known.max_episode_steps,
+                kwargs=dict(known.arguments),
             )

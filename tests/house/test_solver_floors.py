@@ -15,7 +15,7 @@ FLOORS = [
     {"stage"},
     {"reference", "strategy"},
     {"workspace"},
-    {"solve"},
+    {"entry"},
     {"mod"},
 ]
 FLOOR = {name: number for number, names in enumerate(FLOORS) for name in names}

@@ -6,6 +6,8 @@ mod scenes;
 
 #[path = "planar/ball.rs"]
 mod ball;
+#[path = "planar/composite.rs"]
+mod composite;
 #[path = "planar/mirrored_rover.rs"]
 mod mirrored_rover;
 #[path = "planar/siconos.rs"]

@@ -3,9 +3,13 @@
 mod solver_scenes;
 
 use proptest::prelude::*;
-use rover_core::problem::{Dimension, FrictionContactProblem, evaluate};
+use rover_core::problem::{
+    BlockSparseDelassus, BodyPairs, Dimension, DiscPair, FrictionContactProblem, PairContact,
+    evaluate,
+};
 use rover_core::solver::{
-    Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, Stage, solve,
+    ManyBodies, Method, SolveReport, SolveStatus, SolverOptions, SolverWorkspace, Stage, solve,
+    solve_many_bodies,
 };
 use solver_scenes::{Problem, ROVER_NV, Scene, falling, pile, rover, table};
 
@@ -840,6 +844,106 @@ fn the_report_names_the_stage_that_answered_and_those_before_it() {
         let (_, report) = solve_with(&problem, &options, &mut p);
         assert_eq!(report.rungs.as_slice().len(), 1, "{method:?}");
         assert_eq!(report.rungs.as_slice()[0].stage, report.stage);
+    }
+}
+
+/// A problem with nothing to do lists that, and one in other units the same stages.
+#[test]
+fn every_solve_lists_its_stages() {
+    let mut p = vec![0.0; 2];
+    let rest = Problem {
+        dimension: Dimension::Two,
+        W: vec![1.0, 0.0, 0.0, 1.0],
+        q: vec![0.0; 2],
+        mu: vec![0.5],
+    };
+    let (_, report) = solve_with(&rest, &SolverOptions::default(), &mut p);
+    let rungs = report.rungs.as_slice();
+    assert_eq!(rungs.len(), 1);
+    assert_eq!(
+        (rungs[0].stage, rungs[0].status, rungs[0].iterations),
+        (Stage::AtRest, SolveStatus::Converged, 0)
+    );
+    // In other units the same stages, with the same ends.
+    let problem = parked_rover();
+    let tiny = Problem {
+        q: problem.q.iter().map(|q| q * 1e-100).collect(),
+        W: problem.W.clone(),
+        mu: problem.mu.clone(),
+        dimension: problem.dimension,
+    };
+    let (_, _, usual) = solved(&problem);
+    let (_, _, scaled) = solved(&tiny);
+    assert_eq!(scaled.rungs, usual.rungs);
+}
+
+/// A column of discs, whose contacts stand in for W: when the sweeps are cut short the proximal point goes on, and both are listed.
+#[test]
+fn free_bodies_list_their_sweeps_and_what_came_after_them() {
+    let (n, mass, radius) = (20, 1.0_f64, 0.1);
+    let inertia = 0.5 * mass * radius * radius;
+    let (c, s) = (1.0 / mass.sqrt(), radius / inertia.sqrt());
+    let side = |linear: f64, angular: f64, sign: f64| {
+        let c = sign * linear;
+        [[0.0, c, 0.0], [c, 0.0, angular]]
+    };
+    let mut pairs = BodyPairs {
+        n_coordinates: 3 * n,
+        wide_at: 3 * n,
+        ..BodyPairs::default()
+    };
+    let mut contacts = Vec::new();
+    for i in 0..n {
+        let below = (i > 0).then(|| i - 1);
+        let (c_b, s_b) = below.map_or((0.0, 0.0), |_| (c, s));
+        pairs.discs.push(DiscPair {
+            bodies: [3 * i, 3 * below.unwrap_or(0)].map(|k| u32::try_from(k).expect("few")),
+            n: [0.0, 1.0],
+            linear: [c, c_b],
+            angular: [s, s_b],
+        });
+        contacts.push(PairContact::<2, 3> {
+            bodies: [Some(i), below],
+            jacobians: [side(c, s, 1.0), side(c_b, s_b, -1.0)],
+        });
+    }
+    let mut W = BlockSparseDelassus::new();
+    W.assemble(&contacts, &vec![[1.0; 3]; n]);
+    // All fall at 1 cm/s: only the lowest approaches what it touches.
+    let mut q = vec![0.0; 2 * n];
+    q[0] = -0.01;
+    let mu = vec![0.5; n];
+    let bodies = ManyBodies {
+        pairs: &pairs,
+        q: &q,
+        mu: &mu,
+        operator: &|| &W,
+    };
+    let options = SolverOptions {
+        max_sweeps: 3,
+        ..SolverOptions::default()
+    };
+    let (mut p, mut u) = (vec![0.0; 2 * n], vec![0.0; 2 * n]);
+    let mut workspace = SolverWorkspace::new();
+    let report = solve_many_bodies(&bodies, &options, &mut p, &mut u, &mut workspace);
+    let rungs = report.rungs.as_slice();
+    let ends: Vec<_> = rungs.iter().map(|rung| (rung.stage, rung.status)).collect();
+    assert_eq!(
+        ends,
+        [
+            (Stage::BodySweeps, SolveStatus::MaxIterations),
+            (Stage::ProximalPoint, SolveStatus::Converged)
+        ]
+    );
+    assert_eq!(report.stage, Stage::ProximalPoint);
+    let total: usize = rungs.iter().map(|rung| rung.iterations).sum();
+    assert_eq!(total, report.iterations);
+    // m v of the whole column stops at the floor, that of all above the k-th at the k-th.
+    for (k, p) in p.chunks_exact(2).enumerate() {
+        assert!(
+            (p[0] - 0.01 * mass * (n - k) as f64).abs() < 1e-9,
+            "{k}: {p:?}"
+        );
     }
 }
 

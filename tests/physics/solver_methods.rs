@@ -234,6 +234,9 @@ fn a_wrong_velocity_is_not_accepted_at_a_large_mass_ratio() {
             "{}: {report:?}",
             method.name()
         );
+        // An answer that is refused after all is listed as refused.
+        let last = report.rungs.as_slice().last().map(|rung| rung.status);
+        assert_eq!(last, Some(report.status), "{}", method.name());
     }
     let options = SolverOptions::default();
     let (_, u, report) = solve_with(Method::Auto, &problem.view(), &options);

@@ -42,7 +42,7 @@ def _print_version(wanted: bool) -> None:
 @app.callback()
 def rover(
     _version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and stop.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """Drive a six-wheel Mars rover in a nonsmooth simulator."""

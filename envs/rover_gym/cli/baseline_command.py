@@ -20,24 +20,24 @@ CAUSES = {"time": "time limit", "high_centred": "high centred", "roll_over": "ro
 def baseline(
     difficulty: Annotated[
         list[float] | None,
-        typer.Option(help="A difficulty from 0 to 1; may be given several times. Five, if not given."),
+        typer.Option(help="Difficulty from 0 to 1; repeat for several. Default: five of them."),
     ] = None,
-    episodes: Annotated[
-        int, typer.Option(min=1, max=MOST_EPISODES, help="How many episodes at each difficulty.")
-    ] = 200,
+    episodes: Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="Episodes at each difficulty.")] = 200,
     seed: Annotated[
-        int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the first episode; the next ones count up.")
+        int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the first episode; the others count up from it.")
     ] = 0,
     policy: Annotated[
         str,
-        typer.Option(help="'pd' for the baseline, 'trained' for the package's trained one, or such a one's folder."),
+        typer.Option(
+            help="'pd' for the baseline, 'trained' for the trained policy of the package, or a trained policy's folder."
+        ),
     ] = "pd",
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
 ) -> None:
     """Drive RoverRocks-v0 with the PD baseline or a trained policy and print how often it reached the goal.
 
     The interval is Wilson's, 95%. Time is the mean of the episodes that reached the goal; energy the work through
-    the wheel motors over the way driven. Ctrl-C ends the measurement: what is done is printed.
+    the wheel motors over the way driven. Ctrl-C ends the measurement: what is finished is printed.
     """
     difficulties = tuple(difficulty) if difficulty else DIFFICULTIES
     with progress_bar() as bar:

@@ -46,43 +46,45 @@ SHORTEST_STEP = 1e-5  # s: a shorter one makes no episode end
 def drive(
     *,
     terrain: Annotated[str, typer.Option(help="The ground: 'plane', or 'sphere_field' for rocks.")] = "plane",
-    difficulty: Annotated[float | None, typer.Option(help="Of the rocks, from 0 to 1; 0.5 if not given.")] = None,
+    difficulty: Annotated[
+        float | None, typer.Option(help="Difficulty of the rocks, from 0 to 1. Default: 0.5.")
+    ] = None,
     slope: Annotated[
-        float | None, typer.Option(help="Slope of the ground, degrees; if not given 0, among rocks by the difficulty.")
+        float | None, typer.Option(help="Slope of the ground, degrees. Default: 0; on rocks, by the difficulty.")
     ] = None,
     uphill: Annotated[
-        float | None, typer.Option(help="Direction of steepest ascent, degrees to the left of x; drawn if not given.")
+        float | None, typer.Option(help="Direction of steepest ascent, degrees to the left of x. Default: random.")
     ] = None,
     heading: Annotated[
-        float | None, typer.Option(help="Start heading, degrees to the left of x; drawn if not given.")
+        float | None, typer.Option(help="Start heading, degrees to the left of x. Default: random.")
     ] = None,
     goal: Annotated[
-        tuple[float, float] | None, typer.Option(metavar="X Z", help="Goal on the map, m; drawn if not given.")
+        tuple[float, float] | None, typer.Option(metavar="X Z", help="Goal on the map, m. Default: random.")
     ] = None,
     policy: Annotated[
         str,
-        typer.Option(help="'pd' for the baseline, 'trained' for the package's trained one, or such a one's folder."),
+        typer.Option(
+            help="'pd' for the baseline, 'trained' for the trained policy of the package, or a trained policy's folder."
+        ),
     ] = "pd",
-    friction: Annotated[float, typer.Option(help="Coulomb's coefficient.")] = 0.7,
+    friction: Annotated[float, typer.Option(help="Friction coefficient.")] = 0.7,
     time_step: Annotated[float, typer.Option(help="Time step of the physics, s.")] = 0.005,
     time_limit: Annotated[float, typer.Option(min=CONTROL_PERIOD, max=1e6, help="Time limit of an episode, s.")] = 60.0,
-    episodes: Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="How many episodes.")] = 1,
+    episodes: Annotated[int, typer.Option(min=1, max=MOST_EPISODES, help="Number of episodes.")] = 1,
     seed: Annotated[
-        int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the first episode; the next ones count up.")
+        int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the first episode; the others count up from it.")
     ] = 0,
     output: Annotated[
         Path | None,
-        typer.Option(
-            file_okay=False, help="Folder for trajectories (HDF5) and summary.json; nothing is saved without."
-        ),
+        typer.Option(file_okay=False, help="Folder for trajectories (HDF5) and summary.json. Default: save nothing."),
     ] = None,
     video: Annotated[
-        Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes, one after the other.")
+        Path | None, typer.Option(dir_okay=False, metavar="FILE.mp4", help="Film the episodes one after the other.")
     ] = None,
 ) -> None:
-    """Drive Rover-v0 to its goal with the PD baseline or a trained policy and print what the episodes came to.
+    """Drive Rover-v0 to its goal with the PD baseline or a trained policy and print the results of the episodes.
 
-    Ctrl-C ends the drive: the episodes that are done are printed, and what was recorded and filmed is kept.
+    Ctrl-C ends the drive: finished episodes are printed, and what was recorded and filmed is kept.
     """
     _check_time_step(time_step)
     check_folder("output", output)

@@ -50,8 +50,8 @@ Height = Annotated[float, typer.Option(help="Height of the step at x = 2 m.")]
 TableFile = Annotated[
     Path | None, typer.Option(exists=True, dir_okay=False, help="Text file with columns x and y, m, for 'table'.")
 ]
-Friction = Annotated[float, typer.Option(help="Coulomb's coefficient.")]
-Restitution = Annotated[float, typer.Option(help="Newton's coefficient.")]
+Friction = Annotated[float, typer.Option(help="Friction coefficient.")]
+Restitution = Annotated[float, typer.Option(help="Coefficient of restitution.")]
 TimeStep = Annotated[float, typer.Option(help="Time step, s.")]
 Duration = Annotated[float, typer.Option(min=0.01, max=1000.0, help="Time to simulate, s.")]
 Speed = Annotated[float, typer.Option(min=-1e4, max=1e4, help="Forward speed at the start, m/s.")]
@@ -78,7 +78,7 @@ def ball(
     duration: Duration = 10.0,
     output: Output = Path("runs/planar"),
 ) -> None:
-    """Drop a ball on a line, a sine, a step or a table of points; record and draw its way."""
+    """Drop a ball on a line, a sine, a step or a table of points; record and draw its path."""
     check_folder("output", output)
     sim = BallSimulation(
         _ground(ground, slope, amplitude, wavelength, height, table),
@@ -111,7 +111,7 @@ def rover(
     duration: Duration = 10.0,
     output: Output = Path("runs/planar"),
 ) -> None:
-    """Drive the two-wheel rover over a line, a sine, a step or a table of points; record and draw its way."""
+    """Drive the two-wheel rover over a line, a sine, a step or a table of points; record and draw its path."""
     check_folder("output", output)
     sim = TwoWheelRoverSimulation(
         _ground(ground, slope, amplitude, wavelength, height, table),

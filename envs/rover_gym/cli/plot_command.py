@@ -20,12 +20,12 @@ def plot(
         ),
     ],
     output: Annotated[
-        Path | None, typer.Option(file_okay=False, help="Folder to write into; beside the run, if not given.")
+        Path | None, typer.Option(file_okay=False, help="Folder to write into. Default: beside the run.")
     ] = None,
     file_format: Annotated[str, typer.Option("--format", help="'png', 'svg' or 'pdf'.")] = "png",
     overview: Annotated[bool, typer.Option("--overview/--no-overview", help="Add one page with all figures.")] = False,
 ) -> None:
-    """Draw a saved run over time: gaps, loads, slip, attitude, torques, energy and solver, and its way from above.
+    """Draw a saved run over time: gaps, loads, slip, attitude, torques, energy and solver, and its path from above.
 
     Of a run on a soil: speed, slip and sinkage; forces on the wheels; energy, contacts and overlap.
     """

@@ -23,10 +23,12 @@ def replay(
         typer.Argument(help="A trajectory that `rover drive --output`, `rover report` or `rover planar soil` wrote."),
     ],
     html: Annotated[Path | None, typer.Option(dir_okay=False, help="Page for the browser; needs no network.")] = None,
-    vrml: Annotated[Path | None, typer.Option(dir_okay=False, help="VRML97 file, by custom .wrl.")] = None,
-    gltf: Annotated[Path | None, typer.Option(dir_okay=False, help="Binary glTF 2.0 file, by custom .glb.")] = None,
-    fps: Annotated[float, typer.Option(help="Frames a second, at most as many as were recorded.")] = 25.0,
-    follow: Annotated[bool, typer.Option("--follow/--no-follow", help="Let the page's eye go with the rover.")] = True,
+    vrml: Annotated[Path | None, typer.Option(dir_okay=False, help="VRML97 file, usually .wrl.")] = None,
+    gltf: Annotated[Path | None, typer.Option(dir_okay=False, help="Binary glTF 2.0 file, usually .glb.")] = None,
+    fps: Annotated[float, typer.Option(help="Frames per second, at most as many as were recorded.")] = 25.0,
+    follow: Annotated[
+        bool, typer.Option("--follow/--no-follow", help="Let the camera of the page follow the rover.")
+    ] = True,
 ) -> None:
     """Replay a saved run: as a page with a timeline and curves, and as animated 3D files for other programs."""
     if html is None and vrml is None and gltf is None:

@@ -21,7 +21,7 @@ def report(
         str, typer.Option(help="Time stepping: 'newton' (forces at the end of the step) or 'linearised'.")
     ] = "newton",
     stabilisation: Annotated[
-        str, typer.Option(help="'none', as in the Siconos runs, or 'projection', which takes penetration away.")
+        str, typer.Option(help="'none', as in the Siconos runs, or 'projection', which removes penetration.")
     ] = "none",
     output: Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)] = Path("runs/report"),
 ) -> None:

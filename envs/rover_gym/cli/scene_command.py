@@ -39,28 +39,28 @@ class SceneTerrain(StrEnum):
 def scene(
     *,
     terrain: Annotated[SceneTerrain, typer.Option(help="The ground.")] = SceneTerrain.plane,
-    slope: Annotated[float, typer.Option(help="Slope of plane or rocks, degrees, rising along x.")] = 0.0,
-    heading: Annotated[float, typer.Option(help="Heading of the start, degrees, to the left of x.")] = 0.0,
+    slope: Annotated[float, typer.Option(help="Slope of the plane or rocks, degrees, rising along x.")] = 0.0,
+    heading: Annotated[float, typer.Option(help="Start heading, degrees to the left of x.")] = 0.0,
     straight: Annotated[
-        bool, typer.Option("--straight/--steered", help="No steering and equal torques, or any command.")
+        bool, typer.Option("--straight/--steered", help="Promise no steering and equal torques, or allow any command.")
     ] = False,
     held: Annotated[bool, typer.Option("--held", help="Wheels may be braked and joints held.")] = False,
     tumbles: Annotated[bool, typer.Option("--tumbles", help="The rover may turn over in free flight.")] = False,
     reach: Annotated[float | None, typer.Option(help="The rover stays within this distance of its start, m.")] = None,
-    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Of the rocks.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the rocks.")] = 1,
     accuracy: Annotated[
-        str, typer.Option(help="fast, balanced, reference, or the error allowed on 20 m of flat ground, m.")
+        str, typer.Option(help="'fast', 'balanced', 'reference', or the error allowed on 20 m of flat ground, m.")
     ] = "balanced",
-    planar: Annotated[bool, typer.Option("--planar/--no-planar", help="Whether a planar model is welcome.")] = True,
-    explain: Annotated[bool, typer.Option("--explain", help="Say what was built and why.")] = False,
+    planar: Annotated[bool, typer.Option("--planar/--no-planar", help="Allow a planar model.")] = True,
+    explain: Annotated[bool, typer.Option("--explain", help="Print what was built and why.")] = False,
     measure: Annotated[
-        bool, typer.Option("--measure", help="Drive straight with and without each economy: cost and error.")
+        bool, typer.Option("--measure", help="Drive straight with and without each economy; print cost and error.")
     ] = False,
-    torque: Annotated[float, typer.Option(help="Of every wheel in what is measured, N m.")] = 15.0,
-    duration: Annotated[float, typer.Option(min=0.1, max=600.0, help="Of what is measured, s.")] = 10.0,
+    torque: Annotated[float, typer.Option(help="Torque of every wheel in the measured drive, N m.")] = 15.0,
+    duration: Annotated[float, typer.Option(min=0.1, max=600.0, help="Duration of the measured drive, s.")] = 10.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
 ) -> None:
-    """Say what is built for a scene: model, ground, scheme, solver and step, each with its reason.
+    """Print what is built for a scene: model, ground, scheme, solver and step, each with its reason.
 
     What is not known never to happen is built: steering is welded only with --straight, and so on. Without --explain
     and --measure one line is printed.

@@ -47,32 +47,33 @@ UNEQUAL = {"radius_min": 0.013, "radius_max": 0.0195}
 def soil(
     *,
     disks: Annotated[
-        int | None, typer.Option(min=30, max=20_000, help="Number of disks; 222, and 444 in a sweep, if not given.")
+        int | None, typer.Option(min=30, max=20_000, help="Number of disks. Default: 222; in a sweep, 444.")
     ] = None,
     layers: Annotated[int, typer.Option(min=1, max=100, help="Layers of disks.")] = 3,
     torque: Annotated[float, typer.Option(help="Torque of each wheel, N m, positive forward.")] = 50.0,
     gravity: Annotated[
         float, typer.Option(min=1e-3, max=1e3, help="Gravity, m/s^2; the original run had 0.0981.")
     ] = EARTH,
-    friction: Annotated[float, typer.Option(help="Coulomb's coefficient between disks.")] = 0.5,
-    wheel_friction: Annotated[float, typer.Option(help="Coulomb's coefficient at the wheels.")] = 0.9,
+    friction: Annotated[float, typer.Option(help="Friction coefficient between disks.")] = 0.5,
+    wheel_friction: Annotated[float, typer.Option(help="Friction coefficient at the wheels.")] = 0.9,
     time_step: Annotated[
         float | None,
-        typer.Option(
-            help="Time step, s; 1 ms (in a sweep 2 ms) at 9.81 m/s^2, longer as gravity is weaker, if not given."
-        ),
+        typer.Option(help="Time step, s. Default: 1 ms (in a sweep 2 ms) at 9.81 m/s^2, longer under weaker gravity."),
     ] = None,
     duration: Annotated[
         float | None,
         typer.Option(
             min=0.01,
             max=1000.0,
-            help="Time to simulate, s; 4 s at 9.81 m/s^2, longer as gravity is weaker, if not given. "
-            "It ends earlier where the soil does.",
+            help="Time to simulate, s. Default: 4 s at 9.81 m/s^2, longer under weaker gravity. "
+            "The run ends early where the soil ends.",
         ),
     ] = None,
     seed: Annotated[
-        int, typer.Option(min=0, max=LARGEST_SEED - 100, help="Of the disks' radii and places; a sweep's first.")
+        int,
+        typer.Option(
+            min=0, max=LARGEST_SEED - 100, help="Seed of the disks' radii and positions; in a sweep, the first seed."
+        ),
     ] = 0,
     video: Annotated[bool, typer.Option(help="Write a video, soil.mp4.")] = True,
     sweep: Annotated[
@@ -82,9 +83,11 @@ def soil(
             help="Instead of a crossing: slip and sinkage against torque, drawbar pull against slip; takes minutes.",
         ),
     ] = False,
-    seeds: Annotated[int, typer.Option(min=1, max=100, help="Sweep: on how many beds each trial is made.")] = 4,
-    pull_disks: Annotated[int, typer.Option(min=30, max=20_000, help="Sweep: disks under the pulling wheel.")] = 480,
-    pull_layers: Annotated[int, typer.Option(min=1, max=100, help="Sweep: their layers.")] = 6,
+    seeds: Annotated[int, typer.Option(min=1, max=100, help="Sweep: number of beds for each trial.")] = 4,
+    pull_disks: Annotated[
+        int, typer.Option(min=30, max=20_000, help="Sweep: number of disks under the pulling wheel.")
+    ] = 480,
+    pull_layers: Annotated[int, typer.Option(min=1, max=100, help="Sweep: layers of those disks.")] = 6,
     output: Annotated[Path, typer.Option(help="Folder to write into.", file_okay=False)] = Path("runs/planar"),
 ) -> None:
     """Drive the two-wheel rover over granular soil of disks; record, draw and film it."""

@@ -20,16 +20,14 @@ class SpeedTerrain(StrEnum):
 
 @plain_errors
 def speed(
-    num_envs: Annotated[int, typer.Option(min=1, max=100_000, help="How many rovers.")] = 64,
+    num_envs: Annotated[int, typer.Option(min=1, max=100_000, help="Number of rovers.")] = 64,
     threads: Annotated[
-        int | None, typer.Option(min=1, max=1024, help="Threads that step them; one a core, if not given.")
+        int | None, typer.Option(min=1, max=1024, help="Threads that step them. Default: one per core.")
     ] = None,
     terrain: Annotated[
         SpeedTerrain, typer.Option(help="Flat ground, or rocks with a height scan.")
     ] = SpeedTerrain.plane,
-    rounds: Annotated[
-        int, typer.Option(min=1, max=1_000_000, help="How often each is measured; the fastest counts.")
-    ] = 200,
+    rounds: Annotated[int, typer.Option(min=1, max=1_000_000, help="Measurements of each; the fastest counts.")] = 200,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Step a batch of rovers with one thread and with several, and a SyncVectorEnv, and print how fast they are."""

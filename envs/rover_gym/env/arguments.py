@@ -131,9 +131,9 @@ class RoverArguments(TypedDict, total=False):
         float, Argument(2.0, Number(at_least=MIN_TIME_STEP), "until a high-centred rover ends the episode", "s")
     ]
     friction: Annotated[
-        float | Range, Argument(0.7, NumberOrRange(at_least=0.0, at_most=MAX_FRICTION), "Coulomb's coefficient")
+        float | Range, Argument(0.7, NumberOrRange(at_least=0.0, at_most=MAX_FRICTION), "friction coefficient")
     ]
-    restitution: Annotated[float, Argument(0.0, Number(at_least=0.0, at_most=1.0), "Newton's coefficient")]
+    restitution: Annotated[float, Argument(0.0, Number(at_least=0.0, at_most=1.0), "coefficient of restitution")]
     gravity: Annotated[
         tuple[float, float, float],
         Argument(

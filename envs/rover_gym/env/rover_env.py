@@ -36,12 +36,12 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     The world has x forward, y up and z to the right; heading is the angle about +y, positive to the
     left. Wheels are listed FL, FR, ML, BL, MR, BR (front, middle, back; left, right). Units are SI
-    and radians, except for arguments and options whose name ends in `_deg`. The motors hold their
-    command and the steering PD, inside the physics, its set-point over one control period.
+    and radians, except for arguments and options whose name ends in `_deg`. Over one control period the
+    motors hold their commands, and the steering PD, which is part of the physics, its set-points.
 
     ## Action
 
-    `Box(-1, 1, (12,), float32)`. Anything outside the box or not finite is refused with
+    `Box(-1, 1, (12,), float32)`. An action that is outside the box or not finite is refused with
     `CommandError`, and nothing changes.
 
     | index | meaning                                             | range   | one stands for      | unit |
@@ -61,10 +61,10 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     ## Motors
 
-    A motor gives its command, but no more than its torque-speed line: at the speed omega of its wheel, forwards at most
-    `stall_torque (1 - omega / no_load_speed)`, backwards at most `stall_torque (1 + omega / no_load_speed)`, and `stall_torque`
-    either way. Driven faster than `no_load_speed` it brakes by its line if it is `regenerating`, and else turns freely.
-    The rover's six motors are alike:
+    A motor delivers its command within its torque-speed line. At a wheel speed omega that is at most
+    `stall_torque (1 - omega / no_load_speed)` forwards and `stall_torque (1 + omega / no_load_speed)` backwards, and never more
+    than `stall_torque`. Driven faster than `no_load_speed`, a `regenerating` motor brakes along its line; any other turns freely.
+    The rover's six motors are identical:
 
     | quantity       | value | unit  | meaning                                                |
     |----------------|-------|-------|--------------------------------------------------------|
@@ -73,14 +73,14 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | no_load_speed  | 30    | rad/s | where the line reaches zero: 3 m/s of the rim          |
     | regenerating   | True  |       | whether it brakes when it is driven faster             |
 
-    So the full command is given up to half the no-load speed, and level ground is driven at 3 m/s at most.
-    `model=RoverModel().replace(motor=Motor(...))` changes them; with `motor=None` a wheel gives its command at any speed.
+    The full command is therefore available up to half the no-load speed, and the top speed on level ground is 3 m/s.
+    `model=RoverModel().replace(motor=Motor(...))` changes the motors; with `motor=None` a wheel gets its command at any speed.
 
     ## Observation
 
     `Box((91,), float32)`, each entry its value divided by a fixed scale; `observation_layout` names
-    the slices and gives the values back in SI units. Never clipped. The bounds of unbounded entries
-    are float32's largest numbers: the space holds every finite observation and nothing else.
+    the slices and converts the values back to SI units. Observations are never clipped. The bounds of
+    unbounded entries are float32's largest numbers: the space holds every finite observation and nothing else.
 
     | index | field            | meaning                                                   | unit       | scale        |
     |-------|------------------|-----------------------------------------------------------|------------|--------------|
@@ -99,15 +99,15 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     The trunk frame is x forward, y up, z to the right of the trunk. `q` is the simulation's, with the
     wheels' angles wrapped to one turn. Forces are those of the last physics step, zero at reset.
 
-    With `height_scan` one more field follows, `height_scan`: heights in m, scale 1, of the visible ground, rocks
-    included, over the trunk's origin, at a grid of points around it in the heading frame. The first entries
-    are the row farthest ahead, from the left to the right, the last ones the row farthest behind. True
-    stands for 13 rows of 9 points, 0.25 m apart: 117 entries, 1.5 m ahead and behind, 1 m to either side.
+    `height_scan` adds one more field, `height_scan`: the heights (m, scale 1) of the visible ground, rocks included,
+    relative to the trunk's origin, on a grid of points around it in the heading frame. The first entries are the
+    row farthest ahead, from left to right; the last are the row farthest behind. True stands for 13 rows of 9
+    points, 0.25 m apart: 117 entries, 1.5 m ahead and behind, 1 m to either side.
 
     ## Reward
 
-    The sum of the terms below, each in `info["reward_terms"]`; `dt` is the control period. Weights
-    are replaced by name with `reward_weights`.
+    The reward is the sum of the terms below, which `info["reward_terms"]` lists; `dt` is the control period.
+    `reward_weights` replaces weights by name.
 
     | term            | formula                                                        | weight w |
     |-----------------|----------------------------------------------------------------|----------|
@@ -121,18 +121,18 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | success         | w on the step that reaches the goal                            | 10       |
     | failure         | w on a step that ends in failure                               | -10      |
 
-    On a step that the physics could not take, only `failure` counts. What one step counts is bounded, whatever the
-    physics did: 30 m of progress either way, 4e5 J of work, 60 s of `dt`, a slip ratio of 2. So no step is worth more
-    than 90 either way with these weights.
+    If the physics could not take a step, only `failure` counts. The quantities of one step are bounded, whatever the
+    physics did: 30 m of progress either way, 4e5 J of work, 60 s of `dt`, a slip ratio of 2. With these weights the
+    reward of a step therefore never exceeds 90 in magnitude.
 
     ## Start
 
     The ground is a plane through the origin with slope and direction of steepest ascent drawn
     uniformly from `slope_deg` and `uphill_deg`. The rover rests on it at the origin, joints at zero,
     heading drawn from `heading_deg`; the goal lies at a distance from `goal_distance` in a direction
-    from `goal_bearing_deg`, seen from the heading. It has no brakes: without torque it rolls downhill.
-    A scene in which the rover would stand in the ground or in a sphere is drawn again; after 100 scenes
-    `reset` raises `TerrainError`. A reset that is refused, for whatever reason, changes nothing.
+    from `goal_bearing_deg`, relative to the heading. The rover has no brakes: without torque it rolls downhill.
+    A scene in which the rover would penetrate the ground or a sphere is drawn again; after 100 scenes
+    `reset` raises `TerrainError`. A refused reset, whatever the reason, changes nothing.
 
     `reset(options=...)` fixes what it names: `difficulty`, `slope_deg`, `uphill_deg`, `position` (x, z),
     `heading_deg`, `goal` (x, z), or the whole state as `q` (21,) with `v` (21,), as
@@ -142,10 +142,10 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     With `terrain="sphere_field"`, as in `RoverRocks-v0`, fixed spheres lie on the plane, half below the
     ground, with the sizes that Golombek and Rapp (1997) found on Mars, the smallest 5 cm wide. They lie at
-    random up to 4 m beyond the rectangle that start and goal span; two circles, around start
-    and goal, in which the rover has room to turn, stay clear. Each reset draws another field. One number d,
-    the difficulty, says how hard it is; `reset(options={"difficulty": 0.3})` sets it for one episode, and
-    an argument that is not None takes its quantity out of the difficulty's hands.
+    random up to 4 m beyond the rectangle that start and goal span. Two circles, around start and goal,
+    stay clear, so that the rover has room to turn. Each reset draws a new field. A single number d, the
+    difficulty, sets how hard it is; `reset(options={"difficulty": 0.3})` sets it for one episode. An argument
+    that is not None overrides what the difficulty would set.
 
     | quantity        | at difficulty d      | meaning                                          |
     |-----------------|----------------------|--------------------------------------------------|
@@ -161,14 +161,14 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     `"high_centred"`, for `stuck_time` seconds the trunk has carried more than a tenth of the weight
     while the rover moved slower than 0.05 m/s; `"step_failed"`, the physics could not take a step:
     the observation is then the last finite one, and `info["solver"]` says what happened.
-    `truncated`: after 1200 steps (60 s), by Gymnasium's time limit; change it with
+    `truncated`: after 1200 steps (60 s), by Gymnasium's time limit. Change it with
     `gymnasium.make(..., max_episode_steps=...)`. The environment itself never truncates.
 
     ## Randomisation
 
     `friction`, `mass_scale`, `actuator_gain` and `gravity_scale` are drawn uniformly at each reset where they are
     ranges, and fixed where they are numbers. `observation_noise` is Gaussian, drawn anew each step for every
-    entry that has no bounds; flags, fractions, unit vectors, the distance and the action stay exact.
+    unbounded entry; flags, fractions, unit vectors, the distance and the action stay exact.
     `set_difficulty` changes the rocks' difficulty, or its range, from the next reset on.
 
     ## Info
@@ -186,10 +186,10 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     ## Frames
 
-    With `render_mode="rgb_array"` `render()` returns the present state as (height, width, 3) uint8, 640 x 480 by
-    default; `gymnasium.make(..., render_mode="human")` shows the same in a window. Both need `rover-gym[render]`, no
-    display is needed for the first. The cameras "follow", "side" and "top" go with the rover, a pair of points (eye,
-    target) stands still; `show_forces` draws the contact forces of the last physics step as arrows.
+    With `render_mode="rgb_array"`, `render()` returns the current state as (height, width, 3) uint8, 640 x 480 by
+    default; `gymnasium.make(..., render_mode="human")` shows the same in a window. Both need `rover-gym[render]`; the
+    first needs no display. The cameras "follow", "side" and "top" move with the rover; a pair of points (eye, target) is
+    a fixed camera. `show_forces` draws the contact forces of the last physics step as arrows.
     `metadata["render_fps"]` is the control frequency, so that a video runs in real time.
 
     ## Version history

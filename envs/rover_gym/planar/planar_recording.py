@@ -58,7 +58,7 @@ class PlanarSampler:
             Channel("torques", "N m", "driving torques, positive drives forward", (n,), discs),
             Channel("kinetic_energy", "J", "kinetic energy"),
             Channel("potential_energy", "J", "potential energy, zero with the mass centre at height 0"),
-            Channel("solver_residual", "1", "worst natural-map residual of the contact solver since the last row"),
+            Channel("solver_residual", "1", "largest residual of the contact solver since the last row"),
         )
 
     def row(self, sim: PlanarSimulation, *, residual: float = 0.0) -> dict[str, npt.ArrayLike]:

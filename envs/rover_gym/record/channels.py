@@ -77,7 +77,7 @@ class RoverSampler:
             Channel("steering_set_points", "rad", "set-points of the steering controllers", (n,), wheels),
             Channel("kinetic_energy", "J", "kinetic energy of the whole rover"),
             Channel("potential_energy", "J", "potential energy, zero with all mass centres at the world's origin"),
-            Channel("solver_residual", "1", "worst natural-map residual of the contact solver since the last row"),
+            Channel("solver_residual", "1", "largest residual of the contact solver since the last row"),
             Channel("solver_iterations", "1", "iterations of the contact solver since the last row"),
         )
 

@@ -98,7 +98,7 @@ class SoilSampler:
             Channel("potential_energy", "J", "potential energy, zero with all mass centres at height 0"),
             Channel("n_contacts", "1", "contacts of the last step"),
             Channel("penetration", "m", "deepest overlap"),
-            Channel("solver_residual", "1", "worst natural-map residual of the contact solver since the last row"),
+            Channel("solver_residual", "1", "largest residual of the contact solver since the last row"),
         )
 
     def step(self, n: int) -> bool:

@@ -407,7 +407,7 @@ impl SoilSimulation {
         Ok(fresh(py, &self.open()?.command().torques))
     }
 
-    /// Force at the machine's centre, (2,), N.
+    /// Force at the machine's centre along x and y, N.
     #[getter]
     fn pull(&self) -> PyResult<(f64, f64)> {
         let inner = self.open()?;
@@ -415,7 +415,7 @@ impl SoilSimulation {
         Ok((pull.x, pull.y))
     }
 
-    /// The options that have a number or a name, by the names of the arguments.
+    /// The options of contacts, gravity and solver, by the names of the arguments.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let inner = self.open()?;

@@ -8,12 +8,12 @@ use rover_core::multibody::{
 
 use crate::machines::{energy, machine, model, options, simulation, solid};
 
-fn follows(joint: &str, ratio: f64, offset: f64) -> Option<CouplingDescription> {
-    Some(CouplingDescription {
+fn follows(joint: &str, ratio: f64, offset: f64) -> CouplingDescription {
+    CouplingDescription {
         joint: joint.into(),
         ratio,
         offset,
-    })
+    }
 }
 
 fn rocker(name: &str, z: f64, bob: f64) -> SolidDescription {
@@ -28,7 +28,7 @@ fn rocker(name: &str, z: f64, bob: f64) -> SolidDescription {
 fn a_differential_is_one_coordinate() {
     let base = solid("body", None, JointKind::Fixed);
     let (left, mut right) = (rocker("left", -0.5, 0.2), rocker("right", 0.5, 0.6));
-    right.coupled = follows("left", -1.0, 0.0);
+    right.coupled = Some(follows("left", -1.0, 0.0));
     let model = model(vec![base, left, right]);
     assert_eq!((model.nv(), model.n_joints()), (1, 1));
     let h = 1e-6;
@@ -50,7 +50,7 @@ fn a_differential_is_one_coordinate() {
 fn a_follower_on_a_free_body_stays_where_the_ratio_says() {
     let body = solid("body", None, JointKind::Free);
     let (left, mut right) = (rocker("left", -0.5, 0.2), rocker("right", 0.5, 0.6));
-    right.coupled = follows("left", -0.5, 0.3);
+    right.coupled = Some(follows("left", -0.5, 0.3));
     for variant in [Variant::Linearised, Variant::Newton] {
         let model = model(vec![body.clone(), left.clone(), right.clone()]);
         assert_eq!((model.nv(), model.n_joints()), (7, 1));
@@ -87,7 +87,7 @@ fn a_telescope_is_one_mass() {
     });
     let mut second = solid("second", Some("first"), JointKind::Prismatic);
     second.axis = Some([0.0, 1.0, 0.0]);
-    second.coupled = follows("first", 1.0, 0.1);
+    second.coupled = Some(follows("first", 1.0, 0.1));
     second.spring = Some(Spring {
         stiffness: 30.0,
         rest: 0.2,
@@ -123,19 +123,19 @@ fn couplings_that_no_tree_has_are_refused() {
     let refused = |solids| Model::from_description(machine(solids)).unwrap_err();
     // On another branch, further out.
     let mut solids = chain();
-    solids[3].coupled = follows("b", 1.0, 0.0);
+    solids[3].coupled = Some(follows("b", 1.0, 0.0));
     let error = refused(solids);
     assert_eq!(error.field(), "solids[3].coupled.joint", "{error}");
     assert!(matches!(error, ModelError::CoupledApart { .. }));
     // A joint that follows one itself.
     let mut solids = chain();
-    solids[2].coupled = follows("a", 1.0, 0.0);
+    solids[2].coupled = Some(follows("a", 1.0, 0.0));
     solids.push(solid("d", Some("b"), JointKind::Revolute));
-    solids[4].coupled = follows("b", 1.0, 0.0);
+    solids[4].coupled = Some(follows("b", 1.0, 0.0));
     assert_eq!(refused(solids).field(), "solids[4].coupled.joint");
     // One that is locked, one that is not there, one that has no coordinate.
     let mut solids = chain();
-    solids[3].coupled = follows("a", 1.0, 0.0);
+    solids[3].coupled = Some(follows("a", 1.0, 0.0));
     let model = Model::from_description(machine(solids.clone())).unwrap();
     let error = model.with_locked_joints(&[("a".into(), 0.1)]).unwrap_err();
     assert_eq!(error.field(), "solids[3].coupled.joint");
@@ -144,7 +144,7 @@ fn couplings_that_no_tree_has_are_refused() {
         ("body", 1.0, "solids[3].coupled.joint"),
         ("a", f64::NAN, "solids[3].coupled.ratio"),
     ] {
-        solids[3].coupled = follows(leader, ratio, 0.0);
+        solids[3].coupled = Some(follows(leader, ratio, 0.0));
         assert_eq!(refused(solids.clone()).field(), field);
     }
 }

@@ -30,11 +30,11 @@ fn bad_joints_are_refused_by_field() {
         }),
         ("solids[0].damping", |d| d.solids[0].damping = Some(1.0)),
         ("solids[1].parent", |d| {
-            d.solids[1].parent = Some("nothing".into())
+            d.solids[1].parent = Some("nothing".into());
         }),
         ("solids[1].position", |d| d.solids[1].position = None),
         ("solids[1].rotation", |d| {
-            d.solids[1].rotation = Some([f64::NAN, 0.0, 0.0])
+            d.solids[1].rotation = Some([f64::NAN, 0.0, 0.0]);
         }),
         ("solids[1].spring.stiffness", |d| {
             d.solids[1].spring = Some(Spring {
@@ -50,10 +50,10 @@ fn bad_joints_are_refused_by_field() {
         }),
         ("solids[1].damping", |d| d.solids[1].damping = Some(-1.0)),
         ("solids[1].armature", |d| {
-            d.solids[1].armature = Some(f64::NAN)
+            d.solids[1].armature = Some(f64::NAN);
         }),
         ("solids[2].axis", |d| {
-            d.solids[2].axis = Some([1.0, 0.0, 0.0])
+            d.solids[2].axis = Some([1.0, 0.0, 0.0]);
         }),
         ("solids[2].armature", |d| d.solids[2].armature = Some(1.0)),
         ("solids[3].axis", |d| d.solids[3].axis = None),

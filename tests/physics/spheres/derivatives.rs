@@ -49,6 +49,7 @@ proptest! {
             position: Vector3::new(3.0, 2.0, -1.0),
             attitude: UnitQuaternion::from_scaled_axis(Vector3::from(turn)),
             joints,
+            ..Configuration::zero(&model)
         };
         let field = field(&[[place[0] + 3.0, place[1] + 1.8, place[2] - 1.0, radius]]);
         let contact = contact_at(&model, &field, &start, part);

@@ -71,6 +71,7 @@ fn drop_often(drops: u64, restitution: f64, friction_coefficient: f64) -> Worst 
             ),
             attitude,
             joints: (0..15).map(|_| random.between(-0.2, 0.2)).collect(),
+            ..Configuration::zero(&model)
         };
         let mut v: Vec<f64> = (0..21).map(|_| random.between(-0.5, 0.5)).collect();
         v[1] = random.between(-4.0, -2.0);

@@ -41,7 +41,7 @@ fn driven(stones: &[[f64; 4]], heading: f64, steps: usize) -> RoverSimulation {
     let start = Configuration {
         position: turn * Vector3::new(0.0, 0.35, 0.0),
         attitude: turn,
-        joints: vec![0.0; 15],
+        ..simulation.state().configuration.clone()
     };
     simulation.set_state(start, vec![0.0; 21]);
     simulation.set_wheel_torques(&[35.0; 6]).unwrap();

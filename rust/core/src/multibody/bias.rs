@@ -134,8 +134,12 @@ pub fn bias(
             continue;
         }
         // A joint that follows another adds to that one's.
-        for (i, m) in body.motions().enumerate() {
-            out[k + i] += kinematics.motions[m].power(&force, &moment);
+        if body.n_motions == 1 {
+            out[k] += kinematics.motions[body.motion].power(&force, &moment);
+        } else {
+            for (i, m) in body.motions().enumerate() {
+                out[k + i] += kinematics.motions[m].power(&force, &moment);
+            }
         }
         if let Some(parent) = body.parent {
             let carrier = &mut moved[parent];

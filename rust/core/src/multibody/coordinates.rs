@@ -97,9 +97,9 @@ fn to_angles(
 pub fn from_public(model: &Model, q: &[f64]) -> Result<Configuration, StateError> {
     from_angles(model, q, |[roll, heading, pitch]| {
         let angles = HeadingPitchRoll {
-            roll,
             heading,
             pitch,
+            roll,
         };
         angles.to_quaternion()
     })

@@ -104,9 +104,8 @@ impl MassMatrix {
                     let (f, n) = composite.momentum(&kinematics.motions[body.motion + i]);
                     let row = &mut self.rows[(body.velocity + i) * self.stride..];
                     let (base, joints) = row.split_at_mut(LEAD);
-                    if LEAD == BASE {
-                        base[..3].copy_from_slice(f.as_slice());
-                        base[3..].copy_from_slice(n.as_slice());
+                    if let Some(base) = base.first_chunk_mut::<BASE>() {
+                        *base = [f.x, f.y, f.z, n.x, n.y, n.z];
                     }
                     for (entry, &m) in joints.iter_mut().zip(model.motions(b)) {
                         *entry = kinematics.motions[m].power(&f, &n);

@@ -179,7 +179,7 @@ pub struct SolveReport {
     pub iterations: usize,
     /// Work done, in the unit of [`budget`](super::SolverOptions::budget).
     pub work: u64,
-    /// Violation of the law relative to the data, dimensionless, see [`Residual`](crate::problem::Residual).
+    /// Violation of the law relative to the data, dimensionless, see [`Residual`].
     pub residual: f64,
     /// Largest violation at one contact, m/s.
     pub velocity_error: f64,

@@ -418,20 +418,21 @@ impl MechanicalSystem for TreeSystem<'_> {
             motors,
         };
         let mut total = 0.0;
-        let joints = self.model.joints().iter().zip(drives_tried).enumerate();
-        for (j, (joint, tried)) in joints {
-            let torque = trial.actuation(j, joint);
-            let (begin, end) = (start.v[joint.velocity], v_end[joint.velocity]);
+        let mut drives = motors.iter().zip(&self.command.drives).zip(drives_tried);
+        trial.for_each(self.model, |joint, torque| {
             let turned = h * torque.rate;
-            let drive = self.command.drives[j].as_ref();
-            let work = motors[j].work(drive, begin, end, turned);
-            *tried = DriveAction {
-                impulse: torque.drive * h,
-                work,
-            };
-            // A damper never drives: where the rate changes its sign within the step, its torque at one time and the way at another may say so.
-            total += work + torque.other * turned + (torque.damper * turned).min(0.0);
-        }
+            if let Some(((motor, drive), tried)) = drives.next() {
+                let (begin, end) = (start.v[joint.velocity], v_end[joint.velocity]);
+                let work = motor.work(drive.as_ref(), begin, end, turned);
+                *tried = DriveAction {
+                    impulse: torque.drive * h,
+                    work,
+                };
+                // A damper never drives: where the rate changes its sign within the step, its torque at one time and the way at
+                // another may say so.
+                total += work + torque.other * turned + (torque.damper * turned).min(0.0);
+            }
+        });
         total
     }
 
@@ -623,25 +624,30 @@ struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    /// Torques of joint `j`; the PD, the spring and the motor's line at the θ_j-weighted position and velocity of the iterate.
-    #[inline(always)]
-    fn actuation(&self, j: usize, joint: &JointProperties) -> Actuation {
+    /// Torques of every joint; the PD, the spring and the motor's line at the θ_j-weighted position and velocity of the iterate.
+    #[inline]
+    fn for_each(&self, model: &Model, mut act: impl FnMut(&JointProperties, Actuation)) {
         let (h, theta) = (self.options.time_step, self.options.theta);
-        let (motor, held) = (&self.motors[j], &self.command.held[j]);
-        let (begin, end) = (self.start.v[joint.velocity], self.v_end[joint.velocity]);
-        let rate = theta * end + (1.0 - theta) * begin;
-        let (mut other, mut damper) = (self.command.torque[j], 0.0);
-        if held.is_some() || joint.is_passive {
-            let place = self.start.configuration.joints[j] + h * motor.theta() * rate;
-            let (spring, brake) = answer(held.as_ref(), &joint.passive, place);
-            other -= spring;
-            damper = -brake * motor.rate(begin, end);
-        }
-        Actuation {
-            drive: motor.torque(begin, end),
-            damper,
-            other,
-            rate,
+        let acting = self.command.torque.iter().zip(&self.command.held);
+        let joints = model.joints().iter().zip(self.motors);
+        let places = &self.start.configuration.joints;
+        for (((joint, motor), (torque, held)), q) in joints.zip(acting).zip(places) {
+            let (begin, end) = (self.start.v[joint.velocity], self.v_end[joint.velocity]);
+            let rate = theta * end + (1.0 - theta) * begin;
+            let (mut other, mut damper) = (*torque, 0.0);
+            if held.is_some() || joint.is_passive {
+                let place = q + h * motor.theta() * rate;
+                let (spring, brake) = answer(held.as_ref(), &joint.passive, place);
+                other -= spring;
+                damper = -brake * motor.rate(begin, end);
+            }
+            let actuation = Actuation {
+                drive: motor.torque(begin, end),
+                damper,
+                other,
+                rate,
+            };
+            act(joint, actuation);
         }
     }
 }
@@ -676,10 +682,9 @@ fn add_command(
         v_end,
         motors,
     };
-    for (j, joint) in model.joints().iter().enumerate() {
-        let torque = trial.actuation(j, joint);
+    trial.for_each(model, |joint, torque| {
         y[joint.velocity] += options.time_step * (torque.other + torque.damper + torque.drive);
-    }
+    });
 }
 
 /// `y = −(left side)` of the principle of [`crate::integrator::moreau_jean_newton`] at the iterate `v_end`, without commands and contacts.

@@ -169,6 +169,10 @@ fn check_joint(
         (solid.coupled.is_some(), "coupled", has_axis),
         (solid.locked.is_some(), "locked", has_axis),
     ];
+    // A root by mistake would fall out of its machine.
+    if i > 0 && solid.parent.is_none() && solid.joint.is_none() {
+        return Err(missing("parent"));
+    }
     let unwanted = (given.iter()).find(|(is_given, _, is_allowed)| *is_given && !is_allowed);
     if let Some((_, what, _)) = unwanted {
         return Err(ModelError::NotForJoint {
@@ -177,17 +181,13 @@ fn check_joint(
             joint: kind.name(),
         });
     }
-    match &solid.parent {
-        // A root by mistake would fall out of its machine.
-        None if i > 0 && solid.joint.is_none() => return Err(missing("parent")),
-        None => {}
-        Some(parent) if !before.contains_key(parent.as_str()) => {
-            return Err(ModelError::UnknownParent {
-                field: at("parent"),
-                name: parent.clone(),
-            });
-        }
-        Some(_) => {}
+    if let Some(parent) = &solid.parent
+        && !before.contains_key(parent.as_str())
+    {
+        return Err(ModelError::UnknownParent {
+            field: at("parent"),
+            name: parent.clone(),
+        });
     }
     if kind == JointKind::Free {
         return Ok(());

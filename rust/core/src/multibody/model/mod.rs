@@ -323,9 +323,7 @@ impl Model {
     #[inline]
     #[must_use]
     pub fn split_path(&self, b: usize) -> (Range<usize>, &[usize]) {
-        let (lead, rest) = self.path(b).split_at(self.lead(b));
-        let first = lead.first().copied().unwrap_or(0);
-        (first..first + lead.len(), rest)
+        self.paths.split(b)
     }
 
     /// The motions ([`Kinematics::motions`](super::Kinematics::motions)) that the velocities of body `b`'s path beyond its

@@ -32,9 +32,9 @@ impl Tree {
 /// Velocities and motions of all bodies, from the root on.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Paths {
-    /// Those of body `b`: `velocities[b * stride..][..lengths[b]]`.
+    /// Those of body `b`: `velocities[b * stride..]`, as many as its span says.
     velocities: Vec<usize>,
-    lengths: Vec<usize>,
+    spans: Vec<Span>,
     leads: Vec<usize>,
     pub(super) stride: usize,
     /// Of the velocities beyond the lead, in the same layout.
@@ -42,9 +42,19 @@ pub(super) struct Paths {
     pub(super) n_motions: usize,
     /// Body of each velocity, and where in its body's path the velocity stands.
     pub(super) body_of_velocity: Vec<usize>,
-    velocity_paths: Vec<(usize, usize)>,
+    up_to_velocity: Vec<(usize, usize)>,
     /// How many leading entries bodies `a` and `b` share: `common[a * n_bodies + b]`.
     common: Vec<usize>,
+}
+
+/// Where a body's path stands.
+#[derive(Clone, Copy, Debug)]
+struct Span {
+    start: usize,
+    length: usize,
+    /// How many velocities of a free root begin it, and the first of them.
+    lead: usize,
+    first: usize,
 }
 
 /// Path of one body while the tree grows.
@@ -140,16 +150,21 @@ impl Paths {
             let start = b * self.stride;
             self.velocities[start..][..path.velocities.len()].copy_from_slice(&path.velocities);
             self.motions[start..][..path.motions.len()].copy_from_slice(&path.motions);
-            self.lengths.push(path.velocities.len());
+            self.spans.push(Span {
+                start,
+                length: path.velocities.len(),
+                lead: self.leads[b],
+                first: path.velocities.first().copied().unwrap_or(0),
+            });
         }
         for (k, &b) in self.body_of_velocity.iter().enumerate() {
             let at = grown[b].velocities.iter().position(|&i| i == k);
-            self.velocity_paths
+            self.up_to_velocity
                 .push((b * self.stride, at.unwrap_or(0) + 1));
         }
         self.common = vec![0; n * n];
         for (a, body) in bodies.iter().enumerate() {
-            self.common[a * n + a] = self.lengths[a];
+            self.common[a * n + a] = self.spans[a].length;
             let Some(parent) = body.parent else {
                 continue; // Shares nothing with the trees before it.
             };
@@ -172,27 +187,36 @@ impl Paths {
 
     #[inline]
     pub(super) fn path(&self, b: usize) -> &[usize] {
-        &self.velocities[b * self.stride..][..self.lengths[b]]
+        let span = &self.spans[b];
+        &self.velocities[span.start..][..span.length]
     }
 
     #[inline]
     pub(super) fn lead(&self, b: usize) -> usize {
-        self.leads[b]
+        self.spans[b].lead
+    }
+
+    #[inline]
+    pub(super) fn split(&self, b: usize) -> (Range<usize>, &[usize]) {
+        let span = &self.spans[b];
+        let rest = &self.velocities[span.start + span.lead..][..span.length - span.lead];
+        (span.first..span.first + span.lead, rest)
     }
 
     #[inline]
     pub(super) fn motions(&self, b: usize) -> &[usize] {
-        &self.motions[b * self.stride..][..self.lengths[b] - self.leads[b]]
+        let span = &self.spans[b];
+        &self.motions[span.start..][..span.length - span.lead]
     }
 
     #[inline]
     pub(super) fn velocity_path(&self, k: usize) -> &[usize] {
-        let (start, length) = self.velocity_paths[k];
+        let (start, length) = self.up_to_velocity[k];
         &self.velocities[start..][..length]
     }
 
     #[inline]
     pub(super) fn common(&self, a: usize, b: usize) -> usize {
-        self.common[a * self.lengths.len() + b]
+        self.common[a * self.spans.len() + b]
     }
 }
