@@ -12,7 +12,7 @@
 //!
 //! - [`quantity`]: which numbers a description may have; [`spatial`]: rotations and inertias;
 //! - [`multibody`]: model, state, kinematics, mass matrix, bias, energy, momentum;
-//! - [`geometry`]: the ground; [`contact`]: points, frames, gaps, Delassus operator;
+//! - [`geometry`]: shapes, the ground, the distances between them; [`contact`]: points, frames, gaps, Delassus operator;
 //! - [`cone`], [`law`], [`problem`], [`solver`]: the friction-contact problem, which sees only (W, q, μ);
 //! - [`integrator`]: one step of any mechanical system;
 //! - [`planar`]: grounds and machines of the plane; [`system`]: what the steps move, such as the tree of solids;

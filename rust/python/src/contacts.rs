@@ -57,6 +57,7 @@ impl Contacts {
         let name = |a: &ActiveContact<Contact>| match a.contact.part {
             Part::Wheel(i) => model.description().wheels[i].solid.clone(),
             Part::Box(i) => model.boxes()[i].name.clone(),
+            Part::Sphere(i) => model.spheres()[i].name.clone(),
         };
         Self {
             active: Columns(active.to_vec()),
@@ -78,7 +79,7 @@ impl Contacts {
     fn wheels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         let index = |a: &ActiveContact<Contact>| match a.contact.part {
             Part::Wheel(i) => i64::try_from(i).unwrap_or(-1),
-            Part::Box(_) => -1,
+            Part::Box(_) | Part::Sphere(_) => -1,
         };
         PyArray1::from_iter(py, self.active.0.iter().map(index))
     }

@@ -26,6 +26,7 @@ pub fn solid(name: &str, parent: Option<&str>, joint: JointKind) -> SolidDescrip
 
 pub fn machine(solids: Vec<SolidDescription>) -> ModelDescription {
     ModelDescription {
+        self_contact: false,
         name: "machine".into(),
         solids,
         wheels: Vec::new(),

@@ -15,14 +15,11 @@ fn contact_at(
     configuration: &Configuration,
     part: Part,
 ) -> Contact {
-    let body = match part {
-        Part::Wheel(i) => model.wheels()[i].body,
-        Part::Box(i) => model.boxes()[i].body,
-    };
     let mut contact = Contact {
-        key: ContactKey::new(part, 0, 1),
+        key: ContactKey::on_ground(part, 0, 1),
         part,
-        body,
+        body: part.body(model),
+        other: None,
         point: Vector3::zeros(),
         frame: ContactFrame::of_normal(&Vector3::y()),
         gap: 0.0,

@@ -4,6 +4,7 @@
 //! it is wedged and leans. Friction is zero where statics would else be undetermined.
 
 use nalgebra::{UnitQuaternion, Vector3};
+use rover_core::contact::{Contact, Opposite};
 use rover_core::integrator::StepOptions;
 use rover_core::simulation::RoverSimulation;
 
@@ -13,13 +14,21 @@ use crate::sphere_scenes::{WHEEL_MASS, WHEEL_RADIUS, field, lone_wheel, placed};
 const R: f64 = WHEEL_RADIUS;
 const G: f64 = 9.81;
 
+/// The ground's number of what a contact lies on.
+fn primitive(contact: &Contact) -> u32 {
+    match contact.key.opposite {
+        Opposite::Ground(primitive) => primitive,
+        Opposite::Part(_) => panic!("a lone wheel touches only the ground"),
+    }
+}
+
 /// Mean normal forces of the last step by primitive, N.
 fn normal_forces(simulation: &RoverSimulation) -> Vec<(u32, f64)> {
     let h = simulation.options().time_step;
     let mut forces: Vec<(u32, f64)> = simulation
         .contacts()
         .iter()
-        .map(|a| (a.contact.key.primitive, a.impulse[0] / h))
+        .map(|a| (primitive(&a.contact), a.impulse[0] / h))
         .collect();
     forces.sort_by_key(|f| f.0);
     forces

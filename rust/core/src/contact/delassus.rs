@@ -1,15 +1,14 @@
-//! Contact Jacobian `H`, Delassus operator `W = Hᵀ M̂⁻¹ H` and the impulses' way back to velocities.
+//! Delassus operator `W = Hᵀ M̂⁻¹ H` and the impulses' way back to velocities.
 //!
 //! With `M̂ = Lᵀ D L` and `Z = D^(-1/2) L^(-T) H` the operator is `W = Zᵀ Z`. A column of Z is nonzero only along its body's
-//! path, so a block of W is a dot product over the path that two bodies share: never a dense product.
+//! path, or along the union of its two bodies' paths, so a block of W is a dot product over the velocities that two contacts share: never a
+//! dense product.
 
 use std::ops::Range;
 
-use super::contact_point::Contact;
+use super::jacobian::{Columns, columns, columns_of_other, relative_velocity};
+use super::pair::Contact;
 use crate::multibody::{BASE, FactoredMassMatrix, Kinematics, Model};
-
-/// One row of Z at one velocity: the columns n, t, b of a contact, padded so that two pairs of lanes carry it.
-type Columns = [f64; 4];
 
 /// The contacts of a step in matrix form. Scratch: grows to what was needed most, then reuses it.
 #[derive(Clone, Debug, Default)]
@@ -18,10 +17,19 @@ pub struct ContactSystem {
     pub W: Vec<f64>,
     /// Local velocity `Hᵀ v` of the velocity handed to [`Self::assemble`] (3 n_c), m/s.
     pub u: Vec<f64>,
-    /// Z along each contact's path: `Z[c * stride + k]` belongs to the k-th velocity of the path.
+    /// Z along each path: `Z[c * stride + k]` belongs to the k-th velocity of the path of contact c.
     Z: Vec<Columns>,
-    bodies: Vec<usize>,
     stride: usize,
+    /// Body of each contact.
+    bodies: Vec<usize>,
+    /// From where to where in `unions` a contact of two bodies has its rows; nothing of one with the ground. Empty where there is none of two.
+    spans: Vec<Range<usize>>,
+    /// Velocities along the unions of two paths, ascending, and Z there.
+    unions: Vec<(usize, Columns)>,
+    /// One column a velocity (nv), while a union is made.
+    full: Vec<Columns>,
+    /// Rows along one path, while a union is made.
+    path_rows: Vec<Columns>,
 }
 
 impl ContactSystem {
@@ -32,8 +40,12 @@ impl ContactSystem {
             W: Vec::with_capacity(9 * n * n),
             u: Vec::with_capacity(3 * n),
             Z: Vec::with_capacity(n * model.path_stride()),
-            bodies: Vec::with_capacity(n),
             stride: model.path_stride(),
+            bodies: Vec::with_capacity(n),
+            spans: Vec::new(),
+            unions: Vec::new(),
+            full: Vec::new(),
+            path_rows: Vec::new(),
         }
     }
 
@@ -55,13 +67,23 @@ impl ContactSystem {
         let (n, w) = (contacts.len(), self.stride);
         self.bodies.clear();
         self.bodies.extend(contacts.iter().map(|c| c.body));
+        self.spans.clear();
+        self.unions.clear();
         self.Z.resize(n * w, [0.0; 4]);
         self.u.resize(3 * n, 0.0);
         self.W.resize(9 * n * n, 0.0);
         for (c, contact) in contacts.iter().enumerate() {
+            if let Some(other) = contact.other {
+                let u = self.unite(model, kinematics, factor, contact, other.body, v);
+                self.u[3 * c..][..3].copy_from_slice(&u[..3]);
+                self.spans.resize(n, 0..0);
+                let begin = self.spans[..c].iter().map(|span| span.end).max();
+                self.spans[c] = begin.unwrap_or(0)..self.unions.len();
+                continue;
+            }
             let path = model.path(contact.body);
             let rows = &mut self.Z[c * w..][..path.len()];
-            jacobian_columns(model, kinematics, contact, rows);
+            columns(model, kinematics, contact, rows);
             let u = path_product(model.split_path(contact.body), rows, v);
             self.u[3 * c..][..3].copy_from_slice(&u[..3]);
             factor.half_solve_path(path, rows);
@@ -69,17 +91,7 @@ impl ContactSystem {
         let size = 3 * n;
         for c in 0..n {
             for d in 0..=c {
-                let shared = model.common_path(self.bodies[c], self.bodies[d]);
-                let (a, b) = (&self.Z[c * w..][..shared], &self.Z[d * w..][..shared]);
-                // Nine sums that do not wait for each other.
-                let mut block = [[0.0; 4]; 3];
-                for (x, y) in a.iter().zip(b) {
-                    for (sums, factor) in block.iter_mut().zip(x) {
-                        for (sum, value) in sums.iter_mut().zip(y) {
-                            *sum += factor * value;
-                        }
-                    }
-                }
+                let block = self.block(model, c, d);
                 for i in 0..3 {
                     let row = &mut self.W[(3 * c + i) * size + 3 * d..][..3];
                     row.copy_from_slice(&block[i][..3]);
@@ -92,11 +104,127 @@ impl ContactSystem {
         }
     }
 
+    /// Rows of Z of a contact of two bodies, and its `Hᵀ v`, m/s.
+    fn unite(
+        &mut self,
+        model: &Model,
+        kinematics: &Kinematics,
+        factor: &FactoredMassMatrix,
+        contact: &Contact,
+        other: usize,
+        v: &[f64],
+    ) -> Columns {
+        self.full.resize(model.nv(), [0.0; 4]);
+        self.path_rows.resize(self.stride, [0.0; 4]);
+        let begin = self.unions.len();
+        let (path, path_of_other) = (model.path(contact.body), model.path(other));
+        for &k in path.iter().chain(path_of_other) {
+            self.full[k] = [0.0; 4];
+        }
+        columns(
+            model,
+            kinematics,
+            contact,
+            &mut self.path_rows[..path.len()],
+        );
+        for (row, &k) in self.path_rows.iter().zip(path) {
+            add(&mut self.full[k], 1.0, row);
+        }
+        let rows = &mut self.path_rows[..path_of_other.len()];
+        columns_of_other(model, kinematics, contact, other, rows);
+        for (row, &k) in self.path_rows.iter().zip(path_of_other) {
+            add(&mut self.full[k], -1.0, row);
+        }
+        // Both ascend, so their union is merged.
+        let (mut left, mut right) = (path, path_of_other);
+        while let Some(&k) = smaller(left, right) {
+            left = left.strip_prefix(&[k]).unwrap_or(left);
+            right = right.strip_prefix(&[k]).unwrap_or(right);
+            self.unions.push((k, [0.0; 4]));
+        }
+        let mut u = [0.0; 4];
+        for (k, _) in &self.unions[begin..] {
+            add(&mut u, v[*k], &self.full[*k]);
+        }
+        let velocities = self.unions[begin..].iter().map(|(k, _)| *k);
+        factor.half_solve_columns(model, velocities, &mut self.full);
+        for (k, z) in &mut self.unions[begin..] {
+            *z = self.full[*k];
+        }
+        u
+    }
+
+    /// The block of W of two contacts.
+    #[inline]
+    fn block(&self, model: &Model, c: usize, d: usize) -> [[f64; 4]; 3] {
+        // Nine sums that do not wait for each other.
+        let mut block = [[0.0; 4]; 3];
+        let mut add_product = |x: &Columns, y: &Columns| {
+            for (sums, factor) in block.iter_mut().zip(x) {
+                add(sums, *factor, y);
+            }
+        };
+        if self.union(c).is_empty() && self.union(d).is_empty() {
+            let shared = model.common_path(self.bodies[c], self.bodies[d]);
+            let (a, b) = (
+                &self.Z[c * self.stride..][..shared],
+                &self.Z[d * self.stride..][..shared],
+            );
+            for (x, y) in a.iter().zip(b) {
+                add_product(x, y);
+            }
+        } else {
+            let mut right = self.entries(model, d).peekable();
+            for (k, x) in self.entries(model, c) {
+                while right.next_if(|(j, _)| *j < k).is_some() {}
+                if let Some((_, y)) = right.next_if(|(j, _)| *j == k) {
+                    add_product(x, y);
+                }
+            }
+        }
+        block
+    }
+
+    /// Rows of a contact of two bodies; nothing of one with the ground.
+    #[inline]
+    fn union(&self, c: usize) -> &[(usize, Columns)] {
+        if self.spans.is_empty() {
+            &[]
+        } else {
+            &self.unions[self.spans[c].clone()]
+        }
+    }
+
+    /// Velocities of a contact, ascending, and its Z there.
+    fn entries<'a>(
+        &'a self,
+        model: &'a Model,
+        c: usize,
+    ) -> impl Iterator<Item = (usize, &'a Columns)> {
+        let unions = self.union(c);
+        let path = if unions.is_empty() {
+            model.path(self.bodies[c])
+        } else {
+            &[]
+        };
+        let along_path = path.iter().copied().zip(&self.Z[c * self.stride..]);
+        along_path.chain(unions.iter().map(|(k, z)| (*k, z)))
+    }
+
     /// `out = Zᵀ y` (3 n_c): what a velocity change `y` in factor coordinates does at the contacts.
     pub fn local(&self, model: &Model, y: &[f64], out: &mut [f64]) {
         for (c, values) in out.chunks_exact_mut(3).enumerate() {
-            let path = model.split_path(self.bodies[c]);
-            let u = path_product(path, &self.Z[c * self.stride..], y);
+            let union = self.union(c);
+            let u = if union.is_empty() {
+                let path = model.split_path(self.bodies[c]);
+                path_product(path, &self.Z[c * self.stride..], y)
+            } else {
+                let mut u = [0.0; 4];
+                for (k, z) in union {
+                    add(&mut u, y[*k], z);
+                }
+                u
+            };
             values.copy_from_slice(&u[..3]);
         }
     }
@@ -111,7 +239,7 @@ impl ContactSystem {
         out: &mut [f64],
     ) {
         for (contact, values) in contacts.iter().zip(out.chunks_exact_mut(3)) {
-            let velocity = kinematics.point_velocity(model, contact.body, &contact.point, v);
+            let velocity = relative_velocity(model, kinematics, contact, v);
             for (value, d) in values.iter_mut().zip(contact.frame.rows()) {
                 *value += velocity.dot(&d);
             }
@@ -121,9 +249,16 @@ impl ContactSystem {
     /// `y += Z p`: impulses to a velocity change in factor coordinates.
     pub fn add_impulses(&self, model: &Model, p: &[f64], y: &mut [f64]) {
         for (c, p) in p.chunks_exact(3).enumerate() {
+            let product = |z: &Columns| z[0] * p[0] + z[1] * p[1] + z[2] * p[2];
+            let union = self.union(c);
+            if !union.is_empty() {
+                for (k, z) in union {
+                    y[*k] += product(z);
+                }
+                continue;
+            }
             let (lead, rest) = model.split_path(self.bodies[c]);
             let (Z_lead, Z_rest) = self.Z[c * self.stride..].split_at(lead.len());
-            let product = |z: &Columns| z[0] * p[0] + z[1] * p[1] + z[2] * p[2];
             if let (Some(y), Some(Z)) = (
                 y[lead].first_chunk_mut::<BASE>(),
                 Z_lead.first_chunk::<BASE>(),
@@ -139,26 +274,19 @@ impl ContactSystem {
     }
 }
 
-/// `Hᵀ` of one contact along its path: for each velocity, what it moves the point along n, t, b.
-fn jacobian_columns(
-    model: &Model,
-    kinematics: &Kinematics,
-    contact: &Contact,
-    rows: &mut [Columns],
-) {
-    let [n, t, b] = contact.frame.rows();
-    let x = &contact.point;
-    let (xn, xt, xb) = (x.cross(&n), x.cross(&t), x.cross(&b));
-    let (lead, rest) = rows.split_at_mut(model.lead(contact.body));
-    if let Some(base) = lead.first_chunk_mut::<BASE>() {
-        for i in 0..3 {
-            base[i] = [n[i], t[i], b[i], 0.0];
-            base[3 + i] = [xn[i], xt[i], xb[i], 0.0];
-        }
+/// `sums += a x`.
+#[inline]
+fn add(sums: &mut Columns, a: f64, x: &Columns) {
+    for (sum, value) in sums.iter_mut().zip(x) {
+        *sum += a * value;
     }
-    for (row, &m) in rest.iter_mut().zip(model.motions(contact.body)) {
-        let velocity = kinematics.motions[m].velocity_at(x);
-        *row = [velocity.dot(&n), velocity.dot(&t), velocity.dot(&b), 0.0];
+}
+
+/// The smaller of the first entries of two ascending lists.
+fn smaller<'a>(left: &'a [usize], right: &'a [usize]) -> Option<&'a usize> {
+    match (left.first(), right.first()) {
+        (Some(a), Some(b)) => Some(a.min(b)),
+        (a, b) => a.or(b),
     }
 }
 
@@ -166,45 +294,14 @@ fn jacobian_columns(
 #[inline]
 fn path_product((lead, rest): (Range<usize>, &[usize]), rows: &[Columns], v: &[f64]) -> Columns {
     let mut sums = [0.0; 4];
-    let mut add = |row: &Columns, v: f64| {
-        for (sum, value) in sums.iter_mut().zip(row) {
-            *sum += value * v;
-        }
-    };
     let (of_lead, of_rest) = rows.split_at(lead.len());
     if let (Some(rows), Some(v)) = (of_lead.first_chunk::<BASE>(), v[lead].first_chunk::<BASE>()) {
         for (row, &v) in rows.iter().zip(v) {
-            add(row, v);
+            add(&mut sums, v, row);
         }
     }
     for (row, &k) in of_rest.iter().zip(rest) {
-        add(row, v[k]);
+        add(&mut sums, v[k], row);
     }
     sums
-}
-
-/// `out = H p` (nv): generalized impulse, N s and N m s, of the impulses `p` (3 n_c) at the contacts.
-pub fn generalized_impulse(
-    model: &Model,
-    kinematics: &Kinematics,
-    contacts: &[Contact],
-    p: &[f64],
-    out: &mut [f64],
-) {
-    out.fill(0.0);
-    for (contact, p) in contacts.iter().zip(p.chunks_exact(3)) {
-        let [n, t, b] = contact.frame.rows();
-        let force = n * p[0] + t * p[1] + b * p[2];
-        let moment = contact.point.cross(&force);
-        let (lead, rest) = model.split_path(contact.body);
-        if let Some(base) = out[lead].first_chunk_mut::<BASE>() {
-            for i in 0..3 {
-                base[i] += force[i];
-                base[3 + i] += moment[i];
-            }
-        }
-        for (&k, &m) in rest.iter().zip(model.motions(contact.body)) {
-            out[k] += kinematics.motions[m].power(&force, &moment);
-        }
-    }
 }

@@ -1,27 +1,26 @@
-//! Which contacts a step must consider.
+//! Which contacts with the ground a step must consider.
 
 use nalgebra::Vector3;
 
 use super::activation::Activation;
-use super::contact_frame::ContactFrame;
-use super::contact_point::{Contact, ContactKey, Part};
-use super::sweep::{DEEP, first_touch};
-use super::wheel_plane::{self, PlacedWheel};
-use super::wheel_sphere::{self, NearestPoint};
-use super::{box_plane, box_sphere};
-use crate::geometry::{Primitive, Sphere, Terrain};
-use crate::multibody::{Kinematics, Model, Wheel};
+use super::frame::ContactFrame;
+use super::pair::{Contact, ContactKey};
+use super::part::Part;
+use crate::geometry::query::sweep::{DEEP, first_touch};
+use crate::geometry::query::{SurfacePoint, box_sphere, disc_sphere, dispatch, sphere_sphere};
+use crate::geometry::{PlacedShape, Primitive, Sphere, Terrain};
+use crate::multibody::{Kinematics, Model};
 
 /// On a sphere: the nearest point of the pose.
-const NEAREST: u16 = 0;
+const NEAREST: usize = 0;
 
 /// On a sphere: the point over the tangent plane where it was first met, for a part that passes it in this step.
-const PASSING: u16 = 1;
+pub(super) const PASSING: u16 = 1;
 
-/// Collects the contacts of a configuration with velocity `v` (nv) into `out`, cleared first.
+/// Collects the contacts with the ground of a configuration with velocity `v` (nv) into `out`, cleared first.
 ///
 /// `kinematics`: the poses at the step's midpoint, where they are measured; `end`: at its predicted end, which tells
-/// the motion within the step. They are left where they were measured: see [`relocate`].
+/// the motion within the step. They are left where they were measured: see [`super::relocate`].
 pub fn detect(
     model: &Model,
     kinematics: &Kinematics,
@@ -42,10 +41,13 @@ pub fn detect(
         out,
     };
     for i in 0..model.wheels().len() {
-        wheel_candidates(i, end, terrain, &mut gate);
+        candidates(Part::Wheel(i), end, terrain, &mut gate);
     }
     for i in 0..model.boxes().len() {
-        box_candidates(i, end, terrain, &mut gate);
+        candidates(Part::Box(i), end, terrain, &mut gate);
+    }
+    for i in 0..model.spheres().len() {
+        candidates(Part::Sphere(i), end, terrain, &mut gate);
     }
 }
 
@@ -60,19 +62,41 @@ struct Gate<'a> {
     out: &'a mut Vec<Contact>,
 }
 
+/// A part and where it is.
+struct Placed {
+    part: Part,
+    body: usize,
+    shape: PlacedShape,
+}
+
+impl Placed {
+    /// Its contact at a point of the ground.
+    #[inline]
+    fn contact(&self, point: &SurfacePoint, primitive: u32) -> Contact {
+        Contact {
+            key: ContactKey::on_ground(self.part, point.feature, primitive),
+            part: self.part,
+            body: self.body,
+            other: None,
+            point: point.point,
+            frame: ContactFrame::on_ground(&self.shape, point),
+            gap: point.gap,
+        }
+    }
+}
+
 impl Gate<'_> {
     #[inline]
-    fn offer(&mut self, contact: Contact) {
+    fn offer(&mut self, placed: &Placed, point: &SurfacePoint, primitive: u32) {
         let u_N = || {
             let velocity =
                 self.kinematics
-                    .point_velocity(self.model, contact.body, &contact.point, self.v);
-            contact.frame.n.dot(&velocity)
+                    .point_velocity(self.model, placed.body, &point.point, self.v);
+            point.n.dot(&velocity)
         };
-        if !self.activation.admits(contact.gap, u_N) {
-            return;
+        if self.activation.admits(point.gap, u_N) {
+            self.out.push(placed.contact(point, primitive));
         }
-        self.out.push(contact);
     }
 
     /// A contact with a sphere: the nearest point's, or, where `touch` finds a normal, the passing one.
@@ -81,217 +105,143 @@ impl Gate<'_> {
     #[inline]
     fn offer_sphere(
         &mut self,
-        (part, body, id): (Part, usize, u32),
-        sphere: &Sphere,
-        near: &NearestPoint,
+        placed: &Placed,
+        (primitive, sphere): (u32, &Sphere),
+        near: &SurfacePoint,
         motion: f64,
         touch: impl FnOnce() -> Option<Vector3<f64>>,
     ) {
-        let mut contact = Contact {
-            key: ContactKey::new(part, usize::from(NEAREST), id),
-            part,
-            body,
-            point: near.point,
-            frame: near.frame,
-            gap: near.gap,
-        };
         if near.gap - motion < -DEEP * sphere.radius
             && let Some(n) = touch()
         {
+            let mut contact = placed.contact(near, primitive);
             contact.key.feature = PASSING;
             contact.frame.n = n;
             self.out.push(contact);
         } else if near.gap <= self.reach {
-            self.offer(contact);
+            self.offer(placed, near, primitive);
         }
     }
 }
 
-fn wheel_candidates(i: usize, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Gate<'_>) {
-    let kinematics = gate.kinematics;
-    let wheel = &gate.model.wheels()[i];
-    let (part, body) = (Part::Wheel(i), wheel.body);
+/// Offers the contacts of one part with the ground.
+#[inline]
+fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Gate<'_>) {
+    let (model, kinematics) = (gate.model, gate.kinematics);
+    let body = part.body(model);
     let base = kinematics.origin(body);
-    let placed = place_wheel(kinematics, wheel);
-    let half_way = if gate.can_be_passed {
-        end.origin(body) - base + end.point(body, &wheel.centre) - placed.centre
-    } else {
-        Vector3::zeros()
+    let placed = Placed {
+        part,
+        body,
+        shape: part.place(model, kinematics),
     };
-    let motion = half_way.norm();
-    terrain.visit_near(
-        &(base + placed.centre),
-        wheel.radius + gate.reach + motion,
-        &mut |id, primitive| match primitive {
-            Primitive::Plane(plane) => {
-                wheel_plane::rim_points(&placed, plane, base, gate.reach, |p| {
-                    gate.offer(Contact {
-                        key: ContactKey::new(part, p.feature, id),
-                        part,
-                        body,
-                        point: p.point,
-                        frame: p.frame,
-                        gap: p.gap,
-                    });
-                });
-            }
-            Primitive::Sphere(sphere) => {
-                let aside = placed.axle.dot(&(sphere.centre - base - placed.centre));
-                if aside.abs() > sphere.radius + gate.reach + motion {
-                    return;
-                }
-                let near = wheel_sphere::nearest_point(&placed, sphere, base);
-                gate.offer_sphere((part, body, id), sphere, &near, motion, || {
-                    // The disc's axes are taken as those of the midpoint all along.
-                    let middle = sphere.centre - base - placed.centre;
-                    let distance = |x: &Vector3<f64>| {
-                        let ball = Sphere {
-                            centre: x + base + placed.centre,
-                            radius: 0.0,
-                        };
-                        let near = wheel_sphere::nearest_point(&placed, &ball, base);
-                        (near.frame.n, near.gap)
-                    };
-                    first_touch(distance, &middle, &(middle - half_way), sphere.radius)
-                });
-            }
-        },
-    );
-}
-
-fn box_candidates(i: usize, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Gate<'_>) {
-    let kinematics = gate.kinematics;
-    let solid = &gate.model.boxes()[i];
-    let (part, body) = (Part::Box(i), solid.body);
-    let base = kinematics.origin(body);
-    let R = kinematics.R[body] * solid.rotation;
-    let centre = kinematics.point(body, &solid.centre);
-    let end_centre = end.point(body, &solid.centre);
-    let size = solid.half_size.norm();
-    let motion = if gate.can_be_passed {
-        (end.origin(body) - base + end_centre - centre).norm()
-            + (end.R[body] - kinematics.R[body]).norm() * size
+    let (centre, bound) = match &placed.shape {
+        PlacedShape::Disc(disc) => (disc.centre, disc.radius),
+        PlacedShape::Box(solid) => (solid.centre, solid.half_size.norm()),
+        PlacedShape::Sphere(sphere) => (sphere.centre, sphere.radius),
+    };
+    let end_centre = || end.point(body, &part.centre(model));
+    let (half_way, motion) = if gate.can_be_passed {
+        let half_way = end.origin(body) - base + end_centre() - centre;
+        let turning = match &placed.shape {
+            // A box is swept with its own turning, the others are as good as round.
+            PlacedShape::Box(_) => (end.R[body] - kinematics.R[body]).norm() * bound,
+            PlacedShape::Disc(_) | PlacedShape::Sphere(_) => 0.0,
+        };
+        (half_way, half_way.norm() + turning)
     } else {
-        0.0
+        (Vector3::zeros(), 0.0)
     };
     terrain.visit_near(
         &(base + centre),
-        size + gate.reach + motion,
+        bound + gate.reach + motion,
         &mut |id, primitive| match primitive {
             Primitive::Plane(plane) => {
-                box_plane::corners(
-                    &centre,
-                    &R,
-                    &solid.half_size,
-                    plane,
-                    base,
-                    gate.reach,
-                    |corner, point, gap| {
-                        gate.offer(Contact {
-                            key: ContactKey::new(part, corner, id),
-                            part,
-                            body,
-                            point,
-                            frame: ContactFrame::of_normal(plane.normal()),
-                            gap,
-                        });
-                    },
-                );
+                dispatch::visit_on_plane(&placed.shape, plane, base, gate.reach, |point| {
+                    gate.offer(&placed, point, id);
+                });
             }
             Primitive::Sphere(sphere) => {
-                let local = R.tr_mul(&(sphere.centre - base - centre));
-                let outside = (local.abs() - solid.half_size).map(|x| x.max(0.0));
-                let within = sphere.radius + gate.reach + motion;
-                if outside.norm_squared() > within * within {
+                let between = sphere.centre - base - centre;
+                if is_far(&placed.shape, &between, sphere.radius + gate.reach + motion) {
                     return;
                 }
-                let near = box_sphere::nearest_point(&centre, &R, &solid.half_size, sphere, base);
-                gate.offer_sphere((part, body, id), sphere, &near, motion, || {
-                    let end_R = end.R[body] * solid.rotation;
-                    let end = end_R.tr_mul(&(sphere.centre - end.origin(body) - end_centre));
-                    let distance = |x: &Vector3<f64>| {
-                        let (_, n, distance) = box_sphere::nearest_local(x, &solid.half_size);
-                        (n, distance)
-                    };
-                    first_touch(distance, &local, &end, sphere.radius).map(|n| R * n)
+                let near = dispatch::point_on_sphere(&placed.shape, sphere, base);
+                gate.offer_sphere(&placed, (id, sphere), &near, motion, || {
+                    touch(&placed, end, model, sphere, base, &half_way)
                 });
             }
         },
     );
 }
 
-fn place_wheel(kinematics: &Kinematics, wheel: &Wheel) -> PlacedWheel {
-    let R = &kinematics.R[wheel.body];
-    PlacedWheel {
-        centre: kinematics.point(wheel.body, &wheel.centre),
-        axle: R * wheel.axle,
-        spoke: R * wheel.spoke,
-        radius: wheel.radius,
+/// Whether a sphere's centre, relative to a shape's, is further than `within` from the shape by a bound that costs little.
+#[inline]
+fn is_far(shape: &PlacedShape, between: &Vector3<f64>, within: f64) -> bool {
+    match shape {
+        PlacedShape::Disc(disc) => disc.axle.dot(between).abs() > within,
+        PlacedShape::Box(solid) => {
+            let local = solid.R.tr_mul(between);
+            let outside = (local.abs() - solid.half_size).map(|x| x.max(0.0));
+            outside.norm_squared() > within * within
+        }
+        PlacedShape::Sphere(_) => false,
     }
 }
 
-/// Point, frame and gap of a contact in another configuration: the same feature on the same primitive.
-pub fn relocate(
+/// Normal from a sphere of the ground to a part, where the part first met it in this step, if it passes it.
+fn touch(
+    placed: &Placed,
+    end: &Kinematics,
     model: &Model,
-    kinematics: &Kinematics,
-    terrain: &dyn Terrain,
-    contact: &mut Contact,
-) {
-    let base = kinematics.origin(contact.body);
-    let feature = usize::from(contact.key.feature);
-    match (contact.part, terrain.primitive(contact.key.primitive)) {
-        (Part::Wheel(i), Primitive::Plane(plane)) => {
-            let placed = place_wheel(kinematics, &model.wheels()[i]);
-            let rim = wheel_plane::rim_point(&placed, &plane, base, feature);
-            (contact.point, contact.frame, contact.gap) = (rim.point, rim.frame, rim.gap);
+    ground: &Sphere,
+    base: &Vector3<f64>,
+    half_way: &Vector3<f64>,
+) -> Option<Vector3<f64>> {
+    match &placed.shape {
+        PlacedShape::Disc(disc) => {
+            // The disc's axes are taken as those of the midpoint all along.
+            let middle = ground.centre - base - disc.centre;
+            let distance = |x: &Vector3<f64>| {
+                let ball = Sphere {
+                    centre: x + base + disc.centre,
+                    radius: 0.0,
+                };
+                let near = disc_sphere::nearest_point(disc, &ball, base);
+                (near.n, near.gap)
+            };
+            first_touch(distance, &middle, &(middle - half_way), ground.radius)
         }
-        (Part::Box(i), Primitive::Plane(plane)) => {
-            let solid = &model.boxes()[i];
-            let R = kinematics.R[solid.body] * solid.rotation;
-            let centre = kinematics.point(solid.body, &solid.centre);
-            contact.point = box_plane::corner(&centre, &R, &solid.half_size, feature);
-            contact.gap = plane.distance(&(base + contact.point));
+        PlacedShape::Box(solid) => {
+            let middle = solid.R.tr_mul(&(ground.centre - base - solid.centre));
+            let PlacedShape::Box(at_end) = placed.part.place(model, end) else {
+                return None;
+            };
+            let origin = end.origin(placed.body);
+            let last = (at_end.R).tr_mul(&(ground.centre - origin - at_end.centre));
+            let distance = |x: &Vector3<f64>| {
+                let (_, n, distance) = box_sphere::nearest_local(x, &solid.half_size);
+                (n, distance)
+            };
+            first_touch(distance, &middle, &last, ground.radius).map(|n| solid.R * n)
         }
-        (_, Primitive::Sphere(sphere)) => relocate_on_sphere(model, kinematics, &sphere, contact),
+        PlacedShape::Sphere(sphere) => {
+            let middle = ground.centre - base - sphere.centre;
+            let distance = |x: &Vector3<f64>| {
+                let ball = Sphere {
+                    centre: *x,
+                    radius: 0.0,
+                };
+                let own = Sphere {
+                    centre: Vector3::zeros(),
+                    radius: sphere.radius,
+                };
+                let near = sphere_sphere::nearest_point(&own, &ball, &Vector3::zeros());
+                (near.n, near.gap)
+            };
+            first_touch(distance, &middle, &(middle - half_way), ground.radius)
+        }
     }
-}
-
-fn relocate_on_sphere(
-    model: &Model,
-    kinematics: &Kinematics,
-    sphere: &Sphere,
-    contact: &mut Contact,
-) {
-    let base = kinematics.origin(contact.body);
-    let n = &contact.frame.n;
-    let is_passing = contact.key.feature == PASSING;
-    let near = match contact.part {
-        Part::Wheel(i) => {
-            let placed = place_wheel(kinematics, &model.wheels()[i]);
-            if is_passing {
-                wheel_sphere::point_over_tangent(&placed, n, &touch(sphere, n, base))
-            } else {
-                wheel_sphere::nearest_point(&placed, sphere, base)
-            }
-        }
-        Part::Box(i) => {
-            let solid = &model.boxes()[i];
-            let R = kinematics.R[solid.body] * solid.rotation;
-            let centre = kinematics.point(solid.body, &solid.centre);
-            let half = &solid.half_size;
-            if is_passing {
-                box_sphere::point_over_tangent(&centre, &R, half, n, &touch(sphere, n, base))
-            } else {
-                box_sphere::nearest_point(&centre, &R, half, sphere, base)
-            }
-        }
-    };
-    (contact.point, contact.frame, contact.gap) = (near.point, near.frame, near.gap);
-}
-
-/// The sphere's point with the outward normal n, relative to `base`.
-fn touch(sphere: &Sphere, n: &Vector3<f64>, base: &Vector3<f64>) -> Vector3<f64> {
-    sphere.centre - base + n * sphere.radius
 }
 
 /// Gap, nearest point (relative to the trunk origin) and frame of every wheel over a terrain: the nearest primitive's.
@@ -303,53 +253,42 @@ pub fn wheel_contacts(
     kinematics: &Kinematics,
     terrain: &dyn Terrain,
 ) -> Vec<Contact> {
-    let nearest = |(i, wheel): (usize, &Wheel)| {
-        let placed = place_wheel(kinematics, wheel);
-        let mut best = Contact {
-            key: ContactKey::new(Part::Wheel(i), 0, 0),
-            part: Part::Wheel(i),
-            body: wheel.body,
-            point: placed.centre,
-            frame: ContactFrame::of_wheel(&Vector3::y(), &placed.axle, &placed.spoke),
-            gap: f64::INFINITY,
+    let nearest = |i: usize| {
+        let part = Part::Wheel(i);
+        let placed = Placed {
+            part,
+            body: part.body(model),
+            shape: part.place(model, kinematics),
         };
+        let centre = kinematics.point(placed.body, &part.centre(model));
+        let radius = part.bound(model);
+        let mut best = placed.contact(
+            &SurfacePoint::of_normal(NEAREST, centre, &Vector3::y(), f64::INFINITY),
+            0,
+        );
         // What is not visited is further from the centre than `reach`, thus from the wheel than reach − R.
-        let mut reach = 2.0 * wheel.radius;
-        while reach < FAR && best.gap + wheel.radius > reach {
-            look_around(&placed, kinematics, terrain, reach, &mut best);
+        let mut reach = 2.0 * radius;
+        while reach < FAR && best.gap + radius > reach {
+            let base = kinematics.origin(placed.body);
+            terrain.visit_near(&(base + centre), reach, &mut |id, primitive| {
+                let point = match primitive {
+                    Primitive::Plane(plane) => {
+                        dispatch::point_on_plane(&placed.shape, plane, base, NEAREST)
+                    }
+                    Primitive::Sphere(sphere) => {
+                        dispatch::point_on_sphere(&placed.shape, sphere, base)
+                    }
+                };
+                if point.gap < best.gap {
+                    best = placed.contact(&point, id);
+                }
+            });
             reach *= 2.0;
         }
         best
     };
-    model.wheels().iter().enumerate().map(nearest).collect()
+    (0..model.wheels().len()).map(nearest).collect()
 }
 
 /// How far a wheel looks for the nearest ground, m.
 const FAR: f64 = 1e4;
-
-/// Enters the nearest primitive within `reach` of a wheel's centre into `best`, if it is nearer than that.
-fn look_around(
-    placed: &PlacedWheel,
-    kinematics: &Kinematics,
-    terrain: &dyn Terrain,
-    reach: f64,
-    best: &mut Contact,
-) {
-    let base = kinematics.origin(best.body);
-    terrain.visit_near(&(base + placed.centre), reach, &mut |id, primitive| {
-        let (point, frame, gap) = match primitive {
-            Primitive::Plane(plane) => {
-                let rim = wheel_plane::rim_point(placed, plane, base, 0);
-                (rim.point, rim.frame, rim.gap)
-            }
-            Primitive::Sphere(sphere) => {
-                let near = wheel_sphere::nearest_point(placed, sphere, base);
-                (near.point, near.frame, near.gap)
-            }
-        };
-        if gap < best.gap {
-            best.key.primitive = id;
-            (best.point, best.frame, best.gap) = (point, frame, gap);
-        }
-    });
-}

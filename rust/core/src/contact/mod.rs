@@ -1,18 +1,26 @@
-//! From bodies near the ground to unilateral contacts: points, frames, gaps and their Jacobians.
+//! From bodies near the ground, or near each other, to unilateral contacts: points, frames, gaps and their Jacobians.
+//!
+//! A contact ([`pair`]) lies between a part of a body and either the ground or a part of another body. [`detection`] finds those with the
+//! ground and [`pair_detection`] those between bodies: the broad phase says what is near, [`crate::geometry::query`] measures, and
+//! [`activation`] decides which take part in the step. [`relocation`] measures them again in another configuration. [`jacobian`] and
+//! [`delassus`] put them into matrices.
 
 pub mod activation;
-pub mod box_plane;
-pub mod box_sphere;
-pub mod contact_frame;
-pub mod contact_point;
 pub mod delassus;
 pub mod detection;
-mod sweep;
-pub mod wheel_plane;
-pub mod wheel_sphere;
+pub mod frame;
+pub mod jacobian;
+pub mod pair;
+pub mod pair_detection;
+pub mod part;
+pub mod relocation;
 
 pub use activation::Activation;
-pub use contact_frame::ContactFrame;
-pub use contact_point::{Contact, ContactKey, Part};
-pub use delassus::{ContactSystem, generalized_impulse};
-pub use detection::{detect, relocate};
+pub use delassus::ContactSystem;
+pub use detection::detect;
+pub use frame::ContactFrame;
+pub use jacobian::generalized_impulse;
+pub use pair::{Contact, ContactKey, Opposite, OtherSide};
+pub use pair_detection::{PairSearch, detect_pairs};
+pub use part::Part;
+pub use relocation::relocate;

@@ -1,19 +1,15 @@
-//! The ground: primitives, and terrains that say which of them a thing can touch; [`support`]: a ground of any shape, as a round body in the
-//! plane or in space meets it.
+//! Shapes, the ground, and the distances between them. Nothing here knows of a machine.
+//!
+//! - [`shape`]: what parts are made of; [`terrain`]: what the ground is made of;
+//! - [`broad_phase`]: what comes near what; [`query`]: distance, points and normal of a pair, one page a pair of shapes;
+//! - [`support`]: a ground of any shape, as a round body in the plane or in space meets it.
 
-pub mod ball_tree;
-pub mod error;
-pub mod plane;
-pub mod rocks;
-pub mod sphere;
-pub mod sphere_field;
+pub mod broad_phase;
+pub mod query;
+pub mod shape;
 pub mod support;
 pub mod terrain;
 
-pub use error::TerrainError;
-pub use plane::Plane;
-pub use rocks::{Clearing, Rocks};
-pub use sphere::Sphere;
-pub use sphere_field::SphereField;
+pub use shape::{Disc, OrientedBox, PlacedShape, Sphere, SupportMap};
 pub use support::{Facing, Support};
-pub use terrain::{Primitive, Terrain};
+pub use terrain::{Clearing, Plane, Primitive, Rocks, SphereField, Terrain, TerrainError};

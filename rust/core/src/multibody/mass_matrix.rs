@@ -371,6 +371,26 @@ impl FactoredMassMatrix {
         }
     }
 
+    /// `y ← D^(-1/2) L^(-T) y` for several columns (nv) that are nonzero only at some velocities: ascending, and with each all of its path.
+    pub fn half_solve_columns<const N: usize>(
+        &self,
+        model: &Model,
+        velocities: impl DoubleEndedIterator<Item = usize>,
+        y: &mut [[f64; N]],
+    ) {
+        for k in velocities.rev() {
+            let value = y[k];
+            let path = model.velocity_path(k);
+            let row = &self.rows[k * self.stride..];
+            for (entry, &i) in row.iter().zip(&path[..path.len() - 1]) {
+                for (y, x) in y[i].iter_mut().zip(&value) {
+                    *y -= entry * x;
+                }
+            }
+            y[k] = value.map(|x| x * self.inverse_root[k]);
+        }
+    }
+
     /// `x ← L^(-1) D^(-1/2) x`: with [`Self::half_solve`] before it, `M^(-1)`.
     pub fn half_solve_back(&self, model: &Model, x: &mut [f64]) {
         for tree in model.trees() {

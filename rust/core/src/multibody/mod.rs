@@ -29,7 +29,8 @@ pub use kinematics::Kinematics;
 pub use mass_matrix::{FactoredMassMatrix, MassMatrix};
 pub(crate) use model::fingerprint;
 pub use model::{
-    BASE, Body, CollisionBox, Frame, JointProperties, MAX_SOLIDS, Model, Passive, Tree, Wheel,
+    BASE, Body, CollisionBox, CollisionSphere, Frame, JointProperties, MAX_SOLIDS, Model, Passive,
+    Tree, Wheel,
 };
 pub use momentum::{Energy, EnergyScratch, Momentum};
 pub use motor::{DriveTrial, Motor, MotorRegime};

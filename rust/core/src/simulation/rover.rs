@@ -11,7 +11,7 @@ use super::scene::{DenseOperator, Scene, StepTaken};
 use super::snapshot::Snapshot;
 use super::state::State;
 use super::stepping::Simulation;
-use crate::contact::{Contact, Part};
+use crate::contact::{Contact, Opposite, Part};
 use crate::geometry::Terrain;
 use crate::integrator::{OptionsError, StepOptions, StepReport};
 use crate::multibody::{Configuration, Energy, Kinematics, Model, Momentum, momentum};
@@ -93,9 +93,10 @@ impl Scene for RoverScene {
         }
     }
 
-    /// Most contacts on a plane: three rim points a wheel, four corners a box.
+    /// Most contacts on a plane: three rim points a wheel, four corners a box, one point a ball.
     fn contact_capacity(&self) -> usize {
-        3 * self.model.wheels().len() + 4 * self.model.boxes().len()
+        let model = &self.model;
+        3 * model.wheels().len() + 4 * model.boxes().len() + model.spheres().len()
     }
 
     #[inline]
@@ -149,17 +150,19 @@ impl Scene for RoverScene {
     fn admits(&self, snapshot: &Snapshot<Self>) -> bool {
         let model = &*self.model;
         let configuration = &snapshot.state.configuration;
-        let is_part = |contact: &Contact| match contact.part {
-            Part::Wheel(i) => i < model.wheels().len(),
-            Part::Box(i) => i < model.boxes().len(),
+        let is_part = |part: Part, body: usize| part.is_of(model) && part.body(model) == body;
+        let is_sound = |contact: &Contact| {
+            let is_of_two = matches!(contact.key.opposite, Opposite::Part(_));
+            is_part(contact.part, contact.body)
+                && is_of_two == contact.other.is_some()
+                && (contact.other).is_none_or(|other| is_part(other.part, other.body))
         };
         configuration.is_finite()
             && configuration.is_of(model)
             && snapshot.command.is_of(model)
             && snapshot.memory.len() == model.wheels().len()
             && snapshot.memory.iter().all(|x| x.is_finite())
-            && (snapshot.active.iter())
-                .all(|a| is_part(&a.contact) && a.contact.body < model.bodies().len())
+            && (snapshot.active.iter()).all(|a| is_sound(&a.contact))
     }
 }
 

@@ -10,7 +10,8 @@ use super::command::{Command, HeldJoint};
 use super::gyroscopic::{GyroscopicScratch, gravity_load};
 use super::motor_branch::{MotorBranch, line_slope};
 use crate::contact::{
-    Activation, Contact, ContactKey, ContactSystem, detect, generalized_impulse, relocate,
+    Activation, Contact, ContactKey, ContactSystem, PairSearch, detect, detect_pairs,
+    generalized_impulse, relocate,
 };
 use crate::geometry::Terrain;
 use crate::integrator::{
@@ -65,6 +66,7 @@ pub struct TreeScratch {
     energy: EnergyScratch,
     gyroscopic: GyroscopicScratch,
     force: Vec<f64>,
+    pairs: PairSearch,
     system: ContactSystem,
 }
 
@@ -89,6 +91,7 @@ impl TreeScratch {
             energy: EnergyScratch::new(model),
             gyroscopic: GyroscopicScratch::default(),
             force: vec![0.0; model.nv()],
+            pairs: PairSearch::new(model),
             system: ContactSystem::with_capacity(model, n),
         }
     }
@@ -214,6 +217,10 @@ impl MechanicalSystem for TreeSystem<'_> {
             &activation,
             out,
         );
+        let TreeScratch {
+            kinematics, pairs, ..
+        } = &mut *self.parts;
+        detect_pairs(self.model, kinematics, v, &activation, pairs, out);
     }
 
     #[inline]

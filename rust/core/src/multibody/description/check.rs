@@ -299,7 +299,9 @@ fn check_body(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
             length(&at("shape.radius"), radius)?;
             length(&at("shape.height"), height)?;
         }
-        Shape::Disc { radius } => length(&at("shape.radius"), radius)?,
+        Shape::Disc { radius } | Shape::Sphere { radius } => {
+            length(&at("shape.radius"), radius)?;
+        }
     }
     place(
         &at("centre_of_mass"),
@@ -316,7 +318,7 @@ fn check_body(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
             principal: principal.into(),
         });
     }
-    if solid.collides && !matches!(solid.shape, Shape::Box { .. }) {
+    if solid.collides && !matches!(solid.shape, Shape::Box { .. } | Shape::Sphere { .. }) {
         return Err(ModelError::CollidesWithoutBox {
             field: at("collides"),
         });

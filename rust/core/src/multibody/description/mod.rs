@@ -28,6 +28,9 @@ pub struct ModelDescription {
     /// Points with a name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tags: Vec<TagDescription>,
+    /// Whether parts of one tree touch each other, where no joint connects their bodies. Parts of two trees always do.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub self_contact: bool,
 }
 
 /// A point fixed to a solid.
@@ -75,7 +78,7 @@ pub struct SolidDescription {
     /// Inertia about the mass centre, frame axes, kg m²: xx, yy, zz, xy, xz, yz. From the shape by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inertia: Option<[f64; 6]>,
-    /// Whether its box touches the ground.
+    /// Whether its box or ball touches the ground and other bodies.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub collides: bool,
     /// Gains with which the joint is held at a set-point.
@@ -119,6 +122,11 @@ pub enum Shape {
         /// m.
         radius: f64,
     },
+    /// Solid ball.
+    Sphere {
+        /// m.
+        radius: f64,
+    },
 }
 
 impl Shape {
@@ -139,6 +147,7 @@ impl Shape {
                 [across, m * r * r / 2.0, across]
             }
             Self::Disc { radius: r } => [m * r * r / 4.0, m * r * r / 4.0, m * r * r / 2.0],
+            Self::Sphere { radius: r } => [0.4 * m * r * r; 3],
         }
     }
 }
@@ -214,6 +223,7 @@ impl ModelDescription {
             solids: Vec::new(),
             wheels: Vec::new(),
             tags: Vec::new(),
+            self_contact: false,
         })
     }
 

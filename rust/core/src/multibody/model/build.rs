@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-use super::parts::{CollisionBox, Frame, Wheel};
+use super::parts::{CollisionBox, CollisionSphere, Frame, Wheel};
 use super::properties::{JointProperties, Passive};
 use super::spinners::mark_spinners;
 use super::tree::{Paths, Tree};
@@ -34,6 +34,7 @@ struct Builder {
     lumps: Vec<Lump>,
     frames: Vec<Frame>,
     boxes: Vec<CollisionBox>,
+    spheres: Vec<CollisionSphere>,
     joints: Vec<JointProperties>,
     n_trees: usize,
     n_poses: usize,
@@ -61,6 +62,7 @@ impl Model {
             mut bodies,
             frames,
             boxes,
+            spheres,
             mut joints,
             n_trees,
             n_poses,
@@ -72,7 +74,8 @@ impl Model {
             coupled_apart(i, &description.solids[i])
         })?;
         let wheels = wheels(&description.wheels, &index_of, &frames, &bodies);
-        mark_spinners(&mut bodies, &wheels, &boxes);
+        let carriers = (boxes.iter().map(|x| x.body)).chain(spheres.iter().map(|x| x.body));
+        mark_spinners(&mut bodies, &wheels, carriers);
         let trees = (0..n_trees).map(|t| tree(t, &bodies, &paths)).collect();
         for joint in &mut joints {
             joint.velocity = bodies[joint.body].velocity;
@@ -120,6 +123,7 @@ impl Model {
             frames,
             wheels,
             boxes,
+            spheres,
             paths,
         })
     }
@@ -286,6 +290,14 @@ impl Builder {
                 centre,
                 rotation: frame.rotation,
                 half_size: Vector3::from(size) * 0.5,
+            });
+        }
+        if let (true, Shape::Sphere { radius }) = (solid.collides, solid.shape) {
+            self.spheres.push(CollisionSphere {
+                body: frame.body,
+                name: solid.name.clone(),
+                centre,
+                radius,
             });
         }
         self.frames.push(frame);

@@ -16,7 +16,7 @@ use std::ops::Range;
 use nalgebra::{Matrix3, Vector3};
 
 pub(super) use build::solid_inertia;
-pub use parts::{CollisionBox, Frame, Wheel};
+pub use parts::{CollisionBox, CollisionSphere, Frame, Wheel};
 pub use properties::{JointProperties, Passive};
 use tree::Paths;
 pub use tree::Tree;
@@ -94,6 +94,7 @@ pub struct Model {
     frames: Vec<Frame>,
     wheels: Vec<Wheel>,
     boxes: Vec<CollisionBox>,
+    spheres: Vec<CollisionSphere>,
     paths: Paths,
     joints: Vec<JointProperties>,
     joint_velocities: Vec<usize>,
@@ -169,6 +170,20 @@ impl Model {
     #[must_use]
     pub fn boxes(&self) -> &[CollisionBox] {
         &self.boxes
+    }
+
+    /// Balls that touch the ground.
+    #[must_use]
+    pub fn spheres(&self) -> &[CollisionSphere] {
+        &self.spheres
+    }
+
+    /// Whether parts of two bodies can touch: in one tree only where it has self-contact, and not across a joint.
+    #[must_use]
+    pub fn can_touch(&self, a: usize, b: usize) -> bool {
+        let (first, second) = (&self.bodies[a], &self.bodies[b]);
+        let is_joined = first.parent == Some(b) || second.parent == Some(a);
+        first.tree != second.tree || (self.description.self_contact && a != b && !is_joined)
     }
 
     /// Number of velocities, of all joints together.

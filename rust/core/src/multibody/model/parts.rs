@@ -60,3 +60,16 @@ pub struct CollisionBox {
     /// Half edge lengths, m.
     pub half_size: Vector3<f64>,
 }
+
+/// A ball that touches the ground.
+#[derive(Clone, Debug)]
+pub struct CollisionSphere {
+    /// Body that carries it.
+    pub body: usize,
+    /// Name of its solid.
+    pub name: String,
+    /// Centre in the body's frame, m.
+    pub centre: Vector3<f64>,
+    /// m.
+    pub radius: f64,
+}

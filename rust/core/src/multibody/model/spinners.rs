@@ -5,13 +5,17 @@ use std::collections::{HashMap, HashSet};
 use nalgebra::Vector3;
 
 use super::Body;
-use super::parts::{CollisionBox, Wheel};
+use super::parts::Wheel;
 use crate::multibody::joint::{Joint, JointAxis, Revolute};
 
 /// Finds the bodies whose own rotation is only looks.
-pub(super) fn mark_spinners(bodies: &mut [Body], wheels: &[Wheel], boxes: &[CollisionBox]) {
+pub(super) fn mark_spinners(
+    bodies: &mut [Body],
+    wheels: &[Wheel],
+    carriers: impl Iterator<Item = usize>,
+) {
     let carriers: HashSet<usize> = (bodies.iter().filter_map(|b| b.parent))
-        .chain(boxes.iter().map(|x| x.body))
+        .chain(carriers)
         .collect();
     let mut wheels_of: HashMap<usize, Vec<&Wheel>> = HashMap::new();
     for wheel in wheels {

@@ -173,7 +173,7 @@ impl<const D: usize> Grid<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::rocks::Random;
+    use crate::geometry::terrain::rocks::Random;
     use crate::spatial::space::length;
 
     fn finds_every_neighbour_once<const D: usize>(reach: f64) {

@@ -2,7 +2,7 @@
 
 use super::bodies::{COORDINATES, Grains, check_count, noun};
 use super::error::GrainError;
-use crate::geometry::rocks::Random;
+use crate::geometry::terrain::rocks::Random;
 use crate::quantity::{LENGTHS, MASSES, PLACES, within};
 
 /// Grains of radii drawn evenly from a range, row upon row over a width, in space layer upon layer over a rectangle.

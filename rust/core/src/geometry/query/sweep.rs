@@ -12,13 +12,13 @@ use nalgebra::Vector3;
 /// Depth in radii of the sphere up to which the nearest point of the pose itself is used.
 ///
 /// Measured on drops from 2 m at 20 ms onto stones of 2 to 50 cm: 0.1 and 0.25 leave a wheel at most 0.3 radii inside, 0.5 leaves it 0.39.
-pub(super) const DEEP: f64 = 0.25;
+pub(crate) const DEEP: f64 = 0.25;
 
 /// Most iterations for one crossing; a graze that needs more is not deep.
 const MAX_ITERATIONS: usize = 12;
 
 /// Distance (m, signed or not) of a place to a convex part, and the unit direction from the place to the part.
-pub(super) trait Distance: Fn(&Vector3<f64>) -> (Vector3<f64>, f64) {}
+pub(crate) trait Distance: Fn(&Vector3<f64>) -> (Vector3<f64>, f64) {}
 
 impl<F: Fn(&Vector3<f64>) -> (Vector3<f64>, f64)> Distance for F {}
 
@@ -26,7 +26,7 @@ impl<F: Fn(&Vector3<f64>) -> (Vector3<f64>, f64)> Distance for F {}
 ///
 /// `middle` and `end`: the sphere's centre in the part's axes at τ = 0 and 1. None where the path stays shallow, or was deep from
 /// the start.
-pub(super) fn first_touch(
+pub(crate) fn first_touch(
     distance: impl Distance,
     middle: &Vector3<f64>,
     end: &Vector3<f64>,

@@ -4,29 +4,30 @@
 //! negative. `gap = ±|a − E| − r_s`, n from the sphere to the box. As E minimises over the box, the gap's gradient is nᵀ times
 //! the Jacobian of the material point at E.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
-use super::contact_frame::ContactFrame;
-use super::wheel_sphere::NearestPoint;
-use crate::geometry::Sphere;
+use super::{NEAREST, PairPoint, SurfacePoint};
+use crate::geometry::{OrientedBox, Sphere};
 
-/// Nearest point of a box; `centre` relative to `base`, `R` from the box's axes to the world's, `half_size` m.
+/// Nearest point of a box; `base` (m, world) is where its coordinates have their origin.
 #[inline]
 #[must_use]
-pub fn nearest_point(
-    centre: &Vector3<f64>,
-    R: &Matrix3<f64>,
-    half_size: &Vector3<f64>,
-    sphere: &Sphere,
-    base: &Vector3<f64>,
-) -> NearestPoint {
-    let local = R.tr_mul(&(sphere.centre - base - centre));
-    let (point, n, distance) = nearest_local(&local, half_size);
-    NearestPoint {
-        point: centre + R * point,
-        frame: ContactFrame::of_normal(&(R * n)),
-        gap: distance - sphere.radius,
-    }
+pub fn nearest_point(solid: &OrientedBox, sphere: &Sphere, base: &Vector3<f64>) -> SurfacePoint {
+    let local = solid.R.tr_mul(&(sphere.centre - base - solid.centre));
+    let (point, n, distance) = nearest_local(&local, &solid.half_size);
+    SurfacePoint::of_normal(
+        NEAREST,
+        solid.centre + solid.R * point,
+        &(solid.R * n),
+        distance - sphere.radius,
+    )
+}
+
+/// Nearest points of a box and a ball that moves; n from the box to the ball.
+#[must_use]
+pub fn nearest_points(solid: &OrientedBox, sphere: &Sphere) -> PairPoint {
+    let near = nearest_point(solid, sphere, &Vector3::zeros());
+    PairPoint::from_first(NEAREST, &near.point, &-near.n, near.gap)
 }
 
 /// Nearest point of the surface, normal into the box and signed distance of a point, all in the box's axes.
@@ -58,12 +59,15 @@ pub fn nearest_local(
 #[inline]
 #[must_use]
 pub fn point_over_tangent(
-    centre: &Vector3<f64>,
-    R: &Matrix3<f64>,
-    half_size: &Vector3<f64>,
+    solid: &OrientedBox,
     n: &Vector3<f64>,
     touch: &Vector3<f64>,
-) -> NearestPoint {
+) -> SurfacePoint {
+    let OrientedBox {
+        centre,
+        R,
+        half_size,
+    } = solid;
     let n_local = R.tr_mul(n);
     let local = R.tr_mul(&(touch - centre));
     let point = Vector3::from_fn(|k, _| {
@@ -74,11 +78,7 @@ pub fn point_over_tangent(
         }
     });
     let point = centre + R * point;
-    NearestPoint {
-        point,
-        frame: ContactFrame::of_normal(n),
-        gap: n.dot(&(point - touch)),
-    }
+    SurfacePoint::of_normal(NEAREST, point, n, n.dot(&(point - touch)))
 }
 
 /// Sine of the tilt above which a box meets a plane with an edge and not with a face: more than a box turns in a step.
@@ -111,15 +111,14 @@ mod tests {
             centre: Vector3::new(0.1, 0.0, -0.2),
             radius: 0.5,
         };
-        let near = nearest_point(
-            &Vector3::new(0.0, 0.69, 0.0),
-            &Matrix3::identity(),
-            &Vector3::new(0.6, 0.2, 0.5),
-            &sphere,
-            &Vector3::zeros(),
-        );
+        let solid = OrientedBox {
+            centre: Vector3::new(0.0, 0.69, 0.0),
+            R: nalgebra::Matrix3::identity(),
+            half_size: Vector3::new(0.6, 0.2, 0.5),
+        };
+        let near = nearest_point(&solid, &sphere, &Vector3::zeros());
         assert!((near.gap + 0.01).abs() < 1e-12);
-        assert!((near.frame.n - Vector3::y()).norm() < 1e-12);
+        assert!((near.n - Vector3::y()).norm() < 1e-12);
         assert!((near.point - Vector3::new(0.1, 0.49, -0.2)).norm() < 1e-12);
         let centre = nearest_local(&Vector3::zeros(), &Vector3::new(0.6, 0.2, 0.5));
         assert!((centre.2 + 0.2).abs() < 1e-15 && centre.1.norm() > 0.0);

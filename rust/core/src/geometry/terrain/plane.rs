@@ -4,7 +4,7 @@ use nalgebra::{Unit, Vector3};
 
 use super::error::TerrainError;
 use super::sphere_field::MAX_SIZE;
-use super::terrain::{Primitive, Terrain};
+use super::{Primitive, Terrain};
 
 /// How far the squared length of a normalised vector can be from 1: three roundings of its entries, and those of the square.
 const UNIT: f64 = 8.0 * f64::EPSILON;

@@ -3,10 +3,13 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use crate::geometry::PlacedShape;
+use crate::geometry::query::{PairPoint, SurfacePoint};
+
 /// Right-handed orthonormal frame in world axes; `b = t × n`, so `(t, n, b)` stands like (x, y, z).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ContactFrame {
-    /// From the ground to the machine.
+    /// From the ground, or from the other body, to the contact's own part.
     pub n: Vector3<f64>,
     /// Rolling direction: forward where the axle points to the right.
     pub t: Vector3<f64>,
@@ -52,6 +55,28 @@ impl ContactFrame {
         }
     }
 
+    /// Frame of a shape at a point of the ground: a disc has a rolling direction.
+    #[inline]
+    #[must_use]
+    pub fn on_ground(shape: &PlacedShape, point: &SurfacePoint) -> Self {
+        match shape {
+            PlacedShape::Disc(disc) => Self::of_wheel(&point.n, &disc.axle, &point.rolling),
+            _ => Self::of_normal(&point.n),
+        }
+    }
+
+    /// Frame of a shape, the second of its pair, at another one.
+    #[must_use]
+    pub fn of_pair(shape: &PlacedShape, point: &PairPoint) -> Self {
+        let PlacedShape::Disc(disc) = shape else {
+            return Self::of_normal(&point.n);
+        };
+        // Struck on its face a disc rolls along its rim.
+        let along_rim = disc.axle.cross(&(point.point - disc.centre));
+        let along_rim = along_rim.try_normalize(PARALLEL).unwrap_or(disc.spoke);
+        Self::of_wheel(&point.n, &disc.axle, &along_rim)
+    }
+
     /// n, t, b in this order.
     #[inline]
     #[must_use]
@@ -83,5 +108,39 @@ mod tests {
         }
         let flat = ContactFrame::of_wheel(&Vector3::y(), &Vector3::z(), &Vector3::x());
         assert!((flat.t - Vector3::x()).norm() < 1e-15 && (flat.b - Vector3::z()).norm() < 1e-15);
+    }
+
+    #[test]
+    fn the_frame_is_continuous_where_the_rim_turns_into_the_face() {
+        use crate::geometry::query::disc_sphere::nearest_point;
+        use crate::geometry::{Disc, Sphere};
+        let axle = Vector3::new(0.3, 0.2, 0.9).normalize();
+        let spoke = ContactFrame::of_normal(&axle).t;
+        let disc = Disc {
+            centre: Vector3::new(0.3, 0.1, -0.2),
+            axle,
+            spoke,
+            radius: 0.3,
+        };
+        for phi in [0.0, 1.0, 2.5, 4.0, 6.0_f64] {
+            let out = spoke * phi.cos() + axle.cross(&spoke) * phi.sin();
+            let at = |share: f64| {
+                let centre = disc.centre + out * (disc.radius * share) + axle * 0.1;
+                let ground = Sphere {
+                    centre,
+                    radius: 0.05,
+                };
+                let near = nearest_point(&disc, &ground, &Vector3::zeros());
+                (
+                    near,
+                    ContactFrame::on_ground(&PlacedShape::Disc(disc), &near),
+                )
+            };
+            let (rim, face) = (at(1.0 + 1e-7), at(1.0 - 1e-7));
+            assert!((rim.0.point - face.0.point).norm() < 1e-6);
+            assert!((rim.0.gap - face.0.gap).abs() < 1e-6);
+            assert!((rim.1.n - face.1.n).norm() < 1e-4);
+            assert!((rim.1.t - face.1.t).norm() < 1e-4, "{rim:?} {face:?}");
+        }
     }
 }

@@ -18,8 +18,8 @@ use nalgebra::Vector3;
 
 use super::error::TerrainError;
 use super::plane::Plane;
-use super::sphere::Sphere;
 use super::sphere_field::{MAX_SIZE, check_count};
+use crate::geometry::shape::Sphere;
 
 /// A circle that no rock reaches into, seen from above.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,6 @@
-//! Wheel on a plane: the lowest points of a rim.
+//! Disc on a plane: the lowest points of a rim.
 //!
-//! A wheel is a disc of radius R, centre c, unit axle s. With `w = n − (n·s) s` the lowest rim point is
+//! The disc has radius R, centre c, unit axle s. With `w = n − (n·s) s` the lowest rim point is
 //! `E = c − R w/|w|`, the gap `n·c + d − R |w|`, `|w| = √(1 − (n·s)²)`. By the envelope theorem the gap's gradient is nᵀ times the
 //! Jacobian of the *material* point at E, so the contact frame's normal is the plane's, not the in-wheel one.
 //!
@@ -9,47 +9,21 @@
 
 use nalgebra::Vector3;
 
-use super::contact_frame::ContactFrame;
-use crate::geometry::Plane;
-
-/// A rim point: number, place (relative to the plane's argument origin), frame, gap.
-#[derive(Clone, Copy, Debug)]
-pub struct RimPoint {
-    /// 0 the lowest, 1 and 2 to either side.
-    pub feature: usize,
-    /// m.
-    pub point: Vector3<f64>,
-    /// Frame of the contact.
-    pub frame: ContactFrame,
-    /// m.
-    pub gap: f64,
-}
-
-/// A wheel in space: centre and unit axle and in-plane spoke, in the axes of the plane.
-#[derive(Clone, Copy, Debug)]
-pub struct PlacedWheel {
-    /// m.
-    pub centre: Vector3<f64>,
-    /// Unit.
-    pub axle: Vector3<f64>,
-    /// Unit, in the wheel's plane.
-    pub spoke: Vector3<f64>,
-    /// m.
-    pub radius: f64,
-}
+use super::SurfacePoint;
+use crate::geometry::{Disc, Plane};
 
 /// Rim points whose gap is at most `reach`; the lowest one always comes first if it is near.
 ///
-/// `base` (m, world) is where the wheel's coordinates have their origin: the centre's world position is `base + centre`.
+/// `base` (m, world) is where the disc's coordinates have their origin: the centre's world position is `base + centre`.
 #[inline]
 pub fn rim_points(
-    wheel: &PlacedWheel,
+    disc: &Disc,
     plane: &Plane,
     base: &Vector3<f64>,
     reach: f64,
-    mut visit: impl FnMut(&RimPoint),
+    mut visit: impl FnMut(&SurfacePoint),
 ) {
-    let rim = Rim::of(wheel, plane, base);
+    let rim = Rim::of(disc, plane, base);
     for feature in 0..3 {
         if rim.gap(feature) > reach {
             return;
@@ -61,18 +35,24 @@ pub fn rim_points(
 /// The rim point of a number, wherever it is.
 #[inline]
 #[must_use]
-pub fn rim_point(
-    wheel: &PlacedWheel,
-    plane: &Plane,
-    base: &Vector3<f64>,
-    feature: usize,
-) -> RimPoint {
-    Rim::of(wheel, plane, base).point(feature)
+pub fn rim_point(disc: &Disc, plane: &Plane, base: &Vector3<f64>, feature: usize) -> SurfacePoint {
+    Rim::of(disc, plane, base).point(feature)
 }
 
-/// A wheel over a plane: what its rim points share.
+/// The rim point of a number over the plane with the unit normal n through a point, all in the disc's coordinates.
+#[must_use]
+pub fn rim_point_over(
+    disc: &Disc,
+    n: &Vector3<f64>,
+    on_plane: &Vector3<f64>,
+    feature: usize,
+) -> SurfacePoint {
+    Rim::over(disc, n, n.dot(&(disc.centre - on_plane))).point(feature)
+}
+
+/// A disc over a plane: what its rim points share.
 struct Rim<'a> {
-    wheel: &'a PlacedWheel,
+    disc: &'a Disc,
     normal: &'a Vector3<f64>,
     /// Of the centre, m.
     height: f64,
@@ -83,13 +63,19 @@ struct Rim<'a> {
 
 impl<'a> Rim<'a> {
     #[inline]
-    fn of(wheel: &'a PlacedWheel, plane: &'a Plane, base: &Vector3<f64>) -> Self {
-        let (n, s) = (plane.normal(), &wheel.axle);
+    fn of(disc: &'a Disc, plane: &'a Plane, base: &Vector3<f64>) -> Self {
+        let n = plane.normal();
+        Self::over(disc, n, plane.distance(base) + n.dot(&disc.centre))
+    }
+
+    #[inline]
+    fn over(disc: &'a Disc, n: &'a Vector3<f64>, height: f64) -> Self {
+        let s = &disc.axle;
         let w = n - s * n.dot(s);
         Self {
-            wheel,
+            disc,
             normal: n,
-            height: plane.distance(base) + n.dot(&wheel.centre),
+            height,
             w,
             length: w.norm(),
         }
@@ -99,27 +85,28 @@ impl<'a> Rim<'a> {
     #[inline]
     fn gap(&self, feature: usize) -> f64 {
         let share = if feature == 0 { 1.0 } else { -0.5 };
-        self.height - share * self.wheel.radius * self.length
+        self.height - share * self.disc.radius * self.length
     }
 
     #[inline]
-    fn point(&self, feature: usize) -> RimPoint {
-        let wheel = self.wheel;
+    fn point(&self, feature: usize) -> SurfacePoint {
+        let disc = self.disc;
         let down = if self.length > 1e-9 {
             self.w / -self.length
         } else {
-            wheel.spoke
+            disc.spoke
         };
-        let side = || wheel.axle.cross(&down) * 0.75_f64.sqrt();
+        let side = || disc.axle.cross(&down) * 0.75_f64.sqrt();
         let direction = match feature {
             0 => down,
             1 => down * -0.5 + side(),
             _ => down * -0.5 - side(),
         };
-        RimPoint {
+        SurfacePoint {
             feature,
-            point: wheel.centre + direction * wheel.radius,
-            frame: ContactFrame::of_wheel(self.normal, &wheel.axle, &wheel.spoke),
+            point: disc.centre + direction * disc.radius,
+            n: *self.normal,
+            rolling: disc.spoke,
             gap: self.gap(feature),
         }
     }
@@ -139,8 +126,8 @@ mod tests {
         fn the_lowest_point_is_lower_than_any_other(a in -3.0..3.0, b in -1.5..1.5, tilt in -0.3..0.3, phi in 0.0..std::f64::consts::TAU) {
             let plane = Plane::new([tilt, 1.0, -tilt], 0.2).unwrap();
             let axle = unit(a, b);
-            let spoke = ContactFrame::of_normal(&axle).t;
-            let wheel = PlacedWheel { centre: Vector3::new(0.3, 0.1, -0.2), axle, spoke, radius: 0.3 };
+            let spoke = crate::geometry::query::any_tangent(&axle);
+            let wheel = Disc { centre: Vector3::new(0.3, 0.1, -0.2), axle, spoke, radius: 0.3 };
             let base = Vector3::new(1.0, 2.0, 3.0);
             let rim = wheel.centre + (spoke * f64::cos(phi) + axle.cross(&spoke) * f64::sin(phi)) * wheel.radius;
             let mut gaps = Vec::new();
@@ -159,7 +146,7 @@ mod tests {
     #[test]
     fn a_wheel_lying_flat_stands_on_three_points_around_its_centre() {
         let plane = Plane::ground();
-        let wheel = PlacedWheel {
+        let wheel = Disc {
             centre: Vector3::zeros(),
             axle: Vector3::y(),
             spoke: Vector3::x(),

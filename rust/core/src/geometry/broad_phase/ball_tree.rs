@@ -9,7 +9,7 @@
 
 use nalgebra::Vector3;
 
-use super::sphere::Sphere;
+use crate::geometry::shape::Sphere;
 
 /// Most balls in a leaf. Measured on 100 000 balls: 2, 4 and 8 search equally fast.
 const LEAF: usize = 4;

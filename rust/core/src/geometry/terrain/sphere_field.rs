@@ -2,12 +2,12 @@
 
 use nalgebra::Vector3;
 
-use super::ball_tree::BallTree;
 use super::error::TerrainError;
 use super::plane::Plane;
 use super::rocks::Rocks;
-use super::sphere::Sphere;
-use super::terrain::{Primitive, Terrain};
+use super::{Primitive, Terrain};
+use crate::geometry::broad_phase::BallTree;
+use crate::geometry::shape::Sphere;
 
 /// Most spheres of a field: some hundred megabytes, and a second to sort them.
 pub const MAX_SPHERES: usize = 2_000_000;

@@ -1,11 +1,23 @@
-//! What a terrain must answer: which of its primitives can be touched near a place.
+//! The ground: what a terrain must answer, and the terrains there are.
+//!
+//! A terrain says which of its primitives can be touched near a place. Each primitive is convex and pairs with every shape of a machine
+//! ([`super::query`]).
+
+pub mod error;
+pub mod plane;
+pub mod rocks;
+pub mod sphere_field;
 
 use nalgebra::Vector3;
 
-use super::plane::Plane;
-use super::sphere::Sphere;
+pub use error::TerrainError;
+pub use plane::Plane;
+pub use rocks::{Clearing, Rocks};
+pub use sphere_field::SphereField;
 
-/// A convex piece of ground whose distance to a wheel or a box has a closed form.
+use super::shape::Sphere;
+
+/// A convex piece of ground whose distance to every shape has a closed form.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Primitive {
     /// A half-space.

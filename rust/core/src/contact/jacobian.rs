@@ -1,0 +1,125 @@
+//! Contact Jacobian H: how a velocity moves a contact's two sides past each other, `u = Hᵀ v`.
+//!
+//! On the ground a row is nonzero along the path of the contact's body. Between two bodies it is the difference of two such rows, each at the
+//! contact's one place, so that what moves both alike, a common ancestor's joint or a free base, moves neither past the other: exactly zero.
+
+use nalgebra::Vector3;
+
+use super::pair::Contact;
+use crate::multibody::{BASE, Kinematics, Model};
+
+/// One velocity's entries of a contact's three rows n, t, b, padded so that two pairs of lanes carry them.
+pub(super) type Columns = [f64; 4];
+
+/// The contact's place relative to the origin of another body's tree, m.
+#[inline]
+fn place_in_tree_of(kinematics: &Kinematics, contact: &Contact, body: usize) -> Vector3<f64> {
+    contact.point + (kinematics.origin(contact.body) - kinematics.origin(body))
+}
+
+/// Velocity (m/s, world) of the contact's part past its other side, at the contact's place.
+#[inline]
+#[must_use]
+pub fn relative_velocity(
+    model: &Model,
+    kinematics: &Kinematics,
+    contact: &Contact,
+    v: &[f64],
+) -> Vector3<f64> {
+    let velocity = kinematics.point_velocity(model, contact.body, &contact.point, v);
+    let Some(other) = contact.other else {
+        return velocity;
+    };
+    let x = place_in_tree_of(kinematics, contact, other.body);
+    velocity - kinematics.point_velocity(model, other.body, &x, v)
+}
+
+/// Rows of Hᵀ along the path of the contact's own body: what each velocity moves the body's point along n, t, b.
+#[inline]
+pub(super) fn columns(
+    model: &Model,
+    kinematics: &Kinematics,
+    contact: &Contact,
+    rows: &mut [Columns],
+) {
+    columns_at(
+        model,
+        kinematics,
+        contact,
+        contact.body,
+        &contact.point,
+        rows,
+    );
+}
+
+/// The same along the path of the other body, not yet subtracted.
+pub(super) fn columns_of_other(
+    model: &Model,
+    kinematics: &Kinematics,
+    contact: &Contact,
+    body: usize,
+    rows: &mut [Columns],
+) {
+    let x = place_in_tree_of(kinematics, contact, body);
+    columns_at(model, kinematics, contact, body, &x, rows);
+}
+
+#[allow(clippy::inline_always)] // as a call it costs a hundredth of a step
+#[inline(always)]
+fn columns_at(
+    model: &Model,
+    kinematics: &Kinematics,
+    contact: &Contact,
+    body: usize,
+    x: &Vector3<f64>,
+    rows: &mut [Columns],
+) {
+    let [n, t, b] = contact.frame.rows();
+    let (lead, rest) = rows.split_at_mut(model.lead(body));
+    if let Some(rows) = lead.first_chunk_mut::<BASE>() {
+        let (xn, xt, xb) = (x.cross(&n), x.cross(&t), x.cross(&b));
+        for i in 0..3 {
+            rows[i] = [n[i], t[i], b[i], 0.0];
+            rows[3 + i] = [xn[i], xt[i], xb[i], 0.0];
+        }
+    }
+    for (row, &m) in rest.iter_mut().zip(model.motions(body)) {
+        let velocity = kinematics.motions[m].velocity_at(x);
+        *row = [velocity.dot(&n), velocity.dot(&t), velocity.dot(&b), 0.0];
+    }
+}
+
+/// `out = H p` (nv): generalized impulse, N s and N m s, of the impulses `p` (3 n_c) at the contacts.
+pub fn generalized_impulse(
+    model: &Model,
+    kinematics: &Kinematics,
+    contacts: &[Contact],
+    p: &[f64],
+    out: &mut [f64],
+) {
+    out.fill(0.0);
+    for (contact, p) in contacts.iter().zip(p.chunks_exact(3)) {
+        let [n, t, b] = contact.frame.rows();
+        let force = n * p[0] + t * p[1] + b * p[2];
+        // The other side, where it is a body, is pushed at the same place the other way.
+        let mut side = Some((contact.body, contact.point, force));
+        let mut other = contact.other;
+        while let Some((body, x, force)) = side {
+            let moment = x.cross(&force);
+            let (lead, rest) = model.split_path(body);
+            if let Some(out) = out[lead].first_chunk_mut::<BASE>() {
+                for i in 0..3 {
+                    out[i] += force[i];
+                    out[3 + i] += moment[i];
+                }
+            }
+            for (&k, &m) in rest.iter().zip(model.motions(body)) {
+                out[k] += kinematics.motions[m].power(&force, &moment);
+            }
+            side = other.take().map(|other| {
+                let x = place_in_tree_of(kinematics, contact, other.body);
+                (other.body, x, -force)
+            });
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! Which contacts between bodies a step must consider.
+//!
+//! Two parts can touch where they belong to different trees, or, in a model that says so
+//! ([`crate::multibody::ModelDescription::self_contact`]), to bodies of one tree that no joint connects. What passes another body within one
+//! step is not seen: between bodies there is no sweep.
+
+use super::activation::Activation;
+use super::frame::ContactFrame;
+use super::jacobian::relative_velocity;
+use super::pair::{Contact, ContactKey, OtherSide};
+use super::part::Part;
+use super::relocation::place_pair;
+use crate::geometry::Sphere;
+use crate::geometry::broad_phase::IntervalSweep;
+use crate::geometry::query::dispatch;
+use crate::multibody::{Kinematics, Model};
+
+/// Scratch of a search, sized once for a model.
+#[derive(Clone, Debug, Default)]
+pub struct PairSearch {
+    /// Empty where no two parts of the model can touch.
+    parts: Vec<Part>,
+    balls: Vec<Sphere>,
+    sweep: IntervalSweep,
+}
+
+impl PairSearch {
+    /// Room for a model.
+    #[must_use]
+    pub fn new(model: &Model) -> Self {
+        let parts: Vec<Part> = Part::all(model).collect();
+        let mut later = parts.iter().enumerate();
+        if !later.any(|(i, a)| (parts[i + 1..].iter()).any(|b| can_touch(model, *a, *b))) {
+            return Self::default();
+        }
+        Self {
+            balls: Vec::with_capacity(parts.len()),
+            sweep: IntervalSweep::with_capacity(parts.len()),
+            parts,
+        }
+    }
+}
+
+/// Whether two parts are ever looked at together.
+fn can_touch(model: &Model, a: Part, b: Part) -> bool {
+    model.can_touch(a.body(model), b.body(model))
+}
+
+/// Adds the contacts between bodies of a configuration with velocity `v` (nv) to `out`; `kinematics` as for [`super::detect`].
+///
+/// `activation.margin` bounds the speed of one body; two come together at up to twice that.
+pub fn detect_pairs(
+    model: &Model,
+    kinematics: &Kinematics,
+    v: &[f64],
+    activation: &Activation,
+    search: &mut PairSearch,
+    out: &mut Vec<Contact>,
+) {
+    let PairSearch {
+        parts,
+        balls,
+        sweep,
+    } = search;
+    if parts.is_empty() {
+        return;
+    }
+    let reach = activation.hover.max(2.0 * activation.margin);
+    let first_origin = kinematics.origin(parts[0].body(model));
+    balls.clear();
+    balls.extend(parts.iter().map(|part| {
+        let body = part.body(model);
+        let shift = kinematics.origin(body) - first_origin;
+        Sphere {
+            centre: kinematics.point(body, &part.centre(model)) + shift,
+            radius: part.bound(model),
+        }
+    }));
+    let is_wanted = |i: usize, j: usize| can_touch(model, parts[i], parts[j]);
+    for &(i, j) in sweep.pairs(balls, reach, is_wanted) {
+        // Wheels come first: where one takes part the contact is the wheel's.
+        let (part, other) = (parts[i as usize], parts[j as usize]);
+        let other = OtherSide {
+            part: other,
+            body: other.body(model),
+        };
+        let (first, second) = place_pair(model, kinematics, other.part, part);
+        dispatch::visit_pair(&first, &second, reach, |point| {
+            let contact = Contact {
+                key: ContactKey::between(part, point.feature, other.part),
+                part,
+                body: part.body(model),
+                other: Some(other),
+                point: point.point,
+                frame: ContactFrame::of_pair(&second, point),
+                gap: point.gap,
+            };
+            let u_N = || (contact.frame.n).dot(&relative_velocity(model, kinematics, &contact, v));
+            if activation.admits(contact.gap, u_N) {
+                out.push(contact);
+            }
+        });
+    }
+}

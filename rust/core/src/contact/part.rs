@@ -1,0 +1,136 @@
+//! The parts of a model that can touch, and where they are.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::{Disc, OrientedBox, PlacedShape, Sphere};
+use crate::multibody::{Kinematics, Model, Wheel};
+
+/// What of the machine touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Part {
+    /// A wheel, by its index.
+    Wheel(usize),
+    /// A box, by its index in the model.
+    Box(usize),
+    /// A ball, by its index in the model.
+    Sphere(usize),
+}
+
+/// From here on a code is a ball's, or a box's.
+const SPHERES: u16 = 0x4000;
+const BOXES: u16 = 0x8000;
+
+impl Part {
+    /// A number of 16 bits for a part: wheels count from 0, balls from 2^14, boxes from 2^15.
+    ///
+    /// # Panics
+    /// If a model has more than 2^14 wheels, balls or boxes.
+    #[inline]
+    #[must_use]
+    pub fn code(self) -> u16 {
+        let narrow = |i: usize| match u16::try_from(i) {
+            Ok(code) if code < SPHERES => code,
+            _ => panic!("invariant: part {i} fits 14 bits"),
+        };
+        match self {
+            Self::Wheel(i) => narrow(i),
+            Self::Sphere(i) => narrow(i) | SPHERES,
+            Self::Box(i) => narrow(i) | BOXES,
+        }
+    }
+
+    /// All parts of a model: wheels, boxes, balls.
+    pub fn all(model: &Model) -> impl Iterator<Item = Self> {
+        let wheels = (0..model.wheels().len()).map(Self::Wheel);
+        let boxes = (0..model.boxes().len()).map(Self::Box);
+        let spheres = (0..model.spheres().len()).map(Self::Sphere);
+        wheels.chain(boxes).chain(spheres)
+    }
+
+    /// Whether a model has it.
+    #[must_use]
+    pub fn is_of(self, model: &Model) -> bool {
+        match self {
+            Self::Wheel(i) => i < model.wheels().len(),
+            Self::Box(i) => i < model.boxes().len(),
+            Self::Sphere(i) => i < model.spheres().len(),
+        }
+    }
+
+    /// Body that carries it.
+    #[inline]
+    #[must_use]
+    pub fn body(self, model: &Model) -> usize {
+        match self {
+            Self::Wheel(i) => model.wheels()[i].body,
+            Self::Box(i) => model.boxes()[i].body,
+            Self::Sphere(i) => model.spheres()[i].body,
+        }
+    }
+
+    /// Centre in its body's frame, m.
+    #[inline]
+    #[must_use]
+    pub fn centre(self, model: &Model) -> Vector3<f64> {
+        match self {
+            Self::Wheel(i) => model.wheels()[i].centre,
+            Self::Box(i) => model.boxes()[i].centre,
+            Self::Sphere(i) => model.spheres()[i].centre,
+        }
+    }
+
+    /// Radius of a ball about the centre that holds all of it, m.
+    #[must_use]
+    pub fn bound(self, model: &Model) -> f64 {
+        match self {
+            Self::Wheel(i) => model.wheels()[i].radius,
+            Self::Box(i) => model.boxes()[i].half_size.norm(),
+            Self::Sphere(i) => model.spheres()[i].radius,
+        }
+    }
+
+    /// Its shape at the poses of `kinematics`, relative to the origin of its body's tree.
+    #[inline]
+    #[must_use]
+    pub fn place(self, model: &Model, kinematics: &Kinematics) -> PlacedShape {
+        if let Self::Wheel(i) = self {
+            PlacedShape::Disc(place_wheel(&model.wheels()[i], kinematics))
+        } else {
+            self.place_solid(model, kinematics)
+        }
+    }
+
+    /// The same, kept apart from the wheels: what is short is inlined where wheels are looked at.
+    fn place_solid(self, model: &Model, kinematics: &Kinematics) -> PlacedShape {
+        match self {
+            Self::Wheel(i) => PlacedShape::Disc(place_wheel(&model.wheels()[i], kinematics)),
+            Self::Box(i) => {
+                let solid = &model.boxes()[i];
+                PlacedShape::Box(OrientedBox {
+                    centre: kinematics.point(solid.body, &solid.centre),
+                    R: kinematics.R[solid.body] * solid.rotation,
+                    half_size: solid.half_size,
+                })
+            }
+            Self::Sphere(i) => {
+                let ball = &model.spheres()[i];
+                PlacedShape::Sphere(Sphere {
+                    centre: kinematics.point(ball.body, &ball.centre),
+                    radius: ball.radius,
+                })
+            }
+        }
+    }
+}
+
+#[inline]
+fn place_wheel(wheel: &Wheel, kinematics: &Kinematics) -> Disc {
+    let R = &kinematics.R[wheel.body];
+    Disc {
+        centre: kinematics.point(wheel.body, &wheel.centre),
+        axle: R * wheel.axle,
+        spoke: R * wheel.spoke,
+        radius: wheel.radius,
+    }
+}

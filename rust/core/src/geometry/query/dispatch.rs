@@ -1,0 +1,125 @@
+//! Which page measures a pair of shapes: the only place that knows which pairs there are.
+//!
+//! A new shape adds its arms here; see "add a shape" in `CONTRIBUTING.md`.
+
+use nalgebra::Vector3;
+
+use super::{
+    PairPoint, SurfacePoint, box_box, box_plane, box_sphere, convex, disc_box, disc_disc,
+    disc_plane, disc_sphere, sphere_plane, sphere_sphere,
+};
+use crate::geometry::{PlacedShape, Plane, Sphere};
+
+/// Visits the points of a shape over a plane of the ground whose gap is at most `reach`, m.
+///
+/// `base` (m, world) is where the shape's coordinates have their origin, here and below.
+#[inline]
+pub fn visit_on_plane(
+    shape: &PlacedShape,
+    plane: &Plane,
+    base: &Vector3<f64>,
+    reach: f64,
+    mut visit: impl FnMut(&SurfacePoint),
+) {
+    match shape {
+        PlacedShape::Disc(disc) => disc_plane::rim_points(disc, plane, base, reach, visit),
+        PlacedShape::Box(solid) => box_plane::corners(solid, plane, base, reach, visit),
+        PlacedShape::Sphere(sphere) => {
+            let low = sphere_plane::lowest_point(sphere, plane, base);
+            if low.gap <= reach {
+                visit(&low);
+            }
+        }
+    }
+}
+
+/// The point of a feature over a plane of the ground, wherever it is.
+#[inline]
+#[must_use]
+pub fn point_on_plane(
+    shape: &PlacedShape,
+    plane: &Plane,
+    base: &Vector3<f64>,
+    feature: usize,
+) -> SurfacePoint {
+    match shape {
+        PlacedShape::Disc(disc) => disc_plane::rim_point(disc, plane, base, feature),
+        PlacedShape::Box(solid) => box_plane::corner(solid, plane, base, feature),
+        PlacedShape::Sphere(sphere) => sphere_plane::lowest_point(sphere, plane, base),
+    }
+}
+
+/// Nearest point of a shape to a sphere of the ground.
+#[inline]
+#[must_use]
+pub fn point_on_sphere(shape: &PlacedShape, ground: &Sphere, base: &Vector3<f64>) -> SurfacePoint {
+    match shape {
+        PlacedShape::Disc(disc) => disc_sphere::nearest_point(disc, ground, base),
+        PlacedShape::Box(solid) => box_sphere::nearest_point(solid, ground, base),
+        PlacedShape::Sphere(sphere) => sphere_sphere::nearest_point(sphere, ground, base),
+    }
+}
+
+/// A shape's point over the tangent plane (normal n) at the point `touch` where a sphere of the ground was first met ([`super::sweep`]).
+#[inline]
+#[must_use]
+pub fn point_over_tangent(
+    shape: &PlacedShape,
+    n: &Vector3<f64>,
+    touch: &Vector3<f64>,
+) -> SurfacePoint {
+    match shape {
+        PlacedShape::Disc(disc) => disc_sphere::point_over_tangent(disc, n, touch),
+        PlacedShape::Box(solid) => box_sphere::point_over_tangent(solid, n, touch),
+        PlacedShape::Sphere(sphere) => sphere_sphere::point_over_tangent(sphere, n, touch),
+    }
+}
+
+/// Visits the points of two moving shapes whose gap is at most `reach`, m; n from the first to the second.
+pub fn visit_pair(
+    first: &PlacedShape,
+    second: &PlacedShape,
+    reach: f64,
+    mut visit: impl FnMut(&PairPoint),
+) {
+    match (first, second) {
+        (PlacedShape::Box(a), PlacedShape::Box(b)) => box_box::points(a, b, reach, visit),
+        (PlacedShape::Disc(a), PlacedShape::Box(b)) => disc_box::points(a, b, reach, visit),
+        (PlacedShape::Box(a), PlacedShape::Disc(b)) => {
+            disc_box::points(b, a, reach, |point| visit(&point.swapped()));
+        }
+        _ => {
+            let near = nearest_points(first, second);
+            if near.gap <= reach {
+                visit(&near);
+            }
+        }
+    }
+}
+
+/// The point of a feature of two moving shapes, wherever it is; n from the first to the second.
+#[must_use]
+pub fn point_of_pair(first: &PlacedShape, second: &PlacedShape, feature: usize) -> PairPoint {
+    match (first, second) {
+        (PlacedShape::Box(a), PlacedShape::Box(b)) => box_box::point(a, b, feature),
+        (PlacedShape::Disc(a), PlacedShape::Box(b)) => disc_box::point(a, b, feature),
+        (PlacedShape::Box(a), PlacedShape::Disc(b)) => disc_box::point(b, a, feature).swapped(),
+        _ => nearest_points(first, second),
+    }
+}
+
+/// Nearest points of two moving shapes.
+#[must_use]
+pub fn nearest_points(first: &PlacedShape, second: &PlacedShape) -> PairPoint {
+    match (first, second) {
+        (PlacedShape::Sphere(a), PlacedShape::Sphere(b)) => sphere_sphere::nearest_points(a, b),
+        (PlacedShape::Disc(a), PlacedShape::Sphere(b)) => disc_sphere::nearest_points(a, b),
+        (PlacedShape::Sphere(a), PlacedShape::Disc(b)) => {
+            disc_sphere::nearest_points(b, a).swapped()
+        }
+        (PlacedShape::Box(a), PlacedShape::Sphere(b)) => box_sphere::nearest_points(a, b),
+        (PlacedShape::Sphere(a), PlacedShape::Box(b)) => box_sphere::nearest_points(b, a).swapped(),
+        (PlacedShape::Disc(a), PlacedShape::Disc(b)) => disc_disc::nearest_points(a, b),
+        _ => convex::nearest_points(first, second),
+    }
+}

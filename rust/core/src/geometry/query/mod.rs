@@ -1,0 +1,120 @@
+//! Signed distance, points and normal of a pair of shapes: one page a pair, one dispatcher.
+//!
+//! | | plane | sphere of the ground | disc | box | sphere |
+//! |---|---|---|---|---|---|
+//! | disc | [`disc_plane`] | [`disc_sphere`] | [`disc_disc`] | [`disc_box`] | [`disc_sphere`] |
+//! | box | [`box_plane`] | [`box_sphere`] | | [`box_box`] | [`box_sphere`] |
+//! | sphere | [`sphere_plane`] | [`sphere_sphere`] | | | [`sphere_sphere`] |
+//!
+//! The gap is positive where the shapes are apart. Points and normals are such that the gap's rate is the normal part of the relative
+//! velocity of the two *material* points there: exactly, except where a page says how nearly. [`convex`] measures any two shapes by their
+//! support maps, for pages without a formula of their own; [`sweep`] says how a part met a sphere that it passes within one step.
+//!
+//! [`dispatch`] is the only page that knows which pairs there are.
+
+pub mod box_box;
+pub mod box_plane;
+pub mod box_sphere;
+pub mod convex;
+pub mod disc_box;
+pub mod disc_disc;
+pub mod disc_plane;
+pub mod disc_sphere;
+pub mod dispatch;
+pub mod sphere_plane;
+pub mod sphere_sphere;
+pub mod sweep;
+
+use nalgebra::Vector3;
+
+/// The feature of a pair that is measured by its nearest points, whichever they are.
+pub const NEAREST: usize = 0;
+
+/// A point of a shape at a primitive of the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Names the point among all that the pair can have.
+    pub feature: usize,
+    /// The shape's point, m.
+    pub point: Vector3<f64>,
+    /// Unit normal from the ground to the shape.
+    pub n: Vector3<f64>,
+    /// Of a disc: its rolling direction where its axle is along n.
+    pub rolling: Vector3<f64>,
+    /// m, negative inside.
+    pub gap: f64,
+}
+
+impl SurfacePoint {
+    /// A point of a shape that does not roll.
+    #[inline]
+    #[must_use]
+    pub fn of_normal(feature: usize, point: Vector3<f64>, n: &Vector3<f64>, gap: f64) -> Self {
+        Self {
+            feature,
+            point,
+            n: *n,
+            rolling: Vector3::zeros(),
+            gap,
+        }
+    }
+}
+
+/// A point where two shapes are near each other.
+///
+/// The two surfaces' points are `point ∓ ½ gap n`, so that both shapes are pushed at one place and no couple is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PairPoint {
+    /// Names the point among all that the pair can have.
+    pub feature: usize,
+    /// Halfway between the surfaces, m.
+    pub point: Vector3<f64>,
+    /// Unit normal from the first shape to the second.
+    pub n: Vector3<f64>,
+    /// m, negative where the shapes overlap.
+    pub gap: f64,
+}
+
+impl PairPoint {
+    /// Between a point of the first shape and the one of the second that lies `gap` along n.
+    #[inline]
+    #[must_use]
+    pub(crate) fn from_first(feature: usize, x: &Vector3<f64>, n: &Vector3<f64>, gap: f64) -> Self {
+        Self {
+            feature,
+            point: x + n * (0.5 * gap),
+            n: *n,
+            gap,
+        }
+    }
+
+    /// The same pair seen from the other side.
+    #[inline]
+    #[must_use]
+    pub fn swapped(self) -> Self {
+        Self { n: -self.n, ..self }
+    }
+
+    /// The first shape's point, m.
+    #[must_use]
+    pub fn on_first(&self) -> Vector3<f64> {
+        self.point - self.n * (0.5 * self.gap)
+    }
+
+    /// The second shape's point, m.
+    #[must_use]
+    pub fn on_second(&self) -> Vector3<f64> {
+        self.point + self.n * (0.5 * self.gap)
+    }
+}
+
+/// Some unit vector perpendicular to a unit vector.
+#[must_use]
+pub(crate) fn any_tangent(n: &Vector3<f64>) -> Vector3<f64> {
+    let e = if n.x.abs() < 0.9 {
+        Vector3::x()
+    } else {
+        Vector3::z()
+    };
+    (e - n * n.dot(&e)).normalize()
+}

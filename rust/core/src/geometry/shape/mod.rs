@@ -1,0 +1,95 @@
+//! Shapes of a machine's parts, placed in space: one file a shape, with its data, its bounds and its support map.
+//!
+//! All coordinates are in world axes and relative to one origin that the caller chooses, mostly the trunk's, so that a machine far from
+//! the world's origin loses no digit.
+
+pub mod disc;
+pub mod oriented_box;
+pub mod sphere;
+
+use nalgebra::Vector3;
+
+pub use disc::Disc;
+pub use oriented_box::OrientedBox;
+pub use sphere::Sphere;
+
+/// A convex body as its support map sees it.
+pub trait SupportMap {
+    /// The point that lies furthest along `direction`, which need not be a unit vector.
+    fn support(&self, direction: &Vector3<f64>) -> Vector3<f64>;
+
+    /// A point inside, m.
+    fn centre(&self) -> Vector3<f64>;
+
+    /// Radius of a ball about the centre that holds the whole shape, m.
+    fn bound(&self) -> f64;
+}
+
+/// Any shape of a part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PlacedShape {
+    /// A wheel.
+    Disc(Disc),
+    /// A box.
+    Box(OrientedBox),
+    /// A ball.
+    Sphere(Sphere),
+}
+
+impl SupportMap for PlacedShape {
+    fn support(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        match self {
+            Self::Disc(disc) => disc.support(direction),
+            Self::Box(solid) => solid.support(direction),
+            Self::Sphere(sphere) => sphere.support(direction),
+        }
+    }
+
+    fn centre(&self) -> Vector3<f64> {
+        match self {
+            Self::Disc(disc) => disc.centre,
+            Self::Box(solid) => solid.centre,
+            Self::Sphere(sphere) => sphere.centre,
+        }
+    }
+
+    fn bound(&self) -> f64 {
+        match self {
+            Self::Disc(disc) => disc.bound(),
+            Self::Box(solid) => solid.bound(),
+            Self::Sphere(sphere) => sphere.bound(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Rotation3;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_support_point_is_in_the_shape_and_furthest(
+            angles in prop::array::uniform3(-3.0..3.0), d in prop::array::uniform3(-1.0..1.0), phi in 0.0..6.3,
+        ) {
+            let R = *Rotation3::from_euler_angles(angles[0], angles[1], angles[2]).matrix();
+            let centre = Vector3::new(0.3, -0.2, 0.1);
+            let d = Vector3::from(d);
+            let disc = Disc { centre, axle: R.column(2).into(), spoke: R.column(0).into(), radius: 0.3 };
+            let E = disc.support(&d) - centre;
+            prop_assert!(E.norm() <= 0.3 + 1e-12 && E.dot(&disc.axle).abs() < 1e-12);
+            let rim = R * Vector3::new(f64::cos(phi), f64::sin(phi), 0.0) * 0.3;
+            prop_assert!(d.dot(&rim) <= d.dot(&E) + 1e-12);
+            let solid = OrientedBox { centre, R, half_size: Vector3::new(0.4, 0.2, 0.1) };
+            let E = R.tr_mul(&(solid.support(&d) - centre));
+            prop_assert!((E.abs() - solid.half_size).norm() < 1e-12);
+            for k in 0..8 {
+                prop_assert!(d.dot(&solid.corner(k)) <= d.dot(&solid.support(&d)) + 1e-12);
+            }
+            for shape in [PlacedShape::Disc(disc), PlacedShape::Box(solid), PlacedShape::Sphere(Sphere { centre, radius: 0.2 })] {
+                prop_assert!((shape.support(&d) - shape.centre()).norm() <= shape.bound() + 1e-12);
+            }
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! Box at any attitude.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::SupportMap;
+
+/// A box in space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OrientedBox {
+    /// m.
+    pub centre: Vector3<f64>,
+    /// From the box's axes to the world's.
+    pub R: Matrix3<f64>,
+    /// Half edge lengths, m.
+    pub half_size: Vector3<f64>,
+}
+
+impl OrientedBox {
+    /// Place of the corner of a number: bits 0, 1, 2 say the side along x, y, z.
+    #[inline]
+    #[must_use]
+    pub fn corner(&self, number: usize) -> Vector3<f64> {
+        self.centre + self.R * self.half_size.component_mul(&signs(number))
+    }
+
+    /// Unit axis of a number, world axes.
+    #[inline]
+    #[must_use]
+    pub fn axis(&self, k: usize) -> Vector3<f64> {
+        self.R.column(k).into()
+    }
+}
+
+/// The sides on which a corner lies, 1 or −1.
+#[inline]
+#[must_use]
+pub(crate) fn signs(number: usize) -> Vector3<f64> {
+    let sign = |bit: usize| if number >> bit & 1 == 1 { 1.0 } else { -1.0 };
+    Vector3::new(sign(0), sign(1), sign(2))
+}
+
+impl SupportMap for OrientedBox {
+    fn support(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        let local = self.R.tr_mul(direction);
+        let corner = self.half_size.zip_map(&local, f64::copysign);
+        self.centre + self.R * corner
+    }
+
+    fn centre(&self) -> Vector3<f64> {
+        self.centre
+    }
+
+    fn bound(&self) -> f64 {
+        self.half_size.norm()
+    }
+}

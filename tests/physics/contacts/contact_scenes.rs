@@ -1,0 +1,114 @@
+//! Machines whose parts meet.
+
+use std::sync::Arc;
+
+use rover_core::contact::{Activation, Contact, PairSearch, detect_pairs};
+use rover_core::geometry::Plane;
+use rover_core::integrator::{StepOptions, Variant};
+use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription};
+use rover_core::simulation::RoverSimulation;
+
+/// A chassis with an arm of two links over it: the second link, a box, a ball or a wheel, folds down onto the chassis.
+pub fn folding(last: &str) -> Model {
+    let text = format!(
+        r#"
+name = "folding"
+self_contact = true
+
+[[solids]]
+name = "chassis"
+mass = 20.0
+shape = {{ kind = "box", size = [1.0, 0.2, 0.6] }}
+collides = true
+
+[[solids]]
+name = "shoulder"
+parent = "chassis"
+position = [-0.4, 0.3, 0.0]
+axis = [0.0, 1.0, 0.0]
+mass = 1.0
+shape = {{ kind = "box", size = [0.1, 0.1, 0.1] }}
+
+[[solids]]
+name = "arm"
+parent = "shoulder"
+position = [0.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+mass = 2.0
+centre_of_mass = [0.3, 0.0, 0.0]
+inertia = [0.01, 0.1, 0.1, 0.0, 0.0, 0.0]
+shape = {{ kind = "box", size = [0.1, 0.1, 0.1] }}
+
+[[solids]]
+name = "tip"
+parent = "arm"
+position = [0.6, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+mass = 3.0
+{last}
+"#
+    );
+    Model::from_description(ModelDescription::from_toml(&text).unwrap()).unwrap()
+}
+
+/// The tips that an arm may have.
+pub fn tips() -> [&'static str; 3] {
+    [
+        "shape = { kind = \"box\", size = [0.2, 0.1, 0.3] }\ncollides = true",
+        "shape = { kind = \"sphere\", radius = 0.1 }\ncollides = true",
+        "shape = { kind = \"disc\", radius = 0.15 }\n[[wheels]]\nname = \"W\"\nsolid = \"tip\"\naxle = [0.0, 0.0, 1.0]\nradius = 0.15\ntorque_limit = 1.0\ndrive_sign = 1.0",
+    ]
+}
+
+/// Contacts of a machine's bodies with each other that are no further apart than 20 cm.
+pub fn near(model: &Model, kinematics: &Kinematics) -> Vec<Contact> {
+    let activation = Activation {
+        lead: 0.0,
+        hover: 0.2,
+        slow: f64::INFINITY,
+        margin: 0.0,
+    };
+    touching(model, kinematics, &activation)
+}
+
+fn touching(model: &Model, kinematics: &Kinematics, activation: &Activation) -> Vec<Contact> {
+    let (at_rest, mut found) = (vec![0.0; model.nv()], Vec::new());
+    let mut search = PairSearch::new(model);
+    detect_pairs(
+        model,
+        kinematics,
+        &at_rest,
+        activation,
+        &mut search,
+        &mut found,
+    );
+    found
+}
+
+/// Deepest gap between two bodies now, m: 0 where none overlap.
+pub fn overlap(simulation: &RoverSimulation) -> f64 {
+    let found = touching(
+        simulation.model(),
+        &simulation.kinematics(),
+        &Activation::default(),
+    );
+    found
+        .iter()
+        .fold(0.0, |deepest, contact| deepest.min(contact.gap))
+}
+
+/// A simulation on flat ground that begins at rest, its base's centre at a height.
+pub fn at_rest(model: Model, height: f64, joints: &[f64], variant: Variant) -> RoverSimulation {
+    let mut start = Configuration::zero(&model);
+    start.position.y = height;
+    start.joints.copy_from_slice(joints);
+    let options = StepOptions {
+        variant,
+        ..StepOptions::default()
+    };
+    let v = vec![0.0; model.nv()];
+    let model = Arc::new(model);
+    let mut simulation = RoverSimulation::new(model, Arc::new(Plane::ground()), options).unwrap();
+    simulation.set_state(start, v);
+    simulation
+}

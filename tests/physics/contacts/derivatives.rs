@@ -1,0 +1,73 @@
+//! The Jacobian of a contact of two bodies is the gap's derivative, and its impulse is nobody's from outside.
+
+use proptest::prelude::*;
+use rover_core::contact::{Contact, generalized_impulse, relocate};
+use rover_core::geometry::Plane;
+use rover_core::multibody::{Configuration, Kinematics, Model};
+
+use crate::contact_scenes::{folding, near, tips};
+
+/// Where the machine is, and its contacts with itself that are no further apart than 20 cm.
+fn contacts(model: &Model, joints: [f64; 3], turn: [f64; 3]) -> (Configuration, Vec<Contact>) {
+    let mut q = Configuration::zero(model);
+    q.joints.copy_from_slice(&joints);
+    let v: Vec<f64> = [0.3, 0.2, -0.1]
+        .into_iter()
+        .chain(turn)
+        .chain([0.0; 3])
+        .collect();
+    q.advance(model, &v, 1.0);
+    let found = near(model, &Kinematics::of(model, &q));
+    (q, found)
+}
+
+proptest! {
+    #[test]
+    fn the_jacobian_is_the_gaps_derivative_and_moves_nothing_as_a_whole(
+        tip in 0..3_usize, yaw in -0.3..0.3, lift in -0.45..-0.1, wrist in -0.6..0.6, turn in prop::array::uniform3(-1.0..1.0),
+    ) {
+        let model = folding(tips()[tip]);
+        let (q, found) = contacts(&model, [yaw, lift, wrist], turn);
+        // Not of a wheel's rim points beside the lowest, which fade in and carry it only where it lies flat, and not where two edges cross, where
+        // the point slides along them: their pages say how nearly.
+        let is_exact = |c: &&Contact| match (tip, c.key.feature) {
+            (0, feature) if feature & (1 << 13) != 0 => feature & 31 < 8,
+            (2, feature) if feature & (1 << 13) != 0 => feature % 4 == 0,
+            _ => true,
+        };
+        for contact in found.iter().filter(is_exact) {
+            prop_assert!(contact.other.is_some());
+            let kinematics = Kinematics::of(&model, &q);
+            let mut row = vec![0.0; model.nv()];
+            generalized_impulse(&model, &kinematics, std::slice::from_ref(contact), &[1.0, 0.3, -0.2], &mut row);
+            // An impulse within the machine pushes its base exactly not at all.
+            prop_assert!(row[..6].iter().all(|x| x.abs() < 1e-15), "{row:?}");
+            generalized_impulse(&model, &kinematics, std::slice::from_ref(contact), &[1.0, 0.0, 0.0], &mut row);
+            for k in 0..model.nv() {
+                let gap_at = |h: f64| {
+                    let mut v = vec![0.0; model.nv()];
+                    v[k] = 1.0;
+                    let mut moved = q.clone();
+                    moved.advance(&model, &v, h);
+                    let mut contact = *contact;
+                    relocate(&model, &Kinematics::of(&model, &moved), &Plane::ground(), &mut contact);
+                    contact.gap
+                };
+                let h = 1e-6;
+                let slope = (gap_at(h) - gap_at(-h)) / (2.0 * h);
+                prop_assert!((slope - row[k]).abs() < 1e-5, "{k}: {slope} {} {contact:?}", row[k]);
+            }
+        }
+    }
+}
+
+#[test]
+fn parts_that_a_joint_connects_do_not_touch_and_a_machine_touches_itself_only_where_it_says_so() {
+    let model = folding(tips()[0]);
+    let (_, found) = contacts(&model, [0.0, -0.3, 0.3], [0.0; 3]);
+    assert!(!found.is_empty());
+    let mut description = model.description().clone();
+    description.self_contact = false;
+    let model = Model::from_description(description).unwrap();
+    assert!(contacts(&model, [0.0, -0.3, 0.3], [0.0; 3]).1.is_empty());
+}

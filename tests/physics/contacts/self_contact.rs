@@ -1,0 +1,49 @@
+//! An arm that folds down onto its own chassis rests there.
+
+use rover_core::contact::Part;
+use rover_core::integrator::Variant;
+
+use crate::contact_scenes::{at_rest, folding, overlap, tips};
+
+#[test]
+fn a_folded_arm_rests_on_the_chassis() {
+    for variant in [Variant::Linearised, Variant::Newton] {
+        for (tip, half_height) in tips().iter().zip([0.05, 0.1, 0.15]) {
+            let mut simulation = at_rest(folding(tip), 0.1, &[0.1, 0.2, -0.1], variant);
+            let mut before = simulation.energy();
+            let mut deepest = 0.0_f64;
+            for _ in 0..600 {
+                let report = simulation.step(1).unwrap();
+                assert!(report.is_converged(), "{report:?}");
+                // Nothing but gravity works here, and contacts only take.
+                let energy = simulation.energy();
+                let gain = energy.kinetic + energy.potential - before.kinetic - before.potential;
+                assert!(gain < 1e-6 + report.energy_lifted, "{gain}");
+                before = energy;
+                deepest = deepest.min(overlap(&simulation));
+            }
+            // A step sees a contact half a step after it has closed, and lifts it out in the next.
+            assert!(deepest > -1e-2, "{tip}: {deepest}");
+            assert!(overlap(&simulation) > -1e-7, "{tip}");
+            assert!(before.kinetic < 1e-4, "{tip} {variant:?}: {before:?}");
+            // The tip lies on the chassis: its centre is its own height over the chassis' top.
+            let kinematics = simulation.kinematics();
+            let height = kinematics.r[3].dot(&kinematics.R[0].column(1));
+            assert!((height - 0.1 - half_height).abs() < 1e-3, "{tip}: {height}");
+            let weight: f64 = (simulation.contacts().iter())
+                .filter(|a| a.contact.other.is_some())
+                .map(|a| a.impulse[0] / 0.005)
+                .sum();
+            // The tip's weight and half the arm's, but for what friction along the sloping arm carries.
+            assert!((weight - 9.81 * (3.0 + 1.0)).abs() < 4.0, "{tip}: {weight}");
+            let is_wheel = |part| matches!(part, Part::Wheel(_));
+            let ground = simulation
+                .contacts()
+                .iter()
+                .filter(|a| a.contact.other.is_none());
+            assert!(
+                ground.clone().count() >= 3 && ground.clone().all(|a| !is_wheel(a.contact.part))
+            );
+        }
+    }
+}
