@@ -41,7 +41,9 @@ fn two_trees_move_as_each_alone() {
         let mut ends = Vec::new();
         for (model, seed) in alone.into_iter().zip([0.4, 1.7]) {
             let (start, mut rates) = somewhere(&model, seed);
-            rates.iter_mut().for_each(|rate| *rate *= 0.2);
+            for rate in &mut rates {
+                *rate *= 0.2;
+            }
             q.extend(coordinates::to_public(&model, &start));
             v.extend_from_slice(&rates);
             let mut run = simulation(model, options(1e-3, Variant::Newton));
