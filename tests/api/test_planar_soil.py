@@ -119,11 +119,16 @@ def test_the_rover_drives_and_a_snapshot_continues_bit_for_bit(bed: Bed, tmp_pat
     start = sim.machine
     sim.step(40)
     snapshot = SoilSnapshot.from_bytes(sim.snapshot().to_bytes())
+    assert snapshot == sim.snapshot()
+    pressed = sim.impulse_on_wheels()
     path = tmp_path / "soil.h5"
     record_soil(sim, path, "a test", duration=0.08, steps_per_row=20, walls=bed.walls)
     end = sim.position
     assert sim.machine[0] > start[0]
+    assert snapshot != sim.snapshot()
     sim.restore(snapshot)
+    np.testing.assert_array_equal(sim.impulse_on_wheels(), pressed)
+    assert pressed[1] > 0.0
     impulse = np.zeros(2)
     for _ in range(80):
         sim.step()

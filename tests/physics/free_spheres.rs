@@ -2,13 +2,17 @@
 
 #![allow(clippy::unwrap_used)] // a test stops where a scene is impossible
 
+use std::sync::Arc;
+
 use rover_comparison::free_spheres::SphereKind;
 use rover_comparison::scenes::{G, options};
 use rover_comparison::slab::Slab;
 use rover_comparison::sphere_scenes::{KIND, Push, Scene, Treatment, run};
 use rover_comparison::sphere_simulation::SphereSimulation;
-use rover_core::integrator::StepOptions;
+use rover_core::integrator::{Stabilisation, StepOptions};
 use rover_core::nalgebra::Vector3;
+use rover_core::simulation::GrainSimulation;
+use rover_core::system::grains::{GrainFriction, GrainScene, Grains, Wall};
 
 /// No CPU time is wanted here.
 fn no_clock() -> f64 {
@@ -232,4 +236,54 @@ fn a_sliding_sphere_comes_to_roll_at_five_sevenths() {
     let expected = 12.0 / (49.0 * 0.3 * G) + 5.0 / 7.0 * (0.2 - slips);
     assert!((simulation.centres()[0].x - expected).abs() < 2e-4);
     assert!((simulation.centres()[0].y - 0.2).abs() < 1e-12);
+}
+
+/// The core's grains have another law at the contact, `0 ≤ u_N + gap⁺/h ⊥ p_N ≥ 0` with θ = 1, and find contacts in another way: both come to the same
+/// motion as the step shrinks.
+#[test]
+fn grains_in_space_and_free_spheres_come_to_the_same_motion() {
+    let kind = SphereKind {
+        mass: 2.0,
+        radius: 0.1,
+    };
+    // One falls on three that lie on the ground, beside their middle, and pushes them apart.
+    let centres = vec![
+        Vector3::new(0.0, 0.1, 0.0),
+        Vector3::new(0.22, 0.1, 0.0),
+        Vector3::new(0.11, 0.1, 0.19),
+        Vector3::new(0.12, 0.4, 0.07),
+    ];
+    let apart = |step: f64, n: usize| {
+        let settings = options(0.3, 0.0, step);
+        let mut spheres = SphereSimulation::new(kind, centres.clone(), settings).unwrap();
+        spheres.step(n).unwrap();
+        let grains = Grains::<3>::new(vec![kind.radius; 4], vec![kind.mass; 4]).unwrap();
+        let settings = StepOptions {
+            theta: 1.0,
+            forecast: 1.0,
+            stabilisation: Stabilisation::None,
+            ..options(0.3, 0.0, step)
+        };
+        let scene = GrainScene {
+            grains,
+            walls: vec![Wall::floor(0.0)],
+            ground: None,
+            machine: None,
+            friction: GrainFriction {
+                grains: 0.3,
+                walls: 0.3,
+                wheels: 0.3,
+            },
+        };
+        let q = centres.iter().flatten().copied().collect();
+        let mut balls = GrainSimulation::<3>::new(Arc::new(scene), settings, None, q).unwrap();
+        balls.step(n).unwrap();
+        let moved = (spheres.centres()[1] - centres[1]).norm();
+        assert!(moved > 0.01, "pushed away: {moved} m");
+        let rows = balls.q().chunks_exact(3).zip(spheres.centres());
+        rows.map(|(q, x)| (Vector3::from_column_slice(q) - x).norm())
+            .fold(0.0, f64::max)
+    };
+    let (coarse, fine) = (apart(1e-3, 400), apart(2.5e-4, 1600));
+    assert!(fine < 5e-4 && fine < 0.5 * coarse, "{coarse} m, {fine} m");
 }

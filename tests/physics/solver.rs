@@ -4,7 +4,7 @@ mod solver_scenes;
 
 use proptest::prelude::*;
 use rover_core::problem::{
-    BlockSparseDelassus, BodyPairs, Dimension, DiscPair, FrictionContactProblem, PairContact,
+    BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, PairContact, RoundPair,
     evaluate,
 };
 use rover_core::solver::{
@@ -889,16 +889,16 @@ fn free_bodies_list_their_sweeps_and_what_came_after_them() {
     };
     let mut pairs = BodyPairs {
         n_coordinates: 3 * n,
-        wide_at: 3 * n,
-        ..BodyPairs::default()
+        machine_at: 3 * n,
+        ..BodyPairs::<2>::default()
     };
     let mut contacts = Vec::new();
     for i in 0..n {
         let below = (i > 0).then(|| i - 1);
         let (c_b, s_b) = below.map_or((0.0, 0.0), |_| (c, s));
-        pairs.discs.push(DiscPair {
+        pairs.round.push(RoundPair {
             bodies: [3 * i, 3 * below.unwrap_or(0)].map(|k| u32::try_from(k).expect("few")),
-            n: [0.0, 1.0],
+            frame: [[0.0, 1.0], [1.0, 0.0]],
             linear: [c, c_b],
             angular: [s, s_b],
         });

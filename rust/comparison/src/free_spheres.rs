@@ -9,8 +9,8 @@ use rover_core::contact::{Activation, ContactFrame};
 use rover_core::integrator::{MechanicalSystem, Start, StepOptions, UnilateralContact};
 use rover_core::nalgebra::{UnitQuaternion, Vector3};
 use rover_core::problem::{BlockSparseDelassus, Dimension, FrictionContactProblem, PairContact};
+use rover_core::system::grains::grid::Grid;
 
-use crate::cell_grid::CellGrid;
 use crate::slab::{CORNERS, Slab};
 
 /// Velocities of a body.
@@ -98,6 +98,38 @@ impl UnilateralContact for SphereContact {
 
     fn gap(&self) -> f64 {
         self.gap
+    }
+}
+
+/// Pairs of close points, found by the grid of the core's grains: its memory, kept from one search to the next.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Pairs {
+    grid: Grid<3>,
+    coordinates: Vec<f64>,
+    sizes: Vec<f64>,
+}
+
+impl Pairs {
+    /// Calls `visit(i, j)`, i < j, once for each pair that can be nearer than `size` (m, positive).
+    pub fn visit(
+        &mut self,
+        points: &[Vector3<f64>],
+        size: f64,
+        mut visit: impl FnMut(usize, usize),
+    ) {
+        self.coordinates.clear();
+        self.coordinates.extend(points.iter().flatten());
+        self.sizes.clear();
+        self.sizes.resize(points.len(), 0.5 * size);
+        self.grid.fill(&self.coordinates, &self.sizes, size);
+        for (i, point) in points.iter().enumerate() {
+            self.grid.near(&(*point).into(), size, |other| {
+                let j = other.index as usize;
+                if j > i {
+                    visit(i, j);
+                }
+            });
+        }
     }
 }
 
@@ -189,7 +221,7 @@ pub(crate) fn spin(v: &[f64], body: usize) -> Vector3<f64> {
 pub struct SphereScratch {
     middle: Placement,
     pub(crate) end: Placement,
-    grid: CellGrid,
+    grid: Pairs,
     rows: Vec<PairContact<3, NV>>,
     inverse_masses: Vec<[f64; NV]>,
     /// Square roots of M's diagonal.
@@ -323,9 +355,7 @@ impl MechanicalSystem for SphereSystem<'_> {
             }
         }
         let size = 2.0 * bodies.kind.radius + reach;
-        grid.visit_pairs(&middle.centres[..n], size, |i, j| {
-            offer((name(i.min(j)), name(i.max(j))));
-        });
+        grid.visit(&middle.centres[..n], size, |i, j| offer((name(i), name(j))));
         out.sort_unstable_by_key(|contact| contact.key);
     }
 

@@ -6,14 +6,13 @@
 //!
 //! - [`generalised_alpha`], [`schatzman_paoli`], [`event_driven`], [`penalty`]: one scheme each; [`scheme`]: the list;
 //! - [`scenes`]: motions with closed forms or a converged reference; [`measure`]: orders, drift, energy, cost.
-//! - [`free_spheres`] in space with a block-sparse W, found by a [`cell_grid`], and a [`slab`] among them; [`sphere_simulation`];
+//! - [`free_spheres`] in space with a block-sparse W, found by the core's grid of cells, and a [`slab`] among them; [`sphere_simulation`];
 //!   [`sphere_scenes`]: heaps, bounces and rolling; [`projected_to_convergence`]: no penetration at the end of any step.
 //!
 //! `make orders` writes the figures of `docs/integrators.md`.
 #![forbid(unsafe_code)]
 
 mod acceleration;
-pub mod cell_grid;
 pub mod event_driven;
 pub mod free_spheres;
 pub mod generalised_alpha;

@@ -9,10 +9,9 @@ use rover_core::problem::BlockSparseDelassus;
 use rover_core::simulation::{ActiveContact, LocatedContact, Scene, Simulation, Snapshot, State};
 
 use crate::Stepper;
-use crate::cell_grid::CellGrid;
 use crate::free_spheres::{
-    Bodies, NV, Placement, SphereContact, SphereKind, SphereScratch, SphereSystem, apart, linear,
-    spin,
+    Bodies, NV, Pairs, Placement, SphereContact, SphereKind, SphereScratch, SphereSystem, apart,
+    linear, spin,
 };
 use crate::slab::{CORNERS, Slab};
 
@@ -120,7 +119,7 @@ impl Scene for Bodies {
 pub struct SphereSimulation {
     inner: Simulation<Bodies>,
     stepper: Stepper,
-    grid: CellGrid,
+    grid: Pairs,
 }
 
 impl SphereSimulation {
@@ -163,7 +162,7 @@ impl SphereSimulation {
         Ok(Self {
             stepper: Stepper::MoreauJean(options.variant),
             inner: Simulation::of(bodies, Placement { centres, turn }, options)?,
-            grid: CellGrid::default(),
+            grid: Pairs::default(),
         })
     }
 
@@ -288,7 +287,7 @@ impl SphereSimulation {
                 enter(-(centres[n].y + (turn * slab.corner(k)).y));
             }
         }
-        self.grid.visit_pairs(&centres[..n], 2.0 * radius, |i, j| {
+        self.grid.visit(&centres[..n], 2.0 * radius, |i, j| {
             enter(-apart(&centres[i], &centres[j], radius).0);
         });
         found

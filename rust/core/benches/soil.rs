@@ -9,8 +9,8 @@ use std::time::Instant;
 
 use rover_core::integrator::StepOptions;
 use rover_core::nalgebra::Vector3;
-use rover_core::planar::soil::{Packing, SoilFriction, SoilScene, Wall};
 use rover_core::simulation::{SoilSimulation, soil_options};
+use rover_core::system::soil::{Packing, SoilFriction, SoilScene, Wall};
 
 /// CPU seconds of this thread, wall seconds where /proc does not tell.
 fn cpu_seconds(start: Instant) -> f64 {
@@ -25,7 +25,7 @@ fn bed(count: usize) -> SoilSimulation {
     let width = 0.033 * count as f64 / 10.0 * 1.01;
     let packing = Packing {
         count,
-        width,
+        sides: [width, f64::INFINITY],
         radius_min: 0.014,
         radius_max: 0.0165,
         ..Packing::default()
@@ -38,13 +38,13 @@ fn bed(count: usize) -> SoilSimulation {
         ground: None,
         machine: None,
         friction: SoilFriction::default(),
-        disks,
+        grains: disks,
     };
     let mut soil = SoilSimulation::new(Arc::new(scene), options, None, q).expect("a soil");
     // Until it rests, or for 12 s.
     for _ in 0..120 {
         soil.step(100).expect("finite");
-        let mass: f64 = soil.soil().disks.mass().iter().sum();
+        let mass: f64 = soil.soil().grains.mass().iter().sum();
         if 2.0 * soil.energy().kinetic < 1e-10 * mass {
             break;
         }
@@ -80,7 +80,7 @@ fn measure(name: &str, soil: &mut SoilSimulation, steps: usize) {
         converged += usize::from(report.is_converged());
     }
     let time = cpu_seconds(Instant::now()) - before;
-    let disks = soil.soil().disks.len();
+    let disks = soil.soil().grains.len();
     println!(
         "{disks:6} {:8.0e}   {name:5}  {:12.2e}  {:11.1}  {contacts:8}  {:9.2}  {:17.1}  {:13.4}  {gain:9.1e}",
         soil.options().solver.tolerance,
@@ -88,7 +88,7 @@ fn measure(name: &str, soil: &mut SoilSimulation, steps: usize) {
         sweeps as f64 / steps as f64,
         converged as f64 / steps as f64,
         1e9 * time / visits as f64,
-        soil.penetration() / soil.soil().disks.smallest(),
+        soil.penetration() / soil.soil().grains.smallest(),
     );
 }
 

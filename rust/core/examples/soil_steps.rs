@@ -9,9 +9,9 @@ use std::error::Error;
 use std::sync::Arc;
 
 use rover_core::nalgebra::{Vector2, Vector3};
-use rover_core::planar::soil::{Packing, SleepOptions, SoilFriction, SoilScene, Wall};
 use rover_core::planar::{PlanarWheel, TwoWheelRover};
 use rover_core::simulation::{SoilSimulation, soil_options};
+use rover_core::system::soil::{Packing, SleepOptions, SoilFriction, SoilScene, Wall, on_soil};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().collect();
@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         options.gravity = Vector3::new(4.0, -9.0, 0.0);
     }
     let mut scene = SoilScene {
-        disks,
+        grains: disks,
         walls: vec![Wall::floor(0.0), Wall::left(0.0), Wall::right(2.4494)],
         ground: None,
         machine: None,
@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             axle: Vector2::new(x, 0.0),
         };
         let rover = TwoWheelRover::new(130.0, 130.0 * 0.64 / 12.0, wheel(-0.4), wheel(0.4))?;
-        scene.machine = Some(Arc::new(rover));
+        scene.machine = Some(on_soil(rover));
         q.extend([0.7, 0.32, 0.0, 0.0, 0.0]);
     }
     let sleep = drives.then(SleepOptions::default);

@@ -10,7 +10,7 @@
 //!
 //! Chapters, each using only those above it:
 //!
-//! - [`spatial`]: rotations and inertias;
+//! - [`quantity`]: which numbers a description may have; [`spatial`]: rotations and inertias;
 //! - [`multibody`]: model, state, kinematics, mass matrix, bias, energy, momentum;
 //! - [`geometry`]: the ground; [`contact`]: points, frames, gaps, Delassus operator;
 //! - [`cone`], [`law`], [`problem`], [`solver`]: the friction-contact problem, which sees only (W, q, μ);
@@ -29,6 +29,7 @@ pub mod law;
 pub mod multibody;
 pub mod planar;
 pub mod problem;
+pub mod quantity;
 pub mod simulation;
 pub mod solver;
 pub mod spatial;

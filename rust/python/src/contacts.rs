@@ -4,9 +4,9 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use rover_core::contact::{Contact, Part};
 use rover_core::multibody::Model;
-use rover_core::planar::soil::SoilContact;
 use rover_core::simulation::{ActiveContact, Components, LocatedContact};
 use rover_core::system::PlanarContact;
+use rover_core::system::soil::SoilContact;
 
 use crate::arrays::fresh_blocks;
 

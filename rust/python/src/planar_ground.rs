@@ -6,6 +6,7 @@ use rover_core::planar::{
     Ground, Line as CoreLine, PlanarError, Polyline as CorePolyline, Sine as CoreSine,
     Spline as CoreSpline,
 };
+use rover_core::quantity::QuantityError;
 use std::sync::Arc;
 
 use crate::arguments::{Given, number, shown};
@@ -15,11 +16,8 @@ use crate::errors::{BorderError, Kind, Value};
 /// A planar error on its way to Python, as a terrain's or a machine's.
 pub fn border(kind: Kind, e: &PlanarError) -> BorderError {
     let value = match e {
-        PlanarError::NotFinite { value, .. }
-        | PlanarError::NotPositive { value, .. }
-        | PlanarError::Negative { value, .. }
-        | PlanarError::OutOfRange { value, .. }
-        | PlanarError::WheelsOverlap { value, .. }
+        PlanarError::Number(number) => Value::Number(number.value()),
+        PlanarError::WheelsOverlap { value, .. }
         | PlanarError::NotAFunction { value, .. }
         | PlanarError::RepeatedPoint { value, .. } => Value::Number(*value),
         PlanarError::TooFewPoints { count, .. }
@@ -34,6 +32,16 @@ pub fn border(kind: Kind, e: &PlanarError) -> BorderError {
         message: e.to_string(),
         field: Some(e.field()),
         value,
+    }
+}
+
+/// A number that cannot be, on its way to Python.
+pub fn quantity(kind: Kind, e: &QuantityError) -> BorderError {
+    BorderError {
+        kind,
+        message: e.to_string(),
+        field: Some(e.field().to_owned()),
+        value: Value::Number(e.value()),
     }
 }
 

@@ -3,13 +3,14 @@
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use rover_core::geometry::Support;
 use rover_core::integrator::Stabilisation;
 use rover_core::nalgebra::Vector2;
-use rover_core::planar::Ground;
-use rover_core::planar::soil::{
-    Disks, Machine, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, Wall, WheelRig,
-};
+use rover_core::planar::{Ground, WheelRig};
 use rover_core::simulation::{SoilSetupError, SoilSimulation as Core, soil_options};
+use rover_core::system::soil::{
+    Disks, Machine, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, Wall, on_soil,
+};
 use std::sync::{Arc, MutexGuard};
 
 use crate::arguments::{Given, flags, text};
@@ -18,7 +19,7 @@ use crate::contacts::SoilContacts;
 use crate::errors::{BorderError, Kind, Value};
 use crate::options::{STABILISATIONS, choice, name_of};
 use crate::planar::pair;
-use crate::planar_ground::{border, parse};
+use crate::planar_ground::{border, parse, quantity};
 use crate::planar_machines::two_wheel_rover;
 use crate::report::{Energy, StepReport};
 use crate::shared::Shared;
@@ -41,7 +42,7 @@ fn soil_error(e: &SoilError) -> BorderError {
         _ => Kind::Model,
     };
     let value = match e {
-        SoilError::Number(number) => return border(kind, number),
+        SoilError::Number(number) => return quantity(kind, number),
         SoilError::Length { count, .. } | SoilError::TooMany { count, .. } => Value::Count(*count),
         SoilError::Overlap { value, .. }
         | SoilError::InWall { value, .. }
@@ -147,7 +148,7 @@ impl SoilSimulation {
 }
 
 fn n_disks(inner: &Core) -> usize {
-    inner.soil().disks.len()
+    inner.soil().grains.len()
 }
 
 /// Positions with an angle where none was given.
@@ -270,17 +271,17 @@ impl SoilSimulation {
         if let Some(walls) = walls {
             for row in rows(walls, Kind::Terrain, "walls", 4)?.chunks_exact(4) {
                 let wall = Wall::new(Vector2::new(row[0], row[1]), Vector2::new(row[2], row[3]));
-                lines.push(wall.map_err(|e| border(Kind::Terrain, &e))?);
+                lines.push(wall.map_err(|e| quantity(Kind::Terrain, &e))?);
             }
         }
         let ground: Option<Arc<dyn Ground>> = ground.map(parse).transpose()?;
         let rover = rover.object::<Bound<'_, PyDict>>(Kind::Model, "rover", "a dict")?;
         let who: Option<Arc<Machine>> = match (&rover, rig) {
-            (Some(given), None) => Some(Arc::new(two_wheel_rover(&given.copy()?)?)),
+            (Some(given), None) => Some(on_soil(two_wheel_rover(&given.copy()?)?)),
             (None, Some(given)) => {
                 let given = pair(given, Kind::Model, "rig")?;
                 let rig = WheelRig::new(given.x, given.y);
-                Some(Arc::new(rig.map_err(|e| border(Kind::Model, &e))?))
+                Some(on_soil(rig.map_err(|e| border(Kind::Model, &e))?))
             }
             (None, None) => None,
             _ => {
@@ -292,12 +293,12 @@ impl SoilSimulation {
             q.extend(vector(machine, Kind::State, "machine")?);
         }
         let scene = SoilScene {
-            disks,
+            grains: disks,
             walls: lines,
-            ground,
+            ground: ground.map(|ground| ground as Arc<dyn Support<2>>),
             machine: who,
             friction: SoilFriction {
-                disks: friction.number(0.5, option, "friction")?,
+                grains: friction.number(0.5, option, "friction")?,
                 walls: wall_friction.number(0.5, option, "wall_friction")?,
                 wheels: wheel_friction.number(0.9, option, "wheel_friction")?,
             },
@@ -333,13 +334,13 @@ impl SoilSimulation {
     /// Radii of the disks, (n,), m.
     #[getter]
     fn radius<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, self.open()?.soil().disks.radius()))
+        Ok(fresh(py, self.open()?.soil().grains.radius()))
     }
 
     /// Masses of the disks, (n,), kg.
     #[getter]
     fn mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(fresh(py, self.open()?.soil().disks.mass()))
+        Ok(fresh(py, self.open()?.soil().grains.mass()))
     }
 
     /// Centres and angles of the disks, (n, 3), m and rad.
@@ -361,7 +362,7 @@ impl SoilSimulation {
     fn kinematic<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<bool>>> {
         Ok(PyArray1::from_slice(
             py,
-            self.open()?.soil().disks.kinematic(),
+            self.open()?.soil().grains.kinematic(),
         ))
     }
 
@@ -392,13 +393,12 @@ impl SoilSimulation {
         let Some(machine) = &inner.soil().machine else {
             return fresh_rows::<3>(py, &[]);
         };
-        let own = &inner.q()[3 * n_disks(&inner)..];
-        let pose = rover_core::nalgebra::SVector::<f64, 5>::from_column_slice(own);
+        let own = inner.soil().machine_coordinates(inner.q());
         let row = |k| {
-            let disc = machine.disc(k, &pose);
-            [disc.centre.x, disc.centre.y, disc.radius]
+            let wheel = machine.wheel(k, own);
+            [wheel.centre.x, wheel.centre.y, wheel.radius]
         };
-        fresh_rows(py, &(0..machine.n_discs()).map(row).collect::<Vec<_>>())
+        fresh_rows(py, &(0..machine.n_wheels()).map(row).collect::<Vec<_>>())
     }
 
     /// Commanded torques of the rover's wheels, (2,), N m, positive forward; empty without a rover.
@@ -421,7 +421,7 @@ impl SoilSimulation {
         let inner = self.open()?;
         let (o, friction) = (inner.options(), &inner.soil().friction);
         let settings = PyDict::new(py);
-        settings.set_item("friction", friction.disks)?;
+        settings.set_item("friction", friction.grains)?;
         settings.set_item("wall_friction", friction.walls)?;
         settings.set_item("wheel_friction", friction.wheels)?;
         settings.set_item("restitution", o.restitution)?;
@@ -537,7 +537,7 @@ impl SoilSimulation {
     #[getter]
     fn contacts(&self) -> PyResult<SoilContacts> {
         let inner = self.open()?;
-        let wheels = inner.soil().machine.as_ref().map_or(0, |m| m.n_discs());
+        let wheels = inner.soil().machine.as_ref().map_or(0, |m| m.n_wheels());
         Ok(SoilContacts::new(
             inner.contacts(),
             n_disks(&inner) + wheels,
@@ -646,9 +646,11 @@ pub fn soil_packing<'py>(
         radius_min: radius_min.number(0.016, kind, "radius_min")?,
         radius_max: radius_max.number(0.0165, kind, "radius_max")?,
         mass: mass.number(0.7, kind, "mass")?,
-        left: left.number(0.0, kind, "left")?,
-        width: width.number(2.4494, kind, "width")?,
-        bottom: bottom.number(0.0, kind, "bottom")?,
+        corner: [
+            left.number(0.0, kind, "left")?,
+            bottom.number(0.0, kind, "bottom")?,
+        ],
+        sides: [width.number(2.4494, kind, "width")?, f64::INFINITY],
         seed: seed.whole(0, kind, "seed")?,
     };
     let built = py.detach(|| packing.build());

@@ -121,5 +121,5 @@ snapshot_class! {
 
 snapshot_class! {
     /// Everything that a soil needs to continue bit for bit. Picklable.
-    SoilSnapshot, SnapshotOf<GrainBed>
+    SoilSnapshot, SnapshotOf<GrainBed<2>>
 }

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use rover_core::integrator::{Stabilisation, StepOptions};
 use rover_core::nalgebra::{Vector2, Vector3};
-use rover_core::planar::soil::{
-    Disks, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, Wall,
-};
 use rover_core::planar::{Line, PlanarWheel, TwoWheelRover};
 use rover_core::simulation::{SoilSetupError, SoilSimulation, soil_options};
 use rover_core::solver::Method;
+use rover_core::system::soil::{
+    Disks, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, Wall, on_soil,
+};
 
 fn box_of(width: f64) -> Vec<Wall> {
     vec![Wall::floor(0.0), Wall::left(0.0), Wall::right(width)]
@@ -18,7 +18,7 @@ fn box_of(width: f64) -> Vec<Wall> {
 fn packing(count: usize, columns: usize, seed: u64) -> Packing {
     Packing {
         count,
-        width: 0.0335 * columns as f64,
+        sides: [0.0335 * columns as f64, f64::INFINITY],
         radius_min: 0.013,
         seed,
         ..Packing::default()
@@ -33,8 +33,8 @@ fn soil(
     let (disks, q) = packing.build().expect("a packing");
     let mut options = soil_options(&disks);
     let mut scene = SoilScene {
-        disks,
-        walls: box_of(packing.width),
+        grains: disks,
+        walls: box_of(packing.sides[0]),
         ground: None,
         machine: None,
         friction: SoilFriction::default(),
@@ -46,7 +46,7 @@ fn soil(
 /// Velocities drawn from a recurrence, in [−speed, speed].
 fn shake(soil: &mut SoilSimulation, speed: f64) {
     let mut x = 0.37_f64;
-    let n = 3 * soil.soil().disks.len();
+    let n = 3 * soil.soil().grains.len();
     let v: Vec<f64> = (0..n)
         .map(|k| {
             x = 3.99 * x * (1.0 - x);
@@ -70,7 +70,9 @@ fn equal_seeds_give_equal_packings_and_none_overlaps() {
                 let apart = (q[3 * i] - q[3 * j]).hypot(q[3 * i + 1] - q[3 * j + 1]);
                 assert!(apart >= r[i] + r[j], "{i} {j}");
             }
-            assert!(q[3 * i] >= r[i] && q[3 * i] + r[i] <= packing.width && q[3 * i + 1] >= r[i]);
+            assert!(
+                q[3 * i] >= r[i] && q[3 * i] + r[i] <= packing.sides[0] && q[3 * i + 1] >= r[i]
+            );
         }
     }
 }
@@ -147,7 +149,7 @@ fn disks_that_are_shaken_and_fall_stay_out_of_one_another() {
     shake(&mut soil, 0.5);
     for step in 0..300 {
         soil.step(1).expect("finite");
-        let share = soil.penetration() / soil.soil().disks.smallest();
+        let share = soil.penetration() / soil.soil().grains.smallest();
         assert!(share < 0.01, "step {step}: {share}");
     }
 }
@@ -164,7 +166,7 @@ fn energy_never_grows_with_restitution_without_friction() {
                 .walls
                 .push(Wall::new(Vector2::new(0.0, 0.6), -Vector2::y()).expect("a wall"));
             scene.friction = SoilFriction {
-                disks: 0.0,
+                grains: 0.0,
                 walls: 0.0,
                 wheels: 0.0,
             };
@@ -191,7 +193,7 @@ fn a_disk_falls_and_rests_within_a_rounding_of_the_floor() {
     let disks = Disks::new(vec![0.02], vec![0.5]).expect("a disk");
     let options = soil_options(&disks);
     let scene = SoilScene {
-        disks,
+        grains: disks,
         walls: vec![],
         ground: Some(Arc::new(Line::new(0.0, 0.1).expect("a line"))),
         machine: None,
@@ -215,7 +217,7 @@ fn a_disk_on_a_slope_rolls_below_and_slides_above_three_times_the_friction() {
         let options = soil_options(&disks);
         let alpha = slope.atan();
         let scene = SoilScene {
-            disks,
+            grains: disks,
             walls: vec![],
             ground: Some(Arc::new(Line::new(-slope, 0.0).expect("a line"))),
             machine: None,
@@ -244,11 +246,11 @@ fn a_disk_on_a_slope_rolls_below_and_slides_above_three_times_the_friction() {
 fn the_floor_carries_the_weight() {
     let mut soil = soil(&packing(200, 12, 4), |_, _| {});
     soil.step(800).expect("finite");
-    let weight: f64 = 9.81 * soil.soil().disks.mass().iter().sum::<f64>();
+    let weight: f64 = 9.81 * soil.soil().grains.mass().iter().sum::<f64>();
     let force: f64 = soil
         .contacts()
         .iter()
-        .filter(|c| !c.contact.is_with_disk())
+        .filter(|c| !c.contact.is_with_grain())
         .map(|c| (c.contact.n * c.impulse[0] + c.contact.t() * c.impulse[1]).y * 1e3)
         .sum();
     assert!((force - weight).abs() < 2e-3 * weight, "{force} {weight}");
@@ -284,15 +286,15 @@ fn dropped(sleep: Option<SleepOptions>) -> (SoilSimulation, usize) {
     let mut bed = soil(&packing, |options, _| options.solver.tolerance = 1e-6);
     bed.step(700).expect("finite");
     let (mut radius, mut mass) = (
-        bed.soil().disks.radius().to_vec(),
-        bed.soil().disks.mass().to_vec(),
+        bed.soil().grains.radius().to_vec(),
+        bed.soil().grains.mass().to_vec(),
     );
     radius.push(0.03);
     mass.push(3.0);
     let mut q = bed.q().clone();
     q.extend([0.2, 0.6, 0.0]);
     let scene = SoilScene {
-        disks: Disks::new(radius, mass).expect("disks"),
+        grains: Disks::new(radius, mass).expect("disks"),
         ..(**bed.soil()).clone()
     };
     let options = bed.options().clone();
@@ -384,7 +386,7 @@ fn what_is_left_after_a_removal_keeps_its_load_and_old_snapshots_do_not_fit() {
             .map(|i| [soil.q()[3 * i], soil.q()[3 * i + 1]])
             .collect();
         soil.remove(&marked).expect("others are left");
-        assert_eq!(soil.soil().disks.len(), 119);
+        assert_eq!(soil.soil().grains.len(), 119);
         assert!(soil.restore(&snapshot).is_err(), "of another soil");
         soil.step(20).expect("finite");
         for before in lowest {
@@ -393,7 +395,7 @@ fn what_is_left_after_a_removal_keeps_its_load_and_old_snapshots_do_not_fit() {
             assert!(nearest.fold(f64::MAX, f64::min) < 1e-4, "it stays");
         }
         assert!(soil.remove(&[true; 119]).is_err(), "one must be left");
-        assert_eq!(soil.soil().disks.len(), 119);
+        assert_eq!(soil.soil().grains.len(), 119);
     }
 }
 
@@ -412,8 +414,8 @@ fn the_rover_drives_over_the_original_soil() {
     let (disks, q) = Packing::default().build().expect("a packing");
     let options = soil_options(&disks);
     let scene = SoilScene {
-        disks,
-        walls: box_of(Packing::default().width),
+        grains: disks,
+        walls: box_of(Packing::default().sides[0]),
         ground: None,
         machine: None,
         friction: SoilFriction::default(),
@@ -423,7 +425,7 @@ fn the_rover_drives_over_the_original_soil() {
     let mut q = bed.q().clone();
     q.extend([0.7, 0.31, 0.0, 0.0, 0.0]);
     let scene = SoilScene {
-        machine: Some(Arc::new(rover())),
+        machine: Some(on_soil(rover())),
         ..(**bed.soil()).clone()
     };
     let mut soil = SoilSimulation::new(Arc::new(scene), options, None, q).expect("a soil");
@@ -439,7 +441,7 @@ fn the_rover_drives_over_the_original_soil() {
         "{weight} N"
     );
     soil.set_inputs(&[50.0, 50.0]).expect("torques");
-    let n = 3 * soil.soil().disks.len();
+    let n = 3 * soil.soil().grains.len();
     let from = soil.q()[n];
     let snapshot = soil.snapshot();
     soil.step(500).expect("finite");
@@ -474,14 +476,14 @@ fn what_cannot_be_is_refused() {
         "mass"
     );
     let scene = Arc::new(SoilScene {
-        disks: made(&[0.1, 0.1], &[1.0, 1.0]).expect("disks"),
+        grains: made(&[0.1, 0.1], &[1.0, 1.0]).expect("disks"),
         walls: vec![Wall::floor(0.0)],
         ground: None,
         machine: None,
         friction: SoilFriction::default(),
     });
     let build = |q: &[f64]| {
-        SoilSimulation::new(scene.clone(), soil_options(&scene.disks), None, q.to_vec())
+        SoilSimulation::new(scene.clone(), soil_options(&scene.grains), None, q.to_vec())
     };
     for (q, field) in [
         ([0.0, 0.1, 0.0, 0.15, 0.1, 0.0], "position[1]"),

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{SMatrix, SVector, Vector2};
+use rover_core::geometry::Support;
 use rover_core::integrator::StepOptions;
 use rover_core::planar::{
     ContactRule, Ground, Line, PlanarMachine, PlanarWheel, Polyline, Sine, TwoWheelRover,

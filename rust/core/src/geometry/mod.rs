@@ -1,4 +1,5 @@
-//! The ground: primitives, and terrains that say which of them a thing can touch.
+//! The ground: primitives, and terrains that say which of them a thing can touch; [`support`]: a ground of any shape, as a round body in the
+//! plane or in space meets it.
 
 pub mod ball_tree;
 pub mod error;
@@ -6,6 +7,7 @@ pub mod plane;
 pub mod rocks;
 pub mod sphere;
 pub mod sphere_field;
+pub mod support;
 pub mod terrain;
 
 pub use error::TerrainError;
@@ -13,4 +15,5 @@ pub use plane::Plane;
 pub use rocks::{Clearing, Rocks};
 pub use sphere::Sphere;
 pub use sphere_field::SphereField;
+pub use support::{Facing, Support};
 pub use terrain::{Primitive, Terrain};

@@ -9,8 +9,9 @@
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
-use super::error::{INERTIAS, LENGTHS, MASSES, PlanarError, within};
+use super::error::PlanarError;
 use super::machine::{Disc, PlanarMachine, fingerprint};
+use crate::quantity::{INERTIAS, LENGTHS, MASSES, within};
 
 /// A disc.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -13,8 +13,10 @@ use std::sync::Arc;
 
 use nalgebra::Vector2;
 
-use super::error::{PLACES, PlanarError, Range, finite, within};
+use super::error::PlanarError;
 use super::ground::{Facing, Ground, MAX_FACING};
+use crate::geometry::Support;
+use crate::quantity::{PLACES, QuantityError, Range, finite, within};
 
 /// Slopes, m/m.
 const SLOPES: Range = Range {
@@ -87,6 +89,13 @@ impl Ground for Line {
         self.slope * x + self.offset
     }
 
+    fn below(&self, centre: &Vector2<f64>) -> Facing {
+        let y = self.height(centre.x);
+        tangent_facing(centre, y, self.slope)
+    }
+}
+
+impl Support<2> for Line {
     fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
         let facing = self.below(centre);
         if facing.distance <= reach {
@@ -95,11 +104,6 @@ impl Ground for Line {
                 ..facing
             });
         }
-    }
-
-    fn below(&self, centre: &Vector2<f64>) -> Facing {
-        let y = self.height(centre.x);
-        tangent_facing(centre, y, self.slope)
     }
 }
 
@@ -137,11 +141,12 @@ impl Sine {
         let steepest = SLOPES.ends[1] / k;
         within(|| "amplitude".to_owned(), amplitude, PLACES)?;
         if amplitude.abs() > steepest {
-            return Err(PlanarError::OutOfRange {
+            return Err(QuantityError::OutOfRange {
                 field: "amplitude".to_owned(),
                 range: "at most 1000/2π of the wavelength either way",
                 value: amplitude,
-            });
+            }
+            .into());
         }
         Ok(Self {
             amplitude,
@@ -335,12 +340,16 @@ impl Ground for Sine {
     fn height(&self, x: f64) -> f64 {
         self.jet(x)[0]
     }
-    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
-        facing(self, centre, reach, out);
-    }
+
     fn below(&self, centre: &Vector2<f64>) -> Facing {
         let [y, slope, ..] = self.jet(centre.x);
         tangent_facing(centre, y, slope)
+    }
+}
+
+impl Support<2> for Sine {
+    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
+        facing(self, centre, reach, out);
     }
 }
 
@@ -348,12 +357,16 @@ impl Ground for Spline {
     fn height(&self, x: f64) -> f64 {
         self.jet(x)[0]
     }
-    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
-        facing(self, centre, reach, out);
-    }
+
     fn below(&self, centre: &Vector2<f64>) -> Facing {
         let [y, slope, ..] = self.jet(centre.x);
         tangent_facing(centre, y, slope)
+    }
+}
+
+impl Support<2> for Spline {
+    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
+        facing(self, centre, reach, out);
     }
 }
 
@@ -362,11 +375,15 @@ impl Ground for Arc<dyn Ground> {
     fn height(&self, x: f64) -> f64 {
         (**self).height(x)
     }
-    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
-        (**self).facing(centre, reach, out);
-    }
+
     fn below(&self, centre: &Vector2<f64>) -> Facing {
         (**self).below(centre)
+    }
+}
+
+impl Support<2> for Arc<dyn Ground> {
+    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
+        (**self).facing(centre, reach, out);
     }
 }
 

@@ -4,20 +4,12 @@
 //! neighbours: one on a line, two in a valley that is narrower than the disc, a corner of a step. Seen from a centre inside the ground
 //! only the nearest point of all counts, and pushes out.
 
-use std::fmt::Debug;
-
 use nalgebra::Vector2;
 
+use crate::geometry::Support;
+
 /// A point of the ground that faces a disc's centre.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Facing {
-    /// The point, m.
-    pub foot: Vector2<f64>,
-    /// Unit normal, out of the ground.
-    pub n: Vector2<f64>,
-    /// Signed distance of the centre from the ground along n, m; negative inside.
-    pub distance: f64,
-}
+pub type Facing = crate::geometry::Facing<2>;
 
 /// Most points of the ground that face one disc: the nearest of more.
 pub const MAX_FACING: usize = 64;
@@ -47,15 +39,12 @@ pub(super) fn keep_few(out: &mut Vec<Facing>, begin: usize) {
 }
 
 /// What planar machines stand on. Immutable, shared between threads.
-pub trait Ground: Debug + Send + Sync {
+///
+/// The points that face a centre are those whose distance is smallest among their neighbours, in the order of x, the [`MAX_FACING`] nearest of
+/// more; from inside the ground the nearest of all, at any depth.
+pub trait Ground: Support<2> {
     /// Height of the ground at x, m; the upper one at a vertical face.
     fn height(&self, x: f64) -> f64;
-
-    /// Appends the points that face `centre` at a distance of at most `reach` (m), in the order of x.
-    ///
-    /// Those whose distance is smallest among their neighbours, the [`MAX_FACING`] nearest of more; from inside the ground the nearest of
-    /// all, at any depth.
-    fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>);
 
     /// The report's own rule: the point straight below the centre counts as nearest; its normal is the curve's there.
     ///

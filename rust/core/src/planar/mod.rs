@@ -3,7 +3,7 @@
 //! - [`ground`], [`curve`], [`polyline`]: what lies below a curve, and where a disc touches it;
 //! - [`machine`]: what a machine with few coordinates says of itself;
 //! - [`ball`], [`two_wheel_rover`]: two of them; [`mirrored_rover`]: the six-wheel rover driven straight;
-//! - [`soil`]: thousands of free disks, and a machine that drives over them;
+//! - [`rig`]: one wheel at a given slip, for the drawbar pull on a [soil](crate::system::soil).
 //!
 //! Nothing of time stepping, contact law or solver is here: [`crate::system::planar`] makes a mechanical system of a machine on a ground, and
 //! [`crate::simulation`] steps it as it steps the rover.
@@ -16,7 +16,7 @@ pub mod ground;
 pub mod machine;
 pub mod mirrored_rover;
 pub mod polyline;
-pub mod soil;
+pub mod rig;
 pub mod two_wheel_rover;
 
 pub use ball::Ball;
@@ -26,4 +26,5 @@ pub use ground::{ContactRule, Facing, Ground, MAX_FACING};
 pub use machine::{Disc, PlanarMachine, PlanarMotor};
 pub use mirrored_rover::MirroredRover;
 pub use polyline::Polyline;
+pub use rig::WheelRig;
 pub use two_wheel_rover::{PlanarWheel, TwoWheelRover};

@@ -3,8 +3,10 @@
 use nalgebra::Vector2;
 
 use super::curve::{check_points, keep_nearest};
-use super::error::{PLACES, PlanarError, within};
+use super::error::PlanarError;
 use super::ground::{Facing, Ground, keep_few, keep_if};
+use crate::geometry::Support;
+use crate::quantity::{PLACES, QuantityError, within};
 
 /// Straight pieces between points, continued beyond the ends with the slope of the last pieces (level where those are vertical).
 ///
@@ -49,10 +51,11 @@ impl Polyline {
         within(|| "x".to_owned(), x, PLACES)?;
         within(|| "height".to_owned(), height, PLACES)?;
         if height.abs() <= 0.0 {
-            return Err(PlanarError::NotPositive {
+            return Err(QuantityError::NotPositive {
                 field: "height".to_owned(),
                 value: height,
-            });
+            }
+            .into());
         }
         Self::new(&[x - 1.0, x, x, x + 1.0], &[0.0, 0.0, height, height])
     }
@@ -172,6 +175,20 @@ impl Ground for Polyline {
         y
     }
 
+    fn below(&self, centre: &Vector2<f64>) -> Facing {
+        let i = self.points.partition_point(|p| p.x <= centre.x);
+        let t = self.direction(i);
+        let n = Vector2::new(-t.y, t.x);
+        let y = self.height(centre.x);
+        Facing {
+            foot: Vector2::new(centre.x, y),
+            n,
+            distance: (centre.y - y) * n.y,
+        }
+    }
+}
+
+impl Support<2> for Polyline {
     fn facing(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
         let begin = out.len();
         let depth = (self.height(centre.x) - centre.y).max(0.0);
@@ -189,18 +206,6 @@ impl Ground for Polyline {
         } else {
             keep_if(out, begin, |f| (0.0..=reach).contains(&f.distance));
             keep_few(out, begin);
-        }
-    }
-
-    fn below(&self, centre: &Vector2<f64>) -> Facing {
-        let i = self.points.partition_point(|p| p.x <= centre.x);
-        let t = self.direction(i);
-        let n = Vector2::new(-t.y, t.x);
-        let y = self.height(centre.x);
-        Facing {
-            foot: Vector2::new(centre.x, y),
-            n,
-            distance: (centre.y - y) * n.y,
         }
     }
 }

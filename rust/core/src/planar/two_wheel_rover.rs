@@ -21,8 +21,9 @@
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
-use super::error::{INERTIAS, LENGTHS, MASSES, PLACES, PlanarError, within};
+use super::error::PlanarError;
 use super::machine::{Disc, PlanarMachine, fingerprint};
+use crate::quantity::{INERTIAS, LENGTHS, MASSES, PLACES, within};
 
 /// A wheel and where its axle sits.
 #[derive(Clone, Copy, Debug, PartialEq)]

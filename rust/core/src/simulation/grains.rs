@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{SVector, Vector2};
+use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use super::active_contact::LocatedContact;
@@ -12,27 +12,29 @@ use super::state::State;
 use super::stepping::Simulation;
 use crate::integrator::{OptionsError, Scratch, Stabilisation, StepOptions};
 use crate::multibody::Energy;
-use crate::planar::error::finite;
-use crate::planar::soil::contact::WALL;
-use crate::planar::soil::grid::Grid;
-use crate::planar::soil::removal::Renumbering;
-use crate::planar::soil::sleep::{self, Sleep, SleepOptions};
-use crate::planar::soil::{Disks, SoilContact, SoilError, SoilParts, SoilScene, SoilSystem};
-use crate::solver::SolverOptions;
+use crate::problem::BodyPairs;
+use crate::quantity::finite;
+use crate::solver::{SolverOptions, Swept};
+use crate::spatial::space::body_velocities;
+use crate::system::grains::contact::WALL;
+use crate::system::grains::{
+    self, COORDINATES, GrainContact, GrainError, GrainParts, GrainScene, GrainSystem, Grains,
+    Renumbering, Sleep, SleepOptions,
+};
 
-/// Options that suit a soil of these disks.
+/// Options that suit a bed of these grains.
 ///
 /// θ = 1 and γ = 1, which the contact's law needs; h = 1 ms; solver tolerance 1e-4 and at most 2000 sweeps. Penetration is
-/// not projected away, which lifts what lies above and adds energy: circles that come together by their gap along the normal do
+/// not projected away, which lifts what lies above and adds energy: circles and spheres that come together by their gap along the normal do
 /// not overlap, so nothing but the solver's tolerance is left to project. Asked for, projection begins at 0.5% of the smallest radius.
 #[must_use]
-pub fn soil_options(disks: &Disks) -> StepOptions {
+pub fn soil_options<const D: usize>(grains: &Grains<D>) -> StepOptions {
     StepOptions {
         theta: 1.0,
         forecast: 1.0,
         time_step: 1e-3,
         stabilisation: Stabilisation::None,
-        penetration_tolerance: 5e-3 * disks.smallest(),
+        penetration_tolerance: 5e-3 * grains.smallest(),
         solver: SolverOptions {
             tolerance: 1e-4,
             velocity_tolerance: 1e-3,
@@ -48,20 +50,20 @@ const MAX_STEPS: usize = 1 << 53;
 
 /// Grains, what they lie on, and when they sleep. The description is shared.
 #[derive(Clone, Debug)]
-pub struct GrainBed {
+pub struct GrainBed<const D: usize> {
     /// What there is.
-    pub soil: Arc<SoilScene>,
+    pub soil: Arc<GrainScene<D>>,
     /// When grains sleep; by None never.
     pub sleep: Option<SleepOptions>,
 }
 
 /// What a bed's machine is told.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BedCommand {
+pub struct BedCommand<const D: usize> {
     /// Torques, N m, positive forward.
     pub torques: Vec<f64>,
-    /// Force at the machine's first two coordinates, N: a drawbar.
-    pub pull: Vector2<f64>,
+    /// Force at the machine's first D coordinates, N: a drawbar.
+    pub pull: SVector<f64, D>,
 }
 
 /// What a bed remembers.
@@ -74,12 +76,15 @@ pub struct BedMemory {
 }
 
 /// A bed of grains, stepped through time.
-pub type SoilSimulation = Simulation<GrainBed>;
+pub type GrainSimulation<const D: usize> = Simulation<GrainBed<D>>;
 
-impl LocatedContact for SoilContact {
-    type Vector = [f64; 2];
+/// A bed of disks, stepped through time.
+pub type SoilSimulation = GrainSimulation<2>;
 
-    fn normal(&self) -> [f64; 2] {
+impl<const D: usize> LocatedContact for GrainContact<D> {
+    type Vector = [f64; D];
+
+    fn normal(&self) -> [f64; D] {
         self.n.into()
     }
 
@@ -91,54 +96,52 @@ impl LocatedContact for SoilContact {
     }
 }
 
-/// The machine's part of coordinates or rates.
-fn own(disks: &Disks, all: &[f64]) -> SVector<f64, 5> {
-    SVector::from_column_slice(&all[3 * disks.len()..])
-}
-
-impl Scene for GrainBed {
-    /// (x, y, θ) of each disk, then the machine's coordinates, m and rad.
+impl<const D: usize> Scene for GrainBed<D>
+where
+    BodyPairs<D>: Swept<D>,
+{
+    /// [`COORDINATES`] of each grain, then the machine's, m and rad.
     type Configuration = Vec<f64>;
-    type Contact = SoilContact;
-    type Command = BedCommand;
+    type Contact = GrainContact<D>;
+    type Command = BedCommand<D>;
     type Memory = BedMemory;
-    type Parts = SoilParts;
-    type System<'a> = SoilSystem<'a>;
+    type Parts = GrainParts<D>;
+    type System<'a> = GrainSystem<'a, D>;
 
     fn nv(&self) -> usize {
         self.soil.nv()
     }
 
-    fn command(&self) -> BedCommand {
+    fn command(&self) -> BedCommand<D> {
         let machine = self.soil.machine.as_ref();
         BedCommand {
             torques: vec![0.0; machine.map_or(0, |m| m.n_inputs())],
-            pull: Vector2::zeros(),
+            pull: SVector::zeros(),
         }
     }
 
     fn memory(&self) -> BedMemory {
         BedMemory {
             count: 0,
-            sleep: Sleep::new(self.soil.disks.kinematic()),
+            sleep: Sleep::new(self.soil.grains.kinematic()),
         }
     }
 
-    fn parts(&self) -> SoilParts {
-        SoilParts::default()
+    fn parts(&self) -> GrainParts<D> {
+        GrainParts::default()
     }
 
     fn contact_capacity(&self) -> usize {
-        3 * self.soil.disks.len()
+        3 * self.soil.grains.len()
     }
 
     fn system<'a>(
         &'a self,
-        command: &'a BedCommand,
+        command: &'a BedCommand<D>,
         memory: &'a BedMemory,
-        parts: &'a mut SoilParts,
-    ) -> SoilSystem<'a> {
-        SoilSystem {
+        parts: &'a mut GrainParts<D>,
+    ) -> GrainSystem<'a, D> {
+        GrainSystem {
             scene: &self.soil,
             asleep: memory.sleep.asleep(),
             inputs: &command.torques,
@@ -147,7 +150,7 @@ impl Scene for GrainBed {
         }
     }
 
-    fn position(&self, _parts: &SoilParts, contact: &SoilContact) -> [f64; 2] {
+    fn position(&self, _parts: &GrainParts<D>, contact: &GrainContact<D>) -> [f64; D] {
         contact.point.into()
     }
 
@@ -157,7 +160,7 @@ impl Scene for GrainBed {
         let Some(options) = &self.sleep else {
             return;
         };
-        let step = sleep::StepTaken {
+        let step = grains::StepTaken {
             scene: &self.soil,
             weight_impulse: taken.options.gravity.norm() * taken.options.time_step,
             q: &taken.state.configuration,
@@ -171,23 +174,10 @@ impl Scene for GrainBed {
 
     /// Without kinematic disks.
     fn energy(&self, options: &StepOptions, state: &State<Vec<f64>>) -> Energy {
-        let disks = &self.soil.disks;
-        let gravity = options.gravity.xy();
-        let mut energy = Energy::default();
-        let free = |(i, _): &(usize, &f64)| !disks.kinematic()[*i];
-        for (i, m) in disks.mass().iter().enumerate().filter(free) {
-            let q = &state.configuration[3 * i..3 * i + 3];
-            let v = &state.v[3 * i..3 * i + 3];
-            energy.kinetic += 0.5 * m * (v[0] * v[0] + v[1] * v[1]);
-            energy.kinetic += 0.5 * disks.inertia(i) * v[2] * v[2];
-            energy.potential -= m * (gravity.x * q[0] + gravity.y * q[1]);
-        }
-        if let Some(machine) = &self.soil.machine {
-            let (pose, rate) = (own(disks, &state.configuration), own(disks, &state.v));
-            energy.kinetic += 0.5 * rate.dot(&(machine.mass_matrix(&pose) * rate));
-            energy.potential += machine.potential(&pose, &gravity);
-        }
-        energy
+        let State {
+            configuration, v, ..
+        } = state;
+        self.soil.energy(configuration, v, &options.gravity)
     }
 
     fn fingerprint(&self) -> u64 {
@@ -195,36 +185,41 @@ impl Scene for GrainBed {
     }
 
     fn admits(&self, snapshot: &Snapshot<Self>) -> bool {
-        let SoilScene { disks, machine, .. } = &*self.soil;
+        let GrainScene {
+            grains, machine, ..
+        } = &*self.soil;
         let (torques, pull) = (&snapshot.command.torques, &snapshot.command.pull);
         let expected = machine
             .as_ref()
-            .map_or([0; 2], |m| [m.n_inputs(), m.n_discs()]);
+            .map_or([0; 2], |m| [m.n_inputs(), m.n_wheels()]);
         let mut numbers = snapshot
             .state
             .configuration
             .iter()
             .chain(torques)
             .chain(pull);
-        let n_bodies = disks.len() + expected[1];
+        let n_bodies = grains.len() + expected[1];
         let is_body = |body: u32| (body as usize) < n_bodies;
         let mut keys = snapshot.active.iter().map(|a| a.contact.key);
-        snapshot.state.configuration.len() == self.nv()
+        snapshot.state.configuration.len() == self.soil.nq()
             && torques.len() == expected[0]
             && snapshot.memory.count <= MAX_STEPS
-            && snapshot.memory.sleep.is_of(disks.kinematic())
+            && snapshot.memory.sleep.is_of(grains.kinematic())
             && numbers.all(|x| x.is_finite())
             && keys.all(|key| is_body(key.a) && (key.b >= WALL || is_body(key.b)))
     }
 }
 
-impl SoilSimulation {
-    /// At rest in the configuration `q` (nv): (x, y, θ) of each disk, then the machine's coordinates.
+impl<const D: usize> GrainSimulation<D>
+where
+    BodyPairs<D>: Swept<D>,
+{
+    /// At rest in the configuration `q` (nq): [`COORDINATES`] of each grain, then the machine's.
     ///
     /// # Errors
-    /// A description or configuration that cannot be: see [`SoilScene::check_configuration`].
+    /// A description or configuration that cannot be: see [`GrainScene::check_configuration`].
     pub fn new(
-        soil: Arc<SoilScene>,
+        soil: Arc<GrainScene<D>>,
         options: StepOptions,
         sleep: Option<SleepOptions>,
         q: Vec<f64>,
@@ -246,65 +241,59 @@ impl SoilSimulation {
 
     /// The description.
     #[must_use]
-    pub fn soil(&self) -> &Arc<SoilScene> {
+    pub fn soil(&self) -> &Arc<GrainScene<D>> {
         &self.scene.soil
     }
 
-    /// Which disks sleep (n); kinematic ones always do.
+    /// Which grains sleep (n); kinematic ones always do.
     #[must_use]
     pub fn asleep(&self) -> &[bool] {
         self.memory.sleep.asleep()
     }
 
-    /// Sets configuration and rates (nv), those that kinematic disks keep among them; time 0, all awake, warm start forgotten, torques kept.
+    /// Sets configuration (nq) and velocities (nv), those that kinematic grains keep among them; time 0, all awake, warm start forgotten, torques kept.
     ///
     /// # Errors
     /// As [`Self::new`]; nothing is changed then.
-    pub fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), SoilError> {
+    pub fn set_state(&mut self, q: &[f64], v: &[f64]) -> Result<(), GrainError> {
         self.soil().check_configuration(q)?;
-        if v.len() != q.len() {
-            return Err(SoilError::Length {
+        if v.len() != self.soil().nv() {
+            return Err(GrainError::Length {
                 field: "velocity",
-                expected: q.len(),
+                expected: self.soil().nv(),
                 count: v.len(),
             });
         }
-        let n = self.soil().disks.len();
-        for (k, value) in v.iter().enumerate() {
-            let field = if k < 3 * n {
-                format!("velocity[{}]", k / 3)
-            } else {
-                format!("machine_rate[{}]", k - 3 * n)
-            };
-            finite(&field, *value)?;
-        }
+        let width = body_velocities(D);
+        let soil = self.soil();
+        soil.check_finite("velocity", "machine_rate", v, width)?;
         self.place(q.to_vec(), v.to_vec());
         Ok(())
     }
 
-    /// Takes the disks that are marked (n) out of the bed; the others go on as they are, under new numbers in the same order.
+    /// Takes the grains that are marked (n) out of the bed; the others go on as they are, under new numbers in the same order.
     ///
     /// Snapshots of before belong to another bed.
     ///
     /// # Errors
     /// Another number of marks; none would be left. Nothing is changed then.
-    pub fn remove(&mut self, marked: &[bool]) -> Result<(), SoilError> {
-        let n = self.soil().disks.len();
+    pub fn remove(&mut self, marked: &[bool]) -> Result<(), GrainError> {
+        let n = self.soil().grains.len();
         if marked.len() != n {
-            return Err(SoilError::Length {
+            return Err(GrainError::Length {
                 field: "which",
                 expected: n,
                 count: marked.len(),
             });
         }
         let renumbering = Renumbering::without(marked);
-        let disks = self.soil().disks.without(&renumbering)?;
-        self.scene.soil = Arc::new(SoilScene {
-            disks,
+        let grains = self.soil().grains.without(&renumbering)?;
+        self.scene.soil = Arc::new(GrainScene {
+            grains,
             ..(**self.soil()).clone()
         });
-        self.state.configuration = renumbering.keep(&self.state.configuration, 3);
-        self.state.v = renumbering.keep(&self.state.v, 3);
+        self.state.configuration = renumbering.keep(&self.state.configuration, COORDINATES);
+        self.state.v = renumbering.keep(&self.state.v, body_velocities(D));
         self.memory.sleep = self.memory.sleep.without(&renumbering);
         self.warm_start.persistent.clear();
         let impulses = self.warm_start.impulses.iter();
@@ -312,7 +301,7 @@ impl SoilSimulation {
             .filter_map(|(key, p)| Some((renumbering.key(*key)?, *p)))
             .collect();
         let room = 3 * renumbering.left();
-        self.scratch = Scratch::new(&self.state.configuration, self.scene.nv(), room, 2);
+        self.scratch = Scratch::new(&self.state.configuration, self.scene.nv(), room, D);
         self.active.clear();
         Ok(())
     }
@@ -321,10 +310,10 @@ impl SoilSimulation {
     ///
     /// # Errors
     /// Wrong length or an entry that is not finite; nothing is changed then.
-    pub fn set_inputs(&mut self, inputs: &[f64]) -> Result<(), SoilError> {
+    pub fn set_inputs(&mut self, inputs: &[f64]) -> Result<(), GrainError> {
         let own = &mut self.command.torques;
         if inputs.len() != own.len() {
-            return Err(SoilError::Length {
+            return Err(GrainError::Length {
                 field: "torques",
                 expected: own.len(),
                 count: inputs.len(),
@@ -337,13 +326,13 @@ impl SoilSimulation {
         Ok(())
     }
 
-    /// Sets a force at the machine's first two coordinates, N: a drawbar.
+    /// Sets a force at the machine's first D coordinates, N: a drawbar.
     ///
     /// # Errors
     /// No machine, or an entry that is not finite; nothing is changed then.
-    pub fn set_pull(&mut self, pull: [f64; 2]) -> Result<(), SoilError> {
+    pub fn set_pull(&mut self, pull: [f64; D]) -> Result<(), GrainError> {
         if self.soil().machine.is_none() {
-            return Err(SoilError::NoMachine);
+            return Err(GrainError::NoMachine);
         }
         for (k, value) in pull.iter().enumerate() {
             finite(&format!("pull[{k}]"), *value)?;
@@ -352,80 +341,42 @@ impl SoilSimulation {
         Ok(())
     }
 
-    /// Momentum (x, y) of the disks that are not kinematic, kg m/s, and their moment of momentum about the origin, kg m²/s.
+    /// Impulse of the last step's contacts on the machine's wheels, N s.
     #[must_use]
-    pub fn momentum(&self) -> [f64; 3] {
-        let disks = &self.soil().disks;
-        let mut sum = [0.0; 3];
-        let free = |(i, _): &(usize, &f64)| !disks.kinematic()[*i];
-        for (i, m) in disks.mass().iter().enumerate().filter(free) {
-            let (q, v) = (&self.q()[3 * i..3 * i + 3], &self.v()[3 * i..3 * i + 3]);
-            sum[0] += m * v[0];
-            sum[1] += m * v[1];
-            sum[2] += m * (q[0] * v[1] - q[1] * v[0]) + disks.inertia(i) * v[2];
-        }
-        sum
-    }
-
-    /// Impulse (x, y) of the last step's contacts on the machine's wheels, N s.
-    #[must_use]
-    pub fn impulse_on_wheels(&self) -> [f64; 2] {
-        let n = self.soil().disks.len();
+    pub fn impulse_on_wheels(&self) -> [f64; D] {
+        let n = self.soil().grains.len();
         let wheels = self.active.iter().filter(|c| c.contact.key.a as usize >= n);
-        let mut sum = Vector2::zeros();
+        let mut sum = SVector::<f64, D>::zeros();
         for active in wheels {
-            let [p_N, p_T] = active.impulse;
-            sum += active.contact.n * p_N + active.contact.t() * p_T;
+            let frame = active.contact.frame();
+            let mut impulse = frame[0] * active.impulse[0];
+            for k in 1..D {
+                impulse += frame[k] * active.impulse[k];
+            }
+            sum += impulse;
         }
         sum.into()
     }
 
-    /// Deepest overlap now, m: 0 where nothing overlaps. Kinematic disks among themselves and in walls do not count.
+    /// Deepest overlap now, m: 0 where nothing overlaps. Kinematic grains among themselves and in walls do not count.
     #[must_use]
     pub fn penetration(&self) -> f64 {
-        let disks = &self.soil().disks;
-        let (n, radius, kinematic) = (disks.len(), disks.radius(), disks.kinematic());
-        let mut grid = Grid::default();
-        grid.fill(self.q(), radius, 2.0 * disks.largest());
-        let mut facing = Vec::new();
-        let mut least = 0.0_f64;
-        let mut meet = |i: usize, x: f64, y: f64, r: f64| {
-            let is_kinematic = i < n && kinematic[i];
-            grid.near(x, y, r + disks.largest(), |item| {
-                let other = item.index as usize;
-                if other != i && !(is_kinematic && kinematic[other]) {
-                    least = least.min((item.x - x).hypot(item.y - y) - r - item.radius);
-                }
-            });
-            if is_kinematic {
-                return;
-            }
-            for wall in &self.soil().walls {
-                least = least.min(wall.distance(x, y) - r);
-            }
-            if let Some(ground) = &self.soil().ground {
-                facing.clear();
-                ground.facing(&Vector2::new(x, y), r, &mut facing);
-                least = facing.iter().fold(least, |l, f| l.min(f.distance - r));
-            }
-        };
-        for (i, r) in radius.iter().enumerate() {
-            meet(i, self.q()[3 * i], self.q()[3 * i + 1], *r);
-        }
-        if let Some(machine) = &self.soil().machine {
-            let pose = own(disks, self.q());
-            for k in 0..machine.n_discs() {
-                let disc = machine.disc(k, &pose);
-                meet(n + k, disc.centre.x, disc.centre.y, disc.radius);
-            }
-        }
-        -least
+        self.soil().penetration(self.q())
     }
 
-    /// Wakes all disks.
+    /// Wakes all grains.
     pub fn wake(&mut self) {
-        let kinematic = self.scene.soil.disks.kinematic();
+        let kinematic = self.scene.soil.grains.kinematic();
         self.memory.sleep.wake_all(kinematic, &mut self.warm_start);
+    }
+}
+
+impl SoilSimulation {
+    /// Momentum (x, y) of the disks that are not kinematic, kg m/s, and their moment of momentum about the origin, kg m²/s.
+    #[must_use]
+    pub fn momentum(&self) -> [f64; 3] {
+        let (linear, moment) = self.soil().momentum(self.q(), self.v());
+        [linear.x, linear.y, moment.z]
     }
 }
 
@@ -437,5 +388,5 @@ pub enum SoilSetupError {
     Options(#[from] OptionsError),
     /// The scene or its configuration.
     #[error(transparent)]
-    Soil(#[from] SoilError),
+    Soil(#[from] GrainError),
 }

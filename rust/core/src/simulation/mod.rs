@@ -25,7 +25,9 @@ pub mod stepping;
 pub use active_contact::{ActiveContact, Components, LocatedContact};
 pub use batch::Batch;
 pub use error::{BatchError, CommandError, SnapshotError};
-pub use grains::{BedCommand, BedMemory, GrainBed, SoilSetupError, SoilSimulation, soil_options};
+pub use grains::{
+    BedCommand, BedMemory, GrainBed, GrainSimulation, SoilSetupError, SoilSimulation, soil_options,
+};
 pub use planar::{
     BallSimulation, MirroredRoverSimulation, PlanarScene, PlanarSimulation, TwoWheelRoverSimulation,
 };

@@ -205,9 +205,8 @@ impl RoverSimulation {
     /// # Panics
     /// If the sizes are another model's.
     pub fn set_state(&mut self, configuration: Configuration, v: Vec<f64>) {
-        assert_eq!(
-            configuration.joints.len(),
-            self.model().n_joints(),
+        assert!(
+            configuration.is_of(self.model()),
             "invariant: a configuration of this model"
         );
         self.place(configuration, v);

@@ -4,6 +4,7 @@ use super::options::{ContactLaw, Method, SolverOptions};
 use super::reference::relaxed;
 use super::report::{Outcome, Rung, Rungs, SolveReport, SolveStatus, Stage};
 use super::scratch::Scratch;
+use super::stage::body_sweeps::Swept;
 use super::stage::{admm, gauss_seidel, newton, proximal};
 use super::strategy::auto;
 use super::strategy::islands::IslandSolver;
@@ -11,7 +12,7 @@ use super::strategy::many_bodies::{self, ManyBodies};
 use super::work::{SweepBudget, Work};
 use super::workspace::SolverWorkspace;
 use crate::problem::{
-    Dimension, FrictionContactProblem, Operator, Prepared, evaluate_into, power_of_two,
+    BodyPairs, Dimension, FrictionContactProblem, Operator, Prepared, evaluate_into, power_of_two,
 };
 
 /// Solves `K_μ* ∋ ũ ⊥ p ∈ K_μ`, `u = W p + q`.
@@ -57,13 +58,16 @@ pub fn solve(
 ///
 /// # Panics
 /// If a length does not fit.
-pub fn solve_many_bodies(
-    bodies: &ManyBodies<'_>,
+pub fn solve_many_bodies<const D: usize>(
+    bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
     workspace: &mut SolverWorkspace,
-) -> SolveReport {
+) -> SolveReport
+where
+    BodyPairs<D>: Swept<D>,
+{
     let mut sweeps = std::mem::take(&mut workspace.body_sweeps);
     let mut solve_whole =
         |problem: &FrictionContactProblem<'_>,

@@ -35,6 +35,6 @@ pub use entry::{solve, solve_many_bodies};
 pub use local::one_contact::{OneContactSolution, solve_one_contact};
 pub use options::{ContactLaw, Method, SolverOptions};
 pub use report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
-pub use stage::body_sweeps::{BodySweeps, solve_body_pairs};
+pub use stage::body_sweeps::{BodySweeps, Swept, solve_body_pairs};
 pub use strategy::many_bodies::ManyBodies;
 pub use workspace::SolverWorkspace;

@@ -182,43 +182,76 @@ impl BlockSparseDelassus {
         contacts: &[PairContact<D, V>],
         inverse_masses: &[[f64; V]],
     ) {
-        assert!(D == 2 || D == 3, "a contact has two or three components");
-        self.clear(D);
-        self.list_contacts_of_bodies(contacts, inverse_masses.len());
-        for (i, contact) in contacts.iter().enumerate() {
-            // M⁻¹ Jᵀ of both sides, then a merge of the two bodies' lists of contacts.
-            let mut weighted = contact.jacobians;
-            let mut lists: [&[usize]; 2] = [&[], &[]];
-            for side in 0..2 {
-                let Some(body) = contact.bodies[side] else {
-                    continue;
-                };
-                for row in &mut weighted[side] {
-                    for (x, m) in row.iter_mut().zip(&inverse_masses[body]) {
-                        *x *= m;
+        let mut weighted = [[[0.0; V]; D]; 2];
+        let mut of = usize::MAX;
+        self.assemble_with::<D>(
+            contacts.len(),
+            inverse_masses.len(),
+            |i| contacts[i].bodies,
+            |block, (i, side), (j, at)| {
+                if of != i {
+                    // M⁻¹ Jᵀ of both sides.
+                    of = i;
+                    weighted = contacts[i].jacobians;
+                    for (rows, body) in weighted.iter_mut().zip(contacts[i].bodies) {
+                        let Some(body) = body else { continue };
+                        for row in rows {
+                            for (x, m) in row.iter_mut().zip(&inverse_masses[body]) {
+                                *x *= m;
+                            }
+                        }
                     }
                 }
-                lists[side] =
-                    &self.body_contacts[self.body_starts[body]..self.body_starts[body + 1]];
-            }
+                for (out, row) in block.iter_mut().zip(&weighted[side]) {
+                    for (x, column) in out.iter_mut().zip(&contacts[j].jacobians[at]) {
+                        *x += row.iter().zip(column).map(|(a, b)| a * b).sum::<f64>();
+                    }
+                }
+            },
+        );
+    }
+
+    /// Assembles `W` row by row from contacts between pairs of bodies of any number of velocities each.
+    ///
+    /// `bodies(i)`: the two bodies of contact i, below `n_bodies`, different ones; `None` is the fixed world. `add(block, (i, s), (j, t))` adds
+    /// `J_is M⁻¹ J_jtᵀ`, 1/kg, where side s of contact i is the same body as side t of contact j; i never decreases.
+    ///
+    /// # Panics
+    /// If `D` is not 2 or 3, a body is out of range, or both bodies of a contact are the same.
+    pub fn assemble_with<const D: usize>(
+        &mut self,
+        n_contacts: usize,
+        n_bodies: usize,
+        bodies: impl Fn(usize) -> [Option<usize>; 2],
+        mut add: impl FnMut(&mut [[f64; D]; D], (usize, usize), (usize, usize)),
+    ) {
+        assert!(D == 2 || D == 3, "a contact has two or three components");
+        self.clear(D);
+        self.list_contacts_of_bodies(n_contacts, n_bodies, &bodies);
+        for i in 0..n_contacts {
+            // A merge of the two bodies' lists of contacts.
+            let own = bodies(i);
+            let mut lists = own.map(|body| {
+                body.map_or(0..0, |body| {
+                    self.body_starts[body]..self.body_starts[body + 1]
+                })
+            });
             loop {
-                let j = match (lists[0].first(), lists[1].first()) {
-                    (Some(&a), Some(&b)) => a.min(b),
-                    (Some(&a), None) | (None, Some(&a)) => a,
-                    (None, None) => break,
+                let first = |list: &std::ops::Range<usize>| {
+                    (!list.is_empty()).then(|| self.body_contacts[list.start])
+                };
+                let next = [first(&lists[0]), first(&lists[1])];
+                let j = match next {
+                    [Some(a), Some(b)] => a.min(b),
+                    [Some(a), None] | [None, Some(a)] => a,
+                    [None, None] => break,
                 };
                 let mut block = [[0.0; D]; D];
                 for side in 0..2 {
-                    if lists[side].first() != Some(&j) {
-                        continue;
-                    }
-                    lists[side] = &lists[side][1..];
-                    let other = &contacts[j];
-                    let at = usize::from(other.bodies[1] == contact.bodies[side]);
-                    for (out, row) in block.iter_mut().zip(&weighted[side]) {
-                        for (x, column) in out.iter_mut().zip(&other.jacobians[at]) {
-                            *x += row.iter().zip(column).map(|(a, b)| a * b).sum::<f64>();
-                        }
+                    if next[side] == Some(j) {
+                        lists[side].start += 1;
+                        let at = usize::from(bodies(j)[1] == own[side]);
+                        add(&mut block, (i, side), (j, at));
                     }
                 }
                 if i == j {
@@ -237,19 +270,19 @@ impl BlockSparseDelassus {
         }
     }
 
-    fn list_contacts_of_bodies<const D: usize, const V: usize>(
+    fn list_contacts_of_bodies(
         &mut self,
-        contacts: &[PairContact<D, V>],
+        n_contacts: usize,
         n_bodies: usize,
+        bodies: impl Fn(usize) -> [Option<usize>; 2],
     ) {
         self.body_starts.resize(n_bodies + 1, 0);
-        let bodies = || contacts.iter().map(|c| c.bodies.iter().flatten());
-        for (contact, pair) in contacts.iter().zip(bodies()) {
+        for pair in (0..n_contacts).map(&bodies) {
             assert!(
-                contact.bodies[0] != contact.bodies[1] || contact.bodies[0].is_none(),
+                pair[0] != pair[1] || pair[0].is_none(),
                 "a contact joins two different bodies"
             );
-            for &body in pair {
+            for body in pair.into_iter().flatten() {
                 self.body_starts[body + 1] += 1;
             }
         }
@@ -257,8 +290,8 @@ impl BlockSparseDelassus {
             self.body_starts[body + 1] += self.body_starts[body];
         }
         self.body_contacts.resize(self.body_starts[n_bodies], 0);
-        for (i, pair) in bodies().enumerate() {
-            for &body in pair {
+        for (i, pair) in (0..n_contacts).map(&bodies).enumerate() {
+            for body in pair.into_iter().flatten() {
                 self.body_contacts[self.body_starts[body]] = i;
                 self.body_starts[body] += 1;
             }

@@ -1,85 +1,134 @@
 //! Contacts of many bodies that share nothing but their contacts: what each reads and changes, and no operator W at all.
 //!
 //! A contact touches two bodies, so with `u = Zᵀ y + q` and `y = Z p` in factor coordinates
-//! (see [`crate::integrator::mechanical_system`]) it reads six numbers and changes six numbers. A disc against a disc has a diagonal
-//! block of W. [`solve_body_pairs`](crate::solver::solve_body_pairs) solves them.
+//! (see [`crate::integrator::mechanical_system`]) it reads and changes three numbers of each in the plane, six in space. Two round bodies, disks for
+//! D = 2 and balls for D = 3, have a diagonal block of W. [`solve_body_pairs`](crate::solver::solve_body_pairs) solves them.
+//!
+//! With the arms `∓r n` from the centres to the point of contact, turning moves the rims along the tangents t, b (`n = b × t`) alone:
+//!
+//! ```text
+//! u_N = n · (v_a − v_b)
+//! u_t = t · (v_a − v_b) + b · (r_a ω_a + r_b ω_b)          in the plane b is the axis that points to the viewer
+//! u_b = b · (v_a − v_b) − t · (r_a ω_a + r_b ω_b)          in space only
+//! ```
 //!
 //! Source: Jean 1999; Moreau 1999 (contact by contact on the bodies' velocities).
 
-/// Coordinates of the one body that is no disc.
-pub const WIDE: usize = 5;
+use super::BlockSparseDelassus;
+use crate::spatial::space::{body_velocities, dot};
 
-/// A contact of two discs, or of a disc with what does not move.
+/// A contact of two round bodies, or of one with what does not move.
 ///
-/// `u = (n·(w_a − w_b), t·(w_a − w_b) + s_a y_a3 + s_b y_b3)` with `w = c (y_1, y_2)`, t = n × e_z.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct DiscPair {
-    /// Place of each body's three factor coordinates; any place, with c = s = 0, for one that does not move.
+/// In factor coordinates `v = c (y_1, …, y_D)` and `r ω = s (y_D+1, …)`, see the page above.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RoundPair<const D: usize> {
+    /// Place of each body's factor coordinates; any place, with c = s = 0, for one that does not move.
     pub bodies: [u32; 2],
-    /// Unit normal, from the second body into the first.
-    pub n: [f64; 2],
+    /// Unit normal, from the second body into the first, then the tangents.
+    pub frame: [[f64; D]; D],
     /// c: `1/√m` of each body, 0 for one that does not move.
     pub linear: [f64; 2],
     /// s: `r/√J` of each body, 0 for one that does not move.
     pub angular: [f64; 2],
 }
 
-/// A contact of the wide body with a disc, or with what does not move.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct WidePair {
-    /// Rows n and t of Zᵀ in the wide body's factor coordinates.
-    pub rows: [[f64; WIDE]; 2],
-    /// The disc as second body: its place, c, s and the normal from it into the wide body.
-    pub disc: DiscPair,
-}
-
-/// All contacts of a step: first the discs' pairs, then the wide body's.
+/// All contacts of a step: first those among round bodies, then those of the machine, a body of any number of coordinates.
+///
+/// A machine of several trees is one too: its coordinates are theirs, one after the other.
 #[derive(Clone, Debug, Default)]
-pub struct BodyPairs {
-    /// Contacts among discs.
-    pub discs: Vec<DiscPair>,
-    /// Contacts of the wide body.
-    pub wide: Vec<WidePair>,
-    /// Place of the wide body's coordinates.
-    pub wide_at: usize,
+pub struct BodyPairs<const D: usize> {
+    /// Contacts among round bodies.
+    pub round: Vec<RoundPair<D>>,
+    /// Contacts of the machine, with the round body, or what does not move, as second body.
+    pub machine: Vec<RoundPair<D>>,
+    /// Rows n, t, (b) of Zᵀ of the machine's contacts in its own factor coordinates, contact by contact (D rows of `width`).
+    pub rows: Vec<f64>,
+    /// Number of the machine's coordinates.
+    pub width: usize,
+    /// Place of the machine's coordinates.
+    pub machine_at: usize,
     /// Number of factor coordinates.
     pub n_coordinates: usize,
 }
 
-impl DiscPair {
+/// Velocity along tangent k (from 1) of a rim that turns with `rim` = r ω.
+#[inline]
+pub(crate) fn rim_velocity<const D: usize>(frame: &[[f64; D]; D], k: usize, rim: &[f64]) -> f64 {
+    if D == 2 {
+        return rim[0];
+    }
+    // The axis that moves the rim along one tangent is the other.
+    let axis = &frame[3 - k];
+    let along = axis[0] * rim[0] + axis[1] * rim[1] + axis[2] * rim[2];
+    if k == 1 { along } else { -along }
+}
+
+/// Component c of what the tangential impulses turn, divided by r: the transpose of [`rim_velocity`].
+#[inline]
+pub(crate) fn rim_impulse<const D: usize>(frame: &[[f64; D]; D], p: &[f64; D], c: usize) -> f64 {
+    if D == 2 {
+        return p[1];
+    }
+    frame[2][c] * p[1] - frame[1][c] * p[2]
+}
+
+impl<const D: usize> RoundPair<D> {
     /// u without q.
     #[inline]
     #[must_use]
-    pub fn local(&self, y: &[f64]) -> [f64; 2] {
-        let (a, b) = (self.bodies[0] as usize, self.bodies[1] as usize);
-        let (ya, yb) = (&y[a..a + 3], &y[b..b + 3]);
-        let [n_x, n_y] = self.n;
+    pub fn local(&self, y: &[f64]) -> [f64; D] {
+        let V = body_velocities(D);
+        let places = self.bodies.map(|at| at as usize);
+        let [ya, yb] = places.map(|at| &y[at..at + V]);
         let [ca, cb] = self.linear;
-        let [sa, sb] = self.angular;
-        let (wx, wy) = (ca * ya[0] - cb * yb[0], ca * ya[1] - cb * yb[1]);
-        [
-            n_x * wx + n_y * wy,
-            n_y * wx - n_x * wy + sa * ya[2] + sb * yb[2],
-        ]
+        let mut between = [0.0; D];
+        for k in 0..D {
+            between[k] = ca * ya[k] - cb * yb[k];
+        }
+        let mut u = [0.0; D];
+        for k in 0..D {
+            u[k] = dot(&self.frame[k], &between);
+        }
+        for (y, s) in [ya, yb].into_iter().zip(self.angular) {
+            for k in 1..D {
+                u[k] += s * rim_velocity(&self.frame, k, &y[D..]);
+            }
+        }
+        u
     }
 
     /// `y += Z p`.
     #[inline]
-    pub fn add(&self, p: [f64; 2], y: &mut [f64]) {
-        let (a, b) = (self.bodies[0] as usize, self.bodies[1] as usize);
-        let [n_x, n_y] = self.n;
-        let (fx, fy) = (n_x * p[0] + n_y * p[1], n_y * p[0] - n_x * p[1]);
-        let ya = &mut y[a..a + 3];
-        ya[0] += self.linear[0] * fx;
-        ya[1] += self.linear[0] * fy;
-        ya[2] += self.angular[0] * p[1];
-        let yb = &mut y[b..b + 3];
-        yb[0] -= self.linear[1] * fx;
-        yb[1] -= self.linear[1] * fy;
-        yb[2] += self.angular[1] * p[1];
+    pub fn add(&self, p: [f64; D], y: &mut [f64]) {
+        let V = body_velocities(D);
+        let force = self.force(&p);
+        for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+            let at = self.bodies[side] as usize;
+            let (c, s) = (sign * self.linear[side], self.angular[side]);
+            let y = &mut y[at..at + V];
+            for k in 0..D {
+                y[k] += c * force[k];
+            }
+            for k in D..V {
+                y[k] += s * rim_impulse(&self.frame, &p, k - D);
+            }
+        }
     }
 
-    /// `W_NN`, `W_TT`, 1/kg; `W_NT` is 0.
+    /// The impulse in the world's axes.
+    #[inline]
+    fn force(&self, p: &[f64; D]) -> [f64; D] {
+        let mut force = [0.0; D];
+        for (k, force) in force.iter_mut().enumerate() {
+            *force = self.frame[0][k] * p[0];
+            for r in 1..D {
+                *force += self.frame[r][k] * p[r];
+            }
+        }
+        force
+    }
+
+    /// `W_NN` and `W_TT`, the same for each tangent, 1/kg; all else of the block is 0.
     #[inline]
     #[must_use]
     pub fn block(&self) -> [f64; 2] {
@@ -87,50 +136,46 @@ impl DiscPair {
         let normal = square(self.linear);
         [normal, normal + square(self.angular)]
     }
-}
 
-impl WidePair {
-    /// u without q.
-    #[inline]
-    #[must_use]
-    pub fn local(&self, wide_at: usize, y: &[f64]) -> [f64; 2] {
-        let mut u = self.disc.local(y);
-        let own = &y[wide_at..wide_at + WIDE];
-        for (u, row) in u.iter_mut().zip(&self.rows) {
-            *u += row.iter().zip(own).map(|(a, b)| a * b).sum::<f64>();
-        }
-        u
+    /// Whether a side of it moves.
+    fn moves(&self, side: usize) -> bool {
+        self.linear[side] > 0.0
     }
 
-    /// `y += Z p`.
-    #[inline]
-    pub fn add(&self, wide_at: usize, p: [f64; 2], y: &mut [f64]) {
-        self.disc.add(p, y);
-        let own = &mut y[wide_at..wide_at + WIDE];
-        for (row, p) in self.rows.iter().zip(p) {
-            for (y, z) in own.iter_mut().zip(row) {
-                *y += z * p;
+    /// Appends the rows of Zᵀ of one side (D rows of [`body_velocities`]).
+    fn push_rows(&self, side: usize, out: &mut Vec<f64>) {
+        let V = body_velocities(D);
+        let sign = if side == 0 { 1.0 } else { -1.0 };
+        let (c, s) = (sign * self.linear[side], self.angular[side]);
+        for (k, row) in self.frame.iter().enumerate() {
+            out.extend(row.iter().map(|x| c * x));
+            for axis in 0..V - D {
+                let mut unit = [0.0; 3];
+                unit[axis] = 1.0;
+                let turned = if k == 0 {
+                    0.0
+                } else {
+                    rim_velocity(&self.frame, k, &unit)
+                };
+                out.push(s * turned);
             }
         }
     }
-
-    /// Block of W, 1/kg.
-    #[must_use]
-    pub fn block(&self) -> [[f64; 2]; 2] {
-        let dot = |a: &[f64; WIDE], b: &[f64; WIDE]| a.iter().zip(b).map(|(a, b)| a * b).sum();
-        let [n, t] = &self.rows;
-        let [disc_n, disc_t] = self.disc.block();
-        let cross: f64 = dot(n, t);
-        let (own_n, own_t): (f64, f64) = (dot(n, n), dot(t, t));
-        [[own_n + disc_n, cross], [cross, own_t + disc_t]]
-    }
 }
 
-impl BodyPairs {
+impl<const D: usize> BodyPairs<D> {
+    /// Forgets all contacts, of a machine of `width` coordinates at `machine_at` among `n_coordinates`.
+    pub fn clear(&mut self, width: usize, machine_at: usize, n_coordinates: usize) {
+        self.round.clear();
+        self.machine.clear();
+        self.rows.clear();
+        (self.width, self.machine_at, self.n_coordinates) = (width, machine_at, n_coordinates);
+    }
+
     /// Number of contacts.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.discs.len() + self.wide.len()
+        self.round.len() + self.machine.len()
     }
 
     /// Whether there is no contact.
@@ -139,25 +184,131 @@ impl BodyPairs {
         self.len() == 0
     }
 
+    /// The machine's rows of its contact i.
+    #[inline]
+    pub(crate) fn rows_of(&self, i: usize) -> impl Iterator<Item = &[f64]> {
+        let size = D * self.width;
+        self.rows[size * i..size * (i + 1)].chunks_exact(self.width)
+    }
+
+    /// Block of W of the machine's contact i, 1/kg.
+    #[must_use]
+    pub fn machine_block(&self, i: usize) -> [[f64; D]; D] {
+        let [normal, tangential] = self.machine[i].block();
+        let mut block = [[0.0; D]; D];
+        for (r, (out, row)) in block.iter_mut().zip(self.rows_of(i)).enumerate() {
+            for (x, column) in out.iter_mut().zip(self.rows_of(i)) {
+                *x = row.iter().zip(column).map(|(a, b)| a * b).sum();
+            }
+            out[r] += if r == 0 { normal } else { tangential };
+        }
+        block
+    }
+
     /// `y += Z p`.
     pub fn add_impulses(&self, p: &[f64], y: &mut [f64]) {
-        let (discs, wide) = p.split_at(2 * self.discs.len());
-        for (pair, p) in self.discs.iter().zip(discs.chunks_exact(2)) {
-            pair.add([p[0], p[1]], y);
+        let (p, of_machine) = p.as_chunks::<D>().0.split_at(self.round.len());
+        for (pair, p) in self.round.iter().zip(p) {
+            pair.add(*p, y);
         }
-        for (pair, p) in self.wide.iter().zip(wide.chunks_exact(2)) {
-            pair.add(self.wide_at, [p[0], p[1]], y);
+        for (i, (pair, p)) in self.machine.iter().zip(of_machine).enumerate() {
+            pair.add(*p, y);
+            let own = &mut y[self.machine_at..self.machine_at + self.width];
+            self.add_to_machine(i, p, own);
+        }
+    }
+
+    /// `own += Z p` of the machine's contact i.
+    #[inline]
+    pub(crate) fn add_to_machine(&self, i: usize, p: &[f64; D], own: &mut [f64]) {
+        for (row, p) in self.rows_of(i).zip(p) {
+            for (y, z) in own.iter_mut().zip(row) {
+                *y += z * p;
+            }
+        }
+    }
+
+    /// `u += Zᵀ own` of the machine's contact i.
+    #[inline]
+    pub(crate) fn add_local_of_machine(&self, i: usize, own: &[f64], u: &mut [f64; D]) {
+        for (u, row) in u.iter_mut().zip(self.rows_of(i)) {
+            *u += row.iter().zip(own).map(|(a, b)| a * b).sum::<f64>();
         }
     }
 
     /// `out = Zᵀ y`.
     pub fn local(&self, y: &[f64], out: &mut [f64]) {
-        let (discs, wide) = out.split_at_mut(2 * self.discs.len());
-        for (pair, out) in self.discs.iter().zip(discs.chunks_exact_mut(2)) {
-            out.copy_from_slice(&pair.local(y));
+        let (out, of_machine) = out.as_chunks_mut::<D>().0.split_at_mut(self.round.len());
+        for (pair, out) in self.round.iter().zip(out) {
+            *out = pair.local(y);
         }
-        for (pair, out) in self.wide.iter().zip(wide.chunks_exact_mut(2)) {
-            out.copy_from_slice(&pair.local(self.wide_at, y));
+        for (i, (pair, out)) in self.machine.iter().zip(of_machine).enumerate() {
+            *out = pair.local(y);
+            let own = &y[self.machine_at..self.machine_at + self.width];
+            self.add_local_of_machine(i, own, out);
         }
+    }
+
+    /// The operator `W = Zᵀ Z`, block by block, 1/kg.
+    #[must_use]
+    pub fn operator(&self) -> BlockSparseDelassus {
+        let V = body_velocities(D);
+        let machine = self.machine_at / V;
+        let n_round = self.round.len();
+        let of_machine = (V + self.width) * self.machine.len();
+        let mut rows = Vec::with_capacity(D * (2 * V * n_round + of_machine));
+        // Where the rows of both sides of each contact begin.
+        let mut starts = Vec::with_capacity(2 * self.len());
+        for (i, pair) in self.round.iter().chain(&self.machine).enumerate() {
+            starts.push(rows.len());
+            match i.checked_sub(n_round) {
+                Some(own) => self
+                    .rows_of(own)
+                    .for_each(|row| rows.extend_from_slice(row)),
+                None => pair.push_rows(0, &mut rows),
+            }
+            starts.push(rows.len());
+            pair.push_rows(1, &mut rows);
+        }
+        let pair = |i: usize| match i.checked_sub(n_round) {
+            Some(own) => &self.machine[own],
+            None => &self.round[i],
+        };
+        let body = |pair: &RoundPair<D>, side: usize| {
+            pair.moves(side).then_some(pair.bodies[side] as usize / V)
+        };
+        let width = |i: usize, side: usize| {
+            if i >= n_round && side == 0 {
+                self.width
+            } else {
+                V
+            }
+        };
+        let mut operator = BlockSparseDelassus::new();
+        operator.assemble_with::<D>(
+            self.len(),
+            machine + 1,
+            |i| {
+                let second = body(pair(i), 1);
+                if i < n_round {
+                    [body(pair(i), 0), second]
+                } else {
+                    [Some(machine), second]
+                }
+            },
+            |block, (i, side), (j, at)| {
+                let width = width(i, side);
+                let of = |i: usize, side: usize| {
+                    let start = starts[2 * i + side];
+                    rows[start..start + D * width].chunks_exact(width)
+                };
+                for (out, row) in block.iter_mut().zip(of(i, side)) {
+                    for (x, column) in out.iter_mut().zip(of(j, at)) {
+                        *x += row.iter().zip(column).map(|(a, b)| a * b).sum::<f64>();
+                    }
+                }
+            },
+        );
+        operator
     }
 }

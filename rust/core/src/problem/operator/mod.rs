@@ -9,7 +9,8 @@ mod dense;
 mod storage;
 
 pub use block_sparse::{BlockSparseDelassus, PairContact};
-pub use body_pairs::{BodyPairs, DiscPair, WIDE, WidePair};
+pub use body_pairs::{BodyPairs, RoundPair};
+pub(crate) use body_pairs::{rim_impulse, rim_velocity};
 pub(crate) use dense::dot;
 pub(crate) use storage::Storage;
 

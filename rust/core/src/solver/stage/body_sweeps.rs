@@ -12,11 +12,12 @@
 //!
 //! Source: Jean 1999 and Moreau 1999 (the sweep); Nesterov 1983, O'Donoghue and Candès 2015 (extrapolation with restart).
 
+use super::body_rows::{MachineRow, Row, draw_in, square};
 use crate::law::coulomb::violation;
-use crate::problem::{BodyPairs, DiscPair, Magnitudes, Residual, Violations, WIDE, passive_share};
-use crate::solver::local::one_contact::solve_one_contact;
+use crate::problem::{BodyPairs, Magnitudes, Residual, Violations, passive_share};
 use crate::solver::options::{Method, SolverOptions};
 use crate::solver::report::{Rung, Rungs, SolveReport, SolveStatus, Stage};
+use crate::spatial::space::{body_velocities, dot};
 
 /// Places of the list that are visited in turn.
 const PLACES: usize = 4;
@@ -30,145 +31,66 @@ const UNITS: u64 = 30;
 /// Scratch of [`solve_body_pairs`].
 #[derive(Clone, Debug, Default)]
 pub struct BodySweeps {
-    rows: Vec<Row>,
+    disks: Sweeps<2, 0, 4>,
+    balls: Sweeps<3, 3, 8>,
+}
+
+/// Contacts that there are sweeps for: among disks, and among balls.
+pub trait Swept<const D: usize> {
+    /// Solves them as [`solve_body_pairs`] says.
+    fn sweep(
+        &self,
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        p: &mut [f64],
+        u: &mut [f64],
+        sweeps: &mut BodySweeps,
+    ) -> SolveReport;
+}
+
+impl Swept<2> for BodyPairs<2> {
+    fn sweep(
+        &self,
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        p: &mut [f64],
+        u: &mut [f64],
+        sweeps: &mut BodySweeps,
+    ) -> SolveReport {
+        sweeps.disks.solve(self, q, mu, options, p, u)
+    }
+}
+
+impl Swept<3> for BodyPairs<3> {
+    fn sweep(
+        &self,
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        p: &mut [f64],
+        u: &mut [f64],
+        sweeps: &mut BodySweeps,
+    ) -> SolveReport {
+        sweeps.balls.solve(self, q, mu, options, p, u)
+    }
+}
+
+/// The sweeps in D dimensions. T numbers tell where a contact's tangents are: none in the plane, the first tangent in space. A body has S
+/// numbers: its velocity, that of its rim, and zeros up to a round size.
+#[derive(Clone, Debug, Default)]
+struct Sweeps<const D: usize, const T: usize, const S: usize> {
+    rows: Vec<Row<D, T>>,
     /// Number of each row's contact.
     order: Vec<u32>,
-    wide: Vec<WideRow>,
-    /// Velocity that the impulses give each disc: x, y, and that of its rim, m/s; the last is no disc and does not move.
-    velocity: Vec<[f64; 4]>,
-    velocity_before: Vec<[f64; 4]>,
-    own: [f64; WIDE],
-    own_before: [f64; WIDE],
-}
-
-/// A contact among discs with all that a sweep reads and writes of it: two lines of cache.
-#[derive(Clone, Copy, Debug)]
-struct Row {
-    bodies: [u32; 2],
-    n: [f64; 2],
-    /// 1/m of each body, 1/kg.
-    linear: [f64; 2],
-    /// r²/J of each body, 1/kg.
-    angular: [f64; 2],
-    /// `1/W_NN`, `1/W_TT`, kg.
-    inverse: [f64; 2],
-    q: [f64; 2],
-    mu: f64,
-    p: [f64; 2],
-    /// p of the sweep before.
-    before: [f64; 2],
-}
-
-/// A contact of the wide body.
-#[derive(Clone, Copy, Debug)]
-struct WideRow {
-    /// The disc's side, as second body.
-    disc: Row,
-    rows: [[f64; WIDE]; 2],
-    block: [[f64; 2]; 2],
-}
-
-impl Row {
-    /// `still`: the place of what does not move.
-    fn new(pair: &DiscPair, block: [f64; 2], still: u32, q: &[f64], mu: f64, p: &[f64]) -> Self {
-        let place = |k: usize| {
-            let moves = pair.linear[k] > 0.0;
-            if moves { pair.bodies[k] / 3 } else { still }
-        };
-        let invert = |w: f64| if w > 0.0 { 1.0 / w } else { 0.0 };
-        Self {
-            bodies: [place(0), place(1)],
-            n: pair.n,
-            linear: pair.linear.map(|c| c * c),
-            angular: pair.angular.map(|s| s * s),
-            inverse: block.map(invert),
-            q: [q[0], q[1]],
-            mu,
-            p: [p[0], p[1]],
-            before: [p[0], p[1]],
-        }
-    }
-
-    /// u.
-    #[inline]
-    fn local(&self, velocity: &[[f64; 4]]) -> [f64; 2] {
-        let (a, b) = (
-            velocity[self.bodies[0] as usize],
-            velocity[self.bodies[1] as usize],
-        );
-        let (x, y) = (a[0] - b[0], a[1] - b[1]);
-        let [n_x, n_y] = self.n;
-        [
-            n_x * x + n_y * y + self.q[0],
-            n_y * x - n_x * y + (a[2] + b[2]) + self.q[1],
-        ]
-    }
-
-    #[inline]
-    fn add(&self, p: [f64; 2], velocity: &mut [[f64; 4]]) {
-        let [n_x, n_y] = self.n;
-        let (x, y) = (n_x * p[0] + n_y * p[1], n_y * p[0] - n_x * p[1]);
-        let [l_a, l_b] = self.linear;
-        let [r_a, r_b] = self.angular;
-        let a = &mut velocity[self.bodies[0] as usize];
-        *a = [a[0] + l_a * x, a[1] + l_a * y, a[2] + r_a * p[1], 0.0];
-        let b = &mut velocity[self.bodies[1] as usize];
-        *b = [b[0] - l_b * x, b[1] - l_b * y, b[2] + r_b * p[1], 0.0];
-    }
-
-    /// p as the sweep starts, and remembers the one before.
-    #[inline]
-    fn extrapolate(&mut self, share: f64) -> [f64; 2] {
-        let [p_n, p_t] = self.p;
-        let [b_n, b_t] = self.before;
-        self.before = self.p;
-        [p_n + share * (p_n - b_n), p_t + share * (p_t - b_t)]
-    }
-
-    /// Solves its law; the square of the impulse's change.
-    #[inline]
-    fn visit(&mut self, share: f64, velocity: &mut [[f64; 4]]) -> f64 {
-        let [z_n, z_t] = self.extrapolate(share);
-        let [u_n, u_t] = self.local(velocity);
-        let p_n = (z_n - u_n * self.inverse[0]).max(0.0);
-        let limit = self.mu * p_n;
-        let p_t = (z_t - u_t * self.inverse[1]).min(limit).max(-limit);
-        self.p = [p_n, p_t];
-        let change = [p_n - z_n, p_t - z_t];
-        self.add(change, velocity);
-        change[0] * change[0] + change[1] * change[1]
-    }
-}
-
-impl WideRow {
-    fn local(&self, velocity: &[[f64; 4]], own: &[f64; WIDE]) -> [f64; 2] {
-        let mut u = self.disc.local(velocity);
-        for (u, row) in u.iter_mut().zip(&self.rows) {
-            *u += row.iter().zip(own).map(|(a, b)| a * b).sum::<f64>();
-        }
-        u
-    }
-
-    fn add(&self, p: [f64; 2], velocity: &mut [[f64; 4]], own: &mut [f64; WIDE]) {
-        self.disc.add(p, velocity);
-        for (row, p) in self.rows.iter().zip(p) {
-            for (y, z) in own.iter_mut().zip(row) {
-                *y += z * p;
-            }
-        }
-    }
-
-    fn visit(&mut self, share: f64, velocity: &mut [[f64; 4]], own: &mut [f64; WIDE]) -> f64 {
-        let z = self.disc.extrapolate(share);
-        let u = self.local(velocity, own);
-        let free = [0, 1].map(|r| u[r] - self.block[r][0] * z[0] - self.block[r][1] * z[1]);
-        let p = solve_one_contact(&self.block, &free, self.disc.mu).impulse;
-        // A NaN of the data shows in the change.
-        self.disc.p = p;
-        let change = [p[0] - z[0], p[1] - z[1]];
-        self.add(change, velocity, own);
-        change[0] * change[0] + change[1] * change[1]
-    }
+    machine: Vec<MachineRow<D, T>>,
+    /// Velocity that the impulses give each body: of its centre, and r ω, m/s; the last is no body and does not move.
+    velocity: Vec<[f64; S]>,
+    velocity_before: Vec<[f64; S]>,
+    /// Of the machine, in its factor coordinates.
+    own: Vec<f64>,
+    own_before: Vec<f64>,
 }
 
 /// What an answer is worth.
@@ -187,63 +109,66 @@ impl Measured {
     }
 }
 
-impl BodySweeps {
-    fn fit(&mut self, pairs: &BodyPairs, q: &[f64], mu: &[f64], p: &[f64]) {
-        let discs = pairs.discs.len();
-        let bodies = pairs.n_coordinates / 3;
+impl<const D: usize, const T: usize, const S: usize> Sweeps<D, T, S> {
+    fn fit(&mut self, pairs: &BodyPairs<D>, q: &[f64], mu: &[f64], p: &[f64]) {
+        let round = pairs.round.len();
+        let bodies = pairs.n_coordinates / body_velocities(D);
         #[allow(clippy::cast_possible_truncation)] // bodies and contacts are numbered by u32
         let still = bodies as u32;
         for velocity in [&mut self.velocity, &mut self.velocity_before] {
             velocity.clear();
-            velocity.resize(bodies + 1, [0.0; 4]);
+            velocity.resize(bodies + 1, [0.0; S]);
         }
         self.order.clear();
-        let length = discs.div_ceil(PLACES);
+        let length = round.div_ceil(PLACES);
         for k in 0..length {
             #[allow(clippy::cast_possible_truncation)]
-            let places = (k..discs).step_by(length).map(|i| i as u32);
+            let places = (k..round).step_by(length).map(|i| i as u32);
             self.order.extend(places);
         }
-        let local = |i: usize| (&q[2 * i..2 * i + 2], mu[i], &p[2 * i..2 * i + 2]);
+        let (q, p) = (q.as_chunks::<D>().0, p.as_chunks::<D>().0);
         self.rows.clear();
         self.rows.extend(self.order.iter().map(|&i| {
-            let (q, mu, p) = local(i as usize);
-            let pair = &pairs.discs[i as usize];
-            Row::new(pair, pair.block(), still, q, mu, p)
+            let i = i as usize;
+            let pair = &pairs.round[i];
+            Row::new(pair, pair.block(), still, &q[i], mu[i], &p[i])
         }));
-        self.wide.clear();
-        let wide = (discs..).zip(&pairs.wide);
-        self.wide.extend(wide.map(|(i, pair)| {
-            let (q, mu, p) = local(i);
-            let block = pair.block();
-            WideRow {
-                disc: Row::new(&pair.disc, [block[0][0], block[1][1]], still, q, mu, p),
-                rows: pair.rows,
+        self.machine.clear();
+        let machine = pairs.machine.iter().enumerate();
+        self.machine.extend(machine.map(|(k, pair)| {
+            let i = round + k;
+            let block = pairs.machine_block(k);
+            let tangential: f64 = (1..D).map(|k| block[k][k]).sum();
+            let scales = [block[0][0], tangential / (D - 1) as f64];
+            MachineRow {
+                round: Row::new(pair, scales, still, &q[i], mu[i], &p[i]),
                 block,
             }
         }));
-        self.sum();
+        self.own.resize(pairs.width, 0.0);
+        self.sum(pairs);
         self.velocity_before.clone_from(&self.velocity);
-        self.own_before = self.own;
+        self.own_before.clone_from(&self.own);
     }
 
     /// Velocities of the impulses, anew.
-    fn sum(&mut self) {
-        self.velocity.fill([0.0; 4]);
-        self.own = [0.0; WIDE];
+    fn sum(&mut self, pairs: &BodyPairs<D>) {
+        self.velocity.fill([0.0; S]);
+        self.own.fill(0.0);
         for row in &self.rows {
-            row.add(row.p, &mut self.velocity);
+            row.add(&row.frame(), row.p, &mut self.velocity);
         }
-        for row in &self.wide {
-            row.add(row.disc.p, &mut self.velocity, &mut self.own);
+        for (i, row) in self.machine.iter().enumerate() {
+            let (velocity, own) = (&mut self.velocity, &mut self.own);
+            row.add(pairs, i, row.round.p, velocity, own);
         }
     }
 
     /// One sweep from the impulses extrapolated by `share`; the square of its change, N² s².
-    fn sweep(&mut self, share: f64) -> f64 {
+    fn sweep(&mut self, pairs: &BodyPairs<D>, share: f64) -> f64 {
         if share > 0.0 {
             for (v, before) in self.velocity.iter_mut().zip(&mut self.velocity_before) {
-                for k in 0..3 {
+                for k in 0..body_velocities(D) {
                     let now = v[k];
                     v[k] += share * (now - before[k]);
                     before[k] = now;
@@ -256,45 +181,47 @@ impl BodySweeps {
             }
         } else {
             self.velocity_before.copy_from_slice(&self.velocity);
-            self.own_before = self.own;
+            self.own_before.copy_from_slice(&self.own);
         }
         let mut change = 0.0;
         for row in &mut self.rows {
             change += row.visit(share, &mut self.velocity);
         }
-        for row in &mut self.wide {
-            change += row.visit(share, &mut self.velocity, &mut self.own);
+        for (i, row) in self.machine.iter_mut().enumerate() {
+            change += row.visit(pairs, i, share, &mut self.velocity, &mut self.own);
         }
         change
     }
 
     /// The residual as [`crate::problem::evaluate_into`] defines it; writes p and u.
-    fn measure(&mut self, p: &mut [f64], u: &mut [f64]) -> Measured {
-        self.sum();
+    fn measure(&mut self, pairs: &BodyPairs<D>, p: &mut [f64], u: &mut [f64]) -> Measured {
+        self.sum(pairs);
         let (mut violations, mut data) = (Violations::default(), Magnitudes::default());
         let (mut work, mut free) = (0.0, 0.0);
-        let mut judge = |i: usize, row: &Row, own: [f64; 2]| {
+        let mut judge = |i: usize, row: &Row<D, T>, own: [f64; D]| {
             let [i_n, i_t] = row.inverse;
-            let sum = i_n + i_t;
+            // D over the trace: D − 1 tangents.
+            let sum = (D - 1) as f64 * i_n + i_t;
             let mass = if sum > 0.0 {
-                2.0 * i_n * i_t / sum
+                D as f64 * i_n * i_t / sum
             } else {
                 1.0
             };
             let scale = |inverse: f64| if inverse > 0.0 { inverse } else { mass };
-            let [v_n, v_t] = violation(&row.p, &own, row.mu, [scale(i_n), scale(i_t)]);
-            violations.add(v_n * v_n + v_t * v_t, mass);
+            let off = violation(&row.p, &own, row.mu, [scale(i_n), scale(i_t)]);
+            violations.add(square(&off), mass);
             data.add(&row.q, mass);
-            work += row.p[0] * own[0] + row.p[1] * own[1];
-            free += row.p[0] * row.q[0] + row.p[1] * row.q[1];
-            p[2 * i..2 * i + 2].copy_from_slice(&row.p);
-            u[2 * i..2 * i + 2].copy_from_slice(&own);
+            work += dot(&row.p, &own);
+            free += dot(&row.p, &row.q);
+            p[D * i..D * (i + 1)].copy_from_slice(&row.p);
+            u[D * i..D * (i + 1)].copy_from_slice(&own);
         };
         for (row, i) in self.rows.iter().zip(&self.order) {
-            judge(*i as usize, row, row.local(&self.velocity));
+            judge(*i as usize, row, row.local(&row.frame(), &self.velocity));
         }
-        for (i, row) in (self.rows.len()..).zip(&self.wide) {
-            judge(i, &row.disc, row.local(&self.velocity, &self.own));
+        for (i, row) in self.machine.iter().enumerate() {
+            let own = row.local(pairs, i, &self.velocity, &self.own);
+            judge(self.rows.len() + i, &row.round, own);
         }
         let [inverse_speed, inverse_data] = data.inverses();
         let residual = violations.residual(inverse_speed, inverse_data);
@@ -307,30 +234,120 @@ impl BodySweeps {
 
     /// Multiplies all impulses.
     fn scale(&mut self, share: f64) {
-        let wide = self.wide.iter_mut().map(|row| &mut row.disc);
-        for row in self.rows.iter_mut().chain(wide) {
+        let machine = self.machine.iter_mut().map(|row| &mut row.round);
+        for row in self.rows.iter_mut().chain(machine) {
             row.p = row.p.map(|p| share * p);
+        }
+    }
+
+    /// See [`solve_body_pairs`].
+    fn solve(
+        &mut self,
+        pairs: &BodyPairs<D>,
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        p: &mut [f64],
+        u: &mut [f64],
+    ) -> SolveReport {
+        let n = pairs.len();
+        assert!(
+            q.len() == D * n && mu.len() == n && p.len() == D * n && u.len() == D * n,
+            "q, mu, p and u must be of the same contacts"
+        );
+        let mut report = SolveReport {
+            status: SolveStatus::Converged,
+            iterations: 0,
+            residual: 0.0,
+            velocity_error: 0.0,
+            work: 0,
+            method: Method::GaussSeidel,
+            stage: Stage::BodySweeps,
+            rungs: Rungs::default(),
+        };
+        for (p, &mu) in p.as_chunks_mut::<D>().0.iter_mut().zip(mu) {
+            // A start outside its cone (another μ, another step) is drawn in.
+            if p.iter().all(|x| x.is_finite()) {
+                p[0] = p[0].max(0.0);
+                let limit = mu * p[0];
+                draw_in(p, limit);
+            } else {
+                *p = [0.0; D];
+            }
+        }
+        self.fit(pairs, q, mu, p);
+        let (mut t, mut share, mut last_change) = (1.0_f64, 0.0, f64::INFINITY);
+        // Violation, in tolerances, for each N s of a sweep's change: tells when to look.
+        let (mut rate, mut last_look) = (f64::INFINITY, 0);
+        loop {
+            if report.iterations < options.max_sweeps {
+                let change = self.sweep(pairs, share);
+                report.iterations += 1;
+                if change > last_change {
+                    t = 1.0;
+                }
+                last_change = change;
+                let is_due = rate * change.sqrt() <= 1.0
+                    || report.iterations - last_look >= PATIENCE
+                    || report.iterations == 1
+                    || report.iterations == options.max_sweeps;
+                if !is_due {
+                    share = next_share(&mut t);
+                    continue;
+                }
+            }
+            let is_last = report.iterations >= options.max_sweeps;
+            let mut measured = self.measure(pairs, p, u);
+            if (is_last || measured.is_within(options))
+                && let Some(share) = passive_share(measured.work, measured.free)
+            {
+                self.scale(share);
+                measured = self.measure(pairs, p, u);
+                t = 1.0;
+            }
+            let Residual { relative, velocity } = measured.residual;
+            (report.residual, report.velocity_error) = (relative, velocity);
+            if !measured.residual.is_finite() {
+                report.status = SolveStatus::NonFinite;
+                p.fill(0.0);
+                u.fill(0.0);
+                return report;
+            }
+            if measured.is_within(options) {
+                return report;
+            }
+            if is_last {
+                report.status = SolveStatus::MaxIterations;
+                return report;
+            }
+            let violation =
+                (relative / options.tolerance).max(velocity / options.velocity_tolerance);
+            (rate, last_look) = (violation / last_change.sqrt(), report.iterations);
+            share = next_share(&mut t);
         }
     }
 }
 
-/// Solves `K_μ* ∋ ũ ⊥ p ∈ K_μ`, `u = Zᵀ Z p + q`, in the plane.
+/// Solves `K_μ* ∋ ũ ⊥ p ∈ K_μ`, `u = Zᵀ Z p + q`, among round bodies and a machine.
 ///
-/// q (2 n_c), m/s; mu (n_c); p (2 n_c), N s: in, the warm start, out, the impulses inside their cones; u (2 n_c), m/s: out. Only
+/// q (D n_c), m/s; mu (n_c); p (D n_c), N s: in, the warm start, out, the impulses inside their cones; u (D n_c), m/s: out. Only
 /// the tolerances and `max_sweeps` of the options matter; the budget does not. Allocates only when there are more contacts than ever before.
 ///
 /// # Panics
 /// If a length does not fit.
-pub fn solve_body_pairs(
-    pairs: &BodyPairs,
+pub fn solve_body_pairs<const D: usize>(
+    pairs: &BodyPairs<D>,
     q: &[f64],
     mu: &[f64],
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
     sweeps: &mut BodySweeps,
-) -> SolveReport {
-    let mut report = sweep_pairs(pairs, q, mu, options, p, u, sweeps);
+) -> SolveReport
+where
+    BodyPairs<D>: Swept<D>,
+{
+    let mut report = pairs.sweep(q, mu, options, p, u, sweeps);
     report.work = UNITS * (pairs.len() * report.iterations) as u64;
     report.rungs.push(Rung {
         stage: report.stage,
@@ -338,91 +355,6 @@ pub fn solve_body_pairs(
         iterations: report.iterations,
     });
     report
-}
-
-fn sweep_pairs(
-    pairs: &BodyPairs,
-    q: &[f64],
-    mu: &[f64],
-    options: &SolverOptions,
-    p: &mut [f64],
-    u: &mut [f64],
-    sweeps: &mut BodySweeps,
-) -> SolveReport {
-    let n = pairs.len();
-    assert!(
-        q.len() == 2 * n && mu.len() == n && p.len() == 2 * n && u.len() == 2 * n,
-        "q, mu, p and u must be of the same contacts"
-    );
-    let mut report = SolveReport {
-        status: SolveStatus::Converged,
-        iterations: 0,
-        residual: 0.0,
-        velocity_error: 0.0,
-        work: 0,
-        method: Method::GaussSeidel,
-        stage: Stage::BodySweeps,
-        rungs: Rungs::default(),
-    };
-    for (p, &mu) in p.chunks_exact_mut(2).zip(mu) {
-        // A start outside its cone (another μ, another step) is drawn in.
-        let is_sound = p[0].is_finite() && p[1].is_finite();
-        p[0] = if is_sound { p[0].max(0.0) } else { 0.0 };
-        p[1] = if is_sound {
-            p[1].clamp(-mu * p[0], mu * p[0])
-        } else {
-            0.0
-        };
-    }
-    sweeps.fit(pairs, q, mu, p);
-    let (mut t, mut share, mut last_change) = (1.0_f64, 0.0, f64::INFINITY);
-    // Violation, in tolerances, for each N s of a sweep's change: tells when to look.
-    let (mut rate, mut last_look) = (f64::INFINITY, 0);
-    loop {
-        if report.iterations < options.max_sweeps {
-            let change = sweeps.sweep(share);
-            report.iterations += 1;
-            if change > last_change {
-                t = 1.0;
-            }
-            last_change = change;
-            let is_due = rate * change.sqrt() <= 1.0
-                || report.iterations - last_look >= PATIENCE
-                || report.iterations == 1
-                || report.iterations == options.max_sweeps;
-            if !is_due {
-                share = next_share(&mut t);
-                continue;
-            }
-        }
-        let is_last = report.iterations >= options.max_sweeps;
-        let mut measured = sweeps.measure(p, u);
-        if (is_last || measured.is_within(options))
-            && let Some(share) = passive_share(measured.work, measured.free)
-        {
-            sweeps.scale(share);
-            measured = sweeps.measure(p, u);
-            t = 1.0;
-        }
-        let Residual { relative, velocity } = measured.residual;
-        (report.residual, report.velocity_error) = (relative, velocity);
-        if !measured.residual.is_finite() {
-            report.status = SolveStatus::NonFinite;
-            p.fill(0.0);
-            u.fill(0.0);
-            return report;
-        }
-        if measured.is_within(options) {
-            return report;
-        }
-        if is_last {
-            report.status = SolveStatus::MaxIterations;
-            return report;
-        }
-        let violation = (relative / options.tolerance).max(velocity / options.velocity_tolerance);
-        (rate, last_look) = (violation / last_change.sqrt(), report.iterations);
-        share = next_share(&mut t);
-    }
 }
 
 /// Share of the extrapolation after a sweep, and Nesterov's sequence one on.

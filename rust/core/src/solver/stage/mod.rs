@@ -4,6 +4,7 @@
 //! ended. None knows which stage came before or comes next: that is the strategy's.
 
 pub(super) mod admm;
+mod body_rows;
 pub(super) mod body_sweeps;
 pub(super) mod gauss_seidel;
 pub(super) mod guided;

@@ -10,7 +10,7 @@ use crate::problem::{
 };
 use crate::solver::options::{Method, SolverOptions};
 use crate::solver::report::{Rung, Rungs, SolveReport, SolveStatus};
-use crate::solver::stage::body_sweeps::{BodySweeps, solve_body_pairs};
+use crate::solver::stage::body_sweeps::{BodySweeps, Swept, solve_body_pairs};
 
 /// Contacts up to which an answer that the sweeps did not reach is sought by factorisation: a step costs some 3 µs a contact there.
 const FEW: usize = 1000;
@@ -21,12 +21,12 @@ const FACTORISATIONS: usize = 200;
 /// Such searches for one solve, each after all the sweeps that are allowed.
 const SEARCHES: usize = 3;
 
-/// The problem `u = Zᵀ Z p + q` of the contacts of free bodies, in the plane.
+/// The problem `u = Zᵀ Z p + q` of the contacts of free bodies and a machine in D dimensions.
 #[derive(Clone, Copy)]
-pub struct ManyBodies<'a> {
+pub struct ManyBodies<'a, const D: usize> {
     /// What each contact reads and changes.
-    pub pairs: &'a BodyPairs,
-    /// Free velocity (2 `n_c`), m/s.
+    pub pairs: &'a BodyPairs<D>,
+    /// Free velocity (D `n_c`), m/s.
     pub q: &'a [f64],
     /// Friction coefficients (`n_c`).
     pub mu: &'a [f64],
@@ -34,7 +34,7 @@ pub struct ManyBodies<'a> {
     pub operator: &'a dyn Fn() -> &'a BlockSparseDelassus,
 }
 
-impl std::fmt::Debug for ManyBodies<'_> {
+impl<const D: usize> std::fmt::Debug for ManyBodies<'_, D> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("ManyBodies")
             .field("n_contacts", &self.mu.len())
@@ -42,7 +42,7 @@ impl std::fmt::Debug for ManyBodies<'_> {
     }
 }
 
-impl<'a> ManyBodies<'a> {
+impl<'a, const D: usize> ManyBodies<'a, D> {
     /// The same problem with `W`.
     fn problem(&self) -> FrictionContactProblem<'a> {
         FrictionContactProblem::from_assembled_sparse((self.operator)(), self.q, self.mu)
@@ -50,14 +50,17 @@ impl<'a> ManyBodies<'a> {
 }
 
 /// Solves as the method asks; `solve` is the solver of a problem with `W`, which is above this page.
-pub(in crate::solver) fn solve(
-    bodies: &ManyBodies<'_>,
+pub(in crate::solver) fn solve<const D: usize>(
+    bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
     sweeps: &mut BodySweeps,
     solve: &mut SolvePart<'_>,
-) -> SolveReport {
+) -> SolveReport
+where
+    BodyPairs<D>: Swept<D>,
+{
     match options.method {
         Method::GaussSeidel => {
             solve_body_pairs(bodies.pairs, bodies.q, bodies.mu, options, p, u, sweeps)
@@ -68,14 +71,17 @@ pub(in crate::solver) fn solve(
 }
 
 /// Sweeps, and searches by factorisation with sweeps between them.
-fn escalate(
-    bodies: &ManyBodies<'_>,
+fn escalate<const D: usize>(
+    bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,
     p: &mut [f64],
     u: &mut [f64],
     sweeps: &mut BodySweeps,
     solve: &mut SolvePart<'_>,
-) -> SolveReport {
+) -> SolveReport
+where
+    BodyPairs<D>: Swept<D>,
+{
     let mut sweep = |p: &mut [f64], u: &mut [f64]| {
         solve_body_pairs(bodies.pairs, bodies.q, bodies.mu, options, p, u, sweeps)
     };
@@ -119,8 +125,8 @@ fn escalate(
 }
 
 /// Goes on from where the sweeps stopped by the proximal-point method. The better of both answers stays, and adds no energy.
-fn search(
-    bodies: &ManyBodies<'_>,
+fn search<const D: usize>(
+    bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,
     (p, u): (&mut [f64], &mut [f64]),
     report: SolveReport,

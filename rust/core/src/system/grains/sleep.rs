@@ -1,27 +1,31 @@
-//! Sleep: disks that rest far from anything that moves are left out of the step until something comes near or leans on them.
+//! Sleep: grains that rest far from anything that moves are left out of the step until something comes near or leans on them.
 //!
-//! A disk falls asleep after so many steps slower than a limit, with nothing faster than the limit within a distance. It wakes when something
+//! A grain falls asleep after so many steps slower than a limit, with nothing faster than the limit within a distance. It wakes when something
 //! faster comes within the distance, or when the impulse of a neighbour that is awake differs from the one it fell asleep under by more than a share of its own
-//! weight. The impulses of sleeping contacts are kept, so a disk wakes with the load that it had. A kinematic disk counts as
+//! weight. The impulses of sleeping contacts are kept, so a grain wakes with the load that it had. A kinematic grain counts as
 //! asleep and never wakes.
 
 use serde::{Deserialize, Serialize};
 
-use super::contact::{SoilContact, SoilKey};
+use super::bodies::COORDINATES;
+use super::contact::{GrainContact, GrainKey};
+use super::machine::point_velocity;
 use super::removal::Renumbering;
-use super::scene::SoilScene;
+use super::scene::GrainScene;
 use crate::integrator::{OptionsError, WarmStart};
+use crate::spatial::space::{axis, body_velocities, length};
+use nalgebra::SVector;
 
-/// When disks sleep.
+/// When grains sleep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SleepOptions {
-    /// A disk slower than this (rim included) is still, m/s. Default 5e-4.
+    /// A grain slower than this (rim included) is still, m/s. Default 5e-4.
     pub speed: f64,
-    /// Steps that a disk must have been still. Default 50.
+    /// Steps that a grain must have been still. Default 50.
     pub steps: u32,
     /// How far away anything that moves must be, m. Default 0.2: six diameters of the original's disks.
     pub distance: f64,
-    /// Change of an impulse that wakes, as a share of the disk's weight times the step. Default 0.1.
+    /// Change of an impulse that wakes, as a share of the grain's weight times the step. Default 0.1.
     pub share: f64,
 }
 
@@ -71,34 +75,45 @@ impl SleepOptions {
 /// Who sleeps, and under what load.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sleep {
-    /// Steps that each disk has been still (n).
+    /// Steps that each grain has been still (n).
     still: Vec<u32>,
-    /// Which disks sleep (n).
+    /// Which grains sleep (n).
     asleep: Vec<bool>,
     /// Impulses of the contacts of those that sleep, in the order of the keys, N s.
-    dormant: Vec<(SoilKey, [f64; 3])>,
+    dormant: Vec<(GrainKey, [f64; 3])>,
 }
 
 /// Most cells that a wheel marks either way.
 const MOST_CELLS: i64 = 1000;
 
+/// Most cells that one mover marks; of more, all are.
+const MOST_MARKS: i64 = (2 * MOST_CELLS + 1) * (2 * MOST_CELLS + 1);
+
 /// Steps between two looks at who may sleep: nothing crosses the distance in them.
 const EVERY: usize = 5;
 
 /// What sleep looks at after a step.
-pub(crate) struct StepTaken<'a> {
-    pub scene: &'a SoilScene,
+pub struct StepTaken<'a, const D: usize> {
+    /// What there is.
+    pub scene: &'a GrainScene<D>,
+    /// Weight of 1 kg times the step, m/s.
     pub weight_impulse: f64,
+    /// Coordinates after it, m and rad.
     pub q: &'a [f64],
+    /// Velocities after it: those of what falls asleep become 0.
     pub v: &'a mut [f64],
-    pub contacts: &'a [SoilContact],
+    /// Its contacts.
+    pub contacts: &'a [GrainContact<D>],
+    /// Their impulses (D n_c), N s.
     pub impulses: &'a [f64],
+    /// How many steps have been taken.
     pub count: usize,
 }
 
 impl Sleep {
-    /// All disks awake that are not kinematic (n).
-    pub(crate) fn new(kinematic: &[bool]) -> Self {
+    /// All grains awake that are not kinematic (n).
+    #[must_use]
+    pub fn new(kinematic: &[bool]) -> Self {
         Self {
             still: vec![0; kinematic.len()],
             asleep: kinematic.to_vec(),
@@ -106,8 +121,9 @@ impl Sleep {
         }
     }
 
-    /// Of the disks that stay.
-    pub(crate) fn without(&self, renumbering: &Renumbering) -> Self {
+    /// Of the grains that stay.
+    #[must_use]
+    pub fn without(&self, renumbering: &Renumbering) -> Self {
         let dormant = self.dormant.iter();
         Self {
             still: renumbering.keep(&self.still, 1),
@@ -118,7 +134,7 @@ impl Sleep {
         }
     }
 
-    /// Which disks sleep (n).
+    /// Which grains sleep (n).
     #[must_use]
     pub fn asleep(&self) -> &[bool] {
         &self.asleep
@@ -126,12 +142,13 @@ impl Sleep {
 
     /// Impulses of the contacts of those that sleep, N s.
     #[must_use]
-    pub fn dormant(&self) -> &[(SoilKey, [f64; 3])] {
+    pub fn dormant(&self) -> &[(GrainKey, [f64; 3])] {
         &self.dormant
     }
 
-    /// Whether this is the sleep of these disks (n).
-    pub(crate) fn is_of(&self, kinematic: &[bool]) -> bool {
+    /// Whether this is the sleep of these grains (n).
+    #[must_use]
+    pub fn is_of(&self, kinematic: &[bool]) -> bool {
         self.still.len() == kinematic.len()
             && self.asleep.len() == kinematic.len()
             && self.asleep.iter().zip(kinematic).all(|(s, k)| *s || !k)
@@ -143,7 +160,7 @@ impl Sleep {
     }
 
     /// Wakes all that are not kinematic (n).
-    pub(crate) fn wake_all(&mut self, kinematic: &[bool], warm_start: &mut WarmStart<SoilKey>) {
+    pub fn wake_all(&mut self, kinematic: &[bool], warm_start: &mut WarmStart<GrainKey>) {
         if self.asleep != kinematic {
             let before = std::mem::replace(&mut self.asleep, kinematic.to_vec());
             self.exchange(kinematic, &before, warm_start);
@@ -151,12 +168,12 @@ impl Sleep {
         self.still.fill(0);
     }
 
-    /// Lets disks sleep and wake after a step.
-    pub(crate) fn update(
+    /// Lets grains sleep and wake after a step.
+    pub fn update<const D: usize>(
         &mut self,
         options: &SleepOptions,
-        step: StepTaken<'_>,
-        warm_start: &mut WarmStart<SoilKey>,
+        step: StepTaken<'_, D>,
+        warm_start: &mut WarmStart<GrainKey>,
     ) {
         let StepTaken {
             scene,
@@ -167,18 +184,18 @@ impl Sleep {
             impulses,
             count,
         } = step;
-        let n = scene.disks.len();
-        let kinematic = scene.disks.kinematic();
-        let rows = v[..3 * n].chunks_exact(3).zip(scene.disks.radius());
+        let (n, V) = (scene.grains.len(), body_velocities(D));
+        let kinematic = scene.grains.kinematic();
+        let rows = v[..V * n].chunks_exact(V).zip(scene.grains.radius());
         for ((v, r), still) in rows.zip(&mut self.still) {
-            let is_still = v[0].hypot(v[1]) + r * v[2].abs() < options.speed;
+            let is_still = length(&v[..D]) + r * length(&v[D..]) < options.speed;
             *still = if is_still { still.saturating_add(1) } else { 0 };
         }
         let mut woken = Vec::new();
         if self.asleep.contains(&true) {
-            for (contact, p) in contacts.iter().zip(impulses.chunks_exact(2)) {
-                let SoilKey { a, b } = contact.key;
-                let Some(disk) = [a, b]
+            for (contact, p) in contacts.iter().zip(impulses.chunks_exact(D)) {
+                let GrainKey { a, b } = contact.key;
+                let Some(grain) = [a, b]
                     .into_iter()
                     .map(|body| body as usize)
                     .find(|&body| body < n && self.asleep[body] && !kinematic[body])
@@ -189,9 +206,12 @@ impl Sleep {
                     .dormant
                     .binary_search_by_key(&contact.key, |(key, _)| *key);
                 let before = place.map_or([0.0; 3], |k| self.dormant[k].1);
-                let change = (p[0] - before[0]).hypot(p[1] - before[1]);
-                if change > options.share * scene.disks.mass()[disk] * weight_impulse {
-                    woken.push(disk);
+                let mut change = [0.0; D];
+                for k in 0..D {
+                    change[k] = p[k] - before[k];
+                }
+                if length(&change) > options.share * scene.grains.mass()[grain] * weight_impulse {
+                    woken.push(grain);
                 }
             }
         }
@@ -200,9 +220,9 @@ impl Sleep {
             return;
         }
         let before = self.asleep.clone();
-        for disk in woken {
-            self.asleep[disk] = false;
-            self.still[disk] = 0;
+        for grain in woken {
+            self.asleep[grain] = false;
+            self.still[grain] = 0;
         }
         if looks {
             let near = self.near_movers(options, scene, q, v);
@@ -214,7 +234,7 @@ impl Sleep {
                     self.asleep[i] = false;
                 } else if self.still[i] >= options.steps {
                     self.asleep[i] = true;
-                    v[3 * i..3 * i + 3].fill(0.0);
+                    v[V * i..V * (i + 1)].fill(0.0);
                 }
             }
         }
@@ -223,57 +243,37 @@ impl Sleep {
         }
     }
 
-    /// For each disk whether something that moves may be within the distance (n).
-    fn near_movers(
+    /// For each grain whether something that moves may be within the distance (n).
+    fn near_movers<const D: usize>(
         &self,
         options: &SleepOptions,
-        scene: &SoilScene,
+        scene: &GrainScene<D>,
         q: &[f64],
         v: &[f64],
     ) -> Vec<bool> {
-        let n = scene.disks.len();
-        // Cells of that side, folded into a table: a mover marks its cell and the eight around it.
-        let size = (4 * n).next_power_of_two().max(64);
-        let mask = i64::try_from(size).unwrap_or(i64::MAX) - 1;
-        let cell = |x: f64| {
-            #[allow(clippy::cast_possible_truncation)] // saturates, and folds
-            let cell = (x / options.distance).floor() as i64;
-            cell
-        };
-        let place = |column: i64, row: i64| {
-            let mixed = row.wrapping_mul(0x9E37_79B1).wrapping_add(column);
-            usize::try_from(mixed & mask).unwrap_or(0)
-        };
-        let mut marked = vec![false; size];
-        let mut mark = |x: f64, y: f64, cells: i64| {
-            for row in -cells..=cells {
-                for column in -cells..=cells {
-                    marked[place(cell(x).wrapping_add(column), cell(y).wrapping_add(row))] = true;
-                }
-            }
-        };
-        for i in 0..n {
-            if self.still[i] == 0 {
-                mark(q[3 * i], q[3 * i + 1], 1);
-            }
+        let n = scene.grains.len();
+        let mut marks = Marks::<D>::new(n, options.distance);
+        let centre = |i: usize| SVector::from_fn(|k, _| q[COORDINATES * i + k]);
+        for i in (0..n).filter(|i| self.still[*i] == 0) {
+            marks.mark(&centre(i), 1);
         }
-        if let Some(machine) = &scene.machine {
-            let pose = nalgebra::SVector::<f64, 5>::from_column_slice(&q[3 * n..]);
-            let rate = nalgebra::SVector::<f64, 5>::from_column_slice(&v[3 * n..]);
-            for k in 0..machine.n_discs() {
-                let disc = machine.disc(k, &pose);
-                let below = disc.centre - nalgebra::Vector2::y() * disc.radius;
-                let speed = (machine.point_jacobian(k, &pose, &disc.centre) * rate).norm();
-                let turning = (machine.point_jacobian(k, &pose, &below) * rate).norm();
-                if speed.max(turning) >= options.speed {
-                    let cells = 1 + cell(disc.radius + options.distance);
-                    mark(disc.centre.x, disc.centre.y, cells.min(MOST_CELLS));
+        if let Some(machine) = scene.machine.as_deref() {
+            let own = (&q[COORDINATES * n..], &v[body_velocities(D) * n..]);
+            let mut jacobian = Vec::new();
+            for k in 0..machine.n_wheels() {
+                let wheel = machine.wheel(k, own.0);
+                let below = wheel.centre - axis(1) * wheel.radius;
+                let mut speed = |point| {
+                    let velocity = point_velocity(machine, k, own, point, &mut jacobian);
+                    velocity.norm()
+                };
+                if speed(&wheel.centre).max(speed(&below)) >= options.speed {
+                    let cells = 1 + marks.cell(wheel.radius + options.distance);
+                    marks.mark(&wheel.centre, cells.min(MOST_CELLS));
                 }
             }
         }
-        (0..n)
-            .map(|i| marked[place(cell(q[3 * i]), cell(q[3 * i + 1]))])
-            .collect()
+        (0..n).map(|i| marks.is_marked(&centre(i))).collect()
     }
 
     /// After a change of who sleeps: loads of those that fell asleep are put away, those of the woken given back to the warm start.
@@ -281,9 +281,9 @@ impl Sleep {
         &mut self,
         kinematic: &[bool],
         before: &[bool],
-        warm_start: &mut WarmStart<SoilKey>,
+        warm_start: &mut WarmStart<GrainKey>,
     ) {
-        let touches = |asleep: &[bool], key: &SoilKey| {
+        let touches = |asleep: &[bool], key: &GrainKey| {
             let sleeps = |body: u32| {
                 let body = body as usize;
                 body < kinematic.len() && asleep[body] && !kinematic[body]
@@ -291,7 +291,7 @@ impl Sleep {
             sleeps(key.a) || sleeps(key.b)
         };
         // What the step just did is newer than what was put away, but the load to wake at stays the one of falling asleep.
-        let mut all: Vec<(SoilKey, [f64; 3], bool)> = Vec::new();
+        let mut all: Vec<(GrainKey, [f64; 3], bool)> = Vec::new();
         all.extend(warm_start.impulses.iter().map(|(k, p)| (*k, *p, false)));
         all.extend(self.dormant.iter().map(|(k, p)| (*k, *p, true)));
         all.sort_by_key(|(key, _, is_dormant)| (*key, *is_dormant));
@@ -306,5 +306,62 @@ impl Sleep {
                 self.dormant.push((key, old.map_or(latest, |g| g.1)));
             }
         }
+    }
+}
+
+/// Cells of the side `distance`, folded into a table: a mover marks its own and those around it.
+struct Marks<const D: usize> {
+    distance: f64,
+    marked: Vec<bool>,
+}
+
+impl<const D: usize> Marks<D> {
+    fn new(n: usize, distance: f64) -> Self {
+        Self {
+            distance,
+            marked: vec![false; (4 * n).next_power_of_two().max(64)],
+        }
+    }
+
+    fn cell(&self, x: f64) -> i64 {
+        #[allow(clippy::cast_possible_truncation)] // saturates, and folds
+        let cell = (x / self.distance).floor() as i64;
+        cell
+    }
+
+    fn place(&self, cell: &[i64; D]) -> usize {
+        let mask = i64::try_from(self.marked.len()).unwrap_or(i64::MAX) - 1;
+        let mixed = cell.iter().rev().fold(0_i64, |mixed, cell| {
+            mixed.wrapping_mul(0x9E37_79B1).wrapping_add(*cell)
+        });
+        usize::try_from(mixed & mask).unwrap_or(0)
+    }
+
+    fn cell_of(&self, x: &SVector<f64, D>) -> [i64; D] {
+        std::array::from_fn(|k| self.cell(x[k]))
+    }
+
+    /// Marks the cell of `x` and those up to `cells` away along each axis.
+    fn mark(&mut self, x: &SVector<f64, D>, cells: i64) {
+        let side = 2 * cells + 1;
+        let count = (1..D).fold(side, |count, _| count.saturating_mul(side));
+        if count > MOST_MARKS {
+            self.marked.fill(true);
+            return;
+        }
+        let middle = self.cell_of(x);
+        for number in 0..count {
+            let (mut cell, mut rest) = (middle, number);
+            for cell in &mut cell {
+                *cell = cell.wrapping_add(rest % side - cells);
+                rest /= side;
+            }
+            let place = self.place(&cell);
+            self.marked[place] = true;
+        }
+    }
+
+    fn is_marked(&self, x: &SVector<f64, D>) -> bool {
+        self.marked[self.place(&self.cell_of(x))]
     }
 }

@@ -1,68 +1,84 @@
-//! The disks: radii and masses, and the factors of their diagonal mass matrix.
+//! The grains: radii and masses, and the factors of their diagonal mass matrix.
 
-use super::super::error::{LENGTHS, MASSES, within};
-use super::error::SoilError;
+use super::error::GrainError;
 use super::removal::Renumbering;
+use crate::quantity::{LENGTHS, MASSES, within};
 
-/// Most disks of a soil: some hundred megabytes.
-pub const MAX_DISKS: usize = 1_000_000;
+/// Most grains: some hundred megabytes.
+pub const MAX_GRAINS: usize = 1_000_000;
 
-/// Refuses more disks than a soil may have, before anything is allocated for them.
-pub(crate) fn check_count(count: usize) -> Result<(), SoilError> {
-    if count > MAX_DISKS {
-        return Err(SoilError::TooMany {
+/// Coordinates of a grain: (x, y, angle) of a disk; the centre of a ball, which looks the same from all sides. Their rates are the first of its
+/// velocities.
+pub const COORDINATES: usize = 3;
+
+/// A moment of inertia over m r²: of a solid disk, of a solid ball.
+const fn share_of_inertia(dimensions: usize) -> f64 {
+    if dimensions == 2 { 0.5 } else { 0.4 }
+}
+
+/// What a grain is called.
+pub(super) const fn noun(dimensions: usize) -> &'static str {
+    if dimensions == 2 { "disk" } else { "ball" }
+}
+
+/// Refuses more grains than there may be, before anything is allocated for them.
+pub(super) fn check_count<const D: usize>(count: usize) -> Result<(), GrainError> {
+    if count > MAX_GRAINS {
+        return Err(GrainError::TooMany {
+            noun: noun(D),
             count,
-            limit: MAX_DISKS,
+            limit: MAX_GRAINS,
         });
     }
     Ok(())
 }
 
-/// Solid disks, immutable: `J = m r²/2`. Some may be kinematic: nothing changes their velocity, as grains
+/// Solid disks (D = 2, `J = m r²/2`) or balls (D = 3, `J = 2 m r²/5`), immutable. Some may be kinematic: nothing changes their velocity, as grains
 /// glued to a rough floor or a piston.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Disks {
+pub struct Grains<const D: usize> {
     radius: Vec<f64>,
     mass: Vec<f64>,
     /// `1/√m`.
-    pub(crate) linear: Vec<f64>,
-    /// `r/√J = √(2/m)`.
-    pub(crate) angular: Vec<f64>,
+    pub(super) linear: Vec<f64>,
+    /// `r/√J`: `√(2/m)` of a disk, `√(5/(2m))` of a ball.
+    pub(super) angular: Vec<f64>,
     /// `√m`, `√J`.
-    pub(crate) roots: Vec<[f64; 2]>,
+    pub(super) roots: Vec<[f64; 2]>,
     kinematic: Vec<bool>,
     largest: f64,
     smallest: f64,
 }
 
-impl Disks {
+impl<const D: usize> Grains<D> {
     /// `radius` (n) in m, `mass` (n) in kg.
     ///
     /// # Errors
     /// None at all, another number of masses, an entry that is not finite and positive.
-    pub fn new(radius: Vec<f64>, mass: Vec<f64>) -> Result<Self, SoilError> {
+    pub fn new(radius: Vec<f64>, mass: Vec<f64>) -> Result<Self, GrainError> {
         if radius.is_empty() {
-            return Err(SoilError::Empty);
+            return Err(GrainError::Empty);
         }
         if mass.len() != radius.len() {
-            return Err(SoilError::Length {
+            return Err(GrainError::Length {
                 field: "mass",
                 expected: radius.len(),
                 count: mass.len(),
             });
         }
-        check_count(radius.len())?;
+        check_count::<D>(radius.len())?;
         for (name, values, range) in [("radius", &radius, LENGTHS), ("mass", &mass, MASSES)] {
             for (i, value) in values.iter().enumerate() {
                 within(|| format!("{name}[{i}]"), *value, range)?;
             }
         }
+        let share = share_of_inertia(D);
         let roots = radius.iter().zip(&mass);
         Ok(Self {
             linear: mass.iter().map(|m| 1.0 / m.sqrt()).collect(),
-            angular: mass.iter().map(|m| (2.0 / m).sqrt()).collect(),
+            angular: mass.iter().map(|m| (1.0 / share / m).sqrt()).collect(),
             roots: roots
-                .map(|(r, m)| [m.sqrt(), r * (0.5 * m).sqrt()])
+                .map(|(r, m)| [m.sqrt(), r * (share * m).sqrt()])
                 .collect(),
             largest: radius.iter().copied().fold(0.0, f64::max),
             smallest: radius.iter().copied().fold(f64::INFINITY, f64::min),
@@ -72,13 +88,13 @@ impl Disks {
         })
     }
 
-    /// The same disks, of which those marked (n) are kinematic: no weight and no contact changes their velocity.
+    /// The same grains, of which those marked (n) are kinematic: no weight and no contact changes their velocity.
     ///
     /// # Errors
     /// Another number of marks.
-    pub fn with_kinematic(self, kinematic: Vec<bool>) -> Result<Self, SoilError> {
+    pub fn with_kinematic(self, kinematic: Vec<bool>) -> Result<Self, GrainError> {
         if kinematic.len() != self.len() {
-            return Err(SoilError::Length {
+            return Err(GrainError::Length {
                 field: "kinematic",
                 expected: self.len(),
                 count: kinematic.len(),
@@ -88,18 +104,21 @@ impl Disks {
     }
 
     /// Those that stay.
-    pub(crate) fn without(&self, renumbering: &Renumbering) -> Result<Self, SoilError> {
+    ///
+    /// # Errors
+    /// None would be left.
+    pub fn without(&self, renumbering: &Renumbering) -> Result<Self, GrainError> {
         let [radius, mass] = [&self.radius, &self.mass].map(|all| renumbering.keep(all, 1));
         Self::new(radius, mass)?.with_kinematic(renumbering.keep(&self.kinematic, 1))
     }
 
-    /// Number of disks.
+    /// How many there are.
     #[must_use]
     pub fn len(&self) -> usize {
         self.radius.len()
     }
 
-    /// Never: a soil has at least one disk.
+    /// Never: there is at least one.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.radius.is_empty()
@@ -117,16 +136,16 @@ impl Disks {
         &self.mass
     }
 
-    /// Disks whose velocity nothing changes.
+    /// Whose velocity nothing changes.
     #[must_use]
     pub fn kinematic(&self) -> &[bool] {
         &self.kinematic
     }
 
-    /// `J = m r²/2` of disk i, kg m².
+    /// J of grain i, kg m².
     #[must_use]
     pub fn inertia(&self, i: usize) -> f64 {
-        0.5 * self.mass[i] * self.radius[i] * self.radius[i]
+        share_of_inertia(D) * self.mass[i] * self.radius[i] * self.radius[i]
     }
 
     /// Largest radius, m.

@@ -1,21 +1,22 @@
-//! Taking disks out of a running soil: the others keep their state, and each contact its impulse under its new name.
+//! Taking grains out of a running simulation: the others keep their state, and each contact its impulse under its new name.
 
-use super::contact::{SoilKey, WALL};
+use super::contact::{GrainKey, WALL};
 
-/// New numbers of bodies after disks were taken out; the order stays.
+/// New numbers of bodies after grains were taken out; the order stays.
 #[derive(Clone, Debug)]
-pub(crate) struct Renumbering {
-    /// New number of each disk (n), if it stays.
-    disks: Vec<Option<u32>>,
-    /// How many disks stay.
+pub struct Renumbering {
+    /// New number of each grain (n), if it stays.
+    grains: Vec<Option<u32>>,
+    /// How many grains stay.
     left: u32,
 }
 
 impl Renumbering {
-    /// Without the disks that are marked (n).
-    pub(crate) fn without(marked: &[bool]) -> Self {
+    /// Without the grains that are marked (n).
+    #[must_use]
+    pub fn without(marked: &[bool]) -> Self {
         let mut left = 0;
-        let disks = marked
+        let grains = marked
             .iter()
             .map(|is_taken| {
                 let number = left;
@@ -23,17 +24,19 @@ impl Renumbering {
                 (!is_taken).then_some(number)
             })
             .collect();
-        Self { disks, left }
+        Self { grains, left }
     }
 
-    /// How many disks stay.
-    pub(crate) fn left(&self) -> usize {
+    /// How many grains stay.
+    #[must_use]
+    pub fn left(&self) -> usize {
         self.left as usize
     }
 
     /// The same contact's new name, if both of its bodies stay.
-    pub(crate) fn key(&self, key: SoilKey) -> Option<SoilKey> {
-        Some(SoilKey {
+    #[must_use]
+    pub fn key(&self, key: GrainKey) -> Option<GrainKey> {
+        Some(GrainKey {
             a: self.body(key.a)?,
             b: self.body(key.b)?,
         })
@@ -43,18 +46,19 @@ impl Renumbering {
         if body >= WALL {
             return Some(body);
         }
-        match self.disks.get(body as usize) {
+        match self.grains.get(body as usize) {
             Some(number) => *number,
-            // Wheels are numbered after the disks.
-            #[allow(clippy::cast_possible_truncation)] // disks are numbered by u32
-            None => Some(body - self.disks.len() as u32 + self.left),
+            // Wheels are numbered after the grains.
+            #[allow(clippy::cast_possible_truncation)] // grains are numbered by u32
+            None => Some(body - self.grains.len() as u32 + self.left),
         }
     }
 
-    /// The rows (`width` entries each) of the disks that stay, and whatever follows them.
-    pub(crate) fn keep<T: Copy>(&self, rows: &[T], width: usize) -> Vec<T> {
-        let (own, rest) = rows.split_at(width * self.disks.len());
-        let kept = own.chunks_exact(width).zip(&self.disks);
+    /// The rows (`width` entries each) of the grains that stay, and whatever follows them.
+    #[must_use]
+    pub fn keep<T: Copy>(&self, rows: &[T], width: usize) -> Vec<T> {
+        let (own, rest) = rows.split_at(width * self.grains.len());
+        let kept = own.chunks_exact(width).zip(&self.grains);
         let mut out: Vec<T> = kept
             .filter(|(_, number)| number.is_some())
             .flat_map(|(row, _)| row.iter().copied())
@@ -72,7 +76,7 @@ mod tests {
     fn those_that_stay_move_up_and_walls_and_wheels_stay_what_they_are() {
         let renumbering = Renumbering::without(&[false, true, false, true]);
         assert_eq!(renumbering.left(), 2);
-        let key = |a, b| SoilKey { a, b };
+        let key = |a, b| GrainKey { a, b };
         assert_eq!(renumbering.key(key(0, 2)), Some(key(0, 1)));
         assert_eq!(renumbering.key(key(1, 2)), None);
         assert_eq!(renumbering.key(key(2, WALL + 3)), Some(key(1, WALL + 3)));

@@ -6,8 +6,9 @@
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
-use super::super::error::{LENGTHS, MASSES, PlanarError, within};
-use super::super::machine::{Disc, PlanarMachine, fingerprint};
+use super::error::PlanarError;
+use super::machine::{Disc, PlanarMachine, fingerprint};
+use crate::quantity::{LENGTHS, MASSES, within};
 
 /// A wheel of the test rig.
 #[derive(Clone, Copy, Debug, PartialEq)]

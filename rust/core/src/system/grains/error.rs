@@ -1,22 +1,24 @@
-//! Soils that cannot be.
+//! Grains that cannot be.
 
 use thiserror::Error;
 
-use super::super::error::PlanarError;
+use crate::quantity::QuantityError;
 
-/// A soil that cannot be built.
+/// Grains that cannot be.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
-pub enum SoilError {
+pub enum GrainError {
     /// A number that is not finite or of the wrong sign.
     #[error(transparent)]
-    Number(#[from] PlanarError),
-    /// No disk at all.
-    #[error("radius: needs at least one disk")]
+    Number(#[from] QuantityError),
+    /// No grain at all.
+    #[error("radius: needs at least one entry")]
     Empty,
-    /// More disks than a soil may have.
-    #[error("count: at most {limit} disks, are {count}")]
+    /// More grains than there may be.
+    #[error("count: at most {limit} {noun}s, are {count}")]
     TooMany {
+        /// What they are called.
+        noun: &'static str,
         /// How many there are, or would be.
         count: usize,
         /// How many there may be.
@@ -32,27 +34,29 @@ pub enum SoilError {
         /// How many there are.
         count: usize,
     },
-    /// Two disks in one place.
-    #[error("position[{second}]: overlaps disk {first}, their gap is {value} m")]
+    /// Two grains in one place.
+    #[error("position[{second}]: overlaps {noun} {first}, their gap is {value} m")]
     Overlap {
-        /// The disk of smaller number.
+        /// What they are called.
+        noun: &'static str,
+        /// The one of smaller number.
         first: usize,
         /// The other.
         second: usize,
         /// Their gap, m: negative.
         value: f64,
     },
-    /// A disk in a wall or in the ground.
-    #[error("position[{disk}]: reaches into {what}, the gap is {value} m")]
+    /// A grain in a wall or in the ground.
+    #[error("position[{grain}]: reaches into {what}, the gap is {value} m")]
     InWall {
-        /// Which disk.
-        disk: usize,
+        /// Which grain.
+        grain: usize,
         /// Which wall, in words.
         what: String,
         /// The gap, m: negative.
         value: f64,
     },
-    /// A wheel in a disk, a wall or the ground.
+    /// A wheel in a grain, a wall or the ground.
     #[error("machine: wheel {wheel} reaches into {what}, the gap is {value} m")]
     WheelIn {
         /// Which wheel.
@@ -62,9 +66,13 @@ pub enum SoilError {
         /// The gap, m: negative.
         value: f64,
     },
-    /// Too few places for the disks that were asked for.
-    #[error("width: {value} m leaves no room for a disk of {needed} m")]
+    /// No place for a grain between the sides.
+    #[error("{field}: {value} m leaves no room for a {noun} of {needed} m")]
     TooNarrow {
+        /// Name of the argument.
+        field: &'static str,
+        /// What a grain is called.
+        noun: &'static str,
         /// m.
         value: f64,
         /// m.
@@ -76,24 +84,23 @@ pub enum SoilError {
         /// m.
         value: f64,
     },
-    /// A soil without a machine cannot drive.
+    /// Where there is no machine, none can drive.
     #[error("machine: the scene has none")]
     NoMachine,
 }
 
-impl SoilError {
+impl GrainError {
     /// Name of the argument that is wrong.
     #[must_use]
     pub fn field(&self) -> String {
         match self {
-            Self::Number(number) => number.field(),
+            Self::Number(number) => number.field().to_owned(),
             Self::Empty => "radius".to_owned(),
             Self::TooMany { .. } => "count".to_owned(),
-            Self::Length { field, .. } => (*field).to_owned(),
+            Self::Length { field, .. } | Self::TooNarrow { field, .. } => (*field).to_owned(),
             Self::Overlap { second, .. } => format!("position[{second}]"),
-            Self::InWall { disk, .. } => format!("position[{disk}]"),
+            Self::InWall { grain, .. } => format!("position[{grain}]"),
             Self::WheelIn { .. } | Self::NoMachine => "machine".to_owned(),
-            Self::TooNarrow { .. } => "width".to_owned(),
             Self::Range { .. } => "radius_max".to_owned(),
         }
     }

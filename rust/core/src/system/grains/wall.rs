@@ -1,22 +1,23 @@
-//! A straight wall: disks stay on one side of it.
+//! A straight wall: grains stay on one side of it.
 
-use nalgebra::Vector2;
+use nalgebra::SVector;
 
-use super::super::error::{PLACES, PlanarError, within};
+use crate::quantity::{PLACES, QuantityError, within};
+use crate::spatial::space::axis;
 
-/// The half-plane `n · x ≥ offset` is free.
+/// The half-plane or half-space `n · x ≥ offset` is free.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wall {
-    n: Vector2<f64>,
+pub struct Wall<const D: usize> {
+    n: SVector<f64, D>,
     offset: f64,
 }
 
-impl Wall {
+impl<const D: usize> Wall<D> {
     /// Through `point` (m), with `normal` (any length) pointing to the free side.
     ///
     /// # Errors
     /// An entry that is not finite, a normal of no length.
-    pub fn new(point: Vector2<f64>, normal: Vector2<f64>) -> Result<Self, PlanarError> {
+    pub fn new(point: SVector<f64, D>, normal: SVector<f64, D>) -> Result<Self, QuantityError> {
         for (name, vector) in [("point", &point), ("normal", &normal)] {
             for (k, value) in vector.iter().enumerate() {
                 within(|| format!("{name}[{k}]"), *value, PLACES)?;
@@ -24,7 +25,7 @@ impl Wall {
         }
         let length = normal.norm();
         if !(length > 0.0 && length.is_finite()) {
-            return Err(PlanarError::NotPositive {
+            return Err(QuantityError::NotPositive {
                 field: "normal".to_owned(),
                 value: length,
             });
@@ -40,7 +41,7 @@ impl Wall {
     #[must_use]
     pub fn floor(y: f64) -> Self {
         Self {
-            n: Vector2::y(),
+            n: axis(1),
             offset: y,
         }
     }
@@ -49,7 +50,7 @@ impl Wall {
     #[must_use]
     pub fn left(x: f64) -> Self {
         Self {
-            n: Vector2::x(),
+            n: axis(0),
             offset: x,
         }
     }
@@ -58,14 +59,14 @@ impl Wall {
     #[must_use]
     pub fn right(x: f64) -> Self {
         Self {
-            n: -Vector2::x(),
+            n: -axis(0),
             offset: -x,
         }
     }
 
     /// Unit normal, to the free side.
     #[must_use]
-    pub fn n(&self) -> Vector2<f64> {
+    pub fn n(&self) -> SVector<f64, D> {
         self.n
     }
 
@@ -78,7 +79,7 @@ impl Wall {
     /// Signed distance of a point, m.
     #[inline]
     #[must_use]
-    pub fn distance(&self, x: f64, y: f64) -> f64 {
-        self.n.x * x + self.n.y * y - self.offset
+    pub fn distance(&self, point: &SVector<f64, D>) -> f64 {
+        self.n.dot(point) - self.offset
     }
 }

@@ -1,0 +1,24 @@
+//! A ground of any shape, as a round body meets it.
+
+use std::fmt::Debug;
+
+use nalgebra::SVector;
+
+/// A point of the ground that faces the centre of a round body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facing<const D: usize> {
+    /// The point, m.
+    pub foot: SVector<f64, D>,
+    /// Unit normal, out of the ground.
+    pub n: SVector<f64, D>,
+    /// Signed distance of the centre from the ground along n, m; negative inside.
+    pub distance: f64,
+}
+
+/// A ground that carries round bodies. Immutable, shared between threads.
+pub trait Support<const D: usize>: Debug + Send + Sync {
+    /// Appends the points that face `centre` at a distance of at most `reach` (m), in an order that a small motion does not change.
+    ///
+    /// Each is nearest among its neighbours; from inside the ground only the nearest of all counts, at any depth.
+    fn facing(&self, centre: &SVector<f64, D>, reach: f64, out: &mut Vec<Facing<D>>);
+}

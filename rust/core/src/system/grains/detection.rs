@@ -1,0 +1,275 @@
+//! Which bodies may touch within a step, and how their gaps change.
+
+use nalgebra::SVector;
+
+use super::bodies::COORDINATES;
+use super::contact::{GROUND, GrainContact, GrainKey, WALL};
+use super::grid::Grid;
+use super::machine::point_velocity;
+use super::system::GrainSystem;
+use crate::contact::Activation;
+use crate::problem::BodyPairs;
+use crate::solver::Swept;
+use crate::spatial::space::{axis, body_velocities, dot, length};
+
+/// Gap up to which a pair is taken as a contact though it is not forecast to close, as a share of the smallest radius: its neighbours may push it.
+const SKIN: f64 = 0.01;
+
+/// Largest such gap, as a share of the smallest radius: a blow that throws farther in one step is a step that is too long.
+const FARTHEST_SKIN: f64 = 0.2;
+
+/// A grain near a round body.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Neighbour<const D: usize> {
+    index: u32,
+    gap: f64,
+    /// From its centre to the body's, m.
+    between: [f64; D],
+}
+
+/// A round body as detection sees it.
+#[derive(Clone, Copy)]
+struct Seeker<const D: usize> {
+    /// Its name.
+    a: u32,
+    centre: SVector<f64, D>,
+    radius: f64,
+    velocity: SVector<f64, D>,
+}
+
+/// How near is near enough: a contact is what may close within the step, or comes within the skin.
+#[derive(Clone, Copy)]
+struct Rule {
+    reach: f64,
+    lead: f64,
+    skin: f64,
+}
+
+impl Rule {
+    #[inline]
+    fn admits(&self, gap: f64, u_N: f64) -> bool {
+        gap + self.lead * u_N.min(0.0) <= self.skin
+    }
+}
+
+/// Finds grains near a round body of number above `after`, in the order of their numbers.
+#[inline]
+fn gather<const D: usize>(
+    grid: &Grid<D>,
+    seeker: &Seeker<D>,
+    reach: f64,
+    largest: f64,
+    after: Option<u32>,
+    found: &mut Vec<Neighbour<D>>,
+) {
+    found.clear();
+    let centre: [f64; D] = seeker.centre.into();
+    let radius = seeker.radius;
+    grid.near(&centre, radius + largest + reach, |item| {
+        if after.is_some_and(|i| item.index <= i) {
+            return;
+        }
+        let mut between = [0.0; D];
+        for k in 0..D {
+            between[k] = centre[k] - item.centre[k];
+        }
+        let square = dot(&between, &between);
+        let limit = radius + item.radius + reach;
+        if square <= limit * limit {
+            let distance = square.sqrt();
+            found.push(Neighbour {
+                index: item.index,
+                gap: distance - radius - item.radius,
+                between,
+            });
+        }
+    });
+    found.sort_unstable_by_key(|neighbour| neighbour.index);
+}
+
+/// Unit vector along `x`; up where there is no direction.
+#[inline]
+fn direction<const D: usize>(x: &[f64; D]) -> SVector<f64, D> {
+    let length = length(x);
+    if length > 0.0 {
+        SVector::from_fn(|k, _| x[k] / length)
+    } else {
+        axis(1)
+    }
+}
+
+impl<const D: usize> Seeker<D> {
+    /// The contact with what faces it along −n.
+    #[inline]
+    fn contact(&self, b: u32, n: SVector<f64, D>, gap: f64) -> GrainContact<D> {
+        GrainContact {
+            key: GrainKey { a: self.a, b },
+            n,
+            point: self.centre - n * self.radius,
+            gap,
+            gap_start: gap,
+        }
+    }
+}
+
+/// The first D entries.
+#[inline]
+fn head<const D: usize>(x: &[f64]) -> SVector<f64, D> {
+    SVector::from_column_slice(&x[..D])
+}
+
+impl<const D: usize> GrainSystem<'_, D>
+where
+    BodyPairs<D>: Swept<D>,
+{
+    /// See [`crate::integrator::MechanicalSystem::detect`].
+    pub(super) fn find_contacts(
+        &mut self,
+        v: &[f64],
+        activation: Activation,
+        out: &mut Vec<GrainContact<D>>,
+    ) {
+        out.clear();
+        let (n, V) = (self.n(), body_velocities(D));
+        let q = std::mem::take(&mut self.parts.middle);
+        let mut found = std::mem::take(&mut self.parts.found);
+        let mut grid = std::mem::take(&mut self.parts.grid);
+        let scene = self.scene;
+        let (radius, largest) = (scene.grains.radius(), scene.grains.largest());
+        let lead = activation.lead.abs();
+        let sum = |x: &[f64]| x[1..].iter().fold(x[0].abs(), |sum, x| sum + x.abs());
+        let mut fastest = v[..V * n]
+            .chunks_exact(V)
+            .zip(radius)
+            .map(|(v, r)| sum(&v[..D]) + r * sum(&v[D..]))
+            .fold(0.0, f64::max);
+        let mut wheels = Vec::new();
+        if let Some(machine) = scene.machine.as_deref() {
+            let own = (scene.machine_coordinates(&q), scene.machine_velocities(v));
+            #[allow(clippy::cast_possible_truncation)] // grains are numbered by u32
+            for (k, a) in (0..machine.n_wheels()).zip(n as u32..) {
+                let wheel = machine.wheel(k, own.0);
+                let jacobian = &mut self.parts.machine.jacobian;
+                let velocity = point_velocity(machine, k, own, &wheel.centre, jacobian);
+                fastest = fastest.max(velocity.norm());
+                wheels.push(Seeker {
+                    a,
+                    centre: wheel.centre,
+                    radius: wheel.radius,
+                    velocity,
+                });
+            }
+        }
+        // What the fastest can be thrown at within the step is a contact too, though it comes no nearer yet.
+        let smallest = scene.grains.smallest();
+        let skin = (SKIN * smallest)
+            .max(lead * fastest)
+            .min(FARTHEST_SKIN * smallest);
+        let skin = skin.max(activation.hover);
+        // Two bodies close by at most twice that; farther than a diameter nobody looks (a step that long is too long).
+        let reach = (skin + 2.0 * lead * fastest).min(2.0 * largest);
+        let rule = Rule { reach, lead, skin };
+        grid.fill(&q, radius, 2.0 * largest + reach);
+        #[allow(clippy::cast_possible_truncation)] // grains are numbered by u32
+        for i in 0..n as u32 {
+            let k = i as usize;
+            let seeker = Seeker {
+                a: i,
+                centre: head(&q[COORDINATES * k..]),
+                radius: radius[k],
+                velocity: head(&v[V * k..]),
+            };
+            let sleeps = self.asleep[k];
+            gather(&grid, &seeker, reach, largest, Some(i), &mut found);
+            let met = found
+                .iter()
+                .filter(|other| !(sleeps && self.asleep[other.index as usize]));
+            meet_grains(&seeker, met, v, &rule, out);
+            if !sleeps {
+                self.meet_fixed(&seeker, &rule, out);
+            }
+        }
+        for seeker in &wheels {
+            gather(&grid, seeker, reach, largest, None, &mut found);
+            meet_grains(seeker, found.iter(), v, &rule, out);
+            self.meet_fixed(seeker, &rule, out);
+        }
+        self.parts.middle = q;
+        self.parts.found = found;
+        self.parts.grid = grid;
+    }
+
+    /// Adds the contacts of a round body with walls and ground.
+    fn meet_fixed(&mut self, seeker: &Seeker<D>, rule: &Rule, out: &mut Vec<GrainContact<D>>) {
+        let mut push = |b: u32, n: SVector<f64, D>, gap: f64| {
+            if rule.admits(gap, n.dot(&seeker.velocity)) {
+                out.push(seeker.contact(b, n, gap));
+            }
+        };
+        for (k, wall) in (WALL..).zip(&self.scene.walls) {
+            let gap = wall.distance(&seeker.centre) - seeker.radius;
+            if gap <= rule.reach {
+                push(k, wall.n(), gap);
+            }
+        }
+        if let Some(ground) = &self.scene.ground {
+            let facing = &mut self.parts.facing;
+            facing.clear();
+            ground.facing(&seeker.centre, seeker.radius + rule.reach, facing);
+            for (k, facing) in (GROUND..).zip(&*facing) {
+                push(k, facing.n, facing.distance - seeker.radius);
+            }
+        }
+    }
+
+    /// Frames stay where the step begins; the gap becomes the one that the velocities before the step lead to.
+    pub(super) fn forecast_gaps(&self, contacts: &mut [GrainContact<D>]) {
+        let n = self.n();
+        let (middle, end) = (&self.parts.middle, &self.parts.end);
+        let scene = self.scene;
+        let wheels: Vec<SVector<f64, D>> =
+            scene.machine.as_ref().map_or_else(Vec::new, |machine| {
+                let (from, to) = (
+                    scene.machine_coordinates(middle),
+                    scene.machine_coordinates(end),
+                );
+                let moved = |k| machine.wheel(k, to).centre - machine.wheel(k, from).centre;
+                (0..machine.n_wheels()).map(moved).collect()
+            });
+        let moved = |body: u32| {
+            let body = body as usize;
+            if body < n {
+                let k = COORDINATES * body;
+                head::<D>(&end[k..]) - head::<D>(&middle[k..])
+            } else {
+                wheels.get(body - n).copied().unwrap_or_else(SVector::zeros)
+            }
+        };
+        for contact in contacts {
+            let mut motion = moved(contact.key.a);
+            if contact.is_with_grain() {
+                motion -= moved(contact.key.b);
+            }
+            contact.gap = contact.gap_start + contact.n.dot(&motion);
+        }
+    }
+}
+
+/// Adds the contacts of a round body with its neighbours.
+#[inline]
+fn meet_grains<'a, const D: usize>(
+    seeker: &Seeker<D>,
+    found: impl Iterator<Item = &'a Neighbour<D>>,
+    v: &[f64],
+    rule: &Rule,
+    out: &mut Vec<GrainContact<D>>,
+) {
+    for other in found {
+        let n = direction(&other.between);
+        let theirs = head::<D>(&v[body_velocities(D) * other.index as usize..]);
+        let u_N = n.dot(&(seeker.velocity - theirs));
+        if rule.admits(other.gap, u_N) {
+            out.push(seeker.contact(other.index, n, other.gap));
+        }
+    }
+}

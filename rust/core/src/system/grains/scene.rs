@@ -1,0 +1,247 @@
+//! What there is: grains, walls, a ground, a machine, and how rough they are.
+
+use std::sync::Arc;
+
+use nalgebra::SVector;
+
+use super::bodies::{COORDINATES, Grains, noun};
+use super::error::GrainError;
+use super::grid::Grid;
+use super::machine::Machine;
+use super::wall::Wall;
+use crate::geometry::{Facing, Support};
+use crate::multibody::fingerprint;
+use crate::quantity::{QuantityError, finite};
+use crate::spatial::space::{body_velocities, length};
+
+/// Coulomb's μ of each kind of contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GrainFriction {
+    /// Between grains. Default 0.5, the original's.
+    pub grains: f64,
+    /// Grains against walls and ground. Default 0.5.
+    pub walls: f64,
+    /// Wheels against grains, walls and ground. Default 0.9, the original's.
+    pub wheels: f64,
+}
+
+impl Default for GrainFriction {
+    fn default() -> Self {
+        Self {
+            grains: 0.5,
+            walls: 0.5,
+            wheels: 0.9,
+        }
+    }
+}
+
+impl GrainFriction {
+    /// # Errors
+    /// A coefficient that is not finite or negative.
+    fn check(&self) -> Result<(), QuantityError> {
+        for (field, value) in [
+            ("friction", self.grains),
+            ("wall_friction", self.walls),
+            ("wheel_friction", self.wheels),
+        ] {
+            if finite(field, value)? < 0.0 {
+                return Err(QuantityError::Negative {
+                    field: field.to_owned(),
+                    value,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Grains and what is among them, immutable.
+#[derive(Clone, Debug)]
+pub struct GrainScene<const D: usize> {
+    /// The grains.
+    pub grains: Grains<D>,
+    /// Straight walls.
+    pub walls: Vec<Wall<D>>,
+    /// A ground of any shape.
+    pub ground: Option<Arc<dyn Support<D>>>,
+    /// What drives.
+    pub machine: Option<Arc<dyn Machine<D>>>,
+    /// μ.
+    pub friction: GrainFriction,
+}
+
+/// How far bodies may overlap at the start, as a share of the smallest radius: rounding of a state that was written to a file.
+pub const OVERLAP: f64 = 0.01;
+
+impl<const D: usize> GrainScene<D> {
+    /// Number of velocities.
+    #[must_use]
+    pub fn nv(&self) -> usize {
+        body_velocities(D) * self.grains.len() + self.machine.as_ref().map_or(0, |m| m.nv())
+    }
+
+    /// Number of coordinates.
+    #[must_use]
+    pub fn nq(&self) -> usize {
+        COORDINATES * self.grains.len() + self.machine.as_ref().map_or(0, |m| m.nv())
+    }
+
+    /// Coordinates of the machine among all (nq).
+    #[must_use]
+    pub fn machine_coordinates<'q>(&self, q: &'q [f64]) -> &'q [f64] {
+        &q[COORDINATES * self.grains.len()..]
+    }
+
+    /// Velocities of the machine among all (nv).
+    #[must_use]
+    pub fn machine_velocities<'v>(&self, v: &'v [f64]) -> &'v [f64] {
+        &v[body_velocities(D) * self.grains.len()..]
+    }
+
+    /// A number that two scenes share only if their grains and their machine do: what a snapshot belongs to.
+    #[must_use]
+    pub fn fingerprint(&self) -> u64 {
+        let grains = &self.grains;
+        let numbers = grains.radius().iter().chain(grains.mass()).copied();
+        let kinematic = grains.kinematic().iter().map(|k| f64::from(u8::from(*k)));
+        let machine = self.machine.as_ref().map_or(0, |m| m.fingerprint());
+        let kind = if D == 2 { "soil" } else { "balls" };
+        let numbers = numbers
+            .chain(kinematic)
+            .flat_map(|x| x.to_bits().to_le_bytes());
+        fingerprint(kind.bytes().chain(numbers)) ^ machine.rotate_left(1)
+    }
+
+    /// Checks what the types do not.
+    ///
+    /// # Errors
+    /// A friction coefficient that is not finite or negative.
+    pub fn check(&self) -> Result<(), GrainError> {
+        Ok(self.friction.check()?)
+    }
+
+    /// Checks a configuration (nq): finite, and nothing deeper in anything than [`OVERLAP`] of the smallest radius. Kinematic grains may
+    /// overlap one another and walls.
+    ///
+    /// # Errors
+    /// The first entry that is wrong, the first overlap.
+    pub fn check_configuration(&self, q: &[f64]) -> Result<(), GrainError> {
+        let n = self.grains.len();
+        let (radius, kinematic) = (self.grains.radius(), self.grains.kinematic());
+        if q.len() != self.nq() {
+            return Err(GrainError::Length {
+                field: "position",
+                expected: self.nq(),
+                count: q.len(),
+            });
+        }
+        self.check_finite("position", "machine", q, COORDINATES)?;
+        let allowed = -OVERLAP * self.grains.smallest();
+        let mut grid = Grid::<D>::default();
+        grid.fill(q, radius, 2.0 * self.grains.largest());
+        let mut facing = Vec::new();
+        for (i, grain) in q.chunks_exact(COORDINATES).take(n).enumerate() {
+            let centre = SVector::<f64, D>::from_fn(|k, _| grain[k]);
+            let mut worst: Option<(usize, f64)> = None;
+            grid.near(&centre.into(), 2.0 * self.grains.largest(), |item| {
+                let j = item.index as usize;
+                let gap = apart(&item.centre, &centre) - radius[i] - item.radius;
+                let may_overlap = kinematic[i] && kinematic[j];
+                if j > i && !may_overlap && gap < worst.map_or(allowed, |w| w.1) {
+                    worst = Some((j, gap));
+                }
+            });
+            if let Some((second, value)) = worst {
+                return Err(GrainError::Overlap {
+                    noun: noun(D),
+                    first: i,
+                    second,
+                    value,
+                });
+            }
+            if kinematic[i] {
+                continue;
+            }
+            let found = self.deepest_fixed(&centre, radius[i], &mut facing);
+            if let Some((what, value)) = found.filter(|(_, gap)| *gap < allowed) {
+                return Err(GrainError::InWall {
+                    grain: i,
+                    what,
+                    value,
+                });
+            }
+        }
+        let Some(machine) = &self.machine else {
+            return Ok(());
+        };
+        let own = self.machine_coordinates(q);
+        for wheel in 0..machine.n_wheels() {
+            let disc = machine.wheel(wheel, own);
+            let mut found = self.deepest_fixed(&disc.centre, disc.radius, &mut facing);
+            let reach = disc.radius + self.grains.largest();
+            grid.near(&disc.centre.into(), reach, |item| {
+                let gap = apart(&item.centre, &disc.centre) - disc.radius - item.radius;
+                if gap < found.as_ref().map_or(0.0, |f| f.1) {
+                    found = Some((format!("{} {}", noun(D), item.index), gap));
+                }
+            });
+            if let Some((what, value)) = found.filter(|(_, gap)| *gap < allowed) {
+                return Err(GrainError::WheelIn { wheel, what, value });
+            }
+        }
+        Ok(())
+    }
+
+    /// Names the first entry that is not finite: of a grain, with `width` entries each, or of the machine.
+    ///
+    /// # Errors
+    /// That entry.
+    pub fn check_finite(
+        &self,
+        of_grain: &str,
+        of_machine: &str,
+        values: &[f64],
+        width: usize,
+    ) -> Result<(), GrainError> {
+        let own = width * self.grains.len();
+        if let Some(k) = values.iter().position(|x| !x.is_finite()) {
+            let field = if k < own {
+                format!("{of_grain}[{}]", k / width)
+            } else {
+                format!("{of_machine}[{}]", k - own)
+            };
+            finite(&field, values[k])?;
+        }
+        Ok(())
+    }
+
+    /// The wall, or the ground, that a round body is deepest in: its name and the gap.
+    fn deepest_fixed(
+        &self,
+        centre: &SVector<f64, D>,
+        radius: f64,
+        facing: &mut Vec<Facing<D>>,
+    ) -> Option<(String, f64)> {
+        let walls = self.walls.iter().enumerate().map(|(k, wall)| {
+            let gap = wall.distance(centre) - radius;
+            (format!("wall {k}"), gap)
+        });
+        facing.clear();
+        if let Some(ground) = &self.ground {
+            ground.facing(centre, radius, facing);
+        }
+        let ground = facing
+            .iter()
+            .map(|f| ("the ground".to_owned(), f.distance - radius));
+        walls.chain(ground).min_by(|(_, a), (_, b)| a.total_cmp(b))
+    }
+}
+
+/// Distance of two centres, m.
+pub(super) fn apart<const D: usize>(a: &[f64; D], b: &SVector<f64, D>) -> f64 {
+    let mut between = [0.0; D];
+    for k in 0..D {
+        between[k] = a[k] - b[k];
+    }
+    length(&between)
+}

@@ -1,0 +1,460 @@
+//! Grains as a [`MechanicalSystem`]: a diagonal mass matrix, contacts between pairs of bodies, and a machine with a dense one.
+
+use std::sync::OnceLock;
+
+use nalgebra::SVector;
+
+use super::bodies::COORDINATES;
+use super::contact::{GrainContact, GrainKey, WALL};
+use super::detection::Neighbour;
+use super::grid::Grid;
+use super::machine::{Machine, MachineParts};
+use super::scene::GrainScene;
+use crate::contact::Activation;
+use crate::geometry::Facing;
+use crate::integrator::{MechanicalSystem, Start, StepOptions};
+use crate::problem::{
+    BlockSparseDelassus, BodyPairs, Dimension, FrictionContactProblem, RoundPair,
+};
+use crate::solver::{
+    ManyBodies, SolveReport, SolverOptions, SolverWorkspace, Swept, solve_many_bodies,
+};
+use crate::spatial::space::body_velocities;
+
+/// A place that holds nothing that moves: c = s = 0 there.
+const NOWHERE: u32 = 0;
+
+/// Matrices of a step: scratch.
+#[derive(Debug, Default)]
+pub struct GrainParts<const D: usize> {
+    pub(super) middle: Vec<f64>,
+    pub(super) end: Vec<f64>,
+    pub(super) grid: Grid<D>,
+    pub(super) found: Vec<Neighbour<D>>,
+    pub(super) facing: Vec<Facing<D>>,
+    pub(super) pairs: BodyPairs<D>,
+    pub(super) machine: MachineParts,
+    /// W, made where it is asked for.
+    operator: OnceLock<BlockSparseDelassus>,
+}
+
+impl<const D: usize> Clone for GrainParts<D> {
+    /// Scratch is not worth copying.
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl<const D: usize> GrainParts<D> {
+    /// The last step's contacts as pairs of bodies.
+    #[must_use]
+    pub fn pairs(&self) -> &BodyPairs<D> {
+        &self.pairs
+    }
+
+    /// The operator W of the last step's contacts, block by block, 1/kg.
+    pub fn operator(&self) -> &BlockSparseDelassus {
+        self.operator.get_or_init(|| self.pairs.operator())
+    }
+}
+
+/// Grains, with what acts on them in a step.
+#[derive(Debug)]
+pub struct GrainSystem<'a, const D: usize> {
+    /// The description.
+    pub scene: &'a GrainScene<D>,
+    /// Which grains sleep (n): they have no velocity and stay where they are, whatever touches them.
+    pub asleep: &'a [bool],
+    /// Torques of the machine, N m.
+    pub inputs: &'a [f64],
+    /// A force at the machine's first D coordinates, N.
+    pub pull: SVector<f64, D>,
+    /// Its scratch.
+    pub parts: &'a mut GrainParts<D>,
+}
+
+/// Velocity of the rim of a grain that faces along ∓n, in the contact's frame: `r` is negative where n points away from it.
+///
+/// In the plane `v + ω r t`; in space `v − r ω × n`.
+#[inline]
+fn add_rim_velocity<const D: usize>(
+    v: &[f64],
+    r: f64,
+    n: &SVector<f64, D>,
+    sign: f64,
+    sum: &mut SVector<f64, D>,
+) {
+    let mut rim = *n;
+    if D == 2 {
+        rim[0] = v[0] + v[2] * r * n[1];
+        rim[1] = v[1] - v[2] * r * n[0];
+    } else {
+        let spin = &v[D..];
+        for k in 0..D {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            rim[k] = v[k] - r * (spin[i] * n[j] - spin[j] * n[i]);
+        }
+    }
+    *sum += rim * sign;
+}
+
+impl<const D: usize> GrainSystem<'_, D> {
+    /// How many grains.
+    pub(super) fn n(&self) -> usize {
+        self.scene.grains.len()
+    }
+
+    /// μ of a contact.
+    fn friction_of(&self, key: GrainKey) -> f64 {
+        let friction = &self.scene.friction;
+        if key.a as usize >= self.n() {
+            friction.wheels
+        } else if key.b >= WALL {
+            friction.walls
+        } else {
+            friction.grains
+        }
+    }
+
+    /// Divides an impulse by the roots of the diagonal.
+    fn divide_by_roots(&self, y: &mut [f64]) {
+        let rows = y.chunks_exact_mut(body_velocities(D));
+        for (y, [m, J]) in rows.zip(&self.scene.grains.roots) {
+            for y in &mut y[..D] {
+                *y /= m;
+            }
+            for y in &mut y[D..] {
+                *y /= J;
+            }
+        }
+    }
+}
+
+/// Two or three components.
+const fn dimension(dimensions: usize) -> Dimension {
+    if dimensions == 2 {
+        Dimension::Two
+    } else {
+        Dimension::Three
+    }
+}
+
+/// Its energy is not audited: frames stay where the step begins and grains have no gyroscopic terms, so that a step with θ ≥ ½ is passive by
+/// construction.
+impl<const D: usize> MechanicalSystem for GrainSystem<'_, D>
+where
+    BodyPairs<D>: Swept<D>,
+{
+    /// [`COORDINATES`] of each grain, then the machine's, m and rad.
+    type Configuration = Vec<f64>;
+    type Contact = GrainContact<D>;
+
+    const DIMENSION: Dimension = dimension(D);
+
+    fn nv(&self) -> usize {
+        self.scene.nv()
+    }
+
+    fn set_moved(&self, from: &Vec<f64>, v: &[f64], h: f64, to: &mut Vec<f64>) {
+        to.clone_from(from);
+        self.advance(to, v, h);
+    }
+
+    fn advance(&self, q: &mut Vec<f64>, v: &[f64], h: f64) {
+        let (n, V) = (self.n(), body_velocities(D));
+        let (grains, machine) = q.split_at_mut(COORDINATES * n);
+        let (of_grains, of_machine) = v.split_at(V * n);
+        let rows = grains.chunks_exact_mut(COORDINATES);
+        for (q, v) in rows.zip(of_grains.chunks_exact(V)) {
+            for (q, v) in q.iter_mut().zip(v) {
+                *q += h * v;
+            }
+        }
+        for (q, v) in machine.iter_mut().zip(of_machine) {
+            *q += h * v;
+        }
+    }
+
+    fn is_finite(&self, q: &Vec<f64>) -> bool {
+        q.iter().all(|x| x.is_finite())
+    }
+
+    fn place_middle(&mut self, q: &Vec<f64>) {
+        self.parts.middle.clone_from(q);
+    }
+
+    fn place_end(&mut self, q: &Vec<f64>) {
+        self.parts.end.clone_from(q);
+    }
+
+    fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<GrainContact<D>>) {
+        self.find_contacts(v, activation, out);
+    }
+
+    fn relocate(&mut self, contacts: &mut [GrainContact<D>]) {
+        self.forecast_gaps(contacts);
+    }
+
+    fn friction_coefficient(&self, _options: &StepOptions, contact: &GrainContact<D>) -> f64 {
+        self.friction_of(contact.key)
+    }
+
+    fn update_mass_matrix(&mut self, _options: &StepOptions) {
+        if let Some(machine) = self.scene.machine.as_deref() {
+            let GrainParts {
+                middle,
+                machine: own,
+                ..
+            } = &mut *self.parts;
+            own.set_mass(machine, self.scene.machine_coordinates(middle));
+        }
+    }
+
+    fn factorise(&mut self, _options: &StepOptions) -> bool {
+        self.scene.machine.is_none() || self.parts.machine.factorise()
+    }
+
+    fn multiply_mass(&self, v: &[f64], out: &mut [f64]) {
+        let V = body_velocities(D);
+        let rows = v.chunks_exact(V).zip(out.chunks_exact_mut(V));
+        for ((v, out), [m, J]) in rows.zip(&self.scene.grains.roots) {
+            for k in 0..V {
+                let root = if k < D { m } else { J };
+                out[k] = root * root * v[k];
+            }
+        }
+        if self.scene.machine.is_some() {
+            let rate = self.scene.machine_velocities(v);
+            self.parts
+                .machine
+                .multiply_mass(rate, &mut out[V * self.n()..]);
+        }
+    }
+
+    fn load(
+        &mut self,
+        options: &StepOptions,
+        _start: Start<'_, Vec<f64>>,
+        v_mean: &[f64],
+        y: &mut [f64],
+    ) {
+        let (h, V) = (options.time_step, body_velocities(D));
+        let gravity = &options.gravity;
+        let masses = self.scene.grains.mass().iter().zip(self.asleep);
+        for (y, (m, sleeps)) in y.chunks_exact_mut(V).zip(masses) {
+            let m = if *sleeps { 0.0 } else { *m };
+            for k in 0..D {
+                y[k] = h * m * gravity[k];
+            }
+            y[D..].fill(0.0);
+        }
+        if let Some(machine) = &self.scene.machine {
+            let pose = self.scene.machine_coordinates(&self.parts.middle);
+            let rate = self.scene.machine_velocities(v_mean);
+            let force = &mut y[V * self.n()..];
+            machine.force(pose, rate, gravity, self.inputs, force);
+            for (force, pull) in force.iter_mut().zip(&self.pull) {
+                *force += pull;
+            }
+            for force in force {
+                *force *= h;
+            }
+        }
+    }
+
+    fn half_solve(&self, y: &mut [f64]) {
+        self.divide_by_roots(y);
+        if self.scene.machine.is_some() {
+            let at = body_velocities(D) * self.n();
+            self.parts.machine.forward(&mut y[at..]);
+        }
+    }
+
+    fn half_solve_back(&self, y: &mut [f64]) {
+        self.divide_by_roots(y);
+        if self.scene.machine.is_some() {
+            let at = body_velocities(D) * self.n();
+            self.parts.machine.backward(&mut y[at..]);
+        }
+    }
+
+    fn assemble(&mut self, contacts: &[GrainContact<D>], v: &[f64], u: &mut [f64]) {
+        let (n, V) = (self.n(), body_velocities(D));
+        let scene = self.scene;
+        let machine = scene.machine.as_deref();
+        let GrainParts {
+            middle,
+            pairs,
+            machine: own,
+            operator,
+            ..
+        } = &mut *self.parts;
+        let pose = scene.machine_coordinates(middle);
+        pairs.clear(machine.map_or(0, Machine::nv), V * n, scene.nv());
+        own.clear_rows();
+        operator.take();
+        let asleep = self.asleep;
+        #[allow(clippy::cast_possible_truncation)] // 3 or 6
+        let side = |body: u32| {
+            let i = body as usize;
+            if i < n && !asleep[i] {
+                let (c, s) = (scene.grains.linear[i], scene.grains.angular[i]);
+                (V as u32 * body, c, s)
+            } else {
+                (NOWHERE, 0.0, 0.0)
+            }
+        };
+        for contact in contacts {
+            let GrainKey { a, b } = contact.key;
+            // A wheel is none of the grains: its side of the pair holds nothing.
+            let (at_a, c_a, s_a) = side(a);
+            let (at_b, c_b, s_b) = side(b);
+            let frame = contact.frame();
+            let pair = RoundPair {
+                bodies: [at_a, at_b],
+                frame: frame.map(Into::into),
+                linear: [c_a, c_b],
+                angular: [s_a, s_b],
+            };
+            if (a as usize) < n {
+                pairs.round.push(pair);
+            } else if let Some(machine) = machine {
+                let wheel = (a as usize - n, pose);
+                own.push_contact(machine, wheel, &contact.point, &frame, &mut pairs.rows);
+                pairs.machine.push(pair);
+            }
+        }
+        u.fill(0.0);
+        self.add_local_of_velocity(contacts, v, u);
+    }
+
+    fn local(&self, y: &[f64], out: &mut [f64]) {
+        self.parts.pairs.local(y, out);
+    }
+
+    fn add_local_of_velocity(&self, contacts: &[GrainContact<D>], v: &[f64], out: &mut [f64]) {
+        let (n, V) = (self.n(), body_velocities(D));
+        let radius = self.scene.grains.radius();
+        let own = self.scene.machine_velocities(v);
+        let mut of_machine = 0;
+        for (contact, out) in contacts.iter().zip(out.chunks_exact_mut(D)) {
+            let mut u = SVector::zeros();
+            let (a, b) = (contact.key.a as usize, contact.key.b as usize);
+            if a < n {
+                add_rim_velocity(&v[V * a..V * (a + 1)], radius[a], &contact.n, 1.0, &mut u);
+            }
+            if contact.is_with_grain() {
+                add_rim_velocity(&v[V * b..V * (b + 1)], -radius[b], &contact.n, -1.0, &mut u);
+            }
+            for (out, direction) in out.iter_mut().zip(contact.frame()) {
+                *out += direction.dot(&u);
+            }
+            if a >= n {
+                self.parts.machine.add_local(of_machine, own, out);
+                of_machine += 1;
+            }
+        }
+    }
+
+    fn add_impulses(&self, p: &[f64], y: &mut [f64]) {
+        self.parts.pairs.add_impulses(p, y);
+    }
+
+    fn generalized_impulse(&self, contacts: &[GrainContact<D>], p: &[f64], out: &mut [f64]) {
+        out.fill(0.0);
+        let (n, V) = (self.n(), body_velocities(D));
+        let radius = self.scene.grains.radius();
+        let mut of_machine = 0;
+        for (contact, p) in contacts.iter().zip(p.as_chunks::<D>().0) {
+            let frame = contact.frame();
+            let mut force = frame[0] * p[0];
+            for k in 1..D {
+                force += frame[k] * p[k];
+            }
+            let turn = moment(&frame, p);
+            let (a, b) = (contact.key.a as usize, contact.key.b as usize);
+            let mut add = |body: usize, sign: f64| {
+                let out = &mut out[V * body..V * (body + 1)];
+                for k in 0..D {
+                    out[k] += sign * force[k];
+                }
+                for k in D..V {
+                    out[k] += radius[body] * turn[k - D];
+                }
+            };
+            if a < n {
+                add(a, 1.0);
+            }
+            if contact.is_with_grain() {
+                add(b, -1.0);
+            }
+            if a >= n {
+                let own = &mut out[V * n..];
+                self.parts.machine.add_impulse(of_machine, p, own);
+                of_machine += 1;
+            }
+        }
+    }
+
+    fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a> {
+        FrictionContactProblem::from_assembled_sparse(self.parts.operator(), q, mu)
+    }
+
+    /// Newton's law for a pair that comes together fast within the step; any other may close by its gap.
+    ///
+    /// With `e u_N⁻ + s` and any s ≥ 0 a frictionless impact gains no energy, see [`crate::law::newton_impact`]: here s is what the gap allows.
+    fn normal_shift(
+        &self,
+        options: &StepOptions,
+        contact: &GrainContact<D>,
+        u_N_before: f64,
+    ) -> f64 {
+        let h = options.time_step;
+        let gap = contact.gap_start.max(0.0);
+        let rebound = options.restitution * u_N_before;
+        let slow = 2.0 * options.gravity.norm() * h;
+        if rebound < 0.0 && u_N_before < -slow && gap + h * u_N_before <= 0.0 {
+            rebound
+        } else {
+            gap / h + rebound.max(0.0)
+        }
+    }
+
+    /// Its sweeps end at a loose tolerance, and a pile that bounces needs many.
+    fn solves_to_the_end(&self) -> bool {
+        false
+    }
+
+    fn solve(
+        &self,
+        q: &[f64],
+        mu: &[f64],
+        options: &SolverOptions,
+        p: &mut [f64],
+        u: &mut [f64],
+        workspace: &mut SolverWorkspace,
+    ) -> SolveReport {
+        let bodies = ManyBodies {
+            pairs: &self.parts.pairs,
+            q,
+            mu,
+            operator: &|| self.parts.operator(),
+        };
+        solve_many_bodies(&bodies, options, p, u, workspace)
+    }
+
+    fn displacement(&self, y: &[f64]) -> f64 {
+        match &self.scene.machine {
+            Some(machine) => machine.displacement(self.scene.machine_velocities(y)),
+            None => 0.0,
+        }
+    }
+}
+
+/// What the tangential impulses turn, divided by r: p_t in the plane, `b p_t − t p_b` in space.
+fn moment<const D: usize>(frame: &[SVector<f64, D>; D], p: &[f64; D]) -> SVector<f64, D> {
+    if D == 2 {
+        return SVector::from_fn(|k, _| if k == 0 { p[1] } else { 0.0 });
+    }
+    frame[2] * p[1] - frame[1] * p[2]
+}
