@@ -9,6 +9,8 @@ mod coupling;
 mod derivatives;
 #[path = "joints/descriptions.rs"]
 mod descriptions;
+#[path = "joints/limits.rs"]
+mod limits;
 #[path = "joints/machines.rs"]
 mod machines;
 #[path = "joints/several_trees.rs"]
