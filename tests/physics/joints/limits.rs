@@ -20,15 +20,11 @@ const LENGTH: f64 = 0.8;
 /// Of the pendulum about its axis.
 const INERTIA: f64 = LENGTH * LENGTH + 0.5 * 0.1 * 0.1;
 
-fn between(lower: f64, upper: f64) -> Option<Limits> {
-    Some(Limits { lower, upper })
-}
-
 /// A bob of 1 kg that hangs at zero.
 fn pendulum(lower: f64, upper: f64) -> SolidDescription {
     let mut bob = solid("bob", None, JointKind::Revolute);
     bob.centre_of_mass = Some([0.0, -LENGTH, 0.0]);
-    bob.limits = between(lower, upper);
+    bob.limits = Some(Limits { lower, upper });
     bob
 }
 
@@ -117,7 +113,7 @@ fn a_stop_that_is_foreseen_is_never_passed() {
         };
         let depth = options.penetration_tolerance;
         let mut run = simulation(model(vec![pendulum(-0.2, 0.9)]), options);
-        start(&mut run, &[0.8], &[1.0]);
+        start(&mut run, &[0.8], &[2.0]);
         let mut reached = [false; 2];
         for _ in 0..400 {
             run.step(1).unwrap();
@@ -139,7 +135,10 @@ fn a_slide_rests_on_its_stop() {
         for (up, side) in [(1.0, Side::Lower), (-1.0, Side::Upper)] {
             let mut slide = solid("slide", None, JointKind::Prismatic);
             slide.axis = Some([0.0, up, 0.0]);
-            slide.limits = between(-0.3, 0.3);
+            slide.limits = Some(Limits {
+                lower: -0.3,
+                upper: 0.3,
+            });
             let mut load = solid("load", Some("slide"), JointKind::Revolute);
             load.centre_of_mass = Some([0.0, -0.4, 0.0]);
             load.mass = 3.0;
@@ -158,8 +157,8 @@ fn a_slide_rests_on_its_stop() {
 fn stops_give_no_energy() {
     for variant in VARIANTS {
         for restitution in [0.0, 0.5, 1.0] {
-            let upper = pendulum(-0.5, 0.7);
-            let mut lower = pendulum(-0.3, 0.4);
+            let upper = pendulum(-0.2, 0.3);
+            let mut lower = pendulum(-0.1, 0.15);
             lower.name = "lower".into();
             lower.parent = Some("bob".into());
             lower.position = Some([0.0, -LENGTH, 0.0]);
@@ -168,7 +167,7 @@ fn stops_give_no_energy() {
                 ..options(2e-3, variant)
             };
             let mut run = simulation(model(vec![upper, lower]), options);
-            start(&mut run, &[0.6, 0.0], &[-2.0, 3.0]);
+            start(&mut run, &[0.2, 0.0], &[-2.0, 3.0]);
             let mut least = energy(&run);
             let scale = least.abs();
             let mut struck = 0;
@@ -177,12 +176,12 @@ fn stops_give_no_energy() {
                 struck += run.contacts().len();
                 let now = energy(&run);
                 assert!(
-                    now < least + 1e-4 * scale,
+                    now < least + 1e-6 * scale,
                     "{variant:?} {restitution}: {now} {least}"
                 );
                 least = least.min(now);
             }
-            assert!(struck > 10);
+            assert!(struck >= 10, "{variant:?} {restitution}: {struck}");
         }
     }
 }
@@ -209,7 +208,10 @@ fn a_stop_carries_what_the_ground_presses() {
     }
     let mut arm = foot("arm", JointKind::Revolute);
     arm.centre_of_mass = Some([-0.5, -0.2, 0.0]);
-    arm.limits = between(0.0, 1.0);
+    arm.limits = Some(Limits {
+        lower: 0.0,
+        upper: 1.0,
+    });
     solids.push(arm);
     let model = Arc::new(model(solids));
     for variant in VARIANTS {
@@ -220,7 +222,7 @@ fn a_stop_carries_what_the_ground_presses() {
         let ground = Arc::new(Plane::ground());
         let mut run = RoverSimulation::new(model.clone(), ground, options).unwrap();
         let mut q = Configuration::zero(&model);
-        q.base_mut().position.y = 0.3;
+        q.position.y = 0.3;
         run.set_state(q, vec![0.0; 7]);
         run.step(400).unwrap();
         assert_eq!(run.contacts().len(), 4);
@@ -293,7 +295,7 @@ fn bad_limits_are_refused_by_field() {
             ratio: 1.0,
             offset: 0.0,
         });
-        solids[solid].limits = between(lower, upper);
+        solids[solid].limits = Some(Limits { lower, upper });
         let error = Model::from_description(machine(solids)).unwrap_err();
         assert_eq!(error.field(), format!("solids[{solid}].{field}"), "{error}");
     };
