@@ -292,7 +292,7 @@ def test_a_joint_at_its_stop_is_among_the_contacts():
     sim.set_joint_torques([100.0])
     sim.step(5)
     np.testing.assert_allclose(sim.contacts.impulses[0, 0] / sim.time_step, weight - 1.5, atol=1e-6)
-    again = pickle.loads(pickle.dumps(sim))
+    again = pickle.loads(pickle.dumps(sim))  # noqa: S301
     assert again.contacts.kinds == ["limit"]
     assert again.model.to_dict() == model.to_dict()
 
@@ -300,7 +300,7 @@ def test_a_joint_at_its_stop_is_among_the_contacts():
 def test_limits_that_exclude_each_other_are_refused():
     description = rover_gym.RoverModel().to_dict()
     description["solids"][1]["limits"] = {"lower": 0.2, "upper": 0.1}
-    with pytest.raises(rover_gym.ModelError, match="must be below the upper limit 0.1, is 0.2") as caught:
+    with pytest.raises(rover_gym.ModelError, match=r"must be below the upper limit 0\.1, is 0\.2") as caught:
         rover_gym.RoverModel.from_dict(description)
     assert caught.value.field == "solids[1].limits.lower"
     assert caught.value.value == 0.2
