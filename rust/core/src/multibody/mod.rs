@@ -20,8 +20,8 @@ pub mod state;
 
 pub use bias::bias;
 pub use description::{
-    CouplingDescription, Hold, JointKind, ModelDescription, Shape, SolidDescription, Spring,
-    TagDescription, WheelDescription,
+    CouplingDescription, DriveDescription, Hold, JointKind, Limits, ModelDescription, Shape,
+    SolidDescription, Spring, TagDescription, WheelDescription,
 };
 pub use error::{ModelError, StateError};
 pub use joint::{Joint, JointAxis, Motion, Pose};

@@ -9,7 +9,7 @@ pub mod joint;
 
 use super::error::ModelError;
 use super::motor::Motor;
-pub use joint::{CouplingDescription, Hold, JointKind, Spring};
+pub use joint::{CouplingDescription, DriveDescription, Hold, JointKind, Limits, Spring};
 
 /// The built-in rover: Table 4.1 and Fig. 4.5 of the report, in SI units.
 const ROVER: &str = include_str!("../../../models/rover.toml");
@@ -93,6 +93,12 @@ pub struct SolidDescription {
     /// Inertia of the joint's rotor, reflected to the joint, kg m² or kg; 0 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub armature: Option<f64>,
+    /// Stops of the joint, where it has any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<Limits>,
+    /// Drive of a revolute joint.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drive: Option<DriveDescription>,
     /// Another joint that this one follows: its coordinate is gone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coupled: Option<CouplingDescription>,
