@@ -5,9 +5,10 @@ use std::collections::{HashMap, HashSet};
 use nalgebra::{Unit, Vector3};
 
 use super::joint::JointKind;
-use super::{ModelDescription, Shape, SolidDescription};
+use super::masses::mass_left;
+use super::{ModelDescription, Shape, ShapeDescription, SolidDescription};
 use crate::multibody::error::ModelError;
-use crate::multibody::model::{MAX_SOLIDS, solid_inertia};
+use crate::multibody::model::{MAX_SHAPES, MAX_SOLIDS};
 
 /// Largest length of a description either way, m.
 const MAX_LENGTH: f64 = 1e6;
@@ -108,17 +109,19 @@ pub(in crate::multibody) fn check(description: &ModelDescription) -> Result<(), 
     if description.solids.is_empty() {
         return Err(ModelError::NoSolids);
     }
-    for (field, count) in [
-        ("solids", description.solids.len()),
-        ("wheels", description.wheels.len()),
-        ("tags", description.tags.len()),
+    let n_shapes = description.solids.iter().map(|s| s.shapes.len()).sum();
+    for (field, what, count, limit) in [
+        ("solids", "solids", description.solids.len(), MAX_SOLIDS),
+        ("wheels", "wheels", description.wheels.len(), MAX_SOLIDS),
+        ("tags", "tags", description.tags.len(), MAX_SOLIDS),
+        ("solids", "shapes", n_shapes, MAX_SHAPES),
     ] {
-        if count > MAX_SOLIDS {
+        if count > limit {
             return Err(ModelError::TooMany {
                 field,
-                what: field,
+                what,
                 count,
-                limit: MAX_SOLIDS,
+                limit,
             });
         }
     }
@@ -291,18 +294,7 @@ fn check_body(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
             value: solid.mass,
         });
     }
-    match solid.shape {
-        Shape::Box { size } => size
-            .iter()
-            .try_for_each(|&s| length(&at("shape.size"), s))?,
-        Shape::Cylinder { radius, height } => {
-            length(&at("shape.radius"), radius)?;
-            length(&at("shape.height"), height)?;
-        }
-        Shape::Disc { radius } | Shape::Sphere { radius } => {
-            length(&at("shape.radius"), radius)?;
-        }
-    }
+    check_shapes(i, solid)?;
     place(
         &at("centre_of_mass"),
         &solid.centre_of_mass.unwrap_or_default(),
@@ -310,7 +302,10 @@ fn check_body(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
     for entry in solid.inertia.iter().flatten() {
         in_range(&at("inertia"), *entry, 1e24, "at most 1e24 kg m²")?;
     }
-    let principal = solid_inertia(solid.mass, &solid.shape, solid.inertia).symmetric_eigenvalues();
+    let of_solid = |error: ModelError| error.within(&format!("solids[{i}]"));
+    mass_left(solid).map_err(of_solid)?;
+    let inertia = solid.mass_properties().map_err(of_solid)?.inertia;
+    let principal = inertia.symmetric_eigenvalues();
     let (sum, largest) = (principal.sum(), principal.max());
     if principal.min() <= 0.0 || largest > (sum - largest) * (1.0 + 1e-9) {
         return Err(ModelError::ImpossibleInertia {
@@ -318,12 +313,85 @@ fn check_body(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
             principal: principal.into(),
         });
     }
-    if solid.collides && !matches!(solid.shape, Shape::Box { .. } | Shape::Sphere { .. }) {
-        return Err(ModelError::CollidesWithoutBox {
+    Ok(())
+}
+
+/// The shapes of a solid, one by one, and that it has them in one form.
+fn check_shapes(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
+    let at = |what: &str| format!("solids[{i}].{what}");
+    if let Some(shape) = solid.shape {
+        check_lengths(&at("shape"), &shape)?;
+    }
+    let can_collide = solid.shapes.is_empty() && solid.shape.is_some_and(|shape| collides(&shape));
+    for (is_given, what) in [
+        (solid.shape.is_some(), "shape"),
+        (solid.collides, "collides"),
+    ] {
+        if is_given && !solid.shapes.is_empty() {
+            return Err(ModelError::NotWithShapes {
+                field: at(what),
+                what,
+            });
+        }
+    }
+    if solid.collides && !can_collide {
+        return Err(ModelError::CannotCollide {
             field: at("collides"),
         });
     }
+    for (k, shape) in solid.shapes.iter().enumerate() {
+        check_placed_shape(&at(&format!("shapes[{k}]")), shape)?;
+    }
+    let is_half_given = solid.centre_of_mass.is_some() != solid.inertia.is_some();
+    if !solid.shapes.is_empty() && is_half_given {
+        let missing = if solid.inertia.is_none() {
+            "inertia"
+        } else {
+            "centre_of_mass"
+        };
+        return Err(ModelError::Missing { field: at(missing) });
+    }
     Ok(())
+}
+
+fn check_placed_shape(at: &str, shape: &ShapeDescription) -> Result<(), ModelError> {
+    check_lengths(at, &shape.shape)?;
+    place(
+        &format!("{at}.position"),
+        &shape.position.unwrap_or_default(),
+    )?;
+    for angle in shape.rotation.iter().flatten() {
+        let field = format!("{at}.rotation");
+        in_range(&field, *angle, 1e3, "at most 1e3 rad either way")?;
+    }
+    if let Some(mass) = shape.mass {
+        let field = format!("{at}.mass");
+        positive(&field, mass)?;
+        in_range(&field, mass, 1e12, "at most 1e12 kg")?;
+    }
+    if shape.collides && !collides(&shape.shape) {
+        return Err(ModelError::CannotCollide {
+            field: format!("{at}.collides"),
+        });
+    }
+    Ok(())
+}
+
+fn check_lengths(at: &str, shape: &Shape) -> Result<(), ModelError> {
+    let field = |what: &str| format!("{at}.{what}");
+    match *shape {
+        Shape::Box { size } => (size.iter()).try_for_each(|&s| length(&field("size"), s)),
+        Shape::Cylinder { radius, height } => {
+            length(&field("radius"), radius)?;
+            length(&field("height"), height)
+        }
+        Shape::Disc { radius } | Shape::Sphere { radius } => length(&field("radius"), radius),
+    }
+}
+
+/// Whether a shape can touch; a disc does as a wheel.
+fn collides(shape: &Shape) -> bool {
+    matches!(shape, Shape::Box { .. } | Shape::Sphere { .. })
 }
 
 fn check_tags(
@@ -376,7 +444,7 @@ fn check_wheels(
         if let Some(radius) = wheel.contact_radius {
             length(&at("contact_radius"), radius)?;
         }
-        if let Shape::Disc { radius } = description.solids[solid].shape
+        if let Some(radius) = description.solids[solid].disc_radius(&wheel.axle)
             && (radius - wheel.radius).abs() > 1e-9 * radius
         {
             return Err(ModelError::RadiusContradictsShape {
