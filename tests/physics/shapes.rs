@@ -1,4 +1,5 @@
-//! Several shapes a solid: their masses and inertias, what of them touches, and what a description may not say.
+//! Several shapes a solid: their masses and inertias, what of them touches, and what a description
+//! may not say.
 #![allow(clippy::unwrap_used)]
 
 #[path = "shapes/descriptions.rs"]

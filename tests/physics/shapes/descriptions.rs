@@ -107,7 +107,12 @@ fn of_several_shapes_the_wheels_disc_takes_another_radius() {
         })
         .collect();
     assert_eq!(radii, [0.5 * before, 0.4, before, 0.05]);
-    assert!(larger.wheels().iter().all(|wheel| wheel.radius == 0.4));
+    assert!(
+        larger
+            .wheels()
+            .iter()
+            .all(|wheel| (wheel.radius - 0.4).abs() < 1e-15)
+    );
 
     let mut contrary = hubbed();
     contrary.wheels[4].radius = 0.3;

@@ -4,9 +4,10 @@ use std::collections::{HashMap, HashSet};
 
 use nalgebra::{Unit, Vector3};
 
+use super::check_shapes::check_shapes;
 use super::joint::JointKind;
 use super::masses::mass_left;
-use super::{ModelDescription, Shape, ShapeDescription, SolidDescription};
+use super::{ModelDescription, SolidDescription};
 use crate::multibody::error::ModelError;
 use crate::multibody::model::{MAX_SHAPES, MAX_SOLIDS};
 
@@ -45,7 +46,7 @@ pub(in crate::multibody) fn length(field: &str, value: f64) -> Result<(), ModelE
 }
 
 /// A place, m.
-fn place(field: &str, values: &[f64; 3]) -> Result<(), ModelError> {
+pub(super) fn place(field: &str, values: &[f64; 3]) -> Result<(), ModelError> {
     (values.iter()).try_for_each(|&x| in_range(field, x, MAX_LENGTH, "at most 1e6 m either way"))
 }
 
@@ -68,7 +69,7 @@ fn finite(field: &str, values: &[f64]) -> Result<(), ModelError> {
     })
 }
 
-fn positive(field: &str, value: f64) -> Result<(), ModelError> {
+pub(super) fn positive(field: &str, value: f64) -> Result<(), ModelError> {
     finite(field, &[value])?;
     if value > 0.0 {
         Ok(())
@@ -314,84 +315,6 @@ fn check_body(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
         });
     }
     Ok(())
-}
-
-/// The shapes of a solid, one by one, and that it has them in one form.
-fn check_shapes(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
-    let at = |what: &str| format!("solids[{i}].{what}");
-    if let Some(shape) = solid.shape {
-        check_lengths(&at("shape"), &shape)?;
-    }
-    let can_collide = solid.shapes.is_empty() && solid.shape.is_some_and(|shape| collides(&shape));
-    for (is_given, what) in [
-        (solid.shape.is_some(), "shape"),
-        (solid.collides, "collides"),
-    ] {
-        if is_given && !solid.shapes.is_empty() {
-            return Err(ModelError::NotWithShapes {
-                field: at(what),
-                what,
-            });
-        }
-    }
-    if solid.collides && !can_collide {
-        return Err(ModelError::CannotCollide {
-            field: at("collides"),
-        });
-    }
-    for (k, shape) in solid.shapes.iter().enumerate() {
-        check_placed_shape(&at(&format!("shapes[{k}]")), shape)?;
-    }
-    let is_half_given = solid.centre_of_mass.is_some() != solid.inertia.is_some();
-    if !solid.shapes.is_empty() && is_half_given {
-        let missing = if solid.inertia.is_none() {
-            "inertia"
-        } else {
-            "centre_of_mass"
-        };
-        return Err(ModelError::Missing { field: at(missing) });
-    }
-    Ok(())
-}
-
-fn check_placed_shape(at: &str, shape: &ShapeDescription) -> Result<(), ModelError> {
-    check_lengths(at, &shape.shape)?;
-    place(
-        &format!("{at}.position"),
-        &shape.position.unwrap_or_default(),
-    )?;
-    for angle in shape.rotation.iter().flatten() {
-        let field = format!("{at}.rotation");
-        in_range(&field, *angle, 1e3, "at most 1e3 rad either way")?;
-    }
-    if let Some(mass) = shape.mass {
-        let field = format!("{at}.mass");
-        positive(&field, mass)?;
-        in_range(&field, mass, 1e12, "at most 1e12 kg")?;
-    }
-    if shape.collides && !collides(&shape.shape) {
-        return Err(ModelError::CannotCollide {
-            field: format!("{at}.collides"),
-        });
-    }
-    Ok(())
-}
-
-fn check_lengths(at: &str, shape: &Shape) -> Result<(), ModelError> {
-    let field = |what: &str| format!("{at}.{what}");
-    match *shape {
-        Shape::Box { size } => (size.iter()).try_for_each(|&s| length(&field("size"), s)),
-        Shape::Cylinder { radius, height } => {
-            length(&field("radius"), radius)?;
-            length(&field("height"), height)
-        }
-        Shape::Disc { radius } | Shape::Sphere { radius } => length(&field("radius"), radius),
-    }
-}
-
-/// Whether a shape can touch; a disc does as a wheel.
-fn collides(shape: &Shape) -> bool {
-    matches!(shape, Shape::Box { .. } | Shape::Sphere { .. })
 }
 
 fn check_tags(

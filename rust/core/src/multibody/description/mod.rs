@@ -5,6 +5,7 @@
 use serde::{Deserialize, Serialize};
 
 pub(super) mod check;
+mod check_shapes;
 pub mod joint;
 mod masses;
 pub mod shape;
@@ -78,17 +79,20 @@ pub struct SolidDescription {
     /// Its only shape, about its mass centre: gives the inertia and the looks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<Shape>,
-    /// Its shapes, each with a pose, instead of `shape` and `collides`. A solid whose inertia is given needs none.
+    /// Its shapes, each with a pose, instead of `shape` and `collides`. A solid whose inertia is
+    /// given needs none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shapes: Vec<ShapeDescription>,
-    /// Mass centre in the solid's frame, m; the origin by default. A solid with `shapes` states it together with `inertia`, or
-    /// neither.
+    /// Mass centre in the solid's frame, m; the origin by default. A solid with `shapes` states it
+    /// together with `inertia`, or neither.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub centre_of_mass: Option<[f64; 3]>,
-    /// Inertia about the mass centre, frame axes, kg m²: xx, yy, zz, xy, xz, yz. From the shape or the shapes by default.
+    /// Inertia about the mass centre, frame axes, kg m²: xx, yy, zz, xy, xz, yz. From the shape or
+    /// the shapes by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inertia: Option<[f64; 6]>,
-    /// Whether its box or ball touches the ground and other bodies; of a solid with `shapes` each shape says it.
+    /// Whether its box or ball touches the ground and other bodies; of a solid with `shapes` each
+    /// shape says it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub collides: bool,
     /// Gains with which the joint is held at a set-point.
@@ -167,7 +171,8 @@ impl SolidDescription {
         })
     }
 
-    /// Mass centre (m) and inertia about it (kg m²), in the solid's frame: as given, else of its shapes.
+    /// Mass centre (m) and inertia about it (kg m²), in the solid's frame: as given, else of its
+    /// shapes.
     ///
     /// # Errors
     /// What makes the masses of its shapes unknown, named by its field in the solid.
@@ -175,8 +180,8 @@ impl SolidDescription {
         mass_properties(self)
     }
 
-    /// Radius of the disc that a wheel with this axle is made of, m: its only shape's, or the largest of those about the
-    /// axle through the origin.
+    /// Radius of the disc that a wheel with this axle is made of, m: its only shape's, or the
+    /// largest of those about the axle through the origin.
     pub(super) fn disc_radius(&self, axle: &[f64; 3]) -> Option<f64> {
         let radius = |shape: &Shape| match *shape {
             Shape::Disc { radius } => Some(radius),
@@ -190,11 +195,10 @@ impl SolidDescription {
             .or_else(|| radii.reduce(f64::max))
     }
 
-    /// Gives that disc, and all of its size about the same axle, another radius (m). Whether there is one.
-    pub(super) fn set_disc_radius(&mut self, axle: &[f64; 3], radius: f64) -> bool {
-        let Some(before) = self.disc_radius(axle) else {
-            return false;
-        };
+    /// Gives that disc, and all of its size about the same axle, another radius (m). Returns the
+    /// radius before; none where there is no such disc.
+    pub(super) fn set_disc_radius(&mut self, axle: &[f64; 3], radius: f64) -> Option<f64> {
+        let before = self.disc_radius(axle)?;
         let of_shapes = (self.shapes.iter_mut()).filter(|shape| shape.is_disc_about(axle));
         for shape in (self.shape.iter_mut()).chain(of_shapes.map(|placed| &mut placed.shape)) {
             if let Shape::Disc { radius: own } = shape
@@ -203,7 +207,7 @@ impl SolidDescription {
                 *own = radius;
             }
         }
-        true
+        Some(before)
     }
 
     /// Gives it another mass (kg): an inertia and masses of shapes that it states scale with it.

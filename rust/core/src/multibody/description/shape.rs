@@ -80,7 +80,8 @@ pub struct ShapeDescription {
     /// Centre in the solid's frame, m; the origin by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position: Option<[f64; 3]>,
-    /// Rotation from the shape's axes to the solid's frame as a rotation vector: the axis times the angle, rad. None by default.
+    /// Rotation from the shape's axes to the solid's frame as a rotation vector: the axis times the
+    /// angle, rad. None by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<[f64; 3]>,
     /// Whether it touches the ground and other bodies; only boxes and spheres can.
@@ -89,7 +90,8 @@ pub struct ShapeDescription {
     /// Whether it is drawn.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub visible: bool,
-    /// Its part of the solid's mass, kg; by default a share, by volume, of what the other shapes leave.
+    /// Its part of the solid's mass, kg; by default a share, by volume, of what the other shapes
+    /// leave.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,
 }
@@ -116,7 +118,8 @@ impl ShapeDescription {
         (self.rotation).map(|turn| *exp_rotation(&turn.into()).to_rotation_matrix().matrix())
     }
 
-    /// Whether it is a disc about an axle through the origin: what a wheel fixed to the solid is made of.
+    /// Whether it is a disc about an axle through the origin, as a wheel is that is fixed to the
+    /// solid.
     #[must_use]
     pub fn is_disc_about(&self, axle: &[f64; 3]) -> bool {
         let Shape::Disc { radius } = self.shape else {
