@@ -4,7 +4,7 @@
 //! ground it costs `n log n` and the pairs that overlap along x; nothing is remembered from one search to the next, so that equal scenes
 //! give equal pairs.
 //!
-//! Source: Baraff 1992, *Dynamic simulation of non-penetrating rigid bodies*; Cohen et al. 1995, *I-COLLIDE*.
+//! Source: Baraff 1992; Cohen et al. 1995.
 
 use crate::geometry::shape::Sphere;
 

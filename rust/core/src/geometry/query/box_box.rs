@@ -12,7 +12,7 @@
 //! The gap's rate is the relative velocity's normal part exactly at corners and at a pair of edges. At a crossing it is up to the tilt of the two
 //! faces, since the crossing slides along the edges: nothing for boxes that lie on each other.
 //!
-//! Source: Gottschalk, Lin, Manocha 1996, *OBBTree*; Sutherland, Hodgman 1974, *Reentrant polygon clipping*.
+//! Source: Gottschalk, Lin and Manocha 1996 (separating axes); Sutherland and Hodgman 1974 (clipping).
 
 use nalgebra::{Vector2, Vector3};
 

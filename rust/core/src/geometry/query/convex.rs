@@ -7,8 +7,7 @@
 //! Apart, lengths are exact to 1e-11 of the shapes' size, and so are overlaps of shapes with corners. Round rims take some twenty iterations; a
 //! wheel a whole radius inside a box is measured to 1e-5 of its size.
 //!
-//! Source: Gilbert, Johnson, Keerthi 1988, *IEEE J. Robotics Automation* 4; van den Bergen 2001, *Proximity queries and penetration depth
-//! computation on 3D game objects*.
+//! Source: Gilbert, Johnson and Keerthi 1988 (distance); van den Bergen 2001 (penetration depth).
 
 use nalgebra::{Matrix3, Vector3};
 
