@@ -15,7 +15,6 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-pub(super) use build::solid_inertia;
 pub use parts::{CollisionBox, CollisionSphere, Frame, Wheel};
 pub use properties::{JointProperties, Passive};
 use tree::Paths;
@@ -29,6 +28,9 @@ use super::state::Configuration;
 
 /// Most solids of a model, and most wheels and tags: beyond it a step costs seconds and matrices gigabytes.
 pub const MAX_SOLIDS: usize = 1000;
+
+/// Most shapes that the solids of a model list, all together.
+pub const MAX_SHAPES: usize = 4000;
 
 /// Velocities of a free base, with which every path of its tree begins.
 pub const BASE: usize = free::NV;
@@ -168,13 +170,13 @@ impl Model {
         &self.wheels
     }
 
-    /// Boxes that touch the ground.
+    /// Boxes that touch, in the order of the solids and their shapes.
     #[must_use]
     pub fn boxes(&self) -> &[CollisionBox] {
         &self.boxes
     }
 
-    /// Balls that touch the ground.
+    /// Balls that touch, in the order of the solids and their shapes.
     #[must_use]
     pub fn spheres(&self) -> &[CollisionSphere] {
         &self.spheres
