@@ -147,6 +147,21 @@ pub fn energy_and_momentum(
     gravity: &Vector3<f64>,
     scratch: &mut EnergyScratch,
 ) -> (Energy, Vector3<f64>) {
+    if model.only_turns() {
+        energy_and_momentum_if::<true>(model, q, v, gravity, scratch)
+    } else {
+        energy_and_momentum_if::<false>(model, q, v, gravity, scratch)
+    }
+}
+
+/// The same; where `TURNS` every root must be free and every other joint revolute and on its own.
+fn energy_and_momentum_if<const TURNS: bool>(
+    model: &Model,
+    q: &Configuration,
+    v: &[f64],
+    gravity: &Vector3<f64>,
+    scratch: &mut EnergyScratch,
+) -> (Energy, Vector3<f64>) {
     let bodies = model.bodies();
     let moving = &mut scratch.moving[..bodies.len()];
     let mut sums = Sums::default();
@@ -170,7 +185,8 @@ pub fn energy_and_momentum(
                 };
                 height += pose.position * model.trees()[body.tree].mass;
             }
-            Joint::Revolute(joint) => own.turn(carrier(), body, joint, q, v),
+            Joint::Revolute(joint) => own.turn::<TURNS>(carrier(), body, joint, q, v),
+            _ if TURNS => {}
             _ => own.follow(carrier(), body, q, v),
         }
         sums.add(body, own);
@@ -186,9 +202,9 @@ pub fn energy_and_momentum(
 }
 
 impl Moving {
-    /// Places a body under a revolute joint on its carrier.
+    /// Places a body under a revolute joint, where `OWN` one that follows no other, on its carrier.
     #[inline]
-    fn turn(
+    fn turn<const OWN: bool>(
         &mut self,
         carrier: &Self,
         body: &Body,
@@ -205,9 +221,19 @@ impl Moving {
         (self.R, axis) = if body.is_spinner {
             (*frame, joint.axis.turned(frame))
         } else {
-            joint.axis.rotate(frame, joint.coordinate.of(&q.joints))
+            let angle = if OWN {
+                q.joints[joint.coordinate.joint]
+            } else {
+                joint.coordinate.of(&q.joints)
+            };
+            joint.axis.rotate(frame, angle)
         };
-        self.omega = carrier.omega + axis * joint.coordinate.rate(v[body.velocity]);
+        let rate = if OWN {
+            v[body.velocity]
+        } else {
+            joint.coordinate.rate(v[body.velocity])
+        };
+        self.omega = carrier.omega + axis * rate;
     }
 
     /// Places any other body on its carrier.
