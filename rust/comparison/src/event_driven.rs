@@ -1,19 +1,24 @@
-//! Event-driven: a Runge–Kutta method of order 4 between events, events located, impacts by the impact law. Planar systems.
+//! Event-driven: a Runge–Kutta method of order 4 between events, events
+//! located, impacts by the impact law. Planar systems.
 //!
-//! Between events each contact is open, sticks or slides in one direction, and λ solves linear equations:
+//! Between events each contact is open, sticks or slides in one direction,
+//! and λ solves linear equations:
 //!
 //! ```text
 //! M a = F + H λ,    d/dt u_N = 0,    stick: d/dt u_T = 0,    slide: λ_T = −μ sign(u_T) λ_N
 //! ```
 //!
-//! What integration leaves of drift in gap and velocity is projected away after each step. An event is a gap that closes, a λ_N or a reserve
-//! of friction μ λ_N − |λ_T| that runs out, a slip that stops; it is found by bisection on the length of the step. At an impact all
-//! touching contacts obey Newton's and Coulomb's law together, as in Moreau–Jean; then contact law at acceleration level says how each
-//! goes on.
+//! What integration leaves of drift in gap and velocity is projected away after each step.
+//! An event is a gap that closes, a λ_N or a reserve of friction μ λ_N − |λ_T| that runs
+//! out, a slip that stops; it is found by bisection on the length of the step. At an
+//! impact all touching contacts obey Newton's and Coulomb's law together, as in
+//! Moreau–Jean; then contact law at acceleration level says how each goes on.
 //!
-//! The order is the Runge–Kutta method's, 4, in all quantities, which makes it the reference for scenes with few contacts. It cannot pass
-//! a point where infinitely many impacts accumulate and says so: after `max_impacts` in one step the step is refused. Two events of
-//! one kind within a step, gone and come back, are not seen. At acceleration level Painlevé's paradox has no answer either.
+//! The order is the Runge–Kutta method's, 4, in all quantities, which makes it the
+//! reference for scenes with few contacts. It cannot pass a point where infinitely many
+//! impacts accumulate and says so: after `max_impacts` in one step the step is refused.
+//! Two events of one kind within a step, gone and come back, are not seen. At
+//! acceleration level Painlevé's paradox has no answer either.
 
 use std::cell::RefCell;
 
@@ -113,7 +118,8 @@ struct Run<'a, S: MechanicalSystem> {
 }
 
 impl<S: MechanicalSystem> Run<'_, S> {
-    /// Decides at (q, v) which contacts stay closed and how; `decision` overrides what rounding would say.
+    /// Decides at (q, v) which contacts stay closed and how; `decision`
+    /// overrides what rounding would say.
     fn begin(
         &mut self,
         q: &S::Configuration,

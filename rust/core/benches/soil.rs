@@ -1,7 +1,9 @@
-//! Disk-steps per second of one core, for more and more disks and several tolerances: `cargo bench --bench soil`, or `-- 2000` for that number.
+//! Disk-steps per second of one core, for more and more disks and several tolerances:
+//! `cargo bench --bench soil`, or `-- 2000` for that number.
 //!
-//! A bed of ten layers in a box, poured and at rest ("rest"), and the same bed with gravity tilted by 30 degrees, which flows ("flow"). Nothing
-//! sleeps. Times are the thread's CPU time where the system tells it.
+//! A bed of ten layers in a box, poured and at rest ("rest"), and the same bed
+//! with gravity tilted by 30 degrees, which flows ("flow"). Nothing sleeps.
+//! Times are the thread's CPU time where the system tells it.
 #![allow(clippy::print_stdout)] // a bench reports
 
 use std::sync::Arc;

@@ -1,4 +1,5 @@
-//! Numbers that a description may have: finite, of the right sign, within what the mechanics can bear.
+//! Numbers that a description may have: finite, of the right sign, within
+//! what the mechanics can bear.
 
 use thiserror::Error;
 

@@ -1,6 +1,8 @@
-//! Runs the scenes of free spheres and prints JSON: `free_spheres [--start] [--scene NAME] [--duration S] STEP...` (steps in s).
+//! Runs the scenes of free spheres and prints JSON:
+//! `free_spheres [--start] [--scene NAME] [--duration S] STEP...` (steps in s).
 //!
-//! Run: `cargo run --release -p rover-comparison --bin free_spheres -- 0.01 0.005`. `--start` prints the centres at the start instead, for other engines.
+//! Run: `cargo run --release -p rover-comparison --bin free_spheres -- 0.01 0.005`. `--start`
+//! prints the centres at the start instead, for other engines.
 
 #![allow(clippy::print_stdout)] // it prints its result
 

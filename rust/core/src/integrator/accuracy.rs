@@ -1,8 +1,9 @@
 //! Accuracy by request: step, scheme and tolerance for an error that somebody can live with.
 //!
-//! The numbers are measured (`make chart`, `docs/accuracy.md`). The error of a path grows in proportion to the step: on 22 m of
-//! flat ground driven in a curve its root mean square is 0.21 m/s times the step, from 0.1 to 50 ms. On rocks it is larger and one drive
-//! tells little: `docs/comparison.md` has medians and quartiles over ensembles.
+//! The numbers are measured (`make chart`, `docs/accuracy.md`). The error of a path grows in
+//! proportion to the step: on 22 m of flat ground driven in a curve its root mean square is 0.21
+//! m/s times the step, from 0.1 to 50 ms. On rocks it is larger and one drive tells little:
+//! `docs/comparison.md` has medians and quartiles over ensembles.
 
 use super::options::{StepOptions, Variant};
 
@@ -38,7 +39,8 @@ impl Accuracy {
     };
     /// 0.2 ms to 1e-12: to compare others with.
     ///
-    /// Linearised: the Newton variant is as far from the finest paths, over rocks too, at two to three times the cost.
+    /// Linearised: the Newton variant is as far from the finest paths, over
+    /// rocks too, at two to three times the cost.
     pub const REFERENCE: Self = Self {
         time_step: 2e-4,
         variant: Variant::Linearised,
@@ -47,7 +49,8 @@ impl Accuracy {
     /// Smallest error that [`Self::for_error`] promises, m.
     pub const FINEST: f64 = ERROR_PER_STEP * STEPS[STEPS.len() - 1];
 
-    /// The coarsest step whose path on 20 m of flat ground stays within an error (m); none below [`Self::FINEST`].
+    /// The coarsest step whose path on 20 m of flat ground stays within an
+    /// error (m); none below [`Self::FINEST`].
     #[must_use]
     pub fn for_error(metres: f64) -> Option<Self> {
         let fits = |h: &f64| ERROR_PER_STEP * h <= metres * (1.0 + 1e-12);

@@ -1,23 +1,27 @@
-//! The audit of a step's energy: a step may gain what gravity and actuators put in, and nothing else.
+//! The audit of a step's energy: a step may gain what gravity and actuators
+//! put in, and nothing else.
 //!
 //! ```text
 //! excess = (K + V)(q⁺, v⁺) − (K + V)(q, v) − W
 //! ```
 //!
-//! W is the work of torques, motors and held joints. Inelastic contact with friction only takes energy away, so a positive excess is
-//! the scheme's own: the linearisation (of third order in the step), a solver that stopped early, or Newton's law of restitution, which
+//! W is the work of torques, motors and held joints. Inelastic contact with friction only
+//! takes energy away, so a positive excess is the scheme's own: the linearisation (of third
+//! order in the step), a solver that stopped early, or Newton's law of restitution, which
 //! creates energy in some impacts with friction (Kane's paradox).
 //!
-//! - A coarse excess asks for the step to be taken again, with implicit gyroscopic terms and then in halves.
-//! - What is left is taken out by shortening the velocity, `v⁺ ← s v⁺`. Signorini's condition at e = 0 and Coulomb's law are
-//!   homogeneous in the velocity, so both hold as before.
-//! - In free flight energy is neither lost nor gained: there s goes both ways, and acts on the motion relative to the mass centre, which
-//!   keeps its momentum.
+//! - A coarse excess asks for the step to be taken again, with implicit
+//!   gyroscopic terms and then in halves.
+//! - What is left is taken out by shortening the velocity, `v⁺ ← s v⁺`. Signorini's condition at
+//!   e = 0 and Coulomb's law are homogeneous in the velocity, so both hold as before.
+//! - In free flight energy is neither lost nor gained: there s goes both ways, and acts on the
+//!   motion relative to the mass centre, which keeps its momentum.
 //!
-//! - Where even standing still does not give it back the way is shortened too: a step that a contact ends early.
+//! - Where even standing still does not give it back the way is shortened
+//!   too: a step that a contact ends early.
 //!
-//! The correction is of the order of the excess, so the scheme keeps its order. Lifting out of penetration happens after the audit and is
-//! counted apart.
+//! The correction is of the order of the excess, so the scheme keeps its order. Lifting out of
+//! penetration happens after the audit and is counted apart.
 
 use nalgebra::Vector3;
 
@@ -92,7 +96,8 @@ impl<Q: Clone> Audited<Q> {
     }
 }
 
-/// Energy at the start of a step: remembered from the end of the last one, where this is the same state.
+/// Energy at the start of a step: remembered from the end of the last one,
+/// where this is the same state.
 pub(super) fn energy_before<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -125,12 +130,14 @@ pub(super) struct Audit {
     pub is_last: bool,
     /// Part of the kinetic energy that may be gained, see [`GAIN`].
     pub gain: f64,
-    /// Part of the kinetic energy that free flight may gain or lose: an error of the scheme's order that does not add up.
+    /// Part of the kinetic energy that free flight may gain or lose: an
+    /// error of the scheme's order that does not add up.
     pub drift: f64,
 }
 
 impl Audit {
-    /// Judges `ws.v` and `ws.end`, before projection, and corrects `ws.v` where there is no safer way.
+    /// Judges `ws.v` and `ws.end`, before projection, and corrects `ws.v`
+    /// where there is no safer way.
     pub(super) fn judge<S: MechanicalSystem>(
         &self,
         system: &mut S,
@@ -151,7 +158,8 @@ impl Audit {
                 if excess.is_nan() || excess <= SHORT * after.kinetic {
                     break;
                 }
-                // Far off: the way that such a velocity leads is no better than the velocity. Both are taken back together.
+                // Far off: the way that such a velocity leads is no better than
+                // the velocity. Both are taken back together.
                 let share = (before.kinetic / after.kinetic).min(SHORT).sqrt();
                 shorten(ws, share);
                 place(system, options, ws);
@@ -171,7 +179,8 @@ impl Audit {
                 Verdict::Coarse
             };
         }
-        // A machine at rest has no kinetic energy to measure by: what gravity gives in a step of free fall is the least that counts.
+        // A machine at rest has no kinetic energy to measure by: what gravity gives in a step of
+        // free fall is the least that counts.
         let fall = options.gravity.norm() * options.time_step;
         let least = 0.5 * after.mass * fall * fall;
         let size = before.kinetic.max(after.kinetic).max(least);
@@ -226,10 +235,12 @@ impl Audit {
 }
 
 impl Audit {
-    /// Shortens the way of a step at whose end nothing moves any more, and which still gained energy.
+    /// Shortens the way of a step at whose end nothing moves any more, and
+    /// which still gained energy.
     ///
-    /// Such a step was stopped within its time: by a jam, while the actuators' work was counted to its end, or on its way up by a contact that
-    /// closes before the end. As long a part σ of the way is left as its energy allows; none always does.
+    /// Such a step was stopped within its time: by a jam, while the actuators' work was counted to
+    /// its end, or on its way up by a contact that closes before the end. As long a part σ of the
+    /// way is left as its energy allows; none always does.
     fn hold_back<S: MechanicalSystem>(
         &self,
         system: &mut S,
@@ -254,7 +265,8 @@ impl Audit {
             if excess <= 0.0 {
                 break;
             }
-            // Without a way the excess is minus the kinetic energy; between both it is nearly straight.
+            // Without a way the excess is minus the kinetic energy; between
+            // both it is nearly straight.
             let shorter = SAFE * share * before.kinetic / (excess + before.kinetic);
             let back = h * (share - shorter);
             share = if shorter > LEAST_WAY { shorter } else { 0.0 };

@@ -36,7 +36,8 @@ pub enum StepError {
         /// Time before the step, s.
         time: f64,
     },
-    /// Events without end: a scheme that stops at each of them cannot pass the point where they accumulate.
+    /// Events without end: a scheme that stops at each of them cannot pass
+    /// the point where they accumulate.
     #[error(
         "{events} events before t = {time} s in one step: they accumulate, and an event-driven scheme cannot pass; the state before the step was kept"
     )]

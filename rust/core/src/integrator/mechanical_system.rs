@@ -1,10 +1,12 @@
-//! What time stepping needs of a mechanical system: `M(q) dv = F(q, v) dt + H(q) dp`, q moved along v by ⊕.
+//! What time stepping needs of a mechanical system:
+//! `M(q) dv = F(q, v) dt + H(q) dp`, q moved along v by ⊕.
 //!
-//! Every scheme of this chapter is written once, over this trait. The rover's tree of solids implements it with its sparse factor,
-//! a planar ball or two-wheel rover with small dense matrices, a soil of disks with a diagonal one; nothing of a step is written twice.
+//! Every scheme of this chapter is written once, over this trait. The rover's tree of solids
+//! implements it with its sparse factor, a planar ball or two-wheel rover with small dense
+//! matrices, a soil of disks with a diagonal one; nothing of a step is written twice.
 //!
-//! A system holds its description and the scratch of its matrices, never its state: the scheme hands in configurations and
-//! velocities and asks in the order
+//! A system holds its description and the scratch of its matrices, never its state: the scheme
+//! hands in configurations and velocities and asks in the order
 //!
 //! ```text
 //! place_middle(q_m), place_end(q̃) → detect → relocate      the contacts, measured at q̃
@@ -13,9 +15,10 @@
 //! load, half_solve, local, problem, add_impulses, half_solve_back
 //! ```
 //!
-//! Vectors between `half_solve` and `half_solve_back` are in *factor coordinates* `y = F v`: there an impulse y does
-//! `Zᵀ y` at the contacts, and contact impulses p change y by `Z p`, so W never needs a product with M̂⁻¹. Any factor will do (Cholesky's,
-//! the tree's `Lᵀ D L`, the square root of a diagonal).
+//! Vectors between `half_solve` and `half_solve_back` are in *factor coordinates*
+//! `y = F v`: there an impulse y does `Zᵀ y` at the contacts, and contact impulses p
+//! change y by `Z p`, so W never needs a product with M̂⁻¹. Any factor will do
+//! (Cholesky's, the tree's `Lᵀ D L`, the square root of a diagonal).
 
 use super::energy_audit::MechanicalEnergy;
 use super::options::StepOptions;
@@ -55,7 +58,8 @@ impl<Q> Copy for Start<'_, Q> {}
 
 /// A system with unilateral contacts, see the page above.
 ///
-/// With d components a contact (2 or 3, `DIMENSION`), local vectors run contact by contact `normal, tangent, (tangent)`.
+/// With d components a contact (2 or 3, `DIMENSION`), local vectors run
+/// contact by contact `normal, tangent, (tangent)`.
 pub trait MechanicalSystem {
     /// A point of the configuration space; sizes may be anything, ⊕ is the system's.
     type Configuration: Clone + PartialEq;
@@ -92,7 +96,8 @@ pub trait MechanicalSystem {
     /// Kinematics where contact frames and Jacobians are evaluated.
     fn place_end(&mut self, q: &Self::Configuration);
 
-    /// Finds the contacts of the step, measured at the middle's pose, by the forecast at the velocity `v` (nv).
+    /// Finds the contacts of the step, measured at the middle's pose, by
+    /// the forecast at the velocity `v` (nv).
     ///
     /// `activation.margin` is 0 and the system's to fill. `out` is cleared first.
     fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<Self::Contact>);
@@ -108,14 +113,17 @@ pub trait MechanicalSystem {
     /// M at the middle's pose, and how implicit its implicit forces are.
     fn update_mass_matrix(&mut self, options: &StepOptions);
 
-    /// Factors `M̂ = M + (implicit forces) = Fᵀ F`; false where it is not positive definite in floating point.
+    /// Factors `M̂ = M + (implicit forces) = Fᵀ F`; false where it is not
+    /// positive definite in floating point.
     #[must_use]
     fn factorise(&mut self, options: &StepOptions) -> bool;
 
-    /// `out = M v` (nv), kg m/s and kg m²/s: asked for between `update_mass_matrix` and `factorise`, which may add implicit terms.
+    /// `out = M v` (nv), kg m/s and kg m²/s: asked for between `update_mass_matrix` and
+    /// `factorise`, which may add implicit terms.
     fn multiply_mass(&self, v: &[f64], out: &mut [f64]);
 
-    /// `impulse = h F(q_m, v_mean)` (nv), N s and N m s: that of all forces but the contacts' over the step.
+    /// `impulse = h F(q_m, v_mean)` (nv), N s and N m s: that of all forces
+    /// but the contacts' over the step.
     ///
     /// Forces taken implicitly enter with their value extrapolated from the start's velocity.
     fn load(
@@ -126,20 +134,23 @@ pub trait MechanicalSystem {
         impulse: &mut [f64],
     );
 
-    /// Whether gyroscopic terms are too fast for the step to take them explicitly. By default never.
+    /// Whether gyroscopic terms are too fast for the step to take them
+    /// explicitly. By default never.
     fn is_gyroscopic(&self, _options: &StepOptions, _v: &[f64]) -> bool {
         false
     }
 
     /// [`Self::load`] with the gyroscopic terms implicit, and already in factor coordinates.
     ///
-    /// With `C(q_m, v_mean) v` the gyroscopic part of the bias and J (`impulse`, nv) a forecast of the contacts' generalized impulse
+    /// With `C(q_m, v_mean) v` the gyroscopic part of the bias and J
+    /// (`impulse`, nv) a forecast of the contacts' generalized impulse
     ///
     /// ```text
     /// (M̂ + θ h C) Δv = h (τ − G − C v) + J,        y = F Δv − F⁻ᵀ J
     /// ```
     ///
-    /// so that an impulse J that comes true makes the step implicit as a whole. Only asked of a system that may be [`Self::is_gyroscopic`].
+    /// so that an impulse J that comes true makes the step implicit as a whole. Only asked of a
+    /// system that may be [`Self::is_gyroscopic`].
     fn load_gyroscopic(
         &mut self,
         options: &StepOptions,
@@ -152,16 +163,19 @@ pub trait MechanicalSystem {
         self.half_solve(y);
     }
 
-    /// Chooses the branch of each piecewise force for a step that begins here. By default there is none.
+    /// Chooses the branch of each piecewise force for a step that begins
+    /// here. By default there is none.
     fn choose_branches(&mut self, _start: Start<'_, Self::Configuration>) {}
 
-    /// Goes on to the next branch of each piecewise force towards that of a step that ends with `v_end`; true where one has changed and
-    /// the step must be taken again. By default there is none.
+    /// Goes on to the next branch of each piecewise force towards that of a
+    /// step that ends with `v_end`; true where one has changed and the step
+    /// must be taken again. By default there is none.
     fn revise(&mut self, _start: Start<'_, Self::Configuration>, _v_end: &[f64]) -> bool {
         false
     }
 
-    /// Kinetic and potential energy of a state, J, and what moves as a whole; none where the system is not audited.
+    /// Kinetic and potential energy of a state, J, and what moves as a
+    /// whole; none where the system is not audited.
     fn energy(
         &mut self,
         _options: &StepOptions,
@@ -176,8 +190,8 @@ pub trait MechanicalSystem {
         0.0
     }
 
-    /// Whether [`Self::balance`] keeps the momenta of free flight whatever the step, which no correction of the energy may touch. By default
-    /// it does not.
+    /// Whether [`Self::balance`] keeps the momenta of free flight whatever the step, which no
+    /// correction of the energy may touch. By default it does not.
     fn conserves_momenta(&self) -> bool {
         false
     }
@@ -192,13 +206,16 @@ pub trait MechanicalSystem {
         0.0
     }
 
-    /// The step, or the part of one, that was asked for its work last becomes the state. By default nothing is kept of it.
+    /// The step, or the part of one, that was asked for its work last
+    /// becomes the state. By default nothing is kept of it.
     fn accept(&mut self) {}
 
-    /// Before the iterations of a Newton variant: what it must remember of the start. By default nothing.
+    /// Before the iterations of a Newton variant: what it must remember of
+    /// the start. By default nothing.
     fn begin_balance(&mut self, _start: Start<'_, Self::Configuration>) {}
 
-    /// [`Self::load`] for the iterate `v_end`: forces taken implicitly enter with their value there. By default there are none.
+    /// [`Self::load`] for the iterate `v_end`: forces taken implicitly
+    /// enter with their value there. By default there are none.
     fn load_at_end(
         &mut self,
         options: &StepOptions,
@@ -210,10 +227,11 @@ pub trait MechanicalSystem {
         self.load(options, start, v_mean, impulse);
     }
 
-    /// `impulse = h F − Δ(M v)` (nv): what the iterate `v_end` leaves of the balance over the step without contacts.
+    /// `impulse = h F − Δ(M v)` (nv): what the iterate `v_end` leaves of
+    /// the balance over the step without contacts.
     ///
-    /// The default is the rule at the middle, `h F(q_m, v_mean) − M(q_m) (v_end − v)`, of order 2 for θ = ½.
-    /// `scratch` (nv) may be overwritten.
+    /// The default is the rule at the middle, `h F(q_m, v_mean) − M(q_m) (v_end − v)`, of order 2
+    /// for θ = ½. `scratch` (nv) may be overwritten.
     fn balance(
         &mut self,
         options: &StepOptions,
@@ -254,10 +272,12 @@ pub trait MechanicalSystem {
     /// `out = H p` (nv): the generalized impulse, N s and N m s, of p (d n_c), N s.
     fn generalized_impulse(&self, contacts: &[Self::Contact], p: &[f64], out: &mut [f64]);
 
-    /// The friction-contact problem of the assembled W, with the free velocity q (d n_c), m/s, and μ (n_c).
+    /// The friction-contact problem of the assembled W, with the free
+    /// velocity q (d n_c), m/s, and μ (n_c).
     fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a>;
 
-    /// What is added to the normal free velocity, m/s, so that the problem's `0 ≤ u_N ⊥ p_N ≥ 0` is the contact's law.
+    /// What is added to the normal free velocity, m/s, so that the
+    /// problem's `0 ≤ u_N ⊥ p_N ≥ 0` is the contact's law.
     ///
     /// The default is Newton's impact law, `e u_N⁻`.
     fn normal_shift(
@@ -269,12 +289,14 @@ pub trait MechanicalSystem {
         rebound(options.restitution, u_N_before)
     }
 
-    /// Whether a solve that does not converge speaks for a problem without an answer. By default it does; not where sweeps end early.
+    /// Whether a solve that does not converge speaks for a problem without an
+    /// answer. By default it does; not where sweeps end early.
     fn solves_to_the_end(&self) -> bool {
         true
     }
 
-    /// Solves [`Self::problem`]: p (d n_c), N s, in and out, and u (d n_c), m/s, out, as [`solve`] takes them.
+    /// Solves [`Self::problem`]: p (d n_c), N s, in and out, and u (d n_c),
+    /// m/s, out, as [`solve`] takes them.
     ///
     /// A system of very many bodies has its own way, which needs no W.
     fn solve(
@@ -289,6 +311,7 @@ pub trait MechanicalSystem {
         solve(&self.problem(q, mu), options, p, u, workspace)
     }
 
-    /// How far a displacement `y` (nv) moves what is not a contact point, m: the projection's guard.
+    /// How far a displacement `y` (nv) moves what is not a contact point,
+    /// m: the projection's guard.
     fn displacement(&self, y: &[f64]) -> f64;
 }

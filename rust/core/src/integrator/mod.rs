@@ -5,11 +5,12 @@
 //! | Moreau–Jean, one linearised step | [`moreau_jean`] | 2, gyroscopic terms explicit or implicit by the spin | 1 |
 //! | Moreau–Jean, Newton on the end-of-step forces | [`moreau_jean_newton`] | 2 | 1 |
 //!
-//! Both treat impacts and persistent contact by the same law at velocity level and search for no event.
-//! What the velocity law leaves of penetration, [`position_projection`] removes. Every step's energy is audited ([`energy_audit`]).
+//! Both treat impacts and persistent contact by the same law at velocity level and search for no
+//! event. What the velocity law leaves of penetration, [`position_projection`] removes. Every
+//! step's energy is audited ([`energy_audit`]).
 //!
-//! A scheme is written once, over what a [`MechanicalSystem`] can do: the tree of solids and the planar systems
-//! ([`crate::system`], [`crate::planar`]) step through the same code.
+//! A scheme is written once, over what a [`MechanicalSystem`] can do: the tree of solids and the
+//! planar systems ([`crate::system`], [`crate::planar`]) step through the same code.
 
 pub mod accuracy;
 pub mod energy_audit;
@@ -57,7 +58,8 @@ pub trait Integrator<S: MechanicalSystem> {
     /// Takes one step, or leaves `state` and `warm_start` as they were.
     ///
     /// # Errors
-    /// `NonFinite` or `SingularMassMatrix`. A solver that did not converge is no error: see the report.
+    /// `NonFinite` or `SingularMassMatrix`. A solver that did not converge
+    /// is no error: see the report.
     fn step(
         &self,
         system: &mut S,

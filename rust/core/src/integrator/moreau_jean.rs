@@ -1,24 +1,30 @@
 //! Moreau–Jean, one linearised step.
 //!
-//! Forces are evaluated at `q_m = q ⊕ (1−θ) h v` (for θ = ½ the midpoint of Moreau 1988) and `v_m = v + (1−θ) Δv`, Δv the change that the
-//! forces at (q_m, v) and the last step's impulses would make; the contacts at the predicted end `q̃ = q ⊕ h v`:
+//! Forces are evaluated at `q_m = q ⊕ (1−θ) h v` (for θ = ½ the midpoint of Moreau 1988) and
+//! `v_m = v + (1−θ) Δv`, Δv the change that the forces at (q_m, v) and the last step's impulses
+//! would make; the contacts at the predicted end `q̃ = q ⊕ h v`:
 //!
 //! ```text
-//! M̂ (v⁺ − v) = h (τ − bias(q_m, v_m)) + H(q̃) p + r,      M̂ = M(q_m) + h θ_j K_d + h² θ_j θ K_p on held joints
+//! M̂ (v⁺ − v) = h (τ − bias(q_m, v_m)) + H(q̃) p + r
+//! M̂  = M(q_m) + h θ_j K_d + h² θ_j θ K_p on held joints
 //! q⁺ = q_m ⊕ θ h v⁺
 //! ```
 //!
-//! The velocity law `H(q̃)ᵀ v⁺` thus holds where v⁺ does, at the end of the step, and not half a step before. In persistent
-//! contact `r = (1−θ) (H(q_k) − H(q̃)) p_k`, with the impulses p_k of the step before, turns the reaction back to its mean direction
-//! over the step (a correction deferred by one step, so that W stays symmetric). Without the two a turning rover's path is late by
-//! h/2 and its speed decays with h ω²/2: on the flat drive of the tests the error was five times larger.
+//! The velocity law `H(q̃)ᵀ v⁺` thus holds where v⁺ does, at the end of the step, and
+//! not half a step before. In persistent contact `r = (1−θ) (H(q_k) − H(q̃)) p_k`, with
+//! the impulses p_k of the step before, turns the reaction back to its mean direction
+//! over the step (a correction deferred by one step, so that W stays symmetric). Without
+//! the two a turning rover's path is late by h/2 and its speed decays with h ω²/2: on
+//! the flat drive of the tests the error was five times larger.
 //!
-//! Where the spin asks for it ([`MechanicalSystem::is_gyroscopic`]), or the audit of the energy ([`super::energy_audit`]), the gyroscopic terms
-//! are implicit instead: `bias = G + C(q_m, v_m) (v + (1−θ) Δv)` with the impulses of persistent contact inside Δv. Then no spin and no step
-//! make the scheme unstable.
+//! Where the spin asks for it ([`MechanicalSystem::is_gyroscopic`]), or the audit of the energy
+//! ([`super::energy_audit`]), the gyroscopic terms are implicit instead:
+//! `bias = G + C(q_m, v_m) (v + (1−θ) Δv)` with the impulses of persistent contact inside Δv. Then
+//! no spin and no step make the scheme unstable.
 //!
-//! The PD of a held joint is implicit with an exponentially fitted θ_j ([`crate::system::fitted_theta`]), so no gain and
-//! no step make it unstable. Contacts enter by the forecast `gap + γ h u_N ≤ 0`, measured from q_m.
+//! The PD of a held joint is implicit with an exponentially fitted θ_j
+//! ([`crate::system::fitted_theta`]), so no gain and no step make it unstable. Contacts enter by
+//! the forecast `gap + γ h u_N ≤ 0`, measured from q_m.
 //!
 //! Source: Moreau 1988; Jean 1999; Acary and Brogliato 2008, ch. 10.
 
@@ -71,10 +77,12 @@ const MOST_HALVINGS: usize = 3;
 /// Turn of a frame in a step, rad, beyond which it is taken in parts.
 const MOST_TURN: f64 = 0.5;
 
-/// Most parts that fast turning is given; what turns faster is not resolved, and its energy is the audit's.
+/// Most parts that fast turning is given; what turns faster is not
+/// resolved, and its energy is the audit's.
 const MOST_PARTS: f64 = 64.0;
 
-/// A step or a part of one: what did not come out is taken again in halves, which are other and mostly easier problems.
+/// A step or a part of one: what did not come out is taken again in halves,
+/// which are other and mostly easier problems.
 struct Part<'a> {
     options: &'a StepOptions,
     /// What part of the whole step.
@@ -199,14 +207,16 @@ impl Part<'_> {
     }
 }
 
-/// Most times that a step is taken again because a piecewise force has changed its branch. A motor that comes to its line takes one, a
-/// wheel alone at most four.
+/// Most times that a step is taken again because a piecewise force has changed its branch. A motor
+/// that comes to its line takes one, a wheel alone at most four.
 pub(super) const MOST_REVISIONS: usize = 6;
 
-/// Passes over the mean velocity in which implicit gyroscopic terms are frozen: the second makes the step of order 2.
+/// Passes over the mean velocity in which implicit gyroscopic terms are
+/// frozen: the second makes the step of order 2.
 const GYROSCOPIC_PASSES: usize = 2;
 
-/// One attempt at the step: `ws.v`, `ws.end`, `ws.p` and `ws.gap_end`. None where the mass matrix cannot be factored.
+/// One attempt at the step: `ws.v`, `ws.end`, `ws.p` and `ws.gap_end`. None
+/// where the mass matrix cannot be factored.
 fn attempt<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -264,7 +274,8 @@ pub(super) fn place<S: MechanicalSystem>(system: &S, options: &StepOptions, ws: 
     ws.gap_end.extend(ws.contacts.iter().zip(local).map(moved));
 }
 
-/// The free change `ws.y` (factor coordinates) by forces at v, then at the velocity that they lead to.
+/// The free change `ws.y` (factor coordinates) by forces at v, then at the
+/// velocity that they lead to.
 fn load_explicitly<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -277,7 +288,8 @@ fn load_explicitly<S: MechanicalSystem>(
         system.load(options, start, &ws.v_mean, &mut ws.impulse);
         ws.half_solve(|impulse| system.half_solve(impulse));
         if !is_last {
-            // An impact's impulses say nothing of this step's: with them v_m would be far off, and the bias is quadratic in it.
+            // An impact's impulses say nothing of this step's: with them v_m
+            // would be far off, and the bias is quadratic in it.
             if is_persistent(options, warm_start, &ws.contacts) {
                 system.add_impulses(&ws.p, &mut ws.y);
             }
@@ -290,7 +302,8 @@ fn load_explicitly<S: MechanicalSystem>(
     add_correction(system, options, warm_start, ws);
 }
 
-/// The free change `ws.y` (factor coordinates) with implicit gyroscopic terms; the correction r is part of the forecast impulse.
+/// The free change `ws.y` (factor coordinates) with implicit gyroscopic
+/// terms; the correction r is part of the forecast impulse.
 fn load_implicitly<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -334,7 +347,8 @@ pub(super) fn activation(options: &StepOptions, measured: f64) -> Activation {
     }
 }
 
-/// Contact Jacobian, operator, velocity before the step and the solver's starting point, at the end's poses.
+/// Contact Jacobian, operator, velocity before the step and the solver's
+/// starting point, at the end's poses.
 ///
 /// Newton's law looks at `v_before`, the velocity before the step.
 pub(super) fn assemble_contacts<S: MechanicalSystem>(
@@ -373,7 +387,8 @@ pub(super) fn set_friction<S: MechanicalSystem>(
     );
 }
 
-/// Whether the last step had the same contacts and none of them was new or struck, so that its impulses are those of this step but for O(h).
+/// Whether the last step had the same contacts and none of them was new or struck, so that its
+/// impulses are those of this step but for O(h).
 fn is_persistent<C: UnilateralContact>(
     options: &StepOptions,
     warm_start: &WarmStart<C::Key>,
@@ -382,7 +397,8 @@ fn is_persistent<C: UnilateralContact>(
     options.warm_start && !warm_start.persistent.is_empty() && warm_start.is_of(contacts)
 }
 
-/// Adds the deferred correction r to `ws.y` where the last step had the same contacts and all of them persisted.
+/// Adds the deferred correction r to `ws.y` where the last step had the
+/// same contacts and all of them persisted.
 ///
 /// `ws.p` must still hold the last step's impulses.
 pub(super) fn add_correction<S: MechanicalSystem>(
@@ -405,12 +421,15 @@ pub(super) fn add_correction<S: MechanicalSystem>(
     }
 }
 
-/// Solves the assembled contacts for the free change `ws.y` (factor coordinates) from `ws.v`, and adds both, as `ws.dv`, to `ws.v`.
+/// Solves the assembled contacts for the free change `ws.y` (factor
+/// coordinates) from `ws.v`, and adds both, as `ws.dv`, to `ws.v`.
 ///
-/// Newton's law of restitution with friction may have no answer: a wheel that two slopes hold by friction can not leave both. Where the solver
-/// finds none the impact is inelastic, which always has one, since on a ground at rest standing still is admissible.
+/// Newton's law of restitution with friction may have no answer: a wheel that two slopes hold by
+/// friction can not leave both. Where the solver finds none the impact is inelastic, which always
+/// has one, since on a ground at rest standing still is admissible.
 ///
-/// Starts from `ws.p`. `is_from_start`: `ws.v` is still the velocity before the step, whose local velocity is known.
+/// Starts from `ws.p`. `is_from_start`: `ws.v` is still the velocity before
+/// the step, whose local velocity is known.
 pub(super) fn solve_contacts<S: MechanicalSystem>(
     system: &S,
     options: &StepOptions,

@@ -1,20 +1,23 @@
 //! Moreau–Jean with Newton on the forces at the end of the step, in momentum form.
 //!
-//! Unknown v⁺ (and p). With the mean velocity `v̄ = θ v⁺ + (1−θ) v`, `q⁺ = q ⊕ h v̄`, `q_m = q ⊕ θ h v̄`, and the momentum `(P_i, L_i)` of body i
-//! about a point fixed in the world, d'Alembert's principle over the step reads, for every velocity k with screw S_k(q_m),
+//! Unknown v⁺ (and p). With the mean velocity `v̄ = θ v⁺ + (1−θ) v`, `q⁺ = q ⊕ h v̄`,
+//! `q_m = q ⊕ θ h v̄`, and the momentum `(P_i, L_i)` of body i about a point fixed in the world,
+//! d'Alembert's principle over the step reads, for every velocity k with screw S_k(q_m),
 //!
 //! ```text
 //! Σ_{i moved by k} S_k · (ΔP_i − h m_i g, ΔL_i − h c̄_i × m_i g) = h τ_k + (H(q⁺) p + r)_k
 //! ```
 //!
-//! Momenta at both ends are evaluated exactly, so no bias is needed and, summed over the base's six screws, total linear and
-//! angular momentum change by the impulses alone: in free flight they are conserved to the tolerance of the iteration, at
-//! any step. For θ = ½ the scheme is symmetric and of order 2: the energy of free flight swings with the third power of the turn in a step
-//! and does not drift, and the audit ([`super::energy_audit`]) lets it, since taking it out would cost the momentum. The iteration uses M̂(q_m) as its matrix, which
-//! differs from the true Jacobian by O(h) and converges by that factor.
+//! Momenta at both ends are evaluated exactly, so no bias is needed and, summed over the
+//! base's six screws, total linear and angular momentum change by the impulses alone: in free
+//! flight they are conserved to the tolerance of the iteration, at any step. For θ = ½ the
+//! scheme is symmetric and of order 2: the energy of free flight swings with the third power
+//! of the turn in a step and does not drift, and the audit ([`super::energy_audit`]) lets it,
+//! since taking it out would cost the momentum. The iteration uses M̂(q_m) as its matrix,
+//! which differs from the true Jacobian by O(h) and converges by that factor.
 //!
-//! Source: the discrete d'Alembert principle, as in Simo and Wong 1991 for one body; contacts and the
-//! correction r as in [`super::moreau_jean`].
+//! Source: the discrete d'Alembert principle, as in Simo and Wong 1991 for one body; contacts and
+//! the correction r as in [`super::moreau_jean`].
 
 use super::energy_audit::{Audit, GAIN, Verdict, energy_before};
 use super::error::StepError;
@@ -35,7 +38,8 @@ const ROUNDING: f64 = 1e-8;
 /// Iterates in a row whose contacts were not solved after which the iteration is given up.
 const MOST_UNSOLVED: usize = 2;
 
-/// Turn in a step, rad, up to which the energy of free flight may err with the third power of the turn, as a part of itself.
+/// Turn in a step, rad, up to which the energy of free flight may err with
+/// the third power of the turn, as a part of itself.
 const MOST_TURN: f64 = 0.1;
 
 /// The Newton variant.
@@ -113,7 +117,8 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
             }
         }
         if !is_settled {
-            // An iterate that has not settled obeys no law: take the step that needs no iteration, and say so.
+            // An iterate that has not settled obeys no law: take the step
+            // that needs no iteration, and say so.
             let taken = MoreauJean.step(system, options, state, warm_start, ws, probe)?;
             return Ok(StepReport {
                 newton_iterations: report.newton_iterations,
@@ -155,7 +160,8 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
     }
 }
 
-/// One iteration: `ws.v` moves by `ws.dv`. None where the mass matrix cannot be factored: the iterate has run away.
+/// One iteration: `ws.v` moves by `ws.dv`. None where the mass matrix
+/// cannot be factored: the iterate has run away.
 fn iterate<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,

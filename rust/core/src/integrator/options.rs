@@ -44,13 +44,16 @@ pub struct StepOptions {
     pub variant: Variant,
     /// Default projection.
     pub stabilisation: Stabilisation,
-    /// Penetration that is left alone, m. Default 1e-8: what one step of driving adds on a plane is below it.
+    /// Penetration that is left alone, m. Default 1e-8: what one step of
+    /// driving adds on a plane is below it.
     pub penetration_tolerance: f64,
     /// Whether the solver starts from the last step's impulses. Default true.
     pub warm_start: bool,
-    /// Options of the contact solver. Default tolerance 1e-12: 5% dearer than 1e-10 on a drive, and a rover at rest is at rest.
+    /// Options of the contact solver. Default tolerance 1e-12: 5% dearer
+    /// than 1e-10 on a drive, and a rover at rest is at rest.
     pub solver: SolverOptions,
-    /// Newton variant: stop when no velocity changes by more than this, relative to 1 m/s and to the largest. Default 1e-12.
+    /// Newton variant: stop when no velocity changes by more than this,
+    /// relative to 1 m/s and to the largest. Default 1e-12.
     pub newton_tolerance: f64,
     /// Newton variant: most iterations. Default 20.
     pub newton_max_iterations: usize,

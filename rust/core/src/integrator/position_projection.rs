@@ -1,12 +1,13 @@
 //! Removal of penetration: projection of the position onto gap ≥ 0 (combined scheme).
 //!
-//! The displacement is that of a friction-contact problem at position level, with the step's own operator:
-//! `d = W λ + (gap, 0, 0)`, `0 ≤ d_N ⊥ λ_N ≥ 0`, and Coulomb's law on the tangential displacement. The friction keeps a parked rover from
-//! being shifted down its slope by the correction. It runs only where more than `penetration_tolerance` is left, and leaves
-//! alone a contact that is bouncing off and will be out by itself after the next step.
+//! The displacement is that of a friction-contact problem at position level, with the step's own
+//! operator: `d = W λ + (gap, 0, 0)`, `0 ≤ d_N ⊥ λ_N ≥ 0`, and Coulomb's law on the tangential
+//! displacement. The friction keeps a parked rover from being shifted down its slope by the
+//! correction. It runs only where more than `penetration_tolerance` is left, and leaves alone a
+//! contact that is bouncing off and will be out by itself after the next step.
 //!
-//! Source: Acary 2013, *Projected event-capturing time-stepping schemes for nonsmooth mechanical systems with unilateral
-//! contact and Coulomb's friction*, CMAME 256, 224–250.
+//! Source: Acary 2013, *Projected event-capturing time-stepping schemes for nonsmooth mechanical
+//! systems with unilateral contact and Coulomb's friction*, CMAME 256, 224–250.
 
 use super::ScratchOf;
 use super::mechanical_system::MechanicalSystem;
@@ -16,7 +17,8 @@ use super::report::StepReport;
 use crate::problem::{FrictionContactProblem, Operator};
 use crate::solver::{SolveReport, SolveStatus, solve};
 
-/// Corrects `ws.end`, where the contacts are predicted to have the gaps `ws.gap_end`; tells whether it has moved.
+/// Corrects `ws.end`, where the contacts are predicted to have the gaps
+/// `ws.gap_end`; tells whether it has moved.
 pub(super) fn project<S: MechanicalSystem>(
     system: &S,
     options: &StepOptions,
@@ -48,12 +50,13 @@ pub(super) fn project<S: MechanicalSystem>(
     let mut solved = displace(system, options, ws, 0.0);
     let is_finite = solved.status != SolveStatus::NonFinite;
     if is_finite && (!solved.is_converged() || size(system, ws) > limit) {
-        // Friction locks a wedge, or fights itself over nanometres: the shortest way out needs none.
+        // Friction locks a wedge, or fights itself over nanometres: the
+        // shortest way out needs none.
         ws.mu.fill(0.0);
         solved = displace(system, options, ws, 0.0);
         if !solved.is_converged() {
-            // Nothing frees what is wedged between gaps that face each other. As if the ground yielded a little there is an answer, which takes
-            // each as far as the others let it.
+            // Nothing frees what is wedged between gaps that face each other. As if the ground
+            // yielded a little there is an answer, which takes each as far as the others let it.
             solved = displace(system, options, ws, COMPLIANCE);
         }
         set_friction(system, options, &ws.contacts, &mut ws.mu);
@@ -67,7 +70,8 @@ pub(super) fn project<S: MechanicalSystem>(
 /// Compliance of the ground where nothing else frees a wedged machine, relative to W's own.
 const COMPLIANCE: f64 = 1e-2;
 
-/// Solves for the displacement `ws.dv` with the coefficients in `ws.mu`, on ground of a compliance relative to W's mean.
+/// Solves for the displacement `ws.dv` with the coefficients in `ws.mu`, on
+/// ground of a compliance relative to W's mean.
 fn displace<S: MechanicalSystem>(
     system: &S,
     options: &StepOptions,
@@ -116,8 +120,10 @@ fn size<S: MechanicalSystem>(system: &S, ws: &ScratchOf<S>) -> f64 {
     points.fold(elsewhere, |m, d| m.max(d.abs()))
 }
 
-/// How far a displacement may go, as a multiple of the deepest penetration; the rest is left to the next steps.
+/// How far a displacement may go, as a multiple of the deepest penetration;
+/// the rest is left to the next steps.
 ///
-/// A wheel that an impact left in the wedge between a stone and the ground is locked there by friction: the linearised problem
-/// then has its answer a metre away, and a rover was thrown up by that much over 2 cm.
+/// A wheel that an impact left in the wedge between a stone and the ground is
+/// locked there by friction: the linearised problem then has its answer a
+/// metre away, and a rover was thrown up by that much over 2 cm.
 const FARTHEST: f64 = 4.0;

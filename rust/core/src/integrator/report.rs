@@ -6,7 +6,8 @@ pub enum StepStatus {
     /// They were.
     #[default]
     Converged,
-    /// The contact solver, or Newton's iteration, stopped above its tolerance; the state is the best it had.
+    /// The contact solver, or Newton's iteration, stopped above its
+    /// tolerance; the state is the best it had.
     NotConverged,
 }
 
@@ -25,9 +26,11 @@ pub struct StepReport {
     pub residual: f64,
     /// Most contacts in a step.
     pub n_contacts: usize,
-    /// Steps that were taken again: a motor changed its branch, the energy asked for a safer way, or Newton's law of restitution had no answer.
+    /// Steps that were taken again: a motor changed its branch, the energy asked for a safer way,
+    /// or Newton's law of restitution had no answer.
     pub retaken: usize,
-    /// Largest gain of energy in a step beyond the work of gravity and actuators, as a part of its kinetic energy.
+    /// Largest gain of energy in a step beyond the work of gravity and
+    /// actuators, as a part of its kinetic energy.
     pub energy_gain: f64,
     /// Energy that the scheme would have gained and that the audit took out, all steps together, J.
     pub energy_removed: f64,

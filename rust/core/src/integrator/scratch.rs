@@ -3,9 +3,11 @@
 use super::energy_audit::Audited;
 use crate::solver::{SolverOptions, SolverWorkspace};
 
-/// Scratch of a step of configurations `Q` and contacts `C`. Nothing in it is state: a fresh one gives the same bits.
+/// Scratch of a step of configurations `Q` and contacts `C`. Nothing in it
+/// is state: a fresh one gives the same bits.
 ///
-/// After a step it tells what the step did: contacts, impulses, local velocities, all measured at the step's end.
+/// After a step it tells what the step did: contacts, impulses, local
+/// velocities, all measured at the step's end.
 #[derive(Clone, Debug)]
 pub struct Scratch<Q, C> {
     pub(super) middle: Q,
@@ -39,12 +41,14 @@ pub struct Scratch<Q, C> {
     pub(super) work_left: u64,
 }
 
-/// Share of the solver's budget that all solves of a step have together, and the share that each has in any case.
+/// Share of the solver's budget that all solves of a step have together,
+/// and the share that each has in any case.
 const STEP_SHARE: u64 = 4;
 const SOLVE_SHARE: u64 = 64;
 
 impl<Q: Clone, C> Scratch<Q, C> {
-    /// Room for nv velocities and n contacts of d components; `q` is any configuration of the right size.
+    /// Room for nv velocities and n contacts of d components; `q` is any
+    /// configuration of the right size.
     #[must_use]
     pub fn new(q: &Q, nv: usize, n: usize, d: usize) -> Self {
         let room = || Vec::with_capacity(d * n);
@@ -89,7 +93,8 @@ impl<Q: Clone, C> Scratch<Q, C> {
         }
     }
 
-    /// `y = F⁻ᵀ impulse`: the impulse into factor coordinates. What `impulse` holds then is of no use.
+    /// `y = F⁻ᵀ impulse`: the impulse into factor coordinates. What
+    /// `impulse` holds then is of no use.
     #[inline]
     pub(super) fn half_solve(&mut self, half_solve: impl FnOnce(&mut [f64])) {
         half_solve(&mut self.impulse);

@@ -8,13 +8,14 @@ use crate::contact::ContactKey;
 /// From how many remembered contacts on a bisection is tried before a search.
 const MANY: usize = 64;
 
-/// Impulses of the last step by contact: where the next solve starts. Part of what a snapshot holds.
+/// Impulses of the last step by contact: where the next solve starts. Part
+/// of what a snapshot holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WarmStart<K = ContactKey> {
     /// (key, impulse along n, t, b in N s; b is 0 in the plane), in the order of detection.
     pub impulses: Vec<(K, [f64; 3])>,
-    /// Generalized impulse of persistent contact in the last step (nv), N s and N m s; empty where a contact was new,
-    /// left, or struck.
+    /// Generalized impulse of persistent contact in the last step (nv), N s and
+    /// N m s; empty where a contact was new, left, or struck.
     pub persistent: Vec<f64>,
 }
 
@@ -44,7 +45,8 @@ impl<K> WarmStart<K> {
 impl<K: Copy + Ord> WarmStart<K> {
     /// Fills `p` (d n_c) with what is remembered of these contacts, zero for new ones.
     pub fn recall<C: UnilateralContact<Key = K>>(&self, contacts: &[C], d: usize, p: &mut [f64]) {
-        // A few are found by looking around, many by bisection where detection lists them in the order of their keys.
+        // A few are found by looking around, many by bisection where
+        // detection lists them in the order of their keys.
         let is_sorted =
             self.impulses.len() > MANY && self.impulses.is_sorted_by_key(|(key, _)| *key);
         for (i, (contact, out)) in contacts.iter().zip(p.chunks_exact_mut(d)).enumerate() {

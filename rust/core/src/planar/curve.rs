@@ -1,11 +1,14 @@
-//! Smooth grounds `y = f(x)`: line, sine, table of points; and the search for the points that face a centre.
+//! Smooth grounds `y = f(x)`: a line, a sine, a table of points; and the search for the points
+//! that face a centre.
 //!
-//! With the centre c and `D(x) = ½ |(x, f(x)) − c|²` the points sought are the minima of D, roots of
-//! `g(x) = (x − c_x) + (f(x) − c_y) f'(x)` where g rises. On a cell [a, b] with the bounds |f''| ≤ B₂ etc. a centre value that
-//! |g'|'s bound cannot bring to zero excludes roots, a derivative that |g''|'s bound cannot bring to zero leaves one at most, and any
-//! other cell is halved: no root is missed. Cells are looked at in the order of the least distance that their curve can have, so the search ends
-//! with the reach, from inside the ground with the nearest root, and with the [`MAX_FACING`] nearest where there are more. A root pair closer than
-//! 1e-9 of the window, or of a metre, is none.
+//! With the centre c and `D(x) = ½ |(x, f(x)) − c|²`, the search finds the minima of D: the roots
+//! of `g(x) = (x − c_x) + (f(x) − c_y) f'(x)` at which g rises. It works on cells [a, b] with the
+//! bounds |f''| ≤ B₂ and so on. A cell has no root if g at its centre is larger than the bound on
+//! |g'| lets g change in half the cell. It has at most one if the same holds of g' and the bound
+//! on |g''|. Any other cell is halved, so no root is missed. Cells are visited in the order of the
+//! least distance that their curve can have. The search therefore ends at the reach, from inside
+//! the ground at the nearest root, and at the [`MAX_FACING`] nearest roots where there are more.
+//! Two roots closer than 1e-9 of the window, or of a metre, count as none.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -129,7 +132,8 @@ pub struct Sine {
 
 impl Sine {
     /// # Errors
-    /// A number that is not finite or out of its range: wavelengths from a millimetre, slopes `2π amplitude/wavelength` up to 1000.
+    /// A number that is not finite or out of its range: wavelengths from a millimetre, slopes
+    /// `2π amplitude/wavelength` up to 1000.
     pub fn new(
         amplitude: f64,
         wavelength: f64,
@@ -187,7 +191,8 @@ impl Curve for Sine {
     }
 }
 
-/// The natural cubic spline through a table of points, continued beyond its ends by its tangents there: C² everywhere.
+/// The natural cubic spline through a table of points, continued beyond its
+/// ends by its tangents there: C² everywhere.
 ///
 /// Source: de Boor 1978, *A Practical Guide to Splines*, ch. 4.
 #[derive(Clone, Debug, PartialEq)]
@@ -202,7 +207,8 @@ impl Spline {
     /// `x`: strictly increasing, m. `y`: heights, m.
     ///
     /// # Errors
-    /// Fewer than two points, other lengths, entries that are not finite, or x that does not increase.
+    /// Fewer than two points, other lengths, entries that are not finite,
+    /// or x that does not increase.
     pub fn new(x: &[f64], y: &[f64]) -> Result<Self, PlanarError> {
         check_points(x, y)?;
         for (index, pair) in x.windows(2).enumerate() {
@@ -216,7 +222,8 @@ impl Spline {
         }
         let n = x.len();
         let mut m = vec![0.0; n];
-        // Thomas' algorithm on h_{i-1} m_{i-1} + 2 (h_{i-1} + h_i) m_i + h_i m_{i+1} = 6 (slope_i − slope_{i-1}), m_0 = m_{n-1} = 0.
+        // Thomas' algorithm on h_{i-1} m_{i-1} + 2 (h_{i-1} + h_i) m_i + h_i
+        // m_{i+1} = 6 (slope_i − slope_{i-1}), m_0 = m_{n-1} = 0.
         let mut upper = vec![0.0; n];
         for i in 1..n - 1 {
             let (h0, h1) = (x[i] - x[i - 1], x[i + 1] - x[i]);
@@ -293,7 +300,8 @@ impl Curve for Spline {
     }
 
     fn range(&self, a: f64, b: f64) -> [f64; 2] {
-        // Beyond the table the curve is straight, so its ends bound it; within a piece it leaves the chord by max|f''| h²/8 at most.
+        // Beyond the table the curve is straight, so its ends bound it; within a piece it leaves
+        // the chord by max|f''| h²/8 at most.
         let ends = [self.jet(a)[0], self.jet(b)[0]];
         let mut range = [ends[0].min(ends[1]), ends[0].max(ends[1])];
         let (first, last) = (self.x[0], self.x[self.x.len() - 1]);
@@ -517,8 +525,8 @@ impl PartialEq for Cell {
 
 impl Eq for Cell {}
 
-/// Calls `found` with every minimum of the distance in [a, b], nearer cells first, up to a distance of `limit` (m) and then of the least that
-/// `found` returned.
+/// Calls `found` with every minimum of the distance in [a, b], nearer cells first, up to a distance
+/// of `limit` (m) and then of the least that `found` returned.
 fn minima(
     curve: &dyn Curve,
     centre: &Vector2<f64>,
@@ -672,7 +680,8 @@ mod tests {
         assert!((line.height(-2.0) + 3.0).abs() < 1e-12 && (line.height(9.0) - 19.0).abs() < 1e-12);
     }
 
-    /// A ball at y = −1e9 looked for its nearest point in every wavelength of two million kilometres and never came back.
+    /// A ball at y = −1e9 looked for its nearest point in every wavelength
+    /// of two million kilometres and never came back.
     #[test]
     fn a_ball_a_million_kilometres_deep_finds_its_way_out_at_once() {
         let sine = Sine::new(1.0, 0.1, 0.0, 0.0).expect("sound");
@@ -687,7 +696,8 @@ mod tests {
                 (-found[0].distance / (depth - 1.0) - 1.0).abs() < 1e-7,
                 "{found:?}"
             );
-            // The spline goes on steeply downwards beyond its ends, and its side is nearer than its top.
+            // The spline goes on steeply downwards beyond its ends, and its
+            // side is nearer than its top.
             let found = all(&spline, [17.3, -depth], 1.0);
             assert_eq!(found.len(), 1);
             assert!(

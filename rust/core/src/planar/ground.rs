@@ -1,8 +1,9 @@
 //! The ground of a planar scene: where a disc touches it.
 //!
-//! The ground is what lies below a curve. A disc touches it at every point of the curve that is nearest to the disc's centre among its
-//! neighbours: one on a line, two in a valley that is narrower than the disc, a corner of a step. Seen from a centre inside the ground
-//! only the nearest point of all counts, and pushes out.
+//! The ground is what lies below a curve. A disc touches it at every point of the curve that is
+//! nearest to the disc's centre among its neighbours: one on a line, two in a valley that is
+//! narrower than the disc, a corner of a step. Seen from a centre inside the ground only the
+//! nearest point of all counts, and pushes out.
 
 use nalgebra::Vector2;
 
@@ -40,13 +41,15 @@ pub(super) fn keep_few(out: &mut Vec<Facing>, begin: usize) {
 
 /// What planar machines stand on. Immutable, shared between threads.
 ///
-/// The points that face a centre are those whose distance is smallest among their neighbours, in the order of x, the [`MAX_FACING`] nearest of
-/// more; from inside the ground the nearest of all, at any depth.
+/// The points that face a centre are those whose distance is smallest among
+/// their neighbours, in the order of x, the [`MAX_FACING`] nearest of more;
+/// from inside the ground the nearest of all, at any depth.
 pub trait Ground: Support<2> {
     /// Height of the ground at x, m; the upper one at a vertical face.
     fn height(&self, x: f64) -> f64;
 
-    /// The report's own rule: the point straight below the centre counts as nearest; its normal is the curve's there.
+    /// The report's own rule: the point straight below the centre counts as
+    /// nearest; its normal is the curve's there.
     ///
     /// The distance is that to the tangent, `(y − f(x))/√(1 + f'²)`, exact on a line.
     fn below(&self, centre: &Vector2<f64>) -> Facing;
@@ -58,7 +61,7 @@ pub enum ContactRule {
     /// The curve's points nearest to the centre; the gap is their distance less the radius.
     #[default]
     Nearest,
-    /// As the report's examples: the gap is the height of the disc's *centre* over the curve, so the disc sinks in by its radius,
-    /// while friction acts at the radius. For comparison only.
+    /// As the report's examples: the gap is the height of the disc's *centre* over the curve, so
+    /// the disc sinks in by its radius, while friction acts at the radius. For comparison only.
     CentreHeight,
 }

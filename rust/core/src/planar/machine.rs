@@ -1,7 +1,9 @@
-//! Planar machines with few coordinates: what a machine says of itself, and the discs that touch the ground.
+//! Planar machines with few coordinates: what a machine says of itself, and
+//! the discs that touch the ground.
 //!
-//! [`crate::system::planar`] makes a mechanical system of a machine on a ground. Frames follow the rover's: n out of the ground,
-//! t = n × e_z, forward on level ground; a positive angle turns to the left, so a disc that rolls forward turns negatively.
+//! [`crate::system::planar`] makes a mechanical system of a machine on a ground. Frames follow the
+//! rover's: n out of the ground, t = n × e_z, forward on level ground; a positive angle turns to
+//! the left, so a disc that rolls forward turns negatively.
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
@@ -29,13 +31,14 @@ pub struct PlanarMotor {
 
 /// A machine with `NV` coordinates whose velocities are their rates.
 ///
-/// The first two coordinates are a place in the world, m; the others angles, rad, positive to the left.
+/// The first two coordinates are a place in the world, m; the others
+/// angles, rad, positive to the left.
 pub trait PlanarMachine<const NV: usize>: std::fmt::Debug + Send + Sync {
     /// `M(q)`, kg, kg m, kg m².
     fn mass_matrix(&self, q: &SVector<f64, NV>) -> SMatrix<f64, NV, NV>;
 
-    /// `F(q, v)`, N and N m: gravity (m/s²), torques (`torques`, N m, positive forward) and what is quadratic in v, so that `M v̇ = F` without
-    /// contacts.
+    /// `F(q, v)`, N and N m: gravity (m/s²), torques (`torques`, N m, positive forward) and what is
+    /// quadratic in v, so that `M v̇ = F` without contacts.
     fn force(
         &self,
         q: &SVector<f64, NV>,
@@ -69,7 +72,8 @@ pub trait PlanarMachine<const NV: usize>: std::fmt::Debug + Send + Sync {
     /// Disc i.
     fn disc(&self, i: usize, q: &SVector<f64, NV>) -> Disc;
 
-    /// Velocity of the material point of disc i at `point` (world, m) per unit of each coordinate's rate.
+    /// Velocity of the material point of disc i at `point` (world, m) per
+    /// unit of each coordinate's rate.
     fn point_jacobian(
         &self,
         i: usize,
@@ -80,7 +84,8 @@ pub trait PlanarMachine<const NV: usize>: std::fmt::Debug + Send + Sync {
     /// Lengths by which a coordinate's change is measured, m: 1 for places, an arm for angles.
     fn arms(&self) -> SVector<f64, NV>;
 
-    /// A number that two machines share only if they are of one kind, with the same masses, inertias and lengths.
+    /// A number that two machines share only if they are of one kind, with
+    /// the same masses, inertias and lengths.
     fn fingerprint(&self) -> u64;
 }
 

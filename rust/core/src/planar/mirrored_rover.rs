@@ -1,18 +1,22 @@
-//! A rover that is its own mirror image, driven straight: what is left of its tree in the plane of symmetry.
+//! A rover that is its own mirror image, driven straight: what is left of
+//! its tree in the plane of symmetry.
 //!
-//! In a scene that is symmetric about the vertical plane through the heading (equal torques left and right, no steering, ground
-//! that falls or rises along the heading only), the motion is symmetric: z, roll, heading and every joint that does not turn about z
-//! stay at zero, and the two joints of a mirrored pair have one angle. With `v = P w`, P the columns of what remains, the machine is
+//! In a scene that is symmetric about the vertical plane through the heading (equal
+//! torques left and right, no steering, ground that falls or rises along the heading
+//! only), the motion is symmetric: z, roll, heading and every joint that does not
+//! turn about z stay at zero, and the two joints of a mirrored pair have one angle.
+//! With `v = P w`, P the columns of what remains, the machine is
 //!
 //! ```text
 //! Pᵀ M P ẇ + Pᵀ (N v + G) = Pᵀ T u + Pᵀ H p
 //! ```
 //!
-//! which is the mass matrix of a planar tree whose bodies are the pairs, twice as heavy. The contacts of a pair of wheels have one
-//! normal and one tangent; their impulses add up, and their lateral parts vanish.
+//! which is the mass matrix of a planar tree whose bodies are the pairs,
+//! twice as heavy. The contacts of a pair of wheels have one normal and one
+//! tangent; their impulses add up, and their lateral parts vanish.
 //!
-//! Coordinates: x, y of the base's origin, its angle, then the angle of each pair's joint relative to its carrier. Only wheels
-//! touch the ground, no box does.
+//! Coordinates: x, y of the base's origin, its angle, then the angle of each pair's joint relative
+//! to its carrier. Only wheels touch the ground, no box does.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 
@@ -53,13 +57,15 @@ struct WheelPair {
     radius: f64,
     /// Largest torque of each wheel, N m.
     torque_limit: f64,
-    /// Joint torque of a unit of command: the number of wheels and their sign; 0 where the joint is locked.
+    /// Joint torque of a unit of command: the number of wheels and their
+    /// sign; 0 where the joint is locked.
     gain: f64,
     /// Torque–speed line of each wheel's motor.
     motor: Option<Motor>,
 }
 
-/// The planar image of a mirrored rover, with `NV` coordinates: 3 of the base, one for each pair of joints.
+/// The planar image of a mirrored rover, with `NV` coordinates: 3 of the
+/// base, one for each pair of joints.
 #[derive(Clone, Debug)]
 pub struct MirroredRover<const NV: usize> {
     model: Model,
@@ -94,7 +100,8 @@ impl<const NV: usize> MirroredRover<NV> {
     /// The planar image of a model, all joints that do not turn about z locked at zero.
     ///
     /// # Errors
-    /// A joint that a lock has turned out of the plane, a body without its mirror image, another number of coordinates.
+    /// A joint that a lock has turned out of the plane, a body without its
+    /// mirror image, another number of coordinates.
     pub fn new(model: &Model) -> Result<Self, PlanarError> {
         let across: Vec<(String, f64)> = model.bodies()[1..]
             .iter()
@@ -141,7 +148,8 @@ impl<const NV: usize> MirroredRover<NV> {
         self.wheels.iter().map(|w| w.names.clone()).collect()
     }
 
-    /// Velocity indices of [`Self::model`] that follow planar coordinate `k`: the entries of P's column that are 1.
+    /// Velocity indices of [`Self::model`] that follow planar coordinate
+    /// `k`: the entries of P's column that are 1.
     #[must_use]
     pub fn full_indices(&self, k: usize) -> Vec<usize> {
         match k {

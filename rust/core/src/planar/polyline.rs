@@ -8,7 +8,8 @@ use super::ground::{Facing, Ground, keep_few, keep_if};
 use crate::geometry::Support;
 use crate::quantity::{PLACES, QuantityError, within};
 
-/// Straight pieces between points, continued beyond the ends with the slope of the last pieces (level where those are vertical).
+/// Straight pieces between points, continued beyond the ends with the slope
+/// of the last pieces (level where those are vertical).
 ///
 /// x may stay where it is from one point to the next: a vertical face.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,7 +21,8 @@ impl Polyline {
     /// `x`: not decreasing, m. `y`: heights, m.
     ///
     /// # Errors
-    /// Fewer than two points, other lengths, entries that are not finite, x that decreases, or the same point twice.
+    /// Fewer than two points, other lengths, entries that are not finite, x
+    /// that decreases, or the same point twice.
     pub fn new(x: &[f64], y: &[f64]) -> Result<Self, PlanarError> {
         check_points(x, y)?;
         for i in 1..x.len() {
@@ -66,7 +68,8 @@ impl Polyline {
         &self.points
     }
 
-    /// Unit direction of piece i along the curve; pieces -1 and n-1 are the continuations (given as 0 and n here).
+    /// Unit direction of piece i along the curve; pieces -1 and n-1 are the
+    /// continuations (given as 0 and n here).
     fn direction(&self, i: usize) -> Vector2<f64> {
         let last = self.points.len() - 1;
         let d = if i == 0 {
@@ -288,7 +291,8 @@ mod tests {
         }
     }
 
-    /// A height looked at every point, and what did not face a disc was taken out one by one: a million points took hours.
+    /// A height looked at every point, and what did not face a disc was
+    /// taken out one by one: a million points took hours.
     #[test]
     fn a_million_points_cost_no_more_than_those_within_reach() {
         let x: Vec<f64> = (0..1_000_000).map(|i| 1e-5 * f64::from(i)).collect();

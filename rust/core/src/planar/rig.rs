@@ -1,8 +1,10 @@
-//! One wheel on a carriage: it travels and turns at rates that nothing changes, and is free to sink.
+//! One wheel on a carriage: it travels and turns at rates that nothing
+//! changes, and is free to sink.
 //!
-//! Coordinates (x, y, –, θ_w, –): the carriage's way, the wheel's height, its angle. Way and angle have a mass and an inertia so large that no soil
-//! changes their rates in a double's digits, so the slip `1 − ẋ/(r |θ̇_w|)` is given and the drawbar pull, the horizontal force of the soil on the
-//! wheel, is the answer.
+//! Coordinates (x, y, –, θ_w, –): the carriage's way, the wheel's height, its angle. Way
+//! and angle have a mass and an inertia so large that no soil changes their rates in a
+//! double's digits, so the slip `1 − ẋ/(r |θ̇_w|)` is given and the drawbar pull, the
+//! horizontal force of the soil on the wheel, is the answer.
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
@@ -32,7 +34,8 @@ impl WheelRig {
         })
     }
 
-    /// Rates (5) of a wheel that travels forward at `speed` (m/s) with the slip `1 − speed/(r ω)`, below 1.
+    /// Rates (5) of a wheel that travels forward at `speed` (m/s) with the
+    /// slip `1 − speed/(r ω)`, below 1.
     #[must_use]
     pub fn rates(&self, speed: f64, slip: f64) -> [f64; 5] {
         let turning = speed / (self.radius * (1.0 - slip));

@@ -1,9 +1,11 @@
 //! An approximate answer may add energy, an exact one cannot.
 //!
-//! Over a step with θ = 1 the energy changes by `pᵀu − ½ |v⁺ − v⁻|²_M`, and `pᵀu ≤ 0` wherever the law holds. `s p` has the work
-//! `s² pᵀWp + s pᵀq`, which vanishes at `s = −pᵀq / pᵀWp`: a shorter impulse within the same cones.
+//! Over a step with θ = 1 the energy changes by `pᵀu − ½ |v⁺ − v⁻|²_M`, and `pᵀu ≤ 0`
+//! wherever the law holds. `s p` has the work `s² pᵀWp + s pᵀq`, which vanishes at
+//! `s = −pᵀq / pᵀWp`: a shorter impulse within the same cones.
 
-/// The share of an impulse that adds no energy, in [0, 1]; none where the whole adds none beyond the rounding of its sums.
+/// The share of an impulse that adds no energy, in [0, 1]; none where the
+/// whole adds none beyond the rounding of its sums.
 ///
 /// `work = pᵀu` and `free = pᵀq`, J.
 #[must_use]

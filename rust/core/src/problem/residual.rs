@@ -1,11 +1,14 @@
 //! How well an impulse solves a problem: Signorini's and Coulomb's violations, relative and in m/s.
 //!
-//! Each contact is judged by [`violation`], a velocity `v_i` in m/s that vanishes exactly where both laws hold; its scales are the contact's own,
-//! `ρ_N = 1/W_NN` and `ρ_T` the inverse mean of the tangential diagonal, so that no other contact's mass and no friction coefficient enters.
-//! With the contact's mass `ρ_i = d / tr W_ii` (none of the three depends on the choice of tangents) two numbers are made of it:
+//! Each contact is judged by [`violation`], a velocity `v_i` in m/s that vanishes exactly
+//! where both laws hold; its scales are the contact's own, `ρ_N = 1/W_NN` and `ρ_T` the
+//! inverse mean of the tangential diagonal, so that no other contact's mass and no friction
+//! coefficient enters. With the contact's mass `ρ_i = d / tr W_ii` (none of the three
+//! depends on the choice of tangents) two numbers are made of it:
 //!
-//! - `relative`, the larger of `|(ρ_i v_i)| / |(ρ_i q_i)|` (impulses, which a light contact cannot hide) and `|(v_i)| / |(q_i)|` (velocities, which a
-//!   heavy one cannot hide): the error against what the free velocity asks for;
+//! - `relative`, the larger of `|(ρ_i v_i)| / |(ρ_i q_i)|` (impulses, which a light
+//!   contact cannot hide) and `|(v_i)| / |(q_i)|` (velocities, which a heavy one cannot
+//!   hide): the error against what the free velocity asks for;
 //! - `velocity = max_i |v_i|` in m/s.
 
 use super::scales::{contact_scales, power_of_two};
@@ -138,7 +141,8 @@ impl Magnitudes {
     }
 }
 
-/// In units of the largest free velocity and the largest mass, so that no square overflows or vanishes.
+/// In units of the largest free velocity and the largest mass, so that no
+/// square overflows or vanishes.
 fn evaluate_in<const D: usize>(
     problem: &FrictionContactProblem<'_>,
     p: &[f64],
@@ -228,7 +232,8 @@ mod tests {
 
     #[test]
     fn neither_a_heavy_nor_a_light_contact_hides_the_other() {
-        // Two contacts that do not know each other, 1 kg and 1e12 kg; one of them keeps its approach.
+        // Two contacts that do not know each other, 1 kg and 1e12 kg; one
+        // of them keeps its approach.
         let mut W = vec![0.0; 16];
         for (k, w) in [1.0, 1.0, 1e-12, 1e-12].into_iter().enumerate() {
             W[5 * k] = w;

@@ -1,7 +1,8 @@
 //! Many rovers stepped side by side.
 //!
-//! Models and terrains are shared, everything else is each rover's own, so rovers never wait for each other and their
-//! motion does not depend on how many there are nor on how many threads move them.
+//! Models and terrains are shared, everything else is each rover's own, so
+//! rovers never wait for each other and their motion does not depend on how
+//! many there are nor on how many threads move them.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -43,7 +44,8 @@ pub struct Batch {
 impl Batch {
     /// From rovers of models of one size.
     ///
-    /// `scan`: points of the height scan, see [`RoverSimulation::read`]. `threads`: None for one a core.
+    /// `scan`: points of the height scan, see [`RoverSimulation::read`].
+    /// `threads`: None for one a core.
     ///
     /// # Errors
     /// `Empty`, `Differs`, `Threads`.
@@ -104,7 +106,8 @@ impl Batch {
         &self.layout
     }
 
-    /// Puts another rover, with its own terrain, in a place; `target` (x, z, m) is what its readings look at.
+    /// Puts another rover, with its own terrain, in a place; `target` (x,
+    /// z, m) is what its readings look at.
     ///
     /// # Errors
     /// `NoSuchRover`, `Differs`; nothing is changed then.
@@ -124,15 +127,17 @@ impl Batch {
         Ok(())
     }
 
-    /// Gives every rover its commands, takes `n` steps and writes the readings (n_rovers × layout's size, row-major).
+    /// Gives every rover its commands, takes `n` steps and writes the
+    /// readings (n_rovers × layout's size, row-major).
     ///
-    /// `torques` and `set_points`: n_rovers × n_wheels, row-major, as [`RoverSimulation::set_wheel_torques`] and
-    /// [`RoverSimulation::set_steering`] take them. `active`: rovers that are to move; the others keep still, commands too.
-    /// A step that a rover cannot take is that rover's own: see [`Self::errors`].
+    /// `torques` and `set_points`: n_rovers × n_wheels, row-major, as
+    /// [`RoverSimulation::set_wheel_torques`] and [`RoverSimulation::set_steering`] take them.
+    /// `active`: rovers that are to move; the others keep still, commands too. A step that a rover
+    /// cannot take is that rover's own: see [`Self::errors`].
     ///
     /// # Errors
-    /// `Command`: the first command that a rover refuses; `Threads`: in a process forked from the one that made the
-    /// batch, its threads could not be started anew. No rover has moved then.
+    /// `Command`: the first command that a rover refuses; `Threads`: in a process forked from the
+    /// one that made the batch, its threads could not be started anew. No rover has moved then.
     ///
     /// # Panics
     /// If a slice has a wrong length.
@@ -147,7 +152,8 @@ impl Batch {
         self.step_while(torques, set_points, n, active, rows, &mut || true)
     }
 
-    /// The same, but asks `go_on` now and then; once it says no, each rover stops after a whole step of its own.
+    /// The same, but asks `go_on` now and then; once it says no, each rover
+    /// stops after a whole step of its own.
     ///
     /// # Errors
     /// As [`Self::step`].

@@ -24,9 +24,11 @@ use crate::system::grains::{
 
 /// Options that suit a bed of these grains.
 ///
-/// θ = 1 and γ = 1, which the contact's law needs; h = 1 ms; solver tolerance 1e-4 and at most 2000 sweeps. Penetration is
-/// not projected away, which lifts what lies above and adds energy: circles and spheres that come together by their gap along the normal do
-/// not overlap, so nothing but the solver's tolerance is left to project. Asked for, projection begins at 0.5% of the smallest radius.
+/// θ = 1 and γ = 1, which the contact's law needs; h = 1 ms; solver tolerance 1e-4 and
+/// at most 2000 sweeps. Penetration is not projected away, which lifts what lies above
+/// and adds energy: circles and spheres that come together by their gap along the
+/// normal do not overlap, so nothing but the solver's tolerance is left to project.
+/// Asked for, projection begins at 0.5% of the smallest radius.
 #[must_use]
 pub fn soil_options<const D: usize>(grains: &Grains<D>) -> StepOptions {
     StepOptions {
@@ -251,7 +253,8 @@ where
         self.memory.sleep.asleep()
     }
 
-    /// Sets configuration (nq) and velocities (nv), those that kinematic grains keep among them; time 0, all awake, warm start forgotten, torques kept.
+    /// Sets configuration (nq) and velocities (nv), those that kinematic grains keep among them;
+    /// time 0, all awake, warm start forgotten, torques kept.
     ///
     /// # Errors
     /// As [`Self::new`]; nothing is changed then.
@@ -271,7 +274,8 @@ where
         Ok(())
     }
 
-    /// Takes the grains that are marked (n) out of the bed; the others go on as they are, under new numbers in the same order.
+    /// Takes the grains that are marked (n) out of the bed; the others go
+    /// on as they are, under new numbers in the same order.
     ///
     /// Snapshots of before belong to another bed.
     ///
@@ -358,7 +362,8 @@ where
         sum.into()
     }
 
-    /// Deepest overlap now, m: 0 where nothing overlaps. Kinematic grains among themselves and in walls do not count.
+    /// Deepest overlap now, m: 0 where nothing overlaps. Kinematic grains
+    /// among themselves and in walls do not count.
     #[must_use]
     pub fn penetration(&self) -> f64 {
         self.soil().penetration(self.q())
@@ -372,7 +377,8 @@ where
 }
 
 impl SoilSimulation {
-    /// Momentum (x, y) of the disks that are not kinematic, kg m/s, and their moment of momentum about the origin, kg m²/s.
+    /// Momentum (x, y) of the disks that are not kinematic, kg m/s, and
+    /// their moment of momentum about the origin, kg m²/s.
     #[must_use]
     pub fn momentum(&self) -> [f64; 3] {
         let (linear, moment) = self.soil().momentum(self.q(), self.v());

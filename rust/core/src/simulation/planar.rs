@@ -182,7 +182,8 @@ impl<const NV: usize, M: PlanarMachine<NV> + Clone> PlanarSimulation<NV, M> {
         Ok(())
     }
 
-    /// Sets the torques, N m, positive forward; each saturates at its limit ([`PlanarMachine::torque_limit`]).
+    /// Sets the torques, N m, positive forward; each saturates at its limit
+    /// ([`PlanarMachine::torque_limit`]).
     ///
     /// # Errors
     /// Wrong length or an entry that is not finite; nothing is changed then.

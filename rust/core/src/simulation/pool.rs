@@ -39,8 +39,8 @@ impl Pool {
         Ok(self.threads.insert(threads))
     }
 
-    /// Threads of a parent do not run here, and what they held at the fork they hold for ever: to drop the pool, which
-    /// talks to them, could wait without end.
+    /// Threads of a parent do not run here, and what they held at the fork they hold for ever: to
+    /// drop the pool, which talks to them, could wait without end.
     fn forget_a_parents(&mut self) {
         if self.process != std::process::id() {
             std::mem::forget(self.threads.take());

@@ -20,7 +20,8 @@ pub const CONTACT_GAP: f64 = 1e-3;
 pub struct Look<'a> {
     /// A place on the map, x and z, m.
     pub target: [f64; 2],
-    /// Points ahead and to the right of the trunk's origin in the heading frame, m, whose heights are wanted.
+    /// Points ahead and to the right of the trunk's origin in the heading
+    /// frame, m, whose heights are wanted.
     pub scan: &'a [[f64; 2]],
 }
 
@@ -196,7 +197,8 @@ impl RoverSimulation {
         assert_eq!(row.filled, row.out.len(), "a row as long as its layout");
     }
 
-    /// Mean over the wheels' contacts of the last step of |u_T| / max(|rim speed|, |ground speed|); 0 without contacts.
+    /// Mean over the wheels' contacts of the last step of |u_T| / max(|rim
+    /// speed|, |ground speed|); 0 without contacts.
     #[must_use]
     pub fn slip_ratio(&self) -> f64 {
         let (mut total, mut n) = (0.0, 0_u32);

@@ -203,7 +203,8 @@ impl RoverSimulation {
         &self.scene.terrain
     }
 
-    /// Sets configuration and velocity, as checked by [`crate::multibody::coordinates`]; time 0, warm start forgotten.
+    /// Sets configuration and velocity, as checked by
+    /// [`crate::multibody::coordinates`]; time 0, warm start forgotten.
     ///
     /// # Panics
     /// If the sizes are another model's.
@@ -227,7 +228,8 @@ impl RoverSimulation {
         }
     }
 
-    /// Mean torque that the drive of each wheel gave in the last step, positive forward (N m): the command, within the motor's line.
+    /// Mean torque that the drive of each wheel gave in the last step,
+    /// positive forward (N m): the command, within the motor's line.
     ///
     /// Zero before any step and where the wheel is locked.
     #[must_use]

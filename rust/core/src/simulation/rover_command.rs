@@ -101,7 +101,8 @@ impl RoverSimulation {
         Ok(())
     }
 
-    /// Sets torques about the joint axes (n_joints, N m) that come on top of the wheels' and have no limit.
+    /// Sets torques about the joint axes (n_joints, N m) that come on top
+    /// of the wheels' and have no limit.
     ///
     /// # Errors
     /// Wrong length or an entry that is not finite; nothing is changed then.
@@ -150,7 +151,8 @@ impl RoverSimulation {
     /// Holds the steering joints at set-points (rad, one a wheel) with the model's gains.
     ///
     /// # Errors
-    /// Wrong length, not finite, beyond the wheel's limit, or nonzero where there is no free steering joint.
+    /// Wrong length, not finite, beyond the wheel's limit, or nonzero where
+    /// there is no free steering joint.
     pub fn set_steering(&mut self, set_points: &[f64]) -> Result<(), CommandError> {
         self.check_steering(set_points)?;
         for (&set_point, wheel) in set_points.iter().zip(self.scene.model.wheels()) {
@@ -216,7 +218,8 @@ impl RoverSimulation {
     /// Holds joints by name; set-points default to where they are, gains to the model's.
     ///
     /// # Errors
-    /// An unknown joint, a wrong number of set-points, a gain that is negative or not finite; nothing is changed then.
+    /// An unknown joint, a wrong number of set-points, a gain that is
+    /// negative or not finite; nothing is changed then.
     pub fn hold(
         &mut self,
         joints: &[String],

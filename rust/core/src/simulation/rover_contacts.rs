@@ -10,7 +10,8 @@ impl RoverSimulation {
         wheel_contacts(self.model(), &self.kinematics(), &**self.terrain())
     }
 
-    /// Deepest gap (m) of any wheel or box with the ground now: 0 where nothing overlaps, else negative.
+    /// Deepest gap (m) of any wheel or box with the ground now: 0 where
+    /// nothing overlaps, else negative.
     #[must_use]
     pub fn deepest_overlap(&self) -> f64 {
         let mut contacts = Vec::new();

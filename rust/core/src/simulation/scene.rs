@@ -1,8 +1,9 @@
 //! What a simulation steps: a description of all that there is, without its state.
 //!
-//! A scene is a machine, or many bodies, with the ground under them. It hands out a [`MechanicalSystem`] for each step, says what can
-//! be commanded and what it remembers from step to step, and checks the part of a snapshot that only it understands. Everything
-//! else of a simulation is written once, in [`super::Simulation`].
+//! A scene is a machine, or many bodies, with the ground under them. It hands out a
+//! [`MechanicalSystem`] for each step, says what can be commanded and what it remembers from step
+//! to step, and checks the part of a snapshot that only it understands. Everything else of a
+//! simulation is written once, in [`super::Simulation`].
 
 use super::active_contact::LocatedContact;
 use super::snapshot::Snapshot;
@@ -63,7 +64,8 @@ pub trait Scene: Clone {
         contact: &Self::Contact,
     ) -> <Self::Contact as LocatedContact>::Vector;
 
-    /// A call begins, or the state was set: what is summed over a call starts anew. By default nothing is.
+    /// A call begins, or the state was set: what is summed over a call
+    /// starts anew. By default nothing is.
     fn begin_call(&self, _parts: &mut Self::Parts) {}
 
     /// After each step that became the state. By default nothing is to do.
@@ -75,8 +77,8 @@ pub trait Scene: Clone {
     /// A number that two scenes share only if a snapshot of one fits the other.
     fn fingerprint(&self) -> u64;
 
-    /// Whether a snapshot's configuration, command, memory and contacts can be this scene's. Velocities, the warm start and the
-    /// numbers of contacts have been looked at already.
+    /// Whether a snapshot's configuration, command, memory and contacts can be this scene's.
+    /// Velocities, the warm start and the numbers of contacts have been looked at already.
     fn admits(&self, snapshot: &Snapshot<Self>) -> bool;
 }
 

@@ -15,7 +15,8 @@ use crate::multibody::Energy;
 /// Steps of a copy that a profile takes before it measures.
 const WARM_UP: usize = 10;
 
-/// A scene, its state and its scratch. What a scene shares, its copies share; everything else is a simulation's own.
+/// A scene, its state and its scratch. What a scene shares, its copies
+/// share; everything else is a simulation's own.
 #[derive(Clone, Debug)]
 pub struct Simulation<S: Scene> {
     pub(super) scene: S,
@@ -111,7 +112,8 @@ impl<S: Scene> Simulation<S> {
         &self.active
     }
 
-    /// Report of the last call of [`Self::step`]; empty before any, and where one could not be taken.
+    /// Report of the last call of [`Self::step`]; empty before any, and
+    /// where one could not be taken.
     #[must_use]
     pub fn last_report(&self) -> &StepReport {
         &self.last_report
@@ -184,7 +186,8 @@ impl<S: Scene> Simulation<S> {
         self.call(integrator, n, &mut || true, &mut NoProbe)
     }
 
-    /// Takes `n` steps of a copy and says where their time went; `go_on` as for [`Self::step_while`].
+    /// Takes `n` steps of a copy and says where their time went; `go_on` as
+    /// for [`Self::step_while`].
     ///
     /// # Errors
     /// As [`Self::step`].

@@ -1,4 +1,5 @@
-//! A solve from the caller's problem to the judged answer: dimension, storage, units, method, report.
+//! A solve from the caller's problem to the judged answer: dimension,
+//! storage, units, method, report.
 
 use super::options::{ContactLaw, Method, SolverOptions};
 use super::reference::relaxed;
@@ -17,17 +18,19 @@ use crate::problem::{
 
 /// Solves `K_μ* ∋ ũ ⊥ p ∈ K_μ`, `u = W p + q`.
 ///
-/// `p` (n), N s: in, the warm start or zeros; out, the impulses, inside the friction cones up to the report's residual.
-/// `u` (n), m/s: out, `W p + q` of the returned `p`. `workspace` may have served any other problem before; it influences
-/// no bit of the answer, and allocates only when a problem is larger than all before.
+/// `p` (n), N s: in, the warm start or zeros; out, the impulses, inside the friction cones
+/// up to the report's residual. `u` (n), m/s: out, `W p + q` of the returned `p`.
+/// `workspace` may have served any other problem before; it influences no bit of the answer,
+/// and allocates only when a problem is larger than all before.
 ///
-/// From `p = 0` and few contacts the answer is the one next to zero (Tikhonov's limit), so a symmetric problem has a
-/// symmetric answer and the order of the contacts does not matter; from a warm start it is the one next to the warm start.
+/// From `p = 0` and few contacts the answer is the one next to zero (Tikhonov's limit), so a
+/// symmetric problem has a symmetric answer and the order of the contacts does not matter; from a
+/// warm start it is the one next to the warm start.
 ///
-/// Not converged is an answer, see [`SolveStatus`]: then `p` is the best impulse met by any stage. The work is bounded, see
-/// [`SolverOptions::budget`]. Where `q = 0` the answer is zero, whatever the warm start. Data or warm start that are not finite
-/// never come out again: with bad data `p` and `u` are zero and the status is [`SolveStatus::NonFinite`]; a bad warm start
-/// counts as zeros.
+/// Not converged is an answer, see [`SolveStatus`]: then `p` is the best impulse met by any stage.
+/// The work is bounded, see [`SolverOptions::budget`]. Where `q = 0` the answer is zero, whatever
+/// the warm start. Data or warm start that are not finite never come out again: with bad data `p`
+/// and `u` are zero and the status is [`SolveStatus::NonFinite`]; a bad warm start counts as zeros.
 ///
 /// # Panics
 /// If `p` or `u` has not the problem's number of unknowns.
@@ -52,9 +55,11 @@ pub fn solve(
     }
 }
 
-/// Solves the contacts of very many free bodies: [`Method::Auto`] and [`Method::GaussSeidel`] sweep over their pairs and need no `W`.
+/// Solves the contacts of very many free bodies: [`Method::Auto`] and
+/// [`Method::GaussSeidel`] sweep over their pairs and need no `W`.
 ///
-/// `p`, `u`, `workspace` and the report are as [`solve`]'s. The sweeps end at `max_sweeps`, the budget is that of what comes after them.
+/// `p`, `u`, `workspace` and the report are as [`solve`]'s. The sweeps end at
+/// `max_sweeps`, the budget is that of what comes after them.
 ///
 /// # Panics
 /// If a length does not fit.
@@ -150,8 +155,8 @@ fn report_of(status: SolveStatus, method: Method) -> SolveReport {
     }
 }
 
-/// Solves the problem as it is; `None`, and nothing done, where `|q|` or the mean diagonal of `W` is so large or small that squares
-/// overflow or vanish, unless `at_any_scale`.
+/// Solves the problem as it is; `None`, and nothing done, where `|q|` or the mean diagonal of `W`
+/// is so large or small that squares overflow or vanish, unless `at_any_scale`.
 fn solve_with_scales<const D: usize>(
     problem: &FrictionContactProblem<'_>,
     options: &SolverOptions,
@@ -192,7 +197,8 @@ fn solve_with_scales<const D: usize>(
     Some(judge::<D>(&data, options, p, u, scratch, islands))
 }
 
-/// Runs the method. `u` is `W p + q` on return; `iterations` is advanced by the sweeps and linear solves.
+/// Runs the method. `u` is `W p + q` on return; `iterations` is advanced by
+/// the sweeps and linear solves.
 fn run<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
@@ -289,7 +295,8 @@ fn refuse(report: &mut SolveReport, p: &mut [f64], u: &mut [f64]) {
     report.amend(SolveStatus::NonFinite);
 }
 
-/// Solves in units of the largest free velocity and the largest diagonal entry of `W`, both taken as powers of two, so that no digit is lost.
+/// Solves in units of the largest free velocity and the largest diagonal entry of `W`, both taken
+/// as powers of two, so that no digit is lost.
 fn solve_scaled<const D: usize>(
     problem: &FrictionContactProblem<'_>,
     options: &SolverOptions,

@@ -24,9 +24,11 @@ pub enum Method {
     Newton,
     /// Proximal point outside, damped Newton inside.
     ProximalPoint,
-    /// Alternating directions with De Saxcé's shift renewed at every iteration; `Auto` takes some to bring many contacts near.
+    /// Alternating directions with De Saxcé's shift renewed at every
+    /// iteration; `Auto` takes some to bring many contacts near.
     Admm,
-    /// The convex relaxation of Coulomb's law, for comparison: its answer obeys another law and never counts as converged.
+    /// The convex relaxation of Coulomb's law, for comparison: its answer
+    /// obeys another law and never counts as converged.
     Relaxed,
 }
 
@@ -75,26 +77,31 @@ impl Method {
 pub struct SolverOptions {
     /// Which algorithm; default [`Method::Auto`].
     pub method: Method,
-    /// Largest [relative residual](crate::problem::Residual::relative) of a converged answer, dimensionless; default 1e-12.
+    /// Largest [relative residual](crate::problem::Residual::relative) of a
+    /// converged answer, dimensionless; default 1e-12.
     ///
-    /// An answer whose violation is within the rounding of `W p + q` counts as converged too: no impulse does better.
+    /// An answer whose violation is within the rounding of `W p + q` counts
+    /// as converged too: no impulse does better.
     pub tolerance: f64,
     /// Largest violation of a converged answer at any contact, m/s; default 1e-9.
     pub velocity_tolerance: f64,
     /// Most Newton steps of a stage, counting every linear solve; default 500.
     pub max_newton_steps: usize,
-    /// Most Gauss–Seidel sweeps, or iterations of ADMM, when that is the method asked for; default 10 000. `Auto` stops earlier by itself.
+    /// Most Gauss–Seidel sweeps, or iterations of ADMM, when that is the method asked for; default
+    /// 10 000. `Auto` stops earlier by itself.
     pub max_sweeps: usize,
     /// Proximal regularisation `α` relative to the mean diagonal of `W`; default 1e-6.
     ///
-    /// Measured: smaller values let rounding (`ε/α`) leak into the impulses that `W` cannot see, larger ones cost
-    /// refinement steps.
+    /// Measured: smaller values let rounding (`ε/α`) leak into the impulses
+    /// that `W` cannot see, larger ones cost refinement steps.
     pub regularisation: f64,
-    /// Most work of a solve, counted and not timed, so that equal problems end alike on every machine; default
-    /// [`DEFAULT_BUDGET`](Self::DEFAULT_BUDGET).
+    /// Most work of a solve, counted and not timed, so that equal problems end alike on every
+    /// machine; default [`DEFAULT_BUDGET`](Self::DEFAULT_BUDGET).
     ///
-    /// The unit is one multiplication with its addition in a product with `W`. What the budget does not allow is left undone, the status is
-    /// [`SolveStatus::BudgetExhausted`](super::SolveStatus::BudgetExhausted), and the best impulse known by then is returned.
+    /// The unit is one multiplication with its addition in a product with
+    /// `W`. What the budget does not allow is left undone, the status is
+    /// [`SolveStatus::BudgetExhausted`](super::SolveStatus::BudgetExhausted),
+    /// and the best impulse known by then is returned.
     pub budget: u64,
     /// Most contacts that `Auto` takes to Newton without trying Gauss–Seidel first; default 32.
     pub direct_contacts: usize,

@@ -9,7 +9,8 @@ use crate::problem::Residual;
 pub enum SolveStatus {
     /// Both tolerances hold, or the violation is within the rounding of the data.
     Converged,
-    /// The tolerances hold for the convex relaxation, which is not the law that was asked for; the report's numbers are Coulomb's.
+    /// The tolerances hold for the convex relaxation, which is not the law
+    /// that was asked for; the report's numbers are Coulomb's.
     SolvedRelaxed,
     /// The allowed iterations were used up.
     MaxIterations,
@@ -88,7 +89,8 @@ impl Stage {
         }
     }
 
-    /// The method that the stage belongs to; an answer by islands is of the method that the hardest of them took.
+    /// The method that the stage belongs to; an answer by islands is of the
+    /// method that the hardest of them took.
     #[must_use]
     pub const fn method(self) -> Method {
         match self {

@@ -1,11 +1,13 @@
-//! What the stages of a solve share and leave to one another, kept between solves so that none of them allocates.
+//! What the stages of a solve share and leave to one another, kept between
+//! solves so that none of them allocates.
 
 use super::linear::reduced_system::ReducedSystem;
 use super::report::{Rung, Rungs, SolveStatus, Stage};
 use super::work::{Work, sweep};
 use crate::problem::Operator;
 
-/// Impulses and velocities of the iterations (n each), the Newton system, and the record of the stages.
+/// Impulses and velocities of the iterations (n each), the Newton system,
+/// and the record of the stages.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scratch {
     /// The linear system of a Newton step with its linearisation.

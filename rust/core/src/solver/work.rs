@@ -1,7 +1,9 @@
-//! The work of a solve, counted and not timed, so that a budget ends it at the same place on every machine.
+//! The work of a solve, counted and not timed, so that a budget ends it at
+//! the same place on every machine.
 //!
-//! The unit is one multiplication with its addition in a product with `W`. Dense factors run in vector registers and are counted at a fraction, so that a unit
-//! takes about as long everywhere: a little more than a nanosecond on a shared server of 2.5 GHz.
+//! The unit is one multiplication with its addition in a product with `W`. Dense factors run in
+//! vector registers and are counted at a fraction, so that a unit takes about as long everywhere: a
+//! little more than a nanosecond on a shared server of 2.5 GHz.
 
 /// Units of one contact solved exactly, beside its row of the product.
 const ONE_CONTACT: u64 = 200;
@@ -59,6 +61,7 @@ pub(in crate::solver) fn dense(m: usize, is_symmetric: bool) -> u64 {
 pub(in crate::solver) struct SweepBudget {
     /// Most sweeps.
     pub sweeps: usize,
-    /// Whether to stop as soon as the rate of the last sweeps would not reach the tolerance within the budget.
+    /// Whether to stop as soon as the rate of the last sweeps would not
+    /// reach the tolerance within the budget.
     pub predict: bool,
 }

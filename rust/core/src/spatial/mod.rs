@@ -1,4 +1,5 @@
-//! Rotations and symmetric inertias: the alphabet of the multibody chapter; [`space`]: what the plane and space share.
+//! Rotations and symmetric inertias: the alphabet of the multibody chapter;
+//! [`space`]: what the plane and space share.
 
 pub mod rotation;
 pub mod space;

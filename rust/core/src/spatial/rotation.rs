@@ -116,7 +116,8 @@ impl CardanReport {
     #[must_use]
     pub fn rate_matrix_derivative_times_rates(self, rates: &Vector3<f64>) -> Vector3<f64> {
         let E = self.rate_matrix();
-        // Each column turns with the angles outside it: d/dt(Rz Ry x) = (ż z + ẏ Rz y) × column, ...
+        // Each column turns with the angles outside it: d/dt(Rz Ry x) = (ż
+        // z + ẏ Rz y) × column, ...
         let w_z = Vector3::z() * rates.z;
         let w_zy = w_z + E.column(1) * rates.y;
         w_zy.cross(&(E.column(0) * rates.x)) + w_z.cross(&(E.column(1) * rates.y))

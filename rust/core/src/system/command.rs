@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::multibody::{Model, Motor};
 
-/// A joint held at a set-point by a PD that is implicit in the step: `τ = −stiffness (q − set_point) − damping q̇`.
+/// A joint held at a set-point by a PD that is implicit in the step:
+/// `τ = −stiffness (q − set_point) − damping q̇`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeldJoint {
     /// rad.

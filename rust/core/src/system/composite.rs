@@ -1,17 +1,20 @@
 //! Two systems as one: M block by block, the contacts of each, and perhaps contacts between them.
 //!
-//! Everything of one system alone is that system's own code. A [`Coupling`] finds the contacts between the two and says how each
-//! moves with their velocities; its rows of Hᵀ span both, so that with the factors of M̂ = diag(M̂_a, M̂_b)
+//! Everything of one system alone is that system's own code. A [`Coupling`] finds the contacts
+//! between the two and says how each moves with their velocities; its rows of Hᵀ span both, so that
+//! with the factors of M̂ = diag(M̂_a, M̂_b)
 //!
 //! ```text
 //! Z = diag(F_a, F_b)⁻ᵀ H,        W = Zᵀ Z.
 //! ```
 //!
-//! Where nothing lies between them the problem is solved system by system, each in its own way; else W is assembled dense, for the few
-//! contacts of machines rather than the thousands of a bed. A composite of composites holds more than two.
+//! Where nothing lies between them the problem is solved system by system, each in its own way;
+//! else W is assembled dense, for the few contacts of machines rather than the thousands of a bed.
+//! A composite of composites holds more than two.
 //!
-//! What a step decides at once it decides for both: whether it is taken again, what the audit of the energy takes out, and whether the
-//! impulses of the last step are a forecast. Apart from that two systems without a contact between them move as each alone.
+//! What a step decides at once it decides for both: whether it is taken again, what the audit of
+//! the energy takes out, and whether the impulses of the last step are a forecast. Apart from that
+//! two systems without a contact between them move as each alone.
 
 use std::fmt::Debug;
 use std::sync::OnceLock;
@@ -26,7 +29,8 @@ use crate::law::newton_impact::rebound;
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
 
-/// Something of the first of two systems, of the second, or of what lies between them; in this order.
+/// Something of the first of two systems, of the second, or of what lies
+/// between them; in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Of<A, B, K> {
     /// Of the first.
@@ -77,7 +81,8 @@ pub trait Coupling<A, B> {
     /// A contact between them.
     type Contact: UnilateralContact + Clone;
 
-    /// Finds those that take part in a step, at the configurations of its middle, and adds them to `out`.
+    /// Finds those that take part in a step, at the configurations of its
+    /// middle, and adds them to `out`.
     fn detect(
         &self,
         q: (&A, &B),
@@ -89,7 +94,8 @@ pub trait Coupling<A, B> {
     /// Measures a contact anew at the configurations of the step's end.
     fn relocate(&self, q: (&A, &B), contact: &mut Self::Contact);
 
-    /// Rows of Hᵀ of a contact, d for each system, row-major: (d × nv) and (d × nv), which come as zeros.
+    /// Rows of Hᵀ of a contact, d for each system, row-major: (d × nv) and
+    /// (d × nv), which come as zeros.
     fn rows(&self, q: (&A, &B), contact: &Self::Contact, rows: (&mut [f64], &mut [f64]));
 
     /// μ of a contact.

@@ -3,9 +3,10 @@
 //! - [`tree`]: a tree of solids on a terrain, under a [`command`];
 //! - [`planar`]: a planar machine on a ground;
 //! - [`composite`]: two systems as one, with contacts between them;
-//! - [`gyroscopic`]: its gyroscopic terms, implicit; `motor_branch`: the line that a motor is on in a step, taken implicitly with
-//!   [`fitted_theta`];
-//! - [`grains`]: thousands of free disks or balls, and a machine among them; [`soil`]: disks under a planar machine.
+//! - [`gyroscopic`]: its gyroscopic terms, implicit; `motor_branch`: the line that a motor is on in
+//!   a step, taken implicitly with [`fitted_theta`];
+//! - [`grains`]: thousands of free disks or balls, and a machine among
+//!   them; [`soil`]: disks under a planar machine.
 
 pub mod command;
 pub mod composite;

@@ -1,11 +1,13 @@
 //! A motor in a step: the branch of its torque–speed line that holds, taken implicitly.
 //!
 //! ```text
-//! τ = at_rest − slope (ω + θ_j Δω),        M̂ = M + h θ_j slope,        θ_j of the page `fitted_theta`
+//! τ = at_rest − slope (ω + θ_j Δω),    M̂ = M + h θ_j slope,    θ_j of the page `fitted_theta`
 //! ```
 //!
-//! The branch is chosen at the θ_j-weighted rate, so that torque, branch and work belong together; where the step's end asks for another
-//! branch the step is taken again ([`crate::integrator::MechanicalSystem::revise`]). Torques never rise with the speed, so the implicit term is dissipative.
+//! The branch is chosen at the θ_j-weighted rate, so that torque, branch and work
+//! belong together; where the step's end asks for another branch the step is
+//! taken again ([`crate::integrator::MechanicalSystem::revise`]). Torques never
+//! rise with the speed, so the implicit term is dissipative.
 
 use super::command::Drive;
 use super::fitted_theta::fitted_theta;
@@ -43,9 +45,11 @@ impl MotorBranch {
         }
     }
 
-    /// Chooses θ_j for a coordinate with this damping (N m s/rad), stiffness (N m/rad) and inertia (kg m²), all told.
+    /// Chooses θ_j for a coordinate with this damping (N m s/rad),
+    /// stiffness (N m/rad) and inertia (kg m²), all told.
     ///
-    /// The line's slope counts on every branch: a motor whose θ_j changed with its branch could find none.
+    /// The line's slope counts on every branch: a motor whose θ_j changed
+    /// with its branch could find none.
     #[inline]
     pub(crate) fn set_theta(
         &mut self,
@@ -88,10 +92,12 @@ impl MotorBranch {
         self.trial.regime().torque(self.rate(begin, end))
     }
 
-    /// Work (J) that the motor is credited with in a step between two rates (rad/s) that turns it by `turned` (rad).
+    /// Work (J) that the motor is credited with in a step between two rates
+    /// (rad/s) that turns it by `turned` (rad).
     ///
-    /// A line only takes away from what the command does, `(τ − command) ω ≤ 0`. Where a step turns the rate round, the implicit torque and
-    /// the mean rate may say otherwise; that surplus is nobody's work.
+    /// A line only takes away from what the command does, `(τ − command) ω ≤ 0`.
+    /// Where a step turns the rate round, the implicit torque and the mean rate
+    /// may say otherwise; that surplus is nobody's work.
     #[inline]
     pub(crate) fn work(&self, drive: Option<&Drive>, begin: f64, end: f64, turned: f64) -> f64 {
         let work = self.torque(begin, end) * turned;

@@ -1,4 +1,5 @@
-//! A planar machine on a ground as a mechanical system: contacts with one tangent, `M = L Lᵀ`, `Z = L⁻¹ H`.
+//! A planar machine on a ground as a mechanical system: contacts with one
+//! tangent, `M = L Lᵀ`, `Z = L⁻¹ H`.
 
 use nalgebra::{Cholesky, SMatrix, SVector, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -109,7 +110,8 @@ impl<const NV: usize> PlanarScratch<NV> {
     }
 }
 
-/// A machine on a ground, driven by torques. Motors at their torque–speed line are implicit as in the rover's tree.
+/// A machine on a ground, driven by torques. Motors at their torque–speed
+/// line are implicit as in the rover's tree.
 #[derive(Debug)]
 pub struct PlanarSystem<'a, const NV: usize, M> {
     /// The machine.

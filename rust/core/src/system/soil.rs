@@ -1,4 +1,5 @@
-//! Granular soil in the plane: the disks of [`super::grains`], and a planar machine that drives over them.
+//! Granular soil in the plane: the disks of [`super::grains`], and a planar
+//! machine that drives over them.
 
 use std::sync::Arc;
 

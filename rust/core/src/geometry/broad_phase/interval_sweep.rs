@@ -1,10 +1,12 @@
 //! Which pairs of moving balls come near each other: sort and sweep along one axis.
 //!
-//! Balls sorted by where their intervals begin along x are compared with those that begin before they end. In a scene that lies about on the
-//! ground it costs `n log n` and the pairs that overlap along x; nothing is remembered from one search to the next, so that equal scenes
-//! give equal pairs.
+//! Balls sorted by where their intervals begin along x are compared with those that
+//! begin before they end. In a scene that lies about on the ground it costs
+//! `n log n` and the pairs that overlap along x; nothing is remembered from one
+//! search to the next, so that equal scenes give equal pairs.
 //!
-//! Source: Baraff 1992, *Dynamic simulation of non-penetrating rigid bodies*; Cohen et al. 1995, *I-COLLIDE*.
+//! Source: Baraff 1992, *Dynamic simulation of non-penetrating rigid
+//! bodies*; Cohen et al. 1995, *I-COLLIDE*.
 
 use crate::geometry::shape::Sphere;
 
@@ -25,7 +27,8 @@ impl IntervalSweep {
         }
     }
 
-    /// All pairs (i, j), i < j, whose balls overlap or come closer than `reach` (m), sorted; of those that `is_wanted`.
+    /// All pairs (i, j), i < j, whose balls overlap or come closer than
+    /// `reach` (m), sorted; of those that `is_wanted`.
     ///
     /// # Panics
     /// If there are 2^32 balls or more.

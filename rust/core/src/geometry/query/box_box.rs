@@ -1,29 +1,34 @@
 //! Two boxes: as many points as it takes for one to rest on the other.
 //!
-//! Fifteen axes can part two boxes: the faces' normals and the cross products of their edges. Where a face parts them furthest, the face of
-//! the other box that looks at it is cut to its outline, which gives up to eight points:
+//! Fifteen axes can part two boxes: the faces' normals and the cross products of
+//! their edges. Where a face parts them furthest, the face of the other box that
+//! looks at it is cut to its outline, which gives up to eight points:
 //!
-//! - a corner of either box over the other's face: its height over that face, along that face's normal;
+//! - a corner of either box over the other's face: its height over that
+//!   face, along that face's normal;
 //! - where two edges cross, seen along the normal of the first face: the height there.
 //!
-//! Where two edges part them furthest it is the nearest points of these edges. What neither finds (a corner that comes to a corner) is
-//! measured by the nearest points of [`super::convex`].
+//! Where two edges part them furthest it is the nearest points of these edges. What neither finds
+//! (a corner that comes to a corner) is measured by the nearest points of [`super::convex`].
 //!
-//! The gap's rate is the relative velocity's normal part exactly at corners and at a pair of edges. At a crossing it is up to the tilt of the two
-//! faces, since the crossing slides along the edges: nothing for boxes that lie on each other.
+//! The gap's rate is the relative velocity's normal part exactly at corners and at a pair of edges.
+//! At a crossing it is up to the tilt of the two faces, since the crossing slides along the edges:
+//! nothing for boxes that lie on each other.
 //!
-//! Source: Gottschalk, Lin, Manocha 1996, *OBBTree*; Sutherland, Hodgman 1974, *Reentrant polygon clipping*.
+//! Source: Gottschalk, Lin, Manocha 1996, *OBBTree*; Sutherland, Hodgman
+//! 1974, *Reentrant polygon clipping*.
 
 use nalgebra::{Vector2, Vector3};
 
 use super::{PairPoint, convex};
 use crate::geometry::{OrientedBox, SupportMap};
 
-/// Part of the boxes' size by which another axis must part them further than a face of the first box, to be taken instead: of equal axes
-/// it is always the same one.
+/// Part of the boxes' size by which another axis must part them further than a face of the first
+/// box, to be taken instead: of equal axes it is always the same one.
 const PREFERENCE: f64 = 1e-4;
 
-/// Part of the boxes' size by which a corner may stand over the rim of a face: what lies edge on edge lies on it.
+/// Part of the boxes' size by which a corner may stand over the rim of a
+/// face: what lies edge on edge lies on it.
 const SLACK: f64 = 1e-6;
 
 /// Part of the boxes' size within which two points are one.
@@ -116,8 +121,8 @@ pub fn point(first: &OrientedBox, second: &OrientedBox, feature: usize) -> PairP
     convex::nearest_points(first, second)
 }
 
-/// How far the boxes are apart along the axis that parts them furthest, m: their distance, up to sign, wherever a face or two edges are
-/// nearest, and never more.
+/// How far the boxes are apart along the axis that parts them furthest, m: their distance, up to
+/// sign, wherever a face or two edges are nearest, and never more.
 #[must_use]
 pub fn separation(first: &OrientedBox, second: &OrientedBox) -> f64 {
     Axis::furthest(first, second).separation
@@ -191,7 +196,8 @@ fn half_width(solid: &OrientedBox, n: &Vector3<f64>) -> f64 {
     solid.R.tr_mul(n).abs().dot(&solid.half_size)
 }
 
-/// Number of the edge along axis k that lies furthest along n: 4 k and two bits for the sides along the next two axes.
+/// Number of the edge along axis k that lies furthest along n: 4 k and two
+/// bits for the sides along the next two axes.
 fn edge(solid: &OrientedBox, k: usize, n: &Vector3<f64>) -> usize {
     let side = |axis: usize| usize::from(solid.axis(axis % 3).dot(n) > 0.0);
     4 * k + side(k + 1) + 2 * side(k + 2)
@@ -213,7 +219,8 @@ fn place_edge(solid: &OrientedBox, edge: usize) -> (Vector3<f64>, Vector3<f64>, 
     )
 }
 
-/// Nearest points of the lines of two edges, and whether they are within both edges; none where the edges are parallel.
+/// Nearest points of the lines of two edges, and whether they are within
+/// both edges; none where the edges are parallel.
 fn crossing_edges(
     first: &OrientedBox,
     second: &OrientedBox,
@@ -323,7 +330,8 @@ impl Faces {
         }
     }
 
-    /// Where on the reference a candidate is, and whether it is within both faces; none where two edges do not cross.
+    /// Where on the reference a candidate is, and whether it is within both
+    /// faces; none where two edges do not cross.
     fn place(&self, candidate: usize) -> Option<(Vector2<f64>, bool)> {
         let slack = SLACK * self.size;
         match candidate {
@@ -346,7 +354,8 @@ impl Faces {
         }
     }
 
-    /// Point of the incident's edge over the line of a reference's edge, and where along its edge that is, from 0 to 1.
+    /// Point of the incident's edge over the line of a reference's edge,
+    /// and where along its edge that is, from 0 to 1.
     fn crossing(&self, candidate: usize) -> Option<(f64, Vector3<f64>)> {
         let (edge, line) = ((candidate - 8) / 4, (candidate - 8) % 4);
         let (begin, end) = (self.incident.corner(edge), self.incident.corner(edge + 1));
@@ -446,7 +455,8 @@ mod tests {
                 prop_assert!(found.iter().all(|p| p.gap >= -1e-9));
             } else if exact.gap < 0.0 {
                 prop_assert!(!found.is_empty());
-                // No point is deeper than half an edge more than the way out: a long way in, the corner of one is under another face.
+                // No point is deeper than half an edge more than the way out: a long way in, the
+                // corner of one is under another face.
                 prop_assert!(deepest <= 0.0);
             }
             for p in &found {
@@ -465,7 +475,8 @@ mod tests {
             let (there, back) = (all(&first, &second), all(&second, &first));
             let axis = separation(&first, &second);
             prop_assert!((axis - separation(&second, &first)).abs() < 2.0 * PREFERENCE);
-            // Where no other axis comes near, the same points are found with the normals turned round.
+            // Where no other axis comes near, the same points are found
+            // with the normals turned round.
             let sum = |points: &[PairPoint]| points.iter().map(|p| p.gap).sum::<f64>();
             if there.len() == back.len() && (sum(&there) - sum(&back)).abs() < 1e-9 {
                 for p in &there {

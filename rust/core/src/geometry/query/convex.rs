@@ -1,14 +1,16 @@
 //! Any two convex shapes, by their support maps: GJK while they are apart, EPA where they overlap.
 //!
-//! Both look at the difference `C = A − B`, whose distance to the origin is the distance of the shapes. GJK walks over simplices of C towards
-//! the origin. Where the origin is inside, EPA blows a polytope up towards C's surface and returns its face nearest to the origin: the
-//! shortest way to part the shapes.
+//! Both look at the difference `C = A − B`, whose distance to the origin is the
+//! distance of the shapes. GJK walks over simplices of C towards the origin. Where the
+//! origin is inside, EPA blows a polytope up towards C's surface and returns its face
+//! nearest to the origin: the shortest way to part the shapes.
 //!
-//! Apart, lengths are exact to 1e-11 of the shapes' size, and so are overlaps of shapes with corners. Round rims take some twenty iterations; a
-//! wheel a whole radius inside a box is measured to 1e-5 of its size.
+//! Apart, lengths are exact to 1e-11 of the shapes' size, and so are overlaps
+//! of shapes with corners. Round rims take some twenty iterations; a wheel a
+//! whole radius inside a box is measured to 1e-5 of its size.
 //!
-//! Source: Gilbert, Johnson, Keerthi 1988, *IEEE J. Robotics Automation* 4; van den Bergen 2001, *Proximity queries and penetration depth
-//! computation on 3D game objects*.
+//! Source: Gilbert, Johnson, Keerthi 1988, *IEEE J. Robotics Automation* 4; van den Bergen
+//! 2001, *Proximity queries and penetration depth computation on 3D game objects*.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -125,7 +127,8 @@ impl Simplex {
         self.vertices[..self.n].iter().any(|vertex| vertex.w == *w)
     }
 
-    /// Keeps the face that is nearest to the origin and returns the points of both shapes there; none where the origin is inside.
+    /// Keeps the face that is nearest to the origin and returns the points
+    /// of both shapes there; none where the origin is inside.
     ///
     /// Every face is tried: its point nearest to the origin counts where it lies within.
     fn reduce(&mut self) -> Option<(Vector3<f64>, Vector3<f64>)> {
@@ -177,7 +180,8 @@ impl Simplex {
         })
     }
 
-    /// Barycentric coordinates of the point nearest to the origin in the flat through these corners; none where it is degenerate.
+    /// Barycentric coordinates of the point nearest to the origin in the flat through these
+    /// corners; none where it is degenerate.
     fn weights(&self, corners: &[usize]) -> Option<[f64; 4]> {
         let w = |k: usize| self.vertices[corners[k]].w;
         let p = w(0);
@@ -192,7 +196,8 @@ impl Simplex {
                 let (d, e) = (w(1) - p, w(2) - p);
                 let normal = d.cross(&e);
                 let square = normal.norm_squared();
-                // Areas of the triangles that the origin's projection makes with the edges, as parts of the whole.
+                // Areas of the triangles that the origin's projection makes
+                // with the edges, as parts of the whole.
                 let s = -normal.dot(&p.cross(&e)) / square;
                 let t = -normal.dot(&d.cross(&p)) / square;
                 let is_flat = square <= 1e-28 * d.norm_squared() * e.norm_squared();
@@ -285,7 +290,8 @@ impl Polytope {
         })
     }
 
-    /// Takes the faces that a new vertex sees away and joins it to their rim; false where that fails.
+    /// Takes the faces that a new vertex sees away and joins it to their
+    /// rim; false where that fails.
     fn grow(&mut self, vertex: Vertex, tolerance: f64) -> bool {
         let new = self.add_vertex(vertex);
         let mut rim = [(0_usize, 0_usize); 3 * MOST_VERTICES];

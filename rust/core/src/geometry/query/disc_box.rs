@@ -1,7 +1,8 @@
 //! Disc and box: a wheel on a block.
 //!
-//! Where the nearest direction is a face's normal the wheel stands on that face as on a plane: its lowest rim point and, lying flat, one to either
-//! side ([`super::disc_plane`]), as far as they are over the face. Where it is the axle, the box's corners stand on the disc. Elsewhere, at edges
+//! Where the nearest direction is a face's normal the wheel stands on that face as on a plane: its
+//! lowest rim point and, lying flat, one to either side ([`super::disc_plane`]), as far as they are
+//! over the face. Where it is the axle, the box's corners stand on the disc. Elsewhere, at edges
 //! and corners, it is the nearest points, or the shortest way out, of [`super::convex`].
 //!
 //! The gap's rate is exact, except for the two rim points beside the lowest, as on a plane.

@@ -1,14 +1,15 @@
 //! Two discs: wheels that meet.
 //!
-//! A disc has no width, so that two discs that cross would part by the shortest way out, sideways, and pass through each other. Wheels have
-//! tyres: each disc is taken as one whose rim is rounded off by `r = R / 4`, a flat disc of radius `R − r` grown by r all round. Then
+//! A disc has no width, so that two discs that cross would part by the shortest way out, sideways,
+//! and pass through each other. Wheels have tyres: each disc is taken as one whose rim is rounded
+//! off by `r = R / 4`, a flat disc of radius `R − r` grown by r all round. Then
 //!
 //! ```text
-//! gap = |E₂ − E₁| − r₁ − r₂,      n = unit(E₂ − E₁),      E_i the nearest points of the two flat discs
+//! gap = |E₂ − E₁| − r₁ − r₂,    n = unit(E₂ − E₁),    E_i the nearest points of the two flat discs
 //! ```
 //!
-//! which is smooth as long as the tyres overlap by less than `r₁ + r₂`. Deeper than that the normal is the line of centres. Against everything else a
-//! disc stays flat.
+//! which is smooth as long as the tyres overlap by less than `r₁ + r₂`. Deeper than that the normal
+//! is the line of centres. Against everything else a disc stays flat.
 
 use super::{NEAREST, PairPoint, convex};
 use crate::geometry::{Disc, SupportMap};

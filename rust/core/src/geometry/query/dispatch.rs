@@ -60,7 +60,8 @@ pub fn point_on_sphere(shape: &PlacedShape, ground: &Sphere, base: &Vector3<f64>
     }
 }
 
-/// A shape's point over the tangent plane (normal n) at the point `touch` where a sphere of the ground was first met ([`super::sweep`]).
+/// A shape's point over the tangent plane (normal n) at the point `touch`
+/// where a sphere of the ground was first met ([`super::sweep`]).
 #[inline]
 #[must_use]
 pub fn point_over_tangent(
@@ -75,7 +76,8 @@ pub fn point_over_tangent(
     }
 }
 
-/// Visits the points of two moving shapes whose gap is at most `reach`, m; n from the first to the second.
+/// Visits the points of two moving shapes whose gap is at most `reach`, m;
+/// n from the first to the second.
 pub fn visit_pair(
     first: &PlacedShape,
     second: &PlacedShape,

@@ -6,9 +6,11 @@
 //! | box | [`box_plane`] | [`box_sphere`] | | [`box_box`] | [`box_sphere`] |
 //! | sphere | [`sphere_plane`] | [`sphere_sphere`] | | | [`sphere_sphere`] |
 //!
-//! The gap is positive where the shapes are apart. Points and normals are such that the gap's rate is the normal part of the relative
-//! velocity of the two *material* points there: exactly, except where a page says how nearly. [`convex`] measures any two shapes by their
-//! support maps, for pages without a formula of their own; [`sweep`] says how a part met a sphere that it passes within one step.
+//! The gap is positive where the shapes are apart. Points and normals are such that the
+//! gap's rate is the normal part of the relative velocity of the two *material* points
+//! there: exactly, except where a page says how nearly. [`convex`] measures any two
+//! shapes by their support maps, for pages without a formula of their own; [`sweep`]
+//! says how a part met a sphere that it passes within one step.
 //!
 //! [`dispatch`] is the only page that knows which pairs there are.
 
@@ -62,7 +64,8 @@ impl SurfacePoint {
 
 /// A point where two shapes are near each other.
 ///
-/// The two surfaces' points are `point ∓ ½ gap n`, so that both shapes are pushed at one place and no couple is made.
+/// The two surfaces' points are `point ∓ ½ gap n`, so that both shapes are
+/// pushed at one place and no couple is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairPoint {
     /// Names the point among all that the pair can have.

@@ -1,7 +1,7 @@
 //! The ground: what a terrain must answer, and the terrains there are.
 //!
-//! A terrain says which of its primitives can be touched near a place. Each primitive is convex and pairs with every shape of a machine
-//! ([`super::query`]).
+//! A terrain says which of its primitives can be touched near a place. Each primitive is convex and
+//! pairs with every shape of a machine ([`super::query`]).
 
 pub mod error;
 pub mod plane;
@@ -28,12 +28,13 @@ pub enum Primitive {
 
 /// The ground. Immutable, shared between threads.
 pub trait Terrain: Send + Sync {
-    /// Visits every primitive that comes closer than `reach` (m) to `centre` (world, m), with a number that
-    /// names it for as long as the terrain lives. May visit others too; must not depend on those far away.
+    /// Visits every primitive that comes closer than `reach` (m) to `centre`
+    /// (world, m), with a number that names it for as long as the terrain lives.
+    /// May visit others too; must not depend on those far away.
     fn visit_near(&self, centre: &Vector3<f64>, reach: f64, visit: &mut dyn FnMut(u32, &Primitive));
 
-    /// Whether a part can be past a primitive after one step: a ball, but no half-space. Only then is the motion within a
-    /// step looked at.
+    /// Whether a part can be past a primitive after one step: a ball, but no half-space. Only then
+    /// is the motion within a step looked at.
     fn can_be_passed(&self) -> bool {
         true
     }

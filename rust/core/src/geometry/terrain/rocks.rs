@@ -7,10 +7,11 @@
 //! ```
 //!
 //! of the ground, k being the fraction that all rocks cover. A rock covers π D²/4, so there are
-//! `n(D) = 4 k q exp(−q D) / (π D²)` rocks per m² of ground and m of diameter. In `y = 1/D` the density `4 k q exp(−q/y)/π` is bounded and smooth:
-//! its integral is tabulated and inverted.
+//! `n(D) = 4 k q exp(−q D) / (π D²)` rocks per m² of ground and m of diameter. In `y = 1/D` the
+//! density `4 k q exp(−q/y)/π` is bounded and smooth: its integral is tabulated and inverted.
 //!
-//! Source: Golombek and Rapp 1997, *Size–frequency distributions of rocks on Mars and Earth analog sites*, JGR 102 (E2), 4117–4129.
+//! Source: Golombek and Rapp 1997, *Size–frequency distributions of rocks
+//! on Mars and Earth analog sites*, JGR 102 (E2), 4117–4129.
 
 use std::f64::consts::PI;
 
@@ -35,7 +36,8 @@ pub struct Clearing {
 /// What rocks, how many, and where. Equal descriptions give equal rocks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rocks {
-    /// k: fraction of the area that rocks of all sizes cover, in [0, 0.5]. Landing sites on Mars: 0.03 to 0.2.
+    /// k: fraction of the area that rocks of all sizes cover, in [0, 0.5].
+    /// Landing sites on Mars: 0.03 to 0.2.
     pub abundance: f64,
     /// Extent along x and z, m.
     pub area: [f64; 2],
@@ -47,8 +49,8 @@ pub struct Rocks {
     pub max_diameter: f64,
     /// Smallest diameter, m: the law has ever more, ever smaller rocks.
     pub min_diameter: f64,
-    /// Range, from and to, of the fraction of its diameter that a rock is sunk into the ground, each in [0, ½], so that a rock covers what
-    /// the law says. Drawn for each rock.
+    /// Range, from and to, of the fraction of its diameter that a rock is sunk into the ground,
+    /// each in [0, ½], so that a rock covers what the law says. Drawn for each rock.
     pub burial: [f64; 2],
     /// Where no rock lies.
     pub clearings: Vec<Clearing>,
@@ -73,7 +75,8 @@ impl Default for Rocks {
     }
 }
 
-/// Cells of the table of the sizes. The density within one is taken as constant; 2048 cells put its error below that of one rock.
+/// Cells of the table of the sizes. The density within one is taken as
+/// constant; 2048 cells put its error below that of one rock.
 const CELLS: usize = 2048;
 
 /// How often a rock that fell into a clearing is thrown again before it is left out.
@@ -83,7 +86,8 @@ const THROWS: usize = 100;
 const MAX_CLEARINGS: usize = 1000;
 
 impl Rocks {
-    /// F_k(D): fraction of the ground that rocks of diameter `diameter` (m) or more cover, without upper limit.
+    /// F_k(D): fraction of the ground that rocks of diameter `diameter` (m)
+    /// or more cover, without upper limit.
     #[must_use]
     pub fn covered_fraction(&self, diameter: f64) -> f64 {
         if self.abundance > 0.0 {
@@ -207,12 +211,13 @@ impl Rocks {
 
     /// Draws the rocks.
     ///
-    /// Sizes are drawn one from each of N equal slices of the distribution, so that a field follows the law to about one rock at
-    /// every diameter; places are independent and rocks may overlap. A rock in a clearing is thrown again.
+    /// Sizes are drawn one from each of N equal slices of the distribution, so that a field
+    /// follows the law to about one rock at every diameter; places are independent and
+    /// rocks may overlap. A rock in a clearing is thrown again.
     ///
     /// # Errors
     /// As [`Self::check`]; `TooMany`.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // not negative, checked against the limit
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within 0 and the limit
     pub fn sample(&self) -> Result<Vec<Sphere>, TerrainError> {
         self.check()?;
         let table = self.table();
@@ -273,7 +278,8 @@ impl Rocks {
     }
 }
 
-/// SplitMix64 (Steele, Lea and Flood 2014): ten lines that no update of a library can change under a seed.
+/// SplitMix64 (Steele, Lea and Flood 2014): ten lines that no update of a
+/// library can change under a seed.
 pub(crate) struct Random(u64);
 
 impl Random {

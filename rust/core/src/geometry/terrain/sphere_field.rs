@@ -17,7 +17,8 @@ pub const MAX_SIZE: f64 = 1e6;
 
 /// Spheres and an optional ground plane. Immutable.
 ///
-/// Primitive 0 is the plane, whether there is one or not; sphere i (from 0, as given) is primitive i + 1.
+/// Primitive 0 is the plane, whether there is one or not; sphere i (from 0,
+/// as given) is primitive i + 1.
 #[derive(Clone, Debug)]
 pub struct SphereField {
     spheres: Vec<Sphere>,

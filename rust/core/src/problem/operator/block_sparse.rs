@@ -1,17 +1,20 @@
 //! The Delassus operator of many contacts: only the blocks of contacts that share a body.
 //!
-//! `W_ij = Σ_b J_ib M_b⁻¹ J_jbᵀ` over the bodies `b` that touch both contacts. In a heap each contact has a handful of such neighbours, whatever
-//! the size of the heap, so rows are kept as lists of `d × d` blocks (block CSR): memory and one product with `W` grow with the number of
-//! contacts, not with its square.
+//! `W_ij = Σ_b J_ib M_b⁻¹ J_jbᵀ` over the bodies `b` that touch both contacts. In a
+//! heap each contact has a handful of such neighbours, whatever the size of the heap,
+//! so rows are kept as lists of `d × d` blocks (block CSR): memory and one product with
+//! `W` grow with the number of contacts, not with its square.
 
 use super::{Dimension, ProblemError};
 
-/// One contact between two bodies, for [`BlockSparseDelassus::assemble`]. `D` components, `V` velocities a body (3 in the plane, 6 in space).
+/// One contact between two bodies, for [`BlockSparseDelassus::assemble`]. `D` components, `V`
+/// velocities a body (3 in the plane, 6 in space).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairContact<const D: usize, const V: usize> {
     /// The two bodies, different ones; `None` is the fixed world.
     pub bodies: [Option<usize>; 2],
-    /// Jacobians with their signs: `u = Σ_s jacobians[s] v[bodies[s]]`, rows `[normal, tangent, (tangent)]`.
+    /// Jacobians with their signs: `u = Σ_s jacobians[s] v[bodies[s]]`,
+    /// rows `[normal, tangent, (tangent)]`.
     pub jacobians: [[[f64; V]; D]; 2],
 }
 
@@ -40,10 +43,12 @@ impl BlockSparseDelassus {
         Self::default()
     }
 
-    /// The blocks of a dense row-major `W` (`n × n`, 1/kg) that are not zero, and the diagonal ones.
+    /// The blocks of a dense row-major `W` (`n × n`, 1/kg) that are not
+    /// zero, and the diagonal ones.
     ///
     /// # Errors
-    /// [`ProblemError::OperatorShape`] unless `W` has `n × n` entries with `n` a multiple of the components.
+    /// [`ProblemError::OperatorShape`] unless `W` has `n × n` entries with
+    /// `n` a multiple of the components.
     pub fn from_dense(
         dimension: Dimension,
         n_contacts: usize,
@@ -60,10 +65,12 @@ impl BlockSparseDelassus {
 
     /// Takes block rows as they are (BSR, as SciPy calls it).
     ///
-    /// `row_starts` (`n_c + 1`), `columns` (`n_blocks`) ascending in each row, `blocks` (`n_blocks · d · d`) row-major, 1/kg.
+    /// `row_starts` (`n_c + 1`), `columns` (`n_blocks`) ascending in each row, `blocks`
+    /// (`n_blocks · d · d`) row-major, 1/kg.
     ///
     /// # Errors
-    /// [`ProblemError::OperatorPattern`] naming the first row that is not ascending, leaves the matrix or lacks its diagonal block;
+    /// [`ProblemError::OperatorPattern`] naming the first row that is not ascending,
+    /// leaves the matrix or lacks its diagonal block;
     /// [`ProblemError::OperatorShape`] when the lengths do not fit together.
     pub fn from_rows(
         dimension: Dimension,
@@ -130,7 +137,8 @@ impl BlockSparseDelassus {
         }
     }
 
-    /// The rows of some contacts that are coupled with one another only; `place[i]` is where contact `i` goes. `contacts` ascends.
+    /// The rows of some contacts that are coupled with one another only; `place[i]` is where
+    /// contact `i` goes. `contacts` ascends.
     pub(crate) fn restricted(&self, contacts: &[usize], place: &[usize]) -> Self {
         let mut part = Self::default();
         part.clear(self.components);
@@ -172,8 +180,8 @@ impl BlockSparseDelassus {
 
     /// Assembles `W` from contacts between pairs of bodies, in time proportional to the blocks.
     ///
-    /// `inverse_masses` (`n_bodies` of `V`): diagonal of each body's `M⁻¹`, so the Jacobians are in coordinates in which it is diagonal
-    /// (rotations about the principal axes).
+    /// `inverse_masses` (`n_bodies` of `V`): diagonal of each body's `M⁻¹`, so the Jacobians are in
+    /// coordinates in which it is diagonal (rotations about the principal axes).
     ///
     /// # Panics
     /// If `D` is not 2 or 3, a body is out of range, or both bodies of a contact are the same.
@@ -211,10 +219,12 @@ impl BlockSparseDelassus {
         );
     }
 
-    /// Assembles `W` row by row from contacts between pairs of bodies of any number of velocities each.
+    /// Assembles `W` row by row from contacts between pairs of bodies of
+    /// any number of velocities each.
     ///
-    /// `bodies(i)`: the two bodies of contact i, below `n_bodies`, different ones; `None` is the fixed world. `add(block, (i, s), (j, t))` adds
-    /// `J_is M⁻¹ J_jtᵀ`, 1/kg, where side s of contact i is the same body as side t of contact j; i never decreases.
+    /// `bodies(i)`: the two bodies of contact i, below `n_bodies`, different ones; `None` is the
+    /// fixed world. `add(block, (i, s), (j, t))` adds `J_is M⁻¹ J_jtᵀ`, 1/kg, where side s of
+    /// contact i is the same body as side t of contact j; i never decreases.
     ///
     /// # Panics
     /// If `D` is not 2 or 3, a body is out of range, or both bodies of a contact are the same.

@@ -1,15 +1,18 @@
-//! Contacts of many bodies that share nothing but their contacts: what each reads and changes, and no operator W at all.
+//! Contacts of many bodies that share nothing but their contacts: what each
+//! reads and changes, and no operator W at all.
 //!
 //! A contact touches two bodies, so with `u = Zᵀ y + q` and `y = Z p` in factor coordinates
-//! (see [`crate::integrator::mechanical_system`]) it reads and changes three numbers of each in the plane, six in space. Two round bodies, disks for
-//! D = 2 and balls for D = 3, have a diagonal block of W. [`solve_body_pairs`](crate::solver::solve_body_pairs) solves them.
+//! (see [`crate::integrator::mechanical_system`]) it reads and changes three numbers of each in the
+//! plane, six in space. Two round bodies, disks for D = 2 and balls for D = 3, have a diagonal
+//! block of W. [`solve_body_pairs`](crate::solver::solve_body_pairs) solves them.
 //!
-//! With the arms `∓r n` from the centres to the point of contact, turning moves the rims along the tangents t, b (`n = b × t`) alone:
+//! With the arms `∓r n` from the centres to the point of contact, turning
+//! moves the rims along the tangents t, b (`n = b × t`) alone:
 //!
 //! ```text
 //! u_N = n · (v_a − v_b)
-//! u_t = t · (v_a − v_b) + b · (r_a ω_a + r_b ω_b)          in the plane b is the axis that points to the viewer
-//! u_b = b · (v_a − v_b) − t · (r_a ω_a + r_b ω_b)          in space only
+//! u_t = t · (v_a − v_b) + b · (r_a ω_a + r_b ω_b)    in the plane b points to the viewer
+//! u_b = b · (v_a − v_b) − t · (r_a ω_a + r_b ω_b)    in space only
 //! ```
 //!
 //! Source: Jean 1999; Moreau 1999 (contact by contact on the bodies' velocities).
@@ -22,7 +25,8 @@ use crate::spatial::space::{body_velocities, dot};
 /// In factor coordinates `v = c (y_1, …, y_D)` and `r ω = s (y_D+1, …)`, see the page above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoundPair<const D: usize> {
-    /// Place of each body's factor coordinates; any place, with c = s = 0, for one that does not move.
+    /// Place of each body's factor coordinates; any place, with c = s = 0,
+    /// for one that does not move.
     pub bodies: [u32; 2],
     /// Unit normal, from the second body into the first, then the tangents.
     pub frame: [[f64; D]; D],
@@ -32,7 +36,8 @@ pub struct RoundPair<const D: usize> {
     pub angular: [f64; 2],
 }
 
-/// All contacts of a step: first those among round bodies, then those of the machine, a body of any number of coordinates.
+/// All contacts of a step: first those among round bodies, then those of
+/// the machine, a body of any number of coordinates.
 ///
 /// A machine of several trees is one too: its coordinates are theirs, one after the other.
 #[derive(Clone, Debug, Default)]
@@ -41,7 +46,8 @@ pub struct BodyPairs<const D: usize> {
     pub round: Vec<RoundPair<D>>,
     /// Contacts of the machine, with the round body, or what does not move, as second body.
     pub machine: Vec<RoundPair<D>>,
-    /// Rows n, t, (b) of Zᵀ of the machine's contacts in its own factor coordinates, contact by contact (D rows of `width`).
+    /// Rows n, t, (b) of Zᵀ of the machine's contacts in its own factor
+    /// coordinates, contact by contact (D rows of `width`).
     pub rows: Vec<f64>,
     /// Number of the machine's coordinates.
     pub width: usize,
@@ -63,7 +69,8 @@ pub(crate) fn rim_velocity<const D: usize>(frame: &[[f64; D]; D], k: usize, rim:
     if k == 1 { along } else { -along }
 }
 
-/// Component c of what the tangential impulses turn, divided by r: the transpose of [`rim_velocity`].
+/// Component c of what the tangential impulses turn, divided by r: the
+/// transpose of [`rim_velocity`].
 #[inline]
 pub(crate) fn rim_impulse<const D: usize>(frame: &[[f64; D]; D], p: &[f64; D], c: usize) -> f64 {
     if D == 2 {
@@ -164,7 +171,8 @@ impl<const D: usize> RoundPair<D> {
 }
 
 impl<const D: usize> BodyPairs<D> {
-    /// Forgets all contacts, of a machine of `width` coordinates at `machine_at` among `n_coordinates`.
+    /// Forgets all contacts, of a machine of `width` coordinates at
+    /// `machine_at` among `n_coordinates`.
     pub fn clear(&mut self, width: usize, machine_at: usize, n_coordinates: usize) {
         self.round.clear();
         self.machine.clear();

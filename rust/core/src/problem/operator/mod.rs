@@ -1,7 +1,8 @@
 //! The Delassus operator `W`, behind the few products that a solver needs.
 //!
-//! [`Operator`] is `W` in either storage, dense or [block-sparse](BlockSparseDelassus). [`BodyPairs`] is for very many free bodies: the
-//! contacts themselves stand in for `W`, which nobody forms.
+//! [`Operator`] is `W` in either storage, dense or
+//! [block-sparse](BlockSparseDelassus). [`BodyPairs`] is for very many free bodies:
+//! the contacts themselves stand in for `W`, which nobody forms.
 
 mod block_sparse;
 mod body_pairs;
@@ -36,7 +37,8 @@ impl Operator<'_> {
         }
     }
 
-    /// Work of one product with `W`, the judgement of its contacts included, in units of a multiplication with its addition.
+    /// Work of one product with `W`, the judgement of its contacts
+    /// included, in units of a multiplication with its addition.
     pub(crate) fn product_work(self, n: usize) -> u64 {
         let entries = match self {
             Self::Dense(_) => n * n,

@@ -1,7 +1,8 @@
 //! Dense or block-sparse: the storage of `W` that the solve works on.
 //!
-//! Few contacts are dense whatever the caller has; many contacts whose blocks are mostly zero are block-sparse. Measured on 296
-//! contacts with 1.6% of the blocks: the same 580 Newton steps cost a twentieth.
+//! Few contacts are dense whatever the caller has; many contacts whose
+//! blocks are mostly zero are block-sparse. Measured on 296 contacts with
+//! 1.6% of the blocks: the same 580 Newton steps cost a twentieth.
 
 use super::{BlockSparseDelassus, FrictionContactProblem, Operator};
 

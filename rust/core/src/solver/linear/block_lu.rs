@@ -1,10 +1,13 @@
 //! Sparse LU of the Newton system of many contacts, on `D × D` blocks.
 //!
-//! The pattern is the coupling of contacts in `W`. Contacts are eliminated in the order of least degree, which keeps the fill of heaps small
-//! (Tinney and Walker 1967); order and pattern depend on `W` alone, so they are made once per solve. The numbers follow row by row, with exchanges
-//! only inside a diagonal block; one step of iterative refinement makes up for exchanges that are not made between blocks.
+//! The pattern is the coupling of contacts in `W`. Contacts are eliminated in the order
+//! of least degree, which keeps the fill of heaps small (Tinney and Walker 1967); order
+//! and pattern depend on `W` alone, so they are made once per solve. The numbers follow
+//! row by row, with exchanges only inside a diagonal block; one step of iterative
+//! refinement makes up for exchanges that are not made between blocks.
 //!
-//! Every contact keeps its full `D × D` block: unknowns that its mode takes away become rows of the identity.
+//! Every contact keeps its full `D × D` block: unknowns that its mode takes
+//! away become rows of the identity.
 
 use std::collections::BTreeSet;
 
@@ -125,7 +128,8 @@ fn inverse<const D: usize>(mut a: Block<D>) -> Option<Block<D>> {
     Some(b)
 }
 
-/// `Bᵀ W C` of one block: the rows that contact `i` keeps, the columns that the unknowns of contact `j` act through.
+/// `Bᵀ W C` of one block: the rows that contact `i` keeps, the columns that
+/// the unknowns of contact `j` act through.
 #[inline]
 fn reduce<const D: usize>(
     W: &[f64],
@@ -254,7 +258,8 @@ impl BlockLu {
         (d * d * d * products + 4 * d * d * (blocks + self.order.len())) as u64
     }
 
-    /// Builds and factors `Bᵀ (W + α R) C + γ` of the predicted modes; `weights` is the diagonal of `R`, one number a contact. `false` at a singular pivot.
+    /// Builds and factors `Bᵀ (W + α R) C + γ` of the predicted modes; `weights` is the diagonal of
+    /// `R`, one number a contact. `false` at a singular pivot.
     pub fn factorise<const D: usize>(
         &mut self,
         W: &BlockSparseDelassus,
@@ -331,7 +336,8 @@ impl BlockLu {
         true
     }
 
-    /// Solves the factored system in place of `b` (`n`, contact by contact), with one step of refinement.
+    /// Solves the factored system in place of `b` (`n`, contact by
+    /// contact), with one step of refinement.
     pub fn solve<const D: usize>(&mut self, W: &BlockSparseDelassus, b: &mut [f64]) {
         let mut rhs = std::mem::take(&mut self.rhs);
         let mut correction = std::mem::take(&mut self.correction);

@@ -2,9 +2,11 @@
 //!
 //! - *open*: `p = 0`, no unknown;
 //! - *stick*: `û = 0`, the impulse's `d` unknowns;
-//! - *slide* along `e`, with `t = e⊥`: `û_N = 0`, `p_e = μ p_N` and `û_t + γ p_t = 0`, unknowns `(p_N, p_t)` (one in the plane).
+//! - *slide* along `e`, with `t = e⊥`: `û_N = 0`, `p_e = μ p_N` and
+//!   `û_t + γ p_t = 0`, unknowns `(p_N, p_t)` (one in the plane).
 //!
-//! Written for the increment it reads `(Bᵀ (W + α I) C + γ) y = −Bᵀ û − γ p_t`, symmetric when nothing slides with friction.
+//! Written for the increment it reads `(Bᵀ (W + α I) C + γ) y = −Bᵀ û − γ p_t`,
+//! symmetric when nothing slides with friction.
 
 use super::block_lu::BlockLu;
 use super::dense::{self, Chunk, LANES};
@@ -54,12 +56,14 @@ pub(in crate::solver) struct ReducedSystem {
     /// Dense matrix, factored in place, and its row exchanges.
     matrix: Vec<Chunk>,
     pivots: Vec<usize>,
-    /// Factors of the block-sparse system, and whether their pattern is that of the present problem.
+    /// Factors of the block-sparse system, and whether their pattern is
+    /// that of the present problem.
     block_lu: BlockLu,
     is_analysed: bool,
 }
 
-/// Puts `p` where the linearised constraints hold (`p = 0` if open, `p_e = μ p_N` if sliding); says whether that moved it.
+/// Puts `p` where the linearised constraints hold (`p = 0` if open,
+/// `p_e = μ p_N` if sliding); says whether that moved it.
 #[inline]
 fn snap<const D: usize>(mu: &[f64], contacts: &[Linearised], p: &mut [f64]) -> bool {
     let mut moved = false;
@@ -113,7 +117,8 @@ fn pad(A: &mut [Chunk], m: usize) {
     }
 }
 
-/// `W + α I` for a Cholesky factorisation, which reads the lower triangle of these columns: the rows of a symmetric `W`.
+/// `W + α I` for a Cholesky factorisation, which reads the lower triangle
+/// of these columns: the rows of a symmetric `W`.
 #[inline]
 fn assemble_symmetric(W: &[f64], alpha: f64, n: usize, A: &mut [Chunk]) {
     let size = dense::chunks(n);
@@ -159,7 +164,8 @@ fn assemble<const D: usize>(
     }
 }
 
-/// One row of `W C`, the columns that the unknowns of every contact act through, into every `height`-th entry of `target`.
+/// One row of `W C`, the columns that the unknowns of every contact act
+/// through, into every `height`-th entry of `target`.
 #[inline]
 fn combine_columns<const D: usize>(
     row: impl Iterator<Item = [f64; D]>,
@@ -232,7 +238,8 @@ fn right_hand_side<const D: usize>(
     }
 }
 
-/// Adds `C y` to `p`. With `on_cone` a sliding impulse returns radially to the cone's surface, a change of second order.
+/// Adds `C y` to `p`. With `on_cone` a sliding impulse returns radially to
+/// the cone's surface, a change of second order.
 #[inline]
 fn apply<const D: usize>(
     mu: &[f64],
@@ -323,7 +330,8 @@ impl ReducedSystem {
         work.affords(self.block_lu.work())
     }
 
-    /// Factors the system of the predicted modes; none where it is singular, or the budget does not allow it.
+    /// Factors the system of the predicted modes; none where it is
+    /// singular, or the budget does not allow it.
     #[inline]
     pub fn factorise<const D: usize>(
         &mut self,
@@ -376,7 +384,8 @@ impl ReducedSystem {
         }
     }
 
-    /// Factors `W + σ diag(weights)`, one weight a contact; `false` where that fails, or the budget does not allow it.
+    /// Factors `W + σ diag(weights)`, one weight a contact; `false` where
+    /// that fails, or the budget does not allow it.
     pub fn factorise_weighted<const D: usize>(
         &mut self,
         data: &Prepared<'_>,
@@ -416,7 +425,8 @@ impl ReducedSystem {
         }
     }
 
-    /// Solves the system of [`factorise_weighted`](Self::factorise_weighted) for the right-hand side that `write` enters; returns the solution (n).
+    /// Solves the system of [`factorise_weighted`](Self::factorise_weighted) for the right-hand
+    /// side that `write` enters; returns the solution (n).
     pub fn solve_weighted<const D: usize>(
         &mut self,
         data: &Prepared<'_>,
@@ -454,7 +464,8 @@ impl ReducedSystem {
         }
     }
 
-    /// The Newton point of the regularised problem for the predicted modes, from `(p, u)`, into `trial`.
+    /// The Newton point of the regularised problem for the predicted modes,
+    /// from `(p, u)`, into `trial`.
     pub fn newton_point<const D: usize>(
         &mut self,
         data: &Prepared<'_>,

@@ -1,9 +1,10 @@
 //! Which contact is open, sticks or slides: the prediction that a Newton step is built on.
 //!
-//! Two predictors agree at a solution. The cheap one is the projection of `z = p − ρ û` (Alart and Curnier 1991) and serves
-//! steady motion. The exact one solves each contact with the others held; it sees the whole diagonal block and finds the modes of
-//! an impact from rest where the projection cycles (measured: all recorded rover impacts in at most five steps).
-//! Neither depends on the order of the contacts.
+//! Two predictors agree at a solution. The cheap one is the projection of `z = p − ρ û`
+//! (Alart and Curnier 1991) and serves steady motion. The exact one solves each contact
+//! with the others held; it sees the whole diagonal block and finds the modes of an impact
+//! from rest where the projection cycles (measured: all recorded rover impacts in at most
+//! five steps). Neither depends on the order of the contacts.
 
 use super::one_contact::solve_one_contact;
 use crate::law::coulomb::ContactMode;
@@ -70,9 +71,10 @@ pub(in crate::solver) fn set_slide<const D: usize>(contact: &mut Linearised, p: 
 
 /// Reads the modes off the impulse itself: what the last step's answer says of this one.
 ///
-/// In steady motion these are the modes of the answer, and far better ones than a prediction from `u`: wheels that fight each other
-/// in a turn slide at 1e-6 m/s, a hundredth of what the free velocity changes from step to step, so the sign of their slip is lost in `u`
-/// until the modes are right. A contact without impulse is taken to stick if the ground approaches it, else to be open.
+/// In steady motion these are the modes of the answer, and far better ones than a prediction from
+/// `u`: wheels that fight each other in a turn slide at 1e-6 m/s, a hundredth of what the free
+/// velocity changes from step to step, so the sign of their slip is lost in `u` until the modes are
+/// right. A contact without impulse is taken to stick if the ground approaches it, else to be open.
 #[inline]
 pub(in crate::solver) fn recall<const D: usize>(
     mu: &[f64],
@@ -115,7 +117,8 @@ pub(in crate::solver) fn recall<const D: usize>(
     prediction
 }
 
-/// Predicts the modes at `(p, u)`, `u = W p + q`; `contacts` receives them. `exact` chooses the predictor.
+/// Predicts the modes at `(p, u)`, `u = W p + q`; `contacts` receives them.
+/// `exact` chooses the predictor.
 #[inline]
 pub(in crate::solver) fn predict<const D: usize>(
     data: &Prepared<'_>,

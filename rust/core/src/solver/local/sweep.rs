@@ -1,6 +1,8 @@
-//! One sweep of nonsmooth Gauss–Seidel: contact after contact is solved exactly with the others held.
+//! One sweep of nonsmooth Gauss–Seidel: contact after contact is solved
+//! exactly with the others held.
 //!
-//! It costs no more than one product with `W`. Stages sweep the problem itself, or the regularised one to leave a cycle of Newton's.
+//! It costs no more than one product with `W`. Stages sweep the problem
+//! itself, or the regularised one to leave a cycle of Newton's.
 
 use super::one_contact::solve_one_contact;
 use crate::problem::{BlockSparseDelassus, Operator, Prepared, Proximal, dot};

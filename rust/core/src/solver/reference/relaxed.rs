@@ -1,6 +1,8 @@
-//! The convex relaxation of Coulomb's law, `K_μ* ∋ u ⊥ p ∈ K_μ`: a sliding contact parts with `μ|u_T|`.
+//! The convex relaxation of Coulomb's law, `K_μ* ∋ u ⊥ p ∈ K_μ`: a sliding
+//! contact parts with `μ|u_T|`.
 //!
-//! It is what remains without De Saxcé's shift: a convex problem, and another law. Alternating directions solve it provably.
+//! It is what remains without De Saxcé's shift: a convex problem, and
+//! another law. Alternating directions solve it provably.
 
 use crate::cone::SecondOrderCone;
 use crate::problem::{Prepared, Residual};

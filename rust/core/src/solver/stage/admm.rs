@@ -1,15 +1,19 @@
 //! ADMM: a linear system with one matrix and a projection on the cones, in turn.
 //!
-//! With `R = σ diag(1/ρ_i)` (`ρ_i` the contact's own mass, so that a mass ratio does not set the pace) one iteration reads
+//! With `R = σ diag(1/ρ_i)` (`ρ_i` the contact's own mass, so that a mass
+//! ratio does not set the pace) one iteration reads
 //!
 //! ```text
 //! (W + R) x = R z − y − q − s,    z ← Π_K(x̂ + R⁻¹ y),    y ← y + R (x̂ − z),    s_N = μ|y_T|,
 //! ```
 //!
-//! `x̂` being `x` over-relaxed. At rest `y = −ũ`, so De Saxcé's shift `s` is renewed from `y` itself. `W + R` is factored once, and again when
-//! `σ` changes: every so often it is balanced so that both residuals fall alike. Without the shift the same iteration solves the convex relaxation of
-//! Coulomb's law. Converges for any `W` whose symmetric part is positive semidefinite (it is a Douglas–Rachford splitting), in the convex case provably;
-//! linearly, so it is for moderate tolerances. Source: Boyd et al. 2011; for frictional contact Acary, Brémond and Huber 2018, Carpentier et al. 2024.
+//! `x̂` being `x` over-relaxed. At rest `y = −ũ`, so De Saxcé's shift `s` is renewed from `y`
+//! itself. `W + R` is factored once, and again when `σ` changes: every so often it is
+//! balanced so that both residuals fall alike. Without the shift the same iteration solves
+//! the convex relaxation of Coulomb's law. Converges for any `W` whose symmetric part is
+//! positive semidefinite (it is a Douglas–Rachford splitting), in the convex case provably;
+//! linearly, so it is for moderate tolerances. Source: Boyd et al. 2011; for frictional
+//! contact Acary, Brémond and Huber 2018, Carpentier et al. 2024.
 
 use crate::cone::{SecondOrderCone, tangential_norm};
 use crate::problem::{Prepared, Residual};
@@ -40,7 +44,8 @@ fn factorise<const D: usize>(data: &Prepared<'_>, sigma: f64, scratch: &mut Scra
         .factorise_weighted::<D>(data, sigma, &scratch.weights, &mut scratch.work)
 }
 
-/// One iteration after the linear solve: over-relaxation, projection, dual step. Squares of the primal and the dual change, in the norm of `R`.
+/// One iteration after the linear solve: over-relaxation, projection, dual step. Squares of the
+/// primal and the dual change, in the norm of `R`.
 fn project<const D: usize>(
     mu: &[f64],
     sigma: f64,
@@ -68,7 +73,8 @@ fn project<const D: usize>(
     changes
 }
 
-/// What an alternation solves: Coulomb's law or another that its matrix and its projection serve as well.
+/// What an alternation solves: Coulomb's law or another that its matrix and
+/// its projection serve as well.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct Law<M> {
     /// Whether De Saxcé's shift is made.
@@ -96,7 +102,8 @@ pub(in crate::solver) fn solve<const D: usize>(
     alternate::<D, _>(data, options, &law, p, u, scratch, iterations)
 }
 
-/// Alternates from `p` under `law`. `u` is `W p + q` on return, and the residual is Coulomb's under either law.
+/// Alternates from `p` under `law`. `u` is `W p + q` on return, and the
+/// residual is Coulomb's under either law.
 pub(in crate::solver) fn alternate<const D: usize, M: Fn(&[f64], &[f64]) -> Residual>(
     data: &Prepared<'_>,
     options: &SolverOptions,

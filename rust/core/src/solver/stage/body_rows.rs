@@ -1,10 +1,12 @@
-//! Contacts as the sweeps of [`super::body_sweeps`] keep them: what a visit reads and writes, side by side.
+//! Contacts as the sweeps of [`super::body_sweeps`] keep them: what a visit
+//! reads and writes, side by side.
 
 use crate::problem::{BodyPairs, RoundPair, rim_impulse, rim_velocity};
 use crate::solver::local::one_contact::solve_one_contact;
 use crate::spatial::space::{body_velocities, dot};
 
-/// A contact among round bodies with all that a sweep reads and writes of it: two lines of cache in the plane, three in space.
+/// A contact among round bodies with all that a sweep reads and writes of
+/// it: two lines of cache in the plane, three in space.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row<const D: usize, const T: usize> {
     bodies: [u32; 2],

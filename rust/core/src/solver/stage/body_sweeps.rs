@@ -1,16 +1,21 @@
 //! Accelerated Gauss–Seidel on the bodies' velocities, for thousands of free bodies.
 //!
-//! A sweep visits contact after contact: it reads the velocities of its two bodies, solves its own law exactly and changes them. Its
-//! cost is the same for each contact, however many there are. The next sweep starts not from the impulses p_k that this one left but from
-//! `p_k + β (p_k − p_{k−1})`, with β from Nesterov's sequence; where the sweeps' own change grows, the sequence starts anew. The velocities are linear in
-//! the impulses, so they are extrapolated alike. On flowing soil this takes a third to a fifth of the plain sweeps.
+//! A sweep visits contact after contact: it reads the velocities of its two bodies, solves its own
+//! law exactly and changes them. Its cost is the same for each contact, however many there are. The
+//! next sweep starts not from the impulses p_k that this one left but from
+//! `p_k + β (p_k − p_{k−1})`, with β from Nesterov's sequence; where the sweeps' own change grows,
+//! the sequence starts anew. The velocities are linear in the impulses, so they are extrapolated
+//! alike. On flowing soil this takes a third to a fifth of the plain sweeps.
 //!
-//! Contacts are visited in four places of the list in turn, so that one need not wait for what the one before it wrote.
+//! Contacts are visited in four places of the list in turn, so that one
+//! need not wait for what the one before it wrote.
 //!
-//! The answer is judged as every solver's: by the violation of the returned impulse, with the velocities summed anew. It never adds energy:
-//! an approximate answer with `pᵀu > 0` is shortened until pᵀu = 0.
+//! The answer is judged as every solver's: by the violation of the returned
+//! impulse, with the velocities summed anew. It never adds energy: an
+//! approximate answer with `pᵀu > 0` is shortened until pᵀu = 0.
 //!
-//! Source: Jean 1999 and Moreau 1999 (the sweep); Nesterov 1983, O'Donoghue and Candès 2015 (extrapolation with restart).
+//! Source: Jean 1999 and Moreau 1999 (the sweep); Nesterov 1983, O'Donoghue
+//! and Candès 2015 (extrapolation with restart).
 
 use super::body_rows::{MachineRow, Row, draw_in, square};
 use crate::law::coulomb::violation;
@@ -77,15 +82,17 @@ impl Swept<3> for BodyPairs<3> {
     }
 }
 
-/// The sweeps in D dimensions. T numbers tell where a contact's tangents are: none in the plane, the first tangent in space. A body has S
-/// numbers: its velocity, that of its rim, and zeros up to a round size.
+/// The sweeps in D dimensions. T numbers tell where a contact's tangents
+/// are: none in the plane, the first tangent in space. A body has S numbers:
+/// its velocity, that of its rim, and zeros up to a round size.
 #[derive(Clone, Debug, Default)]
 struct Sweeps<const D: usize, const T: usize, const S: usize> {
     rows: Vec<Row<D, T>>,
     /// Number of each row's contact.
     order: Vec<u32>,
     machine: Vec<MachineRow<D, T>>,
-    /// Velocity that the impulses give each body: of its centre, and r ω, m/s; the last is no body and does not move.
+    /// Velocity that the impulses give each body: of its centre, and r ω,
+    /// m/s; the last is no body and does not move.
     velocity: Vec<[f64; S]>,
     velocity_before: Vec<[f64; S]>,
     /// Of the machine, in its factor coordinates.
@@ -330,8 +337,9 @@ impl<const D: usize, const T: usize, const S: usize> Sweeps<D, T, S> {
 
 /// Solves `K_μ* ∋ ũ ⊥ p ∈ K_μ`, `u = Zᵀ Z p + q`, among round bodies and a machine.
 ///
-/// q (D n_c), m/s; mu (n_c); p (D n_c), N s: in, the warm start, out, the impulses inside their cones; u (D n_c), m/s: out. Only
-/// the tolerances and `max_sweeps` of the options matter; the budget does not. Allocates only when there are more contacts than ever before.
+/// q (D n_c), m/s; mu (n_c); p (D n_c), N s: in, the warm start, out, the impulses inside their
+/// cones; u (D n_c), m/s: out. Only the tolerances and `max_sweeps` of the options matter; the
+/// budget does not. Allocates only when there are more contacts than ever before.
 ///
 /// # Panics
 /// If a length does not fit.

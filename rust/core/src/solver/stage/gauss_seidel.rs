@@ -1,7 +1,7 @@
 //! Nonsmooth Gauss–Seidel: contact after contact is solved exactly with the others held.
 //!
-//! Source: Jean 1999; Acary and Brogliato 2008, ch. 13. Converges linearly, and hardly at all for redundant contacts with
-//! large mass ratios; a sweep costs no more than one product with `W`.
+//! Source: Jean 1999; Acary and Brogliato 2008, ch. 13. Converges linearly, and hardly at all for
+//! redundant contacts with large mass ratios; a sweep costs no more than one product with `W`.
 
 use crate::problem::{Prepared, Proximal, Residual};
 use crate::solver::local::sweep;

@@ -1,7 +1,8 @@
 //! Few contacts from rest: a few sweeps guess the modes, and Newton starts from zero with them.
 //!
-//! Sweeps depend on the order of the contacts; the answer does not, since only modes and sliding directions are taken from them. Where a mode is a
-//! matter of choice, or the guess was wrong, there is no answer here and the caller goes on.
+//! Sweeps depend on the order of the contacts; the answer does not, since only modes and sliding
+//! directions are taken from them. Where a mode is a matter of choice, or the guess was wrong,
+//! there is no answer here and the caller goes on.
 
 use crate::cone::tangential_norm;
 use crate::law::coulomb::ContactMode;
@@ -31,8 +32,9 @@ const ROUNDING_ASKED: f64 = 1e-7;
 /// Slip or parting, relative to the largest free velocity, that decides a mode.
 const DECIDED: f64 = 1e-8;
 
-/// Whether every sliding contact slips and every open one parts. Where one does not, its mode is a matter of choice, a sweep's choice depends on the
-/// order of the contacts, and so would the loads of a mechanism that is statically indeterminate.
+/// Whether every sliding contact slips and every open one parts. Where one does not, its mode is a
+/// matter of choice, a sweep's choice depends on the order of the contacts, and so would the loads
+/// of a mechanism that is statically indeterminate.
 fn is_decided<const D: usize>(data: &Prepared<'_>, contacts: &[Linearised], u: &[f64]) -> bool {
     let largest = data.q.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     contacts
@@ -88,8 +90,8 @@ fn sweep<const D: usize>(
     }
 }
 
-/// Solves from `p = 0`; `None` where the modes turn out wrong or undecided. `u` is `W p + q` on return, `iterations` is advanced by sweeps and linear
-/// solves.
+/// Solves from `p = 0`; `None` where the modes turn out wrong or undecided. `u` is `W p + q` on
+/// return, `iterations` is advanced by sweeps and linear solves.
 pub(in crate::solver) fn solve<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
@@ -124,7 +126,8 @@ pub(in crate::solver) fn solve<const D: usize>(
         if factors == Factors::None && prediction.m > 0 {
             return None;
         }
-        // Until the sliding directions are known, which the guess is not, the centre stays at zero, or the guess would stay in what W cannot see.
+        // Until the sliding directions are known, which the guess is not, the centre stays at zero,
+        // or the guess would stay in what W cannot see.
         if step >= SETTLED {
             scratch.system.centre.copy_from_slice(p);
         }

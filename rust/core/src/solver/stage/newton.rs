@@ -1,9 +1,10 @@
 //! Semismooth Newton on the contact modes.
 //!
-//! One step predicts each contact's mode ([`modes`]) for the regularised velocity `û = W p + q + α (p − c)` and solves
-//! the equations of those modes ([`ReducedSystem`]). Once the modes are right the convergence is quadratic, and
-//! finite when nothing slides. `α > 0` makes the system regular when `W` is not: every step is a proximal step, whose answer moves
-//! from the centre `c` no farther than `W` asks.
+//! One step predicts each contact's mode ([`modes`]) for the regularised velocity
+//! `û = W p + q + α (p − c)` and solves the equations of those modes ([`ReducedSystem`]).
+//! Once the modes are right the convergence is quadratic, and finite when nothing slides.
+//! `α > 0` makes the system regular when `W` is not: every step is a proximal step, whose
+//! answer moves from the centre `c` no farther than `W` asks.
 
 use crate::problem::{Prepared, Proximal, Residual};
 use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
@@ -14,11 +15,12 @@ use crate::solver::report::SolveStatus;
 use crate::solver::scratch::Scratch;
 use crate::solver::work;
 
-/// Most full steps before the safeguarded method takes over. Measured on the recorded problems: modes that full steps find at
-/// all are found within about ten.
+/// Most full steps before the safeguarded method takes over. Measured on the recorded problems:
+/// modes that full steps find at all are found within about ten.
 pub(in crate::solver) const FULL_STEPS: usize = 24;
 
-/// Most full steps from a warm start before pivoting takes over. Measured on a rover that steers: 3 to 6 cost the same.
+/// Most full steps from a warm start before pivoting takes over. Measured
+/// on a rover that steers: 3 to 6 cost the same.
 pub(in crate::solver) const WARM_STEPS: usize = 3;
 
 /// Steps with changing modes after which a few sweeps break the cycle.
@@ -37,8 +39,8 @@ const REUSE_CONTRACTION: f64 = 0.02;
 /// A regularised step with settled modes should gain at least this much, or `α` hides what is left.
 const SLOW: f64 = 0.1;
 
-/// Relative natural map at which a proximal step counts as solved: its error is amplified by `1/α` in the directions that `W`
-/// cannot see.
+/// Relative natural map at which a proximal step counts as solved: its error is
+/// amplified by `1/α` in the directions that `W` cannot see.
 const SOLVED: f64 = 1e-15;
 
 /// Settled steps after which the centre moves even so.
@@ -62,7 +64,8 @@ struct Course {
 }
 
 impl Course {
-    /// Decides, from the last step's `progress` (ratio of residuals), whether the kept factors and `α` still serve.
+    /// Decides, from the last step's `progress` (ratio of residuals),
+    /// whether the kept factors and `α` still serve.
     #[inline]
     fn revise(&mut self, progress: f64, prediction: Prediction, smallest: f64) {
         if self.settled > 1 && progress > SLOW && self.factors != Factors::None {
@@ -107,8 +110,9 @@ fn predict<const D: usize>(
         return prediction;
     }
     course.settled += 1;
-    // After a change of modes the centre waits for the answer of its own proximal step, or the transient would stay in the
-    // impulses that W cannot see. The modes of the warm start need no such care.
+    // After a change of modes the centre waits for the answer of its own
+    // proximal step, or the transient would stay in the impulses that W
+    // cannot see. The modes of the warm start need no such care.
     if !course.exact
         || course.settled > PATIENCE
         || data.merit::<D>(prox, p, u).sqrt() * data.inverse_data <= SOLVED
@@ -133,8 +137,9 @@ fn give_best(
 
 /// Full Newton steps from `p`; in steady motion two or three of them solve the step.
 ///
-/// The proximal centre stays at the start until the modes settle and follows the iterate then, so that the last steps refine what the
-/// regularisation left. `u` is `W p + q` on return; `iterations` is advanced by the linear solves.
+/// The proximal centre stays at the start until the modes settle and follows the iterate then, so
+/// that the last steps refine what the regularisation left. `u` is `W p + q` on return;
+/// `iterations` is advanced by the linear solves.
 pub(in crate::solver) fn full_steps<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,

@@ -1,12 +1,15 @@
-//! Proximal point around Newton: a sequence of regularised problems, each with one well-behaved answer.
+//! Proximal point around Newton: a sequence of regularised problems, each
+//! with one well-behaved answer.
 //!
-//! The step from the centre `c` solves the problem with `W + α I` and `q − α c`; its fixed points are the solutions of the given
-//! problem, and it needs no full rank (Acary, Brémond and Huber 2018, section 8). `α` starts at the size of `W`, where the
-//! problem is easy, and shrinks with the centre held at the start, which traces Tikhonov's path to the answer nearest to the start.
-//! When a step fails, the last good answer becomes the centre and `α` grows again.
+//! The step from the centre `c` solves the problem with `W + α I` and `q − α c`; its fixed points
+//! are the solutions of the given problem, and it needs no full rank (Acary, Brémond and Huber
+//! 2018, section 8). `α` starts at the size of `W`, where the problem is easy, and shrinks with the
+//! centre held at the start, which traces Tikhonov's path to the answer nearest to the start. When
+//! a step fails, the last good answer becomes the centre and `α` grows again.
 //!
-//! Inside: Newton steps with backtracking on the natural map of the regularised problem, and Gauss–Seidel sweeps on the same
-//! problem when backtracking fails. Once a step is cheap, a sprint with a small `α` tries to end the search at Newton's speed.
+//! Inside: Newton steps with backtracking on the natural map of the regularised problem, and
+//! Gauss–Seidel sweeps on the same problem when backtracking fails. Once a step is cheap, a sprint
+//! with a small `α` tries to end the search at Newton's speed.
 
 use crate::problem::{Prepared, Proximal, Residual};
 use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
@@ -41,8 +44,9 @@ const SMALLEST: f64 = 1e-13;
 
 /// The choice of `α` from step to step.
 ///
-/// A small `α` gains much per step, but below some bound the inner Newton fails, at ten times the cost of a step that succeeds. So after
-/// a failure the next attempt stays between the failed and the last proved value, and comes later.
+/// A small `α` gains much per step, but below some bound the inner Newton fails, at ten
+/// times the cost of a step that succeeds. So after a failure the next attempt stays
+/// between the failed and the last proved value, and comes later.
 #[derive(Clone, Copy, Debug)]
 struct Course {
     /// Current `α`, 1/kg.
@@ -143,7 +147,8 @@ struct Task {
     steps: usize,
 }
 
-/// Moves from `(p, u)` towards `scratch.system.trial` until the natural map falls; `false`, and no move, if it does not.
+/// Moves from `(p, u)` towards `scratch.system.trial` until the natural map
+/// falls; `false`, and no move, if it does not.
 fn backtrack<const D: usize>(
     data: &Prepared<'_>,
     alpha: f64,
@@ -184,8 +189,8 @@ fn backtrack<const D: usize>(
     false
 }
 
-/// Solves one regularised problem with the centre `scratch.system.centre`, from `p`; says whether its natural map fell below
-/// the tolerance. `u = W p + q` on return.
+/// Solves one regularised problem with the centre `scratch.system.centre`, from `p`; says whether
+/// its natural map fell below the tolerance. `u = W p + q` on return.
 fn descend<const D: usize>(
     data: &Prepared<'_>,
     task: Task,
@@ -239,7 +244,8 @@ fn descend<const D: usize>(
         if current.sqrt() * data.inverse_data < ROUNDING {
             break;
         }
-        // A contact that could open as well as carry has two exact answers; the projection stays with the one at hand.
+        // A contact that could open as well as carry has two exact answers;
+        // the projection stays with the one at hand.
         exact = !exact;
         stuck += 1;
         if stuck > MAX_STUCK {
@@ -261,7 +267,8 @@ fn descend<const D: usize>(
     true
 }
 
-/// Proximal point from `p`. `u = W p + q` on return; the best impulse met is returned when nothing converges.
+/// Proximal point from `p`. `u = W p + q` on return; the best impulse met
+/// is returned when nothing converges.
 pub(in crate::solver) fn solve<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,

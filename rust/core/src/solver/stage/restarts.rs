@@ -1,8 +1,10 @@
 //! Few contacts, when all else has failed: pivoting from other starts.
 //!
-//! Pivoting follows one path through the modes, and where that path goes round in circles another often does not. The first start is the nearest
-//! answer so far, whose modes may be right already; the others are drawn at random, always the same ones, with the size of its impulses. Of 40
-//! problems of six wheels that press against each other with μ = 1e8, which no stage before solves, it solves 21.
+//! Pivoting follows one path through the modes, and where that path goes round in
+//! circles another often does not. The first start is the nearest answer so far, whose
+//! modes may be right already; the others are drawn at random, always the same ones,
+//! with the size of its impulses. Of 40 problems of six wheels that press against each
+//! other with μ = 1e8, which no stage before solves, it solves 21.
 
 use super::pivoting;
 use crate::problem::{Prepared, Residual};
@@ -53,7 +55,8 @@ fn draw<const D: usize>(mu: &[f64], size: f64, draws: &mut Draws, p: &mut [f64])
     }
 }
 
-/// Pivots from the nearest answer so far and from others. `u` is `W p + q` on return; `iterations` is advanced by the linear solves.
+/// Pivots from the nearest answer so far and from others. `u` is `W p + q`
+/// on return; `iterations` is advanced by the linear solves.
 pub(in crate::solver) fn solve<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,

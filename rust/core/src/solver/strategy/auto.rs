@@ -1,4 +1,5 @@
-//! [`Method::Auto`]: what is cheap first, what is robust last. The table of the [chapter](crate::solver) gives each rung its reason.
+//! [`Method::Auto`]: what is cheap first, what is robust last. The table of the
+//! [chapter](crate::solver) gives each rung its reason.
 
 use super::islands::{self, IslandSolver};
 use crate::problem::{Operator, Prepared, Residual};
@@ -8,8 +9,9 @@ use crate::solver::scratch::Scratch;
 use crate::solver::stage::{admm, gauss_seidel, guided, newton, pivoting, proximal, restarts};
 use crate::solver::work::SweepBudget;
 
-/// Most sweeps over many contacts before Newton. Dense, a Newton step costs about as much as `n` sweeps; block-sparse the fill grows with the problem; 20, 50 and 200 were
-/// tried on the recorded ones.
+/// Most sweeps over many contacts before Newton. Dense, a Newton step costs
+/// about as much as `n` sweeps; block-sparse the fill grows with the
+/// problem; 20, 50 and 200 were tried on the recorded ones.
 fn sweep_budget(data: &Prepared<'_>) -> usize {
     match data.W {
         Operator::Dense(_) => 2 * data.n,
@@ -17,10 +19,12 @@ fn sweep_budget(data: &Prepared<'_>) -> usize {
     }
 }
 
-/// Alternations that bring many contacts near enough for the proximal point: on piles of 250 and 460 contacts it then takes a third to five sixths of the steps.
+/// Alternations that bring many contacts near enough for the proximal point: on piles of 250 and
+/// 460 contacts it then takes a third to five sixths of the steps.
 const ALTERNATIONS: usize = 300;
 
-/// Residual below which few contacts are worth the proximal point once more, from the nearest answer. Problems without an answer mostly stay above.
+/// Residual below which few contacts are worth the proximal point once more, from the nearest
+/// answer. Problems without an answer mostly stay above.
 const NEAR: f64 = 1e-4;
 
 /// The stages of [`Method::Auto`] so far: what each came to, and the nearest answer.
@@ -156,7 +160,8 @@ pub(in crate::solver) fn escalate<const D: usize>(
         }
         scratch.start.copy_from_slice(p);
     } else if is_warm {
-        // Where the modes of the last step serve, this is the end; where they do not, more full steps seldom help.
+        // Where the modes of the last step serve, this is the end; where
+        // they do not, more full steps seldom help.
         let few = newton::WARM_STEPS.min(steps);
         let found = newton::full_steps::<D>(data, options, few, p, u, scratch, iterations);
         if let Some(outcome) = ladder.enter(Stage::WarmNewton, found, p, scratch, *iterations) {

@@ -1,8 +1,9 @@
 //! Islands: groups of contacts that no body couples with the rest are solved one by one.
 //!
-//! A heap that has fallen apart is many small problems. One after the other they cost less than together, since a Newton step grows faster than the
-//! number of contacts, and the one island that resists no longer holds up all others. Measured on 296 contacts in 33 islands,
-//! cold, to 1e-8: less than half the time of everything together.
+//! A heap that has fallen apart is many small problems. One after the other they cost less than
+//! together, since a Newton step grows faster than the number of contacts, and the one island that
+//! resists no longer holds up all others. Measured on 296 contacts in 33 islands, cold, to 1e-8:
+//! less than half the time of everything together.
 
 use crate::problem::{
     BlockSparseDelassus, Dimension, FrictionContactProblem, Operator, Prepared, Residual,
@@ -36,8 +37,9 @@ pub(in crate::solver) struct Islands {
 pub(in crate::solver) struct IslandSolver<'a> {
     /// Memory.
     pub islands: &'a mut Islands,
-    /// Solves a problem as [`solve`](crate::solver::solve) does. An island is a problem like any other, and may escalate: this is the one place
-    /// where a strategy needs the whole solver, which is above it.
+    /// Solves a problem as [`solve`](crate::solver::solve) does. An island is
+    /// a problem like any other, and may escalate: this is the one place where
+    /// a strategy needs the whole solver, which is above it.
     pub solve: &'a mut SolvePart<'a>,
 }
 
@@ -46,7 +48,8 @@ pub(in crate::solver) type SolvePart<'a> = dyn FnMut(&FrictionContactProblem<'_>
     + 'a;
 
 impl Islands {
-    /// Finds the islands of `W` and says how many there are. The order is that of their first contacts.
+    /// Finds the islands of `W` and says how many there are. The order is
+    /// that of their first contacts.
     fn find(&mut self, W: &BlockSparseDelassus) -> usize {
         let n = W.n_contacts();
         // Roots of a union–find forest; the root is the lowest contact.
@@ -97,8 +100,8 @@ fn root(parents: &mut [usize], mut i: usize) -> usize {
     i
 }
 
-/// Solves every island that is not solved yet, from `p`, and says which method had to answer the hardest; `None` if all contacts are one island, or
-/// `W` is dense. `u = W p + q` on return.
+/// Solves every island that is not solved yet, from `p`, and says which method had to answer the
+/// hardest; `None` if all contacts are one island, or `W` is dense. `u = W p + q` on return.
 pub(in crate::solver) fn solve<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,

@@ -1,7 +1,9 @@
-//! Very many free bodies: sweeps on their velocities first, and what factors `W` where the sweeps do not end.
+//! Very many free bodies: sweeps on their velocities first, and what
+//! factors `W` where the sweeps do not end.
 //!
-//! A sweep's cost is the same for each contact, and it needs no `W`. Wedged bodies are what it crawls on: there the proximal point goes on from where it stopped, and
-//! where that does not reach the answer either, the sweeps go on from the better of both.
+//! A sweep's cost is the same for each contact, and it needs no `W`. Wedged bodies are what it
+//! crawls on: there the proximal point goes on from where it stopped, and where that does not reach
+//! the answer either, the sweeps go on from the better of both.
 
 use super::islands::SolvePart;
 use crate::problem::{
@@ -12,7 +14,8 @@ use crate::solver::options::{Method, SolverOptions};
 use crate::solver::report::{Rung, Rungs, SolveReport, SolveStatus};
 use crate::solver::stage::body_sweeps::{BodySweeps, Swept, solve_body_pairs};
 
-/// Contacts up to which an answer that the sweeps did not reach is sought by factorisation: a step costs some 3 µs a contact there.
+/// Contacts up to which an answer that the sweeps did not reach is sought
+/// by factorisation: a step costs some 3 µs a contact there.
 const FEW: usize = 1000;
 
 /// Factorisations of such a search; wedged wheels have taken 77.
@@ -49,7 +52,8 @@ impl<'a, const D: usize> ManyBodies<'a, D> {
     }
 }
 
-/// Solves as the method asks; `solve` is the solver of a problem with `W`, which is above this page.
+/// Solves as the method asks; `solve` is the solver of a problem with `W`,
+/// which is above this page.
 pub(in crate::solver) fn solve<const D: usize>(
     bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,
@@ -124,7 +128,8 @@ where
     report
 }
 
-/// Goes on from where the sweeps stopped by the proximal-point method. The better of both answers stays, and adds no energy.
+/// Goes on from where the sweeps stopped by the proximal-point method. The
+/// better of both answers stays, and adds no energy.
 fn search<const D: usize>(
     bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,

@@ -7,8 +7,8 @@ use crate::quantity::{LENGTHS, MASSES, within};
 /// Most grains: some hundred megabytes.
 pub const MAX_GRAINS: usize = 1_000_000;
 
-/// Coordinates of a grain: (x, y, angle) of a disk; the centre of a ball, which looks the same from all sides. Their rates are the first of its
-/// velocities.
+/// Coordinates of a grain: (x, y, angle) of a disk; the centre of a ball, which looks the same from
+/// all sides. Their rates are the first of its velocities.
 pub const COORDINATES: usize = 3;
 
 /// A moment of inertia over m r²: of a solid disk, of a solid ball.
@@ -33,8 +33,8 @@ pub(super) fn check_count<const D: usize>(count: usize) -> Result<(), GrainError
     Ok(())
 }
 
-/// Solid disks (D = 2, `J = m r²/2`) or balls (D = 3, `J = 2 m r²/5`), immutable. Some may be kinematic: nothing changes their velocity, as grains
-/// glued to a rough floor or a piston.
+/// Solid disks (D = 2, `J = m r²/2`) or balls (D = 3, `J = 2 m r²/5`), immutable. Some may be
+/// kinematic: nothing changes their velocity, as grains glued to a rough floor or a piston.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grains<const D: usize> {
     radius: Vec<f64>,
@@ -88,7 +88,8 @@ impl<const D: usize> Grains<D> {
         })
     }
 
-    /// The same grains, of which those marked (n) are kinematic: no weight and no contact changes their velocity.
+    /// The same grains, of which those marked (n) are kinematic: no weight
+    /// and no contact changes their velocity.
     ///
     /// # Errors
     /// Another number of marks.

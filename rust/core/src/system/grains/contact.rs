@@ -11,10 +11,11 @@ pub(crate) const WALL: u32 = 1 << 31;
 /// From here on a second body is the ground.
 pub(crate) const GROUND: u32 = (1 << 31) | (1 << 30);
 
-/// Names a contact by its two bodies: grains 0 to n − 1, then the machine's wheels; then walls, then points of the ground.
+/// Names a contact by its two bodies: grains 0 to n − 1, then the machine's
+/// wheels; then walls, then points of the ground.
 ///
-/// Among two grains the smaller number comes first, a wheel before a grain. Contacts are listed in this order, so a step finds
-/// the impulse of the step before by bisection.
+/// Among two grains the smaller number comes first, a wheel before a grain. Contacts are listed in
+/// this order, so a step finds the impulse of the step before by bisection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct GrainKey {
     /// The first body.
@@ -39,7 +40,8 @@ pub struct GrainContact<const D: usize> {
 }
 
 impl<const D: usize> GrainContact<D> {
-    /// Unit normal and tangents: t = n × e_z in the plane; t, b as [`ContactFrame::of_normal`] has them in space.
+    /// Unit normal and tangents: t = n × e_z in the plane; t, b as
+    /// [`ContactFrame::of_normal`] has them in space.
     #[inline]
     #[must_use]
     pub fn frame(&self) -> [SVector<f64, D>; D] {

@@ -12,10 +12,12 @@ use crate::problem::BodyPairs;
 use crate::solver::Swept;
 use crate::spatial::space::{axis, body_velocities, dot, length};
 
-/// Gap up to which a pair is taken as a contact though it is not forecast to close, as a share of the smallest radius: its neighbours may push it.
+/// Gap up to which a pair is taken as a contact though it is not forecast to close, as a share of
+/// the smallest radius: its neighbours may push it.
 const SKIN: f64 = 0.01;
 
-/// Largest such gap, as a share of the smallest radius: a blow that throws farther in one step is a step that is too long.
+/// Largest such gap, as a share of the smallest radius: a blow that throws
+/// farther in one step is a step that is too long.
 const FARTHEST_SKIN: f64 = 0.2;
 
 /// A grain near a round body.
@@ -160,13 +162,15 @@ where
                 });
             }
         }
-        // What the fastest can be thrown at within the step is a contact too, though it comes no nearer yet.
+        // What the fastest can be thrown at within the step is a contact
+        // too, though it comes no nearer yet.
         let smallest = scene.grains.smallest();
         let skin = (SKIN * smallest)
             .max(lead * fastest)
             .min(FARTHEST_SKIN * smallest);
         let skin = skin.max(activation.hover);
-        // Two bodies close by at most twice that; farther than a diameter nobody looks (a step that long is too long).
+        // Two bodies close by at most twice that; farther than a diameter
+        // nobody looks (a step that long is too long).
         let reach = (skin + 2.0 * lead * fastest).min(2.0 * largest);
         let rule = Rule { reach, lead, skin };
         grid.fill(&q, radius, 2.0 * largest + reach);
@@ -222,7 +226,8 @@ where
         }
     }
 
-    /// Frames stay where the step begins; the gap becomes the one that the velocities before the step lead to.
+    /// Frames stay where the step begins; the gap becomes the one that the
+    /// velocities before the step lead to.
     pub(super) fn forecast_gaps(&self, contacts: &mut [GrainContact<D>]) {
         let n = self.n();
         let (middle, end) = (&self.parts.middle, &self.parts.end);

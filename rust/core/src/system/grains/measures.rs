@@ -53,7 +53,8 @@ impl<const D: usize> GrainScene<D> {
         energy
     }
 
-    /// Momentum of the grains that are not kinematic, kg m/s, and their moment of momentum about the origin, kg m²/s. q (nq), v (nv).
+    /// Momentum of the grains that are not kinematic, kg m/s, and their moment
+    /// of momentum about the origin, kg m²/s. q (nq), v (nv).
     ///
     /// The moment in the plane is its z component.
     #[must_use]
@@ -80,7 +81,8 @@ impl<const D: usize> GrainScene<D> {
         (linear, moment)
     }
 
-    /// Deepest overlap, m: 0 where nothing overlaps. Kinematic grains among themselves and in walls do not count. q (nq).
+    /// Deepest overlap, m: 0 where nothing overlaps. Kinematic grains among
+    /// themselves and in walls do not count. q (nq).
     #[must_use]
     pub fn penetration(&self, q: &[f64]) -> f64 {
         let grains = &self.grains;

@@ -1,4 +1,5 @@
-//! Taking grains out of a running simulation: the others keep their state, and each contact its impulse under its new name.
+//! Taking grains out of a running simulation: the others keep their state,
+//! and each contact its impulse under its new name.
 
 use super::contact::{GrainKey, WALL};
 

@@ -70,7 +70,8 @@ pub struct GrainScene<const D: usize> {
     pub friction: GrainFriction,
 }
 
-/// How far bodies may overlap at the start, as a share of the smallest radius: rounding of a state that was written to a file.
+/// How far bodies may overlap at the start, as a share of the smallest
+/// radius: rounding of a state that was written to a file.
 pub const OVERLAP: f64 = 0.01;
 
 impl<const D: usize> GrainScene<D> {
@@ -98,7 +99,8 @@ impl<const D: usize> GrainScene<D> {
         &v[body_velocities(D) * self.grains.len()..]
     }
 
-    /// A number that two scenes share only if their grains and their machine do: what a snapshot belongs to.
+    /// A number that two scenes share only if their grains and their
+    /// machine do: what a snapshot belongs to.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
         let grains = &self.grains;
@@ -120,8 +122,8 @@ impl<const D: usize> GrainScene<D> {
         Ok(self.friction.check()?)
     }
 
-    /// Checks a configuration (nq): finite, and nothing deeper in anything than [`OVERLAP`] of the smallest radius. Kinematic grains may
-    /// overlap one another and walls.
+    /// Checks a configuration (nq): finite, and nothing deeper in anything than [`OVERLAP`] of the
+    /// smallest radius. Kinematic grains may overlap one another and walls.
     ///
     /// # Errors
     /// The first entry that is wrong, the first overlap.
@@ -192,7 +194,8 @@ impl<const D: usize> GrainScene<D> {
         Ok(())
     }
 
-    /// Names the first entry that is not finite: of a grain, with `width` entries each, or of the machine.
+    /// Names the first entry that is not finite: of a grain, with `width`
+    /// entries each, or of the machine.
     ///
     /// # Errors
     /// That entry.

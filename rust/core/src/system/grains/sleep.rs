@@ -1,9 +1,11 @@
-//! Sleep: grains that rest far from anything that moves are left out of the step until something comes near or leans on them.
+//! Sleep: grains that rest far from anything that moves are left out of the
+//! step until something comes near or leans on them.
 //!
-//! A grain falls asleep after so many steps slower than a limit, with nothing faster than the limit within a distance. It wakes when something
-//! faster comes within the distance, or when the impulse of a neighbour that is awake differs from the one it fell asleep under by more than a share of its own
-//! weight. The impulses of sleeping contacts are kept, so a grain wakes with the load that it had. A kinematic grain counts as
-//! asleep and never wakes.
+//! A grain falls asleep after so many steps slower than a limit, with nothing faster than the limit
+//! within a distance. It wakes when something faster comes within the distance, or when the impulse
+//! of a neighbour that is awake differs from the one it fell asleep under by more than a share of
+//! its own weight. The impulses of sleeping contacts are kept, so a grain wakes with the load that
+//! it had. A kinematic grain counts as asleep and never wakes.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,9 +25,11 @@ pub struct SleepOptions {
     pub speed: f64,
     /// Steps that a grain must have been still. Default 50.
     pub steps: u32,
-    /// How far away anything that moves must be, m. Default 0.2: six diameters of the original's disks.
+    /// How far away anything that moves must be, m. Default 0.2: six
+    /// diameters of the original's disks.
     pub distance: f64,
-    /// Change of an impulse that wakes, as a share of the grain's weight times the step. Default 0.1.
+    /// Change of an impulse that wakes, as a share of the grain's weight
+    /// times the step. Default 0.1.
     pub share: f64,
 }
 
@@ -276,7 +280,8 @@ impl Sleep {
         (0..n).map(|i| marks.is_marked(&centre(i))).collect()
     }
 
-    /// After a change of who sleeps: loads of those that fell asleep are put away, those of the woken given back to the warm start.
+    /// After a change of who sleeps: loads of those that fell asleep are put
+    /// away, those of the woken given back to the warm start.
     fn exchange(
         &mut self,
         kinematic: &[bool],
@@ -290,7 +295,8 @@ impl Sleep {
             };
             sleeps(key.a) || sleeps(key.b)
         };
-        // What the step just did is newer than what was put away, but the load to wake at stays the one of falling asleep.
+        // What the step just did is newer than what was put away, but the
+        // load to wake at stays the one of falling asleep.
         let mut all: Vec<(GrainKey, [f64; 3], bool)> = Vec::new();
         all.extend(warm_start.impulses.iter().map(|(k, p)| (*k, *p, false)));
         all.extend(self.dormant.iter().map(|(k, p)| (*k, *p, true)));

@@ -1,4 +1,5 @@
-//! Grains as a [`MechanicalSystem`]: a diagonal mass matrix, contacts between pairs of bodies, and a machine with a dense one.
+//! Grains as a [`MechanicalSystem`]: a diagonal mass matrix, contacts
+//! between pairs of bodies, and a machine with a dense one.
 
 use std::sync::OnceLock;
 
@@ -63,7 +64,8 @@ impl<const D: usize> GrainParts<D> {
 pub struct GrainSystem<'a, const D: usize> {
     /// The description.
     pub scene: &'a GrainScene<D>,
-    /// Which grains sleep (n): they have no velocity and stay where they are, whatever touches them.
+    /// Which grains sleep (n): they have no velocity and stay where they
+    /// are, whatever touches them.
     pub asleep: &'a [bool],
     /// Torques of the machine, N m.
     pub inputs: &'a [f64],
@@ -73,7 +75,8 @@ pub struct GrainSystem<'a, const D: usize> {
     pub parts: &'a mut GrainParts<D>,
 }
 
-/// Velocity of the rim of a grain that faces along ∓n, in the contact's frame: `r` is negative where n points away from it.
+/// Velocity of the rim of a grain that faces along ∓n, in the contact's
+/// frame: `r` is negative where n points away from it.
 ///
 /// In the plane `v + ω r t`; in space `v − r ω × n`.
 #[inline]
@@ -139,8 +142,8 @@ const fn dimension(dimensions: usize) -> Dimension {
     }
 }
 
-/// Its energy is not audited: frames stay where the step begins and grains have no gyroscopic terms, so that a step with θ ≥ ½ is passive by
-/// construction.
+/// Its energy is not audited: frames stay where the step begins and grains have no gyroscopic
+/// terms, so that a step with θ ≥ ½ is passive by construction.
 impl<const D: usize> MechanicalSystem for GrainSystem<'_, D>
 where
     BodyPairs<D>: Swept<D>,
@@ -400,9 +403,11 @@ where
         FrictionContactProblem::from_assembled_sparse(self.parts.operator(), q, mu)
     }
 
-    /// Newton's law for a pair that comes together fast within the step; any other may close by its gap.
+    /// Newton's law for a pair that comes together fast within the step;
+    /// any other may close by its gap.
     ///
-    /// With `e u_N⁻ + s` and any s ≥ 0 a frictionless impact gains no energy, see [`crate::law::newton_impact`]: here s is what the gap allows.
+    /// With `e u_N⁻ + s` and any s ≥ 0 a frictionless impact gains no energy, see
+    /// [`crate::law::newton_impact`]: here s is what the gap allows.
     fn normal_shift(
         &self,
         options: &StepOptions,
