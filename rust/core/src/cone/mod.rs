@@ -1,5 +1,4 @@
-//! The friction cone, its dual, and the projections that every solver and
-//! every residual is made of.
+//! The friction cone, its dual, and the projections that every solver and every residual uses.
 //!
 //! A contact's impulse `p = (p_N, p_T)` lives in the Coulomb cone `K_μ = { |p_T| ≤ μ p_N }`
 //! ([`SecondOrderCone`]); the modified velocity `ũ` of the law lives in its dual

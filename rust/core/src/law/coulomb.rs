@@ -65,11 +65,11 @@ pub fn natural_map<const D: usize>(
 /// tangential  (p_T − Π_D(p_T − ρ_T u_T))/ρ_T,   D the disc of radius μ max(p_N, 0)
 /// ```
 ///
-/// `p`: impulse, N s. `u`: velocity, m/s. `rho`: `[ρ_N, ρ_T]`, kg, about the inverse
-/// diagonal of the contact's block of W. Unlike the [natural map](natural_map) it has
-/// no product of μ and a velocity, which at a large μ leaves no digit for `u_N`:
-/// `p = 0` at `u = (−1, 1)` is a zero of the natural map in floating point from μ =
-/// 1e16 on, and nearly one from 1e8 on. Source: Alart and Curnier 1991.
+/// `p`: impulse, N s. `u`: velocity, m/s. `rho`: `[ρ_N, ρ_T]`, kg, about the inverse diagonal of
+/// the contact's block of W. Unlike the [natural map](natural_map) it does not multiply a velocity
+/// by μ, a product that swamps the digits of `u_N` when μ is large: in floating point `p = 0` at
+/// `u = (−1, 1)` is a zero of the natural map from μ = 1e16 on, and nearly one from 1e8 on. Source:
+/// Alart and Curnier 1991.
 #[inline]
 #[must_use]
 pub fn violation<const D: usize>(

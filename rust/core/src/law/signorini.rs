@@ -8,7 +8,7 @@
 #[must_use]
 pub fn violation(u_N: f64, p_N: f64, rho: f64) -> f64 {
     let pressed = p_N / rho;
-    // A velocity that is no number stays one.
+    // A NaN velocity stays NaN.
     if pressed <= u_N {
         pressed.abs()
     } else {

@@ -19,8 +19,8 @@
 //! rounding and the solver's tolerance leave of penetration grows by their error in velocity; where
 //! it passes a tolerance the common projection removes it.
 //!
-//! Source: Moreau 1999; Staron, Hinch 2005 (contact dynamics of disks);
-//! Anitescu, Potra 1997 (the gap in the velocity's law).
+//! Source: Moreau 1999; Staron and Hinch 2005 (contact dynamics of disks);
+//! Anitescu and Potra 1997 (the gap in the velocity's law).
 
 pub mod bodies;
 pub mod contact;
