@@ -41,7 +41,8 @@ pub struct Scratch<Q, C> {
     pub(super) work_left: u64,
 }
 
-/// Multiple of the solver's budget for all solves of a step together, and the minimum for each.
+/// Divisors of the solver's budget: for all solves of a shared step together, and for the least
+/// that each solve gets.
 const STEP_SHARE: u64 = 4;
 const SOLVE_SHARE: u64 = 64;
 
@@ -106,8 +107,7 @@ impl<Q: Clone, C> Scratch<Q, C> {
         std::mem::swap(&mut self.y, &mut self.dv);
     }
 
-    /// Sets the work of a new step, which may solve several times, as a multiple of a solve's
-    /// budget.
+    /// Sets the work of a new step: all of a solve's budget, or a fraction if the step shares it.
     pub(super) fn grant_work(&mut self, options: &SolverOptions, is_shared: bool) {
         self.work_left = options.budget / if is_shared { STEP_SHARE } else { 1 };
     }

@@ -1,4 +1,4 @@
-//! The linear system of a Newton step, over the unknowns that the predicted modes leave.
+//! The linear system of a Newton step in the unknowns that the predicted modes leave free.
 //!
 //! - *open*: `p = 0`, no unknown;
 //! - *stick*: `û = 0`, the impulse's `d` unknowns;
@@ -15,7 +15,7 @@ use crate::problem::{BlockSparseDelassus, Operator, Prepared, Proximal};
 use crate::solver::local::modes::{Linearised, Prediction, n_unknowns};
 use crate::solver::work::{self, Work};
 
-/// Kept factors of the reduced system.
+/// Stored factors of the reduced system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::solver) enum Factors {
     /// None, or outdated.
@@ -31,11 +31,11 @@ pub(in crate::solver) enum Factors {
 /// One Newton step with a factored system.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct NewtonStep {
-    /// Regularisation that the factors were made with, 1/kg.
+    /// Regularisation used in the factors, 1/kg.
     pub alpha: f64,
     /// Number of unknowns.
     pub m: usize,
-    /// Which factors there are.
+    /// Kind of the factors.
     pub factors: Factors,
     /// Whether sliding impulses return radially to the cone after the step.
     pub on_cone: bool,
@@ -56,14 +56,14 @@ pub(in crate::solver) struct ReducedSystem {
     /// Dense matrix, factored in place, and its row exchanges.
     matrix: Vec<Chunk>,
     pivots: Vec<usize>,
-    /// Factors of the block-sparse system, and whether their pattern is
-    /// that of the present problem.
+    /// Factors of the block-sparse system, and whether their pattern is that of the current
+    /// problem.
     block_lu: BlockLu,
     is_analysed: bool,
 }
 
-/// Puts `p` where the linearised constraints hold (`p = 0` if open,
-/// `p_e = μ p_N` if sliding); says whether that moved it.
+/// Moves `p` onto the linearised constraints (`p = 0` if open, `p_e = μ p_N` if sliding); true if
+/// that changed it.
 #[inline]
 fn snap<const D: usize>(mu: &[f64], contacts: &[Linearised], p: &mut [f64]) -> bool {
     let mut moved = false;
@@ -100,7 +100,7 @@ fn snap<const D: usize>(mu: &[f64], contacts: &[Linearised], p: &mut [f64]) -> b
     moved
 }
 
-/// Sets what a padded matrix of `m` unknowns has beyond them to the unit matrix.
+/// Sets the padding of a matrix of `m` unknowns to the unit matrix.
 #[inline]
 fn pad(A: &mut [Chunk], m: usize) {
     let size = dense::chunks(m);
@@ -238,8 +238,8 @@ fn right_hand_side<const D: usize>(
     }
 }
 
-/// Adds `C y` to `p`. With `on_cone` a sliding impulse returns radially to
-/// the cone's surface, a change of second order.
+/// Adds `C y` to `p`. With `on_cone` a sliding impulse is projected radially onto the cone's
+/// surface, a second-order change.
 #[inline]
 fn apply<const D: usize>(
     mu: &[f64],
@@ -321,7 +321,7 @@ impl ReducedSystem {
         }
     }
 
-    /// Whether the budget allows another sparse factorisation; finds its pattern at the first.
+    /// Whether the budget allows another sparse factorisation; the first call analyses the pattern.
     fn affords_sparse(&mut self, W: &BlockSparseDelassus, work: &mut Work) -> bool {
         if !self.is_analysed {
             self.block_lu.analyse(W);
@@ -330,8 +330,8 @@ impl ReducedSystem {
         work.affords(self.block_lu.work())
     }
 
-    /// Factors the system of the predicted modes; none where it is
-    /// singular, or the budget does not allow it.
+    /// Factors the system of the predicted modes; none if it is singular or the budget does not
+    /// allow it.
     #[inline]
     pub fn factorise<const D: usize>(
         &mut self,
@@ -359,7 +359,7 @@ impl ReducedSystem {
             }
         };
         let may_be_symmetric = !prediction.slides && allow_symmetric;
-        // A step costs two products and two substitutions beside its factors.
+        // A step costs two products and two substitutions in addition to its factors.
         let cost = work::dense(m, may_be_symmetric) + 2 * data.product;
         if !work.affords(cost) {
             return Factors::None;
@@ -384,8 +384,8 @@ impl ReducedSystem {
         }
     }
 
-    /// Factors `W + σ diag(weights)`, one weight a contact; `false` where
-    /// that fails, or the budget does not allow it.
+    /// Factors `W + σ diag(weights)`, one weight per contact; `false` if that fails or the budget
+    /// does not allow it.
     pub fn factorise_weighted<const D: usize>(
         &mut self,
         data: &Prepared<'_>,
@@ -445,7 +445,7 @@ impl ReducedSystem {
         &self.rhs.as_flattened()[..n]
     }
 
-    /// Solves the factored system for the right-hand side at hand, in place.
+    /// Solves the factored system for the stored right-hand side, in place.
     #[inline]
     fn back_substitute<const D: usize>(&mut self, data: &Prepared<'_>, factors: Factors, m: usize) {
         if let (Factors::Sparse, Operator::BlockSparse(W)) = (factors, data.W) {
@@ -483,7 +483,7 @@ impl ReducedSystem {
         } = self;
         trial.copy_from_slice(p);
         if step.factors == Factors::Sparse {
-            // Every contact keeps its place there, and unknowns that its mode takes away are zero.
+            // Every contact keeps its place; unknowns that its mode eliminates are zero.
             for (i, contact) in contacts.iter_mut().enumerate() {
                 contact.start = D * i;
             }
