@@ -25,7 +25,7 @@ impl Dimension {
     }
 }
 
-/// What a friction-contact problem cannot be built from.
+/// Errors in the data of a friction-contact problem.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum ProblemError {
@@ -110,7 +110,7 @@ pub enum ProblemError {
 }
 
 impl ProblemError {
-    /// The datum that is wrong: `q`, `mu[2]`, `W[0, 3]`.
+    /// The offending datum: `q`, `mu[2]`, `W[0, 3]`.
     #[must_use]
     pub fn field(&self) -> String {
         match self {

@@ -1,5 +1,5 @@
-//! The scales of a problem: what turns a contact's velocity into an
-//! impulse, and units in which no square overflows.
+//! The scales of a problem: factors between a contact's velocity and its impulse, and units in
+//! which no square overflows.
 
 use super::{Dimension, FrictionContactProblem};
 

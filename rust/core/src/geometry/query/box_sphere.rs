@@ -57,9 +57,9 @@ pub fn nearest_local(
 /// The box's point over the tangent plane (normal n) at the point `touch`
 /// where a sphere was first met.
 ///
-/// For a box that may be past the sphere by now; `touch` in the axes of
-/// `base`. Along axes that the plane is tilted against it is the deepest
-/// corner, edge or face; along the others the place of `touch`.
+/// For a box that may already be past the sphere; `touch` in the axes of `base`. The point lies on
+/// the deepest corner, edge or face along the axes that the plane is tilted against, and at `touch`
+/// along the others.
 #[inline]
 #[must_use]
 pub fn point_over_tangent(
@@ -85,8 +85,8 @@ pub fn point_over_tangent(
     SurfacePoint::of_normal(NEAREST, point, n, n.dot(&(point - touch)))
 }
 
-/// Sine of the tilt above which a box meets a plane with an edge and not
-/// with a face: more than a box turns in a step.
+/// Sine of the tilt above which an edge of a box, and not a face, touches a plane: more than a box
+/// turns in a step.
 const TILTED: f64 = 0.1;
 
 #[cfg(test)]

@@ -5,9 +5,9 @@
 //! gap's gradient is nᵀ times the Jacobian of the *material* point at E, so the contact frame's
 //! normal is the plane's, not the in-wheel one.
 //!
-//! A wheel lying flat touches with its whole rim: two more rim points, 120 degrees
-//! to either side of the lowest, carry it then. Their gap is
-//! `n·c + d + R |w| / 2`, so they fade in continuously as the wheel tips over.
+//! A wheel lying flat touches with its whole rim. Two more rim points, 120 degrees to either side
+//! of the lowest, then support it. Their gap is `n·c + d + R |w| / 2`, so they come in continuously
+//! as the wheel tips over.
 
 use nalgebra::Vector3;
 

@@ -25,9 +25,9 @@ const NO_DIRECTION: f64 = 1e-12;
 /// Nearest point of the disc to the sphere's centre; `base` is where the
 /// disc's coordinates have their origin.
 ///
-/// Where a is on the disc itself no direction leads out. Then n is in the
-/// disc's plane, towards its centre: a sphere right in its way pushes it back
-/// and not over. Where a is the disc's centre it is the spoke.
+/// If a lies on the disc itself the normal is undefined. Then n lies in the disc's plane and points
+/// to its centre, so that a sphere right in its way pushes the disc back and not over. If a is the
+/// disc's centre, n is along the spoke.
 #[inline]
 #[must_use]
 pub fn nearest_point(disc: &Disc, sphere: &Sphere, base: &Vector3<f64>) -> SurfacePoint {
@@ -50,8 +50,8 @@ pub fn nearest_point(disc: &Disc, sphere: &Sphere, base: &Vector3<f64>) -> Surfa
     } else {
         -outward
     };
-    // On the face n is along the axle: t is then the rim's direction, which
-    // it has where rim turns into face.
+    // On the face n is along the axle; t is then the rim's direction, its limit where the rim meets
+    // the face.
     SurfacePoint {
         feature: NEAREST,
         point: disc.centre + reach,
@@ -71,9 +71,8 @@ pub fn nearest_points(disc: &Disc, sphere: &Sphere) -> PairPoint {
 /// Nearest point of the disc to the tangent plane (normal n) at the point
 /// `touch` where a sphere was first met.
 ///
-/// For a disc that may be past the sphere by now; `touch` in the axes of
-/// `base`. The point of the rim that is deepest under the plane, or, where the
-/// plane was met by the face, the disc's point over `touch`.
+/// For a disc that may already be past the sphere; `touch` in the axes of `base`. The result is the
+/// rim point deepest below the plane or, if the face touched first, the disc's point over `touch`.
 #[inline]
 #[must_use]
 pub fn point_over_tangent(disc: &Disc, n: &Vector3<f64>, touch: &Vector3<f64>) -> SurfacePoint {
@@ -96,8 +95,8 @@ pub fn point_over_tangent(disc: &Disc, n: &Vector3<f64>, touch: &Vector3<f64>) -
     }
 }
 
-/// Sine of the angle between axle and normal below which a disc is met with its face and not with
-/// its rim: what a wheel turns in a step that is long enough to pass a sphere is less.
+/// Sine of the angle between axle and normal below which the face of a disc, and not its rim,
+/// touches. A wheel turns by less in a step that is long enough to pass a sphere.
 const FLAT: f64 = 0.05;
 
 #[cfg(test)]

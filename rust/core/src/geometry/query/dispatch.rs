@@ -1,4 +1,4 @@
-//! Which page measures a pair of shapes: the only place that knows which pairs there are.
+//! Chooses the module that measures a pair of shapes. No other place knows all pairs.
 //!
 //! A new shape adds its arms here; see "add a shape" in `CONTRIBUTING.md`.
 

@@ -1,4 +1,4 @@
-//! Half-space `n · x + d ≥ 0` of free room above a plane.
+//! Ground below a plane; the half-space `n · x + d ≥ 0` above it is free.
 
 use nalgebra::{Unit, Vector3};
 
@@ -6,8 +6,8 @@ use super::error::TerrainError;
 use super::sphere_field::MAX_SIZE;
 use super::{Primitive, Terrain};
 
-/// How far the squared length of a normalised vector can be from 1: three
-/// roundings of its entries, and those of the square.
+/// Largest deviation of the squared length of a normalised vector from 1: three roundings of its
+/// entries, and those of the square.
 const UNIT: f64 = 8.0 * f64::EPSILON;
 
 /// Plane `n · x + d = 0`, `|n| = 1`, n pointing from the ground to the free side.
@@ -48,7 +48,7 @@ impl Plane {
             });
         }
         let given = Vector3::from(normal);
-        // A length whose square overflows is first brought near 1.
+        // A vector whose squared length overflows is first scaled to about 1.
         let largest = given.amax();
         let scaled = if largest > 1e100 {
             given / largest

@@ -1,4 +1,4 @@
-//! Rocks of Mars: how many of which size lie on an area.
+//! Rocks of Mars: their size–frequency distribution.
 //!
 //! Rocks of diameter D or more cover the fraction
 //!
@@ -33,7 +33,7 @@ pub struct Clearing {
     pub radius: f64,
 }
 
-/// What rocks, how many, and where. Equal descriptions give equal rocks.
+/// Description of a rock field. Equal descriptions give equal rocks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rocks {
     /// k: fraction of the area that rocks of all sizes cover, in [0, 0.5].
@@ -47,7 +47,7 @@ pub struct Rocks {
     pub seed: u64,
     /// Largest diameter, m.
     pub max_diameter: f64,
-    /// Smallest diameter, m: the law has ever more, ever smaller rocks.
+    /// Smallest diameter, m: without it the law has no bound on the number of rocks.
     pub min_diameter: f64,
     /// Range, from and to, of the fraction of its diameter that a rock is sunk into the ground,
     /// each in [0, ½], so that a rock covers what the law says. Drawn for each rock.
@@ -79,10 +79,10 @@ impl Default for Rocks {
 /// constant; 2048 cells put its error below that of one rock.
 const CELLS: usize = 2048;
 
-/// How often a rock that fell into a clearing is thrown again before it is left out.
+/// How often a rock that fell into a clearing is redrawn before it is dropped.
 const THROWS: usize = 100;
 
-/// Most clearings of a field: each throw of a rock looks at all.
+/// Most clearings of a field: each draw of a place checks all of them.
 const MAX_CLEARINGS: usize = 1000;
 
 impl Rocks {
@@ -116,7 +116,7 @@ impl Rocks {
         let mut sum = 0.0;
         let mut table = vec![0.0];
         let (k, q) = (self.abundance, self.decay());
-        // So few rocks that their law has no number has none at all.
+        // With so few rocks that the law underflows there are none.
         if k <= 0.0 || !q.is_finite() {
             return table;
         }
@@ -251,7 +251,7 @@ impl Rocks {
         Ok(spheres)
     }
 
-    /// The diameter below which the share `1 − share` of the rocks is.
+    /// The diameter below which the fraction `1 − share` of the rocks lies.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // an index into the table
     fn diameter(&self, table: &[f64], share: f64) -> f64 {
         let (low, step) = self.grid();
@@ -278,8 +278,8 @@ impl Rocks {
     }
 }
 
-/// SplitMix64 (Steele, Lea and Flood 2014): ten lines that no update of a
-/// library can change under a seed.
+/// SplitMix64 (Steele, Lea and Flood 2014), written out so that no update of a library changes the
+/// rocks of a seed.
 pub(crate) struct Random(u64);
 
 impl Random {

@@ -1,9 +1,9 @@
 //! The Delassus operator of many contacts: only the blocks of contacts that share a body.
 //!
-//! `W_ij = Σ_b J_ib M_b⁻¹ J_jbᵀ` over the bodies `b` that touch both contacts. In a
-//! heap each contact has a handful of such neighbours, whatever the size of the heap,
-//! so rows are kept as lists of `d × d` blocks (block CSR): memory and one product with
-//! `W` grow with the number of contacts, not with its square.
+//! `W_ij = Σ_b J_ib M_b⁻¹ J_jbᵀ` over the bodies `b` that touch both contacts. In a heap each
+//! contact has a handful of such neighbours, whatever the size of the heap. Rows are therefore
+//! stored as lists of `d × d` blocks (block CSR): memory and the cost of a product with `W` grow
+//! with the number of contacts, not with its square.
 
 use super::{Dimension, ProblemError};
 
@@ -18,7 +18,7 @@ pub struct PairContact<const D: usize, const V: usize> {
     pub jacobians: [[[f64; V]; D]; 2],
 }
 
-/// Block rows of `W` in compressed form. Its memory is kept when it is assembled anew.
+/// Block rows of `W` in compressed form. Reassembly reuses the memory.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BlockSparseDelassus {
     /// Components per contact.
@@ -63,7 +63,7 @@ impl BlockSparseDelassus {
         Ok(sparse)
     }
 
-    /// Takes block rows as they are (BSR, as SciPy calls it).
+    /// Takes block rows as given (SciPy's BSR format).
     ///
     /// `row_starts` (`n_c + 1`), `columns` (`n_blocks`) ascending in each row, `blocks`
     /// (`n_blocks · d · d`) row-major, 1/kg.
@@ -112,7 +112,7 @@ impl BlockSparseDelassus {
         })
     }
 
-    /// Reads a dense matrix whose shape is known to fit, keeping the memory at hand.
+    /// Reads a dense matrix of matching shape, reusing the memory.
     pub(crate) fn read_dense(&mut self, dimension: Dimension, n_contacts: usize, W: &[f64]) {
         let d = dimension.components();
         let n = d * n_contacts;
@@ -120,7 +120,7 @@ impl BlockSparseDelassus {
         for i in 0..n_contacts {
             for j in 0..n_contacts {
                 let rows = (0..d).map(|r| &W[(d * i + r) * n + d * j..][..d]);
-                // A NaN is kept, so that the solver meets it.
+                // Keep a NaN, so that the solver sees it.
                 let is_zero = rows.clone().flatten().all(|x| *x == 0.0);
                 if is_zero && i != j {
                     continue;
@@ -137,8 +137,8 @@ impl BlockSparseDelassus {
         }
     }
 
-    /// The rows of some contacts that are coupled with one another only; `place[i]` is where
-    /// contact `i` goes. `contacts` ascends.
+    /// The rows of contacts that are coupled only with one another; `place[i]` is the new number of
+    /// contact `i`. `contacts` ascends.
     pub(crate) fn restricted(&self, contacts: &[usize], place: &[usize]) -> Self {
         let mut part = Self::default();
         part.clear(self.components);
@@ -271,7 +271,7 @@ impl BlockSparseDelassus {
                 self.blocks.extend(block.iter().flatten());
             }
             if self.diagonal.len() == i {
-                // Both sides are fixed: nothing to push.
+                // Both sides are fixed: no coupling.
                 self.diagonal.push(self.columns.len());
                 self.columns.push(i);
                 self.blocks.extend([[0.0; D]; D].iter().flatten());
@@ -492,7 +492,7 @@ mod tests {
                 })
                 .collect();
             let mut sparse = BlockSparseDelassus::new();
-            // Twice: memory that was used before leaves no trace.
+            // Twice: reused memory must not affect the result.
             sparse.assemble(&contacts, &masses);
             sparse.assemble(&contacts, &masses);
             let mut rows = vec![vec![0.0; 12]; 2 * contacts.len()];

@@ -83,8 +83,7 @@ impl Swept<3> for BodyPairs<3> {
 }
 
 /// The sweeps in D dimensions. T numbers store a contact's tangents: none in the plane, the first
-/// tangent in space. A body has S numbers: its velocity, that of its rim, and zeros up to a power
-/// of two.
+/// tangent in space. A body has S numbers: its velocity, that of its rim, and zeros as padding.
 #[derive(Clone, Debug, Default)]
 struct Sweeps<const D: usize, const T: usize, const S: usize> {
     rows: Vec<Row<D, T>>,
