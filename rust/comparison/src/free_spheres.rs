@@ -1,7 +1,6 @@
-//! Free spheres over a plane in space, and perhaps a box among them, by the
-//! rover's own time stepping.
+//! Free spheres over a plane in space, optionally with a box, under the rover's own time stepping.
 //!
-//! M is diagonal, each body touches a handful of others, so W is assembled block-sparse and the
+//! M is diagonal and each body touches a handful of others, so W is assembled block-sparse and the
 //! solver works island by island. A homogeneous sphere looks the same from all sides:
 //! configurations hold its centre, velocities six components (centre, m/s; spin in world axes,
 //! rad/s), and there is no gyroscopic term. The box, the last of the bodies where there is one, has

@@ -10,10 +10,10 @@
 //!                 where the gap at the predicted end is closed
 //! ```
 //!
-//! The smooth part of order 2 takes the reactions of persistent contact too, at acceleration level,
-//! as D1MinusLinear does; in the original only bilateral constraints enter it, and unilateral
-//! contact is of order 1. Both inherit Painlevé's paradox from that level. The implicit equations
-//! are solved by iterating on ã⁺, which contracts by O(h): no stiff forces.
+//! The smooth part, of order 2, includes the reactions of persistent contact at acceleration level,
+//! as D1MinusLinear does. In the original only bilateral constraints enter it, and unilateral
+//! contact is of order 1. Both inherit Painlevé's paradox from the acceleration level. The implicit
+//! equations are solved by iterating on ã⁺, which contracts by O(h) and excludes stiff forces.
 //!
 //! Source: Chen, Acary, Virlez and Brüls 2013, IJNME 96, 487–511; Brüls,
 //! Acary and Cardona 2014; Schindler and Acary 2014 for λ.

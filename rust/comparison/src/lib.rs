@@ -1,10 +1,10 @@
-//! Time-stepping schemes that the rover does not use, over the systems that
-//! it does, and what each costs and reaches.
+//! Other time-stepping schemes over the rover's mechanical systems, with the cost and accuracy of
+//! each.
 //!
 //! Every scheme implements [`rover_core::integrator::Integrator`] over
 //! [`rover_core::integrator::MechanicalSystem`], as the rover's own do, with the same contacts,
-//! laws and solver, so that what differs between two curves is the scheme alone. They are written
-//! to be read and compared, and allocate in a step.
+//! laws and solver, so that two curves differ by the scheme alone. They are written for reading and
+//! comparison, and allocate in a step.
 //!
 //! - [`generalised_alpha`], [`schatzman_paoli`], [`event_driven`],
 //!   [`penalty`]: one scheme each; [`scheme`]: the list;

@@ -334,8 +334,8 @@ pub fn creep(scheme: &Scheme) -> Result<f64, MeasureError> {
     Ok(simulation.v()[0].hypot(simulation.v()[1]))
 }
 
-/// Time at which the event-driven scheme refuses to go on with a ball
-/// dropped from 1 m with e, s; none where it does not.
+/// Time at which the event-driven scheme stops for a ball dropped from 1 m with restitution e, s;
+/// none if it does not stop.
 ///
 /// # Errors
 /// A step that cannot be taken for another reason.

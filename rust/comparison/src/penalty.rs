@@ -1,13 +1,13 @@
-//! Penalty: contact as a spring and damper, friction regularised,
-//! semi-implicit Euler. What most simulators of today do.
+//! Penalty: contact as a spring and damper, regularised friction, semi-implicit Euler, as in most
+//! current simulators.
 //!
 //! ```text
 //! λ_N = max(0, −k g_N − c u_N) where g_N < 0,        λ_T = −μ λ_N u_T/√(|u_T|² + v_s²)
 //! M(q) (v⁺ − v) = h (F(q, v) + H(q) λ),              q⁺ = q ⊕ h v⁺
 //! ```
 //!
-//! It solves another problem: a body sinks in by its weight over k, creeps down any slope at
-//! `v_s tan α/√(μ² − tan² α)`, and its step is bounded by 2/√(k/m) whatever happens in the scene.
+//! It solves a different problem: a body sinks in by its weight over k and creeps down any slope at
+//! `v_s tan α/√(μ² − tan² α)`, and the step is bounded by 2/√(k/m) whatever happens in the scene.
 //! As h tends to 0 the error against rigid Coulomb contact does not.
 
 use rover_core::integrator::{

@@ -1,4 +1,4 @@
-//! Motions by which schemes are judged: flight, persistent contact on a sine, bounces.
+//! Test motions of the schemes: flight, persistent contact on a sine, bounces.
 
 use std::sync::Arc;
 
@@ -178,8 +178,8 @@ pub fn flight(scheme: &Scheme, h: f64) -> Result<TwoWheelRoverSimulation, Measur
     Ok(simulation)
 }
 
-/// Where the flight is after t: the mass centre on its parabola, the body
-/// turning evenly faster about it.
+/// Coordinates of the flight after t: the mass centre on its parabola, the body with constant
+/// angular acceleration about it.
 ///
 /// `J_c θ̈ = τ_A + τ_B` with the inertia about the mass centre of all,
 /// wheels counted as points at their axles; `J_i θ̈_i = −τ_i`.

@@ -8,9 +8,9 @@
 //! q* = (q_{k+1} + e q_{k−1})/(1 + e) = q_k ⊕ h (v_{k+½} − e v_{k−½})/(1 + e)
 //! ```
 //!
-//! with Coulomb's law on `H_Tᵀ v_{k+½}`. Nothing is said of velocities along the normal: with e = 0
-//! no position penetrates, with e > 0 one step does, and the rebound is a step late. The equations
-//! are solved by linearising the gap at q* anew.
+//! with Coulomb's law on `H_Tᵀ v_{k+½}`. Normal velocities are not constrained: with e = 0 no
+//! position penetrates; with e > 0 one does for a step, and the rebound is one step late. The
+//! equations are solved by repeated linearisation of the gap at q*.
 //!
 //! The state's v is v_{k+½} where a contact acts, and otherwise moved on by
 //! half a step to the time of q.

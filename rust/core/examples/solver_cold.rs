@@ -1,4 +1,4 @@
-//! The impacts of a rover from rest, as recorded:
+//! Recorded impacts of a rover, solved from zero:
 //! `cargo run --release --example solver_cold -- [name filter] [runs]`.
 //!
 //! Prints the time of the median and of the fastest run. For instruction counts:

@@ -12,7 +12,7 @@ use std::time::Instant;
 use rover_comparison::sphere_scenes::{Scene, run};
 use rover_core::nalgebra::Vector3;
 
-/// CPU time of this thread where the system tells it, otherwise time, s.
+/// CPU time of this thread if the system provides it, otherwise wall time, s.
 fn clock(origin: Instant) -> f64 {
     // Nanoseconds on a processor come first.
     let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();

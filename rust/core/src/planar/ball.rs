@@ -83,7 +83,7 @@ impl PlanarMachine<3> for Ball {
         1
     }
 
-    /// It looks alike from all sides.
+    /// It looks the same from all sides.
     fn turning(&self, _v: &SVector<f64, 3>) -> f64 {
         0.0
     }

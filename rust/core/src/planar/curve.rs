@@ -27,7 +27,7 @@ const SLOPES: Range = Range {
     words: "at most 1000 either way",
 };
 
-/// Wavelengths, m: a disc rolls over shorter ones as over roughness.
+/// Wavelengths, m: shorter ones are mere roughness to a disc.
 const WAVELENGTHS: Range = Range {
     ends: [1e-3, 1e9],
     words: "from 1e-3 to 1e9 m",
@@ -408,7 +408,7 @@ fn facing(curve: &dyn Curve, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Fa
         return;
     }
     let begin = out.len();
-    // A little more than the window: a foot at its very end is a root at its very end.
+    // Slightly more than the window: a foot at its very end is a root at its very end.
     let (a, b) = (
         centre.x - half * (1.0 + 1e-6),
         centre.x + half * (1.0 + 1e-6),
@@ -429,7 +429,7 @@ fn facing(curve: &dyn Curve, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Fa
             });
         }
         let is_enough = out.len() - begin >= MAX_FACING;
-        // From inside only the nearest counts: nothing farther is looked for.
+        // From inside only the nearest counts: search no farther.
         match (is_enough, is_inside) {
             (true, _) => 0.0,
             (false, true) => distance,
@@ -440,14 +440,14 @@ fn facing(curve: &dyn Curve, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Fa
     if is_inside {
         keep_nearest(out, begin);
         if out.len() == begin {
-            // So deep that its nearest points are all alike to a double: straight up.
+            // So deep that all distances are equal in double precision: straight up.
             let [y, slope, ..] = curve.jet(centre.x);
             out.push(tangent_facing(centre, y, slope));
         }
     }
 }
 
-/// Of what was appended since `begin`, keeps the shallowest.
+/// Keeps the shallowest of the points appended since `begin`.
 pub(super) fn keep_nearest(out: &mut Vec<Facing>, begin: usize) {
     let nearest = out[begin..]
         .iter()
@@ -464,10 +464,10 @@ fn gradient(curve: &dyn Curve, centre: &Vector2<f64>, x: f64) -> (f64, f64) {
     (x - centre.x + above * d1, 1.0 + d1 * d1 + above * d2)
 }
 
-/// Cells narrower than this share of the window, or of a metre, are not halved any more.
+/// Cells narrower than this fraction of the window, or of a metre, are not halved further.
 const NARROWEST: f64 = 1e-9;
 
-/// Most cells of one search. A disc that meets 64 points takes some thousand.
+/// Most cells of one search. A disc that touches 64 points takes some thousand.
 const MAX_CELLS: usize = 100_000;
 
 /// A cell of x and the least distance that the curve over it can have from the centre.
@@ -680,8 +680,8 @@ mod tests {
         assert!((line.height(-2.0) + 3.0).abs() < 1e-12 && (line.height(9.0) - 19.0).abs() < 1e-12);
     }
 
-    /// A ball at y = −1e9 looked for its nearest point in every wavelength
-    /// of two million kilometres and never came back.
+    /// A ball at y = −1e9 searched every wavelength within two million kilometres for its nearest
+    /// point and never returned.
     #[test]
     fn a_ball_a_million_kilometres_deep_finds_its_way_out_at_once() {
         let sine = Sine::new(1.0, 0.1, 0.0, 0.0).expect("sound");
@@ -696,8 +696,8 @@ mod tests {
                 (-found[0].distance / (depth - 1.0) - 1.0).abs() < 1e-7,
                 "{found:?}"
             );
-            // The spline goes on steeply downwards beyond its ends, and its
-            // side is nearer than its top.
+            // The spline continues steeply downwards beyond its ends, and its side is nearer than
+            // its top.
             let found = all(&spline, [17.3, -depth], 1.0);
             assert_eq!(found.len(), 1);
             assert!(

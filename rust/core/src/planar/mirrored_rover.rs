@@ -1,22 +1,20 @@
-//! A rover that is its own mirror image, driven straight: what is left of
-//! its tree in the plane of symmetry.
+//! A mirror-symmetric rover driven straight, reduced to its plane of symmetry.
 //!
-//! In a scene that is symmetric about the vertical plane through the heading (equal
-//! torques left and right, no steering, ground that falls or rises along the heading
-//! only), the motion is symmetric: z, roll, heading and every joint that does not
-//! turn about z stay at zero, and the two joints of a mirrored pair have one angle.
-//! With `v = P w`, P the columns of what remains, the machine is
+//! In a scene that is symmetric about the vertical plane through the heading (equal torques left
+//! and right, no steering, ground that falls or rises along the heading only), the motion is
+//! symmetric: z, roll, heading and every joint that does not turn about z stay at zero, and the two
+//! joints of a mirrored pair have one angle. With `v = P w`, where the columns of P span the
+//! remaining motion, the machine is
 //!
 //! ```text
 //! Pᵀ M P ẇ + Pᵀ (N v + G) = Pᵀ T u + Pᵀ H p
 //! ```
 //!
-//! which is the mass matrix of a planar tree whose bodies are the pairs,
-//! twice as heavy. The contacts of a pair of wheels have one normal and one
-//! tangent; their impulses add up, and their lateral parts vanish.
+//! This is a planar tree whose bodies are the pairs, twice as heavy. The two contacts of a pair of
+//! wheels share one normal and one tangent; their impulses add up, and their lateral parts vanish.
 //!
 //! Coordinates: x, y of the base's origin, its angle, then the angle of each pair's joint relative
-//! to its carrier. Only wheels touch the ground, no box does.
+//! to its carrier. Only wheels touch the ground; boxes do not.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 
@@ -42,7 +40,7 @@ struct Part {
     centre: Vector2<f64>,
     /// About the mass centre, kg m².
     inertia: f64,
-    /// Turning it changes nothing but its looks.
+    /// Its rotation does not change the mass distribution.
     is_spinner: bool,
 }
 
@@ -86,7 +84,7 @@ impl<const NV: usize> Placed<NV> {
     }
 }
 
-/// Turned by a quarter to the left: the velocity at `r` of a unit turn.
+/// Rotation by a quarter turn to the left: the velocity at `r` for a unit rate.
 fn left(r: &Vector2<f64>) -> Vector2<f64> {
     Vector2::new(-r.y, r.x)
 }
@@ -128,7 +126,7 @@ impl<const NV: usize> MirroredRover<NV> {
         })
     }
 
-    /// The model with the joints locked that the plane does not have.
+    /// The model with all joints locked that the plane does not have.
     #[must_use]
     pub fn model(&self) -> &Model {
         &self.model
@@ -200,7 +198,7 @@ impl<const NV: usize> MirroredRover<NV> {
 /// Groups the bodies of a planar tree by mirror images.
 fn pair_bodies(model: &Model) -> Result<Vec<Part>, PlanarError> {
     let bodies = model.bodies();
-    // Nothing turns out of the plane, so z adds up along the tree.
+    // Nothing rotates out of the plane, so z adds up along the tree.
     let mut z = vec![0.0; bodies.len()];
     for (b, body) in bodies.iter().enumerate() {
         let is_in_plane = match (&body.joint, body.parent) {

@@ -11,7 +11,7 @@ use crate::quantity::{PLACES, QuantityError, within};
 /// Straight pieces between points, continued beyond the ends with the slope
 /// of the last pieces (level where those are vertical).
 ///
-/// x may stay where it is from one point to the next: a vertical face.
+/// Two consecutive points may share x: a vertical face.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polyline {
     points: Vec<Vector2<f64>>,
@@ -88,7 +88,7 @@ impl Polyline {
     /// All points that face the centre, whatever their distance and side.
     fn candidates(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
         let n_points = self.points.len();
-        // Only what is within reach in x: pieces are in the order of x.
+        // Only pieces within reach in x; they are in the order of x.
         let first = self.points.partition_point(|p| p.x < centre.x - reach);
         let last = self.points.partition_point(|p| p.x <= centre.x + reach);
         for i in first..=last {
@@ -242,7 +242,7 @@ mod tests {
         // Away from it and on top of it: one.
         assert_eq!(all(&step, [-5.0, 0.2], 0.25).len(), 1);
         assert_eq!(all(&step, [7.0, 0.2], 0.25).len(), 1);
-        // Inside the kerb: out by the nearest way.
+        // Inside the kerb: out by the shortest way.
         let found = all(&step, [1.02, 0.05], 0.2);
         assert!(
             found.len() == 1 && (found[0].n + Vector2::x()).norm() < 1e-15,
@@ -291,8 +291,8 @@ mod tests {
         }
     }
 
-    /// A height looked at every point, and what did not face a disc was
-    /// taken out one by one: a million points took hours.
+    /// A height query visited every point, and points that did not face a disc were removed one by
+    /// one: a million points took hours.
     #[test]
     fn a_million_points_cost_no_more_than_those_within_reach() {
         let x: Vec<f64> = (0..1_000_000).map(|i| 1e-5 * f64::from(i)).collect();

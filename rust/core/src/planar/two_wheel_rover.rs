@@ -16,11 +16,11 @@
 //!     |   0      0           0           0   J_B |      | −τ_B                                  |
 //! ```
 //!
-//! with the torques τ_i of the motors between body and wheels, positive where they drive
-//! forward. The report's (3.37)–(3.41) leave the wheels' masses out of the first two rows of M
-//! and θ̈ out of the third, and (3.29) leaves out g. A wheel's contact at the rim point
-//! `E = c_i − r_i n` has the columns `(n, r_i × n, 0…)` and `(t, r_i × t, r)` with r in the
-//! wheel's own row: the body's turn moves the axle and never the rim.
+//! with the torques τ_i of the motors between body and wheels, positive when they drive forward.
+//! The report's (3.37)–(3.41) leave the wheels' masses out of the first two rows of M and θ̈ out of
+//! the third, and (3.29) leaves out g. A wheel's contact at the rim point `E = c_i − r_i n` has the
+//! columns `(n, r_i × n, 0…)` and `(t, r_i × t, r)` with r in the wheel's own row: the body's turn
+//! moves the axle and never the rim.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 

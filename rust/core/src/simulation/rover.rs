@@ -93,7 +93,8 @@ impl Scene for RoverScene {
         }
     }
 
-    /// Most contacts on a plane: three rim points a wheel, four corners a box, one point a ball.
+    /// Most contacts on a plane: three rim points per wheel, four corners per box, one point per
+    /// ball.
     fn contact_capacity(&self) -> usize {
         let model = &self.model;
         3 * model.wheels().len() + 4 * model.boxes().len() + model.spheres().len()
@@ -124,7 +125,7 @@ impl Scene for RoverScene {
         parts.drive_work.fill(0.0);
     }
 
-    /// Books torques and work of the drives.
+    /// Records torques and work of the drives.
     fn after_step(&self, taken: StepTaken<'_, Self>) {
         let drives = taken.parts.tree.drives();
         for (work, drive) in taken.parts.drive_work.iter_mut().zip(drives) {
@@ -166,10 +167,10 @@ impl Scene for RoverScene {
     }
 }
 
-/// What the last call of [`Simulation::step`] came to; not part of the state.
+/// Results of the last call of [`Simulation::step`]; not part of the state.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LastCall {
-    /// Report of its steps; empty where one could not be taken.
+    /// Report of its steps; empty if one failed.
     pub report: StepReport,
     /// Work through the wheel motors, Σ |∫ τ_i dφ_i|, driving or braking, J.
     pub work: f64,
@@ -207,7 +208,7 @@ impl RoverSimulation {
     /// [`crate::multibody::coordinates`]; time 0, warm start forgotten.
     ///
     /// # Panics
-    /// If the sizes are another model's.
+    /// If the sizes do not fit the model.
     pub fn set_state(&mut self, configuration: Configuration, v: Vec<f64>) {
         assert!(
             configuration.is_of(self.model()),
@@ -216,7 +217,7 @@ impl RoverSimulation {
         self.place(configuration, v);
     }
 
-    /// What the last call of [`Self::step`] came to.
+    /// Results of the last call of [`Self::step`].
     #[must_use]
     pub fn last_call(&self) -> LastCall {
         // A joint's work over the call counts as driving or as braking.
@@ -237,7 +238,7 @@ impl RoverSimulation {
         &self.memory
     }
 
-    /// Poses of the bodies now.
+    /// Current poses of the bodies.
     #[must_use]
     pub fn kinematics(&self) -> Kinematics {
         Kinematics::of(self.model(), &self.state.configuration)

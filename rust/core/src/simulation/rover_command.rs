@@ -1,4 +1,4 @@
-//! What a rover is told: wheel torques, steering, held joints, brakes.
+//! Commands of a rover: wheel torques, steering, held joints, brakes.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,11 +10,11 @@ use crate::system::{Command, Drive, HeldJoint};
 /// Torques and set-points of a rover.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RoverCommand {
-    /// What the actuators do.
+    /// Commands of the actuators.
     pub actuators: Command,
     /// Driving torque of each wheel, positive forward, N m.
     pub wheel_torque: Vec<f64>,
-    /// Torque about each joint's axis that comes on top, N m.
+    /// Additional torque about each joint's axis, N m.
     pub joint_torque: Vec<f64>,
 }
 
@@ -46,7 +46,7 @@ impl RoverCommand {
         }
     }
 
-    /// Whether it is of this model, its motors are the model's, and all of its numbers are finite.
+    /// Whether it fits this model and its motors, and all of its numbers are finite.
     pub(super) fn is_of(&self, model: &Model) -> bool {
         let own = Self::idle(model);
         let Command {
@@ -101,8 +101,7 @@ impl RoverSimulation {
         Ok(())
     }
 
-    /// Sets torques about the joint axes (n_joints, N m) that come on top
-    /// of the wheels' and have no limit.
+    /// Sets additional torques about the joint axes (n_joints, N m), which have no limit.
     ///
     /// # Errors
     /// Wrong length or an entry that is not finite; nothing is changed then.
@@ -206,7 +205,7 @@ impl RoverSimulation {
         self.set_steering(set_points)
     }
 
-    /// Whether [`Self::set_wheel_torques`] and [`Self::set_steering`] would take these.
+    /// Checks whether [`Self::set_wheel_torques`] and [`Self::set_steering`] would accept these.
     ///
     /// # Errors
     /// As these two.
@@ -215,7 +214,7 @@ impl RoverSimulation {
         self.check_steering(set_points)
     }
 
-    /// Holds joints by name; set-points default to where they are, gains to the model's.
+    /// Holds joints by name; set-points default to the current positions, gains to the model's.
     ///
     /// # Errors
     /// An unknown joint, a wrong number of set-points, a gain that is
@@ -250,7 +249,7 @@ impl RoverSimulation {
         Ok(())
     }
 
-    /// Lets joints go by name.
+    /// Releases joints by name.
     ///
     /// # Errors
     /// An unknown joint; nothing is changed then.
@@ -261,7 +260,7 @@ impl RoverSimulation {
         Ok(())
     }
 
-    /// Holds all wheels where they are and takes their torques away.
+    /// Holds all wheels where they are and sets their torques to zero.
     pub fn brake(&mut self) {
         self.command.wheel_torque.fill(0.0);
         self.combine_torques();

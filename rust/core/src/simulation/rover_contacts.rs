@@ -1,10 +1,10 @@
-//! Where a rover touches the ground, and how hard.
+//! Contact points and forces of a rover on the ground.
 
 use super::rover::RoverSimulation;
 use crate::contact::{Activation, Contact, ContactFrame, Part, detect, detection::wheel_contacts};
 
 impl RoverSimulation {
-    /// Nearest point, frame and gap of every wheel now.
+    /// Current nearest point, frame and gap of every wheel.
     #[must_use]
     pub fn wheel_contacts(&self) -> Vec<Contact> {
         wheel_contacts(self.model(), &self.kinematics(), &**self.terrain())
@@ -52,7 +52,7 @@ impl RoverSimulation {
         forces
     }
 
-    /// Mean normal force of the last step on all that is no wheel, N.
+    /// Mean normal force of the last step on all parts except wheels, N.
     #[must_use]
     pub fn body_force(&self) -> f64 {
         let boxes = self

@@ -1,9 +1,9 @@
-//! Which grains are near which: a grid of cells, filled anew each step in
-//! time proportional to the grains.
+//! Neighbour search: a grid of cells, refilled at each step in time proportional to the number of
+//! grains.
 //!
-//! Cells are numbered row after row, layer after layer, and folded into a table of a few
-//! entries per grain, so a grain that flies off costs no memory; it merely shares its
-//! entry with another cell, and the distance tells them apart.
+//! Cells are numbered row by row and layer by layer, and folded into a table of a few entries per
+//! grain. A grain that flies off thus costs no memory: its cell shares an entry with another one,
+//! and the distance test separates them.
 
 use super::bodies::COORDINATES;
 
@@ -70,8 +70,8 @@ impl<const D: usize> Grid<D> {
         self.origin = low;
         let size = (4 * n).next_power_of_two().max(64);
         self.size = i64::try_from(size).unwrap_or(i64::MAX);
-        // One empty column on either side, so that the next row's cells are no neighbours;
-        // neighbours never share an entry: three cells along the last axis always have room.
+        // One empty column on either side separates a row from the next. Neighbours never share an
+        // entry: three cells along the last axis always fit.
         let mut stride = 1;
         for k in 0..D {
             self.strides[k] = stride;
@@ -79,7 +79,7 @@ impl<const D: usize> Grid<D> {
             // Three cells along each later axis must fit; the last is folded.
             let later = if k + 2 < D { 3 } else { 1 };
             let most = (self.size / 4 / stride / later).max(3);
-            // A coordinate that is not finite leaves no number of cells.
+            // A non-finite coordinate gives no number of cells.
             #[allow(clippy::cast_possible_truncation)] // clamped
             let cells = cells.min(most as f64) as i64;
             stride *= cells.max(3);

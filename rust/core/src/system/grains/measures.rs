@@ -1,4 +1,4 @@
-//! What a state of grains has: energy, momentum, overlap.
+//! Measures of a state of grains: energy, momentum, overlap.
 
 use nalgebra::{SVector, Vector3};
 
@@ -81,8 +81,8 @@ impl<const D: usize> GrainScene<D> {
         (linear, moment)
     }
 
-    /// Deepest overlap, m: 0 where nothing overlaps. Kinematic grains among
-    /// themselves and in walls do not count. q (nq).
+    /// Deepest overlap, m: 0 if nothing overlaps. Overlaps of kinematic grains with each other and
+    /// with walls do not count. q (nq).
     #[must_use]
     pub fn penetration(&self, q: &[f64]) -> f64 {
         let grains = &self.grains;

@@ -1,12 +1,12 @@
-//! Seeded packings without overlap: a loose array, shaken; gravity does the rest.
+//! Random packings without overlap: a perturbed loose array, which settles under gravity.
 
 use super::bodies::{COORDINATES, Grains, check_count, noun};
 use super::error::GrainError;
 use crate::geometry::terrain::rocks::Random;
 use crate::quantity::{LENGTHS, MASSES, PLACES, within};
 
-/// Grains of radii drawn evenly from a range, row upon row over a width, in
-/// space layer upon layer over a rectangle.
+/// Grains with radii drawn uniformly from a range, row upon row over a width; in space, layer upon
+/// layer over a rectangle.
 ///
 /// Equal descriptions give equal packings. Rows are filled from the left, in space from the back,
 /// the lowest first; each grain is moved at random in the room that its place in the array leaves,
@@ -45,7 +45,7 @@ impl Default for Packing<2> {
     }
 }
 
-/// Room between the largest grains of the array, as a share of their diameter.
+/// Distance between the largest grains of the array, as a fraction of their diameter.
 const ROOM: f64 = 0.003;
 
 /// Names of the corner's and of the sides' entries.
