@@ -141,7 +141,8 @@ fn bias_if<const TURNS: bool>(
         };
     }
     out.fill(0.0);
-    for (b, body) in bodies.iter().enumerate().rev() {
+    for b in (0..bodies.len()).rev() {
+        let body = &bodies[b];
         let Moved { force, moment, .. } = moved[b];
         let k = body.velocity;
         if body.parent.is_none() && (TURNS || matches!(body.joint, Joint::Free(_))) {

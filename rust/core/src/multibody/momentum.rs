@@ -192,8 +192,9 @@ fn energy_and_momentum_if<const TURNS: bool>(
     for (b, body) in bodies.iter().enumerate() {
         let (before, own) = moving.split_at_mut(b);
         let own = &mut own[0];
-        match (&body.joint, body.parent) {
-            (Joint::Free(free), _) => {
+        let carrier = || body.parent.map_or(&world, |parent| &before[parent]);
+        match &body.joint {
+            Joint::Free(free) => {
                 let (pose, v) = (q.pose(*free), &v[body.velocity..]);
                 *own = Moving {
                     R: *pose.attitude.to_rotation_matrix().matrix(),
@@ -203,14 +204,9 @@ fn energy_and_momentum_if<const TURNS: bool>(
                 };
                 height += pose.position * model.trees()[body.tree].mass;
             }
-            (Joint::Revolute(joint), Some(parent)) => {
-                own.turn::<TURNS>(&before[parent], body, joint, q, v);
-            }
+            Joint::Revolute(joint) => own.turn::<TURNS>(carrier(), body, joint, q, v),
             _ if TURNS => {}
-            (_, parent) => {
-                let carrier = parent.map_or(&world, |parent| &before[parent]);
-                own.follow(carrier, body, q, v);
-            }
+            _ => own.follow(carrier(), body, q, v),
         }
         sums.add(body, own);
     }
@@ -262,10 +258,6 @@ impl Moving {
     /// Places any other body on its carrier.
     #[cold]
     fn follow(&mut self, carrier: &Self, body: &Body, q: &Configuration, v: &[f64]) {
-        if let Joint::Revolute(joint) = &body.joint {
-            self.turn::<false>(carrier, body, joint, q, v);
-            return;
-        }
         let mut lever = carrier.R * body.position;
         let frame = body.rotation.map_or(carrier.R, |fixed| carrier.R * fixed);
         let k = body.velocity;

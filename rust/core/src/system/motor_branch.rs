@@ -88,26 +88,32 @@ impl MotorBranch {
         self.trial.revise(Some(motor), command, rate)
     }
 
-    /// Mean torque of a step between two rates (rad/s), N m.
+    /// Mean torque of a step between two rates (rad/s, asked for only on the line), N m.
     #[inline]
-    pub(crate) fn torque(&self, begin: f64, end: f64) -> f64 {
-        self.trial.regime().torque(self.rate(begin, end))
+    pub(crate) fn torque(&self, rates: impl FnOnce() -> (f64, f64)) -> f64 {
+        match self.trial.regime() {
+            MotorRegime::Constant(torque) => torque,
+            line @ MotorRegime::Line { .. } => {
+                let (begin, end) = rates();
+                line.torque(self.rate(begin, end))
+            }
+        }
     }
 
-    /// Work (J) that the motor is credited with in a step between two rates
-    /// (rad/s) that turns it by `turned` (rad).
+    /// Work (J) that the motor is credited with in a step that turns it by `turned` (rad) at the
+    /// mean `torque` (N m).
     ///
     /// A torque–speed line only reduces the power of the command, `(τ − command) ω ≤ 0`. In a step
     /// that reverses the rate, the implicit torque and the mean rate may violate this; the surplus
     /// is not counted as work.
     #[inline]
-    pub(crate) fn work(&self, drive: Option<&Drive>, begin: f64, end: f64, turned: f64) -> f64 {
-        let work = self.torque(begin, end) * turned;
+    pub(crate) fn work(drive: Option<&Drive>, torque: f64, turned: f64) -> f64 {
+        let work = torque * turned;
         match drive {
             Some(Drive {
-                torque,
+                torque: command,
                 motor: Some(motor),
-            }) => work.min(motor.limited(*torque) * turned),
+            }) => work.min(motor.limited(*command) * turned),
             _ => work,
         }
     }

@@ -157,8 +157,7 @@ impl<const NV: usize, M: PlanarMachine<NV>> PlanarSystem<'_, NV, M> {
         parts.torques.extend_from_slice(self.inputs);
         for (i, (torque, branch)) in parts.torques.iter_mut().zip(&parts.motors).enumerate() {
             if let Some(motor) = self.machine.motor(i) {
-                let (begin, end) = motor_rates(&motor, start, v_end);
-                *torque = branch.torque(begin, end);
+                *torque = branch.torque(|| motor_rates(&motor, start, v_end));
             }
         }
     }
@@ -395,13 +394,11 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
         let mean = |k: usize| theta * v_end[k] + (1.0 - theta) * start.v[k];
         let power: f64 = torques.iter().enumerate().map(|(k, f)| f * mean(k)).sum();
         let mut work = h * power;
-        for (i, branch) in parts.motors.iter().enumerate() {
+        for (i, &torque) in parts.torques.iter().enumerate() {
             if let Some(motor) = self.machine.motor(i) {
-                let (begin, end) = motor_rates(&motor, start.v, v_end);
                 let turned = h * motor.gain.signum() * mean(motor.coordinate);
                 let command = drive(&motor, self.inputs[i]);
-                let surplus =
-                    parts.torques[i] * turned - branch.work(Some(&command), begin, end, turned);
+                let surplus = torque * turned - MotorBranch::work(Some(&command), torque, turned);
                 work -= motor.gain.abs() * surplus;
             }
         }

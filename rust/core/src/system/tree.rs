@@ -447,12 +447,11 @@ impl MechanicalSystem for TreeSystem<'_> {
             motors,
         };
         let mut total = 0.0;
-        let mut drives = motors.iter().zip(&self.command.drives).zip(drives_tried);
+        let mut drives = self.command.drives.iter().zip(drives_tried);
         trial.for_each(self.model, |joint, torque| {
-            let turned = h * torque.rate;
-            if let Some(((motor, drive), tried)) = drives.next() {
-                let (begin, end) = (start.v[joint.velocity], v_end[joint.velocity]);
-                let work = motor.work(drive.as_ref(), begin, end, turned);
+            let turned = h * trial.mean_rate(joint.velocity);
+            if let Some((drive, tried)) = drives.next() {
+                let work = MotorBranch::work(drive.as_ref(), torque.drive, turned);
                 *tried = DriveAction {
                     impulse: torque.drive * h,
                     work,
@@ -639,7 +638,7 @@ fn set_held_theta(
     }
 }
 
-/// Mean torque of a joint over the step, N m, and its mean rate, rad/s.
+/// Mean torque of a joint over the step, N m.
 struct Actuation {
     /// Of its drive.
     drive: f64,
@@ -647,7 +646,6 @@ struct Actuation {
     damper: f64,
     /// Of everything else.
     other: f64,
-    rate: f64,
 }
 
 /// A step that is tried: where it starts, the velocity at its end, what acts.
@@ -661,28 +659,33 @@ struct Trial<'a> {
 }
 
 impl Trial<'_> {
+    /// Mean of a velocity over the step: rad/s or m/s.
+    #[inline]
+    fn mean_rate(&self, k: usize) -> f64 {
+        let theta = self.options.theta;
+        theta * self.v_end[k] + (1.0 - theta) * self.start.v[k]
+    }
+
     /// Torques of every joint; the PD, the spring and the motor's line at the θ_j-weighted position and velocity of the iterate.
     #[inline]
     fn for_each(&self, model: &Model, mut act: impl FnMut(&JointProperties, Actuation)) {
-        let (h, theta) = (self.options.time_step, self.options.theta);
+        let h = self.options.time_step;
         let acting = self.command.torque.iter().zip(&self.command.held);
         let joints = model.joints().iter().zip(self.motors);
         let places = &self.start.configuration.joints;
         for (((joint, motor), (torque, held)), q) in joints.zip(acting).zip(places) {
-            let (begin, end) = (self.start.v[joint.velocity], self.v_end[joint.velocity]);
-            let rate = theta * end + (1.0 - theta) * begin;
+            let k = joint.velocity;
             let (mut other, mut damper) = (*torque, 0.0);
             if held.is_some() || joint.is_passive {
-                let place = q + h * motor.theta() * rate;
+                let place = q + h * motor.theta() * self.mean_rate(k);
                 let (spring, brake) = answer(held.as_ref(), &joint.passive, place);
                 other -= spring;
-                damper = -brake * motor.rate(begin, end);
+                damper = -brake * motor.rate(self.start.v[k], self.v_end[k]);
             }
             let actuation = Actuation {
-                drive: motor.torque(begin, end),
+                drive: motor.torque(|| (self.start.v[k], self.v_end[k])),
                 damper,
                 other,
-                rate,
             };
             act(joint, actuation);
         }
