@@ -219,15 +219,15 @@ fn a_stop_keeps_the_momenta() {
 fn a_stop_carries_what_the_ground_presses() {
     let foot = |name: &str, joint| {
         let mut foot = solid(name, Some("body"), joint);
-        foot.shape = Shape::Sphere { radius: 0.1 };
+        foot.shape = Some(Shape::Sphere { radius: 0.1 });
         foot.collides = true;
         foot
     };
     let mut body = solid("body", None, JointKind::Free);
     body.mass = 10.0;
-    body.shape = Shape::Box {
+    body.shape = Some(Shape::Box {
         size: [1.0, 0.2, 0.6],
-    };
+    });
     let mut solids = vec![body];
     for (name, z) in [("left", -0.3), ("right", 0.3)] {
         let mut front = foot(name, JointKind::Fixed);

@@ -142,7 +142,7 @@ fn a_radius_that_contradicts_the_shape_is_refused() {
     assert!(refused.to_string().contains("contact_radius"), "{refused}");
     let mut description = ModelDescription::rover();
     let solid = description.solids.iter_mut().find(|s| s.name == "wheel_ML");
-    solid.unwrap().shape = Shape::Box { size: [0.2; 3] };
+    solid.unwrap().shape = Some(Shape::Box { size: [0.2; 3] });
     let model = Model::from_description(description).unwrap();
     assert!(matches!(
         model.with_wheel_radius(0.2),
