@@ -186,6 +186,34 @@ fn stops_give_no_energy() {
     }
 }
 
+/// A stop acts between two bodies: in free flight it changes neither momentum, and with e = 1 no energy, but for what the audit
+/// of the energy takes at a strike.
+#[test]
+fn a_stop_keeps_the_momenta() {
+    let body = solid("body", None, JointKind::Free);
+    let mut arm = pendulum(-0.1, 0.2);
+    arm.parent = Some("body".into());
+    arm.position = Some([0.1, 0.2, -0.1]);
+    let options = StepOptions {
+        gravity: Vector3::zeros(),
+        restitution: 1.0,
+        ..options(1e-3, Variant::Newton)
+    };
+    let mut run = simulation(model(vec![body, arm]), options);
+    start(&mut run, &[0.0], &[0.1, 0.2, -0.1, 0.3, 0.2, -0.4, 3.0]);
+    let (before, momentum) = (energy(&run), run.momentum());
+    let mut struck = 0;
+    for _ in 0..500 {
+        run.step(1).unwrap();
+        struck += run.contacts().len();
+        let now = run.momentum();
+        assert!((now.linear - momentum.linear).norm() < 1e-5);
+        assert!((now.angular - momentum.angular).norm() < 1e-5);
+    }
+    assert!(struck > 2, "{struck}");
+    assert!((energy(&run) - before).abs() < 1e-5 * before);
+}
+
 /// A body on two front feet and an arm: about the front feet `F · 0.9 = 10 g · 0.4 + g · 0.9`, and the stop carries `(F − g) · 0.5`.
 #[test]
 fn a_stop_carries_what_the_ground_presses() {
