@@ -208,6 +208,7 @@ impl From<ModelError> for BorderError {
             | ModelError::SteeringNotAbove { name, .. } => Value::Text(name.clone()),
             ModelError::NotFinite { value, .. }
             | ModelError::NotPositive { value, .. }
+            | ModelError::NotBelow { value, .. }
             | ModelError::Negative { value, .. }
             | ModelError::OutOfRange { value, .. }
             | ModelError::MassesContradict { value, .. }

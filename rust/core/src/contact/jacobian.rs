@@ -5,6 +5,7 @@
 
 use nalgebra::Vector3;
 
+use super::limit;
 use super::pair::Contact;
 use crate::multibody::{BASE, Kinematics, Model};
 
@@ -99,6 +100,10 @@ pub fn generalized_impulse(
 ) {
     out.fill(0.0);
     for (contact, p) in contacts.iter().zip(p.chunks_exact(3)) {
+        if let Some((k, sign)) = limit::row(model, contact) {
+            out[k] += sign * p[0];
+            continue;
+        }
         let [n, t, b] = contact.frame.rows();
         let force = n * p[0] + t * p[1] + b * p[2];
         // The other side, where it is a body, is pushed at the same place the other way.

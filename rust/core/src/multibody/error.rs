@@ -98,6 +98,16 @@ pub enum ModelError {
         /// What was given.
         value: f64,
     },
+    /// A lower limit that is not below the upper one.
+    #[error("{field}: must be below the upper limit {upper}, is {value}")]
+    NotBelow {
+        /// Path of the lower limit.
+        field: String,
+        /// What was given.
+        value: f64,
+        /// The upper limit.
+        upper: f64,
+    },
     /// An axis of no direction.
     #[error("{field}: an axis must have a direction, is {value:?}")]
     NoDirection {
@@ -237,6 +247,7 @@ impl ModelError {
             | Self::NotFinite { field, .. }
             | Self::NotPositive { field, .. }
             | Self::Negative { field, .. }
+            | Self::NotBelow { field, .. }
             | Self::NoDirection { field, .. }
             | Self::NotASign { field, .. }
             | Self::ImpossibleInertia { field, .. }

@@ -20,8 +20,9 @@ pub mod state;
 
 pub use bias::bias;
 pub use description::{
-    CouplingDescription, Hold, JointKind, MassProperties, ModelDescription, Shape,
-    ShapeDescription, SolidDescription, Spring, TagDescription, WheelDescription,
+    CouplingDescription, DriveDescription, Hold, JointKind, Limits, MassProperties,
+    ModelDescription, Shape, ShapeDescription, SolidDescription, Spring, TagDescription,
+    WheelDescription,
 };
 pub use error::{ModelError, StateError};
 pub use joint::{Joint, JointAxis, Motion, Pose};

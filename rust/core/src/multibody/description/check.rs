@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use nalgebra::{Unit, Vector3};
 
 use super::check_shapes::check_shapes;
-use super::joint::JointKind;
+use super::joint::{JointKind, Limits};
 use super::masses::mass_left;
 use super::{ModelDescription, SolidDescription};
 use crate::multibody::error::ModelError;
@@ -170,6 +170,8 @@ fn check_joint(
         (solid.spring.is_some(), "spring", has_axis),
         (solid.damping.is_some(), "damping", has_axis),
         (solid.armature.is_some(), "armature", has_axis),
+        (solid.limits.is_some(), "limits", has_axis),
+        (solid.drive.is_some(), "drive", kind == JointKind::Revolute),
         (solid.coupled.is_some(), "coupled", has_axis),
         (solid.locked.is_some(), "locked", has_axis),
     ];
@@ -227,6 +229,13 @@ fn check_properties(
     }
     moderate(&at("damping"), solid.damping.unwrap_or(0.0))?;
     moderate(&at("armature"), solid.armature.unwrap_or(0.0))?;
+    check_limits(i, solid)?;
+    if let Some(drive) = solid.drive {
+        moderate(&at("drive.torque_limit"), drive.torque_limit)?;
+        if let Some(motor) = drive.motor {
+            motor.check(|field| at(&format!("drive.motor.{field}")))?;
+        }
+    }
     let Some(coupled) = &solid.coupled else {
         return Ok(());
     };
@@ -250,6 +259,8 @@ fn check_properties(
     )?;
     for (is_given, what) in [
         (solid.hold.is_some(), "hold"),
+        (solid.limits.is_some(), "limits"),
+        (solid.drive.is_some(), "drive"),
         (solid.locked.is_some(), "locked"),
     ] {
         if is_given {
@@ -261,6 +272,26 @@ fn check_properties(
         }
     }
     Ok(())
+}
+
+/// Stops of a joint.
+fn check_limits(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
+    let at = |what: &str| format!("solids[{i}].limits.{what}");
+    let Some(limits) = solid.limits else {
+        return Ok(());
+    };
+    let Limits { lower, upper } = limits;
+    for (field, value) in [("lower", lower), ("upper", upper)] {
+        in_range(&at(field), value, 1e9, "at most 1e9 rad or m either way")?;
+    }
+    if lower < upper {
+        return Ok(());
+    }
+    Err(ModelError::NotBelow {
+        field: at("lower"),
+        value: lower,
+        upper,
+    })
 }
 
 /// The solids of a tree are listed together.
@@ -362,6 +393,13 @@ fn check_wheels(
             })
         };
         let mut solid = find("solid", &wheel.solid)?;
+        if description.solids[solid].drive.is_some() {
+            return Err(ModelError::NotForJoint {
+                field: format!("solids[{solid}].drive"),
+                what: "drive",
+                joint: "wheel's",
+            });
+        }
         direction(&at("axle"), wheel.axle)?;
         length(&at("radius"), wheel.radius)?;
         if let Some(radius) = wheel.contact_radius {

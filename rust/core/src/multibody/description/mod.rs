@@ -12,7 +12,7 @@ pub mod shape;
 
 use super::error::ModelError;
 use super::motor::Motor;
-pub use joint::{CouplingDescription, Hold, JointKind, Spring};
+pub use joint::{CouplingDescription, DriveDescription, Hold, JointKind, Limits, Spring};
 pub use masses::MassProperties;
 use masses::mass_properties;
 pub use shape::{Shape, ShapeDescription};
@@ -107,6 +107,12 @@ pub struct SolidDescription {
     /// Inertia of the joint's rotor, reflected to the joint, kg m² or kg; 0 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub armature: Option<f64>,
+    /// Stops of the joint, where it has any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<Limits>,
+    /// Drive of a revolute joint.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drive: Option<DriveDescription>,
     /// Another joint that this one follows: its coordinate is gone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coupled: Option<CouplingDescription>,

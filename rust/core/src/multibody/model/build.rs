@@ -81,6 +81,9 @@ impl Model {
             joint.velocity = bodies[joint.body].velocity;
             joint.is_passive = joint.passive.stiffness > 0.0 || joint.passive.damping > 0.0;
         }
+        let limited = (0..joints.len())
+            .filter(|&joint| joints[joint].limits.is_some())
+            .collect();
         let joint_velocities = joints.iter().map(|joint| joint.velocity).collect();
         let is_turn = |k: &usize| {
             let body = &bodies[paths.body_of_velocity[*k]];
@@ -111,6 +114,7 @@ impl Model {
             n_rotations,
             has_slides,
             armatures,
+            limited,
             joint_velocities,
             spinning,
             turning,

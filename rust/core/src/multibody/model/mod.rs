@@ -104,6 +104,8 @@ pub struct Model {
     coupled: Vec<usize>,
     /// Velocities of joints with rotors, and the rotors' inertias.
     armatures: Vec<(usize, f64)>,
+    /// Joints with stops.
+    limited: Vec<usize>,
     n_poses: usize,
     n_rotations: usize,
     has_slides: bool,
@@ -277,6 +279,13 @@ impl Model {
     #[must_use]
     pub fn armatures(&self) -> &[(usize, f64)] {
         &self.armatures
+    }
+
+    /// Numbers of the joints with stops.
+    #[inline]
+    #[must_use]
+    pub fn limited_joints(&self) -> &[usize] {
+        &self.limited
     }
 
     /// Velocity indices that move body `b`, root first.
