@@ -95,13 +95,26 @@ impl ContactSystem {
             self.u[3 * c..][..3].copy_from_slice(&u[..3]);
             factor.half_solve_path(path, rows);
         }
+        if self.spans.is_empty() {
+            self.fill_operator(n, |system, c, d| system.block_on_ground(model, c, d));
+        } else {
+            self.fill_operator(n, |system, c, d| system.block(model, c, d));
+        }
+    }
+
+    /// W from its blocks below the diagonal, and on it.
+    #[inline]
+    fn fill_operator(&mut self, n: usize, block: impl Fn(&Self, usize, usize) -> [Columns; 3]) {
         let size = 3 * n;
         for c in 0..n {
             for d in 0..=c {
-                let block = self.block(model, c, d);
+                let block = block(self, c, d);
                 for i in 0..3 {
                     let row = &mut self.W[(3 * c + i) * size + 3 * d..][..3];
                     row.copy_from_slice(&block[i][..3]);
+                }
+                if c == d {
+                    continue; // Symmetric.
                 }
                 for j in 0..3 {
                     let row = &mut self.W[(3 * d + j) * size + 3 * c..][..3];
@@ -197,32 +210,33 @@ impl ContactSystem {
     }
 
     /// The block of W of two contacts.
-    #[inline]
-    fn block(&self, model: &Model, c: usize, d: usize) -> [[f64; 4]; 3] {
-        // Nine sums that do not wait for each other.
-        let mut block = [[0.0; 4]; 3];
-        let mut add_product = |x: &Columns, y: &Columns| {
-            for (sums, factor) in block.iter_mut().zip(x) {
-                add(sums, *factor, y);
-            }
-        };
+    fn block(&self, model: &Model, c: usize, d: usize) -> [Columns; 3] {
         if self.union(c).is_empty() && self.union(d).is_empty() {
-            let shared = model.common_path(self.bodies[c], self.bodies[d]);
-            let (a, b) = (
-                &self.Z[c * self.stride..][..shared],
-                &self.Z[d * self.stride..][..shared],
-            );
-            for (x, y) in a.iter().zip(b) {
-                add_product(x, y);
+            return self.block_on_ground(model, c, d);
+        }
+        let mut block = [[0.0; 4]; 3];
+        let mut right = self.entries(model, d).peekable();
+        for (k, x) in self.entries(model, c) {
+            while right.next_if(|(j, _)| *j < k).is_some() {}
+            if let Some((_, y)) = right.next_if(|(j, _)| *j == k) {
+                add_product(&mut block, x, y);
             }
-        } else {
-            let mut right = self.entries(model, d).peekable();
-            for (k, x) in self.entries(model, c) {
-                while right.next_if(|(j, _)| *j < k).is_some() {}
-                if let Some((_, y)) = right.next_if(|(j, _)| *j == k) {
-                    add_product(x, y);
-                }
-            }
+        }
+        block
+    }
+
+    /// The block of W of two contacts with the ground.
+    #[allow(clippy::inline_always)] // as a call it costs a hundredth of a step
+    #[inline(always)]
+    fn block_on_ground(&self, model: &Model, c: usize, d: usize) -> [Columns; 3] {
+        let shared = model.common_path(self.bodies[c], self.bodies[d]);
+        let (a, b) = (
+            &self.Z[c * self.stride..][..shared],
+            &self.Z[d * self.stride..][..shared],
+        );
+        let mut block = [[0.0; 4]; 3];
+        for (x, y) in a.iter().zip(b) {
+            add_product(&mut block, x, y);
         }
         block
     }
@@ -317,6 +331,14 @@ impl ContactSystem {
                 y[k] += product(z);
             }
         }
+    }
+}
+
+/// `block += x yᵀ`: nine sums that do not wait for each other.
+#[inline]
+fn add_product(block: &mut [Columns; 3], x: &Columns, y: &Columns) {
+    for (sums, factor) in block.iter_mut().zip(x) {
+        add(sums, *factor, y);
     }
 }
 

@@ -106,6 +106,11 @@ impl Model {
         let has_slides = bodies
             .iter()
             .any(|b| matches!(b.joint, Joint::Prismatic(_)));
+        let only_turns = bodies.iter().all(|body| match &body.joint {
+            Joint::Free(_) => body.parent.is_none(),
+            Joint::Revolute(joint) => body.parent.is_some() && joint.coordinate.coupling.is_none(),
+            Joint::Fixed | Joint::Prismatic(_) | Joint::Spherical(_) => false,
+        });
         let text = description.to_json().unwrap_or_default();
         Ok(Self {
             mass: bodies.iter().map(|b| b.mass).sum(),
@@ -113,6 +118,7 @@ impl Model {
             n_poses,
             n_rotations,
             has_slides,
+            only_turns,
             armatures,
             limited,
             joint_velocities,

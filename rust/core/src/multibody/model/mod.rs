@@ -109,6 +109,7 @@ pub struct Model {
     n_poses: usize,
     n_rotations: usize,
     has_slides: bool,
+    only_turns: bool,
     /// Free and spherical joints, with their first velocities.
     rotating: Vec<(Joint, usize)>,
     mass: f64,
@@ -246,6 +247,14 @@ impl Model {
     #[must_use]
     pub fn has_slides(&self) -> bool {
         self.has_slides
+    }
+
+    /// Whether every root is free and every other joint revolute and on its own, as a rover's are: hot loops then run without a branch on the
+    /// kind of joint.
+    #[inline]
+    #[must_use]
+    pub fn only_turns(&self) -> bool {
+        self.only_turns
     }
 
     /// Free and spherical joints, which have quaternions, with their first velocities.
