@@ -1,4 +1,5 @@
-//! Contacts between bodies: a machine that touches itself, stones that are pushed, machines that meet.
+//! Contacts between bodies: a machine that touches itself, stones that are
+//! pushed, machines that meet.
 #![allow(clippy::unwrap_used)]
 
 #[path = "contacts/contact_scenes.rs"]

@@ -1,4 +1,5 @@
-//! Free spheres in space: energy, momentum, penetration, symmetry, and a single sphere's closed forms.
+//! Free spheres in space: energy, momentum, penetration, symmetry, and a
+//! single sphere's closed forms.
 
 #![allow(clippy::unwrap_used)] // a test stops where a scene is impossible
 
@@ -73,7 +74,8 @@ fn projection_keeps_the_block_apart() {
 
 #[test]
 fn projected_to_convergence_nothing_penetrates_at_the_end_of_any_step() {
-    // 216 contacts with the ground and among neighbours, each less than 1e-10 m deep: a sum below 1e-17 m².
+    // 216 contacts with the ground and among neighbours, each less than
+    // 1e-10 m deep: a sum below 1e-17 m².
     let largest = |treatment: Treatment| {
         let mut simulation = Scene::Block.start(1e-2, treatment).unwrap();
         let mut largest = 0.0_f64;
@@ -143,7 +145,8 @@ fn a_box_dropped_askew_comes_to_rest_on_a_face() {
     simulation.start_with(|v| v[3..6].copy_from_slice(&[0.5, 0.1, 1.0]));
     simulation.step(4000).unwrap();
     let height = simulation.centres()[0].y;
-    // A contact that rests within what gravity falls in a step, g h²/2 = 4.9e-6 m, is left where it is.
+    // A contact that rests within what gravity falls in a step, g h²/2 =
+    // 4.9e-6 m, is left where it is.
     let face = [0.1, 0.2, 0.4].map(|half: f64| (height - half).abs());
     assert!(face.iter().any(|off| *off < 5e-6), "height {height}");
     assert!(simulation.v().iter().all(|v| v.abs() < 1e-9));
@@ -178,7 +181,8 @@ fn impacts_in_flight_keep_the_momentum() {
         assert!(struck > 100, "{struck} contacts");
         let change = (simulation.momentum() - start.0).norm();
         assert!(change < 1e-10, "linear: {change}");
-        // Directions are taken at the predicted end of the step and arms as the radius: angular momentum is kept to O(h).
+        // Directions are taken at the predicted end of the step and arms as
+        // the radius: angular momentum is kept to O(h).
         let spin = (simulation.angular_momentum() - start.1).norm();
         assert!(
             spin < 0.02 * start.1.norm(),
@@ -238,8 +242,8 @@ fn a_sliding_sphere_comes_to_roll_at_five_sevenths() {
     assert!((simulation.centres()[0].y - 0.2).abs() < 1e-12);
 }
 
-/// The core's grains have another law at the contact, `0 ≤ u_N + gap⁺/h ⊥ p_N ≥ 0` with θ = 1, and find contacts in another way: both come to the same
-/// motion as the step shrinks.
+/// The core's grains have another law at the contact, `0 ≤ u_N + gap⁺/h ⊥ p_N ≥ 0` with θ = 1, and
+/// find contacts in another way: both come to the same motion as the step shrinks.
 #[test]
 fn grains_in_space_and_free_spheres_come_to_the_same_motion() {
     let kind = SphereKind {

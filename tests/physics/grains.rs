@@ -1,4 +1,5 @@
-//! Grains in the plane and in space: closed forms for both, heaps, energy and momentum balance, machines of any number of coordinates.
+//! Grains in the plane and in space: closed forms for both, heaps, energy
+//! and momentum balance, machines of any number of coordinates.
 
 use std::sync::Arc;
 
@@ -171,7 +172,8 @@ where
         energy.total()
     }
 
-    /// Force on the first body of each contact of the last step, N: normal, and size of the tangential one.
+    /// Force on the first body of each contact of the last step, N: normal,
+    /// and size of the tangential one.
     fn forces(&self) -> impl Iterator<Item = (&GrainContact<D>, f64, f64)> {
         let h = self.options.time_step;
         let contacts = self.scratch.contacts().iter();
@@ -221,7 +223,8 @@ where
     // v = r ω.
     let spin: f64 = heap.v[D..].iter().map(|w| w * w).sum::<f64>().sqrt();
     assert!((0.1 * spin - expected).abs() < 1e-8, "{spin} rad/s");
-    // It slides until κ v₀/((1 + κ) μ g), and slows down by μ g; then it rolls. The implicit step is late by less than a step.
+    // It slides until κ v₀/((1 + κ) μ g), and slows down by μ g; then it
+    // rolls. The implicit step is late by less than a step.
     let until = kappa::<D>() / (1.0 + kappa::<D>()) / (0.3 * G);
     let way = until - 0.5 * 0.3 * G * until * until + expected * (0.2 - until);
     let gone = (heap.centre(0) - start).norm();
@@ -244,7 +247,8 @@ where
     let wall = Wall::new(SVector::zeros(), normal).expect("a slope");
     let mut heap = on_a_wall(wall, &[normal * 0.1], mu);
     heap.step(500);
-    // Rolls with g sin α/(1 + κ) where tan α ≤ (1 + 1/κ) μ, slides with g (sin α − μ cos α) where not.
+    // Rolls with g sin α/(1 + κ) where tan α ≤ (1 + 1/κ) μ, slides with g
+    // (sin α − μ cos α) where not.
     let kappa = kappa::<D>();
     let share = if slope <= (1.0 + 1.0 / kappa) * mu {
         alpha.sin() / (1.0 + kappa)
@@ -265,7 +269,8 @@ fn on_a_slope_a_disk_slides_above_three_times_the_friction_and_a_ball_above_thre
     }
 }
 
-/// D grains around the y axis with `room` times their diameter between their centres, and one on top of them: sin φ of the lines to it.
+/// D grains around the y axis with `room` times their diameter between their
+/// centres, and one on top of them: sin φ of the lines to it.
 fn small_pyramid<const D: usize>(room: f64) -> (Vec<SVector<f64, D>>, f64) {
     let side = 0.2 * room;
     let out = if D == 2 {
@@ -286,8 +291,9 @@ fn small_pyramid<const D: usize>(room: f64) -> (Vec<SVector<f64, D>>, f64) {
     (centres, sine)
 }
 
-/// Each of the D below carries W/D: moments about its centre ask for equal friction above and below, so with the line of contact at φ from the
-/// vertical `N = W/D`, `T = N tan(φ/2)`, and the floor bears `W + W/D`. It stands for μ ≥ tan(φ/2), and else slips apart.
+/// Each of the D below carries W/D: moments about its centre ask for equal friction above and
+/// below, so with the line of contact at φ from the vertical `N = W/D`, `T = N tan(φ/2)`, and the
+/// floor bears `W + W/D`. It stands for μ ≥ tan(φ/2), and else slips apart.
 fn rests_on_others<const D: usize>()
 where
     for<'a> GrainSystem<'a, D>:
@@ -609,7 +615,8 @@ impl<const D: usize> Machine<D> for RoundMachine {
     }
 }
 
-/// A blow of one body against D others on the floor: the same whether the one is a grain or a machine.
+/// A blow of one body against D others on the floor: the same whether the
+/// one is a grain or a machine.
 fn machine_moves_as_a_grain<const D: usize>()
 where
     for<'a> GrainSystem<'a, D>:

@@ -1,4 +1,5 @@
-//! The time-stepping schemes of the comparison against closed forms and against their textbook orders.
+//! The time-stepping schemes of the comparison against closed forms and
+//! against their textbook orders.
 
 #![allow(clippy::unwrap_used)] // a test stops where a scene is impossible
 
@@ -25,7 +26,8 @@ fn check(scheme: &Scheme, curve: &Curve, expected: f64) {
 
 #[test]
 fn in_flight_every_scheme_has_its_order() {
-    // Moreau–Jean with θ = ½, generalised-α, central differences 2; θ = 1 and semi-implicit Euler 1; Runge–Kutta 4.
+    // Moreau–Jean with θ = ½, generalised-α, central differences 2; θ = 1
+    // and semi-implicit Euler 1; Runge–Kutta 4.
     for scheme in &SCHEMES {
         let expected = match scheme.kind {
             Kind::MoreauJean { theta, .. } if theta > 0.5 => 1.0,
@@ -151,7 +153,8 @@ fn a_sliding_ball_rolls_at_two_thirds_of_its_speed() {
 
 #[test]
 fn a_block_on_a_slope_stays_but_for_the_penalty_which_creeps() {
-    // Regularised friction carries tan α only at the slip v_s tan α/√(μ² − tan² α): closed form of the failure.
+    // Regularised friction carries tan α only at the slip v_s tan α/√(μ² −
+    // tan² α): closed form of the failure.
     let (alpha, mu) = (0.3_f64, 0.5_f64);
     for scheme in &SCHEMES {
         let speed = creep(scheme).unwrap();
@@ -197,7 +200,8 @@ fn bounces_without_loss_keep_the_energy_but_for_what_damps() {
     for scheme in &SCHEMES {
         let change = elastic_change(scheme, 20.0).unwrap();
         match scheme.kind {
-            // θ = 1 falls by g h more than it should in each step, and loses it at the impact; the penalty's impact is resolved by its step.
+            // θ = 1 falls by g h more than it should in each step, and loses it at the impact; the
+            // penalty's impact is resolved by its step.
             Kind::MoreauJean { theta, .. } if theta > 0.5 => assert!(change < -1e-4, "{change}"),
             Kind::Penalty(..) => assert!(change.abs() > 1e-4, "{change}"),
             _ => assert!(change.abs() < 1e-10, "{}: {change:e}", scheme.name),
@@ -219,7 +223,8 @@ fn what_drops_without_restitution_rests() {
 
 #[test]
 fn in_persistent_contact_each_has_its_order() {
-    // The textbook's Moreau–Jean is of order 1; contacts at the end of the step with the reaction's mean direction make it 2.
+    // The textbook's Moreau–Jean is of order 1; contacts at the end of the
+    // step with the reaction's mean direction make it 2.
     for scheme in &SCHEMES {
         let expected = match scheme.kind {
             Kind::MoreauJean { theta, .. } if theta > 0.5 => 1.0,
@@ -242,7 +247,8 @@ fn in_persistent_contact_each_has_its_order() {
 
 #[test]
 fn the_penalty_scheme_converges_to_another_motion() {
-    // Refining sixteen times, from 0.16 ms to 0.01 ms, gains nothing: what is left is the spring and the regularised friction.
+    // Refining sixteen times, from 0.16 ms to 0.01 ms, gains nothing: what
+    // is left is the spring and the regularised friction.
     let curve = order_in(named("Penalty"), Motion::Driving, 4096).unwrap();
     let errors: Vec<f64> = curve.error.iter().map(|e| e.unwrap()).collect();
     assert!(

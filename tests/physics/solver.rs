@@ -57,8 +57,8 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
         .sqrt()
 }
 
-/// Coulomb's and Signorini's laws, written out case by case and without the code under test: largest violation in m/s,
-/// impulses weighed with the contact's own `W_NN`.
+/// Coulomb's and Signorini's laws, written out case by case and without the code under test:
+/// largest violation in m/s, impulses weighed with the contact's own `W_NN`.
 fn coulomb_violation(problem: &Problem, p: &[f64]) -> f64 {
     let n = problem.q.len();
     let d = problem.dimension.components();
@@ -233,7 +233,8 @@ fn rank(W: &[f64], n: usize) -> usize {
     n
 }
 
-/// Part of `x` that a symmetric `W` cannot see, up to `1e-9` of the rest: `(I + W/alpha)^-1 x` by elimination.
+/// Part of `x` that a symmetric `W` cannot see, up to `1e-9` of the rest:
+/// `(I + W/alpha)^-1 x` by elimination.
 fn invisible(W: &[f64], x: &[f64]) -> f64 {
     let n = x.len();
     let alpha = 1e-10 * (0..n).map(|k| W[k * (n + 1)]).sum::<f64>();
@@ -590,7 +591,8 @@ proptest! {
     }
 }
 
-/// Sum without rounding to speak of (Neumaier), so that a cancellation in `W p + q` is the answer's and not the test's.
+/// Sum without rounding to speak of (Neumaier), so that a cancellation in
+/// `W p + q` is the answer's and not the test's.
 fn exact_sum(terms: impl Iterator<Item = (f64, f64)>) -> f64 {
     let (mut sum, mut lost) = (0.0_f64, 0.0_f64);
     for (a, b) in terms {
@@ -607,8 +609,8 @@ fn exact_sum(terms: impl Iterator<Item = (f64, f64)>) -> f64 {
     sum + lost
 }
 
-/// The laws that an answer breaks by more than a millionth of the largest free velocity: approach and slip in m/s, adhesion and
-/// friction beyond the cone in N s of the contact's own mass.
+/// The laws that an answer breaks by more than a millionth of the largest free velocity: approach
+/// and slip in m/s, adhesion and friction beyond the cone in N s of the contact's own mass.
 fn broken_laws(problem: &Problem, p: &[f64]) -> Vec<String> {
     let (n, d) = (problem.q.len(), problem.dimension.components());
     let speed = 1e-6 * problem.q.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -648,7 +650,8 @@ fn broken_laws(problem: &Problem, p: &[f64]) -> Vec<String> {
     broken
 }
 
-/// A random mechanism in other units: W, q and μ times powers of ten, and bodies of very different masses.
+/// A random mechanism in other units: W, q and μ times powers of ten, and
+/// bodies of very different masses.
 fn scaled_problem() -> impl Strategy<Value = Problem> {
     let exponent = || prop_oneof![Just(0.0), -12.0..12.0f64];
     let scales = (exponent(), exponent(), exponent());
@@ -703,8 +706,9 @@ proptest! {
     }
 }
 
-/// The story: `W = I`, `q = (-1, 1, 1)` and `mu = 1e12` were answered by `p = 0` and "converged", with the contact approaching at 1 m/s; single
-/// methods did so from `mu = 1e8`, since De Saxcé's `u_N + mu |u_T|` leaves no digit for `u_N`.
+/// The story: `W = I`, `q = (-1, 1, 1)` and `mu = 1e12` were answered by `p = 0` and "converged",
+/// with the contact approaching at 1 m/s; single methods did so from `mu = 1e8`, since De Saxcé's
+/// `u_N + mu |u_T|` leaves no digit for `u_N`.
 #[test]
 fn no_friction_coefficient_lets_a_contact_approach() {
     for exponent in -300..=300 {
@@ -738,7 +742,8 @@ fn no_friction_coefficient_lets_a_contact_approach() {
     }
 }
 
-/// The unit of mass and of velocity are the caller's: from 1e-300 to 1e300 the answer is the same up to its own unit.
+/// The unit of mass and of velocity are the caller's: from 1e-300 to 1e300
+/// the answer is the same up to its own unit.
 #[test]
 fn the_answer_does_not_depend_on_the_units() {
     let sound = parked_rover();
@@ -878,7 +883,8 @@ fn every_solve_lists_its_stages() {
     assert_eq!(scaled.rungs, usual.rungs);
 }
 
-/// A column of discs, whose contacts stand in for W: when the sweeps are cut short the proximal point goes on, and both are listed.
+/// A column of discs, whose contacts stand in for W: when the sweeps are
+/// cut short the proximal point goes on, and both are listed.
 #[test]
 fn free_bodies_list_their_sweeps_and_what_came_after_them() {
     let (n, mass, radius) = (20, 1.0_f64, 0.1);
@@ -958,7 +964,8 @@ fn hard_problem() -> Problem {
     pile(&masses, 0.3).problem(&v)
 }
 
-/// The story: a step with 131 contacts took 3.5 s, one with 500 a minute. Work is counted, so that the end is the same on every machine.
+/// The story: a step with 131 contacts took 3.5 s, one with 500 a minute. Work
+/// is counted, so that the end is the same on every machine.
 #[test]
 fn a_budget_ends_every_method_with_the_nearest_answer_known() {
     let problem = hard_problem();
@@ -1037,6 +1044,7 @@ fn most_random_mechanisms_are_solved() {
     assert!(iterations <= RANDOM_ITERATIONS, "{iterations}");
 }
 
-/// Snapshot of the test above. Random mechanisms may have no solution at all (frictional jamming), unlike real ones.
+/// Snapshot of the test above. Random mechanisms may have no solution at
+/// all (frictional jamming), unlike real ones.
 const RANDOM_CONVERGED: usize = 1995;
 const RANDOM_ITERATIONS: usize = 41_000;

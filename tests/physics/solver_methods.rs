@@ -47,7 +47,8 @@ fn names_lead_to_their_methods() {
     assert_eq!(coulomb_methods().count(), Method::ALL.len() - 1);
 }
 
-/// A problem made from its answer: `q = u − W p` with `(p, u)` open, sticking or sliding at each contact. `skew` makes `W` unsymmetric.
+/// A problem made from its answer: `q = u − W p` with `(p, u)` open, sticking
+/// or sliding at each contact. `skew` makes `W` unsymmetric.
 fn manufactured(
     dimension: Dimension,
     numbers: &[f64],
@@ -63,7 +64,8 @@ fn manufactured(
             let gram: f64 = (0..n)
                 .map(|k| numbers[(r * n + k) % 97] * numbers[(c * n + k) % 97])
                 .sum();
-            // A heavy diagonal makes the answer the only one, a skew part leaves W positive definite.
+            // A heavy diagonal makes the answer the only one, a skew part
+            // leaves W positive definite.
             W[r * n + c] = 0.3 * gram / n as f64
                 + if r == c { 1.0 } else { 0.0 }
                 + skew * (f64::from(r < c) - f64::from(r > c));
@@ -158,7 +160,8 @@ fn an_unsymmetric_operator_is_not_symmetrised() {
     }
 }
 
-/// With `W = I/m` the relaxed answer is closed: `p = m Π_K(−q)`, and a sliding contact parts with `μ|u_T|`.
+/// With `W = I/m` the relaxed answer is closed: `p = m Π_K(−q)`, and a
+/// sliding contact parts with `μ|u_T|`.
 #[test]
 fn the_relaxed_law_lifts_what_slides() {
     let (mu, m) = (0.5, 2.0);
@@ -217,7 +220,8 @@ fn the_relaxed_law_is_coulombs_where_nothing_slides() {
     );
 }
 
-/// A cube of 1e6 kg on one of 1 kg: no answer with a velocity of more than 1e-9 m/s is accepted, and the default finds one.
+/// A cube of 1e6 kg on one of 1 kg: no answer with a velocity of more than
+/// 1e-9 m/s is accepted, and the default finds one.
 #[test]
 fn a_wrong_velocity_is_not_accepted_at_a_large_mass_ratio() {
     let problem = pile(&[1.0, 1e6], 0.9).problem(&falling(2, 9.81e-3));
@@ -247,15 +251,17 @@ const RADIUS: f64 = 0.05;
 const MASS: f64 = 0.7;
 const STEP: f64 = 9.81e-3;
 
-/// Columns of disks side by side, on the floor or on one plank that lies on the floor with both ends. Contacts, inverse masses and free velocities after
-/// a step of gravity. On the floor every column is an island; the plank makes one of all.
+/// Columns of disks side by side, on the floor or on one plank that lies on the floor with both
+/// ends. Contacts, inverse masses and free velocities after a step of gravity. On the floor every
+/// column is an island; the plank makes one of all.
 fn columns(
     n_columns: usize,
     height: usize,
     plank: bool,
 ) -> (Vec<PairContact<2, 3>>, Vec<[f64; 3]>, Vec<f64>) {
     let mut contacts = Vec::new();
-    // `arms`: from each body's centre to the contact; the normal points up, from the first body to the second.
+    // `arms`: from each body's centre to the contact; the normal points up,
+    // from the first body to the second.
     let mut touch = |bodies: [Option<usize>; 2], arms: [[f64; 2]; 2]| {
         let side = |sign: f64, r: [f64; 2]| {
             [[0.0, 1.0], [-1.0, 0.0]].map(|e| {
@@ -340,7 +346,8 @@ fn columns_of_disks_rest_whatever_the_storage() {
     }
 }
 
-/// Snapshot of the work: sweeps and linear solves of the default, cold, to 1e-12; one island and many.
+/// Snapshot of the work: sweeps and linear solves of the default, cold, to
+/// 1e-12; one island and many.
 #[test]
 fn many_contacts_take_few_iterations() {
     for (n_columns, plank, bound) in [(100, true, 80), (200, false, 700)] {

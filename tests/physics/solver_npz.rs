@@ -1,5 +1,5 @@
-//! Reader of friction-contact problems, the shelf's and recorded ones (`.npz`: a zip of NumPy arrays), for tests and
-//! examples only.
+//! Reader of friction-contact problems, the shelf's and recorded ones
+//! (`.npz`: a zip of NumPy arrays), for tests and examples only.
 
 #![allow(clippy::print_stdout)] // what is left out is said
 
@@ -19,10 +19,12 @@ pub struct Recorded {
     pub mu: Vec<f64>,
 }
 
-/// Environment variable that names the folder of the recorded problems, which are no part of this repository.
+/// Environment variable that names the folder of the recorded problems,
+/// which are no part of this repository.
 const SETTING: &str = "ROVER_GYM_CONTACT_PROBLEMS";
 
-/// The problems of this repository's shelf, `tests/shelf/data`, whose name passes the filter, sorted by size.
+/// The problems of this repository's shelf, `tests/shelf/data`, whose name
+/// passes the filter, sorted by size.
 #[allow(dead_code)] // not every user of this page asks for it
 pub fn shelf(filter: impl Fn(&str) -> bool) -> Vec<Recorded> {
     read_all(
@@ -31,8 +33,8 @@ pub fn shelf(filter: impl Fn(&str) -> bool) -> Vec<Recorded> {
     )
 }
 
-/// The recorded problems, of the folder that the environment variable names, whose name passes the filter, sorted by
-/// size; says so when none is named.
+/// The recorded problems, of the folder that the environment variable names, whose name passes the
+/// filter, sorted by size; says so when none is named.
 #[allow(dead_code)] // not every user of this page asks for it
 pub fn recorded(filter: impl Fn(&str) -> bool) -> Vec<Recorded> {
     let Some(folder) = std::env::var_os(SETTING) else {
@@ -81,7 +83,8 @@ fn read(path: &Path, name: String) -> Recorded {
     }
 }
 
-/// `W = Hᵀ M̂⁻¹ H`, row by row, of free bodies that touch; `tests/shelf/free_bodies.py` tells the arrays' meaning.
+/// `W = Hᵀ M̂⁻¹ H`, row by row, of free bodies that touch;
+/// `tests/shelf/free_bodies.py` tells the arrays' meaning.
 fn delassus_of_free_bodies(
     mass: &[f64],
     inertia_inverse: &[f64],
@@ -124,7 +127,8 @@ fn u32_at(bytes: &[u8], at: usize) -> usize {
     u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]) as usize
 }
 
-/// One file of a zip archive, found through the central directory; `None` if there is none of that name.
+/// One file of a zip archive, found through the central directory; `None`
+/// if there is none of that name.
 fn member(archive: &[u8], wanted: &str) -> Option<Vec<u8>> {
     let end = (0..archive.len() - 21)
         .rev()

@@ -103,9 +103,10 @@ pub const ROVER_NV: usize = 15;
 
 /// A rover of six wheels on the flat: trunk (6), front axle about x, two bogies about z, six spins.
 ///
-/// World x forward, y up, z right; wheels FL, FR, ML, BL, MR, BR; contact components normal, rolling, lateral (normal × rolling
-/// up to sign). `steering`: angle of each wheel about y, rad. Straight wheels give `W` of rank 14 in 18: six loads, six rolling
-/// directions, but only two lateral ones.
+/// World x forward, y up, z right; wheels FL, FR, ML, BL, MR, BR; contact
+/// components normal, rolling, lateral (normal × rolling up to sign). `steering`:
+/// angle of each wheel about y, rad. Straight wheels give `W` of rank 14 in 18: six
+/// loads, six rolling directions, but only two lateral ones.
 pub fn rover(steering: [f64; 6], mu: f64) -> Scene {
     let radius = 0.1;
     let height = 0.4;
@@ -121,7 +122,8 @@ pub fn rover(steering: [f64; 6], mu: f64) -> Scene {
     let bogie_x = -0.22;
     let mut rows = Vec::new();
     for (i, &(x, z)) in wheels.iter().enumerate() {
-        // Velocity of the wheel's material point on the ground, as three rows over the 15 velocities.
+        // Velocity of the wheel's material point on the ground, as three
+        // rows over the 15 velocities.
         let r = [x, -height, z];
         let mut point = vec![vec![0.0; ROVER_NV]; 3];
         for k in 0..3 {
@@ -225,7 +227,8 @@ pub fn pile(masses: &[f64], mu: f64) -> Scene {
     }
 }
 
-/// Free velocity of bodies at rest after a step of gravity: `v = −g h` along y for every sixth velocity from the second.
+/// Free velocity of bodies at rest after a step of gravity: `v = −g h`
+/// along y for every sixth velocity from the second.
 pub fn falling(n_bodies: usize, gh: f64) -> Vec<f64> {
     (0..6 * n_bodies)
         .map(|k| if k % 6 == 1 { -gh } else { 0.0 })

@@ -1,4 +1,5 @@
-//! The shelf's hard problems, `tests/shelf`: piles, stacks, mass ratios, jams, the rover's wheels; always tested.
+//! The shelf's hard problems, `tests/shelf`: piles, stacks, mass ratios,
+//! jams, the rover's wheels; always tested.
 
 mod solver_npz;
 
@@ -9,7 +10,8 @@ use rover_core::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
 use serde::Deserialize;
 use solver_npz::{Recorded, shelf};
 
-/// `tests/shelf/bounds.json`: the relative residual that every problem is solved to, and larger ones for those that are not.
+/// `tests/shelf/bounds.json`: the relative residual that every problem is
+/// solved to, and larger ones for those that are not.
 #[derive(Deserialize)]
 struct Bounds {
     aim: f64,
@@ -19,7 +21,8 @@ struct Bounds {
 /// Work that solves every problem which is solved at all; the default stops four of them earlier.
 const AMPLE: u64 = 4_000_000_000;
 
-/// How well a problem is solved from rest with the default options but for the tolerance, relative and in m/s, and the budget.
+/// How well a problem is solved from rest with the default options but for
+/// the tolerance, relative and in m/s, and the budget.
 fn answer(recorded: &Recorded, tolerance: f64, budget: u64) -> SolveReport {
     let problem =
         FrictionContactProblem::new(recorded.dimension, &recorded.W, &recorded.q, &recorded.mu)

@@ -1,16 +1,19 @@
 //! Contact forces at acceleration level: `M a = F(q, v) + H λ` with the law on `d/dt (Hᵀ v)`.
 //!
-//! The schemes of [`rover_core::integrator`] never ask for these. Those that treat persistent contact as a smooth motion do.
+//! The schemes of [`rover_core::integrator`] do not need these; schemes that treat persistent
+//! contact as smooth motion do.
 
 use rover_core::contact::Activation;
 use rover_core::integrator::{MechanicalSystem, Start, StepError, StepOptions};
 use rover_core::solver::{SolveReport, SolverWorkspace, solve};
 
-/// Half width of the difference quotient of Hᵀ(q(t)) v, s. Its error is a 30th of the fifth derivative times δ⁴: at a few metres per
-/// second over curves of metres 1e-10 of the value, rounding as much.
+/// Half width of the difference quotient of Hᵀ(q(t)) v, s. Its error is a 30th of the fifth
+/// derivative times δ⁴. At a few metres per second over curves of metres this is 1e-10 of the
+/// value, and so is rounding.
 const DELTA: f64 = 1e-3;
 
-/// Contacts no further than `reach` (m) and no faster than `slow` (m/s) along the normal, and all that penetrate; placed at q.
+/// Contacts no further than `reach` (m) and no faster than `slow` (m/s)
+/// along the normal, and all that penetrate; placed at q.
 pub(crate) fn find<S: MechanicalSystem>(
     system: &mut S,
     q: &S::Configuration,
@@ -59,7 +62,8 @@ pub(crate) fn free_acceleration<S: MechanicalSystem>(
     Ok(())
 }
 
-/// `b = d/dt (Hᵀ(q(t)) v)` along q ⊕ t v, m/s²; leaves the contacts placed and assembled at q, with `u = Hᵀ v`.
+/// `b = d/dt (Hᵀ(q(t)) v)` along q ⊕ t v, m/s²; leaves the contacts placed
+/// and assembled at q, with `u = Hᵀ v`.
 pub(crate) fn convective_acceleration<S: MechanicalSystem>(
     system: &mut S,
     contacts: &mut [S::Contact],
@@ -121,10 +125,11 @@ pub(crate) fn response<S: MechanicalSystem>(system: &S, p: &[f64], change: &mut 
     system.half_solve_back(change);
 }
 
-/// Acceleration with the reactions of these contacts: those that act over the time step after (q, v), divided by it.
+/// Acceleration with the reactions of these contacts: those that act over
+/// the time step after (q, v), divided by it.
 ///
-/// In persistent contact, where `Hᵀ v` is 0 in the locked directions, the reactions are exact; a contact that parts has none, one that
-/// slides has them against its slip.
+/// In persistent contact, where `Hᵀ v` is 0 in the locked directions, the reactions are exact. A
+/// separating contact has none; that of a sliding contact opposes the slip.
 pub(crate) fn smooth_acceleration<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -143,7 +148,7 @@ pub(crate) fn smooth_acceleration<S: MechanicalSystem>(
     system.add_local_of_velocity(contacts, &a, &mut b);
     let d = S::DIMENSION.components();
     for (i, (b, u)) in b.iter_mut().zip(&u).enumerate() {
-        // What approaches is for an impact to stop, not for a force.
+        // An approaching contact is stopped by an impact, not by a force.
         let u = if i % d == 0 { u.max(0.0) } else { *u };
         *b += u / options.time_step;
     }

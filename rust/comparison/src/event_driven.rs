@@ -1,19 +1,23 @@
-//! Event-driven: a Runge–Kutta method of order 4 between events, events located, impacts by the impact law. Planar systems.
+//! Event-driven scheme for planar systems: a Runge–Kutta method of order 4 between located events,
+//! and the impact law at impacts.
 //!
-//! Between events each contact is open, sticks or slides in one direction, and λ solves linear equations:
+//! Between events each contact is open, sticks or slides in one direction,
+//! and λ solves linear equations:
 //!
 //! ```text
 //! M a = F + H λ,    d/dt u_N = 0,    stick: d/dt u_T = 0,    slide: λ_T = −μ sign(u_T) λ_N
 //! ```
 //!
-//! What integration leaves of drift in gap and velocity is projected away after each step. An event is a gap that closes, a λ_N or a reserve
-//! of friction μ λ_N − |λ_T| that runs out, a slip that stops; it is found by bisection on the length of the step. At an impact all
-//! touching contacts obey Newton's and Coulomb's law together, as in Moreau–Jean; then contact law at acceleration level says how each
-//! goes on.
+//! Projection after each step removes the drift in gap and velocity. An event is a gap that closes,
+//! a λ_N or a friction reserve μ λ_N − |λ_T| that reaches zero, or a slip that stops; bisection on
+//! the length of the step locates it. At an impact all touching contacts obey Newton's and
+//! Coulomb's laws together, as in Moreau–Jean. The contact law at acceleration level then decides
+//! the mode of each.
 //!
-//! The order is the Runge–Kutta method's, 4, in all quantities, which makes it the reference for scenes with few contacts. It cannot pass
-//! a point where infinitely many impacts accumulate and says so: after `max_impacts` in one step the step is refused. Two events of
-//! one kind within a step, gone and come back, are not seen. At acceleration level Painlevé's paradox has no answer either.
+//! All quantities converge with the order 4 of the Runge–Kutta method, which makes the scheme the
+//! reference for scenes with few contacts. It cannot pass a point where infinitely many impacts
+//! accumulate: after `max_impacts` in one step it refuses the step. Two opposite events of one kind
+//! within a step go unnoticed. Painlevé's paradox remains unsolved at acceleration level.
 
 use std::cell::RefCell;
 
@@ -113,7 +117,8 @@ struct Run<'a, S: MechanicalSystem> {
 }
 
 impl<S: MechanicalSystem> Run<'_, S> {
-    /// Decides at (q, v) which contacts stay closed and how; `decision` overrides what rounding would say.
+    /// Decides at (q, v) which contacts stay closed and in which mode; `decision` overrides cases
+    /// that rounding would decide.
     fn begin(
         &mut self,
         q: &S::Configuration,

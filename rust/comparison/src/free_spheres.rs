@@ -1,9 +1,10 @@
-//! Free spheres over a plane in space, and perhaps a box among them, by the rover's own time stepping.
+//! Free spheres over a plane in space, optionally with a box, under the rover's own time stepping.
 //!
-//! M is diagonal, each body touches a handful of others, so W is assembled block-sparse and the solver works island by
-//! island. A homogeneous sphere looks the same from all sides: configurations hold its centre, velocities six components (centre, m/s; spin in
-//! world axes, rad/s), and there is no gyroscopic term. The box, the last of the bodies where there is one, has an attitude, spins in its own
-//! axes, and touches the plane with its corners.
+//! M is diagonal and each body touches a handful of others, so W is assembled block-sparse and the
+//! solver works island by island. A homogeneous sphere looks the same from all sides:
+//! configurations hold its centre, velocities six components (centre, m/s; spin in world axes,
+//! rad/s), and there is no gyroscopic term. The box, the last of the bodies where there is one, has
+//! an attitude, spins in its own axes, and touches the plane with its corners.
 
 use rover_core::contact::{Activation, ContactFrame};
 use rover_core::integrator::{MechanicalSystem, Start, StepOptions, UnilateralContact};
@@ -77,7 +78,8 @@ pub struct Placement {
 /// A contact of two bodies, or of one with the plane y = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphereContact {
-    /// The two bodies, ascending, where corner k of the box counts as body n + k; the second is [`PLANE`] for the plane.
+    /// The two bodies, ascending, where corner k of the box counts as body
+    /// n + k; the second is [`PLANE`] for the plane.
     pub key: (u32, u32),
     /// The two bodies; `None` is the plane.
     pub bodies: [Option<usize>; 2],
@@ -101,7 +103,8 @@ impl UnilateralContact for SphereContact {
     }
 }
 
-/// Pairs of close points, found by the grid of the core's grains: its memory, kept from one search to the next.
+/// Pairs of close points, found by the grid of the core's grains: its
+/// memory, kept from one search to the next.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Pairs {
     grid: Grid<3>,
@@ -181,7 +184,8 @@ impl Bodies {
         [Some((key.0 as usize).min(self.n)), second]
     }
 
-    /// Velocity of a body's point at an arm (world, m) as far as a normal there feels it: a sphere's spin moves no point along its normal.
+    /// Velocity of a body's point at an arm (world, m) as far as a normal there feels it: a
+    /// sphere's spin moves no point along its normal.
     fn velocity_at(
         &self,
         v: &[f64],
@@ -245,7 +249,8 @@ fn add_product(rows: &[[f64; NV]; 3], v: &[f64], out: &mut [f64]) {
     }
 }
 
-/// Adds `H p` in the order of the velocities, each body's part divided by its `scale`, where there is one.
+/// Adds `H p` in the order of the velocities, each body's part divided by
+/// its `scale`, where there is one.
 fn add_transposed(
     contacts: &[PairContact<3, NV>],
     p: &[f64],

@@ -1,18 +1,22 @@
-//! Nonsmooth generalised-α: the smooth motion by the generalised-α method, impulses by backward Euler.
+//! Nonsmooth generalised-α: the smooth motion by the generalised-α method,
+//! impulses by backward Euler.
 //!
 //! ```text
-//! M(q⁺) ã⁺ = F(q⁺, v⁺) + H(q⁺) λ⁺                                      λ: reactions of persistent contact
+//! M(q⁺) ã⁺ = F(q⁺, v⁺) + H(q⁺) λ⁺               λ: reactions of persistent contact
 //! (1 − α_m) a⁺ + α_m a = (1 − α_f) ã⁺ + α_f ã
-//! v⁺ = v + h ((1 − γ) a + γ a⁺) + w,         M(q⁺) w = H(q⁺) p          p: what impacts add
+//! v⁺ = v + h ((1 − γ) a + γ a⁺) + w,    M(q⁺) w = H(q⁺) p          p: what impacts add
 //! q⁺ = q ⊕ (h v + h² ((½ − β) a + β a⁺) + ½ h w)
-//! u = Hᵀ(q⁺) v⁺:  Newton's impact law and Coulomb's law with p, where the gap at the predicted end is closed
+//! u = Hᵀ(q⁺) v⁺:  Newton's impact law and Coulomb's law with p,
+//!                 where the gap at the predicted end is closed
 //! ```
 //!
-//! The smooth part of order 2 takes the reactions of persistent contact too, at acceleration level, as D1MinusLinear does; in the
-//! original only bilateral constraints enter it, and unilateral contact is of order 1. Both inherit Painlevé's paradox from
-//! that level. The implicit equations are solved by iterating on ã⁺, which contracts by O(h): no stiff forces.
+//! The smooth part, of order 2, includes the reactions of persistent contact at acceleration level,
+//! as D1MinusLinear does. In the original only bilateral constraints enter it, and unilateral
+//! contact is of order 1. Both inherit Painlevé's paradox from the acceleration level. The implicit
+//! equations are solved by iterating on ã⁺, which contracts by O(h) and excludes stiff forces.
 //!
-//! Source: Chen, Acary, Virlez and Brüls 2013, IJNME 96, 487–511; Brüls, Acary and Cardona 2014; Schindler and Acary 2014 for λ.
+//! Source: Chen, Acary, Virlez and Brüls 2013, IJNME 96, 487–511; Brüls,
+//! Acary and Cardona 2014; Schindler and Acary 2014 for λ.
 
 use std::cell::RefCell;
 
@@ -25,7 +29,8 @@ use rover_core::solver::SolverWorkspace;
 
 use crate::acceleration::{find, response, smooth_acceleration, solve_law};
 
-/// Change of h ã⁺, relative to 1 m/s and to the largest velocity, below which the iteration has settled.
+/// Change of h ã⁺, relative to 1 m/s and to the largest velocity, below
+/// which the iteration has settled.
 const SETTLED: f64 = 1e-13;
 
 /// Most iterations.

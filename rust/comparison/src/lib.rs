@@ -1,13 +1,18 @@
-//! Time-stepping schemes that the rover does not use, over the systems that it does, and what each costs and reaches.
+//! Other time-stepping schemes over the rover's mechanical systems, with the cost and accuracy of
+//! each.
 //!
-//! Every scheme implements [`rover_core::integrator::Integrator`] over [`rover_core::integrator::MechanicalSystem`], as the rover's own do, with the same
-//! contacts, laws and solver, so that what differs between two curves is the scheme alone. They are written to be read and
-//! compared, and allocate in a step.
+//! Every scheme implements [`rover_core::integrator::Integrator`] over
+//! [`rover_core::integrator::MechanicalSystem`], as the rover's own do, with the same contacts,
+//! laws and solver, so that two curves differ by the scheme alone. They are written for reading and
+//! comparison, and allocate in a step.
 //!
-//! - [`generalised_alpha`], [`schatzman_paoli`], [`event_driven`], [`penalty`]: one scheme each; [`scheme`]: the list;
-//! - [`scenes`]: motions with closed forms or a converged reference; [`measure`]: orders, drift, energy, cost.
-//! - [`free_spheres`] in space with a block-sparse W, found by the core's grid of cells, and a [`slab`] among them; [`sphere_simulation`];
-//!   [`sphere_scenes`]: heaps, bounces and rolling; [`projected_to_convergence`]: no penetration at the end of any step.
+//! - [`generalised_alpha`], [`schatzman_paoli`], [`event_driven`],
+//!   [`penalty`]: one scheme each; [`scheme`]: the list;
+//! - [`scenes`]: motions with closed forms or a converged reference;
+//!   [`measure`]: orders, drift, energy, cost.
+//! - [`free_spheres`] in space with a block-sparse W, found by the core's grid of cells, and a
+//!   [`slab`] among them; [`sphere_simulation`]; [`sphere_scenes`]: heaps, bounces and rolling;
+//!   [`projected_to_convergence`]: no penetration at the end of any step.
 //!
 //! `make orders` writes the figures of `docs/integrators.md`.
 #![forbid(unsafe_code)]

@@ -48,7 +48,8 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// Slope of the straight line through log error against log h; none with fewer than three errors.
+    /// Slope of the straight line through log error against log h; none
+    /// with fewer than three errors.
     #[must_use]
     pub fn order(&self) -> Option<f64> {
         let points: Vec<(f64, f64)> = self
@@ -244,7 +245,8 @@ pub fn elastic_change(scheme: &Scheme, duration: f64) -> Result<f64, MeasureErro
     Ok((simulation.energy().total() - before) / (MASS * G))
 }
 
-/// Largest relative growth of the energy in a step of a ball that drops from 1 m with e = 0, and its speed after 5 s, m/s.
+/// Largest relative growth of the energy in a step of a ball that drops
+/// from 1 m with e = 0, and its speed after 5 s, m/s.
 ///
 /// # Errors
 /// A step that cannot be taken.
@@ -262,7 +264,8 @@ pub fn drop_and_rest(scheme: &Scheme) -> Result<(f64, f64), MeasureError> {
     Ok((growth / (MASS * G), v.norm()))
 }
 
-/// Change of the energy of a ball that rolls to and fro in a valley, relative to that of a descent by 0.2 m.
+/// Change of the energy of a ball that rolls to and fro in a valley,
+/// relative to that of a descent by 0.2 m.
 ///
 /// # Errors
 /// A step that cannot be taken.
@@ -292,7 +295,8 @@ pub fn energy(scheme: &Scheme) -> EnergyBehaviour {
     }
 }
 
-/// Time of a step of the drive over the sine at 2.5 ms, µs, the least of several runs; outer iterations in a step; whether all converged.
+/// Time of a step of the drive over the sine at 2.5 ms, µs, the least of several runs; outer
+/// iterations in a step; whether all converged.
 ///
 /// # Errors
 /// A step that cannot be taken.
@@ -312,7 +316,8 @@ pub fn cost(scheme: &Scheme) -> Result<(f64, f64, bool), MeasureError> {
     Ok(answer)
 }
 
-/// A ball at rest on a slope below the friction angle: speed downhill (m/s) after 2 s, where 0 is expected.
+/// A ball at rest on a slope below the friction angle: speed downhill (m/s)
+/// after 2 s, where 0 is expected.
 ///
 /// # Errors
 /// A step that cannot be taken.
@@ -329,7 +334,8 @@ pub fn creep(scheme: &Scheme) -> Result<f64, MeasureError> {
     Ok(simulation.v()[0].hypot(simulation.v()[1]))
 }
 
-/// Time at which the event-driven scheme refuses to go on with a ball dropped from 1 m with e, s; none where it does not.
+/// Time at which the event-driven scheme stops for a ball dropped from 1 m with restitution e, s;
+/// none if it does not stop.
 ///
 /// # Errors
 /// A step that cannot be taken for another reason.

@@ -1,12 +1,14 @@
-//! Penalty: contact as a spring and damper, friction regularised, semi-implicit Euler. What most simulators of today do.
+//! Penalty: contact as a spring and damper, regularised friction, semi-implicit Euler, as in most
+//! current simulators.
 //!
 //! ```text
 //! λ_N = max(0, −k g_N − c u_N) where g_N < 0,        λ_T = −μ λ_N u_T/√(|u_T|² + v_s²)
 //! M(q) (v⁺ − v) = h (F(q, v) + H(q) λ),              q⁺ = q ⊕ h v⁺
 //! ```
 //!
-//! It solves another problem: a body sinks in by its weight over k, creeps down any slope at `v_s tan α/√(μ² − tan² α)`, and its step is
-//! bounded by 2/√(k/m) whatever happens in the scene. As h tends to 0 the error against rigid Coulomb contact does not.
+//! It solves a different problem: a body sinks in by its weight over k and creeps down any slope at
+//! `v_s tan α/√(μ² − tan² α)`, and the step is bounded by 2/√(k/m) whatever happens in the scene.
+//! As h tends to 0 the error against rigid Coulomb contact does not.
 
 use rover_core::integrator::{
     Integrator, KeyOf, MechanicalSystem, Probe, ScratchOf, StateMut, StepError, StepOptions,
@@ -27,8 +29,8 @@ pub struct Penalty {
 }
 
 impl Penalty {
-    /// The damping that lets a mass (kg) rebound with e, in (0, 1], from a spring that may pull at the end: `e = exp(−π ζ/√(1 − ζ²))`;
-    /// e = 0 is critical damping.
+    /// The damping that lets a mass (kg) rebound with e, in (0, 1], from a spring that may pull at
+    /// the end: `e = exp(−π ζ/√(1 − ζ²))`; e = 0 is critical damping.
     #[must_use]
     pub fn with_restitution(stiffness: f64, mass: f64, e: f64, slip_speed: f64) -> Self {
         let ratio = if e > 0.0 {

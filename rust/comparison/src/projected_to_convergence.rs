@@ -1,15 +1,18 @@
 //! Moreau–Jean with positions projected until nothing penetrates, at the end of every step.
 //!
-//! The rover's own projection ([`rover_core::integrator::position_projection`]) looks at the contacts of the step, which the forecast chose at
-//! its start. A body that the step's impulses turned aside can end in one that was no contact. Here, after that step, all contacts are found
-//! anew where it ended, and
+//! The rover's own projection ([`rover_core::integrator::position_projection`]) treats the contacts
+//! of the step, which the forecast chose at its start. A body that the impulses deflected may end
+//! inside another one that was not a contact. Here all contacts are detected again at the end of
+//! the step, and
 //!
 //! ```text
 //! d = W λ + g_N,    0 ≤ d ⊥ λ ≥ 0,    q ← q ⊕ M⁻¹ H λ
 //! ```
 //!
-//! is solved again and again, without friction, until no gap is below −[`DEPTH`]. Spheres settle at once where the set is complete: their distance is a convex
-//! function of their displacement, so the true gap is never below the linear one. The velocity is left to the next step, whose contacts these are.
+//! is solved repeatedly, without friction, until no gap is below −[`DEPTH`]. For spheres one solve
+//! suffices once the set is complete: their distance is a convex function of their displacement, so
+//! the true gap is never below the linearised one. The next step, which has these contacts,
+//! corrects the velocity.
 //!
 //! Source: Acary 2013, CMAME 256, 224–250.
 

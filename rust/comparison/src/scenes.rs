@@ -1,4 +1,4 @@
-//! Motions by which schemes are judged: flight, persistent contact on a sine, bounces.
+//! Test motions of the schemes: flight, persistent contact on a sine, bounces.
 
 use std::sync::Arc;
 
@@ -178,9 +178,11 @@ pub fn flight(scheme: &Scheme, h: f64) -> Result<TwoWheelRoverSimulation, Measur
     Ok(simulation)
 }
 
-/// Where the flight is after t: the mass centre on its parabola, the body turning evenly faster about it.
+/// Coordinates of the flight after t: the mass centre on its parabola, the body with constant
+/// angular acceleration about it.
 ///
-/// `J_c θ̈ = τ_A + τ_B` with the inertia about the mass centre of all, wheels counted as points at their axles; `J_i θ̈_i = −τ_i`.
+/// `J_c θ̈ = τ_A + τ_B` with the inertia about the mass centre of all,
+/// wheels counted as points at their axles; `J_i θ̈_i = −τ_i`.
 ///
 /// # Errors
 /// None in fact.
@@ -214,7 +216,8 @@ pub fn flight_at(t: f64) -> Result<SVector<f64, 5>, MeasureError> {
     ]))
 }
 
-/// Height over the ground (m) and velocity (m/s) at t of a ball dropped from `gap`, before its Zeno time.
+/// Height over the ground (m) and velocity (m/s) at t of a ball dropped
+/// from `gap`, before its Zeno time.
 #[must_use]
 pub fn bouncing_at(gap: f64, e: f64, t: f64) -> (f64, f64) {
     let first = (2.0 * gap / G).sqrt();

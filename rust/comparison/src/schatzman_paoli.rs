@@ -1,16 +1,22 @@
-//! Schatzman–Paoli: central differences in the position, with the contact law on a mean of positions.
+//! Schatzman–Paoli: central differences in the position, with the contact
+//! law on a mean of positions.
 //!
 //! ```text
-//! M(q_k) (v_{k+½} − v_{k−½}) = h F(q_k, ½ (v_{k−½} + v_{k+½})) + H p,        q_{k+1} = q_k ⊕ h v_{k+½}
-//! 0 ≤ g_N(q*) ⊥ p_N ≥ 0,    q* = (q_{k+1} + e q_{k−1})/(1 + e) = q_k ⊕ h (v_{k+½} − e v_{k−½})/(1 + e)
+//! M(q_k) (v_{k+½} − v_{k−½}) = h F(q_k, ½ (v_{k−½} + v_{k+½})) + H p
+//! q_{k+1} = q_k ⊕ h v_{k+½}
+//! 0 ≤ g_N(q*) ⊥ p_N ≥ 0
+//! q* = (q_{k+1} + e q_{k−1})/(1 + e) = q_k ⊕ h (v_{k+½} − e v_{k−½})/(1 + e)
 //! ```
 //!
-//! with Coulomb's law on `H_Tᵀ v_{k+½}`. Nothing is said of velocities along the normal: with e = 0 no position penetrates, with e > 0 one
-//! step does, and the rebound is a step late. The equations are solved by linearising the gap at q* anew.
+//! with Coulomb's law on `H_Tᵀ v_{k+½}`. Normal velocities are not constrained: with e = 0 no
+//! position penetrates; with e > 0 one does for a step, and the rebound is one step late. The
+//! equations are solved by repeated linearisation of the gap at q*.
 //!
-//! The state's v is v_{k+½} where a contact acts, and otherwise moved on by half a step to the time of q.
+//! The state's v is v_{k+½} where a contact acts, and otherwise moved on by
+//! half a step to the time of q.
 //!
-//! Source: Paoli and Schatzman 2002, SIAM J. Numer. Anal. 40, 702–733; friction as in Acary and Brogliato 2008, ch. 10.
+//! Source: Paoli and Schatzman 2002, SIAM J. Numer. Anal. 40, 702–733;
+//! friction as in Acary and Brogliato 2008, ch. 10.
 
 use std::cell::RefCell;
 
@@ -22,7 +28,8 @@ use rover_core::solver::SolverWorkspace;
 
 use crate::acceleration::{find, free_acceleration, response, smooth_acceleration, solve_law};
 
-/// Change of the velocity, relative to 1 m/s and to the largest, below which the iteration has settled.
+/// Change of the velocity, relative to 1 m/s and to the largest, below
+/// which the iteration has settled.
 const SETTLED: f64 = 1e-13;
 
 /// Most iterations.

@@ -100,7 +100,8 @@ impl Scheme {
         options
     }
 
-    /// A fresh stepper for one run. `mass`: what a contact carries, kg, by which the penalty scheme chooses its damping.
+    /// A fresh stepper for one run. `mass`: what a contact carries, kg, by
+    /// which the penalty scheme chooses its damping.
     #[must_use]
     pub fn stepper(&self, mass: f64, restitution: f64) -> Stepper {
         match self.kind {

@@ -1,4 +1,5 @@
-//! A box among free spheres: a body of its own, which may lie on the plane by its corners and carry spheres on its faces.
+//! A box among free spheres: a body of its own, which may lie on the plane
+//! by its corners and carry spheres on its faces.
 
 use rover_core::nalgebra::Vector3;
 
@@ -34,7 +35,8 @@ impl Slab {
             .component_mul(&Vector3::new(sign(1), sign(2), sign(4)))
     }
 
-    /// Of a point x, in own axes: the nearest point of the surface (m), the distance (m, negative inside) and the outward normal there.
+    /// Of a point x, in own axes: the nearest point of the surface (m), the distance (m, negative
+    /// inside) and the outward normal there.
     #[must_use]
     pub fn nearest(&self, x: &Vector3<f64>) -> (Vector3<f64>, f64, Vector3<f64>) {
         let clamped = Vector3::from_fn(|k, _| x[k].clamp(-self.half[k], self.half[k]));

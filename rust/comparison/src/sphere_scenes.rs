@@ -1,7 +1,8 @@
-//! Scenes of free spheres after SimBenchmark: a block that falls in a heap, the same with elastic impacts, balls that bounce, balls that
-//! roll on a box that is pushed.
+//! Scenes of free spheres after SimBenchmark: a block that falls in a heap, the same with elastic
+//! impacts, balls that bounce, balls that roll on a box that is pushed.
 //!
-//! The first three: spheres of 10 kg and radius 0.1 m without friction. SimBenchmark's y and z are exchanged: y is up here.
+//! The first three: spheres of 10 kg and radius 0.1 m without friction.
+//! SimBenchmark's y and z are exchanged: y is up here.
 
 use rover_core::integrator::{OptionsError, Stabilisation, StepError, StepOptions};
 use rover_core::nalgebra::Vector3;
@@ -102,7 +103,8 @@ pub enum Scene {
     ElasticBlock,
     /// 7 x 7 balls 0.4 m apart, centres at 5 m, e = 1.
     Bouncing,
-    /// A box of 10 kg is pushed over the plane with 150 N, 5 x 5 balls of 1 kg and 2 m apart roll on it.
+    /// A box of 10 kg is pushed over the plane with 150 N, 5 x 5 balls of 1
+    /// kg and 2 m apart roll on it.
     Rolling(Push),
 }
 
@@ -191,7 +193,8 @@ impl Scene {
         Some((Slab { push, ..BOX }, Vector3::new(0.0, BOX.half.y, 0.0)))
     }
 
-    /// What is done about penetration in it: an elastic scene is never projected, for a projection lifts spheres, which is energy.
+    /// What is done about penetration in it: an elastic scene is never
+    /// projected, for a projection lifts spheres, which is energy.
     #[must_use]
     pub fn treatments(self) -> &'static [Treatment] {
         match self {
@@ -207,7 +210,8 @@ impl Scene {
 
     /// Exact accelerations of the box and of its balls, m/s², where there are any.
     ///
-    /// A ball that rolls on a plate takes 2/7 of its acceleration: `F = m a + 25 · 2/7 m_b a + μ g (m + 25 m_b)`.
+    /// A ball that rolls on a plate takes 2/7 of its acceleration:
+    /// `F = m a + 25 · 2/7 m_b a + μ g (m + 25 m_b)`.
     #[must_use]
     pub fn accelerations(self) -> Option<[Vector3<f64>; 2]> {
         let (slab, _) = self.slab()?;
@@ -262,7 +266,8 @@ impl Scene {
                 Treatment::VelocityLevel => Stabilisation::None,
                 Treatment::Projection | Treatment::Convergence => Stabilisation::Projection,
             },
-            // A plastic impact is taken where it would come within the step, so that nothing is first let in.
+            // A plastic impact is taken where it would come within the
+            // step, so that nothing is first let in.
             forecast: if self == Self::Block { 1.0 } else { 0.5 },
             ..options(self.friction(), self.restitution(), time_step)
         };
@@ -297,7 +302,8 @@ pub struct SphereRun {
     pub energy_change: f64,
     /// Energy at the start, J.
     pub energy: f64,
-    /// Mean over the samples of the box's squared velocity error and the balls' mean of theirs, m²/s²; rolling only.
+    /// Mean over the samples of the box's squared velocity error and the
+    /// balls' mean of theirs, m²/s²; rolling only.
     pub velocity_error: Option<f64>,
     /// CPU time in steps per simulated second, ms.
     pub cpu_ms_per_s: f64,

@@ -1,4 +1,4 @@
-//! Free spheres, and perhaps a box among them, stepped through time.
+//! Simulation of free spheres, optionally with a box.
 
 use std::hash::{DefaultHasher, Hasher};
 

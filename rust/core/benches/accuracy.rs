@@ -1,10 +1,12 @@
-//! The figures of `docs/accuracy.md`: drive, section 6.1, parking, sliding, energy in flight and in elastic tumbling.
+//! The figures of `docs/accuracy.md`: drive, section 6.1, parking, sliding,
+//! energy in flight and in elastic tumbling.
 //!
-//! Run: `cargo bench -p rover-core --bench accuracy` (a minute). It informs and does not gate; `tests/physics/rover/` holds the bounds.
-//! The drive is the one on which three other engines agree at a fine step: 12.585 m along and 18.770 m across the start heading after
-//! 10 s. Cost is the time of one thread per simulated second.
+//! Run: `cargo bench -p rover-core --bench accuracy` (a minute). It only reports;
+//! `tests/physics/rover/` holds the bounds. The drive is the one on which three other engines agree
+//! at a fine step: 12.585 m along and 18.770 m across the start heading after 10 s. Cost is the
+//! time of one thread per simulated second.
 
-#![allow(clippy::print_stdout, clippy::unwrap_used)] // a bench prints, and stops where a scene is impossible
+#![allow(clippy::print_stdout, clippy::unwrap_used)] // prints; stops at an impossible scene
 
 #[allow(dead_code)] // what the tests share beyond this
 #[path = "../../../tests/physics/rover/scenes.rs"]

@@ -1,7 +1,9 @@
-//! Disk-steps per second of one core, for more and more disks and several tolerances: `cargo bench --bench soil`, or `-- 2000` for that number.
+//! Disk-steps per second of one core, for growing numbers of disks and several tolerances:
+//! `cargo bench --bench soil`, or `-- 2000` for that number of disks.
 //!
-//! A bed of ten layers in a box, poured and at rest ("rest"), and the same bed with gravity tilted by 30 degrees, which flows ("flow"). Nothing
-//! sleeps. Times are the thread's CPU time where the system tells it.
+//! A bed of ten layers in a box, poured and at rest ("rest"), and the same bed with gravity tilted
+//! by 30 degrees, which flows ("flow"). Nothing sleeps. Times are the thread's CPU time if the
+//! system provides it.
 #![allow(clippy::print_stdout)] // a bench reports
 
 use std::sync::Arc;
@@ -12,7 +14,7 @@ use rover_core::nalgebra::Vector3;
 use rover_core::simulation::{SoilSimulation, soil_options};
 use rover_core::system::soil::{Packing, SoilFriction, SoilScene, Wall};
 
-/// CPU seconds of this thread, wall seconds where /proc does not tell.
+/// CPU seconds of this thread, or wall seconds without /proc.
 fn cpu_seconds(start: Instant) -> f64 {
     std::fs::read_to_string("/proc/thread-self/schedstat")
         .ok()

@@ -1,7 +1,8 @@
-//! Residual against iterations and time, for 1, 10 and 100 contacts and every method: `cargo bench -p rover-core --bench solver`.
+//! Residual against iterations and time, for 1, 10 and 100 contacts and every method:
+//! `cargo bench -p rover-core --bench solver`.
 //!
-//! Informs and does not gate. Name the machine when quoting. The hot path of a rover step is `examples/solver_hot.rs`, the recorded
-//! problems are `examples/solver_table.rs`.
+//! It only reports. Name the machine when quoting. The hot path of a rover step is
+//! `examples/solver_hot.rs`, the recorded problems are `examples/solver_table.rs`.
 #![allow(clippy::print_stdout)] // its purpose
 
 #[path = "../../../tests/physics/solver_scenes.rs"]

@@ -1,8 +1,10 @@
-//! Microseconds a step of the rover on fields of spheres, one thread, at equal numbers of contacts.
+//! Microseconds per step of the rover on fields of spheres, on one thread, at equal numbers of
+//! contacts.
 //!
-//! Run: `cargo bench -p rover-core --bench spheres`. It informs and does not gate. The drive is the one of the bench `step`: six wheels on the
-//! plane, while the spheres lie about the field clear of the wheels' tracks, so that search and distances are all that differs. The figures are
-//! medians of 21 batches, taken in turns. Then the rug of the report's Fig. 6.6, and driving over rocks.
+//! Run: `cargo bench -p rover-core --bench spheres`. It only reports. The drive is that of the
+//! bench `step`: six wheels on the plane. The spheres lie clear of the wheels' tracks, so only
+//! search and distance computations differ. The figures are medians of 21 batches, taken in turns.
+//! Then the rug of the report's Fig. 6.6, and driving over rocks.
 
 #![allow(clippy::print_stdout)] // a bench prints
 #![allow(clippy::unwrap_used)] // and stops where its own scenes are wrong
@@ -33,7 +35,8 @@ fn simulation(
     simulation
 }
 
-/// `n` spheres on a square of one per 0.25 m², none within 5 cm of the two strips that the wheels of a straight drive roll on.
+/// `n` spheres on a square of one per 0.25 m², none within 5 cm of the two
+/// strips that the wheels of a straight drive roll on.
 fn beside_the_tracks(n: u32) -> SphereField {
     let side = (f64::from(n) * 0.25).sqrt();
     let mut state = 1_u64;
@@ -123,7 +126,7 @@ fn report_machine() -> Model {
     Model::from_description(description).unwrap()
 }
 
-/// Prints mean, median of batches and what the solver said of a run in batches.
+/// Prints the mean, the median of the batches and the solver's report of a run.
 fn run(
     name: &str,
     mut simulation: RoverSimulation,

@@ -1,7 +1,8 @@
-//! Microseconds a step of the rover on a plane, one thread, and where they go.
+//! Microseconds per step of the rover on a plane, on one thread, and their breakdown.
 //!
-//! Run: `cargo bench -p rover-core --bench step`. It informs and does not gate. Each figure is the median of 21 batches of 1000 steps of
-//! 5 ms; the breakdown is one run with a clock read after every phase (about 0.03 µs each, included).
+//! Run: `cargo bench -p rover-core --bench step`. It only reports. Each figure is the median of 21
+//! batches of 1000 steps of 5 ms; the breakdown is one run with a clock read after every phase
+//! (about 0.03 µs each, included).
 
 #![allow(clippy::print_stdout)] // a bench prints
 

@@ -1,7 +1,8 @@
-//! A drive in a curve, for counting instructions: `valgrind --tool=callgrind drive_steps 1000 [linearised|newton] [spheres]`.
+//! A drive in a curve, for counting instructions:
+//! `valgrind --tool=callgrind drive_steps 1000 [linearised|newton] [spheres]`.
 //!
-//! Arguments: number of 5 ms steps (after 400 of run-in), the variant, and how many spheres lie about just under the ground, so that they are looked
-//! at and never touched.
+//! Arguments: number of 5 ms steps (after 400 of run-in), the variant, and the number of spheres
+//! just below the ground, which the search visits and the wheels never touch.
 
 use std::sync::Arc;
 

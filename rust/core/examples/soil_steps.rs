@@ -1,7 +1,8 @@
 //! A bed of soil, for counting instructions: `valgrind --tool=callgrind soil_steps 200 [rover]`.
 //!
-//! Arguments: number of 1 ms steps (after 100 of run-in), and whether a two-wheel rover drives over the bed, which else flows under tilted gravity.
-//! It prints a digest of all bits of the state, so that two builds can be compared.
+//! Arguments: number of 1 ms steps (after 100 of run-in), and `rover` for a two-wheel rover that
+//! drives over the bed; without it the bed flows under tilted gravity. Prints a digest of all bits
+//! of the state, to compare two builds.
 
 #![allow(clippy::print_stdout)] // it prints its result
 

@@ -1,7 +1,12 @@
-//! The impacts of a rover from rest, as recorded: `cargo run --release --example solver_cold -- [name filter] [runs]`.
+//! Recorded impacts of a rover, solved from zero:
+//! `cargo run --release --example solver_cold -- [name filter] [runs]`.
 //!
 //! Prints the time of the median and of the fastest run. For instruction counts:
-//! `valgrind --tool=callgrind --toggle-collect='*solver_cold*counted*' target/release/examples/solver_cold Rover1040 1000`.
+//!
+//! ```sh
+//! valgrind --tool=callgrind --toggle-collect='*solver_cold*counted*' \
+//!     target/release/examples/solver_cold Rover1040 1000
+//! ```
 #![allow(clippy::print_stdout)] // its purpose
 
 #[path = "../../../tests/physics/solver_npz.rs"]

@@ -1,7 +1,13 @@
 //! The time stepper's hot path: six contacts, warm-started step after step.
 //!
-//! `cargo run --release --example solver_hot -- [parked|driving|turning|bumping|frictionless] [steps]`. For instruction counts:
-//! `valgrind --tool=callgrind --toggle-collect='*solver_hot*counted*' target/release/examples/solver_hot turning 1000`.
+//! `cargo run --release --example solver_hot -- [scene] [steps]`, where the scene is `parked`,
+//! `driving`, `turning`, `bumping` or `frictionless`.
+//! For instruction counts:
+//!
+//! ```sh
+//! valgrind --tool=callgrind --toggle-collect='*solver_hot*counted*' \
+//!     target/release/examples/solver_hot turning 1000
+//! ```
 #![allow(clippy::print_stdout)] // its purpose
 
 #[path = "../../../tests/physics/solver_scenes.rs"]

@@ -1,6 +1,8 @@
-//! Prints one row per friction-contact problem, of the shelf and recorded ones, and method: iterations, residual, velocity error, time (best of many).
+//! Prints one row per friction-contact problem, of the shelf and recorded ones, and method:
+//! iterations, residual, velocity error, time (best of many).
 //!
-//! `cargo run --release --example solver_table -- [name filter] [auto|nsgs|newton|proximal|admm|relaxed|all] [tolerance]`
+//! `cargo run --release --example solver_table -- [name filter] [method] [tolerance]`,
+//! where the method is `auto`, `nsgs`, `newton`, `proximal`, `admm`, `relaxed` or `all`.
 #![allow(clippy::print_stdout)] // its purpose
 
 #[path = "../../../tests/physics/solver_npz.rs"]

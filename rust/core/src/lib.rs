@@ -1,7 +1,8 @@
 //! Nonsmooth multibody mechanics of a wheeled rover.
 //!
-//! The machine is a tree of solids under a free base; its wheels are unilateral contacts with Coulomb friction and Newton
-//! impact. A step of length h solves, for the velocity v⁺ and the contact impulses p,
+//! The machine is a tree of rigid bodies on a free base. Its wheels touch the ground through
+//! unilateral contacts with Coulomb friction and Newton impact. A step of length h solves, for the
+//! velocity v⁺ and the contact impulses p,
 //!
 //! ```text
 //! M(q) (v⁺ − v) = h (T u − N(q, v) v − G(q)) + H(q) p
@@ -10,12 +11,15 @@
 //!
 //! Chapters, each using only those above it:
 //!
-//! - [`quantity`]: which numbers a description may have; [`spatial`]: rotations and inertias;
+//! - [`quantity`]: admissible numbers of a description; [`spatial`]: rotations and inertias;
 //! - [`multibody`]: model, state, kinematics, mass matrix, bias, energy, momentum;
-//! - [`geometry`]: shapes, the ground, the distances between them; [`contact`]: points, frames, gaps, Delassus operator;
-//! - [`cone`], [`law`], [`problem`], [`solver`]: the friction-contact problem, which sees only (W, q, μ);
+//! - [`geometry`]: shapes, the ground, distances between them; [`contact`]: points, frames, gaps,
+//!   the Delassus operator;
+//! - [`cone`], [`law`], [`problem`], [`solver`]: the friction-contact
+//!   problem, which sees only (W, q, μ);
 //! - [`integrator`]: one step of any mechanical system;
-//! - [`planar`]: grounds and machines of the plane; [`system`]: what the steps move, such as the tree of solids;
+//! - [`planar`]: grounds and machines in the plane; [`system`]: the mechanical systems that a step
+//!   moves, such as the multibody tree;
 //! - [`simulation`]: many steps of any scene.
 #![forbid(unsafe_code)]
 

@@ -1,8 +1,9 @@
-//! Numbers that a description may have: finite, of the right sign, within what the mechanics can bear.
+//! Checks of the numbers of a description: finite, of the right sign, within a range in which the
+//! mechanics neither overflows nor underflows.
 
 use thiserror::Error;
 
-/// A number that an argument must not have.
+/// An inadmissible number.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum QuantityError {
@@ -30,7 +31,7 @@ pub enum QuantityError {
         /// What was given.
         value: f64,
     },
-    /// So large or so small that the mechanics would overflow or vanish.
+    /// So large or so small that the mechanics would overflow or underflow.
     #[error("{field}: must be {range}, is {value}")]
     OutOfRange {
         /// Name of the argument.
@@ -96,7 +97,7 @@ pub fn positive(field: &str, value: f64) -> Result<f64, QuantityError> {
     }
 }
 
-/// Numbers that an argument may have, with words for them.
+/// Admissible numbers of an argument, with their description in words.
 #[derive(Clone, Copy, Debug)]
 pub struct Range {
     /// Smallest and largest size; either sign where the smallest is negative.

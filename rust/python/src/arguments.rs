@@ -1,7 +1,8 @@
-//! Arguments as they were given, read strictly: what is no number, no count or no flag is refused under its name.
+//! Arguments as they were given, read strictly: what is no number, no count
+//! or no flag is refused under its name.
 //!
-//! A number is a float, an integer, or what numpy or Python hold to be real; a truth value, a complex number, a time and a text are none,
-//! though `float()` or numpy would take some of them.
+//! A number is a float, an integer, or what numpy or Python hold to be real; a truth value, a
+//! complex number, a time and a text are none, though `float()` or numpy would take some of them.
 
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyFloat, PyInt, PyString};

@@ -25,8 +25,8 @@ pub fn array<'py>(
     let found = numpy
         .call_method1("asarray", (value,))
         .map_err(|e| refuse(&e))?;
-    // numpy would also take truth values, texts, times, and the real part of a complex number. Python objects, such as
-    // fractions, are converted one by one.
+    // numpy would also take truth values, texts, times, and the real part of a complex number.
+    // Python objects, such as fractions, are converted one by one.
     let letter: char = found.getattr("dtype")?.getattr("kind")?.extract()?;
     let is_empty = found.len().unwrap_or(1) == 0;
     let converted = if "fiu".contains(letter) || is_empty {

@@ -1,4 +1,5 @@
-//! The exception tree: one root, shape and value mistakes also `ValueError`, fields kept as attributes.
+//! The exception tree: one root, shape and value mistakes also
+//! `ValueError`, fields kept as attributes.
 
 use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -45,7 +46,8 @@ pub enum Value {
     Object(Py<PyAny>),
 }
 
-/// An error on its way to Python. A newtype, since neither crate owns both `ModelError` and `PyErr`.
+/// An error on its way to Python. A newtype, since neither crate owns both
+/// `ModelError` and `PyErr`.
 #[derive(Debug)]
 pub struct BorderError {
     pub kind: Kind,

@@ -16,7 +16,8 @@ pub fn path(value: &Bound<'_, PyAny>, kind: Kind) -> PyResult<PathBuf> {
     found.map_err(|_| refused(value, kind, "path", "a path").into())
 }
 
-/// An `OSError` with number, message and path, as Python's own: the subclass follows from the number.
+/// An `OSError` with number, message and path, as Python's own: the
+/// subclass follows from the number.
 fn os_error(py: Python<'_>, e: &io::Error, path: &Path) -> PyErr {
     match e.raw_os_error() {
         Some(code) => {

@@ -1,4 +1,5 @@
-//! Options of a simulation: read from the arguments of every class in one way, and told again in one way.
+//! Options of a simulation: read from the arguments of every class in one
+//! way, and told again in one way.
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -43,7 +44,8 @@ pub fn name_of<T: PartialEq + Copy>(value: T, choices: &[(&'static str, T)]) -> 
         .map_or("", |(name, _)| name)
 }
 
-/// What was asked of the solver, in the words and numbers of the arguments: the core translates them.
+/// What was asked of the solver, in the words and numbers of the arguments:
+/// the core translates them.
 #[derive(Clone)]
 pub struct SolverWords {
     pub solver: String,
@@ -70,7 +72,8 @@ impl Options {
         }
     }
 
-    /// Takes an option by its name; false where no simulation has one of this name. Gravity is each class's own.
+    /// Takes an option by its name; false where no simulation has one of
+    /// this name. Gravity is each class's own.
     pub fn take(&mut self, field: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
         let number = || number(value, Kind::Option, field);
         let text = || text(value, Kind::Option, field);

@@ -177,7 +177,8 @@ fn usual_stabilisation(restitution: f64) -> &'static str {
     }
 }
 
-/// Speeds go with the root of gravity, so the same soil under another gravity is solved alike; 1 without gravity.
+/// Speeds go with the root of gravity, so the same soil under another
+/// gravity is solved alike; 1 without gravity.
 fn speed_scale(gravity: f64, usual: f64) -> f64 {
     if gravity > 0.0 {
         (gravity / usual).sqrt()
@@ -189,7 +190,7 @@ fn speed_scale(gravity: f64, usual: f64) -> f64 {
 #[pymethods]
 impl SoilSimulation {
     #[new]
-    #[allow(clippy::too_many_arguments, clippy::too_many_lines)] // keyword arguments of a Python class
+    #[allow(clippy::too_many_arguments, clippy::too_many_lines)] // keyword arguments
     #[pyo3(signature = (radius, mass, position, *, kinematic = Given::MISSING, walls = None, ground = None, rover = Given::MISSING, rig = None, machine = None,
         friction = Given::MISSING, wall_friction = Given::MISSING, wheel_friction = Given::MISSING, restitution = Given::MISSING,
         gravity = None, time_step = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING,

@@ -1,4 +1,5 @@
-//! What several Python threads may hold, and long calls that leave the interpreter free and still hear Ctrl-C.
+//! What several Python threads may hold, and long calls that leave the
+//! interpreter free and still hear Ctrl-C.
 
 use std::sync::{Mutex, MutexGuard, TryLockError};
 use std::time::{Duration, Instant};
@@ -10,7 +11,8 @@ use crate::errors::{BorderError, Kind, Value};
 /// How often a long call looks for signals.
 const LOOKING: Duration = Duration::from_millis(20);
 
-/// One call at a time; a second one is refused, not kept waiting: it may come from a signal handler inside the first.
+/// One call at a time; a second one is refused, not kept waiting: it may
+/// come from a signal handler inside the first.
 pub struct Shared<T>(Mutex<T>);
 
 impl<T> Shared<T> {

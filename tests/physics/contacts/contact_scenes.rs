@@ -8,7 +8,8 @@ use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription};
 use rover_core::simulation::RoverSimulation;
 
-/// A chassis with an arm of two links over it: the second link, a box, a ball or a wheel, folds down onto the chassis.
+/// A chassis with an arm of two links over it: the second link, a box, a
+/// ball or a wheel, folds down onto the chassis.
 pub fn folding(last: &str) -> Model {
     let text = format!(
         r#"

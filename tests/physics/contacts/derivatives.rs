@@ -1,4 +1,5 @@
-//! The Jacobian of a contact of two bodies is the gap's derivative, and its impulse is nobody's from outside.
+//! The Jacobian of a contact of two bodies is the gap's derivative, and its
+//! impulse is nobody's from outside.
 
 use proptest::prelude::*;
 use rover_core::contact::{Contact, generalized_impulse, relocate};
@@ -28,8 +29,9 @@ proptest! {
     ) {
         let model = folding(tips()[tip]);
         let (q, found) = contacts(&model, [yaw, lift, wrist], turn);
-        // Not of a wheel's rim points beside the lowest, which fade in and carry it only where it lies flat, and not where two edges cross, where
-        // the point slides along them: their pages say how nearly.
+        // Not of a wheel's rim points beside the lowest, which fade in and carry
+        // it only where it lies flat, and not where two edges cross, where the
+        // point slides along them: their pages say how nearly.
         let is_exact = |c: &&Contact| match (tip, c.key.feature) {
             (0, feature) if feature & (1 << 13) != 0 => feature & 31 < 8,
             (2, feature) if feature & (1 << 13) != 0 => feature % 4 == 0,

@@ -1,4 +1,5 @@
-//! Loose bodies: balls that collide, stones that lie on each other and are pushed, machines that meet.
+//! Loose bodies: balls that collide, stones that lie on each other and are
+//! pushed, machines that meet.
 
 use std::sync::Arc;
 
@@ -145,7 +146,8 @@ fn a_collision_keeps_the_momentum_and_takes_energy() {
                 let linear = (after.linear - before.linear).norm();
                 assert!(linear < 1e-9, "{shapes:?} {linear}");
                 let angular = (after.angular - before.angular).norm();
-                // The impulse acts where the step predicts its end: half a step of the bodies' way past each other beside where it ends.
+                // The impulse acts where the step predicts its end: half a step of the bodies' way
+                // past each other beside where it ends.
                 assert!(angular < 5e-3, "{shapes:?} {variant:?}: {angular}");
                 assert!(simulation.energy().kinetic <= energy * (1.0 + 1e-8));
             }

@@ -34,7 +34,8 @@ fn a_folded_arm_rests_on_the_chassis() {
                 .filter(|a| a.contact.other.is_some())
                 .map(|a| a.impulse[0] / 0.005)
                 .sum();
-            // The tip's weight and half the arm's, but for what friction along the sloping arm carries.
+            // The tip's weight and half the arm's, but for what friction
+            // along the sloping arm carries.
             assert!((weight - 9.81 * (3.0 + 1.0)).abs() < 4.0, "{tip}: {weight}");
             let is_wheel = |part| matches!(part, Part::Wheel(_));
             let ground = simulation

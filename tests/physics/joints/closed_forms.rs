@@ -6,7 +6,8 @@ use rover_core::multibody::{Configuration, Hold, JointKind, Kinematics, Spring};
 
 use crate::machines::{energy, model, options, simulation, solid};
 
-/// Period of a pendulum of length l that swings by ±a: `4 √(l/g) K(sin(a/2))`, K by the arithmetic–geometric mean.
+/// Period of a pendulum of length l that swings by ±a:
+/// `4 √(l/g) K(sin(a/2))`, K by the arithmetic–geometric mean.
 fn period(over_g: f64, a: f64) -> f64 {
     let (mut x, mut y) = (1.0, (0.5 * a).cos());
     for _ in 0..8 {
@@ -181,7 +182,8 @@ fn a_double_pendulum_falls_as_its_lagrangian_says() {
     assert!((found[1] - expected.y).abs() < 1e-3, "{found:?} {expected}");
 }
 
-/// Held joints of a machine on a fixed base go to their set-points; the origin's rotation turns the axis.
+/// Held joints of a machine on a fixed base go to their set-points; the
+/// origin's rotation turns the axis.
 #[test]
 fn an_arm_on_a_turned_base_is_held() {
     let mut base = solid("base", None, JointKind::Fixed);

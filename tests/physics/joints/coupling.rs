@@ -23,7 +23,8 @@ fn rocker(name: &str, z: f64, bob: f64) -> SolidDescription {
     rocker
 }
 
-/// The rockers of a differential on a fixed body: one coordinate with the inertia of both, `q̈ = Σ c τ / Σ I`.
+/// The rockers of a differential on a fixed body: one coordinate with the
+/// inertia of both, `q̈ = Σ c τ / Σ I`.
 #[test]
 fn a_differential_is_one_coordinate() {
     let base = solid("body", None, JointKind::Fixed);
@@ -45,7 +46,8 @@ fn a_differential_is_one_coordinate() {
     );
 }
 
-/// On a free body the follower keeps its ratio, and the fall keeps the energy and the linear momentum that gravity leaves.
+/// On a free body the follower keeps its ratio, and the fall conserves energy and the horizontal
+/// linear momentum.
 #[test]
 fn a_follower_on_a_free_body_stays_where_the_ratio_says() {
     let body = solid("body", None, JointKind::Free);
@@ -76,7 +78,8 @@ fn a_follower_on_a_free_body_stays_where_the_ratio_says() {
     }
 }
 
-/// A telescope whose second stage slides as far again as the first: the tip moves at twice the speed.
+/// A telescope whose second stage slides as far again as the first: the tip
+/// moves at twice the speed.
 #[test]
 fn a_telescope_is_one_mass() {
     let mut first = solid("first", None, JointKind::Prismatic);

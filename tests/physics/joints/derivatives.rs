@@ -1,4 +1,5 @@
-//! Mass matrix, bias, Coriolis matrix and Jacobians of trees with every kind of joint, against differences of the poses.
+//! Mass matrix, bias, Coriolis matrix and Jacobians of trees with every
+//! kind of joint, against differences of the poses.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rover_core::multibody::bias::{BiasScratch, bias};
@@ -37,7 +38,8 @@ fn the_mass_matrix_is_that_of_the_moving_points() {
             let (q, v) = somewhere(&model, seed);
             let mut kinetic = 0.0;
             for (b, body) in model.bodies().iter().enumerate() {
-                // A rigid body is its mass at the centre and, along each principal axis, a pair of points.
+                // A rigid body is its mass at the centre and, along each
+                // principal axis, a pair of points.
                 let c = body.centre_of_mass;
                 let axes = body.principal_axes.unwrap_or_default();
                 let axes = if body.principal_axes.is_some() {

@@ -93,7 +93,8 @@ fn a_ball_rolls_down_a_line_at_the_closed_form() {
                     (speed - expected).abs() < 1e-10 * expected,
                     "{alpha} {mu}: {speed} {expected}"
                 );
-                // The position is that of constant acceleration to rounding: ½ a t² = a h Σ (k − ½) h.
+                // The position is that of constant acceleration to
+                // rounding: ½ a t² = a h Σ (k − ½) h.
                 let way = simulation.q()[0].hypot(simulation.q()[1] - 0.3 / alpha.cos());
                 assert!((way - 0.5 * acceleration * 4.0).abs() < 1e-9, "{way}");
                 assert!(simulation.gaps()[0].abs() < 1e-9);
@@ -248,12 +249,13 @@ fn a_spline_through_a_line_is_the_line() {
 
 #[test]
 fn a_ball_stays_before_a_step_or_rolls_over_it() {
-    // Over the edge of height s without loss but for the impact: the part of the speed along the new tangent stays, with e = 0 and sticking.
+    // Over the edge of height s without loss but for the impact: the part of the speed along the
+    // new tangent stays, with e = 0 and sticking.
     let step = 0.05;
     let ball = disc();
     let (r, inertia, m) = (0.3_f64, 0.09, 2.0);
-    // (With μ above about 1 the ball may jam between floor and edge as well: such an impact has two solutions.)
-    // Angular momentum about the edge is kept: J ω' + m r² ω' = J v/r + m v (r − s).
+    // (With μ above about 1 the ball may jam between floor and edge as well: such an impact has two
+    // solutions.) Angular momentum about the edge is kept: J ω' + m r² ω' = J v/r + m v (r − s).
     let over = |v: f64| {
         let omega = (inertia * v / r + m * v * (r - step)) / (inertia + m * r * r);
         0.5 * (inertia + m * r * r) * omega * omega - m * G * step

@@ -163,7 +163,8 @@ fn machines_of_two_kinds_move_as_each_alone() {
     let both = (&mut first, &mut second);
     together(both, &Apart, (&mut q, &mut v), &options, 300);
     assert!(q.0.x > 0.3, "drives: {}", q.0.x);
-    // What a step remembers of persistent impulses is one for both: where the one lands, the other is of order 1 for a step.
+    // What a step remembers of persistent impulses is one for both: where
+    // the one lands, the other is of order 1 for a step.
     assert!((q.0 - alone.0).amax() < 1e-3, "{} {}", q.0, alone.0);
     assert!((q.1 - ball.0).amax() < 1e-3, "{} {}", q.1, ball.0);
 }
@@ -301,7 +302,8 @@ fn the_operator_between_is_the_sum_of_both_mobilities() {
     let Operator::Dense(W) = problem.operator() else {
         panic!("a dense operator");
     };
-    // 1/m + 1/m, and r²/J beside it along the tangent; the ground's contact and theirs share the first ball.
+    // 1/m + 1/m, and r²/J beside it along the tangent; the ground's contact
+    // and theirs share the first ball.
     let n = Vector2::new(-0.6, -0.8);
     let spin = [0.3 * 0.3 / 0.09, 0.2 * 0.2 / 0.1];
     let expected = [

@@ -18,7 +18,8 @@ fn planar() -> MirroredRover<7> {
     MirroredRover::new(&Model::rover()).unwrap()
 }
 
-/// Without motors, whose torques do not depend on the speed, and with motors weak enough to reach their line in a second.
+/// Without motors, whose torques do not depend on the speed, and with
+/// motors weak enough to reach their line in a second.
 fn with_and_without_motors() -> [MirroredRover<7>; 3] {
     let weak = |regenerating| Motor {
         stall_torque: 120.0,
@@ -94,7 +95,8 @@ fn point_jacobians_are_the_discs_rates() {
     }
 }
 
-/// Six coordinates of the base and free pairs against the planar image: dropped from a hand's breadth, driven for ten seconds.
+/// Six coordinates of the base and free pairs against the planar image:
+/// dropped from a hand's breadth, driven for ten seconds.
 fn largest_distance(
     planar: MirroredRover<7>,
     slope: f64,
@@ -139,7 +141,8 @@ fn largest_distance(
 #[test]
 fn ten_seconds_straight_ahead_are_those_of_the_full_rover() {
     for variant in VARIANTS {
-        // The Newton variant of the tree balances momenta of solids, the planar one forces: equal to second order only.
+        // The Newton variant of the tree balances momenta of solids, the
+        // planar one forces: equal to second order only.
         let bound = match variant {
             Variant::Linearised => 1e-8,
             Variant::Newton => 5e-4,
@@ -157,7 +160,8 @@ fn ten_seconds_straight_ahead_are_those_of_the_full_rover() {
     }
 }
 
-/// The motors reach their lines, are driven beyond their no-load speed downhill, and brake; the image once ignored them and was 90 m ahead.
+/// The motors reach their lines, are driven beyond their no-load speed downhill, and brake; the
+/// image once ignored them and was 90 m ahead.
 #[test]
 fn full_throttle_is_that_of_the_full_rover_to_the_motors_line_and_beyond() {
     // Downhill in either direction, five seconds full ahead and five full astern.
@@ -192,8 +196,8 @@ fn the_torques_are_those_that_the_motors_can_give() {
     assert_eq!(*rover.command(), [150.0, -150.0, 10.0]);
 }
 
-/// Wheels in the valleys of a steep wave, held by friction, were to bounce off both slopes at once: no velocity does, and thousands of
-/// iterations looked for one.
+/// Wheels in the valleys of a steep wave, held by friction, were to bounce off both slopes at once:
+/// no velocity does, and thousands of iterations looked for one.
 #[test]
 fn where_restitution_has_no_answer_the_impact_is_inelastic() {
     for variant in VARIANTS {

@@ -1,4 +1,5 @@
-//! The report's two examples against Siconos (`tests/golden/siconos_ball_*.json`; the scenes are in their `meta`).
+//! The report's two examples against Siconos
+//! (`tests/golden/siconos_ball_*.json`; the scenes are in their `meta`).
 
 use std::sync::Arc;
 
@@ -104,7 +105,8 @@ fn impacts_on_the_incline_come_when_they_did() {
 
 #[test]
 fn the_ball_on_the_sine_is_siconos() {
-    // Impacts move with the step: the reference itself is 3.9 cm from a run at 20 µs, ours at its step 2.2 cm (linearised) and 4.5 cm.
+    // Impacts move with the step: the reference itself is 3.9 cm from a run at
+    // 20 µs, ours at its step 2.2 cm (linearised) and 4.5 cm.
     let reference = rows("siconos_ball_sine.json");
     let sine = Sine::new(1.0, std::f64::consts::TAU, 0.0, 0.0).unwrap();
     for (variant, time_step, tolerance) in [

@@ -96,13 +96,15 @@ fn collisions_in_free_space_keep_momentum_to_rounding() {
     for k in 0..2 {
         assert!((after[k] - before[k]).abs() < 1e-11, "{before:?} {after:?}");
     }
-    // The impulses act at one point of two circles that touch up to the gap that a contact may close: the moment is kept but for that.
+    // The impulses act at one point of two circles that touch up to the gap that a contact may
+    // close: the moment is kept but for that.
     assert!((after[2] - before[2]).abs() < 1e-3 * 84.0 * 0.3);
 }
 
 #[test]
 fn energy_never_grows_without_restitution() {
-    // The default options; sweeps cut short; solved well and without projection; solved coarsely, mostly by the proximal point.
+    // The default options; sweeps cut short; solved well and without
+    // projection; solved coarsely, mostly by the proximal point.
     for case in 0..4 {
         let mut soil = soil(&packing(120, 10, 2), |options, _| match case {
             0 => {}
@@ -211,7 +213,8 @@ fn a_disk_falls_and_rests_within_a_rounding_of_the_floor() {
 
 #[test]
 fn a_disk_on_a_slope_rolls_below_and_slides_above_three_times_the_friction() {
-    // Solid disk on a slope α: rolls with 2/3 g sin α iff tan α ≤ 3 μ, else slides with g (sin α − μ cos α).
+    // Solid disk on a slope α: rolls with 2/3 g sin α iff tan α ≤ 3 μ, else
+    // slides with g (sin α − μ cos α).
     for (mu, slope) in [(0.3, 0.5_f64), (0.1, 0.5)] {
         let disks = Disks::new(vec![0.02], vec![0.5]).expect("a disk");
         let options = soil_options(&disks);
@@ -318,8 +321,8 @@ fn sleep_leaves_the_motion_as_it_is_and_wakes_what_is_struck() {
         .collect();
     let worst = apart.iter().copied().fold(0.0, f64::max);
     let mean = apart.iter().sum::<f64>() / apart.len() as f64;
-    // After an impact that moves disks by several radii: a hundredth of a radius in the mean. Where a single disk falls is chaotic, it moves by
-    // 0.4 mm where the struck place is shifted by 1 nm.
+    // After an impact that moves disks by several radii: a hundredth of a radius in the mean. Where
+    // a single disk falls is chaotic, it moves by 0.4 mm where the struck place is shifted by 1 nm.
     assert!(mean < 0.00015 && worst < 0.005, "{mean} m, {worst} m");
 }
 

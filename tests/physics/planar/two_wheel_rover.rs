@@ -251,7 +251,8 @@ fn on_a_slope_torques_hold_it_and_the_loads_are_those_of_moments() {
         .iter()
         .map(|c| c.impulse[0] / 5e-3)
         .collect();
-    // Moments about the contact points: the mass centre at height z over the slope shifts m g sin α z / (2 l) to the back.
+    // Moments about the contact points: the mass centre at height z over
+    // the slope shifts m g sin α z / (2 l) to the back.
     let z = 0.2 + 130.0 * drop / 250.0;
     let (m, l) = (rover.total_mass(), 0.4);
     let shift = m * G * angle.sin() * z / (2.0 * l);
@@ -290,7 +291,8 @@ fn it_tips_over_where_the_mass_centre_passes_the_lower_contact() {
 
 #[test]
 fn the_steepest_slope_it_climbs_is_the_friction_angle() {
-    // Both wheels driven at their friction limit carry m g sin α = μ m g cos α; above, it slides back whatever the torque.
+    // Both wheels driven at their friction limit carry m g sin α = μ m g
+    // cos α; above, it slides back whatever the torque.
     let mu = 0.5;
     let rover = report_rover();
     for (share, climbs) in [(0.97, true), (1.03, false)] {
@@ -342,7 +344,8 @@ fn driving_on_the_flat_accelerates_at_the_closed_form() {
             simulation.v()[0],
             2.0 * a
         );
-        // Load transfer: the torques' reaction on the body, and the body's inertia at the height of the axles: none beyond it.
+        // Load transfer: the torques' reaction on the body, and the body's
+        // inertia at the height of the axles: none beyond it.
         let loads: Vec<f64> = simulation
             .contacts()
             .iter()

@@ -1,8 +1,9 @@
 //! The independent check: a drive on flat ground on which three other engines agree at a fine step.
 //!
-//! Wheel radius 0.20, μ 0.7, e 0, gains 15000 on all steering joints, mass centre of each steering solid 7.5 cm low; dropped from
-//! 5 cm, 2 s of rest, then 10 s with front steering set-points −0.1 rad and 20 N m a wheel: displacement 12.585 m along and 18.770 m across
-//! the start heading, heading change 1.896 rad.
+//! Wheel radius 0.20, μ 0.7, e 0, gains 15000 on all steering joints, mass centre of each
+//! steering solid 7.5 cm low; dropped from 5 cm, 2 s of rest, then 10 s with front
+//! steering set-points −0.1 rad and 20 N m a wheel: displacement 12.585 m along and
+//! 18.770 m across the start heading, heading change 1.896 rad.
 
 use rover_core::integrator::Variant;
 

@@ -82,7 +82,8 @@ fn energy_stays_or_swings_with_second_order() {
     assert!(drift[2] < 0.2, "{drift:?}");
 }
 
-/// With a spin of 5 rad/s and a step of 84 ms the explicit gyroscopic terms went to 1e82 J; with wheels at 5600 rad/s and 5 ms to 1e152 J.
+/// With a spin of 5 rad/s and a step of 84 ms the explicit gyroscopic terms went to 1e82 J; with
+/// wheels at 5600 rad/s and 5 ms to 1e152 J.
 #[test]
 fn no_spin_and_no_step_add_energy() {
     for time_step in [1e-3, 5e-3, 0.02, 0.084, 0.1] {
@@ -111,7 +112,8 @@ fn no_spin_and_no_step_add_energy() {
                     simulation.step(1).unwrap();
                     let after = simulation.energy();
                     let gained = after.total() - before.total();
-                    // Newton's swings, and does not drift, as long as frames turn by less than 0.1 rad in a step.
+                    // Newton's swings, and does not drift, as long as
+                    // frames turn by less than 0.1 rad in a step.
                     let allowed = match variant {
                         Variant::Linearised => 1e-9,
                         Variant::Newton => 1e-3,

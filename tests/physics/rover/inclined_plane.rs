@@ -1,11 +1,13 @@
-//! The report's section 6.1 against Siconos (`tests/golden/siconos_plane_*.json`; the scene is in their `meta`).
+//! The report's section 6.1 against Siconos
+//! (`tests/golden/siconos_plane_*.json`; the scene is in their `meta`).
 
 use rover_core::integrator::{Stabilisation, Variant};
 use rover_core::simulation::RoverSimulation;
 
 use crate::scenes::{VARIANTS, count, golden, numbers, report_scene};
 
-/// Distance (m) of the trunk from the reference's at the end of 10 s, and the deepest gap on the way.
+/// Distance (m) of the trunk from the reference's at the end of 10 s, and
+/// the deepest gap on the way.
 fn run(mut simulation: RoverSimulation, reference: &str) -> (f64, f64) {
     let steps = count(10.0, simulation.options().time_step);
     let mut deepest = 0.0_f64;
@@ -59,10 +61,11 @@ fn gaps_stay_above_minus_one_millimetre_at_one_millisecond() {
 
 #[test]
 fn error_falls_with_the_step_down_to_the_branching_of_the_impacts() {
-    // At 2.91 s a wheel still trembles (a Zeno sequence) or already rests when another one strikes; which of the two
-    // depends on the step, also in the reference, and moves the end by 3 mm. The limit of small steps is the resting
-    // branch: at 20 µs both variants, with projection and without, end 3.09 mm from the 0.2 ms reference and
-    // within 0.03 mm of each other. So errors against that reference fall to these 3 mm and not below.
+    // At 2.91 s a wheel still trembles (a Zeno sequence) or already rests when another one strikes;
+    // which of the two depends on the step, also in the reference, and moves the end by 3 mm. The
+    // limit of small steps is the resting branch: at 20 µs both variants, with projection and
+    // without, end 3.09 mm from the 0.2 ms reference and within 0.03 mm of each other. So errors
+    // against that reference fall to these 3 mm and not below.
     let at = |h| {
         run(
             report_scene(Variant::Linearised, h, Stabilisation::Projection),

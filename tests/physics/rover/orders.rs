@@ -6,7 +6,8 @@ use rover_core::multibody::Model;
 
 use crate::scenes::{VARIANTS, count, order, simulation};
 
-/// L1 error of the height over half a second of a drop, one to three bounces included (e = 0.5, no friction).
+/// L1 error of the height over half a second of a drop, one to three
+/// bounces included (e = 0.5, no friction).
 ///
 /// The rover falls flat, so all wheels strike together and the exact motion is a bouncing ball's.
 fn bouncing_error(variant: Variant, h: f64, clearance: f64) -> f64 {
@@ -52,7 +53,8 @@ fn bouncing_ball(clearance: f64, e: f64, t: f64) -> f64 {
 
 #[test]
 fn first_order_through_impacts() {
-    // One trajectory's error is erratic, since it depends on where in the step the impact falls: 16 heights.
+    // One trajectory's error is erratic, since it depends on where in the
+    // step the impact falls: 16 heights.
     for variant in VARIANTS {
         let steps = [0.01, 0.005, 0.0025, 0.00125];
         let errors = steps.map(|h| {
@@ -81,7 +83,8 @@ fn elastic_bounces_keep_their_energy_at_any_step() {
         let mut largest = 0.0_f64;
         for _ in 0..count(5.0, h) {
             simulation.step(1).unwrap();
-            // ½ (v_k² + …) at the nodes of a parabola is exact; only the impact's phase is of order h
+            // ½ (v_k² + …) at the nodes of a parabola is exact; only the
+            // impact's phase is of order h
             largest = largest.max((simulation.energy().total() - before).abs());
         }
         assert!(largest < 1e-9 * before, "h = {h}: {largest} J of {before}");

@@ -7,7 +7,8 @@ use rover_core::solver::{SolverOptions, SolverWorkspace, solve};
 
 use crate::scenes::{VARIANTS, at_rest, on_slope};
 
-/// Closed form, N: front (trunk 40/102 + group)/2, side (trunk 62/204 + group)/2, group = axle or bogie + 2 steering + 2 wheels.
+/// Closed form, N: front (trunk 40/102 + group)/2, side (trunk 62/204 +
+/// group)/2, group = axle or bogie + 2 steering + 2 wheels.
 const FRONT: f64 = 9.81 * (600.0 * 40.0 / 102.0 + 120.0) / 2.0;
 const SIDE: f64 = 9.81 * (600.0 * 62.0 / 204.0 + 120.0) / 2.0;
 
@@ -41,7 +42,8 @@ fn loads_on_the_flat_are_the_closed_form() {
 
 #[test]
 fn loads_do_not_depend_on_the_order_of_the_contacts() {
-    // W has rank 14 of 18 here: what pushes the wheels sideways against each other is not determined by the motion.
+    // W has rank 14 of 18 here: what pushes the wheels sideways against
+    // each other is not determined by the motion.
     let mut simulation = at_rest(StepOptions::default());
     simulation.step(1).unwrap();
     let (W, q, mu) = simulation.last_problem();

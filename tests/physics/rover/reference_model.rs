@@ -1,4 +1,5 @@
-//! Mass matrix, bias, energy, origins, gaps and Jacobians against the reference's 20 random states: 1e-10 relative.
+//! Mass matrix, bias, energy, origins, gaps and Jacobians against the
+//! reference's 20 random states: 1e-10 relative.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rover_core::contact::detection::wheel_contacts;

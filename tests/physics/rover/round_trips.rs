@@ -11,7 +11,8 @@ use rover_core::multibody::{
 use rover_core::nalgebra::{Quaternion, UnitQuaternion};
 use rover_core::simulation::{RoverSimulation, SnapshotError};
 
-/// Any double that a description may hold as a place, the shortest and the longest to write among them.
+/// Any double that a description may hold as a place, the shortest and the
+/// longest to write among them.
 fn place() -> impl Strategy<Value = f64> {
     prop_oneof![
         -1e6..1e6_f64,
@@ -61,7 +62,8 @@ fn standing(model: Model) -> RoverSimulation {
     RoverSimulation::new(Arc::new(model), ground, StepOptions::default()).unwrap()
 }
 
-/// Every number of a description tells a machine from others: a snapshot of one is none of the other.
+/// Every number of a description tells a machine from others: a snapshot of
+/// one is none of the other.
 #[test]
 fn a_snapshot_of_other_masses_is_refused() {
     type Change = fn(&mut ModelDescription);
@@ -151,7 +153,8 @@ fn a_radius_that_contradicts_the_shape_is_refused() {
     assert!(model.with_contact_radius(0.2).is_ok());
 }
 
-/// Which path entries two bodies share was found by comparing all with all: a chain of 3000 solids never came to an end.
+/// Which path entries two bodies share was found by comparing all with all:
+/// a chain of 3000 solids never came to an end.
 #[test]
 fn shared_paths_are_those_that_a_comparison_finds() {
     let rover = ModelDescription::rover();

@@ -63,7 +63,8 @@ pub fn slope(degrees: f64) -> Plane {
     Plane::new([-a.sin(), a.cos(), 0.0], 0.0).unwrap()
 }
 
-/// The machine of the report's plane run: 880 kg table, contact radius 0.30 m, gains of 1.5, torques that no speed changes.
+/// The machine of the report's plane run: 880 kg table, contact radius 0.30
+/// m, gains of 1.5, torques that no speed changes.
 pub fn report_machine() -> Model {
     let masses = numbers(&golden("rover_model.json")["meta"]["masses_880"]);
     let mut description = ModelDescription::rover();
@@ -75,8 +76,8 @@ pub fn report_machine() -> Model {
     without_motors(description)
 }
 
-/// The machine of the independent check: contact radius 0.20 m, gains of 15000, steering mass centres 7.5 cm low, torques that no speed
-/// changes.
+/// The machine of the independent check: contact radius 0.20 m, gains of 15000, steering mass
+/// centres 7.5 cm low, torques that no speed changes.
 pub fn check_machine() -> Model {
     let mut description = ModelDescription::rover();
     set_steering_gains(&mut description, 15_000.0, 15_000.0);
@@ -144,7 +145,8 @@ pub fn report_scene(
     simulation
 }
 
-/// The drive of the independent check: displacement (m) and heading (rad) after 10 s, and the report of all steps.
+/// The drive of the independent check: displacement (m) and heading (rad)
+/// after 10 s, and the report of all steps.
 pub fn check_drive(variant: Variant, h: f64) -> (Vector3<f64>, f64, StepReport) {
     let mut q = [0.0; 21];
     q[1] = 0.50;

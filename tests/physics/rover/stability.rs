@@ -23,7 +23,8 @@ fn dropped(
     dropped
 }
 
-/// Steps for some seconds; energy never exceeds what there was, nothing sinks into the ground for good.
+/// Steps for some seconds; energy never exceeds what there was, nothing
+/// sinks into the ground for good.
 fn settle(
     mut simulation: RoverSimulation,
     seconds: f64,
@@ -81,8 +82,9 @@ fn drops_from_two_metres_land_on_the_wheels() {
     }
 }
 
-/// Wheels that spin up and are steered against each other: at 20 ms Newton's iterate ran away after 3.56 s, to where the mass matrix is no number, and the
-/// step ended in an error where it should have been taken without iteration.
+/// Wheels that spin up and are steered against each other: at 20 ms Newton's iterate
+/// ran away after 3.56 s, to where the mass matrix is no number, and the step ended in
+/// an error where it should have been taken without iteration.
 #[test]
 fn an_iterate_that_runs_away_is_reported_and_the_step_is_taken() {
     let options = StepOptions {
@@ -163,7 +165,8 @@ fn rolling_over_and_nose_dives_stay_finite_and_lose_energy() {
 
 #[test]
 fn a_wheel_lying_flat_carries_the_rover_without_a_jump() {
-    // On its side the rover stands on the faces of three wheels (and a corner of the trunk as it settles).
+    // On its side the rover stands on the faces of three wheels (and a
+    // corner of the trunk as it settles).
     let options = StepOptions::default();
     let mut end = settle(
         dropped(Model::rover(), options, 0.75, [PI / 2.0, 0.0, 0.0]),

@@ -84,7 +84,8 @@ fn a_cart_with_three_wheels_and_a_tilted_joint_drives() {
 
 #[test]
 fn a_free_top_precesses_as_the_closed_form_says() {
-    // Axisymmetric body, I = (a, c, a) about y, spin w: in the body the cross rate turns with (c − a)/a w.
+    // Axisymmetric body, I = (a, c, a) about y, spin w: in the body the
+    // cross rate turns with (c − a)/a w.
     let text = "name = 'top'\n[[solids]]\nname = 'top'\nmass = 1.0\nshape = { kind = 'cylinder', radius = 0.3, height = 0.2 }";
     let model = Model::from_description(ModelDescription::from_toml(text).unwrap()).unwrap();
     let (a, c) = ((3.0 * 0.09 + 0.04) / 12.0, 0.045);
@@ -103,7 +104,8 @@ fn a_free_top_precesses_as_the_closed_form_says() {
         &[0.0, 0.0, 0.0, cross, w, 0.0],
     );
     simulation.step(4000).unwrap();
-    // Space frame: the body turns about the constant angular momentum L at |L|/a, and about its own axis at −(c − a)/a w.
+    // Space frame: the body turns about the constant angular momentum L
+    // at |L|/a, and about its own axis at −(c − a)/a w.
     let L = Vector3::new(a * cross, c * w, 0.0);
     let about_L = UnitQuaternion::from_scaled_axis(L * (T / a));
     let about_axis = UnitQuaternion::from_scaled_axis(Vector3::y() * (-(c - a) / a * w * T));

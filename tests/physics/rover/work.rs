@@ -46,7 +46,8 @@ fn driving_takes_few_solver_iterations() {
     );
 }
 
-/// The rover on a slope of 10 degrees with all wheels steered about one centre at a distance of 1 / curvature.
+/// The rover on a slope of 10 degrees with all wheels steered about one
+/// centre at a distance of 1 / curvature.
 fn turning(curvature: f64, options: StepOptions) -> RoverSimulation {
     let mut simulation = on_slope(10.0, options);
     let places = [
@@ -65,9 +66,10 @@ fn turning(curvature: f64, options: StepOptions) -> RoverSimulation {
 
 #[test]
 fn wheels_that_fight_each_other_in_a_turn_take_few_iterations() {
-    // The story: with all wheels steered about one centre W has rank 14 of 18, the steering joints give by 1e-6 rad when the rover speeds
-    // up, and four wheels slide at 1e-6 m/s with full friction. Newton on predicted modes cycled, the proximal method took
-    // 60 to 1000 iterations a step, and a control period seven milliseconds.
+    // The story: with all wheels steered about one centre W has rank 14 of 18, the steering joints
+    // give by 1e-6 rad when the rover speeds up, and four wheels slide at 1e-6 m/s with full
+    // friction. Newton on predicted modes cycled, the proximal method took 60 to 1000 iterations a
+    // step, and a control period seven milliseconds.
     for curvature in [0.1, 0.7] {
         let mut simulation = turning(curvature, StepOptions::default());
         let mut iterations = 0;
@@ -92,7 +94,8 @@ fn wheels_that_fight_each_other_in_a_turn_take_few_iterations() {
 
 #[test]
 fn every_tolerance_comes_to_an_end() {
-    // With 1e-6 asked of the residual and 1e-9 m/s of the velocity a search once went on for ever without an iteration.
+    // With 1e-6 asked of the residual and 1e-9 m/s of the velocity a search
+    // once went on for ever without an iteration.
     for tolerance in [1e-2, 1e-6, 1e-9, 1e-13, 1e-15] {
         let mut options = StepOptions::default();
         options.solver.tolerance = tolerance;

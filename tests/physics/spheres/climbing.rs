@@ -1,9 +1,11 @@
 //! The step that a single driven wheel climbs from rest: at most `1 − 1/√(1 + μ²)` of its radius.
 //!
-//! A wheel at rest against an edge of height s carries its weight on the edge alone when it begins to climb. The reaction then passes through
-//! the edge and is vertical; the normal points from the edge to the centre, tilted by φ from the vertical with cos φ = 1 − s/R. It is within the
-//! friction cone while tan φ ≤ μ: s/R ≤ 1 − 1/√(1 + μ²). The torque that holds the wheel there is m g R sin φ. The edge is the top of a sphere
-//! of a tenth of a millimetre on a plane that is one step lower.
+//! A wheel at rest against an edge of height s carries its weight on the edge alone when
+//! it begins to climb. The reaction then passes through the edge and is vertical; the
+//! normal points from the edge to the centre, tilted by φ from the vertical with cos φ =
+//! 1 − s/R. It is within the friction cone while tan φ ≤ μ: s/R ≤ 1 − 1/√(1 + μ²). The
+//! torque that holds the wheel there is m g R sin φ. The edge is the top of a sphere of
+//! a tenth of a millimetre on a plane that is one step lower.
 
 use nalgebra::Vector3;
 use rover_core::geometry::{Plane, SphereField};
@@ -16,9 +18,11 @@ use crate::scenes::simulation;
 const R: f64 = 0.1;
 const EDGE: f64 = 1e-4;
 
-/// A wheel of radius R on a light arm that does not touch and whose torque reaction an outer weight far ahead takes.
+/// A wheel of radius R on a light arm that does not touch and whose torque
+/// reaction an outer weight far ahead takes.
 fn driven_wheel() -> Model {
-    // The frame is a very long-armed inertia: it takes the reaction of the torque nearly without turning, and weighs next to nothing.
+    // The frame is a very long-armed inertia: it takes the reaction of the
+    // torque nearly without turning, and weighs next to nothing.
     let text = r#"
 name = "driven wheel"
 [[solids]]
@@ -46,7 +50,8 @@ drive_sign = -1.0
 
 /// Whether the wheel, at rest against an edge of `height`, is on top of it in the end.
 fn climbs(height: f64, mu: f64) -> bool {
-    // The edge's top is at y = 0, the ground below it; the wheel stands on it and leans on the edge.
+    // The edge's top is at y = 0, the ground below it; the wheel stands on
+    // it and leans on the edge.
     let ground = Plane::new([0.0, 1.0, 0.0], height).unwrap();
     let field = SphereField::new(&[[0.0, -EDGE, 0.0]], &[EDGE], Some(ground)).unwrap();
     let options = StepOptions {

@@ -1,4 +1,5 @@
-//! The gap's gradient is n·J: along any motion the gap changes by the normal velocity of the material point.
+//! The gap's gradient is n·J: along any motion the gap changes by the
+//! normal velocity of the material point.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use proptest::prelude::*;

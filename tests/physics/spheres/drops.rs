@@ -14,7 +14,8 @@ use crate::sphere_scenes::{Random, rocks};
 struct Worst {
     /// Work of the contacts in a step over the kinetic energy before it.
     work: f64,
-    /// Total energy over that of the start, as a share of the start's kinetic energy: what the drop as a whole gains.
+    /// Total energy over that of the start, as a share of the start's
+    /// kinetic energy: what the drop as a whole gains.
     gain: f64,
     /// The same from one step to the next: projection lifts what an impact left inside a rock.
     rise: f64,
@@ -22,7 +23,8 @@ struct Worst {
     steps: usize,
 }
 
-/// Work of the last step's impulses, J: the kinetic energy that they make, `pᵀ (u⁺ + u_free) / 2 = pᵀ u⁺ − pᵀ W p / 2`.
+/// Work of the last step's impulses, J: the kinetic energy that they make,
+/// `pᵀ (u⁺ + u_free) / 2 = pᵀ u⁺ − pᵀ W p / 2`.
 fn contact_work(simulation: &RoverSimulation) -> f64 {
     let active = simulation.contacts();
     let (W, _, _) = simulation.last_problem();
@@ -148,8 +150,9 @@ fn without_friction_energy_never_grows() {
 fn with_restitution_and_friction_the_worst_gain_is_known() {
     let worst = drop_often(1000, 0.3, 0.7);
     report("e = 0.3, friction", &worst);
-    // Newton's law with friction can add energy (Kane's paradox). Measured: one impact in 1000 drops makes 1.9 times the kinetic
-    // energy before it, and that drop ends with 1.9 times what it began with.
+    // Newton's law with friction can add energy (Kane's paradox). Measured:
+    // one impact in 1000 drops makes 1.9 times the kinetic energy before
+    // it, and that drop ends with 1.9 times what it began with.
     assert!(worst.work < 4.0, "{}", worst.work);
     assert!(worst.gain < 4.0, "{}", worst.gain);
     assert!(

@@ -1,7 +1,8 @@
 //! A wheel at rest on one, two and three spheres, with the load split that statics gives.
 //!
-//! A lone disc stands in the plane of its axle's normal: on one sphere it balances, on two in its plane it is wedged, on three
-//! it is wedged and leans. Friction is zero where statics would else be undetermined.
+//! A lone disc stands in the plane of its axle's normal: on one sphere it
+//! balances, on two in its plane it is wedged, on three it is wedged and leans.
+//! Friction is zero where statics would else be undetermined.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use rover_core::contact::{Contact, Opposite};
@@ -55,8 +56,9 @@ fn on_the_crest_of_one_sphere_it_carries_its_weight() {
 
 #[test]
 fn wedged_between_two_spheres_each_carries_its_share_of_the_triangle_of_forces() {
-    // Two spheres of different size at the same distance below on both sides, in the wheel's plane. With normals at angles
-    // α and β from the vertical, N_1 = m g sin β / sin(α + β), N_2 = m g sin α / sin(α + β).
+    // Two spheres of different size at the same distance below on both sides,
+    // in the wheel's plane. With normals at angles α and β from the vertical,
+    // N_1 = m g sin β / sin(α + β), N_2 = m g sin α / sin(α + β).
     for variant in VARIANTS {
         for (alpha, beta, r1, r2) in [(0.6_f64, 0.6_f64, 0.2, 0.2), (0.9, 0.4, 0.05, 0.3)] {
             let options = StepOptions {
@@ -89,8 +91,9 @@ fn wedged_between_two_spheres_each_carries_its_share_of_the_triangle_of_forces()
 
 #[test]
 fn lying_on_three_spheres_each_carries_a_third() {
-    // The face of a disc that lies flat, on three equal spheres at 120 degrees: m g / 3 each. With two of them at 90 degrees to the third's
-    // opposite, moments about the centre give shares in proportion to 1 : 1/√2 : 1/√2 of the distances.
+    // The face of a disc that lies flat, on three equal spheres at 120 degrees: m g / 3 each. With
+    // two of them at 90 degrees to the third's opposite, moments about the centre give shares in
+    // proportion to 1 : 1/√2 : 1/√2 of the distances.
     for variant in VARIANTS {
         for directions in [[0.0, 120.0, 240.0], [0.0, 135.0, 225.0]] {
             let options = StepOptions {
@@ -133,11 +136,13 @@ fn lying_on_three_spheres_each_carries_a_third() {
 
 #[test]
 fn wedged_between_three_spheres_the_triangle_is_a_pyramid() {
-    // Two spheres ahead of the wheel, mirror images about its plane, and one behind: the pair shares evenly what one in the plane would carry.
+    // Two spheres ahead of the wheel, mirror images about its plane, and one behind: the pair
+    // shares evenly what one in the plane would carry.
     let (alpha, beta, r, side) = (0.6_f64, 0.6_f64, 0.2, 0.05_f64);
     let d = R + r;
     let (x, y) = (d * beta.sin(), -d * beta.cos());
-    // The rim point E = R (sin β, −cos β) must be at the distance r of each centre: pull them in along the same direction.
+    // The rim point E = R (sin β, −cos β) must be at the distance r of each
+    // centre: pull them in along the same direction.
     let along = R + (r * r - side * side).sqrt();
     let (px, py) = (x * along / d, y * along / d);
     let ground = field(&[

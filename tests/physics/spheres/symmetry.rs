@@ -10,7 +10,8 @@ use rover_core::simulation::RoverSimulation;
 
 use crate::sphere_scenes::Random;
 
-/// Spheres for a drive along x, drawn with the rover's own track: every sphere in reach of a wheel sooner or later.
+/// Spheres for a drive along x, drawn with the rover's own track: every
+/// sphere in reach of a wheel sooner or later.
 fn stones(seed: u64) -> Vec<[f64; 4]> {
     let mut random = Random(seed);
     (0..120)

@@ -148,7 +148,8 @@ fn the_rover_dropped_from_two_metres_at_20_ms_comes_to_rest_on_pebbles_and_bould
             }
             assert!(rover.state().configuration.is_finite());
             println_if_any(300 - converged, &format!("{variant:?}, radius {radius}"));
-            // Between pebbles that are further apart than a wheel is wide it may stand on its belly; nothing holds it up elsewhere.
+            // Between pebbles that are further apart than a wheel is wide it may stand on its
+            // belly; nothing holds it up elsewhere.
             let height = rover.state().configuration.position.y;
             assert!(
                 height > -0.2,
@@ -177,7 +178,8 @@ fn eprint(line: &str) {
 
 #[test]
 fn high_centred_on_a_boulder_the_trunk_carries_the_rover() {
-    // The trunk's bottom is 5 cm above the wheels' lowest points' level at most: a boulder under it lifts all wheels.
+    // The trunk's bottom is 5 cm above the wheels' lowest points' level at
+    // most: a boulder under it lifts all wheels.
     for variant in VARIANTS {
         let boulder = field(&[[-0.02, 0.0, 0.0, 0.5]]);
         let options = StepOptions {

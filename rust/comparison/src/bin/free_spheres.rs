@@ -1,6 +1,8 @@
-//! Runs the scenes of free spheres and prints JSON: `free_spheres [--start] [--scene NAME] [--duration S] STEP...` (steps in s).
+//! Runs the scenes of free spheres and prints JSON:
+//! `free_spheres [--start] [--scene NAME] [--duration S] STEP...` (steps in s).
 //!
-//! Run: `cargo run --release -p rover-comparison --bin free_spheres -- 0.01 0.005`. `--start` prints the centres at the start instead, for other engines.
+//! Run: `cargo run --release -p rover-comparison --bin free_spheres -- 0.01 0.005`. `--start`
+//! prints the centres at the start instead, for other engines.
 
 #![allow(clippy::print_stdout)] // it prints its result
 
@@ -10,7 +12,7 @@ use std::time::Instant;
 use rover_comparison::sphere_scenes::{Scene, run};
 use rover_core::nalgebra::Vector3;
 
-/// CPU time of this thread where the system tells it, otherwise time, s.
+/// CPU time of this thread if the system provides it, otherwise wall time, s.
 fn clock(origin: Instant) -> f64 {
     // Nanoseconds on a processor come first.
     let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();

@@ -1,6 +1,7 @@
 //! Measures every scheme and prints a table; with a path, writes the curves there as JSON.
 //!
-//! Run: `cargo run --release -p rover-comparison --bin orders -- runs/orders.json` (or `make orders`, which draws them too).
+//! Run: `cargo run --release -p rover-comparison --bin orders -- runs/orders.json`
+//! (or `make orders`, which draws them too).
 
 #![allow(clippy::print_stdout)] // it prints a table
 

@@ -1,8 +1,10 @@
-//! Projection on the friction disc `D(r) = { |v_T| ≤ r }`, the section of the Coulomb cone at one normal impulse.
+//! Projection on the friction disc `D(r) = { |v_T| ≤ r }`, the section of
+//! the Coulomb cone at one normal impulse.
 
 use super::tangential_norm;
 
-/// Nearest point of the disc `|v_T| ≤ radius` to the tangential part of `v`; the normal component passes through.
+/// Nearest point of the disc `|v_T| ≤ radius` to the tangential part of
+/// `v`; the normal component passes through.
 ///
 /// `v`: `[normal, tangent, (tangent)]`. A negative radius counts as zero.
 #[inline]

@@ -1,4 +1,5 @@
-//! The dual of Coulomb's cone, `K_μ* = { u : u_N ≥ μ |u_T| }`, where the modified velocity `ũ` lives.
+//! The dual of Coulomb's cone, `K_μ* = { u : u_N ≥ μ |u_T| }`, where the
+//! modified velocity `ũ` lives.
 
 use super::SecondOrderCone;
 

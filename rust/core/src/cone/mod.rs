@@ -1,9 +1,9 @@
-//! The friction cone, its dual, and the projections that every solver and every residual is made of.
+//! The friction cone, its dual, and the projections that every solver and every residual uses.
 //!
 //! A contact's impulse `p = (p_N, p_T)` lives in the Coulomb cone `K_μ = { |p_T| ≤ μ p_N }`
 //! ([`SecondOrderCone`]); the modified velocity `ũ` of the law lives in its dual
-//! `K_μ* = { u_N ≥ μ |u_T| }` ([`DualCone`]). Vectors are arrays `[normal, tangent, (tangent)]`, so that
-//! `D = 2` is the planar problem and `D = 3` the spatial one.
+//! `K_μ* = { u_N ≥ μ |u_T| }` ([`DualCone`]). Vectors are arrays `[normal, tangent, (tangent)]`, so
+//! that `D = 2` is the planar problem and `D = 3` the spatial one.
 
 mod disc;
 mod dual_cone;
@@ -13,7 +13,8 @@ pub use disc::project_on_disc;
 pub use dual_cone::DualCone;
 pub use second_order_cone::SecondOrderCone;
 
-/// Length of the tangential part `|(v_2, .., v_D)|` of a contact vector `[normal, tangent, (tangent)]`.
+/// Length of the tangential part `|(v_2, .., v_D)|` of a contact vector
+/// `[normal, tangent, (tangent)]`.
 #[inline]
 #[must_use]
 pub fn tangential_norm<const D: usize>(v: &[f64; D]) -> f64 {

@@ -30,8 +30,9 @@ impl SecondOrderCone {
 
     /// Euclidean projection `Π_K(z)`.
     ///
-    /// Three regions: the polar cone (`z_N ≤ −μ|z_T|`) goes to the apex, the cone stays, the rest lands on the
-    /// generator in its meridian plane: `p_N = (z_N + μ|z_T|)/(1 + μ²)`, `p_T = μ p_N z_T/|z_T|`.
+    /// Three regions: points of the polar cone (`z_N ≤ −μ|z_T|`) map to the apex, points of the
+    /// cone stay, and all others land on the generator in their meridian plane:
+    /// `p_N = (z_N + μ|z_T|)/(1 + μ²)`, `p_T = μ p_N z_T/|z_T|`.
     #[inline]
     #[must_use]
     pub fn project<const D: usize>(self, z: &[f64; D]) -> [f64; D] {

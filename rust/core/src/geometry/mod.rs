@@ -1,8 +1,9 @@
-//! Shapes, the ground, and the distances between them. Nothing here knows of a machine.
+//! Shapes, the ground, and the distances between them. This chapter knows no machine.
 //!
-//! - [`shape`]: what parts are made of; [`terrain`]: what the ground is made of;
-//! - [`broad_phase`]: what comes near what; [`query`]: distance, points and normal of a pair, one page a pair of shapes;
-//! - [`support`]: a ground of any shape, as a round body in the plane or in space meets it.
+//! - [`shape`]: shapes of parts; [`terrain`]: grounds;
+//! - [`broad_phase`]: search for nearby things; [`query`]: distance, points and normal of a pair,
+//!   one module per pair of shapes;
+//! - [`support`]: a ground of any shape under a round body, in the plane or in space.
 
 pub mod broad_phase;
 pub mod query;

@@ -1,4 +1,4 @@
-//! A ground of any shape, as a round body meets it.
+//! A ground of any shape under a round body.
 
 use std::fmt::Debug;
 
@@ -17,8 +17,10 @@ pub struct Facing<const D: usize> {
 
 /// A ground that carries round bodies. Immutable, shared between threads.
 pub trait Support<const D: usize>: Debug + Send + Sync {
-    /// Appends the points that face `centre` at a distance of at most `reach` (m), in an order that a small motion does not change.
+    /// Appends the points that face `centre` within `reach` (m), in an order that does not change
+    /// under small motions.
     ///
-    /// Each is nearest among its neighbours; from inside the ground only the nearest of all counts, at any depth.
+    /// Each is a local minimum of the distance. From inside the ground only the nearest of all
+    /// counts, at any depth.
     fn facing(&self, centre: &SVector<f64, D>, reach: f64, out: &mut Vec<Facing<D>>);
 }

@@ -1,15 +1,16 @@
-//! Accuracy by request: step, scheme and tolerance for an error that somebody can live with.
+//! Accuracy by request: step, scheme and tolerance for a given error of the path.
 //!
-//! The numbers are measured (`make chart`, `docs/accuracy.md`). The error of a path grows in proportion to the step: on 22 m of
-//! flat ground driven in a curve its root mean square is 0.21 m/s times the step, from 0.1 to 50 ms. On rocks it is larger and one drive
-//! tells little: `docs/comparison.md` has medians and quartiles over ensembles.
+//! The numbers are measured (`make chart`, `docs/accuracy.md`). The error of a path is proportional
+//! to the step: over 22 m of a curve on flat ground its root mean square is 0.21 m/s times the
+//! step, for steps from 0.1 to 50 ms. On rocks the error is larger and a single drive is not
+//! representative: `docs/comparison.md` gives medians and quartiles over ensembles.
 
 use super::options::{StepOptions, Variant};
 
-/// Steps to choose from, s, coarsest first.
+/// Available steps, s, coarsest first.
 const STEPS: [f64; 8] = [0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4];
 
-/// Error of the path on flat ground over the step, m/s: the 0.21 measured, and a fifth more.
+/// Error of the path on flat ground divided by the step, m/s: the measured 0.21 plus a fifth.
 const ERROR_PER_STEP: f64 = 0.25;
 
 /// Step, scheme and tolerance of the contact solver.
@@ -36,9 +37,10 @@ impl Accuracy {
         variant: Variant::Linearised,
         tolerance: 1e-12,
     };
-    /// 0.2 ms to 1e-12: to compare others with.
+    /// 0.2 ms to 1e-12: the reference for comparisons.
     ///
-    /// Linearised: the Newton variant is as far from the finest paths, over rocks too, at two to three times the cost.
+    /// Uses the linearised scheme: the Newton variant is just as far from the finest paths, over
+    /// rocks too, at two to three times the cost.
     pub const REFERENCE: Self = Self {
         time_step: 2e-4,
         variant: Variant::Linearised,
@@ -47,7 +49,8 @@ impl Accuracy {
     /// Smallest error that [`Self::for_error`] promises, m.
     pub const FINEST: f64 = ERROR_PER_STEP * STEPS[STEPS.len() - 1];
 
-    /// The coarsest step whose path on 20 m of flat ground stays within an error (m); none below [`Self::FINEST`].
+    /// The coarsest step whose path on 20 m of flat ground stays within an
+    /// error (m); none below [`Self::FINEST`].
     #[must_use]
     pub fn for_error(metres: f64) -> Option<Self> {
         let fits = |h: &f64| ERROR_PER_STEP * h <= metres * (1.0 + 1e-12);
@@ -57,7 +60,7 @@ impl Accuracy {
         })
     }
 
-    /// Writes it into options.
+    /// Writes these values into options.
     pub fn apply(&self, options: &mut StepOptions) {
         options.time_step = self.time_step;
         options.variant = self.variant;

@@ -1,23 +1,25 @@
-//! The audit of a step's energy: a step may gain what gravity and actuators put in, and nothing else.
+//! Energy audit: a step may gain no more energy than gravity and the actuators supply.
 //!
 //! ```text
 //! excess = (K + V)(q⁺, v⁺) − (K + V)(q, v) − W
 //! ```
 //!
-//! W is the work of torques, motors and held joints. Inelastic contact with friction only takes energy away, so a positive excess is
-//! the scheme's own: the linearisation (of third order in the step), a solver that stopped early, or Newton's law of restitution, which
+//! W is the work of torques, motors and held joints. Inelastic contact with friction only
+//! dissipates, so a positive excess is an error of the scheme. Its sources are the linearisation
+//! (third order in the step), a solver that stopped early, and Newton's law of restitution, which
 //! creates energy in some impacts with friction (Kane's paradox).
 //!
-//! - A coarse excess asks for the step to be taken again, with implicit gyroscopic terms and then in halves.
-//! - What is left is taken out by shortening the velocity, `v⁺ ← s v⁺`. Signorini's condition at e = 0 and Coulomb's law are
-//!   homogeneous in the velocity, so both hold as before.
-//! - In free flight energy is neither lost nor gained: there s goes both ways, and acts on the motion relative to the mass centre, which
-//!   keeps its momentum.
+//! - After a coarse excess the step is repeated, with implicit gyroscopic terms and then in halves.
+//! - The remaining excess is removed by scaling the velocity, `v⁺ ← s v⁺`. Signorini's condition at
+//!   e = 0 and Coulomb's law are homogeneous in the velocity, so both still hold.
+//! - Free flight conserves energy. There s may be above or below 1, and it scales only the motion
+//!   relative to the mass centre, so the momentum is kept.
 //!
-//! - Where even standing still does not give it back the way is shortened too: a step that a contact ends early.
+//! - If even v⁺ = 0 leaves an excess, the displacement is shortened too: a contact ended the motion
+//!   within the step.
 //!
-//! The correction is of the order of the excess, so the scheme keeps its order. Lifting out of penetration happens after the audit and is
-//! counted apart.
+//! The correction is of the order of the excess, so the scheme keeps its order. Position projection
+//! follows the audit, and its energy is counted separately.
 
 use nalgebra::Vector3;
 
@@ -27,7 +29,7 @@ use super::moreau_jean::place;
 use super::options::StepOptions;
 use super::report::StepReport;
 
-/// Energy of a state, and its motion as a whole.
+/// Energy of a state, and its overall momentum.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MechanicalEnergy {
     /// J.
@@ -40,28 +42,28 @@ pub struct MechanicalEnergy {
     pub mass: f64,
 }
 
-/// Largest gain in a step that is let pass, as a part of the kinetic energy.
+/// Largest gain in a step that is tolerated, as a fraction of the kinetic energy.
 pub const GAIN: f64 = 5e-10;
 
-/// Excess, as a part of the kinetic energy, from which on the step is taken again.
+/// Excess, as a fraction of the kinetic energy, above which the step is repeated.
 const COARSE: f64 = 1e-3;
 
-/// Roundings of the energies that are subtracted from each other.
+/// Rounding errors allowed in the difference of two energies.
 const ROUNDINGS: f64 = 64.0;
 
-/// Largest part by which the energy of free motion is raised in a step.
+/// Largest relative increase of the energy of free motion in a step.
 const RAISE: f64 = 1.0;
 
-/// Part of the kinetic energy after a step that may be taken out of its velocity alone.
+/// Fraction of the kinetic energy after a step that may be removed by scaling the velocity alone.
 const SHORT: f64 = 0.5;
 
-/// Part of the way that is left where the energy allows all of it.
+/// Fraction of the displacement that is kept where the energy allows all of it.
 const SAFE: f64 = 0.999;
 
-/// Part of the way below which none is left.
+/// Fraction of the displacement below which none is kept.
 const LEAST_WAY: f64 = 1e-3;
 
-/// Most times that a velocity is shortened with its way.
+/// Most times that a velocity is shortened together with its displacement.
 const MOST_SHORTENINGS: usize = 8;
 
 /// A state whose energy is known: the end of a step is the start of the next.
@@ -83,7 +85,7 @@ impl<Q> Audited<Q> {
 }
 
 impl<Q: Clone> Audited<Q> {
-    /// Notes the energy of a state.
+    /// Stores the energy of a state.
     fn is(&mut self, configuration: &Q, v: &[f64], energy: MechanicalEnergy) {
         self.configuration.clone_from(configuration);
         self.v.clear();
@@ -92,7 +94,7 @@ impl<Q: Clone> Audited<Q> {
     }
 }
 
-/// Energy at the start of a step: remembered from the end of the last one, where this is the same state.
+/// Energy at the start of a step, remembered from the end of the last one if the state is the same.
 pub(super) fn energy_before<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -107,30 +109,31 @@ pub(super) fn energy_before<S: MechanicalSystem>(
     system.energy(options, start.configuration, start.v)
 }
 
-/// What an audit found.
+/// Result of an audit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Verdict {
-    /// The step may stand; its velocity may have been corrected.
+    /// The step is accepted; its velocity may have been corrected.
     Sound,
-    /// It should be taken again.
+    /// The step should be repeated.
     Coarse,
 }
 
-/// How far an audit may go.
+/// Limits of an audit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Audit {
     /// Energy before the step; none where the system is not audited.
     pub before: Option<MechanicalEnergy>,
-    /// Whether there is no safer way left.
+    /// Whether no safer way to take the step is left.
     pub is_last: bool,
-    /// Part of the kinetic energy that may be gained, see [`GAIN`].
+    /// Fraction of the kinetic energy that may be gained, see [`GAIN`].
     pub gain: f64,
-    /// Part of the kinetic energy that free flight may gain or lose: an error of the scheme's order that does not add up.
+    /// Fraction of the kinetic energy that free flight may gain or lose: an error of the scheme's
+    /// order that does not accumulate.
     pub drift: f64,
 }
 
 impl Audit {
-    /// Judges `ws.v` and `ws.end`, before projection, and corrects `ws.v` where there is no safer way.
+    /// Judges `ws.v` and `ws.end` before projection, and corrects `ws.v` if no safer way is left.
     pub(super) fn judge<S: MechanicalSystem>(
         &self,
         system: &mut S,
@@ -151,7 +154,8 @@ impl Audit {
                 if excess.is_nan() || excess <= SHORT * after.kinetic {
                     break;
                 }
-                // Far off: the way that such a velocity leads is no better than the velocity. Both are taken back together.
+                // The velocity is far off, and so is the displacement that it caused. Shorten both
+                // together.
                 let share = (before.kinetic / after.kinetic).min(SHORT).sqrt();
                 shorten(ws, share);
                 place(system, options, ws);
@@ -171,7 +175,8 @@ impl Audit {
                 Verdict::Coarse
             };
         }
-        // A machine at rest has no kinetic energy to measure by: what gravity gives in a step of free fall is the least that counts.
+        // A machine at rest has no kinetic energy as a measure: use at least what gravity adds in a
+        // step of free fall.
         let fall = options.gravity.norm() * options.time_step;
         let least = 0.5 * after.mass * fall * fall;
         let size = before.kinetic.max(after.kinetic).max(least);
@@ -181,7 +186,7 @@ impl Audit {
             + after.potential.abs()
             + work.abs();
         let rounding = ROUNDINGS * f64::EPSILON * sum;
-        // With θ > ½ the scheme itself takes energy away.
+        // With θ > ½ the scheme itself dissipates.
         let is_free = ws.contacts.is_empty() && options.theta <= 0.5;
         let is_balanced = if is_free {
             excess.abs() <= rounding + self.drift * size
@@ -194,7 +199,7 @@ impl Audit {
             return Verdict::Sound;
         }
         let coarse = if is_free { excess.abs() } else { excess };
-        // What not even standing still gives back.
+        // The excess that remains at v⁺ = 0.
         let left = excess - after.kinetic;
         let is_left = left > rounding + self.gain * size;
         if (coarse > COARSE * size || is_left) && !self.is_last {
@@ -226,10 +231,11 @@ impl Audit {
 }
 
 impl Audit {
-    /// Shortens the way of a step at whose end nothing moves any more, and which still gained energy.
+    /// Shortens the displacement of a step that ends at rest and still gained energy.
     ///
-    /// Such a step was stopped within its time: by a jam, while the actuators' work was counted to its end, or on its way up by a contact that
-    /// closes before the end. As long a part σ of the way is left as its energy allows; none always does.
+    /// Something stopped such a step before its end: the machine jammed while the actuators' work
+    /// was counted to the end, or a contact closed on its way up. The largest fraction σ of the
+    /// displacement that the energy allows is kept; σ = 0 is always allowed.
     fn hold_back<S: MechanicalSystem>(
         &self,
         system: &mut S,
@@ -254,7 +260,8 @@ impl Audit {
             if excess <= 0.0 {
                 break;
             }
-            // Without a way the excess is minus the kinetic energy; between both it is nearly straight.
+            // With no displacement the excess is minus the kinetic energy; in between it is nearly
+            // linear.
             let shorter = SAFE * share * before.kinetic / (excess + before.kinetic);
             let back = h * (share - shorter);
             share = if shorter > LEAST_WAY { shorter } else { 0.0 };
@@ -268,7 +275,7 @@ impl Audit {
     }
 }
 
-/// Counts what a projection that has moved `ws.end` did to the energy.
+/// Counts the energy that a projection of `ws.end` added.
 pub(super) fn count_lift<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -286,7 +293,7 @@ pub(super) fn count_lift<S: MechanicalSystem>(
     ws.audited.is(&ws.end, &ws.v, after);
 }
 
-/// What a step did to the energy.
+/// Energy balance of a step.
 #[derive(Clone, Copy, Debug)]
 struct Balance {
     after: MechanicalEnergy,
@@ -294,7 +301,7 @@ struct Balance {
     work: f64,
 }
 
-/// Of the step to `ws.end` and `ws.v`.
+/// The balance of the step to `ws.end` and `ws.v`.
 fn balance<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -311,7 +318,7 @@ fn balance<S: MechanicalSystem>(
     }
 }
 
-/// `v⁺ ← share v⁺`, also as the contacts see it.
+/// `v⁺ ← share v⁺`, in the local velocities too.
 fn shorten<Q, C>(ws: &mut super::Scratch<Q, C>, share: f64) {
     for x in ws.v.iter_mut().chain(&mut ws.u) {
         *x *= share;

@@ -1,4 +1,4 @@
-//! Options out of range, and steps that cannot be taken.
+//! Errors: options out of range, and steps that fail.
 
 use thiserror::Error;
 
@@ -17,7 +17,7 @@ pub enum OptionsError {
     },
 }
 
-/// A step that could not be taken. The state is as it was before it.
+/// A step that failed. The state is unchanged.
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum StepError {
     /// A coordinate or velocity overflowed.
@@ -36,7 +36,7 @@ pub enum StepError {
         /// Time before the step, s.
         time: f64,
     },
-    /// Events without end: a scheme that stops at each of them cannot pass the point where they accumulate.
+    /// Too many events: an event-driven scheme cannot pass the point where they accumulate.
     #[error(
         "{events} events before t = {time} s in one step: they accumulate, and an event-driven scheme cannot pass; the state before the step was kept"
     )]

@@ -1,10 +1,12 @@
-//! What time stepping needs of a mechanical system: `M(q) dv = F(q, v) dt + H(q) dp`, q moved along v by ⊕.
+//! The interface of time stepping to a mechanical system `M(q) dv = F(q, v) dt + H(q) dp`, in which
+//! ⊕ moves q along v.
 //!
-//! Every scheme of this chapter is written once, over this trait. The rover's tree of solids implements it with its sparse factor,
-//! a planar ball or two-wheel rover with small dense matrices, a soil of disks with a diagonal one; nothing of a step is written twice.
+//! Every scheme of this chapter is written once, over this trait. The multibody tree implements it
+//! with its sparse factor, a planar ball or two-wheel rover with small dense matrices, and a bed of
+//! disks with a diagonal matrix.
 //!
-//! A system holds its description and the scratch of its matrices, never its state: the scheme hands in configurations and
-//! velocities and asks in the order
+//! A system holds its description and scratch for its matrices, never its state. The scheme passes
+//! in configurations and velocities and calls in the order
 //!
 //! ```text
 //! place_middle(q_m), place_end(q̃) → detect → relocate      the contacts, measured at q̃
@@ -13,9 +15,10 @@
 //! load, half_solve, local, problem, add_impulses, half_solve_back
 //! ```
 //!
-//! Vectors between `half_solve` and `half_solve_back` are in *factor coordinates* `y = F v`: there an impulse y does
-//! `Zᵀ y` at the contacts, and contact impulses p change y by `Z p`, so W never needs a product with M̂⁻¹. Any factor will do (Cholesky's,
-//! the tree's `Lᵀ D L`, the square root of a diagonal).
+//! Vectors between `half_solve` and `half_solve_back` are in *factor coordinates* `y = F v`. In
+//! these an impulse y changes the contact velocities by `Zᵀ y`, and contact impulses p change y by
+//! `Z p`, so W needs no product with M̂⁻¹. Any factor serves (Cholesky's, the tree's `Lᵀ D L`, the
+//! square root of a diagonal).
 
 use super::energy_audit::MechanicalEnergy;
 use super::options::StepOptions;
@@ -24,19 +27,19 @@ use crate::law::newton_impact::rebound;
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
 
-/// A contact as time stepping sees it: a name and a gap.
+/// A contact as time stepping sees it: a key and a gap.
 pub trait UnilateralContact {
-    /// Tells the same contact from one step to the next.
+    /// Identifies a contact from one step to the next.
     type Key: Copy + Ord;
 
-    /// Its name, unique within a step.
+    /// Its key, unique within a step.
     fn key(&self) -> Self::Key;
 
-    /// Signed distance, m, positive when apart, where the contact was last measured.
+    /// Signed distance where the contact was last measured, m, positive when apart.
     fn gap(&self) -> f64;
 }
 
-/// Where a step begins.
+/// Start of a step.
 #[derive(Debug)]
 pub struct Start<'a, Q> {
     /// Configuration.
@@ -55,17 +58,18 @@ impl<Q> Copy for Start<'_, Q> {}
 
 /// A system with unilateral contacts, see the page above.
 ///
-/// With d components a contact (2 or 3, `DIMENSION`), local vectors run contact by contact `normal, tangent, (tangent)`.
+/// With d components a contact (2 or 3, `DIMENSION`), local vectors run
+/// contact by contact `normal, tangent, (tangent)`.
 pub trait MechanicalSystem {
-    /// A point of the configuration space; sizes may be anything, ⊕ is the system's.
+    /// A point of the configuration space, of any size; the system defines ⊕.
     type Configuration: Clone + PartialEq;
-    /// A contact: what the system needs to find its rows of Hᵀ again.
+    /// A contact: the data from which the system rebuilds its rows of Hᵀ.
     type Contact: UnilateralContact;
 
     /// Whether contacts have one tangent or two.
     const DIMENSION: Dimension;
 
-    /// Number of velocities now.
+    /// Current number of velocities.
     fn nv(&self) -> usize;
 
     /// `to = from ⊕ h v`, without allocating.
@@ -83,21 +87,22 @@ pub trait MechanicalSystem {
     /// Whether every entry of a configuration is finite.
     fn is_finite(&self, q: &Self::Configuration) -> bool;
 
-    /// Takes rounding out of a configuration that is about to become the state (unit quaternions).
+    /// Removes rounding from a configuration that is about to become the state (unit quaternions).
     fn normalise(&self, _q: &mut Self::Configuration) {}
 
-    /// Kinematics where forces and mass matrix are evaluated.
+    /// Kinematics at the configuration where forces and mass matrix are evaluated.
     fn place_middle(&mut self, q: &Self::Configuration);
 
-    /// Kinematics where contact frames and Jacobians are evaluated.
+    /// Kinematics at the configuration where contact frames and Jacobians are evaluated.
     fn place_end(&mut self, q: &Self::Configuration);
 
-    /// Finds the contacts of the step, measured at the middle's pose, by the forecast at the velocity `v` (nv).
+    /// Finds the contacts of the step: measures them at the middle pose and forecasts with the
+    /// velocity `v` (nv).
     ///
-    /// `activation.margin` is 0 and the system's to fill. `out` is cleared first.
+    /// `activation.margin` is 0 on entry; the system fills it. `out` is cleared first.
     fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<Self::Contact>);
 
-    /// Measures point, frame and gap of each contact anew at the end's pose: the same features.
+    /// Measures point, frame and gap of the same features again at the end pose.
     fn relocate(&mut self, contacts: &mut [Self::Contact]);
 
     /// μ of one contact.
@@ -105,19 +110,22 @@ pub trait MechanicalSystem {
         options.friction_coefficient
     }
 
-    /// M at the middle's pose, and how implicit its implicit forces are.
+    /// Computes M at the middle pose, and the implicit weights of the stiff forces.
     fn update_mass_matrix(&mut self, options: &StepOptions);
 
-    /// Factors `M̂ = M + (implicit forces) = Fᵀ F`; false where it is not positive definite in floating point.
+    /// Factors `M̂ = M + (implicit forces) = Fᵀ F`; false if it is not positive definite in
+    /// floating point.
     #[must_use]
     fn factorise(&mut self, options: &StepOptions) -> bool;
 
-    /// `out = M v` (nv), kg m/s and kg m²/s: asked for between `update_mass_matrix` and `factorise`, which may add implicit terms.
+    /// `out = M v` (nv), kg m/s and kg m²/s. Called between `update_mass_matrix` and `factorise`,
+    /// which may add implicit terms.
     fn multiply_mass(&self, v: &[f64], out: &mut [f64]);
 
-    /// `impulse = h F(q_m, v_mean)` (nv), N s and N m s: that of all forces but the contacts' over the step.
+    /// `impulse = h F(q_m, v_mean)` (nv), N s and N m s: the impulse of all forces except contact
+    /// forces over the step.
     ///
-    /// Forces taken implicitly enter with their value extrapolated from the start's velocity.
+    /// Implicit forces enter with their value extrapolated from the velocity at the start.
     fn load(
         &mut self,
         options: &StepOptions,
@@ -126,20 +134,22 @@ pub trait MechanicalSystem {
         impulse: &mut [f64],
     );
 
-    /// Whether gyroscopic terms are too fast for the step to take them explicitly. By default never.
+    /// Whether the gyroscopic terms are too stiff to be explicit in this step. By default never.
     fn is_gyroscopic(&self, _options: &StepOptions, _v: &[f64]) -> bool {
         false
     }
 
-    /// [`Self::load`] with the gyroscopic terms implicit, and already in factor coordinates.
+    /// [`Self::load`] with implicit gyroscopic terms; the result is in factor coordinates.
     ///
-    /// With `C(q_m, v_mean) v` the gyroscopic part of the bias and J (`impulse`, nv) a forecast of the contacts' generalized impulse
+    /// With `C(q_m, v_mean) v` the gyroscopic part of the bias and J
+    /// (`impulse`, nv) a forecast of the contacts' generalized impulse
     ///
     /// ```text
     /// (M̂ + θ h C) Δv = h (τ − G − C v) + J,        y = F Δv − F⁻ᵀ J
     /// ```
     ///
-    /// so that an impulse J that comes true makes the step implicit as a whole. Only asked of a system that may be [`Self::is_gyroscopic`].
+    /// If the actual impulse equals the forecast J, the whole step is implicit. Called only for a
+    /// system that may be [`Self::is_gyroscopic`].
     fn load_gyroscopic(
         &mut self,
         options: &StepOptions,
@@ -152,16 +162,17 @@ pub trait MechanicalSystem {
         self.half_solve(y);
     }
 
-    /// Chooses the branch of each piecewise force for a step that begins here. By default there is none.
+    /// Chooses the branch of each piecewise force at the start of a step. By default there is none.
     fn choose_branches(&mut self, _start: Start<'_, Self::Configuration>) {}
 
-    /// Goes on to the next branch of each piecewise force towards that of a step that ends with `v_end`; true where one has changed and
-    /// the step must be taken again. By default there is none.
+    /// Moves each piecewise force one branch towards the branch that holds at `v_end`; true if one
+    /// has changed and the step must be repeated. By default there is none.
     fn revise(&mut self, _start: Start<'_, Self::Configuration>, _v_end: &[f64]) -> bool {
         false
     }
 
-    /// Kinetic and potential energy of a state, J, and what moves as a whole; none where the system is not audited.
+    /// Kinetic and potential energy of a state, J, and its overall momentum; none if the system is
+    /// not audited.
     fn energy(
         &mut self,
         _options: &StepOptions,
@@ -171,13 +182,13 @@ pub trait MechanicalSystem {
         None
     }
 
-    /// Fastest turning of a frame whose pose matters, rad/s. By default 0.
+    /// Largest angular speed of a frame whose pose matters, rad/s. By default 0.
     fn turning(&self, _v: &[f64]) -> f64 {
         0.0
     }
 
-    /// Whether [`Self::balance`] keeps the momenta of free flight whatever the step, which no correction of the energy may touch. By default
-    /// it does not.
+    /// Whether [`Self::balance`] conserves the momenta of free flight at any step, so that no
+    /// energy correction may change them. By default it does not.
     fn conserves_momenta(&self) -> bool {
         false
     }
@@ -192,13 +203,16 @@ pub trait MechanicalSystem {
         0.0
     }
 
-    /// The step, or the part of one, that was asked for its work last becomes the state. By default nothing is kept of it.
+    /// The step (or part of a step) whose work was last requested becomes the state. By default
+    /// nothing is recorded.
     fn accept(&mut self) {}
 
-    /// Before the iterations of a Newton variant: what it must remember of the start. By default nothing.
+    /// Called before the iterations of a Newton variant: stores what it needs of the start. By
+    /// default nothing.
     fn begin_balance(&mut self, _start: Start<'_, Self::Configuration>) {}
 
-    /// [`Self::load`] for the iterate `v_end`: forces taken implicitly enter with their value there. By default there are none.
+    /// [`Self::load`] for the iterate `v_end`: implicit forces enter with their value there. By
+    /// default there are none.
     fn load_at_end(
         &mut self,
         options: &StepOptions,
@@ -210,10 +224,11 @@ pub trait MechanicalSystem {
         self.load(options, start, v_mean, impulse);
     }
 
-    /// `impulse = h F − Δ(M v)` (nv): what the iterate `v_end` leaves of the balance over the step without contacts.
+    /// `impulse = h F − Δ(M v)` (nv): residual of the balance of the step without contacts, at the
+    /// iterate `v_end`.
     ///
-    /// The default is the rule at the middle, `h F(q_m, v_mean) − M(q_m) (v_end − v)`, of order 2 for θ = ½.
-    /// `scratch` (nv) may be overwritten.
+    /// The default is the midpoint rule, `h F(q_m, v_mean) − M(q_m) (v_end − v)`, of order 2 for
+    /// θ = ½. `scratch` (nv) may be overwritten.
     fn balance(
         &mut self,
         options: &StepOptions,
@@ -239,13 +254,13 @@ pub trait MechanicalSystem {
     /// `Δv = F⁻¹ y`, in place: factor coordinates (nv) into a change of the velocity.
     fn half_solve_back(&self, y: &mut [f64]);
 
-    /// Builds H, Z and W of the contacts at the end's pose, and `u = Hᵀ v` (d n_c), m/s.
+    /// Builds H, Z and W of the contacts at the end pose, and `u = Hᵀ v` (d n_c), m/s.
     fn assemble(&mut self, contacts: &[Self::Contact], v: &[f64], u: &mut [f64]);
 
     /// `out = Zᵀ y` (d n_c), m/s.
     fn local(&self, y: &[f64], out: &mut [f64]);
 
-    /// `out += Hᵀ v` (d n_c), m/s, for another velocity than [`Self::assemble`]'s.
+    /// `out += Hᵀ v` (d n_c), m/s, for a velocity other than that of [`Self::assemble`].
     fn add_local_of_velocity(&self, contacts: &[Self::Contact], v: &[f64], out: &mut [f64]);
 
     /// `y += Z p`, with p (d n_c) in N s.
@@ -254,10 +269,12 @@ pub trait MechanicalSystem {
     /// `out = H p` (nv): the generalized impulse, N s and N m s, of p (d n_c), N s.
     fn generalized_impulse(&self, contacts: &[Self::Contact], p: &[f64], out: &mut [f64]);
 
-    /// The friction-contact problem of the assembled W, with the free velocity q (d n_c), m/s, and μ (n_c).
+    /// The friction-contact problem of the assembled W, with the free
+    /// velocity q (d n_c), m/s, and μ (n_c).
     fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a>;
 
-    /// What is added to the normal free velocity, m/s, so that the problem's `0 ≤ u_N ⊥ p_N ≥ 0` is the contact's law.
+    /// Shift of the normal free velocity, m/s, which turns the problem's `0 ≤ u_N ⊥ p_N ≥ 0` into
+    /// the contact's law.
     ///
     /// The default is Newton's impact law, `e u_N⁻`.
     fn normal_shift(
@@ -269,14 +286,16 @@ pub trait MechanicalSystem {
         rebound(options.restitution, u_N_before)
     }
 
-    /// Whether a solve that does not converge speaks for a problem without an answer. By default it does; not where sweeps end early.
+    /// Whether a solve that does not converge suggests that the problem has no answer. True by
+    /// default; false where sweeps end early by design.
     fn solves_to_the_end(&self) -> bool {
         true
     }
 
-    /// Solves [`Self::problem`]: p (d n_c), N s, in and out, and u (d n_c), m/s, out, as [`solve`] takes them.
+    /// Solves [`Self::problem`]: p (d n_c), N s, in and out, and u (d n_c),
+    /// m/s, out, as [`solve`] takes them.
     ///
-    /// A system of very many bodies has its own way, which needs no W.
+    /// A system of very many bodies overrides this with a method that needs no W.
     fn solve(
         &self,
         q: &[f64],
@@ -289,6 +308,7 @@ pub trait MechanicalSystem {
         solve(&self.problem(q, mu), options, p, u, workspace)
     }
 
-    /// How far a displacement `y` (nv) moves what is not a contact point, m: the projection's guard.
+    /// Largest displacement, m, that `y` (nv) causes away from the contact points; it limits the
+    /// projection.
     fn displacement(&self, y: &[f64]) -> f64;
 }

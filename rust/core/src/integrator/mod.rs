@@ -5,11 +5,12 @@
 //! | Moreau–Jean, one linearised step | [`moreau_jean`] | 2, gyroscopic terms explicit or implicit by the spin | 1 |
 //! | Moreau–Jean, Newton on the end-of-step forces | [`moreau_jean_newton`] | 2 | 1 |
 //!
-//! Both treat impacts and persistent contact by the same law at velocity level and search for no event.
-//! What the velocity law leaves of penetration, [`position_projection`] removes. Every step's energy is audited ([`energy_audit`]).
+//! Both schemes treat impacts and persistent contact by the same law at velocity level and locate
+//! no events. [`position_projection`] removes the penetration that the velocity law leaves.
+//! [`energy_audit`] checks the energy of every step.
 //!
-//! A scheme is written once, over what a [`MechanicalSystem`] can do: the tree of solids and the planar systems
-//! ([`crate::system`], [`crate::planar`]) step through the same code.
+//! Each scheme is written once, for any [`MechanicalSystem`]: the multibody tree and the planar
+//! systems ([`crate::system`], [`crate::planar`]) step through the same code.
 
 pub mod accuracy;
 pub mod energy_audit;
@@ -41,7 +42,7 @@ pub type KeyOf<S> = <<S as MechanicalSystem>::Contact as UnilateralContact>::Key
 pub type ScratchOf<S> =
     Scratch<<S as MechanicalSystem>::Configuration, <S as MechanicalSystem>::Contact>;
 
-/// The state that a step moves.
+/// The state that a step advances.
 #[derive(Debug)]
 pub struct StateMut<'a, Q> {
     /// Configuration.
@@ -57,7 +58,8 @@ pub trait Integrator<S: MechanicalSystem> {
     /// Takes one step, or leaves `state` and `warm_start` as they were.
     ///
     /// # Errors
-    /// `NonFinite` or `SingularMassMatrix`. A solver that did not converge is no error: see the report.
+    /// `NonFinite` or `SingularMassMatrix`. A solver that did not converge is not an error; the
+    /// report says so.
     fn step(
         &self,
         system: &mut S,
@@ -69,7 +71,7 @@ pub trait Integrator<S: MechanicalSystem> {
     ) -> Result<StepReport, StepError>;
 }
 
-/// A variant steps as its scheme does: the one place where it is chosen.
+/// Dispatches to the scheme of the variant; no other place chooses it.
 impl<S: MechanicalSystem> Integrator<S> for Variant {
     #[inline]
     fn step(

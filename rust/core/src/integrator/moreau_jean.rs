@@ -1,24 +1,30 @@
 //! Moreau–Jean, one linearised step.
 //!
-//! Forces are evaluated at `q_m = q ⊕ (1−θ) h v` (for θ = ½ the midpoint of Moreau 1988) and `v_m = v + (1−θ) Δv`, Δv the change that the
-//! forces at (q_m, v) and the last step's impulses would make; the contacts at the predicted end `q̃ = q ⊕ h v`:
+//! Forces are evaluated at `q_m = q ⊕ (1−θ) h v` (for θ = ½ the midpoint of Moreau 1988) and
+//! `v_m = v + (1−θ) Δv`, where Δv is the change due to the forces at (q_m, v) and the last step's
+//! impulses. Contacts are evaluated at the predicted end `q̃ = q ⊕ h v`:
 //!
 //! ```text
-//! M̂ (v⁺ − v) = h (τ − bias(q_m, v_m)) + H(q̃) p + r,      M̂ = M(q_m) + h θ_j K_d + h² θ_j θ K_p on held joints
+//! M̂ (v⁺ − v) = h (τ − bias(q_m, v_m)) + H(q̃) p + r
+//! M̂  = M(q_m) + h θ_j K_d + h² θ_j θ K_p on held joints
 //! q⁺ = q_m ⊕ θ h v⁺
 //! ```
 //!
-//! The velocity law `H(q̃)ᵀ v⁺` thus holds where v⁺ does, at the end of the step, and not half a step before. In persistent
-//! contact `r = (1−θ) (H(q_k) − H(q̃)) p_k`, with the impulses p_k of the step before, turns the reaction back to its mean direction
-//! over the step (a correction deferred by one step, so that W stays symmetric). Without the two a turning rover's path is late by
-//! h/2 and its speed decays with h ω²/2: on the flat drive of the tests the error was five times larger.
+//! The contact law on `H(q̃)ᵀ v⁺` thus holds at the end of the step, where v⁺ belongs, and not half
+//! a step earlier. In persistent contact the term `r = (1−θ) (H(q_k) − H(q̃)) p_k`, with the
+//! impulses p_k of the step before, turns the reaction back to its mean direction over the step.
+//! This correction is deferred by one step so that W stays symmetric. Without both measures the
+//! path of a turning rover lags by h/2 and its speed decays with h ω²/2: the error is five times
+//! larger on the flat drive of the tests.
 //!
-//! Where the spin asks for it ([`MechanicalSystem::is_gyroscopic`]), or the audit of the energy ([`super::energy_audit`]), the gyroscopic terms
-//! are implicit instead: `bias = G + C(q_m, v_m) (v + (1−θ) Δv)` with the impulses of persistent contact inside Δv. Then no spin and no step
-//! make the scheme unstable.
+//! If the spin ([`MechanicalSystem::is_gyroscopic`]) or the energy audit ([`super::energy_audit`])
+//! requires it, the gyroscopic terms are implicit: `bias = G + C(q_m, v_m) (v + (1−θ) Δv)`, where
+//! Δv includes the impulses of persistent contact. The scheme is then stable at any spin and any
+//! step.
 //!
-//! The PD of a held joint is implicit with an exponentially fitted θ_j ([`crate::system::fitted_theta`]), so no gain and
-//! no step make it unstable. Contacts enter by the forecast `gap + γ h u_N ≤ 0`, measured from q_m.
+//! The PD controller of a held joint is implicit with an exponentially fitted θ_j
+//! ([`crate::system::fitted_theta`]), and stable at any gain and any step. The forecast
+//! `gap + γ h u_N ≤ 0`, measured from q_m, activates contacts.
 //!
 //! Source: Moreau 1988; Jean 1999; Acary and Brogliato 2008, ch. 10.
 
@@ -68,16 +74,18 @@ const MOST_ATTEMPTS: usize = 16;
 /// Most times that a step is halved.
 const MOST_HALVINGS: usize = 3;
 
-/// Turn of a frame in a step, rad, beyond which it is taken in parts.
+/// Rotation of a frame in a step, rad, above which the step is split.
 const MOST_TURN: f64 = 0.5;
 
-/// Most parts that fast turning is given; what turns faster is not resolved, and its energy is the audit's.
+/// Most parts of a step that fast rotation is given. Faster rotation is not resolved; the audit
+/// controls its energy.
 const MOST_PARTS: f64 = 64.0;
 
-/// A step or a part of one: what did not come out is taken again in halves, which are other and mostly easier problems.
+/// Takes a step or a part of one. A part that fails is repeated in halves, which are different and
+/// mostly easier problems.
 struct Part<'a> {
     options: &'a StepOptions,
-    /// What part of the whole step.
+    /// Fraction of the whole step.
     share: f64,
     depth: usize,
     attempts: &'a mut usize,
@@ -108,7 +116,7 @@ impl Part<'_> {
         let mut retaken = 0;
         let mut report = loop {
             *self.attempts = self.attempts.saturating_sub(1);
-            // Where sweeps end early by design a smaller step would end early too.
+            // Where sweeps end early by design they would do so in a smaller step too.
             let can_halve = self.depth < MOST_HALVINGS
                 && *self.attempts > 1
                 && ws.work_left > 0
@@ -199,14 +207,16 @@ impl Part<'_> {
     }
 }
 
-/// Most times that a step is taken again because a piecewise force has changed its branch. A motor that comes to its line takes one, a
-/// wheel alone at most four.
+/// Most repetitions of a step because a piecewise force changed its branch. A motor that reaches
+/// its torque–speed line needs one, a single wheel at most four.
 pub(super) const MOST_REVISIONS: usize = 6;
 
-/// Passes over the mean velocity in which implicit gyroscopic terms are frozen: the second makes the step of order 2.
+/// Passes over the mean velocity at which implicit gyroscopic terms are frozen: the second makes
+/// the step second order.
 const GYROSCOPIC_PASSES: usize = 2;
 
-/// One attempt at the step: `ws.v`, `ws.end`, `ws.p` and `ws.gap_end`. None where the mass matrix cannot be factored.
+/// One attempt at the step: `ws.v`, `ws.end`, `ws.p` and `ws.gap_end`. None if the mass matrix
+/// cannot be factored.
 fn attempt<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -251,7 +261,7 @@ fn attempt<S: MechanicalSystem>(
     Some(report)
 }
 
-/// `q⁺ = q_m ⊕ θ h v⁺` and the gaps there, of the velocity `ws.v`.
+/// `q⁺ = q_m ⊕ θ h v⁺` for the velocity `ws.v`, and the gaps there.
 pub(super) fn place<S: MechanicalSystem>(system: &S, options: &StepOptions, ws: &mut ScratchOf<S>) {
     let share = options.theta * options.time_step;
     system.set_moved(&ws.middle, &ws.v, share, &mut ws.end);
@@ -264,7 +274,8 @@ pub(super) fn place<S: MechanicalSystem>(system: &S, options: &StepOptions, ws: 
     ws.gap_end.extend(ws.contacts.iter().zip(local).map(moved));
 }
 
-/// The free change `ws.y` (factor coordinates) by forces at v, then at the velocity that they lead to.
+/// The free change `ws.y` (factor coordinates): first from the forces at v, then from those at the
+/// resulting velocity.
 fn load_explicitly<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -277,7 +288,8 @@ fn load_explicitly<S: MechanicalSystem>(
         system.load(options, start, &ws.v_mean, &mut ws.impulse);
         ws.half_solve(|impulse| system.half_solve(impulse));
         if !is_last {
-            // An impact's impulses say nothing of this step's: with them v_m would be far off, and the bias is quadratic in it.
+            // Impulses of an impact do not predict those of this step: v_m would be far off, and
+            // the bias is quadratic in it.
             if is_persistent(options, warm_start, &ws.contacts) {
                 system.add_impulses(&ws.p, &mut ws.y);
             }
@@ -290,7 +302,8 @@ fn load_explicitly<S: MechanicalSystem>(
     add_correction(system, options, warm_start, ws);
 }
 
-/// The free change `ws.y` (factor coordinates) with implicit gyroscopic terms; the correction r is part of the forecast impulse.
+/// The free change `ws.y` (factor coordinates) with implicit gyroscopic
+/// terms; the correction r is part of the forecast impulse.
 fn load_implicitly<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -319,12 +332,13 @@ fn load_implicitly<S: MechanicalSystem>(
     add_correction(system, options, warm_start, ws);
 }
 
-/// The contact forecast measured from `q_m`, and how close to rest a contact stays closed.
+/// The contact forecast, measured from `q_m`, with the margin within which a resting contact stays
+/// closed.
 ///
 /// `measured`: seconds after the start of the step at which the gaps are measured.
 pub(super) fn activation(options: &StepOptions, measured: f64) -> Activation {
     let h = options.time_step;
-    // In one step gravity moves what rests by g h²/2 and speeds it up by g h.
+    // In one step gravity moves a resting body by g h²/2 and accelerates it by g h.
     let g = options.gravity.norm();
     Activation {
         lead: options.forecast * h - measured,
@@ -334,9 +348,10 @@ pub(super) fn activation(options: &StepOptions, measured: f64) -> Activation {
     }
 }
 
-/// Contact Jacobian, operator, velocity before the step and the solver's starting point, at the end's poses.
+/// Contact Jacobian, operator, velocity before the step and the solver's starting point, at the end
+/// pose.
 ///
-/// Newton's law looks at `v_before`, the velocity before the step.
+/// Newton's law refers to `v_before`, the velocity before the step.
 pub(super) fn assemble_contacts<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,
@@ -373,7 +388,8 @@ pub(super) fn set_friction<S: MechanicalSystem>(
     );
 }
 
-/// Whether the last step had the same contacts and none of them was new or struck, so that its impulses are those of this step but for O(h).
+/// Whether the last step had the same contacts and none of them was new or in impact, so that its
+/// impulses equal those of this step up to O(h).
 fn is_persistent<C: UnilateralContact>(
     options: &StepOptions,
     warm_start: &WarmStart<C::Key>,
@@ -382,7 +398,8 @@ fn is_persistent<C: UnilateralContact>(
     options.warm_start && !warm_start.persistent.is_empty() && warm_start.is_of(contacts)
 }
 
-/// Adds the deferred correction r to `ws.y` where the last step had the same contacts and all of them persisted.
+/// Adds the deferred correction r to `ws.y` if the last step had the same contacts and all of them
+/// persisted.
 ///
 /// `ws.p` must still hold the last step's impulses.
 pub(super) fn add_correction<S: MechanicalSystem>(
@@ -405,12 +422,15 @@ pub(super) fn add_correction<S: MechanicalSystem>(
     }
 }
 
-/// Solves the assembled contacts for the free change `ws.y` (factor coordinates) from `ws.v`, and adds both, as `ws.dv`, to `ws.v`.
+/// Solves the assembled contacts for the free change `ws.y` (factor coordinates) from `ws.v`, and
+/// adds the total change `ws.dv` to `ws.v`.
 ///
-/// Newton's law of restitution with friction may have no answer: a wheel that two slopes hold by friction can not leave both. Where the solver
-/// finds none the impact is inelastic, which always has one, since on a ground at rest standing still is admissible.
+/// Newton's law of restitution with friction may have no solution: a wheel held by friction between
+/// two slopes cannot leave both. If the solver finds none, the impact is taken as inelastic. That
+/// problem always has a solution, since rest is admissible on ground at rest.
 ///
-/// Starts from `ws.p`. `is_from_start`: `ws.v` is still the velocity before the step, whose local velocity is known.
+/// Starts from `ws.p`. `is_from_start`: `ws.v` is still the velocity before
+/// the step, whose local velocity is known.
 pub(super) fn solve_contacts<S: MechanicalSystem>(
     system: &S,
     options: &StepOptions,
@@ -449,7 +469,7 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
             solved = solve_problem(system, options, ws);
             report.retaken = 1;
         }
-        // u came with the shift inside: take it out again.
+        // u contains the shift: remove it.
         for ((u, contact), before) in
             (ws.u.chunks_exact_mut(d).zip(&ws.contacts)).zip(ws.u_before.chunks_exact(d))
         {
@@ -480,7 +500,7 @@ fn add_shifts<S: MechanicalSystem>(
     }
 }
 
-/// Solves the assembled problem from `ws.p`, at the cost of the step's budget.
+/// Solves the assembled problem from `ws.p` and charges the step's budget.
 fn solve_problem<S: MechanicalSystem>(
     system: &S,
     options: &StepOptions,
@@ -507,7 +527,8 @@ pub(super) fn note(report: &mut StepReport, solved: &SolveReport) {
     }
 }
 
-/// Projects the position, checks that all is finite, and only then changes state and warm start.
+/// Projects the position, checks that everything is finite, and only then changes state and warm
+/// start.
 pub(super) fn finish<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,

@@ -1,20 +1,23 @@
 //! Moreau–Jean with Newton on the forces at the end of the step, in momentum form.
 //!
-//! Unknown v⁺ (and p). With the mean velocity `v̄ = θ v⁺ + (1−θ) v`, `q⁺ = q ⊕ h v̄`, `q_m = q ⊕ θ h v̄`, and the momentum `(P_i, L_i)` of body i
-//! about a point fixed in the world, d'Alembert's principle over the step reads, for every velocity k with screw S_k(q_m),
+//! Unknown v⁺ (and p). With the mean velocity `v̄ = θ v⁺ + (1−θ) v`, `q⁺ = q ⊕ h v̄`,
+//! `q_m = q ⊕ θ h v̄`, and the momentum `(P_i, L_i)` of body i about a point fixed in the world,
+//! d'Alembert's principle over the step reads, for every velocity k with screw S_k(q_m),
 //!
 //! ```text
 //! Σ_{i moved by k} S_k · (ΔP_i − h m_i g, ΔL_i − h c̄_i × m_i g) = h τ_k + (H(q⁺) p + r)_k
 //! ```
 //!
-//! Momenta at both ends are evaluated exactly, so no bias is needed and, summed over the base's six screws, total linear and
-//! angular momentum change by the impulses alone: in free flight they are conserved to the tolerance of the iteration, at
-//! any step. For θ = ½ the scheme is symmetric and of order 2: the energy of free flight swings with the third power of the turn in a step
-//! and does not drift, and the audit ([`super::energy_audit`]) lets it, since taking it out would cost the momentum. The iteration uses M̂(q_m) as its matrix, which
-//! differs from the true Jacobian by O(h) and converges by that factor.
+//! Momenta at both ends are evaluated exactly, so no bias is needed. Summed over the base's six
+//! screws, total linear and angular momentum change by the impulses alone: free flight conserves
+//! them to the tolerance of the iteration, at any step. For θ = ½ the scheme is symmetric and of
+//! order 2. The energy of free flight oscillates with the third power of the rotation per step and
+//! does not drift; the audit ([`super::energy_audit`]) accepts this, since a correction would
+//! violate the momentum. The iteration matrix M̂(q_m) differs from the true Jacobian by O(h), which
+//! is also the convergence factor.
 //!
-//! Source: the discrete d'Alembert principle, as in Simo and Wong 1991 for one body; contacts and the
-//! correction r as in [`super::moreau_jean`].
+//! Source: the discrete d'Alembert principle, as in Simo and Wong 1991 for one body; contacts and
+//! the correction r as in [`super::moreau_jean`].
 
 use super::energy_audit::{Audit, GAIN, Verdict, energy_before};
 use super::error::StepError;
@@ -29,13 +32,14 @@ use super::report::{StepReport, StepStatus};
 use super::warm_start::WarmStart;
 use super::{Integrator, KeyOf, ScratchOf, StateMut};
 
-/// Relative change below which an iteration that no longer shrinks has met rounding.
+/// Relative change below which an iteration that no longer contracts has reached rounding.
 const ROUNDING: f64 = 1e-8;
 
-/// Iterates in a row whose contacts were not solved after which the iteration is given up.
+/// Consecutive iterates with unsolved contacts after which the iteration stops.
 const MOST_UNSOLVED: usize = 2;
 
-/// Turn in a step, rad, up to which the energy of free flight may err with the third power of the turn, as a part of itself.
+/// Rotation in a step, rad, up to which the relative energy error of free flight may grow with the
+/// third power of the rotation.
 const MOST_TURN: f64 = 0.1;
 
 /// The Newton variant.
@@ -82,11 +86,12 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
             report.residual = solved.residual;
             report.n_contacts = solved.n_contacts;
             report.newton_iterations = iteration + 1;
-            // A maximum passes over what is no number, so that has to be looked for.
+            // A maximum ignores NaN, so check for it.
             if !ws.v.iter().all(|x| x.is_finite()) {
                 break;
             }
-            // An iterate that obeys no law leads nowhere: smaller steps have other problems.
+            // Iterating on an iterate that violates the law is useless; smaller steps have
+            // different problems.
             unsolved = if solved.is_converged() {
                 0
             } else {
@@ -97,7 +102,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
             }
             let change = ws.dv.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let size = ws.v.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
-            // Settled, or as settled as rounding allows: no longer shrinking, and small.
+            // Converged, or as far as rounding allows: the change is small and no longer shrinks.
             let is_small = change <= options.newton_tolerance * size;
             let is_rounding = change <= ROUNDING * size && change >= 0.5 * last_change;
             last_change = change;
@@ -113,7 +118,8 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
             }
         }
         if !is_settled {
-            // An iterate that has not settled obeys no law: take the step that needs no iteration, and say so.
+            // An iterate that has not converged satisfies no law: take the linearised step and
+            // report it.
             let taken = MoreauJean.step(system, options, state, warm_start, ws, probe)?;
             return Ok(StepReport {
                 newton_iterations: report.newton_iterations,
@@ -147,7 +153,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
                 ..taken
             });
         }
-        // The contacts were measured at the end of the last iterate, which is the end of the step.
+        // The contacts were measured at the end of the last iterate, the end of the step.
         ws.gap_end.clear();
         ws.gap_end
             .extend(ws.contacts.iter().map(UnilateralContact::gap));
@@ -155,7 +161,8 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
     }
 }
 
-/// One iteration: `ws.v` moves by `ws.dv`. None where the mass matrix cannot be factored: the iterate has run away.
+/// One iteration: `ws.v` changes by `ws.dv`. None if the mass matrix cannot be factored, which
+/// means that the iterate has diverged.
 fn iterate<S: MechanicalSystem>(
     system: &mut S,
     options: &StepOptions,

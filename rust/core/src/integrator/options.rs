@@ -15,12 +15,12 @@ pub enum Variant {
     Newton,
 }
 
-/// What is done about penetration.
+/// Treatment of penetration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Stabilisation {
-    /// Nothing: it stays as the velocity law leaves it.
+    /// None: penetration stays as the velocity law leaves it.
     None,
-    /// Projection of the position onto gap ≥ 0 where more than `penetration_tolerance` was left.
+    /// Projection of the position onto gap ≥ 0 if penetration exceeds `penetration_tolerance`.
     #[default]
     Projection,
 }
@@ -38,19 +38,22 @@ pub struct StepOptions {
     pub time_step: f64,
     /// θ of the θ-method, in [½, 1]. Default ½: order 2.
     pub theta: f64,
-    /// γ of the contact forecast `gap + γ h u_N ≤ 0`, in [0, 1]. Default ½, as the reference runs.
+    /// γ of the contact forecast `gap + γ h u_N ≤ 0`, in [0, 1]. Default ½, as in the reference
+    /// runs.
     pub forecast: f64,
     /// Scheme. Default linearised.
     pub variant: Variant,
     /// Default projection.
     pub stabilisation: Stabilisation,
-    /// Penetration that is left alone, m. Default 1e-8: what one step of driving adds on a plane is below it.
+    /// Penetration that is tolerated, m. Default 1e-8: one step of driving on a plane adds less.
     pub penetration_tolerance: f64,
     /// Whether the solver starts from the last step's impulses. Default true.
     pub warm_start: bool,
-    /// Options of the contact solver. Default tolerance 1e-12: 5% dearer than 1e-10 on a drive, and a rover at rest is at rest.
+    /// Options of the contact solver. Default tolerance 1e-12: it costs 5% more than 1e-10 on a
+    /// drive, and a parked rover stays at rest.
     pub solver: SolverOptions,
-    /// Newton variant: stop when no velocity changes by more than this, relative to 1 m/s and to the largest. Default 1e-12.
+    /// Newton variant: stop when no velocity changes by more than this, relative to 1 m/s and to
+    /// the largest velocity. Default 1e-12.
     pub newton_tolerance: f64,
     /// Newton variant: most iterations. Default 20.
     pub newton_max_iterations: usize,

@@ -1,12 +1,13 @@
 //! Removal of penetration: projection of the position onto gap ≥ 0 (combined scheme).
 //!
-//! The displacement is that of a friction-contact problem at position level, with the step's own operator:
-//! `d = W λ + (gap, 0, 0)`, `0 ≤ d_N ⊥ λ_N ≥ 0`, and Coulomb's law on the tangential displacement. The friction keeps a parked rover from
-//! being shifted down its slope by the correction. It runs only where more than `penetration_tolerance` is left, and leaves
-//! alone a contact that is bouncing off and will be out by itself after the next step.
+//! The displacement solves a friction-contact problem at position level with the operator of the
+//! step: `d = W λ + (gap, 0, 0)`, `0 ≤ d_N ⊥ λ_N ≥ 0`, and Coulomb's law on the tangential
+//! displacement. Friction prevents the correction from shifting a parked rover down its slope. The
+//! projection runs only if penetration exceeds `penetration_tolerance`, and it skips a contact that
+//! is bouncing off and will have separated after the next step.
 //!
-//! Source: Acary 2013, *Projected event-capturing time-stepping schemes for nonsmooth mechanical systems with unilateral
-//! contact and Coulomb's friction*, CMAME 256, 224–250.
+//! Source: Acary 2013, *Projected event-capturing time-stepping schemes for nonsmooth mechanical
+//! systems with unilateral contact and Coulomb's friction*, CMAME 256, 224–250.
 
 use super::ScratchOf;
 use super::mechanical_system::MechanicalSystem;
@@ -16,7 +17,7 @@ use super::report::StepReport;
 use crate::problem::{FrictionContactProblem, Operator};
 use crate::solver::{SolveReport, SolveStatus, solve};
 
-/// Corrects `ws.end`, where the contacts are predicted to have the gaps `ws.gap_end`; tells whether it has moved.
+/// Corrects `ws.end`, where the contacts have the predicted gaps `ws.gap_end`; true if it moved.
 pub(super) fn project<S: MechanicalSystem>(
     system: &S,
     options: &StepOptions,
@@ -48,12 +49,13 @@ pub(super) fn project<S: MechanicalSystem>(
     let mut solved = displace(system, options, ws, 0.0);
     let is_finite = solved.status != SolveStatus::NonFinite;
     if is_finite && (!solved.is_converged() || size(system, ws) > limit) {
-        // Friction locks a wedge, or fights itself over nanometres: the shortest way out needs none.
+        // Friction locks a wedge, or stalls over nanometres: retry without friction, along the
+        // shortest way out.
         ws.mu.fill(0.0);
         solved = displace(system, options, ws, 0.0);
         if !solved.is_converged() {
-            // Nothing frees what is wedged between gaps that face each other. As if the ground yielded a little there is an answer, which takes
-            // each as far as the others let it.
+            // A part wedged between opposed contacts cannot be freed. With slightly compliant
+            // ground the problem has a solution, which opens each gap as far as the others allow.
             solved = displace(system, options, ws, COMPLIANCE);
         }
         set_friction(system, options, &ws.contacts, &mut ws.mu);
@@ -64,10 +66,11 @@ pub(super) fn project<S: MechanicalSystem>(
     true
 }
 
-/// Compliance of the ground where nothing else frees a wedged machine, relative to W's own.
+/// Compliance of the ground for a wedged machine that nothing else frees, relative to that of W.
 const COMPLIANCE: f64 = 1e-2;
 
-/// Solves for the displacement `ws.dv` with the coefficients in `ws.mu`, on ground of a compliance relative to W's mean.
+/// Solves for the displacement `ws.dv` with the coefficients in `ws.mu`, on
+/// ground of a compliance relative to W's mean.
 fn displace<S: MechanicalSystem>(
     system: &S,
     options: &StepOptions,
@@ -108,16 +111,19 @@ fn displace<S: MechanicalSystem>(
     solved
 }
 
-/// How far a displacement goes, m: the contacts' points, and what the system counts beside them.
+/// Size of a displacement, m: the largest at the contact points and at the points that the system
+/// adds.
 fn size<S: MechanicalSystem>(system: &S, ws: &ScratchOf<S>) -> f64 {
-    // d = W λ is what the answer u = d + (gap, 0, 0) holds beside the gaps.
+    // The answer is u = d + (gap, 0, 0) with d = W λ: subtract the gaps.
     let points = ws.u_position.iter().zip(&ws.q_free).map(|(u, q)| u - q);
     let elsewhere = system.displacement(&ws.dv);
     points.fold(elsewhere, |m, d| m.max(d.abs()))
 }
 
-/// How far a displacement may go, as a multiple of the deepest penetration; the rest is left to the next steps.
+/// Largest displacement, as a multiple of the deepest penetration; the rest is left to the next
+/// steps.
 ///
-/// A wheel that an impact left in the wedge between a stone and the ground is locked there by friction: the linearised problem
-/// then has its answer a metre away, and a rover was thrown up by that much over 2 cm.
+/// Friction locks a wheel that an impact left wedged between a stone and the ground. The solution
+/// of the linearised problem may then lie a metre away: without this limit a penetration of 2 cm
+/// threw a rover up by that much.
 const FARTHEST: f64 = 4.0;

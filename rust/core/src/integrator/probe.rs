@@ -1,4 +1,4 @@
-//! Where the time of a step goes.
+//! Timing of the parts of a step.
 
 /// Part of a step that has just ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -23,13 +23,13 @@ pub enum Phase {
     Projection,
 }
 
-/// Hears when each part of a step ends.
+/// Receives the end of each part of a step.
 pub trait Probe {
     /// `phase` has just ended.
     fn end(&mut self, phase: Phase);
 }
 
-/// Hears nothing.
+/// Ignores all events.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoProbe;
 

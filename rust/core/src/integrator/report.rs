@@ -1,4 +1,4 @@
-//! What a step says of itself.
+//! Report of a step.
 
 /// Whether the equations of the step were solved to their tolerance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -6,7 +6,8 @@ pub enum StepStatus {
     /// They were.
     #[default]
     Converged,
-    /// The contact solver, or Newton's iteration, stopped above its tolerance; the state is the best it had.
+    /// The contact solver or Newton's iteration stopped above its tolerance; the state is the best
+    /// one found.
     NotConverged,
 }
 
@@ -25,13 +26,15 @@ pub struct StepReport {
     pub residual: f64,
     /// Most contacts in a step.
     pub n_contacts: usize,
-    /// Steps that were taken again: a motor changed its branch, the energy asked for a safer way, or Newton's law of restitution had no answer.
+    /// Repeated steps: a motor changed its branch, the energy audit required it, or Newton's law of
+    /// restitution had no solution.
     pub retaken: usize,
-    /// Largest gain of energy in a step beyond the work of gravity and actuators, as a part of its kinetic energy.
+    /// Largest energy gain in a step beyond the work of gravity and actuators, as a fraction of its
+    /// kinetic energy.
     pub energy_gain: f64,
-    /// Energy that the scheme would have gained and that the audit took out, all steps together, J.
+    /// Energy that the scheme would have gained and the audit removed, all steps together, J.
     pub energy_removed: f64,
-    /// Energy that lifting out of penetration gave, all steps together, J.
+    /// Energy that position projection added, all steps together, J.
     pub energy_lifted: f64,
 }
 

@@ -1,16 +1,18 @@
-//! Scratch of a step that every system shares: vectors over velocities and over contacts.
+//! Scratch of a step, common to all systems: vectors over velocities and over contacts.
 
 use super::energy_audit::Audited;
 use crate::solver::{SolverOptions, SolverWorkspace};
 
-/// Scratch of a step of configurations `Q` and contacts `C`. Nothing in it is state: a fresh one gives the same bits.
+/// Scratch of a step of configurations `Q` and contacts `C`. Nothing in it
+/// is state: a fresh one gives the same bits.
 ///
-/// After a step it tells what the step did: contacts, impulses, local velocities, all measured at the step's end.
+/// After a step it holds the step's contacts, impulses and local velocities, all measured at its
+/// end.
 #[derive(Clone, Debug)]
 pub struct Scratch<Q, C> {
     pub(super) middle: Q,
     pub(super) end: Q,
-    /// A generalized impulse (nv), N s and N m s, until it is turned into factor coordinates.
+    /// A generalized impulse (nv), N s and N m s, before its conversion into factor coordinates.
     pub(super) impulse: Vec<f64>,
     /// The change of the velocity in factor coordinates (nv), `y = F Δv`.
     pub(super) y: Vec<f64>,
@@ -20,7 +22,7 @@ pub struct Scratch<Q, C> {
     pub(super) correction: Vec<f64>,
     /// Forecast of the contacts' generalized impulse (nv).
     pub(super) forecast: Vec<f64>,
-    /// Velocity at the end of the step (nv), and where forces are evaluated.
+    /// Velocity at the end of the step (nv), and the one at which forces are evaluated.
     pub(super) v: Vec<f64>,
     pub(super) v_mean: Vec<f64>,
     pub(super) contacts: Vec<C>,
@@ -35,16 +37,18 @@ pub struct Scratch<Q, C> {
     pub(super) u_position: Vec<f64>,
     pub(super) solver: SolverWorkspace,
     pub(super) audited: Audited<Q>,
-    /// Work that the step's solves may still do, in the solver's unit.
+    /// Work left for the step's solves, in the solver's unit.
     pub(super) work_left: u64,
 }
 
-/// Share of the solver's budget that all solves of a step have together, and the share that each has in any case.
+/// Divisors of the solver's budget: for all solves of a shared step together, and for the least
+/// that each solve gets.
 const STEP_SHARE: u64 = 4;
 const SOLVE_SHARE: u64 = 64;
 
 impl<Q: Clone, C> Scratch<Q, C> {
-    /// Room for nv velocities and n contacts of d components; `q` is any configuration of the right size.
+    /// Room for nv velocities and n contacts of d components; `q` is any
+    /// configuration of the right size.
     #[must_use]
     pub fn new(q: &Q, nv: usize, n: usize, d: usize) -> Self {
         let room = || Vec::with_capacity(d * n);
@@ -89,21 +93,21 @@ impl<Q: Clone, C> Scratch<Q, C> {
         }
     }
 
-    /// `y = F⁻ᵀ impulse`: the impulse into factor coordinates. What `impulse` holds then is of no use.
+    /// `y = F⁻ᵀ impulse`: the impulse into factor coordinates. Destroys `impulse`.
     #[inline]
     pub(super) fn half_solve(&mut self, half_solve: impl FnOnce(&mut [f64])) {
         half_solve(&mut self.impulse);
         std::mem::swap(&mut self.impulse, &mut self.y);
     }
 
-    /// `dv = F⁻¹ y`: factor coordinates into a velocity. What `y` holds then is of no use.
+    /// `dv = F⁻¹ y`: factor coordinates into a velocity. Destroys `y`.
     #[inline]
     pub(super) fn half_solve_back(&mut self, half_solve_back: impl FnOnce(&mut [f64])) {
         half_solve_back(&mut self.y);
         std::mem::swap(&mut self.y, &mut self.dv);
     }
 
-    /// Grants a new step its work: a share of a solve's, where it may solve several times.
+    /// Sets the work of a new step: all of a solve's budget, or a fraction if the step shares it.
     pub(super) fn grant_work(&mut self, options: &SolverOptions, is_shared: bool) {
         self.work_left = options.budget / if is_shared { STEP_SHARE } else { 1 };
     }

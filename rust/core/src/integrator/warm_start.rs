@@ -1,20 +1,21 @@
-//! What one step hands to the next: impulses by contact.
+//! Warm start: the impulses of one step, by contact, for the next.
 
 use serde::{Deserialize, Serialize};
 
 use super::mechanical_system::UnilateralContact;
 use crate::contact::ContactKey;
 
-/// From how many remembered contacts on a bisection is tried before a search.
+/// Number of remembered contacts from which bisection is tried before a linear search.
 const MANY: usize = 64;
 
-/// Impulses of the last step by contact: where the next solve starts. Part of what a snapshot holds.
+/// Impulses of the last step by contact, from which the next solve starts. A snapshot contains
+/// them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WarmStart<K = ContactKey> {
     /// (key, impulse along n, t, b in N s; b is 0 in the plane), in the order of detection.
     pub impulses: Vec<(K, [f64; 3])>,
-    /// Generalized impulse of persistent contact in the last step (nv), N s and N m s; empty where a contact was new,
-    /// left, or struck.
+    /// Generalized impulse of persistent contact in the last step (nv), N s and N m s; empty if a
+    /// contact was new, separated or in impact.
     pub persistent: Vec<f64>,
 }
 
@@ -42,14 +43,15 @@ impl<K> WarmStart<K> {
 }
 
 impl<K: Copy + Ord> WarmStart<K> {
-    /// Fills `p` (d n_c) with what is remembered of these contacts, zero for new ones.
+    /// Fills `p` (d n_c) with the remembered impulses of these contacts, zero for new ones.
     pub fn recall<C: UnilateralContact<Key = K>>(&self, contacts: &[C], d: usize, p: &mut [f64]) {
-        // A few are found by looking around, many by bisection where detection lists them in the order of their keys.
+        // A linear search finds a few contacts, bisection many if detection lists them in the order
+        // of their keys.
         let is_sorted =
             self.impulses.len() > MANY && self.impulses.is_sorted_by_key(|(key, _)| *key);
         for (i, (contact, out)) in contacts.iter().zip(p.chunks_exact_mut(d)).enumerate() {
             let wanted = contact.key();
-            // Mostly the same contacts in the same order: look at the same place first.
+            // Mostly the contacts and their order are unchanged: look at the same place first.
             let same = self.impulses.get(i).filter(|(key, _)| *key == wanted);
             let found = same.or_else(|| {
                 if is_sorted {
@@ -114,7 +116,7 @@ mod tests {
             let mut memory = WarmStart::default();
             memory.remember(&contacts, 2, &p);
             assert!(memory.is_of(&contacts));
-            // One lost, one new, the others one place on.
+            // One lost, one new, the others shifted by one place.
             let later: Vec<Named> = keys[1..]
                 .iter()
                 .map(|&k| Named(k))

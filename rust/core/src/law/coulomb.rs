@@ -1,9 +1,9 @@
 //! Coulomb's friction in De Saxcé's form: `K_μ* ∋ ũ ⊥ p ∈ K_μ` with `ũ = u + μ|u_T| n`.
 //!
-//! Together with Signorini's condition this says: open (`p = 0`, `u_N ≥ 0`), stick (`u = 0`, `|p_T| ≤ μ p_N`), or
-//! slide (`u_N = 0`, `p_T = −μ p_N u_T/|u_T|`). The shift `μ|u_T| n` makes the law nonassociated; without it a sliding
-//! contact would lift off with the velocity `μ|u_T|` (the convex relaxation). Source: De Saxcé and Feng 1998; Acary and
-//! Brogliato 2008, ch. 3.
+//! Together with Signorini's condition this says: open (`p = 0`, `u_N ≥ 0`), stick (`u = 0`,
+//! `|p_T| ≤ μ p_N`), or slide (`u_N = 0`, `p_T = −μ p_N u_T/|u_T|`). The shift `μ|u_T| n` makes the
+//! law nonassociated; without it a sliding contact would lift off with the velocity `μ|u_T|` (the
+//! convex relaxation). Source: De Saxcé and Feng 1998; Acary and Brogliato 2008, ch. 3.
 
 use super::signorini;
 use crate::cone::{SecondOrderCone, project_on_disc, tangential_norm};
@@ -22,7 +22,8 @@ pub enum ContactMode {
 
 /// De Saxcé's modified velocity `ũ = u + μ|u_T| n`, m/s.
 ///
-/// `u`: local velocity `[normal, tangent, (tangent)]`, m/s, restitution already added to the normal.
+/// `u`: local velocity `[normal, tangent, (tangent)]`, m/s, restitution
+/// already added to the normal.
 #[inline]
 #[must_use]
 pub fn modified_velocity<const D: usize>(u: &[f64; D], friction_coefficient: f64) -> [f64; D] {
@@ -33,8 +34,8 @@ pub fn modified_velocity<const D: usize>(u: &[f64; D], friction_coefficient: f64
 
 /// Natural map of one contact, `p − Π_K(p − ρ ũ)`, N s: zero exactly where the law holds.
 ///
-/// `p`: impulse, N s. `u`: velocity, m/s. `rho`: positive scale, kg. Divided by `rho` it is the violation in m/s
-/// (by Moreau's split it equals `ρ (ũ − Π_K*(ũ − p/ρ))`).
+/// `p`: impulse, N s. `u`: velocity, m/s. `rho`: positive scale, kg. Divided by `rho` it is the
+/// violation in m/s (by Moreau's split it equals `ρ (ũ − Π_K*(ũ − p/ρ))`).
 #[inline]
 #[must_use]
 pub fn natural_map<const D: usize>(
@@ -56,17 +57,19 @@ pub fn natural_map<const D: usize>(
     map
 }
 
-/// Violation of Signorini's condition and of Coulomb's law by one contact, each as a velocity (m/s); zero exactly where both hold.
+/// Violation of Signorini's condition and of Coulomb's law by one contact,
+/// each as a velocity (m/s); zero exactly where both hold.
 ///
 /// ```text
 /// normal      min(u_N, p_N/ρ_N)
 /// tangential  (p_T − Π_D(p_T − ρ_T u_T))/ρ_T,   D the disc of radius μ max(p_N, 0)
 /// ```
 ///
-/// `p`: impulse, N s. `u`: velocity, m/s. `rho`: `[ρ_N, ρ_T]`, kg, about the inverse diagonal of the contact's block of W. Unlike the
-/// [natural map](natural_map) it has no product of μ and a velocity, which at a large μ leaves no digit for `u_N`: `p = 0` at
-/// `u = (−1, 1)` is a zero of the natural map in floating point from μ = 1e16 on, and nearly one from 1e8 on.
-/// Source: Alart and Curnier 1991.
+/// `p`: impulse, N s. `u`: velocity, m/s. `rho`: `[ρ_N, ρ_T]`, kg, about the inverse diagonal of
+/// the contact's block of W. Unlike the [natural map](natural_map) it does not multiply a velocity
+/// by μ, a product that swamps the digits of `u_N` when μ is large: in floating point `p = 0` at
+/// `u = (−1, 1)` is a zero of the natural map from μ = 1e16 on, and nearly one from 1e8 on. Source:
+/// Alart and Curnier 1991.
 #[inline]
 #[must_use]
 pub fn violation<const D: usize>(

@@ -1,10 +1,12 @@
-//! The contact laws, one contact at a time: what must hold between the local velocity `u` and the impulse `p`.
+//! The contact laws, one contact at a time: what must hold between the
+//! local velocity `u` and the impulse `p`.
 //!
 //! - [`signorini`]: no penetration velocity, no adhesion, `0 ≤ u_N ⊥ p_N ≥ 0`;
 //! - [`newton_impact`]: restitution enters as a shift of the free normal velocity;
 //! - [`coulomb`]: friction, as De Saxcé's cone complementarity `K_μ* ∋ u + μ|u_T| n ⊥ p ∈ K_μ`.
 //!
-//! Vectors are `[normal, tangent, (tangent)]`, velocities in m/s and impulses in N s. A law never sees a solver.
+//! Vectors are `[normal, tangent, (tangent)]`, velocities in m/s and
+//! impulses in N s. A law never sees a solver.
 
 pub mod coulomb;
 pub mod newton_impact;

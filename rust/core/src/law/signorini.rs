@@ -2,13 +2,13 @@
 
 /// Violation of `0 ≤ u_N ⊥ p_N ≥ 0` as a velocity, `|min(u_N, p_N/ρ)|` (m/s).
 ///
-/// `u_N`: normal velocity after the impact, m/s, restitution already added. `p_N`: normal impulse, N s.
-/// `rho`: scale in kg that turns a velocity into an impulse, about `1/W_NN`.
+/// `u_N`: normal velocity after the impact, m/s, restitution already added. `p_N`: normal impulse,
+/// N s. `rho`: scale in kg that turns a velocity into an impulse, about `1/W_NN`.
 #[inline]
 #[must_use]
 pub fn violation(u_N: f64, p_N: f64, rho: f64) -> f64 {
     let pressed = p_N / rho;
-    // A velocity that is no number stays one.
+    // A NaN velocity stays NaN.
     if pressed <= u_N {
         pressed.abs()
     } else {

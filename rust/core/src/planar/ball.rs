@@ -1,11 +1,13 @@
 //! The ball of the report's section 3.1: a disc with the coordinates (x, y, θ).
 //!
 //! ```text
-//! m ẍ = F_x,   m ÿ = −m g + F_y,   J θ̈ = r t · F     with F = n p_N + t p_T at the rim point E = c − r n
+//! m ẍ = F_x,   m ÿ = −m g + F_y,   J θ̈ = r t · F
+//! F = n p_N + t p_T at the rim point E = c − r n
 //! ```
 //!
-//! so the columns of H are (n, 0) and (t, r): the normal row is the gap's gradient, and turning does not change the gap. The report's
-//! (3.8) has the opposite sign, and its (3.17) turns the contact point with the ball.
+//! so the columns of H are (n, 0) and (t, r): the normal row is the gap's
+//! gradient, and turning does not change the gap. The report's (3.8) has the
+//! opposite sign, and its (3.17) turns the contact point with the ball.
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
@@ -81,7 +83,7 @@ impl PlanarMachine<3> for Ball {
         1
     }
 
-    /// It looks alike from all sides.
+    /// It looks the same from all sides.
     fn turning(&self, _v: &SVector<f64, 3>) -> f64 {
         0.0
     }

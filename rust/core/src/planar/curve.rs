@@ -1,11 +1,14 @@
-//! Smooth grounds `y = f(x)`: line, sine, table of points; and the search for the points that face a centre.
+//! Smooth grounds `y = f(x)`: a line, a sine, a table of points; and the search for the points
+//! that face a centre.
 //!
-//! With the centre c and `D(x) = ½ |(x, f(x)) − c|²` the points sought are the minima of D, roots of
-//! `g(x) = (x − c_x) + (f(x) − c_y) f'(x)` where g rises. On a cell [a, b] with the bounds |f''| ≤ B₂ etc. a centre value that
-//! |g'|'s bound cannot bring to zero excludes roots, a derivative that |g''|'s bound cannot bring to zero leaves one at most, and any
-//! other cell is halved: no root is missed. Cells are looked at in the order of the least distance that their curve can have, so the search ends
-//! with the reach, from inside the ground with the nearest root, and with the [`MAX_FACING`] nearest where there are more. A root pair closer than
-//! 1e-9 of the window, or of a metre, is none.
+//! With the centre c and `D(x) = ½ |(x, f(x)) − c|²`, the search finds the minima of D: the roots
+//! of `g(x) = (x − c_x) + (f(x) − c_y) f'(x)` at which g rises. It works on cells [a, b] with the
+//! bounds |f''| ≤ B₂ and so on. A cell has no root if g at its centre is larger than the bound on
+//! |g'| lets g change in half the cell. It has at most one if the same holds of g' and the bound
+//! on |g''|. Any other cell is halved, so no root is missed. Cells are visited in the order of the
+//! least distance that their curve can have. The search therefore ends at the reach, from inside
+//! the ground at the nearest root, and at the [`MAX_FACING`] nearest roots where there are more.
+//! Two roots closer than 1e-9 of the window, or of a metre, count as none.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -24,7 +27,7 @@ const SLOPES: Range = Range {
     words: "at most 1000 either way",
 };
 
-/// Wavelengths, m: a disc rolls over shorter ones as over roughness.
+/// Wavelengths, m: shorter ones are mere roughness to a disc.
 const WAVELENGTHS: Range = Range {
     ends: [1e-3, 1e9],
     words: "from 1e-3 to 1e9 m",
@@ -129,7 +132,8 @@ pub struct Sine {
 
 impl Sine {
     /// # Errors
-    /// A number that is not finite or out of its range: wavelengths from a millimetre, slopes `2π amplitude/wavelength` up to 1000.
+    /// A number that is not finite or out of its range: wavelengths from a millimetre, slopes
+    /// `2π amplitude/wavelength` up to 1000.
     pub fn new(
         amplitude: f64,
         wavelength: f64,
@@ -187,7 +191,8 @@ impl Curve for Sine {
     }
 }
 
-/// The natural cubic spline through a table of points, continued beyond its ends by its tangents there: C² everywhere.
+/// The natural cubic spline through a table of points, continued beyond its
+/// ends by its tangents there: C² everywhere.
 ///
 /// Source: de Boor 1978, *A Practical Guide to Splines*, ch. 4.
 #[derive(Clone, Debug, PartialEq)]
@@ -202,7 +207,8 @@ impl Spline {
     /// `x`: strictly increasing, m. `y`: heights, m.
     ///
     /// # Errors
-    /// Fewer than two points, other lengths, entries that are not finite, or x that does not increase.
+    /// Fewer than two points, other lengths, entries that are not finite,
+    /// or x that does not increase.
     pub fn new(x: &[f64], y: &[f64]) -> Result<Self, PlanarError> {
         check_points(x, y)?;
         for (index, pair) in x.windows(2).enumerate() {
@@ -216,7 +222,8 @@ impl Spline {
         }
         let n = x.len();
         let mut m = vec![0.0; n];
-        // Thomas' algorithm on h_{i-1} m_{i-1} + 2 (h_{i-1} + h_i) m_i + h_i m_{i+1} = 6 (slope_i − slope_{i-1}), m_0 = m_{n-1} = 0.
+        // Thomas' algorithm on h_{i-1} m_{i-1} + 2 (h_{i-1} + h_i) m_i + h_i
+        // m_{i+1} = 6 (slope_i − slope_{i-1}), m_0 = m_{n-1} = 0.
         let mut upper = vec![0.0; n];
         for i in 1..n - 1 {
             let (h0, h1) = (x[i] - x[i - 1], x[i + 1] - x[i]);
@@ -293,7 +300,8 @@ impl Curve for Spline {
     }
 
     fn range(&self, a: f64, b: f64) -> [f64; 2] {
-        // Beyond the table the curve is straight, so its ends bound it; within a piece it leaves the chord by max|f''| h²/8 at most.
+        // Beyond the table the curve is straight, so its ends bound it; within a piece it leaves
+        // the chord by max|f''| h²/8 at most.
         let ends = [self.jet(a)[0], self.jet(b)[0]];
         let mut range = [ends[0].min(ends[1]), ends[0].max(ends[1])];
         let (first, last) = (self.x[0], self.x[self.x.len() - 1]);
@@ -400,7 +408,7 @@ fn facing(curve: &dyn Curve, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Fa
         return;
     }
     let begin = out.len();
-    // A little more than the window: a foot at its very end is a root at its very end.
+    // Slightly more than the window: a foot at its very end is a root at its very end.
     let (a, b) = (
         centre.x - half * (1.0 + 1e-6),
         centre.x + half * (1.0 + 1e-6),
@@ -421,7 +429,7 @@ fn facing(curve: &dyn Curve, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Fa
             });
         }
         let is_enough = out.len() - begin >= MAX_FACING;
-        // From inside only the nearest counts: nothing farther is looked for.
+        // From inside only the nearest counts: search no farther.
         match (is_enough, is_inside) {
             (true, _) => 0.0,
             (false, true) => distance,
@@ -432,14 +440,14 @@ fn facing(curve: &dyn Curve, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Fa
     if is_inside {
         keep_nearest(out, begin);
         if out.len() == begin {
-            // So deep that its nearest points are all alike to a double: straight up.
+            // So deep that all distances are equal in double precision: straight up.
             let [y, slope, ..] = curve.jet(centre.x);
             out.push(tangent_facing(centre, y, slope));
         }
     }
 }
 
-/// Of what was appended since `begin`, keeps the shallowest.
+/// Keeps the shallowest of the points appended since `begin`.
 pub(super) fn keep_nearest(out: &mut Vec<Facing>, begin: usize) {
     let nearest = out[begin..]
         .iter()
@@ -456,10 +464,10 @@ fn gradient(curve: &dyn Curve, centre: &Vector2<f64>, x: f64) -> (f64, f64) {
     (x - centre.x + above * d1, 1.0 + d1 * d1 + above * d2)
 }
 
-/// Cells narrower than this share of the window, or of a metre, are not halved any more.
+/// Cells narrower than this fraction of the window, or of a metre, are not halved further.
 const NARROWEST: f64 = 1e-9;
 
-/// Most cells of one search. A disc that meets 64 points takes some thousand.
+/// Most cells of one search. A disc that touches 64 points takes some thousand.
 const MAX_CELLS: usize = 100_000;
 
 /// A cell of x and the least distance that the curve over it can have from the centre.
@@ -517,8 +525,8 @@ impl PartialEq for Cell {
 
 impl Eq for Cell {}
 
-/// Calls `found` with every minimum of the distance in [a, b], nearer cells first, up to a distance of `limit` (m) and then of the least that
-/// `found` returned.
+/// Calls `found` with every minimum of the distance in [a, b], nearer cells first, up to a distance
+/// of `limit` (m) and then of the least that `found` returned.
 fn minima(
     curve: &dyn Curve,
     centre: &Vector2<f64>,
@@ -672,7 +680,8 @@ mod tests {
         assert!((line.height(-2.0) + 3.0).abs() < 1e-12 && (line.height(9.0) - 19.0).abs() < 1e-12);
     }
 
-    /// A ball at y = −1e9 looked for its nearest point in every wavelength of two million kilometres and never came back.
+    /// A ball at y = −1e9 searched every wavelength within two million kilometres for its nearest
+    /// point and never returned.
     #[test]
     fn a_ball_a_million_kilometres_deep_finds_its_way_out_at_once() {
         let sine = Sine::new(1.0, 0.1, 0.0, 0.0).expect("sound");
@@ -687,7 +696,8 @@ mod tests {
                 (-found[0].distance / (depth - 1.0) - 1.0).abs() < 1e-7,
                 "{found:?}"
             );
-            // The spline goes on steeply downwards beyond its ends, and its side is nearer than its top.
+            // The spline continues steeply downwards beyond its ends, and its side is nearer than
+            // its top.
             let found = all(&spline, [17.3, -depth], 1.0);
             assert_eq!(found.len(), 1);
             assert!(

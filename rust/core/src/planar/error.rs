@@ -1,4 +1,4 @@
-//! Planar scenes that cannot be.
+//! Errors of planar scenes.
 
 use thiserror::Error;
 

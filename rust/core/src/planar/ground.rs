@@ -1,8 +1,9 @@
 //! The ground of a planar scene: where a disc touches it.
 //!
-//! The ground is what lies below a curve. A disc touches it at every point of the curve that is nearest to the disc's centre among its
-//! neighbours: one on a line, two in a valley that is narrower than the disc, a corner of a step. Seen from a centre inside the ground
-//! only the nearest point of all counts, and pushes out.
+//! The ground is the region below a curve. A disc touches it at every local minimum of the distance
+//! between curve and centre: one point on a line, two in a valley narrower than the disc, a corner
+//! of a step. For a centre inside the ground only the nearest point of all counts, and it pushes
+//! the disc out.
 
 use nalgebra::Vector2;
 
@@ -14,7 +15,7 @@ pub type Facing = crate::geometry::Facing<2>;
 /// Most points of the ground that face one disc: the nearest of more.
 pub const MAX_FACING: usize = 64;
 
-/// Of what was appended since `begin`, keeps what is wanted, in its order.
+/// Filters the points appended since `begin`, in their order.
 pub(super) fn keep_if(out: &mut Vec<Facing>, begin: usize, is_wanted: impl Fn(&Facing) -> bool) {
     let mut kept = begin;
     for k in begin..out.len() {
@@ -26,7 +27,7 @@ pub(super) fn keep_if(out: &mut Vec<Facing>, begin: usize, is_wanted: impl Fn(&F
     out.truncate(kept);
 }
 
-/// Of what was appended since `begin`, keeps the [`MAX_FACING`] nearest, in their order.
+/// Keeps the [`MAX_FACING`] nearest of the points appended since `begin`, in their order.
 pub(super) fn keep_few(out: &mut Vec<Facing>, begin: usize) {
     if out.len() - begin <= MAX_FACING {
         return;
@@ -38,27 +39,29 @@ pub(super) fn keep_few(out: &mut Vec<Facing>, begin: usize) {
     out.truncate(begin + MAX_FACING);
 }
 
-/// What planar machines stand on. Immutable, shared between threads.
+/// The ground of planar machines. Immutable, shared between threads.
 ///
-/// The points that face a centre are those whose distance is smallest among their neighbours, in the order of x, the [`MAX_FACING`] nearest of
-/// more; from inside the ground the nearest of all, at any depth.
+/// The points that face a centre are the local minima of the distance, in the order of x, and at
+/// most the [`MAX_FACING`] nearest. From inside the ground only the nearest of all counts, at any
+/// depth.
 pub trait Ground: Support<2> {
     /// Height of the ground at x, m; the upper one at a vertical face.
     fn height(&self, x: f64) -> f64;
 
-    /// The report's own rule: the point straight below the centre counts as nearest; its normal is the curve's there.
+    /// The report's own rule: the point straight below the centre counts as
+    /// nearest; its normal is the curve's there.
     ///
     /// The distance is that to the tangent, `(y − f(x))/√(1 + f'²)`, exact on a line.
     fn below(&self, centre: &Vector2<f64>) -> Facing;
 }
 
-/// How a disc meets a curve.
+/// Contact rule of a disc on a curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ContactRule {
     /// The curve's points nearest to the centre; the gap is their distance less the radius.
     #[default]
     Nearest,
-    /// As the report's examples: the gap is the height of the disc's *centre* over the curve, so the disc sinks in by its radius,
-    /// while friction acts at the radius. For comparison only.
+    /// As the report's examples: the gap is the height of the disc's *centre* over the curve, so
+    /// the disc sinks in by its radius, while friction acts at the radius. For comparison only.
     CentreHeight,
 }

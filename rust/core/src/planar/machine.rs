@@ -1,7 +1,8 @@
-//! Planar machines with few coordinates: what a machine says of itself, and the discs that touch the ground.
+//! The interface of planar machines with few coordinates, and the discs that touch the ground.
 //!
-//! [`crate::system::planar`] makes a mechanical system of a machine on a ground. Frames follow the rover's: n out of the ground,
-//! t = n × e_z, forward on level ground; a positive angle turns to the left, so a disc that rolls forward turns negatively.
+//! [`crate::system::planar`] turns a machine on a ground into a mechanical system. Frames follow
+//! the rover's: n points out of the ground, and t = n × e_z points forward on level ground. Angles
+//! are positive to the left, so the angle of a disc that rolls forward decreases.
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
@@ -16,12 +17,12 @@ pub struct Disc {
     pub radius: f64,
 }
 
-/// The motors behind a torque: alike, and with one angle.
+/// The motors of one torque: equal, and with a common angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarMotor {
     /// Torque–speed line of each.
     pub motor: Motor,
-    /// The coordinate that they turn, relative to what carries them.
+    /// The coordinate that they drive, relative to their carrier.
     pub coordinate: usize,
     /// Torque about that coordinate of a unit forward: their number and their sign.
     pub gain: f64,
@@ -29,13 +30,14 @@ pub struct PlanarMotor {
 
 /// A machine with `NV` coordinates whose velocities are their rates.
 ///
-/// The first two coordinates are a place in the world, m; the others angles, rad, positive to the left.
+/// The first two coordinates are a place in the world, m; the others
+/// angles, rad, positive to the left.
 pub trait PlanarMachine<const NV: usize>: std::fmt::Debug + Send + Sync {
     /// `M(q)`, kg, kg m, kg m².
     fn mass_matrix(&self, q: &SVector<f64, NV>) -> SMatrix<f64, NV, NV>;
 
-    /// `F(q, v)`, N and N m: gravity (m/s²), torques (`torques`, N m, positive forward) and what is quadratic in v, so that `M v̇ = F` without
-    /// contacts.
+    /// `F(q, v)`, N and N m: gravity (m/s²), torques (`torques`, N m, positive forward) and terms
+    /// quadratic in v, so that `M v̇ = F` without contacts.
     fn force(
         &self,
         q: &SVector<f64, NV>,
@@ -55,12 +57,12 @@ pub trait PlanarMachine<const NV: usize>: std::fmt::Debug + Send + Sync {
         f64::INFINITY
     }
 
-    /// Motors behind torque i; by default none, and the torque is the command at any speed.
+    /// Motors of torque i; by default none, and the torque is the command at any speed.
     fn motor(&self, _i: usize) -> Option<PlanarMotor> {
         None
     }
 
-    /// Fastest turning of a frame whose pose matters, rad/s.
+    /// Largest angular speed of a frame whose pose matters, rad/s.
     fn turning(&self, v: &SVector<f64, NV>) -> f64;
 
     /// Number of discs.
@@ -69,7 +71,8 @@ pub trait PlanarMachine<const NV: usize>: std::fmt::Debug + Send + Sync {
     /// Disc i.
     fn disc(&self, i: usize, q: &SVector<f64, NV>) -> Disc;
 
-    /// Velocity of the material point of disc i at `point` (world, m) per unit of each coordinate's rate.
+    /// Velocity of the material point of disc i at `point` (world, m) per
+    /// unit of each coordinate's rate.
     fn point_jacobian(
         &self,
         i: usize,
@@ -77,10 +80,12 @@ pub trait PlanarMachine<const NV: usize>: std::fmt::Debug + Send + Sync {
         point: &Vector2<f64>,
     ) -> SMatrix<f64, 2, NV>;
 
-    /// Lengths by which a coordinate's change is measured, m: 1 for places, an arm for angles.
+    /// Lengths that convert the change of a coordinate into a displacement, m: 1 for places, an arm
+    /// for angles.
     fn arms(&self) -> SVector<f64, NV>;
 
-    /// A number that two machines share only if they are of one kind, with the same masses, inertias and lengths.
+    /// A number that is equal for two machines only if they are of the same kind, with the same
+    /// masses, inertias and lengths.
     fn fingerprint(&self) -> u64;
 }
 

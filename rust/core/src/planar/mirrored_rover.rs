@@ -1,18 +1,20 @@
-//! A rover that is its own mirror image, driven straight: what is left of its tree in the plane of symmetry.
+//! A mirror-symmetric rover driven straight, reduced to its plane of symmetry.
 //!
-//! In a scene that is symmetric about the vertical plane through the heading (equal torques left and right, no steering, ground
-//! that falls or rises along the heading only), the motion is symmetric: z, roll, heading and every joint that does not turn about z
-//! stay at zero, and the two joints of a mirrored pair have one angle. With `v = P w`, P the columns of what remains, the machine is
+//! In a scene that is symmetric about the vertical plane through the heading (equal torques left
+//! and right, no steering, ground that falls or rises along the heading only), the motion is
+//! symmetric: z, roll, heading and every joint that does not turn about z stay at zero, and the two
+//! joints of a mirrored pair have one angle. With `v = P w`, where the columns of P span the
+//! remaining motion, the machine is
 //!
 //! ```text
 //! Pᵀ M P ẇ + Pᵀ (N v + G) = Pᵀ T u + Pᵀ H p
 //! ```
 //!
-//! which is the mass matrix of a planar tree whose bodies are the pairs, twice as heavy. The contacts of a pair of wheels have one
-//! normal and one tangent; their impulses add up, and their lateral parts vanish.
+//! This is a planar tree whose bodies are the pairs, twice as heavy. The two contacts of a pair of
+//! wheels share one normal and one tangent; their impulses add up, and their lateral parts vanish.
 //!
-//! Coordinates: x, y of the base's origin, its angle, then the angle of each pair's joint relative to its carrier. Only wheels
-//! touch the ground, no box does.
+//! Coordinates: x, y of the base's origin, its angle, then the angle of each pair's joint relative
+//! to its carrier. Only wheels touch the ground; boxes do not.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 
@@ -38,7 +40,7 @@ struct Part {
     centre: Vector2<f64>,
     /// About the mass centre, kg m².
     inertia: f64,
-    /// Turning it changes nothing but its looks.
+    /// Its rotation does not change the mass distribution.
     is_spinner: bool,
 }
 
@@ -53,13 +55,15 @@ struct WheelPair {
     radius: f64,
     /// Largest torque of each wheel, N m.
     torque_limit: f64,
-    /// Joint torque of a unit of command: the number of wheels and their sign; 0 where the joint is locked.
+    /// Joint torque of a unit of command: the number of wheels and their
+    /// sign; 0 where the joint is locked.
     gain: f64,
     /// Torque–speed line of each wheel's motor.
     motor: Option<Motor>,
 }
 
-/// The planar image of a mirrored rover, with `NV` coordinates: 3 of the base, one for each pair of joints.
+/// The planar image of a mirrored rover, with `NV` coordinates: 3 of the
+/// base, one for each pair of joints.
 #[derive(Clone, Debug)]
 pub struct MirroredRover<const NV: usize> {
     model: Model,
@@ -80,7 +84,7 @@ impl<const NV: usize> Placed<NV> {
     }
 }
 
-/// Turned by a quarter to the left: the velocity at `r` of a unit turn.
+/// Rotation by a quarter turn to the left: the velocity at `r` for a unit rate.
 fn left(r: &Vector2<f64>) -> Vector2<f64> {
     Vector2::new(-r.y, r.x)
 }
@@ -94,7 +98,8 @@ impl<const NV: usize> MirroredRover<NV> {
     /// The planar image of a model, all joints that do not turn about z locked at zero.
     ///
     /// # Errors
-    /// A joint that a lock has turned out of the plane, a body without its mirror image, another number of coordinates.
+    /// A joint that a lock has turned out of the plane, a body without its
+    /// mirror image, another number of coordinates.
     pub fn new(model: &Model) -> Result<Self, PlanarError> {
         let across: Vec<(String, f64)> = model.bodies()[1..]
             .iter()
@@ -121,7 +126,7 @@ impl<const NV: usize> MirroredRover<NV> {
         })
     }
 
-    /// The model with the joints locked that the plane does not have.
+    /// The model with all joints locked that the plane does not have.
     #[must_use]
     pub fn model(&self) -> &Model {
         &self.model
@@ -141,7 +146,8 @@ impl<const NV: usize> MirroredRover<NV> {
         self.wheels.iter().map(|w| w.names.clone()).collect()
     }
 
-    /// Velocity indices of [`Self::model`] that follow planar coordinate `k`: the entries of P's column that are 1.
+    /// Velocity indices of [`Self::model`] that follow planar coordinate
+    /// `k`: the entries of P's column that are 1.
     #[must_use]
     pub fn full_indices(&self, k: usize) -> Vec<usize> {
         match k {
@@ -192,7 +198,7 @@ impl<const NV: usize> MirroredRover<NV> {
 /// Groups the bodies of a planar tree by mirror images.
 fn pair_bodies(model: &Model) -> Result<Vec<Part>, PlanarError> {
     let bodies = model.bodies();
-    // Nothing turns out of the plane, so z adds up along the tree.
+    // Nothing rotates out of the plane, so z adds up along the tree.
     let mut z = vec![0.0; bodies.len()];
     for (b, body) in bodies.iter().enumerate() {
         let is_in_plane = match (&body.joint, body.parent) {

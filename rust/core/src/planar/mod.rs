@@ -1,13 +1,15 @@
-//! The planar systems of the report's chapter 3: a ball, a two-wheel rover, and the ground they run on.
+//! The planar systems of the report's chapter 3: a ball, a two-wheel rover,
+//! and the ground they run on.
 //!
-//! - [`ground`], [`curve`], [`polyline`]: what lies below a curve, and where a disc touches it;
-//! - [`machine`]: what a machine with few coordinates says of itself;
-//! - [`ball`], [`two_wheel_rover`]: two of them; [`mirrored_rover`]: the six-wheel rover driven straight;
+//! - [`ground`], [`curve`], [`polyline`]: the ground below a curve, and where a disc touches it;
+//! - [`machine`]: the interface of a machine with few coordinates;
+//! - [`ball`], [`two_wheel_rover`]: two such machines; [`mirrored_rover`]: the six-wheel rover
+//!   driven straight;
 //! - [`rig`]: one wheel at a given slip, for the drawbar pull on a [soil](crate::system::soil).
 //!
-//! Nothing of time stepping, contact law or solver is here: [`crate::system::planar`] makes a mechanical system of a machine on a ground, and
-//! [`crate::simulation`] steps it as it steps the rover.
-//! x points forward, y up, angles turn to the left.
+//! Time stepping, contact law and solver live elsewhere: [`crate::system::planar`] turns a machine
+//! on a ground into a mechanical system, and [`crate::simulation`] steps it like the rover. x
+//! points forward, y up, and angles are positive to the left.
 
 pub mod ball;
 pub mod curve;

@@ -8,9 +8,10 @@ use super::ground::{Facing, Ground, keep_few, keep_if};
 use crate::geometry::Support;
 use crate::quantity::{PLACES, QuantityError, within};
 
-/// Straight pieces between points, continued beyond the ends with the slope of the last pieces (level where those are vertical).
+/// Straight pieces between points, continued beyond the ends with the slope
+/// of the last pieces (level where those are vertical).
 ///
-/// x may stay where it is from one point to the next: a vertical face.
+/// Two consecutive points may share x: a vertical face.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polyline {
     points: Vec<Vector2<f64>>,
@@ -20,7 +21,8 @@ impl Polyline {
     /// `x`: not decreasing, m. `y`: heights, m.
     ///
     /// # Errors
-    /// Fewer than two points, other lengths, entries that are not finite, x that decreases, or the same point twice.
+    /// Fewer than two points, other lengths, entries that are not finite, x
+    /// that decreases, or the same point twice.
     pub fn new(x: &[f64], y: &[f64]) -> Result<Self, PlanarError> {
         check_points(x, y)?;
         for i in 1..x.len() {
@@ -66,7 +68,8 @@ impl Polyline {
         &self.points
     }
 
-    /// Unit direction of piece i along the curve; pieces -1 and n-1 are the continuations (given as 0 and n here).
+    /// Unit direction of piece i along the curve; pieces -1 and n-1 are the
+    /// continuations (given as 0 and n here).
     fn direction(&self, i: usize) -> Vector2<f64> {
         let last = self.points.len() - 1;
         let d = if i == 0 {
@@ -85,7 +88,7 @@ impl Polyline {
     /// All points that face the centre, whatever their distance and side.
     fn candidates(&self, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Facing>) {
         let n_points = self.points.len();
-        // Only what is within reach in x: pieces are in the order of x.
+        // Only pieces within reach in x; they are in the order of x.
         let first = self.points.partition_point(|p| p.x < centre.x - reach);
         let last = self.points.partition_point(|p| p.x <= centre.x + reach);
         for i in first..=last {
@@ -239,7 +242,7 @@ mod tests {
         // Away from it and on top of it: one.
         assert_eq!(all(&step, [-5.0, 0.2], 0.25).len(), 1);
         assert_eq!(all(&step, [7.0, 0.2], 0.25).len(), 1);
-        // Inside the kerb: out by the nearest way.
+        // Inside the kerb: out by the shortest way.
         let found = all(&step, [1.02, 0.05], 0.2);
         assert!(
             found.len() == 1 && (found[0].n + Vector2::x()).norm() < 1e-15,
@@ -288,7 +291,8 @@ mod tests {
         }
     }
 
-    /// A height looked at every point, and what did not face a disc was taken out one by one: a million points took hours.
+    /// A height query visited every point, and points that did not face a disc were removed one by
+    /// one: a million points took hours.
     #[test]
     fn a_million_points_cost_no_more_than_those_within_reach() {
         let x: Vec<f64> = (0..1_000_000).map(|i| 1e-5 * f64::from(i)).collect();

@@ -1,8 +1,9 @@
-//! One wheel on a carriage: it travels and turns at rates that nothing changes, and is free to sink.
+//! Test rig: one wheel on a carriage, with prescribed rates of travel and rotation, free to sink.
 //!
-//! Coordinates (x, y, –, θ_w, –): the carriage's way, the wheel's height, its angle. Way and angle have a mass and an inertia so large that no soil
-//! changes their rates in a double's digits, so the slip `1 − ẋ/(r |θ̇_w|)` is given and the drawbar pull, the horizontal force of the soil on the
-//! wheel, is the answer.
+//! Coordinates (x, y, –, θ_w, –): travel of the carriage, height of the wheel, its angle. Mass and
+//! inertia of travel and angle are so large that no soil changes their rates in double precision.
+//! The slip `1 − ẋ/(r |θ̇_w|)` is thus prescribed, and the drawbar pull, the horizontal force of
+//! the soil on the wheel, is the result.
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
@@ -17,7 +18,7 @@ pub struct WheelRig {
     radius: f64,
 }
 
-/// Multiple of the wheel's mass that stands for a rate that nothing changes.
+/// Multiple of the wheel's mass that keeps a rate constant.
 const HEAVY: f64 = 1e12;
 
 impl WheelRig {
@@ -32,7 +33,8 @@ impl WheelRig {
         })
     }
 
-    /// Rates (5) of a wheel that travels forward at `speed` (m/s) with the slip `1 − speed/(r ω)`, below 1.
+    /// Rates (5) of a wheel that travels forward at `speed` (m/s) with the
+    /// slip `1 − speed/(r ω)`, below 1.
     #[must_use]
     pub fn rates(&self, speed: f64, slip: f64) -> [f64; 5] {
         let turning = speed / (self.radius * (1.0 - slip));

@@ -1,23 +1,26 @@
 //! The two-wheel rover of the report's section 3.1 with the coordinates (x, y, θ, θ_A, θ_B).
 //!
-//! (x, y) is the body's mass centre, θ its angle, θ_A and θ_B the *absolute* angles of the back wheel A and the front wheel B. The axle of
-//! wheel i sits at a_i in the body's axes, at `r_i = R(θ) a_i = (X_i, Y_i)` from the mass centre, so its velocity is
-//! `(ẋ − Y_i θ̇, ẏ + X_i θ̇)` and
+//! (x, y) is the body's mass centre, θ its angle, θ_A and θ_B the *absolute*
+//! angles of the back wheel A and the front wheel B. The axle of wheel i sits at
+//! a_i in the body's axes, at `r_i = R(θ) a_i = (X_i, Y_i)` from the mass
+//! centre, so its velocity is `(ẋ − Y_i θ̇, ẏ + X_i θ̇)` and
 //!
 //! ```text
-//! K = ½ (m + m_A + m_B)(ẋ² + ẏ²) + ½ (J + Σ m_i |a_i|²) θ̇² + θ̇ Σ m_i (X_i ẏ − Y_i ẋ) + ½ Σ J_i θ̇_i²
+//! K = ½ (m + m_A + m_B)(ẋ² + ẏ²) + ½ (J + Σ m_i |a_i|²) θ̇²
+//!     + θ̇ Σ m_i (X_i ẏ − Y_i ẋ) + ½ Σ J_i θ̇_i²
 //!
-//!       | m_tot    0      −Σ m_i Y_i         0    0  |        | m_tot g_x + θ̇² Σ m_i X_i         |
-//!       |   0    m_tot     Σ m_i X_i         0    0  |        | m_tot g_y + θ̇² Σ m_i Y_i         |
-//!   M = |  sym    sym   J + Σ m_i |a_i|²     0    0  |    F = | Σ m_i (X_i g_y − Y_i g_x) + τ_A + τ_B |
-//!       |   0      0           0            J_A   0  |        | −τ_A                             |
-//!       |   0      0           0             0   J_B |        | −τ_B                             |
+//!     | m_tot    0      −Σ m_i Y_i       0    0  |      | m_tot g_x + θ̇² Σ m_i X_i              |
+//!     |   0    m_tot     Σ m_i X_i       0    0  |      | m_tot g_y + θ̇² Σ m_i Y_i              |
+//! M = |  sym    sym   J + Σ m_i |a_i|²   0    0  |  F = | Σ m_i (X_i g_y − Y_i g_x) + τ_A + τ_B |
+//!     |   0      0           0          J_A   0  |      | −τ_A                                  |
+//!     |   0      0           0           0   J_B |      | −τ_B                                  |
 //! ```
 //!
-//! with the torques τ_i of the motors between body and wheels, positive where they drive forward. The report's (3.37)–(3.41) leave the wheels'
-//! masses out of the first two rows of M and θ̈ out of the third, and (3.29) leaves out g. A wheel's contact at the rim point
-//! `E = c_i − r_i n` has the columns `(n, r_i × n, 0…)` and `(t, r_i × t, r)` with r in the wheel's own row: the body's turn moves the axle
-//! and never the rim.
+//! with the torques τ_i of the motors between body and wheels, positive when they drive forward.
+//! The report's (3.37)–(3.41) leave the wheels' masses out of the first two rows of M and θ̈ out of
+//! the third, and (3.29) leaves out g. A wheel's contact at the rim point `E = c_i − r_i n` has the
+//! columns `(n, r_i × n, 0…)` and `(t, r_i × t, r)` with r in the wheel's own row: the body's turn
+//! moves the axle and never the rim.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
@@ -47,7 +50,8 @@ pub struct TwoWheelRover {
 }
 
 impl TwoWheelRover {
-    /// `mass` in kg, `inertia` about the body's own mass centre in kg m²; back wheel A and front wheel B.
+    /// `mass` in kg, `inertia` about the body's own mass centre in kg m²;
+    /// back wheel A and front wheel B.
     ///
     /// # Errors
     /// A number that is not finite or not positive, wheels that overlap.

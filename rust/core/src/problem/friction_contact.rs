@@ -25,7 +25,7 @@ impl Dimension {
     }
 }
 
-/// What a friction-contact problem cannot be built from.
+/// Errors in the data of a friction-contact problem.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum ProblemError {
@@ -110,7 +110,7 @@ pub enum ProblemError {
 }
 
 impl ProblemError {
-    /// The datum that is wrong: `q`, `mu[2]`, `W[0, 3]`.
+    /// The offending datum: `q`, `mu[2]`, `W[0, 3]`.
     #[must_use]
     pub fn field(&self) -> String {
         match self {
@@ -129,8 +129,9 @@ impl ProblemError {
 
 /// Find `p` with `u = W p + q`, `ũ = u + μ|u_T| n`, `K_μ* ∋ ũ ⊥ p ∈ K_μ` at every contact.
 ///
-/// Components run contact by contact, `normal, tangent, (tangent)`; with `n_c` contacts of `d` components, `n = d n_c`.
-/// `W` is used as given: it need not be symmetric and may be rank-deficient. Source: Acary, Brémond and Huber 2018.
+/// Components run contact by contact, `normal, tangent, (tangent)`; with `n_c` contacts of `d`
+/// components, `n = d n_c`. `W` is used as given: it need not be symmetric and may be
+/// rank-deficient. Source: Acary, Brémond and Huber 2018.
 #[derive(Clone, Copy, Debug)]
 pub struct FrictionContactProblem<'a> {
     dimension: Dimension,
@@ -142,11 +143,12 @@ pub struct FrictionContactProblem<'a> {
 impl<'a> FrictionContactProblem<'a> {
     /// Checks every entry and states the problem.
     ///
-    /// `W`: Delassus operator, row-major `n × n`, 1/kg. `q`: free local velocity (n), m/s, with `e u_N⁻` already added to
-    /// the normal components. `mu`: friction coefficients (`n_c`).
+    /// `W`: Delassus operator, row-major `n × n`, 1/kg. `q`: free local velocity (n), m/s, with
+    /// `e u_N⁻` already added to the normal components. `mu`: friction coefficients (`n_c`).
     ///
     /// # Errors
-    /// [`ProblemError`], naming the first entry that is of the wrong shape, not finite or of the wrong sign.
+    /// [`ProblemError`], naming the first entry that is of the wrong shape,
+    /// not finite or of the wrong sign.
     pub fn new(
         dimension: Dimension,
         W: &'a [f64],
@@ -240,8 +242,8 @@ impl<'a> FrictionContactProblem<'a> {
         })
     }
 
-    /// States a sparse problem from data that the caller assembled itself; only the shapes are checked, see
-    /// [`from_assembled`](Self::from_assembled).
+    /// States a sparse problem from data that the caller assembled itself; only the shapes are
+    /// checked, see [`from_assembled`](Self::from_assembled).
     ///
     /// # Panics
     /// If the lengths of `W`, `q` and `mu` do not fit together.
@@ -267,7 +269,8 @@ impl<'a> FrictionContactProblem<'a> {
     /// States the problem from data that the caller assembled itself; only the shapes are checked.
     ///
     /// Meant for the time stepper. Entries that are not finite make a solve end with
-    /// [`SolveStatus::NonFinite`](crate::solver::SolveStatus::NonFinite), never with a NaN in the answer.
+    /// [`SolveStatus::NonFinite`](crate::solver::SolveStatus::NonFinite),
+    /// never with a NaN in the answer.
     ///
     /// # Panics
     /// If the lengths of `W`, `q` and `mu` do not fit together.

@@ -1,18 +1,20 @@
 //! The friction-contact problem of one time step, and the measure of how well it is solved.
 //!
-//! Given the Delassus operator `W = Hᵀ M⁻¹ H`, the free local velocity `q` and the friction coefficients `μ`, find the
-//! impulses `p` such that
+//! Given the Delassus operator `W = Hᵀ M⁻¹ H`, the free local velocity `q` and the friction
+//! coefficients `μ`, find the impulses `p` such that
 //!
 //! ```text
 //! u = W p + q,    ũ = u + μ|u_T| n,    K_μ* ∋ ũ ⊥ p ∈ K_μ    at every contact.
 //! ```
 //!
-//! - `friction_contact`: [`FrictionContactProblem`] states it. It knows no body, so a problem read from a file is as good as one from a rover.
-//! - `operator`: `W`, dense or, for many contacts, as [`BlockSparseDelassus`]; for very many free bodies [`BodyPairs`] instead.
-//! - `scales`: what turns the velocity of a contact into an impulse.
+//! - `friction_contact`: [`FrictionContactProblem`] states the problem. It knows no bodies, so a
+//!   problem read from a file is as good as one from a rover.
+//! - `operator`: `W`, dense or, for many contacts, as [`BlockSparseDelassus`]; [`BodyPairs`]
+//!   replaces it for very many free bodies.
+//! - `scales`: factors between the velocity and the impulse of a contact.
 //! - `residual`: [`Residual`] judges an answer.
-//! - `prepared`: a problem with its scales at hand, as iterations want it.
-//! - `passivity`: an approximate answer shortened until it adds no energy.
+//! - `prepared`: a problem together with its scales, for iterative methods.
+//! - `passivity`: scales down an approximate answer that would add energy.
 
 mod friction_contact;
 mod operator;

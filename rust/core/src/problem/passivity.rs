@@ -1,9 +1,11 @@
-//! An approximate answer may add energy, an exact one cannot.
+//! Passivity: scales down an approximate answer that would add energy. An exact one never does.
 //!
-//! Over a step with θ = 1 the energy changes by `pᵀu − ½ |v⁺ − v⁻|²_M`, and `pᵀu ≤ 0` wherever the law holds. `s p` has the work
-//! `s² pᵀWp + s pᵀq`, which vanishes at `s = −pᵀq / pᵀWp`: a shorter impulse within the same cones.
+//! Over a step with θ = 1 the energy changes by `pᵀu − ½ |v⁺ − v⁻|²_M`, and `pᵀu ≤ 0` wherever the
+//! law holds. The work of `s p` is `s² pᵀWp + s pᵀq`. It vanishes at `s = −pᵀq / pᵀWp`, a shorter
+//! impulse within the same cones.
 
-/// The share of an impulse that adds no energy, in [0, 1]; none where the whole adds none beyond the rounding of its sums.
+/// The fraction of an impulse, in [0, 1], that adds no energy; none if the whole impulse adds none
+/// beyond the rounding of its sums.
 ///
 /// `work = pᵀu` and `free = pᵀq`, J.
 #[must_use]
@@ -22,7 +24,7 @@ mod tests {
         let p = 2.0 * share;
         assert!((p * (3.0 * p - 5.0)).abs() < 1e-14);
         assert_eq!(passive_share(-1.0, -10.0), None);
-        // q pushes along p: nothing but zero is free of work.
+        // q points along p: only the zero impulse does no work.
         assert_eq!(passive_share(2.0, 1.0), Some(0.0));
     }
 }

@@ -1,11 +1,12 @@
-//! A problem made ready for iterations: its slices, its scales, and the two measures of an impulse, residual and merit.
+//! A problem prepared for iterative methods: its slices, its scales, and two measures of an
+//! impulse, residual and merit.
 
 use super::residual::{Magnitudes, Violations, evaluate_contact};
 use super::scales::{ContactScales, Scales};
 use super::{FrictionContactProblem, Operator, Residual};
 use crate::law::coulomb::{natural_map, violation};
 
-/// Friction coefficient from which the natural map is no measure of progress.
+/// Friction coefficient above which the natural map does not measure progress.
 const STEEP: f64 = 1e3;
 
 /// Largest rounding of `W p`, relative to `|q|`, of an answer that counts as converged.
@@ -46,7 +47,8 @@ pub(crate) struct Prepared<'a> {
 }
 
 impl<'a> Prepared<'a> {
-    /// Of `problem`, with `W` in the storage that the solve works on; `scales` has room for its contacts.
+    /// Of `problem`, with `W` in the storage that the solve works on;
+    /// `scales` has room for its contacts.
     pub fn new<const D: usize>(
         problem: &FrictionContactProblem<'a>,
         W: Operator<'a>,
@@ -98,7 +100,8 @@ impl<'a> Prepared<'a> {
         self.W.block(self.n, i)
     }
 
-    /// Residual of `(p, u)`; the same numbers as [`crate::problem::evaluate`], with the scales already at hand.
+    /// Residual of `(p, u)`; the same numbers as
+    /// [`crate::problem::evaluate`], with the scales already at hand.
     #[inline]
     pub fn measure<const D: usize>(&self, p: &[f64], u: &[f64]) -> Residual {
         let mut violations = Violations::default();
@@ -109,8 +112,10 @@ impl<'a> Prepared<'a> {
         violations.residual(self.inverse_speed, self.inverse_data)
     }
 
-    /// What a damped step has to make smaller, for the regularised problem (`W + α I`, `q − α c`) at `(p, u)`, `u = W p + q`: the squared natural map, in
-    /// (N s)², or the violation itself where μ leaves the map no digits. Measured on piles of 460 contacts: with the map a tenth to a third fewer steps.
+    /// Merit function of a damped step, for the regularised problem (`W + α I`, `q − α c`) at
+    /// `(p, u)`, `u = W p + q`: the squared natural map, in (N s)², or the violation itself if μ is
+    /// so large that the map loses its digits. Measured on piles of 460 contacts: the map saves a
+    /// tenth to a third of the steps.
     pub fn merit<const D: usize>(&self, prox: Proximal<'_>, p: &[f64], u: &[f64]) -> f64 {
         let Proximal { alpha, centre } = prox;
         let mut sum = 0.0;
@@ -129,8 +134,8 @@ impl<'a> Prepared<'a> {
         sum
     }
 
-    /// Whether the rounding of `W p` is small beside the free velocity, so that the velocities of `p` mean something. At mass ratios of about
-    /// 1e10 they need not.
+    /// Whether the rounding of `W p` is small compared with the free velocity, so that the
+    /// velocities of `p` are meaningful. At mass ratios of about 1e10 they may not be.
     pub fn is_resolved(&self, p: &[f64]) -> bool {
         let allowed = RESOLVED / self.inverse_speed;
         let largest = p.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -139,7 +144,8 @@ impl<'a> Prepared<'a> {
             || (0..self.n).all(|r| f64::EPSILON * self.W.row_magnitude(r, p) <= allowed)
     }
 
-    /// Whether each contact's violation is within the rounding of its own rows of `W p + q`: then no impulse does better.
+    /// Whether each contact's violation is within the rounding of its own rows of `W p + q`, so
+    /// that no impulse does better.
     pub fn is_within_rounding<const D: usize>(&self, p: &[f64], u: &[f64]) -> bool {
         let contacts = self.mu.iter().zip(self.modes);
         contacts.enumerate().all(|(i, (&mu, &modes))| {

@@ -1,11 +1,15 @@
-//! How well an impulse solves a problem: Signorini's and Coulomb's violations, relative and in m/s.
+//! The residual of an impulse: its violation of Signorini's and Coulomb's laws, relative and in
+//! m/s.
 //!
-//! Each contact is judged by [`violation`], a velocity `v_i` in m/s that vanishes exactly where both laws hold; its scales are the contact's own,
-//! `ρ_N = 1/W_NN` and `ρ_T` the inverse mean of the tangential diagonal, so that no other contact's mass and no friction coefficient enters.
-//! With the contact's mass `ρ_i = d / tr W_ii` (none of the three depends on the choice of tangents) two numbers are made of it:
+//! Each contact is judged by [`violation`], a velocity `v_i` in m/s that vanishes exactly where
+//! both laws hold; its scales are the contact's own, `ρ_N = 1/W_NN` and `ρ_T` the inverse mean of
+//! the tangential diagonal, so that no other contact's mass and no friction coefficient enters.
+//! With the contact's mass `ρ_i = d / tr W_ii` the residual has two numbers (none of the three
+//! scales depends on the choice of tangents):
 //!
-//! - `relative`, the larger of `|(ρ_i v_i)| / |(ρ_i q_i)|` (impulses, which a light contact cannot hide) and `|(v_i)| / |(q_i)|` (velocities, which a
-//!   heavy one cannot hide): the error against what the free velocity asks for;
+//! - `relative`, the error relative to the free velocity: the larger of `|(ρ_i v_i)| / |(ρ_i q_i)|`
+//!   (impulses, which show the error of heavy contacts) and `|(v_i)| / |(q_i)|` (velocities, which
+//!   show that of light ones);
 //! - `velocity = max_i |v_i|` in m/s.
 
 use super::scales::{contact_scales, power_of_two};
@@ -22,7 +26,7 @@ pub struct Residual {
 }
 
 impl Residual {
-    /// Both numbers infinite: nothing is known to be solved.
+    /// Both numbers infinite: the residual before any answer.
     pub const UNSOLVED: Self = Self {
         relative: f64::INFINITY,
         velocity: f64::INFINITY,
@@ -73,7 +77,7 @@ pub(crate) fn evaluate_contact<const D: usize>(
         .sum()
 }
 
-/// Sums over the contacts that the two numbers are made of.
+/// Sums over the contacts from which the two numbers follow.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Violations {
     /// `Σ |v_i|²`, (m/s)².
@@ -96,7 +100,7 @@ impl Violations {
     /// The residual; `inverse_speed` is `1/|q|` and `inverse_data` is `1/|(ρ_i q_i)|`.
     #[inline]
     pub fn residual(&self, inverse_speed: f64, inverse_data: f64) -> Residual {
-        // A NaN is in both sums.
+        // A NaN appears in both sums.
         if !(self.squares.is_finite() && self.weighted.is_finite()) {
             return Residual::UNSOLVED;
         }
@@ -127,7 +131,7 @@ impl Magnitudes {
         self.weighted += (mass * mass) * square;
     }
 
-    /// `1/|q|` and `1/|(ρ_i q_i)|`; 0 and 1 where there is nothing to be measured against.
+    /// `1/|q|` and `1/|(ρ_i q_i)|`; 0 and 1 if `q = 0`.
     #[inline]
     pub fn inverses(&self) -> [f64; 2] {
         if self.squares > 0.0 {
@@ -138,7 +142,8 @@ impl Magnitudes {
     }
 }
 
-/// In units of the largest free velocity and the largest mass, so that no square overflows or vanishes.
+/// In units of the largest free velocity and the largest mass, so that no
+/// square overflows or vanishes.
 fn evaluate_in<const D: usize>(
     problem: &FrictionContactProblem<'_>,
     p: &[f64],
@@ -171,7 +176,7 @@ fn evaluate_in<const D: usize>(
     }
 }
 
-/// Residual of `p`, with `u = W p + q` computed on the way.
+/// Residual of `p`; also computes `u = W p + q`.
 ///
 /// `p`: impulses (n), N s. `u`: local velocities (n), m/s, output.
 ///
@@ -228,7 +233,7 @@ mod tests {
 
     #[test]
     fn neither_a_heavy_nor_a_light_contact_hides_the_other() {
-        // Two contacts that do not know each other, 1 kg and 1e12 kg; one of them keeps its approach.
+        // Two uncoupled contacts, 1 kg and 1e12 kg; one of them keeps its approach velocity.
         let mut W = vec![0.0; 16];
         for (k, w) in [1.0, 1.0, 1e-12, 1e-12].into_iter().enumerate() {
             W[5 * k] = w;

@@ -1,4 +1,5 @@
-//! The scales of a problem: what turns a contact's velocity into an impulse, and units in which no square overflows.
+//! The scales of a problem: factors between a contact's velocity and its impulse, and units in
+//! which no square overflows.
 
 use super::{Dimension, FrictionContactProblem};
 
@@ -7,7 +8,8 @@ use super::{Dimension, FrictionContactProblem};
 pub(crate) struct ContactScales {
     /// `ρ = d / tr W_ii`; 1 where the block has no positive trace.
     pub mass: f64,
-    /// `[ρ_N, ρ_T]`: inverse of `W_NN` and of the mean tangential diagonal; `ρ` where that is not positive.
+    /// `[ρ_N, ρ_T]`: inverse of `W_NN` and of the mean tangential diagonal;
+    /// `ρ` where that is not positive.
     pub modes: [f64; 2],
 }
 

@@ -1,4 +1,4 @@
-//! The contacts of the last step with what they did, in the plane and in space.
+//! The contacts of the last step with their impulses and velocities, in the plane and in space.
 
 use std::fmt::Debug;
 
@@ -38,14 +38,14 @@ pub trait LocatedContact: UnilateralContact<Key: Debug> + Copy + PartialEq + Deb
     fn is_finite(&self) -> bool;
 }
 
-/// A contact of the last step with what it did.
+/// A contact of the last step with its impulse and velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound(
     serialize = "C: Serialize, C::Vector: Serialize",
     deserialize = "C: Deserialize<'de>, C::Vector: Deserialize<'de>"
 ))]
 pub struct ActiveContact<C: LocatedContact> {
-    /// Name, frame and gap where the step evaluated them.
+    /// Key, frame and gap, where the step evaluated them.
     pub contact: C,
     /// Where it lies, world, m.
     pub position: C::Vector,

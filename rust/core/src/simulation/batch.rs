@@ -1,7 +1,7 @@
 //! Many rovers stepped side by side.
 //!
-//! Models and terrains are shared, everything else is each rover's own, so rovers never wait for each other and their
-//! motion does not depend on how many there are nor on how many threads move them.
+//! Rovers share models and terrains and nothing else. They never wait for each other, and their
+//! motion depends neither on the number of rovers nor on the number of threads.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -16,7 +16,7 @@ use super::reading::{Look, ReadingLayout};
 use super::rover::RoverSimulation;
 use crate::integrator::StepError;
 
-/// How often the calling thread asks whether to go on while others step.
+/// Interval at which the calling thread asks whether to continue while others step.
 const ASKING: Duration = Duration::from_millis(20);
 
 /// One rover with the places for its error and its reading.
@@ -35,7 +35,7 @@ pub struct Batch {
     scan: Vec<[f64; 2]>,
     layout: ReadingLayout,
     errors: Vec<Option<StepError>>,
-    /// None: the caller's thread does it all.
+    /// None: the caller's thread does all the work.
     pool: Option<Pool>,
     threads: usize,
 }
@@ -43,7 +43,8 @@ pub struct Batch {
 impl Batch {
     /// From rovers of models of one size.
     ///
-    /// `scan`: points of the height scan, see [`RoverSimulation::read`]. `threads`: None for one a core.
+    /// `scan`: points of the height scan, see [`RoverSimulation::read`]. `threads`: None for one
+    /// per core.
     ///
     /// # Errors
     /// `Empty`, `Differs`, `Threads`.
@@ -98,13 +99,14 @@ impl Batch {
         self.threads
     }
 
-    /// What the rows of readings hold.
+    /// Layout of the rows of readings.
     #[must_use]
     pub fn layout(&self) -> &ReadingLayout {
         &self.layout
     }
 
-    /// Puts another rover, with its own terrain, in a place; `target` (x, z, m) is what its readings look at.
+    /// Replaces a rover by another one with its own terrain; `target` (x, z, m) is the target of
+    /// its readings.
     ///
     /// # Errors
     /// `NoSuchRover`, `Differs`; nothing is changed then.
@@ -124,15 +126,17 @@ impl Batch {
         Ok(())
     }
 
-    /// Gives every rover its commands, takes `n` steps and writes the readings (n_rovers × layout's size, row-major).
+    /// Gives every rover its commands, takes `n` steps and writes the readings (n_rovers × size of
+    /// the layout, row-major).
     ///
-    /// `torques` and `set_points`: n_rovers × n_wheels, row-major, as [`RoverSimulation::set_wheel_torques`] and
-    /// [`RoverSimulation::set_steering`] take them. `active`: rovers that are to move; the others keep still, commands too.
-    /// A step that a rover cannot take is that rover's own: see [`Self::errors`].
+    /// `torques` and `set_points`: n_rovers × n_wheels, row-major, as
+    /// [`RoverSimulation::set_wheel_torques`] and [`RoverSimulation::set_steering`] take them.
+    /// `active`: rovers that move; the others keep state and commands. A failed step affects only
+    /// its own rover: see [`Self::errors`].
     ///
     /// # Errors
-    /// `Command`: the first command that a rover refuses; `Threads`: in a process forked from the one that made the
-    /// batch, its threads could not be started anew. No rover has moved then.
+    /// `Command`: the first command that a rover refuses; `Threads`: in a process forked from the
+    /// one that made the batch, its threads could not be started anew. No rover has moved then.
     ///
     /// # Panics
     /// If a slice has a wrong length.
@@ -147,7 +151,8 @@ impl Batch {
         self.step_while(torques, set_points, n, active, rows, &mut || true)
     }
 
-    /// The same, but asks `go_on` now and then; once it says no, each rover stops after a whole step of its own.
+    /// The same, but asks `go_on` from time to time; once it returns false, each rover stops after
+    /// a whole step.
     ///
     /// # Errors
     /// As [`Self::step`].
@@ -218,7 +223,7 @@ impl Batch {
         Ok(())
     }
 
-    /// Writes the readings as they are now, without a step.
+    /// Writes the current readings, without a step.
     ///
     /// # Panics
     /// If `rows` has a wrong length.
@@ -235,14 +240,14 @@ impl Batch {
         }
     }
 
-    /// Why a rover's last step could not be taken, rover by rover.
+    /// Error of the last step of each rover.
     #[must_use]
     pub fn errors(&self) -> &[Option<StepError>] {
         &self.errors
     }
 }
 
-/// All commands are looked at before any is given.
+/// All commands are checked before any is applied.
 fn give_commands(
     rovers: &mut [RoverSimulation],
     torques: &[f64],

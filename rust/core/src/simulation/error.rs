@@ -1,8 +1,8 @@
-//! Commands and snapshots that cannot be taken.
+//! Errors: commands and snapshots that are refused.
 
 use thiserror::Error;
 
-/// A torque or set-point that cannot be taken.
+/// A torque or set-point that is refused.
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum CommandError {
     /// Wrong number of entries.
@@ -55,7 +55,7 @@ pub enum CommandError {
     },
 }
 
-/// A batch that cannot be made, or a command that it cannot take.
+/// A batch that cannot be built, or a command that it refuses.
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum BatchError {
     /// No rovers.
@@ -79,12 +79,12 @@ pub enum BatchError {
         /// Rovers in the batch.
         len: usize,
     },
-    /// Threads that the system would not start.
+    /// Threads that the operating system did not start.
     #[error("threads: {count} could not be started ({reason})")]
     Threads {
-        /// What was asked for; 0 stands for one a core.
+        /// Requested number; 0 stands for one per core.
         count: usize,
-        /// What the system says.
+        /// Message of the operating system.
         reason: String,
     },
     /// A command of one rover.

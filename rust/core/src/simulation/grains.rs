@@ -24,9 +24,11 @@ use crate::system::grains::{
 
 /// Options that suit a bed of these grains.
 ///
-/// θ = 1 and γ = 1, which the contact's law needs; h = 1 ms; solver tolerance 1e-4 and at most 2000 sweeps. Penetration is
-/// not projected away, which lifts what lies above and adds energy: circles and spheres that come together by their gap along the normal do
-/// not overlap, so nothing but the solver's tolerance is left to project. Asked for, projection begins at 0.5% of the smallest radius.
+/// θ = 1 and γ = 1, which the contact law needs; h = 1 ms; solver tolerance 1e-4 and at most 2000
+/// sweeps. Position projection is off, since it lifts the grains above and adds energy. Circles and
+/// spheres that approach by their gap along the normal do not overlap, so only the solver's
+/// tolerance would be left to project. If requested, projection starts at 0.5% of the smallest
+/// radius.
 #[must_use]
 pub fn soil_options<const D: usize>(grains: &Grains<D>) -> StepOptions {
     StepOptions {
@@ -48,16 +50,16 @@ pub fn soil_options<const D: usize>(grains: &Grains<D>) -> StepOptions {
 /// Most steps that a snapshot may have behind it.
 const MAX_STEPS: usize = 1 << 53;
 
-/// Grains, what they lie on, and when they sleep. The description is shared.
+/// Grains, their ground, and when they sleep. The description is shared.
 #[derive(Clone, Debug)]
 pub struct GrainBed<const D: usize> {
-    /// What there is.
+    /// The description.
     pub soil: Arc<GrainScene<D>>,
-    /// When grains sleep; by None never.
+    /// When grains sleep; None: never.
     pub sleep: Option<SleepOptions>,
 }
 
-/// What a bed's machine is told.
+/// Command of a bed's machine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BedCommand<const D: usize> {
     /// Torques, N m, positive forward.
@@ -66,7 +68,7 @@ pub struct BedCommand<const D: usize> {
     pub pull: SVector<f64, D>,
 }
 
-/// What a bed remembers.
+/// Memory of a bed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BedMemory {
     /// Steps taken.
@@ -217,7 +219,7 @@ where
     /// At rest in the configuration `q` (nq): [`COORDINATES`] of each grain, then the machine's.
     ///
     /// # Errors
-    /// A description or configuration that cannot be: see [`GrainScene::check_configuration`].
+    /// An invalid description or configuration: see [`GrainScene::check_configuration`].
     pub fn new(
         soil: Arc<GrainScene<D>>,
         options: StepOptions,
@@ -251,7 +253,8 @@ where
         self.memory.sleep.asleep()
     }
 
-    /// Sets configuration (nq) and velocities (nv), those that kinematic grains keep among them; time 0, all awake, warm start forgotten, torques kept.
+    /// Sets configuration (nq) and velocities (nv), including those that kinematic grains keep;
+    /// time 0, all awake, warm start forgotten, torques kept.
     ///
     /// # Errors
     /// As [`Self::new`]; nothing is changed then.
@@ -271,12 +274,13 @@ where
         Ok(())
     }
 
-    /// Takes the grains that are marked (n) out of the bed; the others go on as they are, under new numbers in the same order.
+    /// Removes the marked grains (n) from the bed; the others keep their state, renumbered in the
+    /// same order.
     ///
-    /// Snapshots of before belong to another bed.
+    /// Earlier snapshots no longer fit.
     ///
     /// # Errors
-    /// Another number of marks; none would be left. Nothing is changed then.
+    /// A wrong number of marks, or no grain left. Nothing is changed then.
     pub fn remove(&mut self, marked: &[bool]) -> Result<(), GrainError> {
         let n = self.soil().grains.len();
         if marked.len() != n {
@@ -306,7 +310,7 @@ where
         Ok(())
     }
 
-    /// Sets the torques, N m, positive forward. Wakes nothing: what turns does.
+    /// Sets the torques, N m, positive forward. This wakes no grain; motion does.
     ///
     /// # Errors
     /// Wrong length or an entry that is not finite; nothing is changed then.
@@ -358,7 +362,8 @@ where
         sum.into()
     }
 
-    /// Deepest overlap now, m: 0 where nothing overlaps. Kinematic grains among themselves and in walls do not count.
+    /// Current deepest overlap, m: 0 if nothing overlaps. Overlaps of kinematic grains with each
+    /// other and with walls do not count.
     #[must_use]
     pub fn penetration(&self) -> f64 {
         self.soil().penetration(self.q())
@@ -372,7 +377,8 @@ where
 }
 
 impl SoilSimulation {
-    /// Momentum (x, y) of the disks that are not kinematic, kg m/s, and their moment of momentum about the origin, kg m²/s.
+    /// Momentum (x, y) of the disks that are not kinematic, kg m/s, and
+    /// their moment of momentum about the origin, kg m²/s.
     #[must_use]
     pub fn momentum(&self) -> [f64; 3] {
         let (linear, moment) = self.soil().momentum(self.q(), self.v());
@@ -380,7 +386,7 @@ impl SoilSimulation {
     }
 }
 
-/// What a soil's simulation cannot be built from.
+/// Errors in the description of a soil simulation.
 #[derive(Clone, Debug, thiserror::Error, PartialEq)]
 pub enum SoilSetupError {
     /// An option.

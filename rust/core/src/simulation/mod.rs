@@ -1,10 +1,13 @@
 //! A scene stepped through time.
 //!
 //! - [`scene`]: what can be simulated; [`stepping`]: the one simulation of all scenes;
-//! - [`state`], [`snapshot`], [`active_contact`]: what it holds, what it needs to continue, what it reports;
-//! - [`rover`]: a rover on a terrain, with its [commands](rover_command), its [contacts](rover_contacts) and its [`reading`];
-//! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains, perhaps with a machine on it;
-//! - [`batch`]: many rovers side by side; [`profile`]: where the time goes.
+//! - [`state`], [`snapshot`], [`active_contact`]: its state, the data needed to continue, its
+//!   contacts;
+//! - [`rover`]: a rover on a terrain, with its [commands](rover_command), its
+//!   [contacts](rover_contacts) and its [`reading`];
+//! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains,
+//!   perhaps with a machine on it;
+//! - [`batch`]: many rovers side by side; [`profile`]: time spent in each part of a step.
 
 pub mod active_contact;
 pub mod batch;

@@ -25,7 +25,7 @@ pub struct PlanarScene<const NV: usize, M> {
     pub machine: M,
     /// The ground.
     pub ground: Arc<dyn Ground>,
-    /// How discs meet the ground.
+    /// Contact rule of discs on the ground.
     pub rule: ContactRule,
 }
 
@@ -182,7 +182,8 @@ impl<const NV: usize, M: PlanarMachine<NV> + Clone> PlanarSimulation<NV, M> {
         Ok(())
     }
 
-    /// Sets the torques, N m, positive forward; each saturates at its limit ([`PlanarMachine::torque_limit`]).
+    /// Sets the torques, N m, positive forward; each saturates at its limit
+    /// ([`PlanarMachine::torque_limit`]).
     ///
     /// # Errors
     /// Wrong length or an entry that is not finite; nothing is changed then.
@@ -196,12 +197,12 @@ impl<const NV: usize, M: PlanarMachine<NV> + Clone> PlanarSimulation<NV, M> {
         Ok(())
     }
 
-    /// `M(q)` now.
+    /// `M(q)` at the current q.
     pub fn mass_matrix(&self) -> SMatrix<f64, NV, NV> {
         self.machine().mass_matrix(self.q())
     }
 
-    /// Smallest gap of every disc now, m; negative where it overlaps the ground.
+    /// Current smallest gap of every disc, m; negative if it overlaps the ground.
     pub fn gaps(&self) -> Vec<f64> {
         let PlanarScene {
             machine,

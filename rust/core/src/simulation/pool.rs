@@ -1,4 +1,4 @@
-//! Threads that survive a fork: a child process has none of its parent's, so it starts its own.
+//! Threads that survive a fork: a child process inherits none of its parent's and starts its own.
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -25,7 +25,7 @@ impl Pool {
         })
     }
 
-    /// The threads, started anew where the process is a child of the one that started them.
+    /// The threads, restarted if the process is a child of the one that started them.
     ///
     /// # Errors
     /// `Threads`.
@@ -39,8 +39,8 @@ impl Pool {
         Ok(self.threads.insert(threads))
     }
 
-    /// Threads of a parent do not run here, and what they held at the fork they hold for ever: to drop the pool, which
-    /// talks to them, could wait without end.
+    /// The parent's threads do not run here, and locks that they held at the fork are never
+    /// released: dropping the pool, which communicates with them, could block for ever.
     fn forget_a_parents(&mut self) {
         if self.process != std::process::id() {
             std::mem::forget(self.threads.take());

@@ -1,4 +1,4 @@
-//! A probe that measures: mean time of each part of a step.
+//! A profile of a step: mean time of each part.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -28,7 +28,7 @@ impl Stopwatch {
         self.steps = steps;
     }
 
-    /// Mean microseconds a step of each phase, in the order of the step.
+    /// Mean microseconds per step of each phase, in the order of the step.
     #[must_use]
     pub fn microseconds(&self) -> Vec<(Phase, f64)> {
         let scale = 1e6 / self.steps.max(1) as f64;

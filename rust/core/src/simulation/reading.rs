@@ -1,4 +1,4 @@
-//! A reading: all that a controller looks at, as one row of numbers.
+//! A reading: all inputs of a controller as one row of numbers.
 
 use std::ops::Range;
 
@@ -9,22 +9,23 @@ use crate::contact::Part;
 use crate::integrator::StepStatus;
 use crate::multibody::{Model, coordinates};
 
-/// Below this speed of rim and ground alike a slip ratio says nothing, m/s.
+/// Speed below which, for both rim and ground, a slip ratio is meaningless, m/s.
 pub const SLIP_SPEED: f64 = 0.05;
 
 /// A wheel touches when its gap is at most this, m. Resting wheels show gaps below a micrometre.
 pub const CONTACT_GAP: f64 = 1e-3;
 
-/// What a reading is asked for.
+/// Request for a reading.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Look<'a> {
     /// A place on the map, x and z, m.
     pub target: [f64; 2],
-    /// Points ahead and to the right of the trunk's origin in the heading frame, m, whose heights are wanted.
+    /// Points of the height scan, ahead and to the right of the trunk's origin in the heading
+    /// frame, m.
     pub scan: &'a [[f64; 2]],
 }
 
-/// Names and places of the numbers in a reading, in order. SI units.
+/// Names and positions of the numbers in a reading, in order. SI units.
 ///
 /// | name | size | meaning |
 /// |---|---|---|
@@ -53,7 +54,7 @@ pub struct ReadingLayout {
 }
 
 impl ReadingLayout {
-    /// Of a model, with a height scan of so many points.
+    /// Layout for a model and this number of height scan points.
     #[must_use]
     pub fn new(model: &Model, n_scan: usize) -> Self {
         let n = model.wheels().len();
@@ -118,7 +119,7 @@ impl RoverSimulation {
     /// Writes a reading in the order of [`ReadingLayout`].
     ///
     /// # Panics
-    /// If `out` has not the size of the layout of this model and scan.
+    /// If the size of `out` is not that of the layout of this model and scan.
     pub fn read(&self, look: &Look<'_>, out: &mut [f64]) {
         let model = self.model();
         let mut row = Row { out, filled: 0 };
@@ -136,7 +137,7 @@ impl RoverSimulation {
         let heading = if is_free { pose[4] } else { 0.0 };
         row.put(pose);
 
-        // A first body that is not free has the world's velocity.
+        // A first body that is not free moves with the world.
         let v = &state.v;
         let base = match v[..] {
             [a, b, c, d, e, f, ..] if is_free => [a, b, c, d, e, f],
@@ -196,7 +197,8 @@ impl RoverSimulation {
         assert_eq!(row.filled, row.out.len(), "a row as long as its layout");
     }
 
-    /// Mean over the wheels' contacts of the last step of |u_T| / max(|rim speed|, |ground speed|); 0 without contacts.
+    /// Mean over the wheels' contacts of the last step of |u_T| / max(|rim
+    /// speed|, |ground speed|); 0 without contacts.
     #[must_use]
     pub fn slip_ratio(&self) -> f64 {
         let (mut total, mut n) = (0.0, 0_u32);

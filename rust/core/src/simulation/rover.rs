@@ -93,7 +93,8 @@ impl Scene for RoverScene {
         }
     }
 
-    /// Most contacts on a plane: three rim points a wheel, four corners a box, one point a ball, and both stops of a joint.
+    /// Most contacts on a plane: three rim points per wheel, four corners per box, one point per
+    /// ball, and both stops of a joint.
     fn contact_capacity(&self) -> usize {
         let model = &self.model;
         let stops = 2 * model.limited_joints().len();
@@ -125,7 +126,7 @@ impl Scene for RoverScene {
         parts.drive_work.fill(0.0);
     }
 
-    /// Books torques and work of the drives.
+    /// Records torques and work of the drives.
     fn after_step(&self, taken: StepTaken<'_, Self>) {
         let drives = taken.parts.tree.drives();
         for (work, drive) in taken.parts.drive_work.iter_mut().zip(drives) {
@@ -169,10 +170,10 @@ impl Scene for RoverScene {
     }
 }
 
-/// What the last call of [`Simulation::step`] came to; not part of the state.
+/// Results of the last call of [`Simulation::step`]; not part of the state.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LastCall {
-    /// Report of its steps; empty where one could not be taken.
+    /// Report of its steps; empty if one failed.
     pub report: StepReport,
     /// Work through the drives of wheels and other joints, Σ |∫ τ_i dφ_i|, driving or braking, J.
     pub work: f64,
@@ -206,10 +207,11 @@ impl RoverSimulation {
         &self.scene.terrain
     }
 
-    /// Sets configuration and velocity, as checked by [`crate::multibody::coordinates`]; time 0, warm start forgotten.
+    /// Sets configuration and velocity, as checked by
+    /// [`crate::multibody::coordinates`]; time 0, warm start forgotten.
     ///
     /// # Panics
-    /// If the sizes are another model's.
+    /// If the sizes do not fit the model.
     pub fn set_state(&mut self, configuration: Configuration, v: Vec<f64>) {
         assert!(
             configuration.is_of(self.model()),
@@ -218,7 +220,7 @@ impl RoverSimulation {
         self.place(configuration, v);
     }
 
-    /// What the last call of [`Self::step`] came to.
+    /// Results of the last call of [`Self::step`].
     #[must_use]
     pub fn last_call(&self) -> LastCall {
         // A joint's work over the call counts as driving or as braking.
@@ -230,7 +232,8 @@ impl RoverSimulation {
         }
     }
 
-    /// Mean torque that the drive of each wheel gave in the last step, positive forward (N m): the command, within the motor's line.
+    /// Mean torque that the drive of each wheel gave in the last step,
+    /// positive forward (N m): the command, within the motor's line.
     ///
     /// Zero before any step and where the wheel is locked.
     #[must_use]
@@ -238,7 +241,7 @@ impl RoverSimulation {
         &self.memory
     }
 
-    /// Poses of the bodies now.
+    /// Current poses of the bodies.
     #[must_use]
     pub fn kinematics(&self) -> Kinematics {
         Kinematics::of(self.model(), &self.state.configuration)

@@ -1,4 +1,4 @@
-//! What a rover is told: wheel torques, steering, held joints, brakes.
+//! Commands of a rover: wheel torques, steering, held joints, brakes.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,11 +10,11 @@ use crate::system::{Command, Drive, HeldJoint};
 /// Torques and set-points of a rover.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RoverCommand {
-    /// What the actuators do.
+    /// Commands of the actuators.
     pub actuators: Command,
     /// Driving torque of each wheel, positive forward, N m.
     pub wheel_torque: Vec<f64>,
-    /// Torque about each joint's axis, N m: its drive's where it has one, else on top of all others.
+    /// Torque about each joint's axis, N m: its drive's where it has one, else additional.
     pub joint_torque: Vec<f64>,
 }
 
@@ -52,7 +52,7 @@ impl RoverCommand {
         }
     }
 
-    /// Whether it is of this model, its motors are the model's, and all of its numbers are finite.
+    /// Whether it fits this model and its motors, and all of its numbers are finite.
     pub(super) fn is_of(&self, model: &Model) -> bool {
         let own = Self::idle(model);
         let Command {
@@ -107,8 +107,10 @@ impl RoverSimulation {
         Ok(())
     }
 
-    /// Sets torques about the joint axes (n_joints, N m). A joint with a drive saturates at its limit and has its motor's line; at all others
-    /// they come on top of the wheels' and have no limit.
+    /// Sets torques about the joint axes (n_joints, N m).
+    ///
+    /// A joint with a drive saturates at its limit and on its motor's line. At all others the torque
+    /// is additional to the wheels' and has no limit.
     ///
     /// # Errors
     /// Wrong length or an entry that is not finite; nothing is changed then.
@@ -170,7 +172,8 @@ impl RoverSimulation {
     /// Holds the steering joints at set-points (rad, one a wheel) with the model's gains.
     ///
     /// # Errors
-    /// Wrong length, not finite, beyond the wheel's limit, or nonzero where there is no free steering joint.
+    /// Wrong length, not finite, beyond the wheel's limit, or nonzero where
+    /// there is no free steering joint.
     pub fn set_steering(&mut self, set_points: &[f64]) -> Result<(), CommandError> {
         self.check_steering(set_points)?;
         for (&set_point, wheel) in set_points.iter().zip(self.scene.model.wheels()) {
@@ -224,7 +227,7 @@ impl RoverSimulation {
         self.set_steering(set_points)
     }
 
-    /// Whether [`Self::set_wheel_torques`] and [`Self::set_steering`] would take these.
+    /// Checks whether [`Self::set_wheel_torques`] and [`Self::set_steering`] would accept these.
     ///
     /// # Errors
     /// As these two.
@@ -233,10 +236,11 @@ impl RoverSimulation {
         self.check_steering(set_points)
     }
 
-    /// Holds joints by name; set-points default to where they are, gains to the model's.
+    /// Holds joints by name; set-points default to the current positions, gains to the model's.
     ///
     /// # Errors
-    /// An unknown joint, a wrong number of set-points, a gain that is negative or not finite; nothing is changed then.
+    /// An unknown joint, a wrong number of set-points, a gain that is
+    /// negative or not finite; nothing is changed then.
     pub fn hold(
         &mut self,
         joints: &[String],
@@ -267,7 +271,7 @@ impl RoverSimulation {
         Ok(())
     }
 
-    /// Lets joints go by name.
+    /// Releases joints by name.
     ///
     /// # Errors
     /// An unknown joint; nothing is changed then.
@@ -278,7 +282,7 @@ impl RoverSimulation {
         Ok(())
     }
 
-    /// Holds all wheels where they are and takes their torques away.
+    /// Holds all wheels where they are and sets their torques to zero.
     pub fn brake(&mut self) {
         self.command.wheel_torque.fill(0.0);
         self.combine_torques();

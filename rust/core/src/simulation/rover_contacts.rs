@@ -1,16 +1,17 @@
-//! Where a rover touches the ground, and how hard.
+//! Contact points and forces of a rover on the ground.
 
 use super::rover::RoverSimulation;
 use crate::contact::{Activation, Contact, ContactFrame, Part, detect, detection::wheel_contacts};
 
 impl RoverSimulation {
-    /// Nearest point, frame and gap of every wheel now.
+    /// Current nearest point, frame and gap of every wheel.
     #[must_use]
     pub fn wheel_contacts(&self) -> Vec<Contact> {
         wheel_contacts(self.model(), &self.kinematics(), &**self.terrain())
     }
 
-    /// Deepest gap (m) of any wheel or box with the ground now: 0 where nothing overlaps, else negative.
+    /// Deepest gap (m) of any wheel or box with the ground now: 0 where
+    /// nothing overlaps, else negative.
     #[must_use]
     pub fn deepest_overlap(&self) -> f64 {
         let mut contacts = Vec::new();
@@ -51,7 +52,7 @@ impl RoverSimulation {
         forces
     }
 
-    /// Mean normal force of the last step on all bodies that are no wheels, N; what joints' stops give is left out.
+    /// Mean normal force of the last step on all parts except wheels, N, without joints' stops.
     #[must_use]
     pub fn body_force(&self) -> f64 {
         let boxes = self

@@ -1,8 +1,8 @@
-//! What a simulation steps: a description of all that there is, without its state.
+//! A scene: the description of everything that a simulation steps, without its state.
 //!
-//! A scene is a machine, or many bodies, with the ground under them. It hands out a [`MechanicalSystem`] for each step, says what can
-//! be commanded and what it remembers from step to step, and checks the part of a snapshot that only it understands. Everything
-//! else of a simulation is written once, in [`super::Simulation`].
+//! A scene is a machine, or many bodies, on a ground. It provides a [`MechanicalSystem`] for each
+//! step, defines its command and its memory between steps, and checks its own part of a snapshot.
+//! Everything else is written once, in [`super::Simulation`].
 
 use super::active_contact::LocatedContact;
 use super::snapshot::Snapshot;
@@ -10,7 +10,7 @@ use super::state::State;
 use crate::integrator::{MechanicalSystem, Scratch, StepOptions, UnilateralContact, WarmStart};
 use crate::multibody::Energy;
 
-/// Names the contacts of a scene.
+/// Key of a scene's contacts.
 pub type SceneKey<S> = <<S as Scene>::Contact as UnilateralContact>::Key;
 
 /// Scratch of a scene's steps.
@@ -22,11 +22,11 @@ pub trait Scene: Clone {
     type Configuration: Clone + PartialEq;
     /// A contact of a step.
     type Contact: LocatedContact;
-    /// What can be set from outside and holds until it is set anew: torques, held joints.
+    /// Command, which holds until the next one: torques, held joints.
     type Command: Clone + PartialEq;
-    /// What the scene remembers from step to step beside its state.
+    /// Memory between steps beyond the state.
     type Memory: Clone + PartialEq;
-    /// Scratch of its matrices. Nothing in it is state: a fresh one gives the same bits.
+    /// Scratch of its matrices. It holds no state: a fresh one gives the same bits.
     type Parts: Clone;
     /// The scene as a step sees it.
     type System<'a>: MechanicalSystem<Configuration = Self::Configuration, Contact = Self::Contact>
@@ -45,10 +45,10 @@ pub trait Scene: Clone {
     /// Fresh scratch.
     fn parts(&self) -> Self::Parts;
 
-    /// How many contacts a step usually has at most: room that is made in advance.
+    /// Usual upper bound of the number of contacts, for which memory is reserved.
     fn contact_capacity(&self) -> usize;
 
-    /// The system of a step that begins.
+    /// The system at the start of a step.
     fn system<'a>(
         &'a self,
         command: &'a Self::Command,
@@ -63,30 +63,31 @@ pub trait Scene: Clone {
         contact: &Self::Contact,
     ) -> <Self::Contact as LocatedContact>::Vector;
 
-    /// A call begins, or the state was set: what is summed over a call starts anew. By default nothing is.
+    /// Called at the start of a call, or after the state was set: resets sums over a call. By
+    /// default there are none.
     fn begin_call(&self, _parts: &mut Self::Parts) {}
 
-    /// After each step that became the state. By default nothing is to do.
+    /// Called after each accepted step. By default it does nothing.
     fn after_step(&self, _taken: StepTaken<'_, Self>) {}
 
     /// Kinetic and potential energy of a state, J.
     fn energy(&self, options: &StepOptions, state: &State<Self::Configuration>) -> Energy;
 
-    /// A number that two scenes share only if a snapshot of one fits the other.
+    /// A number that is equal for two scenes only if a snapshot of one fits the other.
     fn fingerprint(&self) -> u64;
 
-    /// Whether a snapshot's configuration, command, memory and contacts can be this scene's. Velocities, the warm start and the
-    /// numbers of contacts have been looked at already.
+    /// Whether a snapshot's configuration, command, memory and contacts fit this scene. The caller
+    /// has already checked the velocities, the warm start and the numbers of contacts.
     fn admits(&self, snapshot: &Snapshot<Self>) -> bool;
 }
 
-/// A step that has just become the state.
+/// A step that was just accepted.
 pub struct StepTaken<'a, S: Scene> {
     /// The step's options.
     pub options: &'a StepOptions,
     /// Configuration, velocity and time, which the scene may correct.
     pub state: &'a mut State<S::Configuration>,
-    /// What the scene remembers.
+    /// The scene's memory.
     pub memory: &'a mut S::Memory,
     /// Its scratch.
     pub parts: &'a mut S::Parts,

@@ -1,4 +1,4 @@
-//! All that a simulation needs to continue bit for bit.
+//! A snapshot: all data that a simulation needs to continue bit for bit.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,13 +17,13 @@ use crate::integrator::WarmStart;
                    <S::Contact as LocatedContact>::Vector: Deserialize<'de>"
 ))]
 pub struct Snapshot<S: Scene> {
-    /// [`Scene::fingerprint`] of the scene that it was taken of.
+    /// [`Scene::fingerprint`] of its scene.
     pub scene: u64,
-    /// Where and how fast.
+    /// Configuration, velocity and time.
     pub state: State<S::Configuration>,
-    /// What was commanded.
+    /// The command.
     pub command: S::Command,
-    /// What the scene remembers.
+    /// The scene's memory.
     pub memory: S::Memory,
     /// Where the next solve starts.
     pub warm_start: WarmStart<SceneKey<S>>,
@@ -43,7 +43,7 @@ impl<S: Scene> PartialEq for Snapshot<S> {
 }
 
 impl<S: Scene> Snapshot<S> {
-    /// Whether it has the sizes of a scene with so many velocities, and nothing but finite numbers.
+    /// Whether it has the sizes of a scene with this many velocities, and only finite numbers.
     pub(super) fn is_sound(&self, nv: usize) -> bool {
         let warm = &self.warm_start;
         let impulses = warm.impulses.iter().flat_map(|(_, p)| p);

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::integrator::StateMut;
 
-/// Where a scene is and how fast: small, cloneable, without any scratch.
+/// State of a scene: small, cloneable, without scratch.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State<Q> {
     /// A point of the configuration space.
@@ -26,7 +26,7 @@ impl<Q> State<Q> {
         }
     }
 
-    /// What a step moves.
+    /// The view that a step advances.
     #[inline]
     pub(super) fn as_mut(&mut self) -> StateMut<'_, Q> {
         StateMut {

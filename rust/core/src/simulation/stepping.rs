@@ -1,4 +1,4 @@
-//! A scene through time.
+//! The simulation of a scene.
 
 use super::active_contact::{ActiveContact, Components, LocatedContact};
 use super::error::SnapshotError;
@@ -15,7 +15,8 @@ use crate::multibody::Energy;
 /// Steps of a copy that a profile takes before it measures.
 const WARM_UP: usize = 10;
 
-/// A scene, its state and its scratch. What a scene shares, its copies share; everything else is a simulation's own.
+/// A scene, its state and its scratch. Copies share what the scene shares; each owns everything
+/// else.
 #[derive(Clone, Debug)]
 pub struct Simulation<S: Scene> {
     pub(super) scene: S,
@@ -31,7 +32,7 @@ pub struct Simulation<S: Scene> {
 }
 
 impl<S: Scene> Simulation<S> {
-    /// At rest in a configuration, with the scene's first command.
+    /// At rest in a configuration, with the scene's initial command.
     ///
     /// # Errors
     /// An option out of its range.
@@ -69,7 +70,7 @@ impl<S: Scene> Simulation<S> {
         &self.options
     }
 
-    /// Where it is and how fast.
+    /// Configuration, velocity and time.
     #[must_use]
     pub fn state(&self) -> &State<S::Configuration> {
         &self.state
@@ -93,7 +94,7 @@ impl<S: Scene> Simulation<S> {
         self.state.time
     }
 
-    /// What is commanded.
+    /// The command.
     #[must_use]
     pub fn command(&self) -> &S::Command {
         &self.command
@@ -111,13 +112,14 @@ impl<S: Scene> Simulation<S> {
         &self.active
     }
 
-    /// Report of the last call of [`Self::step`]; empty before any, and where one could not be taken.
+    /// Report of the last call of [`Self::step`]; empty before any call, and after a step that
+    /// failed.
     #[must_use]
     pub fn last_report(&self) -> &StepReport {
         &self.last_report
     }
 
-    /// Kinetic and potential energy now, J.
+    /// Current kinetic and potential energy, J.
     #[must_use]
     pub fn energy(&self) -> Energy {
         self.scene.energy(&self.options, &self.state)
@@ -126,7 +128,7 @@ impl<S: Scene> Simulation<S> {
     /// Sets configuration and velocity; time 0, warm start and memory forgotten, the command kept.
     ///
     /// # Panics
-    /// If the velocity is another scene's.
+    /// If the size of the velocity does not fit the scene.
     pub fn place(&mut self, configuration: S::Configuration, v: Vec<f64>) {
         assert_eq!(
             v.len(),
@@ -143,7 +145,7 @@ impl<S: Scene> Simulation<S> {
         self.forget_last_call();
     }
 
-    /// Forgets what the last call of [`Self::step`] came to.
+    /// Clears the results of the last call of [`Self::step`].
     pub(super) fn forget_last_call(&mut self) {
         self.active.clear();
         self.scene.begin_call(&mut self.parts);
@@ -153,12 +155,12 @@ impl<S: Scene> Simulation<S> {
     /// Takes `n` steps, or stops at the first that fails, keeping the state before it.
     ///
     /// # Errors
-    /// See [`StepError`]. A solver that did not converge is no error: see the report.
+    /// See [`StepError`]. A solver that did not converge is not an error; the report says so.
     pub fn step(&mut self, n: usize) -> Result<StepReport, StepError> {
         self.step_while(n, &mut || true)
     }
 
-    /// The same, but stops after a whole step once `go_on`, which is asked after each, says no.
+    /// The same, but asks `go_on` after each step and stops once it returns false.
     ///
     /// The report's `steps` says how many were taken.
     ///
@@ -184,7 +186,8 @@ impl<S: Scene> Simulation<S> {
         self.call(integrator, n, &mut || true, &mut NoProbe)
     }
 
-    /// Takes `n` steps of a copy and says where their time went; `go_on` as for [`Self::step_while`].
+    /// Takes `n` steps of a copy and returns the time of each part; `go_on` as for
+    /// [`Self::step_while`].
     ///
     /// # Errors
     /// As [`Self::step`].
@@ -276,7 +279,7 @@ impl<S: Scene> Simulation<S> {
             .extend(self.scratch.contacts().iter().zip(local).map(active));
     }
 
-    /// Everything that is needed to continue bit for bit.
+    /// All data needed to continue bit for bit.
     #[must_use]
     pub fn snapshot(&self) -> Snapshot<S> {
         Snapshot {

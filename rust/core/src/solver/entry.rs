@@ -1,4 +1,4 @@
-//! A solve from the caller's problem to the judged answer: dimension, storage, units, method, report.
+//! Entry points of a solve: choose dimension, storage, units and method, then judge the answer.
 
 use super::options::{ContactLaw, Method, SolverOptions};
 use super::reference::relaxed;
@@ -17,20 +17,24 @@ use crate::problem::{
 
 /// Solves `K_μ* ∋ ũ ⊥ p ∈ K_μ`, `u = W p + q`.
 ///
-/// `p` (n), N s: in, the warm start or zeros; out, the impulses, inside the friction cones up to the report's residual.
-/// `u` (n), m/s: out, `W p + q` of the returned `p`. `workspace` may have served any other problem before; it influences
-/// no bit of the answer, and allocates only when a problem is larger than all before.
+/// `p` (n), N s: on entry the warm start or zeros, on return the impulses, inside the friction
+/// cones up to the report's residual. `u` (n), m/s: on return `W p + q`. `workspace` may have
+/// served any other problem before. It does not affect the answer in any bit, and it allocates only
+/// when a problem is larger than all earlier ones.
 ///
-/// From `p = 0` and few contacts the answer is the one next to zero (Tikhonov's limit), so a symmetric problem has a
-/// symmetric answer and the order of the contacts does not matter; from a warm start it is the one next to the warm start.
+/// Where several impulses solve the problem of a few contacts, a solve from `p = 0` returns the one
+/// nearest to zero (Tikhonov's limit): a symmetric problem has a symmetric answer, and the order of
+/// the contacts does not matter. A solve from a warm start returns the one nearest to the warm
+/// start.
 ///
-/// Not converged is an answer, see [`SolveStatus`]: then `p` is the best impulse met by any stage. The work is bounded, see
-/// [`SolverOptions::budget`]. Where `q = 0` the answer is zero, whatever the warm start. Data or warm start that are not finite
-/// never come out again: with bad data `p` and `u` are zero and the status is [`SolveStatus::NonFinite`]; a bad warm start
-/// counts as zeros.
+/// A solve that does not converge is no error, see [`SolveStatus`]: `p` is then the best impulse of
+/// any stage. The work is bounded, see [`SolverOptions::budget`]. If `q = 0` the answer is zero,
+/// whatever the warm start. Non-finite input never reaches the output: with non-finite data `p` and
+/// `u` are zero and the status is [`SolveStatus::NonFinite`]; a non-finite warm start counts as
+/// zeros.
 ///
 /// # Panics
-/// If `p` or `u` has not the problem's number of unknowns.
+/// If the length of `p` or `u` is not the problem's number of unknowns.
 pub fn solve(
     problem: &FrictionContactProblem<'_>,
     options: &SolverOptions,
@@ -52,9 +56,11 @@ pub fn solve(
     }
 }
 
-/// Solves the contacts of very many free bodies: [`Method::Auto`] and [`Method::GaussSeidel`] sweep over their pairs and need no `W`.
+/// Solves the contacts of very many free bodies: [`Method::Auto`] and
+/// [`Method::GaussSeidel`] sweep over their pairs and need no `W`.
 ///
-/// `p`, `u`, `workspace` and the report are as [`solve`]'s. The sweeps end at `max_sweeps`, the budget is that of what comes after them.
+/// `p`, `u`, `workspace` and the report are as in [`solve`]. `max_sweeps` bounds the sweeps; the
+/// budget bounds the stages after them.
 ///
 /// # Panics
 /// If a length does not fit.
@@ -101,7 +107,7 @@ fn solve_in<const D: usize>(
     }
 }
 
-/// Nothing moves and nothing is pushed: `p = 0` and `u = 0`.
+/// The zero answer: `p = 0` and `u = 0`.
 fn at_rest(
     problem: &FrictionContactProblem<'_>,
     method: Method,
@@ -122,7 +128,7 @@ fn at_rest(
     report_of(status, method)
 }
 
-/// A report of no work at all.
+/// The report of a solve that took no work.
 fn report_of(status: SolveStatus, method: Method) -> SolveReport {
     let residual = if status == SolveStatus::NonFinite {
         f64::INFINITY
@@ -150,8 +156,9 @@ fn report_of(status: SolveStatus, method: Method) -> SolveReport {
     }
 }
 
-/// Solves the problem as it is; `None`, and nothing done, where `|q|` or the mean diagonal of `W` is so large or small that squares
-/// overflow or vanish, unless `at_any_scale`.
+/// Solves the problem in the caller's units. Returns `None`, with nothing done, if `|q|` or the
+/// mean diagonal of `W` is so large or small that squares overflow or vanish, unless
+/// `at_any_scale`.
 fn solve_with_scales<const D: usize>(
     problem: &FrictionContactProblem<'_>,
     options: &SolverOptions,
@@ -192,7 +199,8 @@ fn solve_with_scales<const D: usize>(
     Some(judge::<D>(&data, options, p, u, scratch, islands))
 }
 
-/// Runs the method. `u` is `W p + q` on return; `iterations` is advanced by the sweeps and linear solves.
+/// Runs the method. `u` is `W p + q` on return; `iterations` is advanced by
+/// the sweeps and linear solves.
 fn run<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
@@ -281,7 +289,7 @@ fn judge<const D: usize>(
     report
 }
 
-/// The answer is not finite: none is given.
+/// The answer if the result is not finite.
 fn refuse(report: &mut SolveReport, p: &mut [f64], u: &mut [f64]) {
     p.fill(0.0);
     u.fill(0.0);
@@ -289,7 +297,8 @@ fn refuse(report: &mut SolveReport, p: &mut [f64], u: &mut [f64]) {
     report.amend(SolveStatus::NonFinite);
 }
 
-/// Solves in units of the largest free velocity and the largest diagonal entry of `W`, both taken as powers of two, so that no digit is lost.
+/// Solves in units of the largest free velocity and the largest diagonal entry of `W`, both taken
+/// as powers of two, so that no digit is lost.
 fn solve_scaled<const D: usize>(
     problem: &FrictionContactProblem<'_>,
     options: &SolverOptions,

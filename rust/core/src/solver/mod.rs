@@ -1,21 +1,25 @@
-//! Solvers of the friction-contact problem. The usual entry point is [`solve`]; a solver sees only `(W, q, μ)`.
+//! Solvers of the friction-contact problem. The usual entry point is
+//! [`solve`]; a solver sees only `(W, q, μ)`.
 //!
-//! The chapter stands in floors, and no page knows one of a higher floor. From the ground up:
+//! The chapter is built in layers, and no module uses one of a higher layer. From the bottom up:
 //!
-//! - `options`, `report`, `work`: what a caller may choose, what comes back, and how work is counted;
-//! - `local`: one contact with the others held, its exact [solution](solve_one_contact) and its mode;
-//! - `linear`: the system of a Newton step and its factors, dense or in sparse blocks;
-//! - `scratch`: what the stages share;
-//! - `stage`: the iterations, a file each;
-//! - `strategy`: which stage when; `reference`: answers to compare with;
-//! - `workspace` and `entry`: from the caller's problem to the judged answer.
+//! - `options`, `report`, `work`: the caller's options, the report, and the count of work;
+//! - `local`: one contact with all others fixed: its exact [solution](solve_one_contact) and its
+//!   mode;
+//! - `linear`: the linear system of a Newton step and its factors, dense or block-sparse;
+//! - `scratch`: memory that the stages share;
+//! - `stage`: the iterative methods, one per file;
+//! - `strategy`: the order of the stages; `reference`: methods for comparison;
+//! - `workspace` and `entry`: from the caller's problem to the answer and its report.
 //!
-//! The problem itself, its scales and its residual lie below all of them, in [`crate::problem`]. A [`Method`] names a stage or, as
-//! [`Method::Auto`], the escalation over them. Every report is computed from the returned impulse, never from inside an iteration.
+//! The problem, its scales and its residual lie below all layers, in [`crate::problem`]. A
+//! [`Method`] names a stage or, as [`Method::Auto`], the escalation over the stages. Every report
+//! is computed from the returned impulse, never from the inside of an iteration.
 //!
 //! # The escalation
 //!
-//! What [`Method::Auto`] tries, in this order, until an answer holds. `docs/solvers.md` says how the last column was measured.
+//! What [`Method::Auto`] tries, in this order, until an answer holds.
+//! `docs/solvers.md` says how the last column was measured.
 //!
 #![doc = include_str!("escalation.md")]
 

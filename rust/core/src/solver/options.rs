@@ -1,4 +1,4 @@
-//! What the caller may choose about a solve.
+//! Options of a solve.
 
 use crate::problem::Residual;
 
@@ -24,9 +24,11 @@ pub enum Method {
     Newton,
     /// Proximal point outside, damped Newton inside.
     ProximalPoint,
-    /// Alternating directions with De Saxcé's shift renewed at every iteration; `Auto` takes some to bring many contacts near.
+    /// Alternating directions (ADMM), with De Saxcé's shift renewed at every iteration; `Auto` uses
+    /// a few iterations to bring many contacts close to the answer.
     Admm,
-    /// The convex relaxation of Coulomb's law, for comparison: its answer obeys another law and never counts as converged.
+    /// The convex relaxation of Coulomb's law, for comparison: its answer
+    /// obeys another law and never counts as converged.
     Relaxed,
 }
 
@@ -41,7 +43,7 @@ impl Method {
         Self::Relaxed,
     ];
 
-    /// Public name: what Python and reports call it.
+    /// Public name, as Python and reports use it.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -54,13 +56,13 @@ impl Method {
         }
     }
 
-    /// The method of a public name.
+    /// The method with this public name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|method| method.name() == name)
     }
 
-    /// The law that its answers obey.
+    /// The law that its answers satisfy.
     #[must_use]
     pub const fn law(self) -> ContactLaw {
         match self {
@@ -75,28 +77,32 @@ impl Method {
 pub struct SolverOptions {
     /// Which algorithm; default [`Method::Auto`].
     pub method: Method,
-    /// Largest [relative residual](crate::problem::Residual::relative) of a converged answer, dimensionless; default 1e-12.
+    /// Largest [relative residual](crate::problem::Residual::relative) of a
+    /// converged answer, dimensionless; default 1e-12.
     ///
-    /// An answer whose violation is within the rounding of `W p + q` counts as converged too: no impulse does better.
+    /// An answer whose violation is within the rounding of `W p + q` also counts as converged,
+    /// since no impulse does better.
     pub tolerance: f64,
     /// Largest violation of a converged answer at any contact, m/s; default 1e-9.
     pub velocity_tolerance: f64,
     /// Most Newton steps of a stage, counting every linear solve; default 500.
     pub max_newton_steps: usize,
-    /// Most Gauss–Seidel sweeps, or iterations of ADMM, when that is the method asked for; default 10 000. `Auto` stops earlier by itself.
+    /// Most Gauss–Seidel sweeps, or ADMM iterations, when that method is requested; default 10 000.
+    /// `Auto` stops earlier by its own rules.
     pub max_sweeps: usize,
     /// Proximal regularisation `α` relative to the mean diagonal of `W`; default 1e-6.
     ///
-    /// Measured: smaller values let rounding (`ε/α`) leak into the impulses that `W` cannot see, larger ones cost
+    /// Measured: smaller values amplify rounding (`ε/α`) in the null space of `W`; larger ones cost
     /// refinement steps.
     pub regularisation: f64,
-    /// Most work of a solve, counted and not timed, so that equal problems end alike on every machine; default
-    /// [`DEFAULT_BUDGET`](Self::DEFAULT_BUDGET).
+    /// Most work of a solve; default [`DEFAULT_BUDGET`](Self::DEFAULT_BUDGET). Work is counted, not
+    /// timed, so that equal problems end alike on every machine.
     ///
-    /// The unit is one multiplication with its addition in a product with `W`. What the budget does not allow is left undone, the status is
-    /// [`SolveStatus::BudgetExhausted`](super::SolveStatus::BudgetExhausted), and the best impulse known by then is returned.
+    /// The unit is one multiply–add in a product with `W`. When the budget is spent, the solve
+    /// stops with [`SolveStatus::BudgetExhausted`](super::SolveStatus::BudgetExhausted) and returns
+    /// the best impulse known by then.
     pub budget: u64,
-    /// Most contacts that `Auto` takes to Newton without trying Gauss–Seidel first; default 32.
+    /// Most contacts for which `Auto` starts with Newton, without Gauss–Seidel first; default 32.
     pub direct_contacts: usize,
 }
 
@@ -110,7 +116,7 @@ impl SolverOptions {
         residual.relative <= self.tolerance && residual.velocity <= self.velocity_tolerance
     }
 
-    /// How far a residual is above the tolerances, as a factor.
+    /// Factor by which a residual exceeds the tolerances.
     pub(super) fn excess(&self, residual: Residual) -> f64 {
         (residual.relative / self.tolerance).max(residual.velocity / self.velocity_tolerance)
     }

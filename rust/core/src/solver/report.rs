@@ -1,4 +1,4 @@
-//! How a solve ended.
+//! The report of a solve.
 
 use super::options::Method;
 use crate::problem::Residual;
@@ -9,14 +9,15 @@ use crate::problem::Residual;
 pub enum SolveStatus {
     /// Both tolerances hold, or the violation is within the rounding of the data.
     Converged,
-    /// The tolerances hold for the convex relaxation, which is not the law that was asked for; the report's numbers are Coulomb's.
+    /// The tolerances hold for the convex relaxation, which is not Coulomb's law; the report's
+    /// residuals are those of Coulomb's law.
     SolvedRelaxed,
     /// The allowed iterations were used up.
     MaxIterations,
     /// Progress stopped before the tolerance.
     #[default]
     Stalled,
-    /// The work that [`budget`](super::SolverOptions::budget) allows was done.
+    /// The [`budget`](super::SolverOptions::budget) of work was spent.
     BudgetExhausted,
     /// The data are not finite, or overflow; the returned `p` and `u` are zero.
     NonFinite,
@@ -37,7 +38,8 @@ impl SolveStatus {
     }
 }
 
-/// One stage of a solve. [`Method::Auto`] climbs from one to the next until an answer holds.
+/// One stage of a solve. [`Method::Auto`] tries one after the other until an answer meets the
+/// tolerances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Stage {
@@ -48,15 +50,15 @@ pub enum Stage {
     Sweeps,
     /// Accelerated sweeps on the velocities of free bodies.
     BodySweeps,
-    /// Groups of contacts that no body couples, each solved by itself.
+    /// Islands of contacts that share no body, each solved separately.
     Islands,
     /// Newton's steps on the modes of the warm start.
     WarmNewton,
-    /// From the warm start, one contact changes its mode at a time.
+    /// Pivoting from the warm start: one contact at a time changes its mode.
     Pivoting,
-    /// From rest, Newton's steps on the modes of a few sweeps.
+    /// From zero impulse: Newton's steps on the modes that a few sweeps find.
     GuidedNewton,
-    /// Newton's full steps on predicted modes, from zero or from where the sweeps ended.
+    /// Full Newton steps on predicted modes, from zero or from the result of the sweeps.
     Newton,
     /// Proximal point around a damped Newton.
     ProximalPoint,
@@ -88,7 +90,7 @@ impl Stage {
         }
     }
 
-    /// The method that the stage belongs to; an answer by islands is of the method that the hardest of them took.
+    /// The method that the stage belongs to; for islands, the method of the hardest one.
     #[must_use]
     pub const fn method(self) -> Method {
         match self {
@@ -106,10 +108,10 @@ impl Stage {
     }
 }
 
-/// What the stages hand to the judge.
+/// The result that the stages hand over for judgement.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Outcome {
-    /// The method that answered.
+    /// The method that gave the answer.
     pub method: Method,
     /// Its stage.
     pub stage: Stage,
@@ -150,7 +152,7 @@ impl Rungs {
         }
     }
 
-    /// Says of the last stage that its answer was not accepted after all.
+    /// Marks the last stage's answer as not accepted.
     pub(super) fn amend(&mut self, status: SolveStatus) {
         if let Some(last) = self.list[..self.len].last_mut() {
             last.status = status;
@@ -170,10 +172,10 @@ impl std::fmt::Debug for Rungs {
     }
 }
 
-/// How a solve ended, judged from the returned impulse.
+/// Report of a solve, computed from the returned impulse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolveReport {
-    /// Why the solve stopped.
+    /// Reason for the end of the solve.
     pub status: SolveStatus,
     /// Sweeps and linear solves together.
     pub iterations: usize,
@@ -192,7 +194,7 @@ pub struct SolveReport {
 }
 
 impl SolveReport {
-    /// Ends with another reason than the last stage gave.
+    /// Replaces the reason that the last stage gave for its end.
     pub(super) fn amend(&mut self, status: SolveStatus) {
         self.status = status;
         self.rungs.amend(status);

@@ -1,20 +1,21 @@
-//! What the stages of a solve share and leave to one another, kept between solves so that none of them allocates.
+//! Memory that the stages of a solve share, kept between solves so that none of them allocates.
 
 use super::linear::reduced_system::ReducedSystem;
 use super::report::{Rung, Rungs, SolveStatus, Stage};
 use super::work::{Work, sweep};
 use crate::problem::Operator;
 
-/// Impulses and velocities of the iterations (n each), the Newton system, and the record of the stages.
+/// Impulses and velocities of the iterations (n each), the Newton system,
+/// and the record of the stages.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scratch {
     /// The linear system of a Newton step with its linearisation.
     pub system: ReducedSystem,
     /// Inverse masses of the contacts, 1/kg: ADMM's penalty at `σ = 1`.
     pub weights: Vec<f64>,
-    /// Impulse that the solve started from, N s.
+    /// Impulse at the start of the solve, N s.
     pub start: Vec<f64>,
-    /// Best impulse of the present stage, N s.
+    /// Best impulse of the current stage, N s.
     pub best: Vec<f64>,
     /// Nearest answer of all stages so far, N s.
     pub nearest: Vec<f64>,
@@ -54,7 +55,8 @@ impl Scratch {
         }
     }
 
-    /// Lists a stage that ended, and says how: for want of budget, where it left something undone.
+    /// Records a stage that ended and its reason, which is the budget if the stage could not finish
+    /// for lack of it.
     #[inline]
     pub fn list_stage(
         &mut self,
@@ -76,7 +78,7 @@ impl Scratch {
         status
     }
 
-    /// Spends the work of a product and so many sweeps, or says that it is too much.
+    /// Spends the work of a product and this many sweeps; false if the budget does not allow it.
     #[inline]
     pub fn affords_sweeps(&mut self, product: u64, n_contacts: usize, sweeps: usize) -> bool {
         self.work

@@ -1,21 +1,23 @@
-//! The work of a solve, counted and not timed, so that a budget ends it at the same place on every machine.
+//! The work of a solve. It is counted, not timed, so that a budget ends the solve at the same point
+//! on every machine.
 //!
-//! The unit is one multiplication with its addition in a product with `W`. Dense factors run in vector registers and are counted at a fraction, so that a unit
-//! takes about as long everywhere: a little more than a nanosecond on a shared server of 2.5 GHz.
+//! The unit is one multiply–add in a product with `W`. Dense factorisations run in vector registers
+//! and count at a fraction, so that a unit takes about the same time everywhere: a little more than
+//! a nanosecond on a shared server of 2.5 GHz.
 
-/// Units of one contact solved exactly, beside its row of the product.
+/// Units of one exact contact solution, in addition to its row of the product.
 const ONE_CONTACT: u64 = 200;
-/// Multiplications of a dense factorisation in one unit.
+/// Multiply–adds of a dense factorisation that make one unit.
 const DENSE: u64 = 4;
 
-/// What a solve has spent of its budget.
+/// Budget of a solve and the part of it that is spent.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::solver) struct Work {
     /// Units spent.
     pub spent: u64,
     /// Units allowed.
     pub budget: u64,
-    /// Whether something was left undone for want of budget.
+    /// Whether some work was refused for lack of budget.
     pub is_exhausted: bool,
 }
 
@@ -29,7 +31,7 @@ impl Work {
         }
     }
 
-    /// Spends `cost`, or says that it is too much.
+    /// Spends `cost`; false if the budget does not allow it.
     #[inline]
     pub fn affords(&mut self, cost: u64) -> bool {
         let spent = self.spent + cost;
@@ -54,11 +56,12 @@ pub(in crate::solver) fn dense(m: usize, is_symmetric: bool) -> u64 {
     m * m * m / (shares * DENSE) + m * m
 }
 
-/// How long to sweep, and when to give up.
+/// Limits of the sweeps.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct SweepBudget {
     /// Most sweeps.
     pub sweeps: usize,
-    /// Whether to stop as soon as the rate of the last sweeps would not reach the tolerance within the budget.
+    /// Whether to stop as soon as the convergence rate of the last sweeps would miss the tolerance
+    /// within the budget.
     pub predict: bool,
 }

@@ -5,10 +5,12 @@ use super::stage::body_sweeps::BodySweeps;
 use super::strategy::islands::Islands;
 use crate::problem::{Scales, Storage};
 
-/// Scratch of [`solve`](crate::solver::solve): grows to the largest problem met, carries nothing from one solve to the next.
+/// Scratch of [`solve`](crate::solver::solve). It grows to the largest problem solved and carries
+/// no information from one solve to the next.
 ///
-/// Up to [`direct_contacts`](crate::solver::SolverOptions::direct_contacts) a solve in a sized workspace allocates nothing; above, the pattern of the sparse
-/// factors is made anew where Gauss–Seidel does not answer.
+/// Up to [`direct_contacts`](crate::solver::SolverOptions::direct_contacts) contacts a solve in a
+/// sized workspace allocates nothing. With more, a solve that Gauss–Seidel does not finish builds
+/// the pattern of the sparse factors anew.
 #[derive(Clone, Debug, Default)]
 pub struct SolverWorkspace {
     /// The problem's scales.
@@ -19,19 +21,21 @@ pub struct SolverWorkspace {
     pub(super) scratch: Scratch,
     /// Of the sweeps over pairs of bodies.
     pub(super) body_sweeps: BodySweeps,
-    /// Problems of the islands, and the workspace that they are solved in: made at the first need, or workspaces would nest for ever.
+    /// Problems of the islands, and the workspace that solves them. Created when first needed,
+    /// since workspaces would otherwise nest without end.
     pub(super) islands: Islands,
     pub(super) nested: Option<Box<SolverWorkspace>>,
 }
 
 impl SolverWorkspace {
-    /// Empty scratch; it sizes itself at the first solve.
+    /// Empty scratch; the first solve sizes it.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Scratch for problems of up to `n_contacts` contacts of `components` components, so that no solve allocates.
+    /// Scratch for problems of up to `n_contacts` contacts of `components`
+    /// components, so that no solve allocates.
     #[must_use]
     pub fn with_capacity(n_contacts: usize, components: usize) -> Self {
         let mut workspace = Self::default();

@@ -1,4 +1,5 @@
-//! Rotations and symmetric inertias: the alphabet of the multibody chapter; [`space`]: what the plane and space share.
+//! Rotations and symmetric inertias, on which the multibody chapter is built, and formulas that the
+//! plane and space share ([`space`]).
 
 pub mod rotation;
 pub mod space;

@@ -1,7 +1,7 @@
 //! Attitude: the exponential map and the two angle triples that users see.
 //!
-//! The state carries a unit quaternion `R_WB`; nothing in a step is singular. Angles are for
-//! people and for comparison with the references:
+//! The state carries a unit quaternion `R_WB`, so no step meets a singularity. Angles serve users
+//! and the comparison with the references:
 //!
 //! - public `q`: `R = Ry(heading) Rz(pitch) Rx(roll)`, singular only with the nose straight up;
 //! - report: `R = Rz(q5) Ry(q4) Rx(q3)`, singular at a heading of 90 degrees.
@@ -116,7 +116,8 @@ impl CardanReport {
     #[must_use]
     pub fn rate_matrix_derivative_times_rates(self, rates: &Vector3<f64>) -> Vector3<f64> {
         let E = self.rate_matrix();
-        // Each column turns with the angles outside it: d/dt(Rz Ry x) = (ż z + ẏ Rz y) × column, ...
+        // Each column turns with the angles to its left: d/dt(Rz Ry x) = (ż z + ẏ Rz y) × column,
+        // ...
         let w_z = Vector3::z() * rates.z;
         let w_zy = w_z + E.column(1) * rates.y;
         w_zy.cross(&(E.column(0) * rates.x)) + w_z.cross(&(E.column(1) * rates.y))

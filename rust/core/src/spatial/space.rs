@@ -1,6 +1,7 @@
-//! The plane and space at once: what has D = 2 and D = 3 as one formula.
+//! Formulas that hold in the plane (D = 2) and in space (D = 3) alike.
 //!
-//! A body has D velocities of its centre and D (D − 1)/2 rates of turning: one in the plane, three in space.
+//! A body has D velocities of its centre and D (D − 1)/2 rates of turning:
+//! one in the plane, three in space.
 
 use nalgebra::SVector;
 

@@ -65,7 +65,7 @@ impl SymmetricMatrix3 {
         }
     }
 
-    /// `m (|c|² 1 − c cᵀ)`: what a point mass at `c` adds about the origin (Huygens–Steiner).
+    /// `m (|c|² 1 − c cᵀ)`: inertia of a point mass at `c` about the origin (Huygens–Steiner).
     #[inline]
     #[must_use]
     pub fn point_mass(m: f64, c: &Vector3<f64>) -> Self {

@@ -1,10 +1,11 @@
-//! What the actuators do during a step: torques, and joints held at set-points.
+//! Actuator commands of a step: torques, and joints held at set-points.
 
 use serde::{Deserialize, Serialize};
 
 use crate::multibody::{Model, Motor};
 
-/// A joint held at a set-point by a PD that is implicit in the step: `τ = −stiffness (q − set_point) − damping q̇`.
+/// A joint held at a set-point by a PD controller that is implicit in the step:
+/// `τ = −stiffness (q − set_point) − damping q̇`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeldJoint {
     /// rad.
@@ -29,7 +30,7 @@ pub struct Drive {
 pub struct Command {
     /// Torque about each joint's axis (n_joints), N m.
     pub torque: Vec<f64>,
-    /// Which joints have a drive (n_joints); its torque comes on top of `torque`.
+    /// Joints with a drive (n_joints), whose torque adds to `torque`.
     pub drives: Vec<Option<Drive>>,
     /// Which joints are held (n_joints).
     pub held: Vec<Option<HeldJoint>>,

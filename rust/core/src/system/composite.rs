@@ -1,17 +1,19 @@
-//! Two systems as one: M block by block, the contacts of each, and perhaps contacts between them.
+//! Two systems as one: block-diagonal M, the contacts of each, and possibly contacts between them.
 //!
-//! Everything of one system alone is that system's own code. A [`Coupling`] finds the contacts between the two and says how each
-//! moves with their velocities; its rows of Hᵀ span both, so that with the factors of M̂ = diag(M̂_a, M̂_b)
+//! Each system runs its own code. A [`Coupling`] finds the contacts between the two and provides
+//! their rows of Hᵀ, which span both systems. With the factors of M̂ = diag(M̂_a, M̂_b)
 //!
 //! ```text
 //! Z = diag(F_a, F_b)⁻ᵀ H,        W = Zᵀ Z.
 //! ```
 //!
-//! Where nothing lies between them the problem is solved system by system, each in its own way; else W is assembled dense, for the few
-//! contacts of machines rather than the thousands of a bed. A composite of composites holds more than two.
+//! Without contacts between the two the problem is solved system by system, by each system's own
+//! method. Otherwise W is assembled dense, which suits the few contacts of machines rather than the
+//! thousands of a bed. A composite of composites holds more than two systems.
 //!
-//! What a step decides at once it decides for both: whether it is taken again, what the audit of the energy takes out, and whether the
-//! impulses of the last step are a forecast. Apart from that two systems without a contact between them move as each alone.
+//! Decisions about a whole step apply to both systems: whether to repeat it, what the energy audit
+//! removes, and whether the last step's impulses serve as a forecast. Apart from that, two systems
+//! without a contact between them move as each would alone.
 
 use std::fmt::Debug;
 use std::sync::OnceLock;
@@ -26,7 +28,7 @@ use crate::law::newton_impact::rebound;
 use crate::problem::{Dimension, FrictionContactProblem};
 use crate::solver::{SolveReport, SolverOptions, SolverWorkspace, solve};
 
-/// Something of the first of two systems, of the second, or of what lies between them; in this order.
+/// An item of the first system, of the second, or between them; in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Of<A, B, K> {
     /// Of the first.
@@ -77,7 +79,7 @@ pub trait Coupling<A, B> {
     /// A contact between them.
     type Contact: UnilateralContact + Clone;
 
-    /// Finds those that take part in a step, at the configurations of its middle, and adds them to `out`.
+    /// Finds the contacts of a step at the middle configurations, and appends them to `out`.
     fn detect(
         &self,
         q: (&A, &B),
@@ -86,10 +88,11 @@ pub trait Coupling<A, B> {
         out: &mut Vec<Self::Contact>,
     );
 
-    /// Measures a contact anew at the configurations of the step's end.
+    /// Measures a contact again at the configurations of the step's end.
     fn relocate(&self, q: (&A, &B), contact: &mut Self::Contact);
 
-    /// Rows of Hᵀ of a contact, d for each system, row-major: (d × nv) and (d × nv), which come as zeros.
+    /// Rows of Hᵀ of a contact, d for each system, row-major: (d × nv) and
+    /// (d × nv), which come as zeros.
     fn rows(&self, q: (&A, &B), contact: &Self::Contact, rows: (&mut [f64], &mut [f64]));
 
     /// μ of a contact.
@@ -98,7 +101,7 @@ pub trait Coupling<A, B> {
     }
 }
 
-/// A contact that there never is.
+/// The contact type without values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Never {}
 
@@ -139,7 +142,7 @@ impl<A, B> Coupling<A, B> for Apart {
     }
 }
 
-/// Scratch of a composite: contacts sorted by where they lie, and the rows of those between.
+/// Scratch of a composite: contacts sorted by system, and the rows of those between.
 #[derive(Clone, Debug)]
 pub struct CompositeParts<Q, A, B, K> {
     middle: Option<Q>,
@@ -173,7 +176,7 @@ impl<Q, A, B, K> Default for CompositeParts<Q, A, B, K> {
 }
 
 impl<Q, A: Clone, B: Clone, K: Clone> CompositeParts<Q, A, B, K> {
-    /// Lists contacts by where they lie.
+    /// Sorts contacts by system.
     fn sort(&mut self, contacts: &[Of<A, B, K>]) {
         self.first.clear();
         self.second.clear();
@@ -187,7 +190,7 @@ impl<Q, A: Clone, B: Clone, K: Clone> CompositeParts<Q, A, B, K> {
         }
     }
 
-    /// Lists them again as one.
+    /// Merges the lists.
     fn listed(&self) -> impl Iterator<Item = Of<A, B, K>> + '_ {
         let first = self.first.iter().cloned().map(Of::First);
         let second = self.second.iter().cloned().map(Of::Second);
@@ -211,7 +214,7 @@ pub type PartsOf<A, B, K> = CompositeParts<
     >>::Contact,
 >;
 
-/// Two systems, with what lies between them.
+/// Two systems and their coupling.
 pub struct Composite<'a, A, B, K>
 where
     A: MechanicalSystem,
@@ -222,13 +225,13 @@ where
     pub first: A,
     /// The second.
     pub second: B,
-    /// What lies between them.
+    /// The coupling.
     pub coupling: &'a K,
     /// Scratch.
     pub parts: &'a mut PartsOf<A, B, K>,
 }
 
-/// What a composite keeps of the configurations that it was placed at.
+/// The configurations at which a composite was placed.
 fn placed<Q>(q: Option<&Q>) -> &Q {
     q.unwrap_or_else(|| panic!("invariant: a step places its systems before it finds contacts"))
 }
@@ -316,7 +319,7 @@ where
         )
     }
 
-    /// W (row-major): column j is what the impulse 1 at j does.
+    /// W (row-major): column j is the response to a unit impulse at j.
     fn operator(&self) -> &[f64] {
         self.parts.W.get_or_init(|| {
             let [a, b] = self.counts();
@@ -338,7 +341,7 @@ where
     }
 }
 
-/// The harder of two answers, with the work of both.
+/// Report of the harder of two solves, with the work of both.
 fn harder(a: SolveReport, b: SolveReport) -> SolveReport {
     let worst = if a.is_converged() && (!b.is_converged() || b.residual > a.residual) {
         b
@@ -511,7 +514,7 @@ where
         is_new.contains(&true)
     }
 
-    /// None where one of the two is not audited.
+    /// None if one of the two is not audited.
     fn energy(
         &mut self,
         options: &StepOptions,

@@ -1,8 +1,9 @@
-//! Exponentially fitted θ: how implicit a held joint's PD must be.
+//! Exponentially fitted θ: the implicit weight of a held joint's PD controller.
 //!
-//! For the decay `v̇ = −λ v` the θ-method is exact at `θ(z) = 1/(1 − e^(−z)) − 1/z`, z = h λ. It tends to ½ (and keeps order 2,
-//! since θ − ½ = z/12) where the step resolves the decay, and to 1 where the PD is stiffer than the step: there the
-//! trapezoidal rule would ring from one step to the next for seconds.
+//! For the decay `v̇ = −λ v` the θ-method is exact at `θ(z) = 1/(1 − e^(−z)) − 1/z`, z = h λ. If
+//! the step resolves the decay, θ tends to ½ and keeps order 2, since θ − ½ = z/12. If the
+//! controller is stiffer than the step resolves, θ tends to 1; the trapezoidal rule would then
+//! oscillate from step to step for seconds.
 //!
 //! Source: Liniger and Willoughby 1970, *SIAM J. Numer. Anal.* 7, 47–66.
 

@@ -1,12 +1,13 @@
-//! Gyroscopic terms taken implicitly: the free change of velocity with the Coriolis matrix inside the balance.
+//! Implicit gyroscopic terms: the free change of velocity with the Coriolis matrix in the balance.
 //!
 //! ```text
 //! (M̂ + θ h C) Δv = h (τ − G − C v) + J
 //! ```
 //!
-//! C is frozen, `C = C(q_m, v_m)`. Its skew part does no work and rotates the velocity by a Cayley transform, whatever the spin. Its symmetric
-//! part `½ Ṁ` can make the matrix singular where a frame turns by radians in a step; there it is left out, and what the poses at both ends
-//! make of the energy is the audit's ([`crate::integrator::energy_audit`]).
+//! C is frozen, `C = C(q_m, v_m)`. Its skew part does no work and rotates the velocity by a Cayley
+//! transform, whatever the spin. Its symmetric part `½ Ṁ` can make the matrix singular if a frame
+//! rotates by radians in a step. It is then left out, and the audit
+//! ([`crate::integrator::energy_audit`]) corrects the resulting change of the energy.
 
 use nalgebra::{DMatrix, DVector, DVectorView, Vector3};
 
@@ -23,7 +24,7 @@ pub(super) struct GyroscopicScratch {
     load: DVector<f64>,
 }
 
-/// `out = −G` (nv), N and N m: what gravity does.
+/// `out = −G` (nv), N and N m: the force of gravity.
 pub(super) fn gravity_load(
     model: &Model,
     kinematics: &Kinematics,
@@ -51,7 +52,8 @@ pub(super) fn gravity_load(
 impl GyroscopicScratch {
     /// Turns the impulse `y = h (τ − G)` (nv) into `M̂ Δv − J`, see the page above.
     ///
-    /// `mass_matrix` is M̂; `v` the velocity before the step and the one at which C is frozen; `impulse` is J (nv).
+    /// `mass_matrix` is M̂; `v` the velocity before the step and the one at
+    /// which C is frozen; `impulse` is J (nv).
     #[allow(clippy::too_many_arguments)] // the letters of the formula
     pub(super) fn solve(
         &mut self,
@@ -85,7 +87,8 @@ impl GyroscopicScratch {
                 *load = y + impulse;
             }
             self.load.gemv(-h, &self.C, &v, 1.0);
-            // Of a matrix whose symmetric part is positive definite every pivot is positive without exchanges.
+            // If the symmetric part is positive definite, every pivot is positive without row
+            // exchanges.
             let change = self.load.as_mut_slice();
             if eliminate(model, &mut self.matrix, change, is_skew) {
                 mass_matrix.times(model, change, y);
@@ -109,9 +112,11 @@ fn keep_skew_part(A: &mut DMatrix<f64>) {
     }
 }
 
-/// Solves `A x = b` in place of b, by elimination without exchanges; false where a pivot is not positive, unless `is_forced`.
+/// Solves `A x = b` in place of b, by elimination without exchanges; false
+/// where a pivot is not positive, unless `is_forced`.
 ///
-/// A has the sparsity of M. From the leaves to the base the elimination keeps it: each velocity changes only the rows and columns of its path.
+/// A has the sparsity of M. Elimination from the leaves to the base preserves it: each velocity
+/// changes only the rows and columns of its path.
 fn eliminate(model: &Model, A: &mut DMatrix<f64>, b: &mut [f64], is_forced: bool) -> bool {
     let n = b.len();
     let A = A.as_mut_slice();

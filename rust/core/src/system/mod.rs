@@ -1,11 +1,12 @@
-//! Mechanical systems: what the time-stepping schemes of [`crate::integrator`] step.
+//! Mechanical systems, which the time-stepping schemes of [`crate::integrator`] advance.
 //!
-//! - [`tree`]: a tree of solids on a terrain, under a [`command`];
+//! - [`tree`]: a multibody tree on a terrain, under a [`command`];
 //! - [`planar`]: a planar machine on a ground;
 //! - [`composite`]: two systems as one, with contacts between them;
-//! - [`gyroscopic`]: its gyroscopic terms, implicit; `motor_branch`: the line that a motor is on in a step, taken implicitly with
-//!   [`fitted_theta`];
-//! - [`grains`]: thousands of free disks or balls, and a machine among them; [`soil`]: disks under a planar machine.
+//! - [`gyroscopic`]: implicit gyroscopic terms of the tree; `motor_branch`: the branch of a motor's
+//!   torque–speed line in a step, implicit with [`fitted_theta`];
+//! - [`grains`]: thousands of free disks or balls, and a machine among
+//!   them; [`soil`]: disks under a planar machine.
 
 pub mod command;
 pub mod composite;

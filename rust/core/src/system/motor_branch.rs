@@ -1,11 +1,13 @@
-//! A motor in a step: the branch of its torque–speed line that holds, taken implicitly.
+//! A motor in a step: the active branch of its torque–speed line, implicit in the rate.
 //!
 //! ```text
-//! τ = at_rest − slope (ω + θ_j Δω),        M̂ = M + h θ_j slope,        θ_j of the page `fitted_theta`
+//! τ = at_rest − slope (ω + θ_j Δω),    M̂ = M + h θ_j slope,    θ_j of the page `fitted_theta`
 //! ```
 //!
-//! The branch is chosen at the θ_j-weighted rate, so that torque, branch and work belong together; where the step's end asks for another
-//! branch the step is taken again ([`crate::integrator::MechanicalSystem::revise`]). Torques never rise with the speed, so the implicit term is dissipative.
+//! The branch is chosen at the θ_j-weighted rate, so that torque, branch and work are consistent.
+//! If another branch holds at the end of the step, the step is repeated
+//! ([`crate::integrator::MechanicalSystem::revise`]). Torques never rise with the speed, so the
+//! implicit term is dissipative.
 
 use super::command::Drive;
 use super::fitted_theta::fitted_theta;
@@ -43,9 +45,11 @@ impl MotorBranch {
         }
     }
 
-    /// Chooses θ_j for a coordinate with this damping (N m s/rad), stiffness (N m/rad) and inertia (kg m²), all told.
+    /// Chooses θ_j for a coordinate with this total damping (N m s/rad), stiffness (N m/rad) and
+    /// inertia (kg m²).
     ///
-    /// The line's slope counts on every branch: a motor whose θ_j changed with its branch could find none.
+    /// The line's slope counts on every branch: if θ_j changed with the branch, no branch might be
+    /// consistent.
     #[inline]
     pub(crate) fn set_theta(
         &mut self,
@@ -61,7 +65,7 @@ impl MotorBranch {
         };
     }
 
-    /// Rate (rad/s) at which a step between two rates takes what is implicit.
+    /// Rate (rad/s) at which a step between two rates evaluates implicit terms.
     #[inline]
     pub(crate) fn rate(&self, begin: f64, end: f64) -> f64 {
         begin + self.theta * (end - begin)
@@ -74,7 +78,7 @@ impl MotorBranch {
         self.trial = DriveTrial::at(motor, command, rate);
     }
 
-    /// Goes on towards the branch of a step between two rates, rad/s; true where it is another one.
+    /// Moves towards the branch of a step between two rates, rad/s; true if the branch changed.
     #[inline]
     pub(crate) fn revise(&mut self, drive: Option<&Drive>, begin: f64, end: f64) -> bool {
         let (command, Some(motor)) = parts(drive) else {
@@ -90,10 +94,12 @@ impl MotorBranch {
         self.trial.regime().torque(self.rate(begin, end))
     }
 
-    /// Work (J) that the motor is credited with in a step between two rates (rad/s) that turns it by `turned` (rad).
+    /// Work (J) that the motor is credited with in a step between two rates
+    /// (rad/s) that turns it by `turned` (rad).
     ///
-    /// A line only takes away from what the command does, `(τ − command) ω ≤ 0`. Where a step turns the rate round, the implicit torque and
-    /// the mean rate may say otherwise; that surplus is nobody's work.
+    /// A torque–speed line only reduces the power of the command, `(τ − command) ω ≤ 0`. In a step
+    /// that reverses the rate, the implicit torque and the mean rate may violate this; the surplus
+    /// is not counted as work.
     #[inline]
     pub(crate) fn work(&self, drive: Option<&Drive>, begin: f64, end: f64, turned: f64) -> f64 {
         let work = self.torque(begin, end) * turned;

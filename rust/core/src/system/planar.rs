@@ -1,4 +1,5 @@
-//! A planar machine on a ground as a mechanical system: contacts with one tangent, `M = L Lᵀ`, `Z = L⁻¹ H`.
+//! A planar machine on a ground as a mechanical system: contacts with one
+//! tangent, `M = L Lᵀ`, `Z = L⁻¹ H`.
 
 use nalgebra::{Cholesky, SMatrix, SVector, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -12,7 +13,7 @@ use crate::integrator::{
 use crate::planar::{ContactRule, Disc, Facing, Ground, PlanarMachine, PlanarMotor};
 use crate::problem::{Dimension, FrictionContactProblem};
 
-/// Names a contact of a disc with the ground.
+/// Key of a contact between a disc and the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct PlanarKey {
     /// Which disc.
@@ -24,7 +25,7 @@ pub struct PlanarKey {
 /// A contact of a disc with the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanarContact {
-    /// Its name from step to step.
+    /// Its key from step to step.
     pub key: PlanarKey,
     /// Point of the disc's rim, world, m.
     pub point: Vector2<f64>,
@@ -109,7 +110,8 @@ impl<const NV: usize> PlanarScratch<NV> {
     }
 }
 
-/// A machine on a ground, driven by torques. Motors at their torque–speed line are implicit as in the rover's tree.
+/// A machine on a ground, driven by torques. Motors on their torque–speed line are implicit, as in
+/// the rover's tree.
 #[derive(Debug)]
 pub struct PlanarSystem<'a, const NV: usize, M> {
     /// The machine.
@@ -133,7 +135,7 @@ fn facing(ground: &dyn Ground, rule: ContactRule, disc: &Disc, reach: f64, out: 
     }
 }
 
-/// One of the motors behind a torque under a command, N m.
+/// One of the motors of a torque, with its command, N m.
 fn drive(motor: &PlanarMotor, torque: f64) -> Drive {
     Drive {
         torque,
@@ -367,7 +369,7 @@ impl<const NV: usize, M: PlanarMachine<NV>> MechanicalSystem for PlanarSystem<'_
     ) -> Option<MechanicalEnergy> {
         let v = SVector::<f64, NV>::from_column_slice(v);
         let momentum = self.machine.mass_matrix(q) * v;
-        // A push along x or y sees the whole mass.
+        // A force along x or y acts on the whole mass.
         let mass = self.machine.mass_matrix(q)[(0, 0)];
         Some(MechanicalEnergy {
             kinetic: 0.5 * momentum.dot(&v),

@@ -1,4 +1,5 @@
-//! Granular soil in the plane: the disks of [`super::grains`], and a planar machine that drives over them.
+//! Granular soil in the plane: the disks of [`super::grains`], and a planar
+//! machine that drives over them.
 
 use std::sync::Arc;
 
@@ -15,9 +16,9 @@ pub use super::grains::{
 pub type Disks = grains::Grains<2>;
 /// Where they start.
 pub type Packing = grains::Packing<2>;
-/// What holds them.
+/// The walls.
 pub type Wall = grains::Wall<2>;
-/// What drives on them.
+/// The machine on the soil.
 pub type Machine = dyn grains::Machine<2>;
 /// A soil's description.
 pub type SoilScene = grains::GrainScene<2>;
@@ -28,7 +29,7 @@ pub type SoilParts = grains::GrainParts<2>;
 /// A soil in a step.
 pub type SoilSystem<'a> = grains::GrainSystem<'a, 2>;
 
-/// A machine of NV coordinates, as grains know one.
+/// A machine of NV coordinates with the interface of a machine among grains.
 #[derive(Clone, Copy, Debug)]
 struct OnSoil<const NV: usize, M>(M);
 

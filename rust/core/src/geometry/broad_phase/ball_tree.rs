@@ -1,9 +1,10 @@
-//! Which of many balls come near a place: a balanced tree of intervals.
+//! A search for the balls near a place: a balanced tree of intervals.
 //!
-//! Each node halves its balls at the median centre along their longest side and notes how far up the lower half reaches along it and how far
-//! down the upper half. A search compares one coordinate a node and enters what it may touch, so that it costs the balls it finds and one way
-//! down, `log₂ n` comparisons: what is far away is not looked at. Unlike a grid the tree asks for no cell size: pebbles beside boulders,
-//! heaps, and one stray ball a kilometre off cost the same.
+//! Each node splits its balls at the median centre along their longest extent, and stores the upper
+//! bound of the lower half and the lower bound of the upper half along that axis. A search compares
+//! one coordinate per node and enters only the halves that it may touch. Its cost is one descent of
+//! `log₂ n` comparisons plus the balls found. Unlike a grid the tree needs no cell size: pebbles
+//! beside boulders, heaps, and a stray ball a kilometre away cost the same.
 //!
 //! Source: Wächter and Keller 2006, *Instant ray tracing: the bounding interval hierarchy*.
 
@@ -30,10 +31,10 @@ struct Node {
     kind: u32,
 }
 
-/// From here on a node's kind is a leaf's.
+/// Kinds from here on are leaves.
 const IS_LEAF: u32 = 3;
 
-/// A ball and the number it was given under.
+/// A ball and its number in the input.
 #[derive(Clone, Copy, Debug)]
 struct Ball {
     sphere: Sphere,
@@ -70,7 +71,8 @@ impl BallTree {
         Self { nodes, balls }
     }
 
-    /// Visits exactly the balls whose surface comes closer than `reach` to `centre`, or that contain it.
+    /// Visits exactly the balls whose surface comes closer than `reach` to
+    /// `centre`, or that contain it.
     #[inline]
     pub fn visit_near(
         &self,

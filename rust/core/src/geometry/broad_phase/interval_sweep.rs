@@ -1,14 +1,15 @@
-//! Which pairs of moving balls come near each other: sort and sweep along one axis.
+//! Pairs of moving balls that come near each other: sort and sweep along one axis.
 //!
-//! Balls sorted by where their intervals begin along x are compared with those that begin before they end. In a scene that lies about on the
-//! ground it costs `n log n` and the pairs that overlap along x; nothing is remembered from one search to the next, so that equal scenes
-//! give equal pairs.
+//! Balls are sorted by the start of their intervals along x, and each is compared with those that
+//! start before it ends. For a scene spread over the ground the cost is `n log n` plus the pairs
+//! that overlap along x. A search remembers nothing of the last one, so equal scenes give equal
+//! pairs.
 //!
 //! Source: Baraff 1992; Cohen et al. 1995.
 
 use crate::geometry::shape::Sphere;
 
-/// Scratch of a search. Grows to what was needed most, then reuses it.
+/// Scratch of a search. It grows to the largest size needed and is reused.
 #[derive(Clone, Debug, Default)]
 pub struct IntervalSweep {
     order: Vec<u32>,
@@ -25,7 +26,8 @@ impl IntervalSweep {
         }
     }
 
-    /// All pairs (i, j), i < j, whose balls overlap or come closer than `reach` (m), sorted; of those that `is_wanted`.
+    /// All pairs (i, j), i < j, whose balls overlap or come closer than
+    /// `reach` (m), sorted; of those that `is_wanted`.
     ///
     /// # Panics
     /// If there are 2^32 balls or more.

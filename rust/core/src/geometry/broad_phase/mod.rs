@@ -1,4 +1,4 @@
-//! Which things come near each other, before any distance is computed.
+//! Broad phase: which things come near each other, before any distance is computed.
 //!
 //! [`ball_tree`]: fixed balls near a place; [`interval_sweep`]: pairs among moving balls.
 

@@ -1,16 +1,19 @@
-//! Two boxes: as many points as it takes for one to rest on the other.
+//! Two boxes, with enough contact points for one to rest on the other.
 //!
-//! Fifteen axes can part two boxes: the faces' normals and the cross products of their edges. Where a face parts them furthest, the face of
-//! the other box that looks at it is cut to its outline, which gives up to eight points:
+//! Fifteen axes can separate two boxes: the face normals and the cross products of the edges. If
+//! the axis of largest separation is a face normal, the opposite face of the other box is clipped
+//! to the outline of this face, which gives up to eight points:
 //!
-//! - a corner of either box over the other's face: its height over that face, along that face's normal;
+//! - a corner of either box over the other's face: its height over that
+//!   face, along that face's normal;
 //! - where two edges cross, seen along the normal of the first face: the height there.
 //!
-//! Where two edges part them furthest it is the nearest points of these edges. What neither finds (a corner that comes to a corner) is
-//! measured by the nearest points of [`super::convex`].
+//! If it is the cross product of two edges, the contact is at the nearest points of these edges.
+//! Cases that neither covers (corner to corner) use the nearest points of [`super::convex`].
 //!
-//! The gap's rate is the relative velocity's normal part exactly at corners and at a pair of edges. At a crossing it is up to the tilt of the two
-//! faces, since the crossing slides along the edges: nothing for boxes that lie on each other.
+//! At corners and at a pair of edges the gap's rate equals the normal part of the relative velocity
+//! exactly. At a crossing the error is of the order of the tilt between the two faces, since the
+//! crossing slides along the edges; it vanishes for boxes that lie on each other.
 //!
 //! Source: Gottschalk, Lin and Manocha 1996 (separating axes); Sutherland and Hodgman 1974 (clipping).
 
@@ -19,20 +22,21 @@ use nalgebra::{Vector2, Vector3};
 use super::{PairPoint, convex};
 use crate::geometry::{OrientedBox, SupportMap};
 
-/// Part of the boxes' size by which another axis must part them further than a face of the first box, to be taken instead: of equal axes
-/// it is always the same one.
+/// Fraction of the boxes' size by which another axis must separate them more than a face of the
+/// first box to be chosen instead, so that the choice among equal axes does not change.
 const PREFERENCE: f64 = 1e-4;
 
-/// Part of the boxes' size by which a corner may stand over the rim of a face: what lies edge on edge lies on it.
+/// Fraction of the boxes' size by which a corner may lie outside a face and still count as over it:
+/// boxes edge on edge touch.
 const SLACK: f64 = 1e-6;
 
-/// Part of the boxes' size within which two points are one.
+/// Distance, as a fraction of the boxes' size, within which two points coincide.
 const SAME: f64 = 1e-3;
 
 /// Sine below which two edges do not cross.
 const PARALLEL: f64 = 1e-9;
 
-/// From here on a feature is a point of two faces, or of two edges.
+/// Features from here on are points of two faces or of two edges.
 const FACES: usize = 1 << 13;
 const EDGES: usize = 1 << 14;
 
@@ -116,14 +120,14 @@ pub fn point(first: &OrientedBox, second: &OrientedBox, feature: usize) -> PairP
     convex::nearest_points(first, second)
 }
 
-/// How far the boxes are apart along the axis that parts them furthest, m: their distance, up to sign, wherever a face or two edges are
-/// nearest, and never more.
+/// Largest separation of the boxes over all axes, m: their signed distance if a face or two edges
+/// are nearest, and otherwise a lower bound.
 #[must_use]
 pub fn separation(first: &OrientedBox, second: &OrientedBox) -> f64 {
     Axis::furthest(first, second).separation
 }
 
-/// The axis that parts two boxes furthest.
+/// The axis of largest separation of two boxes.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     separation: f64,
@@ -191,7 +195,8 @@ fn half_width(solid: &OrientedBox, n: &Vector3<f64>) -> f64 {
     solid.R.tr_mul(n).abs().dot(&solid.half_size)
 }
 
-/// Number of the edge along axis k that lies furthest along n: 4 k and two bits for the sides along the next two axes.
+/// Number of the edge along axis k that lies furthest along n: 4 k and two
+/// bits for the sides along the next two axes.
 fn edge(solid: &OrientedBox, k: usize, n: &Vector3<f64>) -> usize {
     let side = |axis: usize| usize::from(solid.axis(axis % 3).dot(n) > 0.0);
     4 * k + side(k + 1) + 2 * side(k + 2)
@@ -213,7 +218,8 @@ fn place_edge(solid: &OrientedBox, edge: usize) -> (Vector3<f64>, Vector3<f64>, 
     )
 }
 
-/// Nearest points of the lines of two edges, and whether they are within both edges; none where the edges are parallel.
+/// Nearest points of the lines of two edges, and whether they are within
+/// both edges; none where the edges are parallel.
 fn crossing_edges(
     first: &OrientedBox,
     second: &OrientedBox,
@@ -292,7 +298,7 @@ impl Side {
     }
 }
 
-/// Two faces that look at each other.
+/// Two opposite faces.
 #[derive(Clone, Copy, Debug)]
 struct Faces {
     reference: Side,
@@ -304,7 +310,7 @@ struct Faces {
 }
 
 impl Faces {
-    /// A face, and the face of the other box that looks at it most.
+    /// A face, and the face of the other box that is most opposed to it.
     fn of(first: &OrientedBox, second: &OrientedBox, is_of_second: bool, face: usize) -> Self {
         let (own, other) = if is_of_second {
             (second, first)
@@ -323,7 +329,8 @@ impl Faces {
         }
     }
 
-    /// Where on the reference a candidate is, and whether it is within both faces; none where two edges do not cross.
+    /// Where on the reference a candidate is, and whether it is within both
+    /// faces; none where two edges do not cross.
     fn place(&self, candidate: usize) -> Option<(Vector2<f64>, bool)> {
         let slack = SLACK * self.size;
         match candidate {
@@ -346,7 +353,8 @@ impl Faces {
         }
     }
 
-    /// Point of the incident's edge over the line of a reference's edge, and where along its edge that is, from 0 to 1.
+    /// Point of the incident's edge over the line of a reference's edge,
+    /// and where along its edge that is, from 0 to 1.
     fn crossing(&self, candidate: usize) -> Option<(f64, Vector3<f64>)> {
         let (edge, line) = ((candidate - 8) / 4, (candidate - 8) % 4);
         let (begin, end) = (self.incident.corner(edge), self.incident.corner(edge + 1));
@@ -388,7 +396,7 @@ impl Faces {
                 (corner, -incident.n, incident.height(&corner))
             }
             _ => {
-                // Edges that have turned parallel are left at their corner.
+                // Edges that have become parallel keep their corner.
                 let x = self
                     .crossing(candidate)
                     .map_or_else(|| incident.corner((candidate - 8) / 4), |(_, x)| x);
@@ -446,7 +454,8 @@ mod tests {
                 prop_assert!(found.iter().all(|p| p.gap >= -1e-9));
             } else if exact.gap < 0.0 {
                 prop_assert!(!found.is_empty());
-                // No point is deeper than half an edge more than the way out: a long way in, the corner of one is under another face.
+                // No point is deeper than half an edge more than the way out: a long way in, the
+                // corner of one is under another face.
                 prop_assert!(deepest <= 0.0);
             }
             for p in &found {
@@ -465,7 +474,8 @@ mod tests {
             let (there, back) = (all(&first, &second), all(&second, &first));
             let axis = separation(&first, &second);
             prop_assert!((axis - separation(&second, &first)).abs() < 2.0 * PREFERENCE);
-            // Where no other axis comes near, the same points are found with the normals turned round.
+            // Where no other axis comes near, the same points are found
+            // with the normals turned round.
             let sum = |points: &[PairPoint]| points.iter().map(|p| p.gap).sum::<f64>();
             if there.len() == back.len() && (sum(&there) - sum(&back)).abs() < 1e-9 {
                 for p in &there {

@@ -8,7 +8,8 @@ use crate::geometry::{OrientedBox, Plane};
 
 /// Visits corners whose gap is at most `reach`.
 ///
-/// `base` (m, world) is where the box's coordinates have their origin. The feature is the corner's number.
+/// `base` (m, world) is where the box's coordinates have their origin. The
+/// feature is the corner's number.
 #[inline]
 pub fn corners(
     solid: &OrientedBox,

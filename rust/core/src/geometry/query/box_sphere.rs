@@ -1,8 +1,9 @@
 //! Box on a sphere: the point of the box nearest to the sphere's centre.
 //!
-//! Outside, the nearest point E is the sphere's centre clamped to the box; inside, it is on the nearest face and the distance counts
-//! negative. `gap = ±|a − E| − r_s`, n from the sphere to the box. As E minimises over the box, the gap's gradient is nᵀ times
-//! the Jacobian of the material point at E.
+//! Outside, the nearest point E is the sphere's centre clamped to the box; inside,
+//! it is on the nearest face and the distance counts negative.
+//! `gap = ±|a − E| − r_s`, n from the sphere to the box. As E minimises over the
+//! box, the gap's gradient is nᵀ times the Jacobian of the material point at E.
 
 use nalgebra::Vector3;
 
@@ -30,7 +31,8 @@ pub fn nearest_points(solid: &OrientedBox, sphere: &Sphere) -> PairPoint {
     PairPoint::from_first(NEAREST, &near.point, &-near.n, near.gap)
 }
 
-/// Nearest point of the surface, normal into the box and signed distance of a point, all in the box's axes.
+/// Nearest point of the surface, normal into the box and signed distance of
+/// a point, all in the box's axes.
 #[inline]
 #[must_use]
 pub fn nearest_local(
@@ -52,10 +54,12 @@ pub fn nearest_local(
     (point, n, -depth[k])
 }
 
-/// The box's point over the tangent plane (normal n) at the point `touch` where a sphere was first met.
+/// The box's point over the tangent plane (normal n) at the point `touch`
+/// where a sphere was first met.
 ///
-/// For a box that may be past the sphere by now; `touch` in the axes of `base`. Along axes that the plane is tilted against it is the deepest
-/// corner, edge or face; along the others the place of `touch`.
+/// For a box that may already be past the sphere; `touch` in the axes of `base`. The point lies on
+/// the deepest corner, edge or face along the axes that the plane is tilted against, and at `touch`
+/// along the others.
 #[inline]
 #[must_use]
 pub fn point_over_tangent(
@@ -81,7 +85,8 @@ pub fn point_over_tangent(
     SurfacePoint::of_normal(NEAREST, point, n, n.dot(&(point - touch)))
 }
 
-/// Sine of the tilt above which a box meets a plane with an edge and not with a face: more than a box turns in a step.
+/// Sine of the tilt above which an edge of a box, and not a face, touches a plane: more than a box
+/// turns in a step.
 const TILTED: f64 = 0.1;
 
 #[cfg(test)]

@@ -1,11 +1,14 @@
-//! Any two convex shapes, by their support maps: GJK while they are apart, EPA where they overlap.
+//! Distance of any two convex shapes by their support maps: GJK if they are apart, EPA if they
+//! overlap.
 //!
-//! Both look at the difference `C = A − B`, whose distance to the origin is the distance of the shapes. GJK walks over simplices of C towards
-//! the origin. Where the origin is inside, EPA blows a polytope up towards C's surface and returns its face nearest to the origin: the
-//! shortest way to part the shapes.
+//! Both work on the Minkowski difference `C = A − B`, whose distance to the origin is the distance
+//! of the shapes. GJK moves simplices of C towards the origin. If the origin is inside, EPA expands
+//! a polytope towards the surface of C and returns its face nearest to the origin: the shortest way
+//! to separate the shapes.
 //!
-//! Apart, lengths are exact to 1e-11 of the shapes' size, and so are overlaps of shapes with corners. Round rims take some twenty iterations; a
-//! wheel a whole radius inside a box is measured to 1e-5 of its size.
+//! Distances are exact to 1e-11 of the shapes' size, and so are overlaps of shapes with corners.
+//! Round rims take some twenty iterations; the overlap of a wheel a whole radius inside a box is
+//! accurate to 1e-5 of its size.
 //!
 //! Source: Gilbert, Johnson and Keerthi 1988 (distance); van den Bergen 2001 (penetration depth).
 
@@ -14,13 +17,13 @@ use nalgebra::{Matrix3, Vector3};
 use super::{NEAREST, PairPoint};
 use crate::geometry::SupportMap;
 
-/// Most iterations of either; what they have then is a bound that is good to some 1e-6.
+/// Most iterations of either; the bound reached by then is accurate to some 1e-6.
 const MAX_ITERATIONS: usize = 96;
 
-/// Length, relative to the shapes' size, up to which an answer may be off.
+/// Error tolerance, relative to the shapes' size.
 const TOLERANCE: f64 = 1e-11;
 
-/// Length, relative to the shapes' size, below which shapes are not told from touching ones.
+/// Distance, relative to the shapes' size, below which shapes count as touching.
 const TOUCHING: f64 = 1e-10;
 
 /// A point of C, and the two points that it is the difference of.
@@ -48,7 +51,7 @@ impl Vertex {
     };
 }
 
-/// Nearest points of two shapes, or, where they overlap, the ends of the shortest way out.
+/// Nearest points of two shapes or, if they overlap, the ends of the shortest way out.
 #[must_use]
 pub fn nearest_points(first: &impl SupportMap, second: &impl SupportMap) -> PairPoint {
     let size = first.bound() + second.bound();
@@ -65,7 +68,7 @@ pub fn nearest_points(first: &impl SupportMap, second: &impl SupportMap) -> Pair
     overlapping(first, second, size)
 }
 
-/// Nearest points of shapes that are apart; none where they touch or overlap.
+/// Nearest points of shapes that are apart; none if they touch or overlap.
 fn apart(
     first: &impl SupportMap,
     second: &impl SupportMap,
@@ -124,7 +127,8 @@ impl Simplex {
         self.vertices[..self.n].iter().any(|vertex| vertex.w == *w)
     }
 
-    /// Keeps the face that is nearest to the origin and returns the points of both shapes there; none where the origin is inside.
+    /// Keeps the face that is nearest to the origin and returns the points of both shapes there;
+    /// none if the origin is inside.
     ///
     /// Every face is tried: its point nearest to the origin counts where it lies within.
     fn reduce(&mut self) -> Option<(Vector3<f64>, Vector3<f64>)> {
@@ -176,7 +180,8 @@ impl Simplex {
         })
     }
 
-    /// Barycentric coordinates of the point nearest to the origin in the flat through these corners; none where it is degenerate.
+    /// Barycentric coordinates of the point nearest to the origin in the flat through these
+    /// corners; none where it is degenerate.
     fn weights(&self, corners: &[usize]) -> Option<[f64; 4]> {
         let w = |k: usize| self.vertices[corners[k]].w;
         let p = w(0);
@@ -191,7 +196,8 @@ impl Simplex {
                 let (d, e) = (w(1) - p, w(2) - p);
                 let normal = d.cross(&e);
                 let square = normal.norm_squared();
-                // Areas of the triangles that the origin's projection makes with the edges, as parts of the whole.
+                // Areas of the triangles that the origin's projection makes
+                // with the edges, as parts of the whole.
                 let s = -normal.dot(&p.cross(&e)) / square;
                 let t = -normal.dot(&d.cross(&p)) / square;
                 let is_flat = square <= 1e-28 * d.norm_squared() * e.norm_squared();
@@ -211,7 +217,7 @@ impl Simplex {
     }
 }
 
-/// Most vertices and faces of the polytope that is blown up.
+/// Most vertices and faces of the expanding polytope.
 const MOST_VERTICES: usize = MAX_ITERATIONS + 4;
 const MOST_FACES: usize = 2 * MOST_VERTICES;
 
@@ -284,7 +290,8 @@ impl Polytope {
         })
     }
 
-    /// Takes the faces that a new vertex sees away and joins it to their rim; false where that fails.
+    /// Removes the faces visible from a new vertex and joins the vertex to their rim; false if that
+    /// fails.
     fn grow(&mut self, vertex: Vertex, tolerance: f64) -> bool {
         let new = self.add_vertex(vertex);
         let mut rim = [(0_usize, 0_usize); 3 * MOST_VERTICES];
@@ -298,7 +305,7 @@ impl Polytope {
             }
             let [p, q, r] = face.corners;
             for edge in [(p, q), (q, r), (r, p)] {
-                // An edge between two faces that go is not on the rim.
+                // An edge between two removed faces is not on the rim.
                 let reverse = (edge.1, edge.0);
                 if let Some(place) = rim[..n_rim].iter().position(|e| *e == reverse) {
                     n_rim -= 1;

@@ -1,8 +1,9 @@
 //! Disc and box: a wheel on a block.
 //!
-//! Where the nearest direction is a face's normal the wheel stands on that face as on a plane: its lowest rim point and, lying flat, one to either
-//! side ([`super::disc_plane`]), as far as they are over the face. Where it is the axle, the box's corners stand on the disc. Elsewhere, at edges
-//! and corners, it is the nearest points, or the shortest way out, of [`super::convex`].
+//! If the direction between the shapes is a face's normal, the wheel stands on that face as on a
+//! plane: its lowest rim point and, lying flat, one to either side ([`super::disc_plane`]), as far
+//! as they are over the face. If the direction is the axle, the box's corners stand on the disc. At
+//! edges and corners [`super::convex`] gives the nearest points or the shortest way out.
 //!
 //! The gap's rate is exact, except for the two rim points beside the lowest, as on a plane.
 
@@ -11,10 +12,11 @@ use nalgebra::Vector3;
 use super::{NEAREST, PairPoint, convex, disc_plane};
 use crate::geometry::{Disc, OrientedBox, SupportMap};
 
-/// Sine of the angle to a face's normal, or to the axle, below which a direction is taken for it.
+/// Sine of the angle to a face's normal, or to the axle, below which a direction counts as parallel
+/// to it.
 const ALONG: f64 = 1e-5;
 
-/// From here on a feature is a rim point on a face, or a corner on the disc.
+/// Features from here on are rim points on a face or corners on the disc.
 const RIM: usize = 1 << 13;
 const CORNER: usize = 1 << 14;
 

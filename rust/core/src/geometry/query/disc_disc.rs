@@ -1,25 +1,26 @@
 //! Two discs: wheels that meet.
 //!
-//! A disc has no width, so that two discs that cross would part by the shortest way out, sideways, and pass through each other. Wheels have
-//! tyres: each disc is taken as one whose rim is rounded off by `r = R / 4`, a flat disc of radius `R − r` grown by r all round. Then
+//! A disc has no width. Two discs that cross would separate by the shortest way, sideways, and pass
+//! through each other. Each disc therefore gets a tyre, a rim rounded off by `r = R / 4`: a flat
+//! disc of radius `R − r` grown by r all round. Then
 //!
 //! ```text
-//! gap = |E₂ − E₁| − r₁ − r₂,      n = unit(E₂ − E₁),      E_i the nearest points of the two flat discs
+//! gap = |E₂ − E₁| − r₁ − r₂,    n = unit(E₂ − E₁),    E_i the nearest points of the two flat discs
 //! ```
 //!
-//! which is smooth as long as the tyres overlap by less than `r₁ + r₂`. Deeper than that the normal is the line of centres. Against everything else a
-//! disc stays flat.
+//! which is smooth as long as the tyres overlap by less than `r₁ + r₂`. Deeper than that the normal
+//! is the line of centres. Against all other shapes a disc stays flat.
 
 use super::{NEAREST, PairPoint, convex};
 use crate::geometry::{Disc, SupportMap};
 
-/// Part of the radius that the rim is rounded off by.
+/// Radius of the rounded rim, as a fraction of the disc's.
 const TYRE: f64 = 0.25;
 
-/// Distance of the flat discs, relative to their size, below which they are taken to cross.
+/// Distance of the flat discs, relative to their size, below which they count as crossing.
 const CROSSING: f64 = 1e-6;
 
-/// Distance of the centres, relative to the discs' size, below which they have no line.
+/// Distance of the centres, relative to the discs' size, below which their line has no direction.
 const NO_DIRECTION: f64 = 1e-9;
 
 /// Nearest points of two tyres.

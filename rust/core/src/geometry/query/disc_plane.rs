@@ -1,11 +1,13 @@
 //! Disc on a plane: the lowest points of a rim.
 //!
 //! The disc has radius R, centre c, unit axle s. With `w = n − (n·s) s` the lowest rim point is
-//! `E = c − R w/|w|`, the gap `n·c + d − R |w|`, `|w| = √(1 − (n·s)²)`. By the envelope theorem the gap's gradient is nᵀ times the
-//! Jacobian of the *material* point at E, so the contact frame's normal is the plane's, not the in-wheel one.
+//! `E = c − R w/|w|`, the gap `n·c + d − R |w|`, `|w| = √(1 − (n·s)²)`. By the envelope theorem the
+//! gap's gradient is nᵀ times the Jacobian of the *material* point at E, so the contact frame's
+//! normal is the plane's, not the in-wheel one.
 //!
-//! A wheel lying flat touches with its whole rim: two more rim points, 120 degrees to either side of the lowest, carry
-//! it then. Their gap is `n·c + d + R |w| / 2`, so they fade in continuously as the wheel tips over.
+//! A wheel lying flat touches with its whole rim. Two more rim points, 120 degrees to either side
+//! of the lowest, then support it. Their gap is `n·c + d + R |w| / 2`, so they come in continuously
+//! as the wheel tips over.
 
 use nalgebra::Vector3;
 
@@ -14,7 +16,8 @@ use crate::geometry::{Disc, Plane};
 
 /// Rim points whose gap is at most `reach`; the lowest one always comes first if it is near.
 ///
-/// `base` (m, world) is where the disc's coordinates have their origin: the centre's world position is `base + centre`.
+/// `base` (m, world) is where the disc's coordinates have their origin: the
+/// centre's world position is `base + centre`.
 #[inline]
 pub fn rim_points(
     disc: &Disc,
@@ -39,7 +42,8 @@ pub fn rim_point(disc: &Disc, plane: &Plane, base: &Vector3<f64>, feature: usize
     Rim::of(disc, plane, base).point(feature)
 }
 
-/// The rim point of a number over the plane with the unit normal n through a point, all in the disc's coordinates.
+/// The rim point of a number over the plane with the unit normal n through
+/// a point, all in the disc's coordinates.
 #[must_use]
 pub fn rim_point_over(
     disc: &Disc,

@@ -1,15 +1,18 @@
 //! Disc on a sphere: the point of the disc nearest to the sphere's centre.
 //!
-//! The disc has radius R, centre c, unit axle s; the sphere has centre a and radius r_s. With `b0 = a − ((a − c)·s) s`, the projection of a
-//! onto the disc's plane, the nearest point E of the disc is
+//! The disc has radius R, centre c, unit axle s; the sphere has centre a
+//! and radius r_s. With `b0 = a − ((a − c)·s) s`, the projection of a onto
+//! the disc's plane, the nearest point E of the disc is
 //!
 //! ```text
-//! E = c + R unit(b0 − c)   where |b0 − c| ≥ R (the rim),   else b0 (the face: a rock struck from the side)
+//! E = c + R unit(b0 − c)   where |b0 − c| ≥ R (the rim),
+//!     else b0              (the face: a rock struck from the side)
 //! gap = |a − E| − r_s,     n = unit(E − a)
 //! ```
 //!
-//! The nearest point minimises over the disc, so the gap's gradient is nᵀ times the Jacobian of the *material* point at E, on
-//! the rim and on the face (envelope theorem), and E, n and the gap are continuous where one turns into the other.
+//! The nearest point minimises over the disc, so the gap's gradient is nᵀ times the Jacobian of
+//! the *material* point at E, on the rim and on the face (envelope theorem), and E, n and the gap
+//! are continuous where one turns into the other.
 
 use nalgebra::Vector3;
 
@@ -19,10 +22,12 @@ use crate::geometry::{Disc, Sphere};
 /// Lengths below which a direction is not taken from a difference, m.
 const NO_DIRECTION: f64 = 1e-12;
 
-/// Nearest point of the disc to the sphere's centre; `base` is where the disc's coordinates have their origin.
+/// Nearest point of the disc to the sphere's centre; `base` is where the
+/// disc's coordinates have their origin.
 ///
-/// Where a is on the disc itself no direction leads out. Then n is in the disc's plane, towards its centre: a sphere
-/// right in its way pushes it back and not over. Where a is the disc's centre it is the spoke.
+/// If a lies on the disc itself the normal is undefined. Then n lies in the disc's plane and points
+/// to its centre, so that a sphere right in its way pushes the disc back and not over. If a is the
+/// disc's centre, n is along the spoke.
 #[inline]
 #[must_use]
 pub fn nearest_point(disc: &Disc, sphere: &Sphere, base: &Vector3<f64>) -> SurfacePoint {
@@ -45,7 +50,8 @@ pub fn nearest_point(disc: &Disc, sphere: &Sphere, base: &Vector3<f64>) -> Surfa
     } else {
         -outward
     };
-    // On the face n is along the axle: t is then the rim's direction, which it has where rim turns into face.
+    // On the face n is along the axle; t is then the rim's direction, its limit where the rim meets
+    // the face.
     SurfacePoint {
         feature: NEAREST,
         point: disc.centre + reach,
@@ -62,10 +68,11 @@ pub fn nearest_points(disc: &Disc, sphere: &Sphere) -> PairPoint {
     PairPoint::from_first(NEAREST, &near.point, &-near.n, near.gap)
 }
 
-/// Nearest point of the disc to the tangent plane (normal n) at the point `touch` where a sphere was first met.
+/// Nearest point of the disc to the tangent plane (normal n) at the point
+/// `touch` where a sphere was first met.
 ///
-/// For a disc that may be past the sphere by now; `touch` in the axes of `base`. The point of the rim that is deepest under
-/// the plane, or, where the plane was met by the face, the disc's point over `touch`.
+/// For a disc that may already be past the sphere; `touch` in the axes of `base`. The result is the
+/// rim point deepest below the plane or, if the face touched first, the disc's point over `touch`.
 #[inline]
 #[must_use]
 pub fn point_over_tangent(disc: &Disc, n: &Vector3<f64>, touch: &Vector3<f64>) -> SurfacePoint {
@@ -88,8 +95,8 @@ pub fn point_over_tangent(disc: &Disc, n: &Vector3<f64>, touch: &Vector3<f64>) -
     }
 }
 
-/// Sine of the angle between axle and normal below which a disc is met with its face and not with its rim: what a wheel
-/// turns in a step that is long enough to pass a sphere is less.
+/// Sine of the angle between axle and normal below which the face of a disc, and not its rim,
+/// touches. A wheel turns by less in a step that is long enough to pass a sphere.
 const FLAT: f64 = 0.05;
 
 #[cfg(test)]

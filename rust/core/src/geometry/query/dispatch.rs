@@ -1,4 +1,4 @@
-//! Which page measures a pair of shapes: the only place that knows which pairs there are.
+//! Chooses the module that measures a pair of shapes. No other place knows all pairs.
 //!
 //! A new shape adds its arms here; see "add a shape" in `CONTRIBUTING.md`.
 
@@ -60,7 +60,8 @@ pub fn point_on_sphere(shape: &PlacedShape, ground: &Sphere, base: &Vector3<f64>
     }
 }
 
-/// A shape's point over the tangent plane (normal n) at the point `touch` where a sphere of the ground was first met ([`super::sweep`]).
+/// A shape's point over the tangent plane (normal n) at the point `touch`
+/// where a sphere of the ground was first met ([`super::sweep`]).
 #[inline]
 #[must_use]
 pub fn point_over_tangent(
@@ -75,7 +76,8 @@ pub fn point_over_tangent(
     }
 }
 
-/// Visits the points of two moving shapes whose gap is at most `reach`, m; n from the first to the second.
+/// Visits the points of two moving shapes whose gap is at most `reach`, m;
+/// n from the first to the second.
 pub fn visit_pair(
     first: &PlacedShape,
     second: &PlacedShape,

@@ -1,4 +1,4 @@
-//! Signed distance, points and normal of a pair of shapes: one page a pair, one dispatcher.
+//! Signed distance, points and normal of a pair of shapes: one module per pair, one dispatcher.
 //!
 //! | | plane | sphere of the ground | disc | box | sphere |
 //! |---|---|---|---|---|---|
@@ -6,11 +6,12 @@
 //! | box | [`box_plane`] | [`box_sphere`] | | [`box_box`] | [`box_sphere`] |
 //! | sphere | [`sphere_plane`] | [`sphere_sphere`] | | | [`sphere_sphere`] |
 //!
-//! The gap is positive where the shapes are apart. Points and normals are such that the gap's rate is the normal part of the relative
-//! velocity of the two *material* points there: exactly, except where a page says how nearly. [`convex`] measures any two shapes by their
-//! support maps, for pages without a formula of their own; [`sweep`] says how a part met a sphere that it passes within one step.
+//! The gap is positive where the shapes are apart. Its rate is the normal part of the relative
+//! velocity of the two *material* points, exactly unless a module states the error. [`convex`]
+//! measures any two shapes by their support maps, for pairs without a formula of their own;
+//! [`sweep`] finds the normal for a part that passes a sphere within one step.
 //!
-//! [`dispatch`] is the only page that knows which pairs there are.
+//! Only [`dispatch`] knows all pairs.
 
 pub mod box_box;
 pub mod box_plane;
@@ -27,13 +28,13 @@ pub mod sweep;
 
 use nalgebra::Vector3;
 
-/// The feature of a pair that is measured by its nearest points, whichever they are.
+/// The feature number of a pair that is measured by its nearest points.
 pub const NEAREST: usize = 0;
 
 /// A point of a shape at a primitive of the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// Names the point among all that the pair can have.
+    /// Identifies the point among all that the pair can have.
     pub feature: usize,
     /// The shape's point, m.
     pub point: Vector3<f64>,
@@ -62,10 +63,11 @@ impl SurfacePoint {
 
 /// A point where two shapes are near each other.
 ///
-/// The two surfaces' points are `point ∓ ½ gap n`, so that both shapes are pushed at one place and no couple is made.
+/// The points of the two surfaces are `point ∓ ½ gap n`. Both shapes are pushed at the same place,
+/// so no couple arises.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairPoint {
-    /// Names the point among all that the pair can have.
+    /// Identifies the point among all that the pair can have.
     pub feature: usize,
     /// Halfway between the surfaces, m.
     pub point: Vector3<f64>,
@@ -88,7 +90,7 @@ impl PairPoint {
         }
     }
 
-    /// The same pair seen from the other side.
+    /// The same pair in reverse order.
     #[inline]
     #[must_use]
     pub fn swapped(self) -> Self {

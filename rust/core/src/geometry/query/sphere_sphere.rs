@@ -19,7 +19,8 @@ fn line(between: &Vector3<f64>) -> (Vector3<f64>, f64) {
     }
 }
 
-/// Nearest point of a sphere to one of the ground; `base` (m, world) is where the first one's coordinates have their origin.
+/// Nearest point of a sphere to one of the ground; `base` (m, world) is
+/// where the first one's coordinates have their origin.
 #[inline]
 #[must_use]
 pub fn nearest_point(sphere: &Sphere, ground: &Sphere, base: &Vector3<f64>) -> SurfacePoint {
@@ -37,7 +38,8 @@ pub fn nearest_points(first: &Sphere, second: &Sphere) -> PairPoint {
     PairPoint::from_first(NEAREST, &(first.centre + n * first.radius), &n, gap)
 }
 
-/// The sphere's point over the tangent plane (normal n) at the point `touch` where a sphere of the ground was first met.
+/// The sphere's point over the tangent plane (normal n) at the point
+/// `touch` where a sphere of the ground was first met.
 #[inline]
 #[must_use]
 pub fn point_over_tangent(sphere: &Sphere, n: &Vector3<f64>, touch: &Vector3<f64>) -> SurfacePoint {

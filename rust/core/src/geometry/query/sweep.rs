@@ -1,31 +1,36 @@
-//! A sphere that a part meets and passes within one step: the normal is the one of the meeting.
+//! A part that passes a sphere within one step: the contact normal is that of the first touch.
 //!
-//! The nearest point says where to push as long as the part is little way into the sphere. Further in, or beyond, it says
-//! nothing of the side that the part came from: a wheel that falls 12 cm in a step on a stone of 5 cm would be pushed down through it. In
-//! the part's own axes the sphere's centre moves along a line x(τ), τ from −1 at the step's start over 0 at its midpoint to 1 at its
-//! predicted end. Its distance to the part is a convex function of τ, so Newton's iteration for a level, begun outside, never
-//! oversteps the first crossing. Where the path gets deeper than [`DEEP`] radii the contact is taken as one with the sphere's
-//! tangent plane at the first touch.
+//! The nearest point gives the right direction as long as the part has entered the sphere only
+//! slightly. Farther in, or beyond, it no longer tells the side that the part came from: a wheel
+//! that falls 12 cm in a step onto a stone of 5 cm would be pushed down through it. In the part's
+//! own axes the sphere's centre moves along a line x(τ), with τ from −1 at the step's start over 0
+//! at its midpoint to 1 at its predicted end. Its distance to the part is a convex function of τ,
+//! so Newton's iteration for a level, started outside, never oversteps the first crossing. If the
+//! path gets deeper than `DEEP` radii, the contact is measured against the sphere's tangent plane
+//! at the first touch.
 
 use nalgebra::Vector3;
 
 /// Depth in radii of the sphere up to which the nearest point of the pose itself is used.
 ///
-/// Measured on drops from 2 m at 20 ms onto stones of 2 to 50 cm: 0.1 and 0.25 leave a wheel at most 0.3 radii inside, 0.5 leaves it 0.39.
+/// Measured on drops from 2 m at 20 ms onto stones of 2 to 50 cm: with 0.1 and 0.25 a wheel ends at
+/// most 0.3 radii inside, with 0.5 it ends 0.39 radii inside.
 pub(crate) const DEEP: f64 = 0.25;
 
-/// Most iterations for one crossing; a graze that needs more is not deep.
+/// Most iterations for one crossing; a grazing path that needs more is not deep.
 const MAX_ITERATIONS: usize = 12;
 
-/// Distance (m, signed or not) of a place to a convex part, and the unit direction from the place to the part.
+/// Distance (m, signed or not) of a place to a convex part, and the unit
+/// direction from the place to the part.
 pub(crate) trait Distance: Fn(&Vector3<f64>) -> (Vector3<f64>, f64) {}
 
 impl<F: Fn(&Vector3<f64>) -> (Vector3<f64>, f64)> Distance for F {}
 
-/// Normal from sphere to part, in the part's axes, where a sphere that ends up deep in the part was first met.
+/// Normal from sphere to part at their first touch, in the part's axes, for a sphere that ends deep
+/// in the part.
 ///
-/// `middle` and `end`: the sphere's centre in the part's axes at τ = 0 and 1. None where the path stays shallow, or was deep from
-/// the start.
+/// `middle` and `end`: the sphere's centre in the part's axes at τ = 0 and 1. None if the path
+/// stays shallow or was deep from the start.
 pub(crate) fn first_touch(
     distance: impl Distance,
     middle: &Vector3<f64>,
@@ -80,7 +85,8 @@ mod tests {
 
     #[test]
     fn a_passing_sphere_is_met_where_it_came_from() {
-        // A ball of radius 1 passes a point with an offset of 0.3, deep: touched first at (−√(1 − 0.09), 0.3).
+        // A ball of radius 1 passes a point with an offset of 0.3, deep:
+        // touched first at (−√(1 − 0.09), 0.3).
         let offset = Vector3::new(0.0, 0.3, 0.0);
         for (middle, half) in [(0.0, 5.0), (3.0, 4.5), (-0.5, 2.0)] {
             let middle = offset + Vector3::x() * middle;

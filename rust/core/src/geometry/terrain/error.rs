@@ -1,8 +1,8 @@
-//! What can be wrong with a terrain.
+//! Errors of a terrain.
 
 use thiserror::Error;
 
-/// A terrain that cannot be.
+/// An invalid terrain.
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum TerrainError {
     /// NaN or infinite.

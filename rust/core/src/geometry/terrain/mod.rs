@@ -1,7 +1,7 @@
-//! The ground: what a terrain must answer, and the terrains there are.
+//! The ground: the interface of a terrain, and the available terrains.
 //!
-//! A terrain says which of its primitives can be touched near a place. Each primitive is convex and pairs with every shape of a machine
-//! ([`super::query`]).
+//! A terrain lists its primitives near a place. Each primitive is convex and pairs with every shape
+//! of a machine ([`super::query`]).
 
 pub mod error;
 pub mod plane;
@@ -28,22 +28,23 @@ pub enum Primitive {
 
 /// The ground. Immutable, shared between threads.
 pub trait Terrain: Send + Sync {
-    /// Visits every primitive that comes closer than `reach` (m) to `centre` (world, m), with a number that
-    /// names it for as long as the terrain lives. May visit others too; must not depend on those far away.
+    /// Visits every primitive that comes closer than `reach` (m) to `centre` (world, m), with a
+    /// number that identifies it for the lifetime of the terrain. May visit others too; the result
+    /// must not depend on distant ones.
     fn visit_near(&self, centre: &Vector3<f64>, reach: f64, visit: &mut dyn FnMut(u32, &Primitive));
 
-    /// Whether a part can be past a primitive after one step: a ball, but no half-space. Only then is the motion within a
-    /// step looked at.
+    /// Whether a part can pass a primitive within one step: a ball, but not a half-space. Only then
+    /// the motion within a step is examined.
     fn can_be_passed(&self) -> bool {
         true
     }
 
-    /// The primitive of a number that [`Self::visit_near`] gave.
+    /// The primitive with a number from [`Self::visit_near`].
     fn primitive(&self, id: u32) -> Primitive;
 
     /// Height y (m) of the visible surface at (x, z); `None` where there is none.
     fn height(&self, x: f64, z: f64) -> Option<f64>;
 
-    /// The plane that everything else lies on, if there is one.
+    /// The base plane, if there is one.
     fn ground(&self) -> Option<&Plane>;
 }

@@ -1,4 +1,4 @@
-//! Half-space `n · x + d ≥ 0` of free room above a plane.
+//! Ground below a plane; the half-space `n · x + d ≥ 0` above it is free.
 
 use nalgebra::{Unit, Vector3};
 
@@ -6,7 +6,8 @@ use super::error::TerrainError;
 use super::sphere_field::MAX_SIZE;
 use super::{Primitive, Terrain};
 
-/// How far the squared length of a normalised vector can be from 1: three roundings of its entries, and those of the square.
+/// Largest deviation of the squared length of a normalised vector from 1: three roundings of its
+/// entries, and those of the square.
 const UNIT: f64 = 8.0 * f64::EPSILON;
 
 /// Plane `n · x + d = 0`, `|n| = 1`, n pointing from the ground to the free side.
@@ -17,11 +18,13 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// From a normal of any length; `offset` belongs to the normalised one (m). A normal whose length is 1 up to rounding is taken as
-    /// it is, so that a plane's own normal makes the same plane again, to the bit.
+    /// From a normal of any length; `offset` belongs to the normalised one (m). A
+    /// normal whose length is 1 up to rounding is taken as it is, so that a
+    /// plane's own normal makes the same plane again, to the bit.
     ///
     /// # Errors
-    /// `NotFinite`; `NoDirection` for a normal shorter than 1e-9; `OutOfRange` for an offset beyond [`MAX_SIZE`].
+    /// `NotFinite`; `NoDirection` for a normal shorter than 1e-9;
+    /// `OutOfRange` for an offset beyond [`MAX_SIZE`].
     pub fn new(normal: [f64; 3], offset: f64) -> Result<Self, TerrainError> {
         for value in normal {
             if !value.is_finite() {
@@ -45,7 +48,7 @@ impl Plane {
             });
         }
         let given = Vector3::from(normal);
-        // A length whose square overflows is first brought near 1.
+        // A vector whose squared length overflows is first scaled to about 1.
         let largest = given.amax();
         let scaled = if largest > 1e100 {
             given / largest
@@ -126,7 +129,8 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// A third of all planes changed by a bit when they were unpickled, since their normal was normalised once more.
+        /// A third of all planes changed by a bit when they were unpickled,
+        /// since their normal was normalised once more.
         #[test]
         fn a_planes_own_normal_makes_the_same_plane(
             normal in prop::array::uniform3(-1.0..1.0),
@@ -146,7 +150,8 @@ mod tests {
         }
     }
 
-    /// Its square overflowed, so that the normal was zero: the solver "converged" without any ground.
+    /// Its square overflowed, so that the normal was zero: the solver
+    /// "converged" without any ground.
     #[test]
     fn a_huge_normal_is_a_direction_too() {
         let plane = Plane::new([1e308; 3], 0.0).unwrap();

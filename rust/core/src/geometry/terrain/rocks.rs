@@ -1,4 +1,4 @@
-//! Rocks of Mars: how many of which size lie on an area.
+//! Rocks of Mars: their size–frequency distribution.
 //!
 //! Rocks of diameter D or more cover the fraction
 //!
@@ -7,10 +7,11 @@
 //! ```
 //!
 //! of the ground, k being the fraction that all rocks cover. A rock covers π D²/4, so there are
-//! `n(D) = 4 k q exp(−q D) / (π D²)` rocks per m² of ground and m of diameter. In `y = 1/D` the density `4 k q exp(−q/y)/π` is bounded and smooth:
-//! its integral is tabulated and inverted.
+//! `n(D) = 4 k q exp(−q D) / (π D²)` rocks per m² of ground and m of diameter. In `y = 1/D` the
+//! density `4 k q exp(−q/y)/π` is bounded and smooth: its integral is tabulated and inverted.
 //!
-//! Source: Golombek and Rapp 1997, *Size–frequency distributions of rocks on Mars and Earth analog sites*, JGR 102 (E2), 4117–4129.
+//! Source: Golombek and Rapp 1997, *Size–frequency distributions of rocks
+//! on Mars and Earth analog sites*, JGR 102 (E2), 4117–4129.
 
 use std::f64::consts::PI;
 
@@ -32,10 +33,11 @@ pub struct Clearing {
     pub radius: f64,
 }
 
-/// What rocks, how many, and where. Equal descriptions give equal rocks.
+/// Description of a rock field. Equal descriptions give equal rocks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rocks {
-    /// k: fraction of the area that rocks of all sizes cover, in [0, 0.5]. Landing sites on Mars: 0.03 to 0.2.
+    /// k: fraction of the area that rocks of all sizes cover, in [0, 0.5].
+    /// Landing sites on Mars: 0.03 to 0.2.
     pub abundance: f64,
     /// Extent along x and z, m.
     pub area: [f64; 2],
@@ -45,10 +47,10 @@ pub struct Rocks {
     pub seed: u64,
     /// Largest diameter, m.
     pub max_diameter: f64,
-    /// Smallest diameter, m: the law has ever more, ever smaller rocks.
+    /// Smallest diameter, m: without it the law has no bound on the number of rocks.
     pub min_diameter: f64,
-    /// Range, from and to, of the fraction of its diameter that a rock is sunk into the ground, each in [0, ½], so that a rock covers what
-    /// the law says. Drawn for each rock.
+    /// Range, from and to, of the fraction of its diameter that a rock is sunk into the ground,
+    /// each in [0, ½], so that a rock covers what the law says. Drawn for each rock.
     pub burial: [f64; 2],
     /// Where no rock lies.
     pub clearings: Vec<Clearing>,
@@ -73,17 +75,19 @@ impl Default for Rocks {
     }
 }
 
-/// Cells of the table of the sizes. The density within one is taken as constant; 2048 cells put its error below that of one rock.
+/// Cells of the table of the sizes. The density within one is taken as
+/// constant; 2048 cells put its error below that of one rock.
 const CELLS: usize = 2048;
 
-/// How often a rock that fell into a clearing is thrown again before it is left out.
+/// How often a rock that fell into a clearing is redrawn before it is dropped.
 const THROWS: usize = 100;
 
-/// Most clearings of a field: each throw of a rock looks at all.
+/// Most clearings of a field: each draw of a place checks all of them.
 const MAX_CLEARINGS: usize = 1000;
 
 impl Rocks {
-    /// F_k(D): fraction of the ground that rocks of diameter `diameter` (m) or more cover, without upper limit.
+    /// F_k(D): fraction of the ground that rocks of diameter `diameter` (m)
+    /// or more cover, without upper limit.
     #[must_use]
     pub fn covered_fraction(&self, diameter: f64) -> f64 {
         if self.abundance > 0.0 {
@@ -112,7 +116,7 @@ impl Rocks {
         let mut sum = 0.0;
         let mut table = vec![0.0];
         let (k, q) = (self.abundance, self.decay());
-        // So few rocks that their law has no number has none at all.
+        // With so few rocks that the law underflows there are none.
         if k <= 0.0 || !q.is_finite() {
             return table;
         }
@@ -207,12 +211,13 @@ impl Rocks {
 
     /// Draws the rocks.
     ///
-    /// Sizes are drawn one from each of N equal slices of the distribution, so that a field follows the law to about one rock at
-    /// every diameter; places are independent and rocks may overlap. A rock in a clearing is thrown again.
+    /// Sizes are drawn one from each of N equal slices of the distribution, so that a field
+    /// follows the law to about one rock at every diameter; places are independent and
+    /// rocks may overlap. A rock in a clearing is thrown again.
     ///
     /// # Errors
     /// As [`Self::check`]; `TooMany`.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // not negative, checked against the limit
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within 0 and the limit
     pub fn sample(&self) -> Result<Vec<Sphere>, TerrainError> {
         self.check()?;
         let table = self.table();
@@ -246,7 +251,7 @@ impl Rocks {
         Ok(spheres)
     }
 
-    /// The diameter below which the share `1 − share` of the rocks is.
+    /// The diameter below which the fraction `1 − share` of the rocks lies.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // an index into the table
     fn diameter(&self, table: &[f64], share: f64) -> f64 {
         let (low, step) = self.grid();
@@ -273,7 +278,8 @@ impl Rocks {
     }
 }
 
-/// SplitMix64 (Steele, Lea and Flood 2014): ten lines that no update of a library can change under a seed.
+/// SplitMix64 (Steele, Lea and Flood 2014), written out so that no update of a library changes the
+/// rocks of a seed.
 pub(crate) struct Random(u64);
 
 impl Random {

@@ -12,12 +12,12 @@ use crate::geometry::shape::Sphere;
 /// Most spheres of a field: some hundred megabytes, and a second to sort them.
 pub const MAX_SPHERES: usize = 2_000_000;
 
-/// Largest coordinate and radius of a sphere, m: there a double still resolves a nanometre.
+/// Largest coordinate and radius of a sphere, m: a double still resolves a nanometre there.
 pub const MAX_SIZE: f64 = 1e6;
 
 /// Spheres and an optional ground plane. Immutable.
 ///
-/// Primitive 0 is the plane, whether there is one or not; sphere i (from 0, as given) is primitive i + 1.
+/// Number 0 is reserved for the plane; sphere i (from 0, in the given order) is primitive i + 1.
 #[derive(Clone, Debug)]
 pub struct SphereField {
     spheres: Vec<Sphere>,
@@ -89,7 +89,7 @@ impl SphereField {
         }
     }
 
-    /// Rocks strewn over a plane with the size–frequency distribution of Mars: see [`Rocks`].
+    /// Rocks scattered over a plane with the size–frequency distribution of Mars: see [`Rocks`].
     ///
     /// # Errors
     /// A number out of its range; `TooMany`.

@@ -1,21 +1,24 @@
 //! The Delassus operator of many contacts: only the blocks of contacts that share a body.
 //!
-//! `W_ij = Σ_b J_ib M_b⁻¹ J_jbᵀ` over the bodies `b` that touch both contacts. In a heap each contact has a handful of such neighbours, whatever
-//! the size of the heap, so rows are kept as lists of `d × d` blocks (block CSR): memory and one product with `W` grow with the number of
-//! contacts, not with its square.
+//! `W_ij = Σ_b J_ib M_b⁻¹ J_jbᵀ` over the bodies `b` that touch both contacts. In a heap each
+//! contact has a handful of such neighbours, whatever the size of the heap. Rows are therefore
+//! stored as lists of `d × d` blocks (block CSR): memory and the cost of a product with `W` grow
+//! with the number of contacts, not with its square.
 
 use super::{Dimension, ProblemError};
 
-/// One contact between two bodies, for [`BlockSparseDelassus::assemble`]. `D` components, `V` velocities a body (3 in the plane, 6 in space).
+/// One contact between two bodies, for [`BlockSparseDelassus::assemble`]. `D` components, `V`
+/// velocities a body (3 in the plane, 6 in space).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairContact<const D: usize, const V: usize> {
     /// The two bodies, different ones; `None` is the fixed world.
     pub bodies: [Option<usize>; 2],
-    /// Jacobians with their signs: `u = Σ_s jacobians[s] v[bodies[s]]`, rows `[normal, tangent, (tangent)]`.
+    /// Jacobians with their signs: `u = Σ_s jacobians[s] v[bodies[s]]`,
+    /// rows `[normal, tangent, (tangent)]`.
     pub jacobians: [[[f64; V]; D]; 2],
 }
 
-/// Block rows of `W` in compressed form. Its memory is kept when it is assembled anew.
+/// Block rows of `W` in compressed form. Reassembly reuses the memory.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BlockSparseDelassus {
     /// Components per contact.
@@ -40,10 +43,12 @@ impl BlockSparseDelassus {
         Self::default()
     }
 
-    /// The blocks of a dense row-major `W` (`n × n`, 1/kg) that are not zero, and the diagonal ones.
+    /// The blocks of a dense row-major `W` (`n × n`, 1/kg) that are not
+    /// zero, and the diagonal ones.
     ///
     /// # Errors
-    /// [`ProblemError::OperatorShape`] unless `W` has `n × n` entries with `n` a multiple of the components.
+    /// [`ProblemError::OperatorShape`] unless `W` has `n × n` entries with
+    /// `n` a multiple of the components.
     pub fn from_dense(
         dimension: Dimension,
         n_contacts: usize,
@@ -58,12 +63,14 @@ impl BlockSparseDelassus {
         Ok(sparse)
     }
 
-    /// Takes block rows as they are (BSR, as SciPy calls it).
+    /// Takes block rows as given (SciPy's BSR format).
     ///
-    /// `row_starts` (`n_c + 1`), `columns` (`n_blocks`) ascending in each row, `blocks` (`n_blocks · d · d`) row-major, 1/kg.
+    /// `row_starts` (`n_c + 1`), `columns` (`n_blocks`) ascending in each row, `blocks`
+    /// (`n_blocks · d · d`) row-major, 1/kg.
     ///
     /// # Errors
-    /// [`ProblemError::OperatorPattern`] naming the first row that is not ascending, leaves the matrix or lacks its diagonal block;
+    /// [`ProblemError::OperatorPattern`] naming the first row that is not ascending,
+    /// leaves the matrix or lacks its diagonal block;
     /// [`ProblemError::OperatorShape`] when the lengths do not fit together.
     pub fn from_rows(
         dimension: Dimension,
@@ -105,7 +112,7 @@ impl BlockSparseDelassus {
         })
     }
 
-    /// Reads a dense matrix whose shape is known to fit, keeping the memory at hand.
+    /// Reads a dense matrix of matching shape, reusing the memory.
     pub(crate) fn read_dense(&mut self, dimension: Dimension, n_contacts: usize, W: &[f64]) {
         let d = dimension.components();
         let n = d * n_contacts;
@@ -113,7 +120,7 @@ impl BlockSparseDelassus {
         for i in 0..n_contacts {
             for j in 0..n_contacts {
                 let rows = (0..d).map(|r| &W[(d * i + r) * n + d * j..][..d]);
-                // A NaN is kept, so that the solver meets it.
+                // Keep a NaN, so that the solver sees it.
                 let is_zero = rows.clone().flatten().all(|x| *x == 0.0);
                 if is_zero && i != j {
                     continue;
@@ -130,7 +137,8 @@ impl BlockSparseDelassus {
         }
     }
 
-    /// The rows of some contacts that are coupled with one another only; `place[i]` is where contact `i` goes. `contacts` ascends.
+    /// The rows of contacts that are coupled only with one another; `place[i]` is the new number of
+    /// contact `i`. `contacts` ascends.
     pub(crate) fn restricted(&self, contacts: &[usize], place: &[usize]) -> Self {
         let mut part = Self::default();
         part.clear(self.components);
@@ -172,8 +180,8 @@ impl BlockSparseDelassus {
 
     /// Assembles `W` from contacts between pairs of bodies, in time proportional to the blocks.
     ///
-    /// `inverse_masses` (`n_bodies` of `V`): diagonal of each body's `M⁻¹`, so the Jacobians are in coordinates in which it is diagonal
-    /// (rotations about the principal axes).
+    /// `inverse_masses` (`n_bodies` of `V`): diagonal of each body's `M⁻¹`, so the Jacobians are in
+    /// coordinates in which it is diagonal (rotations about the principal axes).
     ///
     /// # Panics
     /// If `D` is not 2 or 3, a body is out of range, or both bodies of a contact are the same.
@@ -211,10 +219,12 @@ impl BlockSparseDelassus {
         );
     }
 
-    /// Assembles `W` row by row from contacts between pairs of bodies of any number of velocities each.
+    /// Assembles `W` row by row from contacts between pairs of bodies of
+    /// any number of velocities each.
     ///
-    /// `bodies(i)`: the two bodies of contact i, below `n_bodies`, different ones; `None` is the fixed world. `add(block, (i, s), (j, t))` adds
-    /// `J_is M⁻¹ J_jtᵀ`, 1/kg, where side s of contact i is the same body as side t of contact j; i never decreases.
+    /// `bodies(i)`: the two bodies of contact i, below `n_bodies`, different ones; `None` is the
+    /// fixed world. `add(block, (i, s), (j, t))` adds `J_is M⁻¹ J_jtᵀ`, 1/kg, where side s of
+    /// contact i is the same body as side t of contact j; i never decreases.
     ///
     /// # Panics
     /// If `D` is not 2 or 3, a body is out of range, or both bodies of a contact are the same.
@@ -261,7 +271,7 @@ impl BlockSparseDelassus {
                 self.blocks.extend(block.iter().flatten());
             }
             if self.diagonal.len() == i {
-                // Both sides are fixed: nothing to push.
+                // Both sides are fixed: no coupling.
                 self.diagonal.push(self.columns.len());
                 self.columns.push(i);
                 self.blocks.extend([[0.0; D]; D].iter().flatten());
@@ -482,7 +492,7 @@ mod tests {
                 })
                 .collect();
             let mut sparse = BlockSparseDelassus::new();
-            // Twice: memory that was used before leaves no trace.
+            // Twice: reused memory must not affect the result.
             sparse.assemble(&contacts, &masses);
             sparse.assemble(&contacts, &masses);
             let mut rows = vec![vec![0.0; 12]; 2 * contacts.len()];

@@ -1,15 +1,18 @@
-//! Contacts of many bodies that share nothing but their contacts: what each reads and changes, and no operator W at all.
+//! Contacts of many bodies that are coupled by contacts alone. Each contact acts on its two bodies
+//! directly, without an operator W.
 //!
 //! A contact touches two bodies, so with `u = Zᵀ y + q` and `y = Z p` in factor coordinates
-//! (see [`crate::integrator::mechanical_system`]) it reads and changes three numbers of each in the plane, six in space. Two round bodies, disks for
-//! D = 2 and balls for D = 3, have a diagonal block of W. [`solve_body_pairs`](crate::solver::solve_body_pairs) solves them.
+//! (see [`crate::integrator::mechanical_system`]) it reads and changes three numbers of each in the
+//! plane, six in space. Two round bodies, disks for D = 2 and balls for D = 3, have a diagonal
+//! block of W. [`solve_body_pairs`](crate::solver::solve_body_pairs) solves them.
 //!
-//! With the arms `∓r n` from the centres to the point of contact, turning moves the rims along the tangents t, b (`n = b × t`) alone:
+//! The arms from the centres to the point of contact are `∓r n`, so rotation moves the rims only
+//! along the tangents t, b (`n = b × t`):
 //!
 //! ```text
 //! u_N = n · (v_a − v_b)
-//! u_t = t · (v_a − v_b) + b · (r_a ω_a + r_b ω_b)          in the plane b is the axis that points to the viewer
-//! u_b = b · (v_a − v_b) − t · (r_a ω_a + r_b ω_b)          in space only
+//! u_t = t · (v_a − v_b) + b · (r_a ω_a + r_b ω_b)    in the plane b points to the viewer
+//! u_b = b · (v_a − v_b) − t · (r_a ω_a + r_b ω_b)    in space only
 //! ```
 //!
 //! Source: Jean 1999; Moreau 1999 (contact by contact on the bodies' velocities).
@@ -17,31 +20,33 @@
 use super::BlockSparseDelassus;
 use crate::spatial::space::{body_velocities, dot};
 
-/// A contact of two round bodies, or of one with what does not move.
+/// A contact of two round bodies, or of one with a fixed body.
 ///
 /// In factor coordinates `v = c (y_1, …, y_D)` and `r ω = s (y_D+1, …)`, see the page above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoundPair<const D: usize> {
-    /// Place of each body's factor coordinates; any place, with c = s = 0, for one that does not move.
+    /// Place of each body's factor coordinates; any place, with c = s = 0, for a fixed body.
     pub bodies: [u32; 2],
     /// Unit normal, from the second body into the first, then the tangents.
     pub frame: [[f64; D]; D],
-    /// c: `1/√m` of each body, 0 for one that does not move.
+    /// c: `1/√m` of each body, 0 for a fixed body.
     pub linear: [f64; 2],
-    /// s: `r/√J` of each body, 0 for one that does not move.
+    /// s: `r/√J` of each body, 0 for a fixed body.
     pub angular: [f64; 2],
 }
 
-/// All contacts of a step: first those among round bodies, then those of the machine, a body of any number of coordinates.
+/// All contacts of a step: first those among round bodies, then those of
+/// the machine, a body of any number of coordinates.
 ///
-/// A machine of several trees is one too: its coordinates are theirs, one after the other.
+/// A machine may have several trees: their coordinates follow one another.
 #[derive(Clone, Debug, Default)]
 pub struct BodyPairs<const D: usize> {
     /// Contacts among round bodies.
     pub round: Vec<RoundPair<D>>,
-    /// Contacts of the machine, with the round body, or what does not move, as second body.
+    /// Contacts of the machine; the second body is the round or the fixed one.
     pub machine: Vec<RoundPair<D>>,
-    /// Rows n, t, (b) of Zᵀ of the machine's contacts in its own factor coordinates, contact by contact (D rows of `width`).
+    /// Rows n, t, (b) of Zᵀ of the machine's contacts in its own factor
+    /// coordinates, contact by contact (D rows of `width`).
     pub rows: Vec<f64>,
     /// Number of the machine's coordinates.
     pub width: usize,
@@ -51,7 +56,7 @@ pub struct BodyPairs<const D: usize> {
     pub n_coordinates: usize,
 }
 
-/// Velocity along tangent k (from 1) of a rim that turns with `rim` = r ω.
+/// Velocity along tangent k (from 1) of a rim that rotates with `rim` = r ω.
 #[inline]
 pub(crate) fn rim_velocity<const D: usize>(frame: &[[f64; D]; D], k: usize, rim: &[f64]) -> f64 {
     if D == 2 {
@@ -63,7 +68,8 @@ pub(crate) fn rim_velocity<const D: usize>(frame: &[[f64; D]; D], k: usize, rim:
     if k == 1 { along } else { -along }
 }
 
-/// Component c of what the tangential impulses turn, divided by r: the transpose of [`rim_velocity`].
+/// Component c of the moment of the tangential impulses, divided by r: the transpose of
+/// [`rim_velocity`].
 #[inline]
 pub(crate) fn rim_impulse<const D: usize>(frame: &[[f64; D]; D], p: &[f64; D], c: usize) -> f64 {
     if D == 2 {
@@ -128,7 +134,7 @@ impl<const D: usize> RoundPair<D> {
         force
     }
 
-    /// `W_NN` and `W_TT`, the same for each tangent, 1/kg; all else of the block is 0.
+    /// `W_NN` and `W_TT`, the same for each tangent, 1/kg; the rest of the block is 0.
     #[inline]
     #[must_use]
     pub fn block(&self) -> [f64; 2] {
@@ -137,7 +143,7 @@ impl<const D: usize> RoundPair<D> {
         [normal, normal + square(self.angular)]
     }
 
-    /// Whether a side of it moves.
+    /// Whether either side moves.
     fn moves(&self, side: usize) -> bool {
         self.linear[side] > 0.0
     }
@@ -164,7 +170,8 @@ impl<const D: usize> RoundPair<D> {
 }
 
 impl<const D: usize> BodyPairs<D> {
-    /// Forgets all contacts, of a machine of `width` coordinates at `machine_at` among `n_coordinates`.
+    /// Forgets all contacts, of a machine of `width` coordinates at
+    /// `machine_at` among `n_coordinates`.
     pub fn clear(&mut self, width: usize, machine_at: usize, n_coordinates: usize) {
         self.round.clear();
         self.machine.clear();

@@ -23,7 +23,8 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     (sums[0] + sums[2]) + (sums[1] + sums[3]) + tail
 }
 
-/// `out = A x + b` for a row-major square matrix `A`; of up to six contacts the size is known to the compiler.
+/// `out = A x + b` for a row-major square matrix `A`; for up to six contacts the compiler knows the
+/// size.
 #[inline]
 pub(crate) fn multiply_add(A: &[f64], x: &[f64], b: &[f64], out: &mut [f64]) {
     match x.len() {

@@ -1,7 +1,8 @@
-//! The Delassus operator `W`, behind the few products that a solver needs.
+//! The Delassus operator `W`, with the few products that a solver needs.
 //!
-//! [`Operator`] is `W` in either storage, dense or [block-sparse](BlockSparseDelassus). [`BodyPairs`] is for very many free bodies: the
-//! contacts themselves stand in for `W`, which nobody forms.
+//! [`Operator`] is `W` in either storage, dense or [block-sparse](BlockSparseDelassus).
+//! [`BodyPairs`] serves very many free bodies: it works with the contacts themselves and never
+//! forms `W`.
 
 mod block_sparse;
 mod body_pairs;
@@ -36,7 +37,7 @@ impl Operator<'_> {
         }
     }
 
-    /// Work of one product with `W`, the judgement of its contacts included, in units of a multiplication with its addition.
+    /// Work of one product with `W`, including the residual of its contacts, in multiply–adds.
     pub(crate) fn product_work(self, n: usize) -> u64 {
         let entries = match self {
             Self::Dense(_) => n * n,
@@ -75,7 +76,7 @@ impl Operator<'_> {
         }
     }
 
-    /// `Σ_c |W_rc x_c|` of row `r`: what the rounding of that row is measured against.
+    /// `Σ_c |W_rc x_c|` of row `r`: the reference for the rounding of that row.
     pub(crate) fn row_magnitude(self, r: usize, x: &[f64]) -> f64 {
         match self {
             Self::Dense(W) => {

@@ -1,11 +1,12 @@
-//! Dense or block-sparse: the storage of `W` that the solve works on.
+//! The storage of `W` in a solve: dense or block-sparse.
 //!
-//! Few contacts are dense whatever the caller has; many contacts whose blocks are mostly zero are block-sparse. Measured on 296
-//! contacts with 1.6% of the blocks: the same 580 Newton steps cost a twentieth.
+//! Few contacts use dense storage, whatever the caller's; many contacts with mostly zero blocks use
+//! block-sparse storage. Measured on 296 contacts with 1.6% of the blocks: the same 580 Newton
+//! steps cost a twentieth.
 
 use super::{BlockSparseDelassus, FrictionContactProblem, Operator};
 
-/// Largest share of blocks that the sparse storage is chosen for.
+/// Largest fraction of nonzero blocks for sparse storage.
 const SPARSE_SHARE: f64 = 0.15;
 
 /// Memory for the storage that the caller did not choose.
@@ -16,7 +17,7 @@ pub(crate) struct Storage {
 }
 
 impl Storage {
-    /// `W` as the solver wants it: the caller's own, or a copy in the other storage.
+    /// `W` in the solver's storage: the caller's own, or a copy in the other storage.
     pub fn choose<'a>(
         &'a mut self,
         problem: &FrictionContactProblem<'a>,

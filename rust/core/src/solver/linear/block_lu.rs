@@ -1,10 +1,12 @@
 //! Sparse LU of the Newton system of many contacts, on `D × D` blocks.
 //!
-//! The pattern is the coupling of contacts in `W`. Contacts are eliminated in the order of least degree, which keeps the fill of heaps small
-//! (Tinney and Walker 1967); order and pattern depend on `W` alone, so they are made once per solve. The numbers follow row by row, with exchanges
-//! only inside a diagonal block; one step of iterative refinement makes up for exchanges that are not made between blocks.
+//! The pattern is the coupling of contacts in `W`. Minimum-degree ordering keeps the fill-in of
+//! heaps small (Tinney and Walker 1967). Order and pattern depend on `W` alone and are computed
+//! once per solve. The numerical factorisation runs row by row and pivots only within a diagonal
+//! block; one step of iterative refinement makes up for the missing pivoting between blocks.
 //!
-//! Every contact keeps its full `D × D` block: unknowns that its mode takes away become rows of the identity.
+//! Every contact keeps its full `D × D` block: unknowns that its mode eliminates become rows of the
+//! identity.
 
 use std::collections::BTreeSet;
 
@@ -25,7 +27,7 @@ pub(super) struct BlockLu {
     upper_blocks: Vec<f64>,
     lower_blocks: Vec<f64>,
     inverse_diagonal: Vec<f64>,
-    /// Whether a pivot has unknowns at all.
+    /// Whether a pivot has any unknowns.
     active: Vec<bool>,
     /// One row while it is eliminated.
     row: Vec<f64>,
@@ -125,7 +127,8 @@ fn inverse<const D: usize>(mut a: Block<D>) -> Option<Block<D>> {
     Some(b)
 }
 
-/// `Bᵀ W C` of one block: the rows that contact `i` keeps, the columns that the unknowns of contact `j` act through.
+/// `Bᵀ W C` of one block: the rows that contact `i` keeps, the columns that
+/// the unknowns of contact `j` act through.
 #[inline]
 fn reduce<const D: usize>(
     W: &[f64],
@@ -241,7 +244,7 @@ impl BlockLu {
         self.correction.resize(W.components() * n, 0.0);
     }
 
-    /// Work of a factorisation of the analysed pattern and of the step that it serves.
+    /// Work of a factorisation with the analysed pattern, and of the step that uses it.
     pub fn work(&self) -> u64 {
         let d = if self.order.is_empty() {
             0
@@ -254,7 +257,8 @@ impl BlockLu {
         (d * d * d * products + 4 * d * d * (blocks + self.order.len())) as u64
     }
 
-    /// Builds and factors `Bᵀ (W + α R) C + γ` of the predicted modes; `weights` is the diagonal of `R`, one number a contact. `false` at a singular pivot.
+    /// Builds and factors `Bᵀ (W + α R) C + γ` of the predicted modes; `weights` is the diagonal of
+    /// `R`, one number a contact. `false` at a singular pivot.
     pub fn factorise<const D: usize>(
         &mut self,
         W: &BlockSparseDelassus,
@@ -331,7 +335,8 @@ impl BlockLu {
         true
     }
 
-    /// Solves the factored system in place of `b` (`n`, contact by contact), with one step of refinement.
+    /// Solves the factored system in place of `b` (`n`, contact by
+    /// contact), with one step of refinement.
     pub fn solve<const D: usize>(&mut self, W: &BlockSparseDelassus, b: &mut [f64]) {
         let mut rhs = std::mem::take(&mut self.rhs);
         let mut correction = std::mem::take(&mut self.correction);

@@ -1,14 +1,15 @@
 //! Factorisations of the dense systems of a Newton step, in place and without allocation.
 //!
-//! Matrices are column-major, of a size that is a multiple of [`LANES`] (the caller pads with the unit matrix), in chunks of that many entries. So every
-//! loop runs over whole chunks, and what is left of a matrix is loaded and stored once for [`LANES`] eliminated columns. That serves six
-//! contacts, where everything stays in the first cache, as well as hundreds.
-#![allow(clippy::inline_always)] // the known size has to reach every loop, or its bounds stay unknown
+//! Matrices are column-major. Their size is a multiple of [`LANES`] (the caller pads with the unit
+//! matrix), and they are stored in chunks of that many entries. Every loop thus runs over whole
+//! chunks, and the trailing matrix is loaded and stored once per [`LANES`] eliminated columns. This
+//! is fast for six contacts, which fit in the first-level cache, and for hundreds.
+#![allow(clippy::inline_always)] // loop bounds are known only where the size is
 
 /// Entries of a chunk, and columns that are eliminated together.
 pub(super) const LANES: usize = 4;
 
-/// Entries that the loops work on together.
+/// Entries that the loops process together.
 pub(super) type Chunk = [f64; LANES];
 
 /// Size of the padded system of `m` unknowns, in chunks.
@@ -17,7 +18,8 @@ pub(super) const fn chunks(m: usize) -> usize {
     m.div_ceil(LANES)
 }
 
-/// Calls `body` with `size`, as a constant where it is that of a few contacts: then all its loops have known bounds.
+/// Calls `body` with `size`, as a constant for a few contacts, so that the bounds of all its loops
+/// are known.
 macro_rules! with_known_size {
     ($size:expr, |$known:ident| $body:expr) => {{
         match $size {
@@ -63,7 +65,8 @@ fn subtract_columns(
     let x = &mut x[range.clone()];
     let [a, b, c, d] = columns.map(|column| &column[range.clone()]);
     for ((((x, a), b), c), d) in x.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-        // Read whole before it is written: then the compiler needs no proof that the columns are others.
+        // Read whole before the write, so that the compiler need not prove that the columns do not
+        // alias.
         let (a, b, c, d) = (*a, *b, *c, *d);
         let old = *x;
         *x = std::array::from_fn(|l| {
@@ -74,9 +77,11 @@ fn subtract_columns(
     }
 }
 
-/// Cholesky factor `A = L Lᵀ` of a symmetric matrix of `size` chunks a side, of which only the lower triangle is read.
+/// Cholesky factor `A = L Lᵀ` of a symmetric matrix of `size` chunks a
+/// side, of which only the lower triangle is read.
 ///
-/// `L` replaces the lower triangle, with reciprocal diagonal. Returns `false` when a pivot is not positive; then `A` is spoilt.
+/// `L` replaces the lower triangle, with reciprocal diagonal. Returns
+/// `false` when a pivot is not positive; then `A` is spoilt.
 #[must_use]
 pub(super) fn cholesky(A: &mut [Chunk], size: usize) -> bool {
     with_known_size!(size, |size| cholesky_of(A, size))
@@ -166,7 +171,8 @@ fn cholesky_solve_of(L: &[Chunk], size: usize, b: &mut [Chunk]) {
     }
 }
 
-/// LU factors with row exchanges of a matrix of `size` chunks a side, in place; the diagonal of `U` is stored reciprocal.
+/// LU factors with row exchanges of a matrix of `size` chunks a side, in
+/// place; the diagonal of `U` is stored reciprocal.
 ///
 /// Returns `false` at a zero or non-finite pivot.
 #[must_use]
@@ -238,8 +244,8 @@ fn eliminate(x: &mut Chunk, panel: [&[Chunk]; LANES], block: usize) -> Chunk {
     *x
 }
 
-/// Brings the largest entry of a column, named by its diagonal's chunk and place there, at or below the diagonal onto it; `false` if it is
-/// zero or not finite.
+/// Brings the largest entry of a column at or below the diagonal onto it; `false` if it is zero or
+/// not finite. The column is named by its diagonal's chunk and the place there.
 #[inline(always)]
 fn exchange(
     A: &mut [Chunk],

@@ -1,4 +1,5 @@
-//! The linear systems of the iterations, and their factors: dense for few contacts, sparse blocks for many.
+//! The linear systems of the iterations and their factors: dense for few contacts, block-sparse for
+//! many.
 
 mod block_lu;
 mod dense;

@@ -1,10 +1,12 @@
-//! The linear system of a Newton step, over the unknowns that the predicted modes leave.
+//! The linear system of a Newton step in the unknowns that the predicted modes leave free.
 //!
 //! - *open*: `p = 0`, no unknown;
 //! - *stick*: `û = 0`, the impulse's `d` unknowns;
-//! - *slide* along `e`, with `t = e⊥`: `û_N = 0`, `p_e = μ p_N` and `û_t + γ p_t = 0`, unknowns `(p_N, p_t)` (one in the plane).
+//! - *slide* along `e`, with `t = e⊥`: `û_N = 0`, `p_e = μ p_N` and
+//!   `û_t + γ p_t = 0`, unknowns `(p_N, p_t)` (one in the plane).
 //!
-//! Written for the increment it reads `(Bᵀ (W + α I) C + γ) y = −Bᵀ û − γ p_t`, symmetric when nothing slides with friction.
+//! Written for the increment it reads `(Bᵀ (W + α I) C + γ) y = −Bᵀ û − γ p_t`,
+//! symmetric when nothing slides with friction.
 
 use super::block_lu::BlockLu;
 use super::dense::{self, Chunk, LANES};
@@ -13,7 +15,7 @@ use crate::problem::{BlockSparseDelassus, Operator, Prepared, Proximal};
 use crate::solver::local::modes::{Linearised, Prediction, n_unknowns};
 use crate::solver::work::{self, Work};
 
-/// Kept factors of the reduced system.
+/// Stored factors of the reduced system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::solver) enum Factors {
     /// None, or outdated.
@@ -29,11 +31,11 @@ pub(in crate::solver) enum Factors {
 /// One Newton step with a factored system.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct NewtonStep {
-    /// Regularisation that the factors were made with, 1/kg.
+    /// Regularisation used in the factors, 1/kg.
     pub alpha: f64,
     /// Number of unknowns.
     pub m: usize,
-    /// Which factors there are.
+    /// Kind of the factors.
     pub factors: Factors,
     /// Whether sliding impulses return radially to the cone after the step.
     pub on_cone: bool,
@@ -54,12 +56,14 @@ pub(in crate::solver) struct ReducedSystem {
     /// Dense matrix, factored in place, and its row exchanges.
     matrix: Vec<Chunk>,
     pivots: Vec<usize>,
-    /// Factors of the block-sparse system, and whether their pattern is that of the present problem.
+    /// Factors of the block-sparse system, and whether their pattern is that of the current
+    /// problem.
     block_lu: BlockLu,
     is_analysed: bool,
 }
 
-/// Puts `p` where the linearised constraints hold (`p = 0` if open, `p_e = μ p_N` if sliding); says whether that moved it.
+/// Moves `p` onto the linearised constraints (`p = 0` if open, `p_e = μ p_N` if sliding); true if
+/// that changed it.
 #[inline]
 fn snap<const D: usize>(mu: &[f64], contacts: &[Linearised], p: &mut [f64]) -> bool {
     let mut moved = false;
@@ -96,7 +100,7 @@ fn snap<const D: usize>(mu: &[f64], contacts: &[Linearised], p: &mut [f64]) -> b
     moved
 }
 
-/// Sets what a padded matrix of `m` unknowns has beyond them to the unit matrix.
+/// Sets the padding of a matrix of `m` unknowns to the unit matrix.
 #[inline]
 fn pad(A: &mut [Chunk], m: usize) {
     let size = dense::chunks(m);
@@ -113,7 +117,8 @@ fn pad(A: &mut [Chunk], m: usize) {
     }
 }
 
-/// `W + α I` for a Cholesky factorisation, which reads the lower triangle of these columns: the rows of a symmetric `W`.
+/// `W + α I` for a Cholesky factorisation, which reads the lower triangle
+/// of these columns: the rows of a symmetric `W`.
 #[inline]
 fn assemble_symmetric(W: &[f64], alpha: f64, n: usize, A: &mut [Chunk]) {
     let size = dense::chunks(n);
@@ -159,7 +164,8 @@ fn assemble<const D: usize>(
     }
 }
 
-/// One row of `W C`, the columns that the unknowns of every contact act through, into every `height`-th entry of `target`.
+/// One row of `W C`, the columns that the unknowns of every contact act
+/// through, into every `height`-th entry of `target`.
 #[inline]
 fn combine_columns<const D: usize>(
     row: impl Iterator<Item = [f64; D]>,
@@ -232,7 +238,8 @@ fn right_hand_side<const D: usize>(
     }
 }
 
-/// Adds `C y` to `p`. With `on_cone` a sliding impulse returns radially to the cone's surface, a change of second order.
+/// Adds `C y` to `p`. With `on_cone` a sliding impulse is projected radially onto the cone's
+/// surface, a second-order change.
 #[inline]
 fn apply<const D: usize>(
     mu: &[f64],
@@ -314,7 +321,7 @@ impl ReducedSystem {
         }
     }
 
-    /// Whether the budget allows another sparse factorisation; finds its pattern at the first.
+    /// Whether the budget allows another sparse factorisation; the first call analyses the pattern.
     fn affords_sparse(&mut self, W: &BlockSparseDelassus, work: &mut Work) -> bool {
         if !self.is_analysed {
             self.block_lu.analyse(W);
@@ -323,7 +330,8 @@ impl ReducedSystem {
         work.affords(self.block_lu.work())
     }
 
-    /// Factors the system of the predicted modes; none where it is singular, or the budget does not allow it.
+    /// Factors the system of the predicted modes; none if it is singular or the budget does not
+    /// allow it.
     #[inline]
     pub fn factorise<const D: usize>(
         &mut self,
@@ -351,7 +359,7 @@ impl ReducedSystem {
             }
         };
         let may_be_symmetric = !prediction.slides && allow_symmetric;
-        // A step costs two products and two substitutions beside its factors.
+        // A step costs two products and two substitutions in addition to its factors.
         let cost = work::dense(m, may_be_symmetric) + 2 * data.product;
         if !work.affords(cost) {
             return Factors::None;
@@ -376,7 +384,8 @@ impl ReducedSystem {
         }
     }
 
-    /// Factors `W + σ diag(weights)`, one weight a contact; `false` where that fails, or the budget does not allow it.
+    /// Factors `W + σ diag(weights)`, one weight per contact; `false` if that fails or the budget
+    /// does not allow it.
     pub fn factorise_weighted<const D: usize>(
         &mut self,
         data: &Prepared<'_>,
@@ -416,7 +425,8 @@ impl ReducedSystem {
         }
     }
 
-    /// Solves the system of [`factorise_weighted`](Self::factorise_weighted) for the right-hand side that `write` enters; returns the solution (n).
+    /// Solves the system of [`factorise_weighted`](Self::factorise_weighted) for the right-hand
+    /// side that `write` enters; returns the solution (n).
     pub fn solve_weighted<const D: usize>(
         &mut self,
         data: &Prepared<'_>,
@@ -435,7 +445,7 @@ impl ReducedSystem {
         &self.rhs.as_flattened()[..n]
     }
 
-    /// Solves the factored system for the right-hand side at hand, in place.
+    /// Solves the factored system for the stored right-hand side, in place.
     #[inline]
     fn back_substitute<const D: usize>(&mut self, data: &Prepared<'_>, factors: Factors, m: usize) {
         if let (Factors::Sparse, Operator::BlockSparse(W)) = (factors, data.W) {
@@ -454,7 +464,8 @@ impl ReducedSystem {
         }
     }
 
-    /// The Newton point of the regularised problem for the predicted modes, from `(p, u)`, into `trial`.
+    /// The Newton point of the regularised problem for the predicted modes,
+    /// from `(p, u)`, into `trial`.
     pub fn newton_point<const D: usize>(
         &mut self,
         data: &Prepared<'_>,
@@ -472,7 +483,7 @@ impl ReducedSystem {
         } = self;
         trial.copy_from_slice(p);
         if step.factors == Factors::Sparse {
-            // Every contact keeps its place there, and unknowns that its mode takes away are zero.
+            // Every contact keeps its place; unknowns that its mode eliminates are zero.
             for (i, contact) in contacts.iter_mut().enumerate() {
                 contact.start = D * i;
             }

@@ -1,4 +1,5 @@
-//! What is known of one contact with the others held: its exact solution, its mode, and the sweep that visits one after the other.
+//! One contact with all others fixed: its exact solution, its mode, and the sweep over all
+//! contacts.
 
 pub(super) mod modes;
 pub(super) mod one_contact;

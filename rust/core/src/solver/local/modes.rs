@@ -1,9 +1,10 @@
-//! Which contact is open, sticks or slides: the prediction that a Newton step is built on.
+//! Prediction of the contact modes (open, stick or slide) for a Newton step.
 //!
-//! Two predictors agree at a solution. The cheap one is the projection of `z = p − ρ û` (Alart and Curnier 1991) and serves
-//! steady motion. The exact one solves each contact with the others held; it sees the whole diagonal block and finds the modes of
-//! an impact from rest where the projection cycles (measured: all recorded rover impacts in at most five steps).
-//! Neither depends on the order of the contacts.
+//! There are two predictors, which agree at a solution. The cheap one projects `z = p − ρ û` (Alart
+//! and Curnier 1991) and suffices for steady motion. The exact one solves each contact with all
+//! others fixed. It uses the whole diagonal block and finds the modes of an impact from rest where
+//! the projection cycles (measured: all recorded rover impacts in at most five steps). Neither
+//! depends on the order of the contacts.
 
 use super::one_contact::solve_one_contact;
 use crate::law::coulomb::ContactMode;
@@ -22,7 +23,7 @@ pub(in crate::solver) struct Linearised {
     pub start: usize,
 }
 
-/// What a prediction of the modes found.
+/// Result of a prediction of the modes.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct Prediction {
     /// Whether any mode differs from the previous prediction.
@@ -68,11 +69,12 @@ pub(in crate::solver) fn set_slide<const D: usize>(contact: &mut Linearised, p: 
     };
 }
 
-/// Reads the modes off the impulse itself: what the last step's answer says of this one.
+/// Reads the modes from the impulse itself, the answer of the last step.
 ///
-/// In steady motion these are the modes of the answer, and far better ones than a prediction from `u`: wheels that fight each other
-/// in a turn slide at 1e-6 m/s, a hundredth of what the free velocity changes from step to step, so the sign of their slip is lost in `u`
-/// until the modes are right. A contact without impulse is taken to stick if the ground approaches it, else to be open.
+/// In steady motion these are the modes of the answer, and far better than a prediction from `u`.
+/// Wheels that work against each other in a turn slip at 1e-6 m/s, a hundredth of the change of the
+/// free velocity from step to step, so `u` does not show the sign of their slip until the modes are
+/// right. A contact without impulse counts as sticking if it approaches, else as open.
 #[inline]
 pub(in crate::solver) fn recall<const D: usize>(
     mu: &[f64],
@@ -115,7 +117,8 @@ pub(in crate::solver) fn recall<const D: usize>(
     prediction
 }
 
-/// Predicts the modes at `(p, u)`, `u = W p + q`; `contacts` receives them. `exact` chooses the predictor.
+/// Predicts the modes at `(p, u)`, `u = W p + q`; `contacts` receives them.
+/// `exact` chooses the predictor.
 #[inline]
 pub(in crate::solver) fn predict<const D: usize>(
     data: &Prepared<'_>,
@@ -179,7 +182,7 @@ fn by_projection<const D: usize>(
     } else {
         contact.mode = ContactMode::Slide;
         contact.e = direction(&z, norm);
-        // A contact about to open would turn with infinite stiffness.
+        // A contact about to open would have infinite turning stiffness.
         contact.gamma = ((norm - radius) / (rho_T * radius)).min(1e12 / rho_T);
     }
     contact

@@ -1,17 +1,19 @@
-//! The exact solution of one contact: given its 3×3 (or 2×2) block `W` and free velocity `q`, find open, stick or slide.
+//! The exact solution of one contact: given its 3×3 (or 2×2) block `W` and
+//! free velocity `q`, find open, stick or slide.
 //!
-//! *Open* when `q_N ≥ 0`. *Stick* when `p = −W⁻¹ q` lies in the cone. Otherwise the contact slides: `u_N = 0` and
-//! `u_T = −κ p_T` with some `κ > 0`. Eliminating `p_N` leaves, with the Schur complement
-//! `Ŵ = W_TT − W_TN W_NT / W_NN` and `q̂ = q_T − W_TN q_N / W_NN`,
+//! *Open* when `q_N ≥ 0`. *Stick* when `p = −W⁻¹ q` lies in the cone. Otherwise the contact slides:
+//! `u_N = 0` and `u_T = −κ p_T` with some `κ > 0`. Eliminating `p_N` leaves, with the Schur
+//! complement `Ŵ = W_TT − W_TN W_NT / W_NN` and `q̂ = q_T − W_TN q_N / W_NN`,
 //!
 //! ```text
 //! p_T(κ) = −(Ŵ + κ I)⁻¹ q̂,    p_N(κ) = −(q_N + W_NT p_T(κ)) / W_NN,    |p_T(κ)| = μ p_N(κ).
 //! ```
 //!
-//! At `κ = 0` the left side is larger (no stick), for `κ → ∞` it is smaller (`p_T → 0`, `p_N → −q_N/W_NN > 0`), so a root
-//! exists for every `μ`. Multiplied by `det(Ŵ + κI)` it reads `g(κ) = |a + κ q̂| + (μ/W_NN)(q_N det − W_NT·(a + κ q̂)) = 0`
-//! with `a = adj(Ŵ) q̂`: a convex norm against a quadratic, solved by Newton kept inside a bracket. Its square is the quartic
-//! of Bonnefon and Daviet 2011.
+//! At `κ = 0` the left side is larger (no stick), for `κ → ∞` it is smaller (`p_T → 0`,
+//! `p_N → −q_N/W_NN > 0`), so a root exists for every `μ`. Multiplied by `det(Ŵ + κI)` it
+//! reads `g(κ) = |a + κ q̂| + (μ/W_NN)(q_N det − W_NT·(a + κ q̂)) = 0` with
+//! `a = adj(Ŵ) q̂`: a convex norm against a quadratic, solved by Newton kept inside a
+//! bracket. Its square is the quartic of Bonnefon and Daviet 2011.
 
 use crate::cone::tangential_norm;
 use crate::law::coulomb::ContactMode;
@@ -19,7 +21,8 @@ use crate::law::coulomb::ContactMode;
 /// Most steps of the safeguarded Newton on `g(κ)`; bisection alone needs about 60 for all digits.
 const MAX_STEPS: usize = 100;
 
-/// Steps of an estimate: with one, a sweep's directions are too rough for loads that do not depend on the order of the contacts.
+/// Steps of an estimate. With a single one a sweep's directions are too coarse: the loads would
+/// depend on the order of the contacts.
 const ESTIMATE_STEPS: usize = 2;
 
 /// The solved contact.
@@ -35,9 +38,9 @@ pub struct OneContactSolution<const D: usize> {
 
 /// Solves a single contact under Coulomb's law and Signorini's condition.
 ///
-/// `W`: block of the Delassus operator, row-major, 1/kg; need not be symmetric, tangential part may be singular. `q`: velocity
-/// without this impulse, m/s. `mu`: friction coefficient. Components `[normal, tangent, (tangent)]`. A block with
-/// `W_NN ≤ 0` cannot be pushed and answers zero.
+/// `W`: block of the Delassus operator, row-major, 1/kg; need not be symmetric, tangential part may
+/// be singular. `q`: velocity without this impulse, m/s. `mu`: friction coefficient. Components
+/// `[normal, tangent, (tangent)]`. A block with `W_NN ≤ 0` gives a zero impulse.
 #[must_use]
 pub fn solve_one_contact<const D: usize>(
     W: &[[f64; D]; D],
@@ -47,7 +50,8 @@ pub fn solve_one_contact<const D: usize>(
     solve_within::<D, MAX_STEPS>(W, q, mu, 0.0)
 }
 
-/// As [`solve_one_contact`], but the direction of a slide is good to a few digits only. `kappa`: that of the last estimate, or zero.
+/// As [`solve_one_contact`], but the slip direction is accurate to a few digits only. `kappa`:
+/// value of the last estimate, or zero.
 #[inline]
 pub(in crate::solver) fn estimate_one_contact<const D: usize>(
     W: &[[f64; D]; D],
@@ -153,9 +157,10 @@ fn in_space<const D: usize, const STEPS: usize>(
                 * (q[0] * (2.0 * kappa + trace) - (W[0][1] * q_hat[0] + W[0][2] * q_hat[1]));
         (g, slope, b, det)
     };
-    // A singular Schur complement leaves the stick impulse undefined: ask just beside it, at the distance √ε that balances the
-    // rounding of a/det against the change of the problem. An indefinite one (from an unsymmetric W) still has its stick
-    // impulse, but slides only above the largest κ with a vanishing determinant.
+    // A singular Schur complement leaves the stick impulse undefined: shift κ by √ε, which balances
+    // the rounding of a/det against the change of the problem. An indefinite one (from an
+    // unsymmetric W) still has a stick impulse, but slides only above the largest κ with a
+    // vanishing determinant.
     let mut smallest = 0.0;
     let mut stick = 0.0;
     if trace <= 0.0 || determinant <= 1e-13 * trace * trace {
@@ -173,7 +178,7 @@ fn in_space<const D: usize, const STEPS: usize>(
             p[k + 1] = -b[k] / det;
         }
         p[0] = -(q[0] + W[0][1] * p[1] + W[0][2] * p[2]) * inverse;
-        // On the very edge the two tests may differ by rounding.
+        // At the boundary of the cone the two tests may differ by rounding.
         if tangential_norm(p) <= mu * p[0] || (det > 0.0 && g <= 0.0 && p[0] > 0.0) {
             solution.mode = ContactMode::Stick;
             return;
@@ -183,7 +188,7 @@ fn in_space<const D: usize, const STEPS: usize>(
     let start = if last > smallest {
         last
     } else {
-        // The answer of a block without preferred direction is a good first guess.
+        // The answer of an isotropic block is a good initial guess.
         let size = (q_hat[0] * q_hat[0] + q_hat[1] * q_hat[1]).sqrt();
         let along = W[0][1] * q_hat[0] + W[0][2] * q_hat[1];
         let guess = (size * W_NN / mu - along / size) / -q[0] - 0.5 * trace;
@@ -193,7 +198,8 @@ fn in_space<const D: usize, const STEPS: usize>(
             beside
         }
     };
-    // Without a sign change (an indefinite W only) the contact has no answer; a damped one keeps an iteration going.
+    // Without a sign change (only if W is indefinite) the contact has no solution; a damped one
+    // lets the iteration continue.
     let kappa = if smallest <= 0.0 || at(smallest).0 > 0.0 {
         falling_root::<STEPS>(
             |kappa| {
@@ -225,7 +231,8 @@ fn in_space<const D: usize, const STEPS: usize>(
     }
 }
 
-/// Root of a function that is positive at `low` and negative far beyond: Newton inside a bracket, whose upper end is looked for in steps of `reach`.
+/// Root of a function that is positive at `low` and negative far above it: Newton's method inside a
+/// bracket. The search for its upper end starts with the step `reach`.
 ///
 /// `at` gives value and slope.
 fn falling_root<const STEPS: usize>(

@@ -1,6 +1,8 @@
-//! One sweep of nonsmooth Gauss–Seidel: contact after contact is solved exactly with the others held.
+//! One sweep of nonsmooth Gauss–Seidel: solves contact after contact exactly, with all others
+//! fixed.
 //!
-//! It costs no more than one product with `W`. Stages sweep the problem itself, or the regularised one to leave a cycle of Newton's.
+//! It costs no more than one product with `W`. Stages sweep the problem itself, or the regularised
+//! one to break a cycle of Newton's method.
 
 use super::one_contact::solve_one_contact;
 use crate::problem::{BlockSparseDelassus, Operator, Prepared, Proximal, dot};
@@ -17,7 +19,7 @@ pub(in crate::solver) fn sweep<const D: usize>(
     }
 }
 
-/// Replaces the impulse of contact `i` by the exact answer to the velocity `u` that it sees now.
+/// Replaces the impulse of contact `i` by the exact solution for its current velocity `u`.
 #[inline]
 fn update<const D: usize>(
     mut block: [[f64; D]; D],

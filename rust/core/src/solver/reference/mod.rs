@@ -1,3 +1,4 @@
-//! Answers to compare with: another law, and what it costs to take it for Coulomb's. No strategy uses them.
+//! Reference methods: another contact law, to measure its error against Coulomb's. No strategy uses
+//! them.
 
 pub(super) mod relaxed;

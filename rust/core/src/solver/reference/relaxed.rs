@@ -1,6 +1,8 @@
-//! The convex relaxation of Coulomb's law, `K_μ* ∋ u ⊥ p ∈ K_μ`: a sliding contact parts with `μ|u_T|`.
+//! The convex relaxation of Coulomb's law, `K_μ* ∋ u ⊥ p ∈ K_μ`: a sliding contact separates at the
+//! speed `μ|u_T|`.
 //!
-//! It is what remains without De Saxcé's shift: a convex problem, and another law. Alternating directions solve it provably.
+//! Without De Saxcé's shift the problem is convex, and a different law. Alternating directions
+//! provably solve it.
 
 use crate::cone::SecondOrderCone;
 use crate::problem::{Prepared, Residual};
@@ -9,7 +11,7 @@ use crate::solver::report::SolveStatus;
 use crate::solver::scratch::Scratch;
 use crate::solver::stage::admm::{self, Law};
 
-/// Residual of `(p, u)` under the relaxed law, in the two numbers that Coulomb's is measured in.
+/// Residual of `(p, u)` under the relaxed law, with the same two numbers as for Coulomb's law.
 fn measure<const D: usize>(data: &Prepared<'_>, p: &[f64], u: &[f64]) -> Residual {
     let (mut map, mut velocity) = (0.0, 0.0_f64);
     for (i, (&mu, &rho)) in data.mu.iter().zip(data.masses).enumerate() {

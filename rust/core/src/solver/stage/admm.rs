@@ -1,15 +1,19 @@
-//! ADMM: a linear system with one matrix and a projection on the cones, in turn.
+//! ADMM: alternates a linear solve with a fixed matrix and a projection onto the cones.
 //!
-//! With `R = σ diag(1/ρ_i)` (`ρ_i` the contact's own mass, so that a mass ratio does not set the pace) one iteration reads
+//! With `R = σ diag(1/ρ_i)`, where `ρ_i` is the contact's own mass so that mass ratios do not slow
+//! the convergence, one iteration reads
 //!
 //! ```text
 //! (W + R) x = R z − y − q − s,    z ← Π_K(x̂ + R⁻¹ y),    y ← y + R (x̂ − z),    s_N = μ|y_T|,
 //! ```
 //!
-//! `x̂` being `x` over-relaxed. At rest `y = −ũ`, so De Saxcé's shift `s` is renewed from `y` itself. `W + R` is factored once, and again when
-//! `σ` changes: every so often it is balanced so that both residuals fall alike. Without the shift the same iteration solves the convex relaxation of
-//! Coulomb's law. Converges for any `W` whose symmetric part is positive semidefinite (it is a Douglas–Rachford splitting), in the convex case provably;
-//! linearly, so it is for moderate tolerances. Source: Boyd et al. 2011; for frictional contact Acary, Brémond and Huber 2018, Carpentier et al. 2024.
+//! where `x̂` is the over-relaxed `x`. At a fixed point `y = −ũ`, so De Saxcé's shift `s` is
+//! updated from `y` itself. `W + R` is factored once, and again when `σ` changes: `σ` is balanced
+//! from time to time so that both residuals fall alike. Without the shift the same iteration solves
+//! the convex relaxation of Coulomb's law. The method is a Douglas–Rachford splitting and converges
+//! for any `W` whose symmetric part is positive semidefinite, provably so in the convex case.
+//! Convergence is linear, which suits moderate tolerances. Source: Boyd et al. 2011; for frictional
+//! contact Acary, Brémond and Huber 2018, Carpentier et al. 2024.
 
 use crate::cone::{SecondOrderCone, tangential_norm};
 use crate::problem::{Prepared, Residual};
@@ -17,20 +21,20 @@ use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
 use crate::solver::scratch::Scratch;
 
-/// First `σ`, dimensionless; the balance finds the rest.
+/// Initial `σ`, dimensionless; balancing adapts it.
 const SIGMA: f64 = 0.1;
 /// Over-relaxation.
 const RELAXATION: f64 = 1.6;
-/// Iterations between two looks at the residual, and between two looks at the balance.
+/// Iterations between two checks of the residual, and between two checks of the balance.
 const LOOK: usize = 5;
 const BALANCE: usize = 20;
-/// Imbalance of the residuals that changes `σ`, and its largest change.
+/// Imbalance of the residuals above which `σ` changes, and its largest change.
 const IMBALANCE: f64 = 3.0;
 const LARGEST_CHANGE: f64 = 10.0;
-/// After so many changes `σ` is kept, so that the iteration cannot chase its own balance.
+/// After this many changes `σ` stays fixed, so that balancing cannot prevent convergence.
 const MAX_CHANGES: usize = 40;
 
-/// Factors `W + R`; `false` where that fails, or the budget does not allow it.
+/// Factors `W + R`; `false` if that fails or the budget does not allow it.
 fn factorise<const D: usize>(data: &Prepared<'_>, sigma: f64, scratch: &mut Scratch) -> bool {
     for (weight, mass) in scratch.weights.iter_mut().zip(data.masses) {
         *weight = 1.0 / mass;
@@ -40,7 +44,8 @@ fn factorise<const D: usize>(data: &Prepared<'_>, sigma: f64, scratch: &mut Scra
         .factorise_weighted::<D>(data, sigma, &scratch.weights, &mut scratch.work)
 }
 
-/// One iteration after the linear solve: over-relaxation, projection, dual step. Squares of the primal and the dual change, in the norm of `R`.
+/// One iteration after the linear solve: over-relaxation, projection, dual step. Squares of the
+/// primal and the dual change, in the norm of `R`.
 fn project<const D: usize>(
     mu: &[f64],
     sigma: f64,
@@ -68,14 +73,14 @@ fn project<const D: usize>(
     changes
 }
 
-/// What an alternation solves: Coulomb's law or another that its matrix and its projection serve as well.
+/// The law that ADMM solves: Coulomb's, or another with the same matrix and projection.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::solver) struct Law<M> {
-    /// Whether De Saxcé's shift is made.
+    /// Whether De Saxcé's shift is applied.
     pub shifts: bool,
     /// Residual of `(p, u)` under the law.
     pub measure: M,
-    /// How an answer within the tolerances is called.
+    /// Status of an answer within the tolerances.
     pub solved: SolveStatus,
 }
 
@@ -96,7 +101,8 @@ pub(in crate::solver) fn solve<const D: usize>(
     alternate::<D, _>(data, options, &law, p, u, scratch, iterations)
 }
 
-/// Alternates from `p` under `law`. `u` is `W p + q` on return, and the residual is Coulomb's under either law.
+/// Alternates from `p` under `law`. `u` is `W p + q` on return, and the
+/// residual is Coulomb's under either law.
 pub(in crate::solver) fn alternate<const D: usize, M: Fn(&[f64], &[f64]) -> Residual>(
     data: &Prepared<'_>,
     options: &SolverOptions,
@@ -108,7 +114,7 @@ pub(in crate::solver) fn alternate<const D: usize, M: Fn(&[f64], &[f64]) -> Resi
 ) -> (SolveStatus, Residual) {
     let mut sigma = SIGMA;
     data.W.multiply_add(p, data.q, u);
-    // y = −ũ of the start, from inside the dual cone.
+    // y = −ũ of the start, with ũ projected into the dual cone.
     for (i, &mu) in data.mu.iter().enumerate() {
         let mut shifted: [f64; D] = std::array::from_fn(|k| u[D * i + k]);
         if law.shifts {

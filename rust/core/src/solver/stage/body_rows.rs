@@ -1,10 +1,11 @@
-//! Contacts as the sweeps of [`super::body_sweeps`] keep them: what a visit reads and writes, side by side.
+//! Contact rows of [`super::body_sweeps`]: all data that a visit reads and writes, side by side.
 
 use crate::problem::{BodyPairs, RoundPair, rim_impulse, rim_velocity};
 use crate::solver::local::one_contact::solve_one_contact;
 use crate::spatial::space::{body_velocities, dot};
 
-/// A contact among round bodies with all that a sweep reads and writes of it: two lines of cache in the plane, three in space.
+/// A contact among round bodies with all data that a sweep reads and writes: two cache lines in the
+/// plane, three in space.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row<const D: usize, const T: usize> {
     bodies: [u32; 2],
@@ -19,19 +20,19 @@ pub(super) struct Row<const D: usize, const T: usize> {
     pub(super) q: [f64; D],
     pub(super) mu: f64,
     pub(super) p: [f64; D],
-    /// p of the sweep before.
+    /// p of the previous sweep.
     before: [f64; D],
 }
 
 /// A contact of the machine.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MachineRow<const D: usize, const T: usize> {
-    /// The round body's side, as second body.
+    /// The side of the round body, the second body.
     pub(super) round: Row<D, T>,
     pub(super) block: [[f64; D]; D],
 }
 
-/// Draws the tangential part of an impulse into the friction disc of a radius that is not negative.
+/// Projects the tangential part of an impulse onto the friction disc of a nonnegative radius.
 #[inline]
 pub(super) fn draw_in<const D: usize>(p: &mut [f64; D], limit: f64) {
     if D == 2 {
@@ -53,7 +54,7 @@ pub(super) fn square<const D: usize>(x: &[f64; D]) -> f64 {
 }
 
 impl<const D: usize, const T: usize> Row<D, T> {
-    /// `still`: the place of what does not move.
+    /// `still`: the place of fixed bodies.
     pub(super) fn new(
         pair: &RoundPair<D>,
         block: [f64; 2],
@@ -158,7 +159,7 @@ impl<const D: usize, const T: usize> Row<D, T> {
         }
     }
 
-    /// p as the sweep starts, and remembers the one before.
+    /// p at the start of the sweep; stores the previous one.
     #[inline]
     pub(super) fn extrapolate(&mut self, share: f64) -> [f64; D] {
         let mut start = self.p;
@@ -169,7 +170,7 @@ impl<const D: usize, const T: usize> Row<D, T> {
         start
     }
 
-    /// Solves its law; the square of the impulse's change.
+    /// Solves the contact law; returns the square of the impulse's change.
     #[inline]
     pub(super) fn visit<const S: usize>(&mut self, share: f64, velocity: &mut [[f64; S]]) -> f64 {
         let frame = self.frame();

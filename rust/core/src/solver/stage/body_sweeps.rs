@@ -1,16 +1,21 @@
-//! Accelerated Gauss–Seidel on the bodies' velocities, for thousands of free bodies.
+//! Accelerated Gauss–Seidel on the velocities of thousands of free bodies.
 //!
-//! A sweep visits contact after contact: it reads the velocities of its two bodies, solves its own law exactly and changes them. Its
-//! cost is the same for each contact, however many there are. The next sweep starts not from the impulses p_k that this one left but from
-//! `p_k + β (p_k − p_{k−1})`, with β from Nesterov's sequence; where the sweeps' own change grows, the sequence starts anew. The velocities are linear in
-//! the impulses, so they are extrapolated alike. On flowing soil this takes a third to a fifth of the plain sweeps.
+//! A sweep visits contact after contact: it reads the velocities of the two bodies, solves the
+//! contact law exactly and updates the velocities. The cost per contact does not depend on the
+//! number of contacts. The next sweep starts not from the impulses p_k but from
+//! `p_k + β (p_k − p_{k−1})`, with β from Nesterov's sequence. The sequence restarts when the
+//! change per sweep grows. Velocities are linear in the impulses and are extrapolated alike. On
+//! flowing soil this needs a third to a fifth of the plain sweeps.
 //!
-//! Contacts are visited in four places of the list in turn, so that one need not wait for what the one before it wrote.
+//! Sweeps visit four places of the list in turn, so that a contact need not wait for the results of
+//! the one before it.
 //!
-//! The answer is judged as every solver's: by the violation of the returned impulse, with the velocities summed anew. It never adds energy:
-//! an approximate answer with `pᵀu > 0` is shortened until pᵀu = 0.
+//! The answer is judged like that of every solver: by the violation of the returned impulse, with
+//! the velocities summed anew. It never adds energy: an approximate answer with `pᵀu > 0` is scaled
+//! down until pᵀu = 0.
 //!
-//! Source: Jean 1999 and Moreau 1999 (the sweep); Nesterov 1983, O'Donoghue and Candès 2015 (extrapolation with restart).
+//! Source: Jean 1999 and Moreau 1999 (the sweep); Nesterov 1983, O'Donoghue
+//! and Candès 2015 (extrapolation with restart).
 
 use super::body_rows::{MachineRow, Row, draw_in, square};
 use crate::law::coulomb::violation;
@@ -22,7 +27,7 @@ use crate::spatial::space::{body_velocities, dot};
 /// Places of the list that are visited in turn.
 const PLACES: usize = 4;
 
-/// Sweeps after which the answer is measured, whatever their change says.
+/// Sweeps after which the residual is computed, whatever the change per sweep.
 const PATIENCE: usize = 50;
 
 /// Work of one visit of a contact, in units of [`SolverOptions::budget`].
@@ -35,7 +40,7 @@ pub struct BodySweeps {
     balls: Sweeps<3, 3, 8>,
 }
 
-/// Contacts that there are sweeps for: among disks, and among balls.
+/// Contacts that the sweeps support: among disks, and among balls.
 pub trait Swept<const D: usize> {
     /// Solves them as [`solve_body_pairs`] says.
     fn sweep(
@@ -77,15 +82,16 @@ impl Swept<3> for BodyPairs<3> {
     }
 }
 
-/// The sweeps in D dimensions. T numbers tell where a contact's tangents are: none in the plane, the first tangent in space. A body has S
-/// numbers: its velocity, that of its rim, and zeros up to a round size.
+/// The sweeps in D dimensions. T numbers store a contact's tangents: none in the plane, the first
+/// tangent in space. A body has S numbers: its velocity, that of its rim, and zeros as padding.
 #[derive(Clone, Debug, Default)]
 struct Sweeps<const D: usize, const T: usize, const S: usize> {
     rows: Vec<Row<D, T>>,
     /// Number of each row's contact.
     order: Vec<u32>,
     machine: Vec<MachineRow<D, T>>,
-    /// Velocity that the impulses give each body: of its centre, and r ω, m/s; the last is no body and does not move.
+    /// Velocity of each body due to the impulses: of its centre, and r ω, m/s. The last entry
+    /// stands for everything fixed.
     velocity: Vec<[f64; S]>,
     velocity_before: Vec<[f64; S]>,
     /// Of the machine, in its factor coordinates.
@@ -93,7 +99,7 @@ struct Sweeps<const D: usize, const T: usize, const S: usize> {
     own_before: Vec<f64>,
 }
 
-/// What an answer is worth.
+/// Quality of an answer.
 struct Measured {
     residual: Residual,
     /// pᵀu, J.
@@ -151,7 +157,7 @@ impl<const D: usize, const T: usize, const S: usize> Sweeps<D, T, S> {
         self.own_before.clone_from(&self.own);
     }
 
-    /// Velocities of the impulses, anew.
+    /// Recomputes the velocities from the impulses.
     fn sum(&mut self, pairs: &BodyPairs<D>) {
         self.velocity.fill([0.0; S]);
         self.own.fill(0.0);
@@ -266,7 +272,7 @@ impl<const D: usize, const T: usize, const S: usize> Sweeps<D, T, S> {
             rungs: Rungs::default(),
         };
         for (p, &mu) in p.as_chunks_mut::<D>().0.iter_mut().zip(mu) {
-            // A start outside its cone (another μ, another step) is drawn in.
+            // Project a start outside its cone (another μ, another step).
             if p.iter().all(|x| x.is_finite()) {
                 p[0] = p[0].max(0.0);
                 let limit = mu * p[0];
@@ -277,7 +283,8 @@ impl<const D: usize, const T: usize, const S: usize> Sweeps<D, T, S> {
         }
         self.fit(pairs, q, mu, p);
         let (mut t, mut share, mut last_change) = (1.0_f64, 0.0, f64::INFINITY);
-        // Violation, in tolerances, for each N s of a sweep's change: tells when to look.
+        // Violation, in tolerances, per N s of a sweep's change: tells when to compute the
+        // residual.
         let (mut rate, mut last_look) = (f64::INFINITY, 0);
         loop {
             if report.iterations < options.max_sweeps {
@@ -330,8 +337,9 @@ impl<const D: usize, const T: usize, const S: usize> Sweeps<D, T, S> {
 
 /// Solves `K_μ* ∋ ũ ⊥ p ∈ K_μ`, `u = Zᵀ Z p + q`, among round bodies and a machine.
 ///
-/// q (D n_c), m/s; mu (n_c); p (D n_c), N s: in, the warm start, out, the impulses inside their cones; u (D n_c), m/s: out. Only
-/// the tolerances and `max_sweeps` of the options matter; the budget does not. Allocates only when there are more contacts than ever before.
+/// q (D n_c), m/s; mu (n_c); p (D n_c), N s: on entry the warm start, on return the impulses inside
+/// their cones; u (D n_c), m/s: on return. Only the tolerances and `max_sweeps` of the options
+/// apply, not the budget. Allocates only when there are more contacts than ever before.
 ///
 /// # Panics
 /// If a length does not fit.
@@ -357,7 +365,7 @@ where
     report
 }
 
-/// Share of the extrapolation after a sweep, and Nesterov's sequence one on.
+/// Extrapolation factor after a sweep; advances Nesterov's sequence.
 fn next_share(t: &mut f64) -> f64 {
     let next = 0.5 * (1.0 + (1.0 + 4.0 * *t * *t).sqrt());
     let share = (*t - 1.0) / next;

@@ -1,7 +1,7 @@
-//! Nonsmooth Gauss–Seidel: contact after contact is solved exactly with the others held.
+//! Nonsmooth Gauss–Seidel: solves contact after contact exactly, with all others fixed.
 //!
-//! Source: Jean 1999; Acary and Brogliato 2008, ch. 13. Converges linearly, and hardly at all for redundant contacts with
-//! large mass ratios; a sweep costs no more than one product with `W`.
+//! Source: Jean 1999; Acary and Brogliato 2008, ch. 13. Converges linearly, and very slowly for
+//! redundant contacts with large mass ratios. A sweep costs no more than one product with `W`.
 
 use crate::problem::{Prepared, Proximal, Residual};
 use crate::solver::local::sweep;
@@ -50,7 +50,7 @@ pub(in crate::solver) fn sweeps<const D: usize>(
         if done >= budget.sweeps {
             return give_best(SolveStatus::MaxIterations, best, p, u, scratch);
         }
-        // The measure costs a sweep: look often at first, then every tenth sweep.
+        // The residual costs as much as a sweep: compute it often at first, then every tenth sweep.
         let batch = (done / 2).clamp(1, 10).min(budget.sweeps - done);
         if budget.predict && done >= 20 {
             let rate = (residual.relative / last).ln() / batch as f64;

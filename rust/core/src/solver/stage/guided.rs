@@ -1,7 +1,9 @@
-//! Few contacts from rest: a few sweeps guess the modes, and Newton starts from zero with them.
+//! Few contacts from zero impulse: a few sweeps guess the modes, with which Newton starts from
+//! zero.
 //!
-//! Sweeps depend on the order of the contacts; the answer does not, since only modes and sliding directions are taken from them. Where a mode is a
-//! matter of choice, or the guess was wrong, there is no answer here and the caller goes on.
+//! Sweeps depend on the order of the contacts. The answer does not, since it takes only modes and
+//! slip directions from them. If a mode is ambiguous or the guess was wrong, the stage gives no
+//! answer and the caller continues.
 
 use crate::cone::tangential_norm;
 use crate::law::coulomb::ContactMode;
@@ -12,27 +14,28 @@ use crate::solver::local::one_contact::estimate_one_contact;
 use crate::solver::options::SolverOptions;
 use crate::solver::scratch::Scratch;
 
-/// Sweeps, and Newton steps that try their modes.
+/// Number of sweeps, and of Newton steps that try their modes.
 const SWEEPS: usize = 4;
 const STEPS: usize = 6;
 
-/// A residual falling at least this much per step lets the old factors serve once more.
+/// The old factors are used once more if the residual falls at least by this factor per step.
 const REUSE_CONTRACTION: f64 = 0.02;
 
 /// Steps after which the sliding directions are known.
 const SETTLED: usize = 1;
 
-/// Least gain of a step; with less, the modes are taken to be wrong.
+/// Smallest gain of a step; with less, the modes count as wrong.
 const LEAST_GAIN: f64 = 0.5;
 
-/// Residual below which a stop of progress may be the rounding of `W p + q`.
+/// Residual below which stagnation may be due to the rounding of `W p + q`.
 const ROUNDING_ASKED: f64 = 1e-7;
 
-/// Slip or parting, relative to the largest free velocity, that decides a mode.
+/// Slip or separation speed, relative to the largest free velocity, that decides a mode.
 const DECIDED: f64 = 1e-8;
 
-/// Whether every sliding contact slips and every open one parts. Where one does not, its mode is a matter of choice, a sweep's choice depends on the
-/// order of the contacts, and so would the loads of a mechanism that is statically indeterminate.
+/// Whether every sliding contact slips and every open one separates. Otherwise a mode is ambiguous.
+/// A sweep would choose it by the order of the contacts, on which the loads of a statically
+/// indeterminate mechanism would then depend.
 fn is_decided<const D: usize>(data: &Prepared<'_>, contacts: &[Linearised], u: &[f64]) -> bool {
     let largest = data.q.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     contacts
@@ -88,8 +91,8 @@ fn sweep<const D: usize>(
     }
 }
 
-/// Solves from `p = 0`; `None` where the modes turn out wrong or undecided. `u` is `W p + q` on return, `iterations` is advanced by sweeps and linear
-/// solves.
+/// Solves from `p = 0`; `None` where the modes turn out wrong or undecided. `u` is `W p + q` on
+/// return, `iterations` is advanced by sweeps and linear solves.
 pub(in crate::solver) fn solve<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
@@ -124,7 +127,8 @@ pub(in crate::solver) fn solve<const D: usize>(
         if factors == Factors::None && prediction.m > 0 {
             return None;
         }
-        // Until the sliding directions are known, which the guess is not, the centre stays at zero, or the guess would stay in what W cannot see.
+        // The centre stays at zero until the slip directions are known. Otherwise the guess would
+        // remain in the null space of W.
         if step >= SETTLED {
             scratch.system.centre.copy_from_slice(p);
         }

@@ -1,7 +1,8 @@
-//! The stages: iterations that take an impulse and leave a better one, each able to answer by itself.
+//! The stages: iterative methods that improve an impulse. Each can solve a problem on its own.
 //!
-//! A stage takes the prepared problem, the start `p` (n), N s, and the shared [scratch](super::scratch); it leaves `p`, `u = W p + q` and why it
-//! ended. None knows which stage came before or comes next: that is the strategy's.
+//! A stage takes the prepared problem, the start `p` (n), N s, and the shared
+//! [scratch](super::scratch). It returns `p`, `u = W p + q` and the reason for its end. No stage
+//! knows which one came before or comes next; the strategy decides that.
 
 pub(super) mod admm;
 mod body_rows;

@@ -1,9 +1,10 @@
 //! Semismooth Newton on the contact modes.
 //!
-//! One step predicts each contact's mode ([`modes`]) for the regularised velocity `û = W p + q + α (p − c)` and solves
-//! the equations of those modes ([`ReducedSystem`]). Once the modes are right the convergence is quadratic, and
-//! finite when nothing slides. `α > 0` makes the system regular when `W` is not: every step is a proximal step, whose answer moves
-//! from the centre `c` no farther than `W` asks.
+//! A step predicts each contact's mode ([`modes`]) for the regularised velocity
+//! `û = W p + q + α (p − c)` and solves the equations of those modes ([`ReducedSystem`]). Once the
+//! modes are right, convergence is quadratic, and finite if nothing slides. `α > 0` makes the
+//! system regular when `W` is not: every step is a proximal step, which leaves the null space of
+//! `W` at the centre `c`.
 
 use crate::problem::{Prepared, Proximal, Residual};
 use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
@@ -14,11 +15,12 @@ use crate::solver::report::SolveStatus;
 use crate::solver::scratch::Scratch;
 use crate::solver::work;
 
-/// Most full steps before the safeguarded method takes over. Measured on the recorded problems: modes that full steps find at
-/// all are found within about ten.
+/// Most full steps before the safeguarded method takes over. Measured on the recorded problems:
+/// full steps find the modes within about ten steps or not at all.
 pub(in crate::solver) const FULL_STEPS: usize = 24;
 
-/// Most full steps from a warm start before pivoting takes over. Measured on a rover that steers: 3 to 6 cost the same.
+/// Most full steps from a warm start before pivoting takes over. Measured on a steering rover: 3 to
+/// 6 cost the same.
 pub(in crate::solver) const WARM_STEPS: usize = 3;
 
 /// Steps with changing modes after which a few sweeps break the cycle.
@@ -34,26 +36,27 @@ const SMALLEST: f64 = 1e-14;
 /// A residual falling at least this much per step lets the old factors serve once more.
 const REUSE_CONTRACTION: f64 = 0.02;
 
-/// A regularised step with settled modes should gain at least this much, or `α` hides what is left.
+/// A regularised step with settled modes should gain at least this factor; otherwise `α` dominates
+/// the remaining error.
 const SLOW: f64 = 0.1;
 
-/// Relative natural map at which a proximal step counts as solved: its error is amplified by `1/α` in the directions that `W`
-/// cannot see.
+/// Relative natural map at which a proximal step counts as solved: `1/α` amplifies its error in the
+/// null space of `W`.
 const SOLVED: f64 = 1e-15;
 
-/// Settled steps after which the centre moves even so.
+/// Steps with settled modes after which the centre moves anyway.
 const PATIENCE: usize = 4;
 
-/// What one step of the iteration hands to the next.
+/// State of the iteration from step to step.
 #[derive(Clone, Copy, Debug)]
 struct Course {
     /// Current `α`, 1/kg.
     alpha: f64,
-    /// Kept factors.
+    /// Stored factors.
     factors: Factors,
-    /// Whether a symmetric factorisation may serve.
+    /// Whether a symmetric factorisation may be used.
     allow_symmetric: bool,
-    /// Whether the modes changed at all, so that the exact predictor serves.
+    /// Whether the modes have ever changed, so that the exact predictor is used.
     exact: bool,
     /// Steps since the modes last changed.
     settled: usize,
@@ -62,12 +65,13 @@ struct Course {
 }
 
 impl Course {
-    /// Decides, from the last step's `progress` (ratio of residuals), whether the kept factors and `α` still serve.
+    /// Decides from the last step's `progress` (ratio of residuals) whether to keep the factors and
+    /// `α`.
     #[inline]
     fn revise(&mut self, progress: f64, prediction: Prediction, smallest: f64) {
         if self.settled > 1 && progress > SLOW && self.factors != Factors::None {
             if self.factors == Factors::Symmetric && self.allow_symmetric {
-                // Perhaps W is not symmetric and half of it is not good enough.
+                // W may be unsymmetric, so that one triangle of it is not enough.
                 self.allow_symmetric = false;
             } else {
                 self.alpha = (0.01 * self.alpha).max(smallest);
@@ -80,7 +84,7 @@ impl Course {
     }
 }
 
-/// Predicts the modes; after the first change the exact predictor serves.
+/// Predicts the modes; after the first change with the exact predictor.
 #[inline]
 fn predict<const D: usize>(
     data: &Prepared<'_>,
@@ -107,8 +111,8 @@ fn predict<const D: usize>(
         return prediction;
     }
     course.settled += 1;
-    // After a change of modes the centre waits for the answer of its own proximal step, or the transient would stay in the
-    // impulses that W cannot see. The modes of the warm start need no such care.
+    // After a change of modes the centre stays until its own proximal step is solved. Otherwise the
+    // transient would remain in the null space of W. The modes of the warm start need no such care.
     if !course.exact
         || course.settled > PATIENCE
         || data.merit::<D>(prox, p, u).sqrt() * data.inverse_data <= SOLVED
@@ -118,7 +122,7 @@ fn predict<const D: usize>(
     prediction
 }
 
-/// Ends without an answer: back to the best impulse met.
+/// Ends without an answer and restores the best impulse.
 fn give_best(
     data: &Prepared<'_>,
     best: Residual,
@@ -133,8 +137,9 @@ fn give_best(
 
 /// Full Newton steps from `p`; in steady motion two or three of them solve the step.
 ///
-/// The proximal centre stays at the start until the modes settle and follows the iterate then, so that the last steps refine what the
-/// regularisation left. `u` is `W p + q` on return; `iterations` is advanced by the linear solves.
+/// The proximal centre stays at the start until the modes settle and follows the iterate then, so
+/// that the last steps refine what the regularisation left. `u` is `W p + q` on return;
+/// `iterations` is advanced by the linear solves.
 pub(in crate::solver) fn full_steps<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,

@@ -1,13 +1,15 @@
 //! Pivoting on the contact modes: from a warm start, one contact changes its mode at a time.
 //!
-//! Full Newton steps change all modes at once, and where W is rank deficient they cycle: six wheels in a turn fight each other
-//! with forces that W cannot see, and a slip of 1e-6 m/s decides which of them slide. Here the impulse moves from the warm start
-//! towards the answer of the current modes only as far as all cones allow; the contact that blocks starts to slide (or opens), and the next
-//! system is solved. With the full step taken, the contact whose velocity contradicts its mode most is corrected. It is the ratio test
-//! of a primal active-set method, here for the nonassociated law, so it may fail; then the caller goes on.
+//! Full Newton steps change all modes at once and cycle if W is rank deficient: six wheels in a
+//! turn work against each other with forces in the null space of W, and a slip of 1e-6 m/s decides
+//! which of them slide. Here the impulse moves from the warm start towards the answer of the
+//! current modes only as far as all cones allow. The blocking contact then slides (or opens), and
+//! the next system is solved. After a full step the contact whose velocity contradicts its mode
+//! most is corrected. This is the ratio test of a primal active-set method. It may fail for the
+//! nonassociated law; then the caller continues.
 //!
-//! Measured on 3860 solves of a rover steering up a slope of 10 degrees: two systems in the median, 14 at the 99th percentile; Newton on the
-//! modes and proximal point needed 600 at the 90th.
+//! Measured on 3860 solves of a rover steering up a slope of 10 degrees: a median of two systems
+//! and 14 at the 99th percentile. Newton on the modes and proximal point needed 600 at the 90th.
 
 use crate::cone::tangential_norm;
 use crate::law::coulomb::ContactMode;
@@ -21,18 +23,21 @@ use crate::solver::scratch::Scratch;
 /// Most systems to solve.
 const MAX_PIVOTS: usize = 80;
 
-/// First `α` relative to the mean diagonal: small, since the ratio test keeps the impulse from running away along what W cannot see.
+/// Initial `α` relative to the mean diagonal. It may be small, since the ratio test bounds the
+/// impulse in the null space of W.
 const ALPHA: f64 = 1e-10;
 
-/// Factor of `α` where full steps gain nothing, and the smallest one. Wheels that are squeezed to the limit of their friction slip at 1e-11 m/s, and the turning stiffness
-/// of such a slide is as small as `α`: on 749 recorded steps over rocks at 1 ms none was solved with the first `α`, nearly all within some ten systems with smaller ones.
+/// Factor by which `α` shrinks when full steps gain nothing, and the smallest `α`. Wheels squeezed
+/// to the limit of friction slip at 1e-11 m/s, and the turning stiffness of such a slide is as
+/// small as `α`. Of 749 recorded steps over rocks at 1 ms none was solved with the initial `α`, and
+/// nearly all within some ten systems with smaller ones.
 const ALPHA_SHRINK: f64 = 0.01;
 const SMALLEST_ALPHA: f64 = 1e-14;
 
 /// Least gain of a full step with the same `α`.
 const LEAST_GAIN: f64 = 0.5;
 
-/// How far the impulse may go, and who stops it.
+/// Length of a step, and the contact that limits it.
 #[derive(Clone, Copy, Debug)]
 struct Block {
     /// Fraction of the step.
@@ -41,7 +46,8 @@ struct Block {
     contact: Option<(usize, ContactMode)>,
 }
 
-/// Smallest `t` in [0, 1] at which `p + t (trial − p)` leaves the cone of a sticking contact; `None` where it stays inside.
+/// Smallest `t` in [0, 1] at which `p + t (trial − p)` leaves the cone of a
+/// sticking contact; `None` where it stays inside.
 fn leaves_cone<const D: usize>(mu: f64, p: &[f64; D], trial: &[f64; D]) -> Option<f64> {
     if p[0] <= 0.0 || tangential_norm(trial) <= mu * trial[0] * (1.0 + 1e-14) {
         return None;
@@ -57,7 +63,7 @@ fn leaves_cone<const D: usize>(mu: f64, p: &[f64; D], trial: &[f64; D]) -> Optio
         return (b >= 0.0).then_some(0.0);
     }
     let root = (b * b - a * c).max(0.0).sqrt();
-    // c < 0: of the two roots the smallest positive one, in the form that does not cancel.
+    // c < 0: the smallest positive root, in the form without cancellation.
     let t = if b >= 0.0 {
         -c / (b + root)
     } else {
@@ -141,7 +147,7 @@ fn worst_contradiction<const D: usize>(
     found
 }
 
-/// Gives contact `i` its new mode, and puts its impulse where that mode needs it.
+/// Gives contact `i` its new mode, and moves its impulse to where that mode requires it.
 fn change_mode<const D: usize>(
     mu: f64,
     mode: ContactMode,
@@ -169,7 +175,7 @@ fn return_to_cone<const D: usize>(mu: f64, p: &mut [f64]) {
     }
 }
 
-/// Renews sliding directions and stiffnesses at `(p, u)` and numbers the unknowns.
+/// Updates slip directions and stiffnesses at `(p, u)` and numbers the unknowns.
 fn linearise<const D: usize>(
     mu: &[f64],
     contacts: &mut [Linearised],
@@ -193,7 +199,8 @@ fn linearise<const D: usize>(
     prediction
 }
 
-/// Pivots from the warm start `p`. `u` is `W p + q` on return; `iterations` is advanced by the linear solves.
+/// Pivots from the warm start `p`. `u` is `W p + q` on return; `iterations`
+/// is advanced by the linear solves.
 pub(in crate::solver) fn pivots<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,

@@ -1,12 +1,15 @@
-//! Proximal point around Newton: a sequence of regularised problems, each with one well-behaved answer.
+//! Proximal point method with an inner Newton method: a sequence of well-posed regularised
+//! problems.
 //!
-//! The step from the centre `c` solves the problem with `W + α I` and `q − α c`; its fixed points are the solutions of the given
-//! problem, and it needs no full rank (Acary, Brémond and Huber 2018, section 8). `α` starts at the size of `W`, where the
-//! problem is easy, and shrinks with the centre held at the start, which traces Tikhonov's path to the answer nearest to the start.
-//! When a step fails, the last good answer becomes the centre and `α` grows again.
+//! A step from the centre `c` solves the problem with `W + α I` and `q − α c`. Its fixed points are
+//! the solutions of the given problem, and `W` need not have full rank (Acary, Brémond and Huber
+//! 2018, section 8). `α` starts at the size of `W`, where the problem is easy. It then shrinks with
+//! the centre fixed at the start, which follows Tikhonov's path to the solution nearest to the
+//! start. When a step fails, the last good answer becomes the centre and `α` grows again.
 //!
-//! Inside: Newton steps with backtracking on the natural map of the regularised problem, and Gauss–Seidel sweeps on the same
-//! problem when backtracking fails. Once a step is cheap, a sprint with a small `α` tries to end the search at Newton's speed.
+//! The inner method takes Newton steps with backtracking on the natural map of the regularised
+//! problem, and Gauss–Seidel sweeps when backtracking fails. Once a step is cheap, a *sprint* with
+//! a small `α` tries to finish with Newton's convergence.
 
 use crate::problem::{Prepared, Proximal, Residual};
 use crate::solver::linear::reduced_system::{Factors, NewtonStep, ReducedSystem};
@@ -18,38 +21,39 @@ use crate::solver::work;
 
 /// Most Newton steps for one value of `α`.
 const INNER_STEPS: usize = 30;
-/// Shrinking of `α` along Tikhonov's path.
+/// Factor by which `α` shrinks along Tikhonov's path.
 const PATH_SHRINK: f64 = 0.1;
-/// A proximal step that leaves more than this of the residual asks for a smaller `α`.
+/// `α` shrinks if a proximal step leaves more than this fraction of the residual.
 const SLOW: f64 = 0.1;
-/// Steps of a sprint, and the steps of a proximal step that suggests one.
+/// Newton steps of a sprint, and those of a proximal step that is cheap enough to try one.
 const SPRINT: usize = 8;
 const CHEAP: usize = 3;
-/// Relative natural map asked of a step with a large `α`.
+/// Relative natural map required of a step with a large `α`.
 const LOOSE: f64 = 1e-7;
-/// Relative natural map below which a failing descent is rounding.
+/// Relative natural map below which a failed descent is due to rounding.
 const ROUNDING: f64 = 1e-13;
 /// Halvings of a Newton step.
 const HALVINGS: usize = 6;
-/// Failed Newton steps in a row that end a descent, and the sweeps after each.
+/// Consecutive failed Newton steps that end a descent, and the sweeps after each.
 const MAX_STUCK: usize = 4;
 const SWEEPS: usize = 10;
-/// Failures in a row after which the method gives up.
+/// Consecutive failures after which the method gives up.
 const MAX_FAILURES: usize = 12;
 /// Smallest `α` relative to the mean diagonal.
 const SMALLEST: f64 = 1e-13;
 
 /// The choice of `α` from step to step.
 ///
-/// A small `α` gains much per step, but below some bound the inner Newton fails, at ten times the cost of a step that succeeds. So after
-/// a failure the next attempt stays between the failed and the last proved value, and comes later.
+/// A small `α` gains much per step, but below some bound the inner Newton fails, at ten times the
+/// cost of a successful step. After a failure the next attempt therefore stays between the failed
+/// value and the last successful one, and comes later.
 #[derive(Clone, Copy, Debug)]
 struct Course {
     /// Current `α`, 1/kg.
     alpha: f64,
     /// Last `α` whose step succeeded, 1/kg.
     proved: f64,
-    /// Whether the centre still is the start.
+    /// Whether the centre is still the start.
     follows_path: bool,
     /// Factor of the next reduction.
     shrink: f64,
@@ -82,7 +86,7 @@ impl Course {
         }
     }
 
-    /// Whether it is time for a sprint; Tikhonov's path is not left for one.
+    /// Whether to try a sprint; never while on Tikhonov's path.
     fn begins_sprint(&mut self) -> bool {
         self.since_sprint += 1;
         let begins = self.cheap && !self.follows_path && self.since_sprint > self.sprint_wait;
@@ -101,7 +105,7 @@ impl Course {
             self.patience = (self.patience / 2).max(1);
         }
         self.proved = self.alpha;
-        // Steps of a single solve say that a smaller α would do.
+        // Steps that take a single linear solve show that a smaller α would do.
         self.successes += if steps <= 1 { 4 } else { 1 };
         if slow && self.successes >= self.patience {
             self.alpha = (self.alpha * self.shrink).max(smallest);
@@ -137,13 +141,14 @@ struct Task {
     alpha: f64,
     /// Relative natural map to reach.
     tolerance: f64,
-    /// Whether the exact predictor begins.
+    /// Whether to start with the exact predictor.
     exact: bool,
     /// Most Newton steps.
     steps: usize,
 }
 
-/// Moves from `(p, u)` towards `scratch.system.trial` until the natural map falls; `false`, and no move, if it does not.
+/// Backtracks from `scratch.system.trial` towards `(p, u)` until the natural map falls; `false`,
+/// with `(p, u)` unchanged, if it never does.
 fn backtrack<const D: usize>(
     data: &Prepared<'_>,
     alpha: f64,
@@ -184,8 +189,8 @@ fn backtrack<const D: usize>(
     false
 }
 
-/// Solves one regularised problem with the centre `scratch.system.centre`, from `p`; says whether its natural map fell below
-/// the tolerance. `u = W p + q` on return.
+/// Solves one regularised problem with the centre `scratch.system.centre`, from `p`; true if its
+/// natural map fell below the tolerance. `u = W p + q` on return.
 fn descend<const D: usize>(
     data: &Prepared<'_>,
     task: Task,
@@ -239,7 +244,8 @@ fn descend<const D: usize>(
         if current.sqrt() * data.inverse_data < ROUNDING {
             break;
         }
-        // A contact that could open as well as carry has two exact answers; the projection stays with the one at hand.
+        // A contact that may either open or carry load has two exact solutions; the projection
+        // keeps the current one.
         exact = !exact;
         stuck += 1;
         if stuck > MAX_STUCK {
@@ -261,7 +267,8 @@ fn descend<const D: usize>(
     true
 }
 
-/// Proximal point from `p`. `u = W p + q` on return; the best impulse met is returned when nothing converges.
+/// Proximal point from `p`. `u = W p + q` on return; without convergence `p` is the best impulse
+/// found.
 pub(in crate::solver) fn solve<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
@@ -284,7 +291,8 @@ pub(in crate::solver) fn solve<const D: usize>(
     let target = options.regularisation * data.mean_diagonal;
     let mut course = Course::new(data.mean_diagonal);
     let mut last = f64::INFINITY;
-    // Asked of a step with the smallest α; tightened where it holds and the velocity is still off.
+    // Required of a step with the smallest α; tightened if it holds and the velocity is still
+    // inaccurate.
     let mut asked = options.tolerance;
     let limit = *iterations + options.max_newton_steps;
     let mut status = SolveStatus::MaxIterations;
@@ -315,7 +323,7 @@ pub(in crate::solver) fn solve<const D: usize>(
         };
         let before = *iterations;
         let solved = descend::<D>(data, task, p, u, scratch, iterations);
-        // A round counts even where its start was its answer, so that the search ends.
+        // Count a round even if its start was its answer, so that the search ends.
         *iterations = (*iterations).max(before + 1);
         let residual = data.measure::<D>(p, u);
         if options.accepts(residual)

@@ -1,8 +1,9 @@
-//! Few contacts, when all else has failed: pivoting from other starts.
+//! The last resort for few contacts: pivoting from other starts.
 //!
-//! Pivoting follows one path through the modes, and where that path goes round in circles another often does not. The first start is the nearest
-//! answer so far, whose modes may be right already; the others are drawn at random, always the same ones, with the size of its impulses. Of 40
-//! problems of six wheels that press against each other with μ = 1e8, which no stage before solves, it solves 21.
+//! Pivoting follows one path through the modes. Where that path cycles, another often does not. The
+//! first start is the best answer so far, whose modes may already be right. The others are
+//! pseudorandom impulses of the same size, from a fixed seed. Of 40 problems of six wheels that
+//! press against each other with μ = 1e8, which no earlier stage solves, it solves 21.
 
 use super::pivoting;
 use crate::problem::{Prepared, Residual};
@@ -13,7 +14,7 @@ use crate::solver::scratch::Scratch;
 /// Starts.
 const STARTS: usize = 16;
 
-/// Share of contacts that carry nothing at the start.
+/// Fraction of contacts without load at the start.
 const OPEN: f64 = 0.2;
 
 /// Numbers in [0, 1) that look random: `SplitMix64` (Steele, Lea and Flood 2014).
@@ -34,7 +35,7 @@ fn draw<const D: usize>(mu: &[f64], size: f64, draws: &mut Draws, p: &mut [f64])
     for (&mu, p) in mu.iter().zip(p.chunks_exact_mut(D)) {
         let is_open = draws.next() < OPEN;
         let normal = 2.0 * size * draws.next();
-        // A third of the contacts begins on the cone's surface, as sliding.
+        // A third of the contacts start on the cone's surface, sliding.
         let tangential = mu.min(1.0) * normal * (1.5 * draws.next()).min(1.0);
         let (sin, cos) = (std::f64::consts::TAU * draws.next()).sin_cos();
         if is_open {
@@ -53,7 +54,8 @@ fn draw<const D: usize>(mu: &[f64], size: f64, draws: &mut Draws, p: &mut [f64])
     }
 }
 
-/// Pivots from the nearest answer so far and from others. `u` is `W p + q` on return; `iterations` is advanced by the linear solves.
+/// Pivots from the best answer so far and from others. `u` is `W p + q` on return; `iterations` is
+/// advanced by the linear solves.
 pub(in crate::solver) fn solve<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,

@@ -1,4 +1,5 @@
-//! [`Method::Auto`]: what is cheap first, what is robust last. The table of the [chapter](crate::solver) gives each rung its reason.
+//! [`Method::Auto`]: cheap stages first, robust ones last. The table of the
+//! [chapter](crate::solver) gives the reason for each rung.
 
 use super::islands::{self, IslandSolver};
 use crate::problem::{Operator, Prepared, Residual};
@@ -8,8 +9,9 @@ use crate::solver::scratch::Scratch;
 use crate::solver::stage::{admm, gauss_seidel, guided, newton, pivoting, proximal, restarts};
 use crate::solver::work::SweepBudget;
 
-/// Most sweeps over many contacts before Newton. Dense, a Newton step costs about as much as `n` sweeps; block-sparse the fill grows with the problem; 20, 50 and 200 were
-/// tried on the recorded ones.
+/// Most sweeps over many contacts before Newton. A dense Newton step costs about as much as `n`
+/// sweeps; the fill-in of a block-sparse one grows with the problem. Chosen among 20, 50 and 200 on
+/// the recorded problems.
 fn sweep_budget(data: &Prepared<'_>) -> usize {
     match data.W {
         Operator::Dense(_) => 2 * data.n,
@@ -17,18 +19,20 @@ fn sweep_budget(data: &Prepared<'_>) -> usize {
     }
 }
 
-/// Alternations that bring many contacts near enough for the proximal point: on piles of 250 and 460 contacts it then takes a third to five sixths of the steps.
+/// ADMM iterations that bring many contacts close enough for the proximal point method: on piles of
+/// 250 and 460 contacts it then takes a third to five sixths of the steps.
 const ALTERNATIONS: usize = 300;
 
-/// Residual below which few contacts are worth the proximal point once more, from the nearest answer. Problems without an answer mostly stay above.
+/// Residual below which few contacts get a second proximal point run, from the best answer.
+/// Problems without a solution mostly stay above it.
 const NEAR: f64 = 1e-4;
 
-/// The stages of [`Method::Auto`] so far: what each came to, and the nearest answer.
+/// The stages of [`Method::Auto`] so far: the result of each, and the best answer.
 struct Ladder<'a> {
     options: &'a SolverOptions,
-    /// Iterations before the present stage.
+    /// Iterations before the current stage.
     before: usize,
-    /// The nearest answer, whose impulse is in the scratch.
+    /// The best answer, whose impulse is in the scratch.
     nearest: Outcome,
 }
 
@@ -89,7 +93,7 @@ impl<'a> Ladder<'a> {
         None
     }
 
-    /// Ends with the nearest answer, for the reason of the last stage. `u` is `W p + q` on return.
+    /// Ends with the best answer and the reason of the last stage. `u` is `W p + q` on return.
     fn give_nearest<const D: usize>(
         self,
         data: &Prepared<'_>,
@@ -117,7 +121,7 @@ impl<'a> Ladder<'a> {
     }
 }
 
-/// [`Method::Auto`]: what is cheap first, what is robust last.
+/// [`Method::Auto`]: cheap stages first, robust ones last.
 pub(in crate::solver) fn escalate<const D: usize>(
     data: &Prepared<'_>,
     options: &SolverOptions,
@@ -156,7 +160,8 @@ pub(in crate::solver) fn escalate<const D: usize>(
         }
         scratch.start.copy_from_slice(p);
     } else if is_warm {
-        // Where the modes of the last step serve, this is the end; where they do not, more full steps seldom help.
+        // If the modes of the last step are right, this ends the solve; if not, more full steps
+        // seldom help.
         let few = newton::WARM_STEPS.min(steps);
         let found = newton::full_steps::<D>(data, options, few, p, u, scratch, iterations);
         if let Some(outcome) = ladder.enter(Stage::WarmNewton, found, p, scratch, *iterations) {
@@ -167,7 +172,7 @@ pub(in crate::solver) fn escalate<const D: usize>(
         if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
             return outcome;
         }
-        // A warm start can mislead where zero does not.
+        // A warm start may mislead; zero does not.
         p.fill(0.0);
     } else if data.q.chunks_exact(D).any(|q| q[0] < 0.0) {
         let found = match guided::solve::<D>(data, options, p, u, scratch, iterations) {

@@ -1,7 +1,9 @@
-//! Very many free bodies: sweeps on their velocities first, and what factors `W` where the sweeps do not end.
+//! Very many free bodies: sweeps on their velocities first, and methods that factor `W` if the
+//! sweeps do not converge.
 //!
-//! A sweep's cost is the same for each contact, and it needs no `W`. Wedged bodies are what it crawls on: there the proximal point goes on from where it stopped, and
-//! where that does not reach the answer either, the sweeps go on from the better of both.
+//! The cost of a sweep is linear in the number of contacts, and it needs no `W`. Sweeps converge
+//! slowly for wedged bodies. There the proximal point method continues from their result, and if it
+//! does not converge either, the sweeps continue from the better of the two.
 
 use super::islands::SolvePart;
 use crate::problem::{
@@ -12,25 +14,26 @@ use crate::solver::options::{Method, SolverOptions};
 use crate::solver::report::{Rung, Rungs, SolveReport, SolveStatus};
 use crate::solver::stage::body_sweeps::{BodySweeps, Swept, solve_body_pairs};
 
-/// Contacts up to which an answer that the sweeps did not reach is sought by factorisation: a step costs some 3 µs a contact there.
+/// Most contacts for which factorisation follows unsuccessful sweeps: a step then costs some 3 µs
+/// per contact.
 const FEW: usize = 1000;
 
-/// Factorisations of such a search; wedged wheels have taken 77.
+/// Most factorisations of such a search; wedged wheels have needed 77.
 const FACTORISATIONS: usize = 200;
 
-/// Such searches for one solve, each after all the sweeps that are allowed.
+/// Most such searches in a solve, each after all the sweeps that are allowed.
 const SEARCHES: usize = 3;
 
 /// The problem `u = Zᵀ Z p + q` of the contacts of free bodies and a machine in D dimensions.
 #[derive(Clone, Copy)]
 pub struct ManyBodies<'a, const D: usize> {
-    /// What each contact reads and changes.
+    /// The contacts, each with the data that it reads and changes.
     pub pairs: &'a BodyPairs<D>,
     /// Free velocity (D `n_c`), m/s.
     pub q: &'a [f64],
     /// Friction coefficients (`n_c`).
     pub mu: &'a [f64],
-    /// `W`, asked for only where the sweeps do not answer.
+    /// `W`, used only if the sweeps do not converge.
     pub operator: &'a dyn Fn() -> &'a BlockSparseDelassus,
 }
 
@@ -49,7 +52,8 @@ impl<'a, const D: usize> ManyBodies<'a, D> {
     }
 }
 
-/// Solves as the method asks; `solve` is the solver of a problem with `W`, which is above this page.
+/// Solves with the chosen method. `solve` is the solver for a problem with `W`, which lies above
+/// this module.
 pub(in crate::solver) fn solve<const D: usize>(
     bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,
@@ -109,7 +113,7 @@ where
         }
         let iterations = report.iterations + swept.iterations;
         if !swept.is_converged() && excess(options, &report) < excess(options, &swept) {
-            // The sweeps led away from the nearest answer so far, and would again.
+            // The sweeps moved away from the best answer so far, and would do so again.
             p.copy_from_slice(&p_before);
             u.copy_from_slice(&u_before);
             report.iterations = iterations;
@@ -124,7 +128,8 @@ where
     report
 }
 
-/// Goes on from where the sweeps stopped by the proximal-point method. The better of both answers stays, and adds no energy.
+/// Continues from the result of the sweeps with the proximal point method. Keeps the better of the
+/// two answers, which adds no energy.
 fn search<const D: usize>(
     bodies: &ManyBodies<'_, D>,
     options: &SolverOptions,
@@ -168,7 +173,7 @@ fn search<const D: usize>(
     }
 }
 
-/// How far an answer is above the tolerances, as a factor.
+/// Factor by which an answer exceeds the tolerances.
 fn excess(options: &SolverOptions, report: &SolveReport) -> f64 {
     options.excess(Residual {
         relative: report.residual,

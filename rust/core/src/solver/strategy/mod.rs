@@ -1,6 +1,8 @@
-//! Which stage when: the strategies, whose rungs the [table](crate::solver) lists.
+//! The strategies: the order in which stages are tried. The [table](crate::solver) lists their
+//! rungs.
 //!
-//! - `auto`: a problem `(W, q, μ)` of any size, with `islands` for many contacts that fall apart into groups;
+//! - `auto`: a problem `(W, q, μ)` of any size, with `islands` for many contacts in separate
+//!   groups;
 //! - `many_bodies`: very many free bodies, whose contacts stand in for `W`.
 
 pub(super) mod auto;

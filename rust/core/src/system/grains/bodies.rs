@@ -7,8 +7,8 @@ use crate::quantity::{LENGTHS, MASSES, within};
 /// Most grains: some hundred megabytes.
 pub const MAX_GRAINS: usize = 1_000_000;
 
-/// Coordinates of a grain: (x, y, angle) of a disk; the centre of a ball, which looks the same from all sides. Their rates are the first of its
-/// velocities.
+/// Coordinates of a grain: (x, y, angle) of a disk; the centre of a ball, which looks the same from
+/// all sides. Their rates are the first of its velocities.
 pub const COORDINATES: usize = 3;
 
 /// A moment of inertia over m r²: of a solid disk, of a solid ball.
@@ -16,12 +16,12 @@ const fn share_of_inertia(dimensions: usize) -> f64 {
     if dimensions == 2 { 0.5 } else { 0.4 }
 }
 
-/// What a grain is called.
+/// Word for a grain in messages.
 pub(super) const fn noun(dimensions: usize) -> &'static str {
     if dimensions == 2 { "disk" } else { "ball" }
 }
 
-/// Refuses more grains than there may be, before anything is allocated for them.
+/// Refuses more grains than allowed, before any allocation.
 pub(super) fn check_count<const D: usize>(count: usize) -> Result<(), GrainError> {
     if count > MAX_GRAINS {
         return Err(GrainError::TooMany {
@@ -33,8 +33,8 @@ pub(super) fn check_count<const D: usize>(count: usize) -> Result<(), GrainError
     Ok(())
 }
 
-/// Solid disks (D = 2, `J = m r²/2`) or balls (D = 3, `J = 2 m r²/5`), immutable. Some may be kinematic: nothing changes their velocity, as grains
-/// glued to a rough floor or a piston.
+/// Solid disks (D = 2, `J = m r²/2`) or balls (D = 3, `J = 2 m r²/5`), immutable. Some may be
+/// kinematic: nothing changes their velocity, as grains glued to a rough floor or a piston.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grains<const D: usize> {
     radius: Vec<f64>,
@@ -54,7 +54,7 @@ impl<const D: usize> Grains<D> {
     /// `radius` (n) in m, `mass` (n) in kg.
     ///
     /// # Errors
-    /// None at all, another number of masses, an entry that is not finite and positive.
+    /// No grain, a wrong number of masses, an entry that is not finite and positive.
     pub fn new(radius: Vec<f64>, mass: Vec<f64>) -> Result<Self, GrainError> {
         if radius.is_empty() {
             return Err(GrainError::Empty);
@@ -88,7 +88,8 @@ impl<const D: usize> Grains<D> {
         })
     }
 
-    /// The same grains, of which those marked (n) are kinematic: no weight and no contact changes their velocity.
+    /// The same grains, with those marked (n) kinematic: neither weight nor contact changes their
+    /// velocity.
     ///
     /// # Errors
     /// Another number of marks.
@@ -136,7 +137,7 @@ impl<const D: usize> Grains<D> {
         &self.mass
     }
 
-    /// Whose velocity nothing changes.
+    /// Whether a grain is kinematic: nothing changes its velocity.
     #[must_use]
     pub fn kinematic(&self) -> &[bool] {
         &self.kinematic

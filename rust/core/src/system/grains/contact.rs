@@ -1,4 +1,4 @@
-//! A contact of a grain, and its name.
+//! A contact of a grain, and its key.
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -6,15 +6,16 @@ use serde::{Deserialize, Serialize};
 use crate::contact::ContactFrame;
 use crate::integrator::UnilateralContact;
 
-/// From here on a second body is a wall.
+/// Numbers of second bodies from here on are walls.
 pub(crate) const WALL: u32 = 1 << 31;
-/// From here on a second body is the ground.
+/// Numbers of second bodies from here on are points of the ground.
 pub(crate) const GROUND: u32 = (1 << 31) | (1 << 30);
 
-/// Names a contact by its two bodies: grains 0 to n − 1, then the machine's wheels; then walls, then points of the ground.
+/// Key of a contact: its two bodies. Numbers 0 to n − 1 are grains, then come the machine's wheels,
+/// walls, and points of the ground.
 ///
-/// Among two grains the smaller number comes first, a wheel before a grain. Contacts are listed in this order, so a step finds
-/// the impulse of the step before by bisection.
+/// Of two grains the smaller number comes first, and a wheel comes before a grain. Contacts are
+/// listed in this order, so bisection finds the impulse of the last step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct GrainKey {
     /// The first body.
@@ -26,7 +27,7 @@ pub struct GrainKey {
 /// A contact of a grain or of a wheel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GrainContact<const D: usize> {
-    /// Its name from step to step.
+    /// Its key from step to step.
     pub key: GrainKey,
     /// Unit normal, from the second body into the first.
     pub n: SVector<f64, D>,
@@ -39,7 +40,8 @@ pub struct GrainContact<const D: usize> {
 }
 
 impl<const D: usize> GrainContact<D> {
-    /// Unit normal and tangents: t = n × e_z in the plane; t, b as [`ContactFrame::of_normal`] has them in space.
+    /// Unit normal and tangents: t = n × e_z in the plane; t, b as
+    /// [`ContactFrame::of_normal`] has them in space.
     #[inline]
     #[must_use]
     pub fn frame(&self) -> [SVector<f64, D>; D] {

@@ -1,4 +1,4 @@
-//! Which bodies may touch within a step, and how their gaps change.
+//! Detection: the bodies that may touch within a step, and their gaps.
 
 use nalgebra::SVector;
 
@@ -12,10 +12,12 @@ use crate::problem::BodyPairs;
 use crate::solver::Swept;
 use crate::spatial::space::{axis, body_velocities, dot, length};
 
-/// Gap up to which a pair is taken as a contact though it is not forecast to close, as a share of the smallest radius: its neighbours may push it.
+/// Gap below which a pair is a contact even if it is not forecast to close, as a fraction of the
+/// smallest radius: neighbours may push it.
 const SKIN: f64 = 0.01;
 
-/// Largest such gap, as a share of the smallest radius: a blow that throws farther in one step is a step that is too long.
+/// Largest such gap, as a fraction of the smallest radius: if an impact throws a grain farther in
+/// one step, the step is too long.
 const FARTHEST_SKIN: f64 = 0.2;
 
 /// A grain near a round body.
@@ -37,7 +39,7 @@ struct Seeker<const D: usize> {
     velocity: SVector<f64, D>,
 }
 
-/// How near is near enough: a contact is what may close within the step, or comes within the skin.
+/// Range of detection: pairs that may close within the step or come within the skin.
 #[derive(Clone, Copy)]
 struct Rule {
     reach: f64,
@@ -99,7 +101,7 @@ fn direction<const D: usize>(x: &[f64; D]) -> SVector<f64, D> {
 }
 
 impl<const D: usize> Seeker<D> {
-    /// The contact with what faces it along −n.
+    /// The contact with the body that faces it along −n.
     #[inline]
     fn contact(&self, b: u32, n: SVector<f64, D>, gap: f64) -> GrainContact<D> {
         GrainContact {
@@ -160,13 +162,15 @@ where
                 });
             }
         }
-        // What the fastest can be thrown at within the step is a contact too, though it comes no nearer yet.
+        // Bodies that the fastest grain can reach within the step are contacts too, even if they
+        // are not yet approaching.
         let smallest = scene.grains.smallest();
         let skin = (SKIN * smallest)
             .max(lead * fastest)
             .min(FARTHEST_SKIN * smallest);
         let skin = skin.max(activation.hover);
-        // Two bodies close by at most twice that; farther than a diameter nobody looks (a step that long is too long).
+        // Two bodies approach by at most twice that; the search ends at a diameter (a longer step
+        // is too long).
         let reach = (skin + 2.0 * lead * fastest).min(2.0 * largest);
         let rule = Rule { reach, lead, skin };
         grid.fill(&q, radius, 2.0 * largest + reach);
@@ -222,7 +226,8 @@ where
         }
     }
 
-    /// Frames stay where the step begins; the gap becomes the one that the velocities before the step lead to.
+    /// Keeps the frames of the start of the step; the gap becomes the one predicted from the
+    /// velocities before the step.
     pub(super) fn forecast_gaps(&self, contacts: &mut [GrainContact<D>]) {
         let n = self.n();
         let (middle, end) = (&self.parts.middle, &self.parts.end);

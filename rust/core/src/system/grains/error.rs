@@ -8,7 +8,7 @@ use crate::quantity::QuantityError;
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum GrainError {
-    /// A number that is not finite or of the wrong sign.
+    /// A number that is not finite or has the wrong sign.
     #[error(transparent)]
     Number(#[from] QuantityError),
     /// No grain at all.

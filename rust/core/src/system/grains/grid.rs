@@ -1,7 +1,9 @@
-//! Which grains are near which: a grid of cells, filled anew each step in time proportional to the grains.
+//! Neighbour search: a grid of cells, refilled at each step in time proportional to the number of
+//! grains.
 //!
-//! Cells are numbered row after row, layer after layer, and folded into a table of a few entries per grain, so a grain that flies off costs no memory;
-//! it merely shares its entry with another cell, and the distance tells them apart.
+//! Cells are numbered row by row and layer by layer, and folded into a table of a few entries per
+//! grain. A grain that flies off thus costs no memory: its cell shares an entry with another one,
+//! and the distance test separates them.
 
 use super::bodies::COORDINATES;
 
@@ -52,7 +54,8 @@ fn centre<const D: usize>(q: &[f64]) -> [f64; D] {
 }
 
 impl<const D: usize> Grid<D> {
-    /// Puts grains into cells of the side `cell` (m). `q`: the coordinates of each grain, at least; all finite.
+    /// Puts grains into cells of the side `cell` (m). `q`: the coordinates
+    /// of each grain, at least; all finite.
     pub fn fill(&mut self, q: &[f64], radius: &[f64], cell: f64) {
         let n = radius.len();
         let grains = || q.chunks_exact(COORDINATES).take(n);
@@ -67,8 +70,8 @@ impl<const D: usize> Grid<D> {
         self.origin = low;
         let size = (4 * n).next_power_of_two().max(64);
         self.size = i64::try_from(size).unwrap_or(i64::MAX);
-        // One empty column on either side, so that the next row's cells are no neighbours; neighbours never share an entry: three
-        // cells along the last axis always have room.
+        // One empty column on either side separates a row from the next. Neighbours never share an
+        // entry: three cells along the last axis always fit.
         let mut stride = 1;
         for k in 0..D {
             self.strides[k] = stride;
@@ -76,7 +79,7 @@ impl<const D: usize> Grid<D> {
             // Three cells along each later axis must fit; the last is folded.
             let later = if k + 2 < D { 3 } else { 1 };
             let most = (self.size / 4 / stride / later).max(3);
-            // A coordinate that is not finite leaves no number of cells.
+            // A non-finite coordinate gives no number of cells.
             #[allow(clippy::cast_possible_truncation)] // clamped
             let cells = cells.min(most as f64) as i64;
             stride *= cells.max(3);
@@ -133,12 +136,14 @@ impl<const D: usize> Grid<D> {
         (number & (self.size - 1)) as u32
     }
 
-    /// Calls `visit` for every grain in the cells that a cube of half side `reach` (m) around `x` touches, and perhaps for others; for each once.
+    /// Calls `visit` for every grain in the cells that a cube of half side `reach` (m) around `x`
+    /// touches, and perhaps for others; for each once.
     #[inline]
     pub fn near(&self, x: &[f64; D], reach: f64, mut visit: impl FnMut(&Item<D>)) {
         let low = self.cell(&x.map(|x| x - reach));
         let high = self.cell(&x.map(|x| x + reach));
-        // Numbers of the cells differ by less than the table's size, and no row runs into the next: no entry is met twice.
+        // Numbers of the cells differ by less than the table's size, and no
+        // row runs into the next: no entry is met twice.
         let mut span = 1_i64;
         let mut is_apart = true;
         for k in 0..D {
@@ -218,8 +223,8 @@ mod tests {
         }
     }
 
-    /// A wheel of twelve cells over a bed that one grain had left: the cells of its upper rows had the same entries as those of the lower ones, and it met
-    /// grains several times.
+    /// A wheel of twelve cells over a bed that one grain had left: the cells of its upper rows had
+    /// the same entries as those of the lower ones, and it met grains several times.
     #[test]
     fn a_wide_look_finds_none_twice() {
         finds_every_neighbour_once::<2>(0.7);

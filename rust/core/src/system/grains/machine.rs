@@ -1,4 +1,4 @@
-//! A machine among grains: a few coordinates, a dense mass matrix, and wheels that grains meet.
+//! A machine among grains: a few coordinates, a dense mass matrix, and wheels that touch grains.
 
 use std::fmt::Debug;
 
@@ -15,7 +15,8 @@ pub struct Wheel<const D: usize> {
 
 /// A machine of [`Self::nv`] coordinates whose velocities are their rates.
 ///
-/// The first D coordinates are a place in the world, m; the others angles, rad. Matrices are row-major.
+/// The first D coordinates are a place in the world, m; the others angles,
+/// rad. Matrices are row-major.
 pub trait Machine<const D: usize>: Debug + Send + Sync {
     /// Number of coordinates.
     fn nv(&self) -> usize;
@@ -23,8 +24,8 @@ pub trait Machine<const D: usize>: Debug + Send + Sync {
     /// `M(q)` (nv × nv), kg, kg m, kg m².
     fn mass_matrix(&self, q: &[f64], out: &mut [f64]);
 
-    /// `F(q, v)` (nv), N and N m: gravity (m/s²), torques (`inputs`, N m, positive forward) and what is quadratic in v, so that `M v̇ = F` without
-    /// contacts.
+    /// `F(q, v)` (nv), N and N m: gravity (m/s²), torques (`inputs`, N m, positive forward) and
+    /// terms quadratic in v, so that `M v̇ = F` without contacts.
     fn force(&self, q: &[f64], v: &[f64], gravity: &Vector3<f64>, inputs: &[f64], out: &mut [f64]);
 
     /// Potential energy `−Σ m g · x`, J.
@@ -39,13 +40,15 @@ pub trait Machine<const D: usize>: Debug + Send + Sync {
     /// Wheel i.
     fn wheel(&self, i: usize, q: &[f64]) -> Wheel<D>;
 
-    /// Velocity of the material point of wheel i at `point` (world, m) per unit of each coordinate's rate (D × nv).
+    /// Velocity of the material point of wheel i at `point` (world, m) per
+    /// unit of each coordinate's rate (D × nv).
     fn point_jacobian(&self, i: usize, q: &[f64], point: &SVector<f64, D>, out: &mut [f64]);
 
-    /// How far a displacement (nv) moves what is not a contact point, m.
+    /// Largest displacement, m, that a change (nv) causes away from the contact points.
     fn displacement(&self, y: &[f64]) -> f64;
 
-    /// A number that two machines share only if they are of one kind, with the same masses, inertias and lengths.
+    /// A number that is equal for two machines only if they are of the same kind, with the same
+    /// masses, inertias and lengths.
     fn fingerprint(&self) -> u64;
 }
 
@@ -91,7 +94,7 @@ impl MachineParts {
         machine.mass_matrix(q, &mut self.mass);
     }
 
-    /// `M = L Lᵀ`; false where it is not positive definite.
+    /// `M = L Lᵀ`; false if it is not positive definite.
     pub fn factorise(&mut self) -> bool {
         let n = self.nv;
         self.L.clone_from(&self.mass);
@@ -146,7 +149,7 @@ impl MachineParts {
         self.rows.clear();
     }
 
-    /// Takes up a contact of wheel i: its rows of Hᵀ are kept, those of Zᵀ are appended to `scaled`.
+    /// Adds a contact of wheel i: stores its rows of Hᵀ and appends those of Zᵀ to `scaled`.
     pub fn push_contact<const D: usize>(
         &mut self,
         machine: &dyn Machine<D>,

@@ -1,4 +1,4 @@
-//! What a state of grains has: energy, momentum, overlap.
+//! Measures of a state of grains: energy, momentum, overlap.
 
 use nalgebra::{SVector, Vector3};
 
@@ -53,7 +53,8 @@ impl<const D: usize> GrainScene<D> {
         energy
     }
 
-    /// Momentum of the grains that are not kinematic, kg m/s, and their moment of momentum about the origin, kg m²/s. q (nq), v (nv).
+    /// Momentum of the grains that are not kinematic, kg m/s, and their moment
+    /// of momentum about the origin, kg m²/s. q (nq), v (nv).
     ///
     /// The moment in the plane is its z component.
     #[must_use]
@@ -80,7 +81,8 @@ impl<const D: usize> GrainScene<D> {
         (linear, moment)
     }
 
-    /// Deepest overlap, m: 0 where nothing overlaps. Kinematic grains among themselves and in walls do not count. q (nq).
+    /// Deepest overlap, m: 0 if nothing overlaps. Overlaps of kinematic grains with each other and
+    /// with walls do not count. q (nq).
     #[must_use]
     pub fn penetration(&self, q: &[f64]) -> f64 {
         let grains = &self.grains;

@@ -1,14 +1,16 @@
-//! Seeded packings without overlap: a loose array, shaken; gravity does the rest.
+//! Random packings without overlap: a perturbed loose array, which settles under gravity.
 
 use super::bodies::{COORDINATES, Grains, check_count, noun};
 use super::error::GrainError;
 use crate::geometry::terrain::rocks::Random;
 use crate::quantity::{LENGTHS, MASSES, PLACES, within};
 
-/// Grains of radii drawn evenly from a range, row upon row over a width, in space layer upon layer over a rectangle.
+/// Grains with radii drawn uniformly from a range, row upon row over a width; in space, layer upon
+/// layer over a rectangle.
 ///
-/// Equal descriptions give equal packings. Rows are filled from the left, in space from the back, the lowest first; each grain is moved at random in the
-/// room that its place in the array leaves, so no two overlap. The mass is `mass` for the mean radius, and goes with r^D.
+/// Equal descriptions give equal packings. Rows are filled from the left, in space from the back,
+/// the lowest first; each grain is moved at random in the room that its place in the array leaves,
+/// so no two overlap. The mass is `mass` for the mean radius, and goes with r^D.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Packing<const D: usize> {
     /// How many grains.
@@ -21,7 +23,8 @@ pub struct Packing<const D: usize> {
     pub mass: f64,
     /// Corner that all grains stay to the right of and above, in space also in front of, m.
     pub corner: [f64; D],
-    /// Sides of the box that they are filled into, m; it is open above, so that of y does not count.
+    /// Sides of the box that they are filled into, m; it is open above, so
+    /// that of y does not count.
     pub sides: [f64; D],
     /// Of radii and places.
     pub seed: u64,
@@ -42,7 +45,7 @@ impl Default for Packing<2> {
     }
 }
 
-/// Room between the largest grains of the array, as a share of their diameter.
+/// Distance between the largest grains of the array, as a fraction of their diameter.
 const ROOM: f64 = 0.003;
 
 /// Names of the corner's and of the sides' entries.
@@ -53,8 +56,9 @@ impl<const D: usize> Packing<D> {
     /// The grains, and the coordinates of each ([`COORDINATES`] n), m and rad.
     ///
     /// # Errors
-    /// No grain, or more than [`MAX_GRAINS`](super::bodies::MAX_GRAINS); a number that is not finite, of the wrong sign or out of its range; radii the
-    /// wrong way round; sides without room for one grain.
+    /// No grain, or more than [`MAX_GRAINS`](super::bodies::MAX_GRAINS); a
+    /// number that is not finite, of the wrong sign or out of its range; radii
+    /// the wrong way round; sides without room for one grain.
     pub fn build(&self) -> Result<(Grains<D>, Vec<f64>), GrainError> {
         within(|| "radius_min".to_owned(), self.radius_min, LENGTHS)?;
         within(|| "radius_max".to_owned(), self.radius_max, LENGTHS)?;
@@ -72,7 +76,8 @@ impl<const D: usize> Packing<D> {
             });
         }
         let pitch = 2.0 * self.radius_max * (1.0 + ROOM);
-        // Places along each axis and their length; the array is spread over the whole sides, and upwards without end.
+        // Places along each axis and their length; the array is spread over
+        // the whole sides, and upwards without end.
         let mut places = [usize::MAX; D];
         let mut across = [pitch; D];
         for k in (0..D).filter(|k| *k != 1) {

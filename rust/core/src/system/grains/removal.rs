@@ -1,8 +1,9 @@
-//! Taking grains out of a running simulation: the others keep their state, and each contact its impulse under its new name.
+//! Removal of grains from a running simulation: the others keep their state, and each contact keeps
+//! its impulse under its new key.
 
 use super::contact::{GrainKey, WALL};
 
-/// New numbers of bodies after grains were taken out; the order stays.
+/// New numbers of bodies after the removal of grains, in the same order.
 #[derive(Clone, Debug)]
 pub struct Renumbering {
     /// New number of each grain (n), if it stays.
@@ -33,7 +34,7 @@ impl Renumbering {
         self.left as usize
     }
 
-    /// The same contact's new name, if both of its bodies stay.
+    /// The new key of a contact, if both of its bodies stay.
     #[must_use]
     pub fn key(&self, key: GrainKey) -> Option<GrainKey> {
         Some(GrainKey {

@@ -1,4 +1,4 @@
-//! What there is: grains, walls, a ground, a machine, and how rough they are.
+//! The description of a bed: grains, walls, a ground, a machine, and their friction.
 
 use std::sync::Arc;
 
@@ -55,7 +55,7 @@ impl GrainFriction {
     }
 }
 
-/// Grains and what is among them, immutable.
+/// Grains and everything among them, immutable.
 #[derive(Clone, Debug)]
 pub struct GrainScene<const D: usize> {
     /// The grains.
@@ -64,13 +64,14 @@ pub struct GrainScene<const D: usize> {
     pub walls: Vec<Wall<D>>,
     /// A ground of any shape.
     pub ground: Option<Arc<dyn Support<D>>>,
-    /// What drives.
+    /// The machine.
     pub machine: Option<Arc<dyn Machine<D>>>,
     /// μ.
     pub friction: GrainFriction,
 }
 
-/// How far bodies may overlap at the start, as a share of the smallest radius: rounding of a state that was written to a file.
+/// Allowed overlap at the start, as a fraction of the smallest radius: the rounding of a state that
+/// was written to a file.
 pub const OVERLAP: f64 = 0.01;
 
 impl<const D: usize> GrainScene<D> {
@@ -98,7 +99,8 @@ impl<const D: usize> GrainScene<D> {
         &v[body_velocities(D) * self.grains.len()..]
     }
 
-    /// A number that two scenes share only if their grains and their machine do: what a snapshot belongs to.
+    /// A number that is equal for two scenes only if their grains and their machine are; it ties a
+    /// snapshot to its scene.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
         let grains = &self.grains;
@@ -112,7 +114,7 @@ impl<const D: usize> GrainScene<D> {
         fingerprint(kind.bytes().chain(numbers)) ^ machine.rotate_left(1)
     }
 
-    /// Checks what the types do not.
+    /// Checks the values.
     ///
     /// # Errors
     /// A friction coefficient that is not finite or negative.
@@ -120,8 +122,8 @@ impl<const D: usize> GrainScene<D> {
         Ok(self.friction.check()?)
     }
 
-    /// Checks a configuration (nq): finite, and nothing deeper in anything than [`OVERLAP`] of the smallest radius. Kinematic grains may
-    /// overlap one another and walls.
+    /// Checks a configuration (nq): finite, and nothing deeper in anything than [`OVERLAP`] of the
+    /// smallest radius. Kinematic grains may overlap one another and walls.
     ///
     /// # Errors
     /// The first entry that is wrong, the first overlap.
@@ -192,7 +194,8 @@ impl<const D: usize> GrainScene<D> {
         Ok(())
     }
 
-    /// Names the first entry that is not finite: of a grain, with `width` entries each, or of the machine.
+    /// Names the first entry that is not finite: of a grain, with `width`
+    /// entries each, or of the machine.
     ///
     /// # Errors
     /// That entry.

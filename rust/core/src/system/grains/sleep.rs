@@ -1,9 +1,11 @@
-//! Sleep: grains that rest far from anything that moves are left out of the step until something comes near or leans on them.
+//! Sleep: the step leaves out grains that rest far from anything that moves, until something comes
+//! near or loads them.
 //!
-//! A grain falls asleep after so many steps slower than a limit, with nothing faster than the limit within a distance. It wakes when something
-//! faster comes within the distance, or when the impulse of a neighbour that is awake differs from the one it fell asleep under by more than a share of its own
-//! weight. The impulses of sleeping contacts are kept, so a grain wakes with the load that it had. A kinematic grain counts as
-//! asleep and never wakes.
+//! A grain falls asleep after a number of steps below a speed limit, with nothing faster than the
+//! limit within a distance. It wakes when something faster comes within the distance, or when the
+//! impulse of an awake neighbour differs from that at falling asleep by more than a fraction of the
+//! grain's weight. Impulses of sleeping contacts are stored, so a grain wakes with its previous
+//! load. A kinematic grain counts as asleep and never wakes.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,9 +25,11 @@ pub struct SleepOptions {
     pub speed: f64,
     /// Steps that a grain must have been still. Default 50.
     pub steps: u32,
-    /// How far away anything that moves must be, m. Default 0.2: six diameters of the original's disks.
+    /// How far away anything that moves must be, m. Default 0.2: six
+    /// diameters of the original's disks.
     pub distance: f64,
-    /// Change of an impulse that wakes, as a share of the grain's weight times the step. Default 0.1.
+    /// Change of an impulse that wakes a grain, as a fraction of its weight times the step. Default
+    /// 0.1.
     pub share: f64,
 }
 
@@ -72,7 +76,7 @@ impl SleepOptions {
     }
 }
 
-/// Who sleeps, and under what load.
+/// Sleeping grains and their loads.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sleep {
     /// Steps that each grain has been still (n).
@@ -83,24 +87,24 @@ pub struct Sleep {
     dormant: Vec<(GrainKey, [f64; 3])>,
 }
 
-/// Most cells that a wheel marks either way.
+/// Most cells that a wheel marks in each direction.
 const MOST_CELLS: i64 = 1000;
 
-/// Most cells that one mover marks; of more, all are.
+/// Most cells that one mover marks; beyond this all cells are marked.
 const MOST_MARKS: i64 = (2 * MOST_CELLS + 1) * (2 * MOST_CELLS + 1);
 
-/// Steps between two looks at who may sleep: nothing crosses the distance in them.
+/// Steps between two updates of sleep, in which nothing crosses the distance.
 const EVERY: usize = 5;
 
-/// What sleep looks at after a step.
+/// Input of the sleep update after a step.
 pub struct StepTaken<'a, const D: usize> {
-    /// What there is.
+    /// The description.
     pub scene: &'a GrainScene<D>,
     /// Weight of 1 kg times the step, m/s.
     pub weight_impulse: f64,
     /// Coordinates after it, m and rad.
     pub q: &'a [f64],
-    /// Velocities after it: those of what falls asleep become 0.
+    /// Velocities after it; those of grains that fall asleep become 0.
     pub v: &'a mut [f64],
     /// Its contacts.
     pub contacts: &'a [GrainContact<D>],
@@ -276,7 +280,8 @@ impl Sleep {
         (0..n).map(|i| marks.is_marked(&centre(i))).collect()
     }
 
-    /// After a change of who sleeps: loads of those that fell asleep are put away, those of the woken given back to the warm start.
+    /// After a change of sleep: stores the loads of grains that fell asleep, and returns those of
+    /// woken grains to the warm start.
     fn exchange(
         &mut self,
         kinematic: &[bool],
@@ -290,7 +295,8 @@ impl Sleep {
             };
             sleeps(key.a) || sleeps(key.b)
         };
-        // What the step just did is newer than what was put away, but the load to wake at stays the one of falling asleep.
+        // The impulses of this step are newer than the stored ones, but the load that decides about
+        // waking stays that of falling asleep.
         let mut all: Vec<(GrainKey, [f64; 3], bool)> = Vec::new();
         all.extend(warm_start.impulses.iter().map(|(k, p)| (*k, *p, false)));
         all.extend(self.dormant.iter().map(|(k, p)| (*k, *p, true)));

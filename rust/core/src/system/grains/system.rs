@@ -1,4 +1,5 @@
-//! Grains as a [`MechanicalSystem`]: a diagonal mass matrix, contacts between pairs of bodies, and a machine with a dense one.
+//! Grains as a [`MechanicalSystem`]: a diagonal mass matrix, contacts
+//! between pairs of bodies, and a machine with a dense one.
 
 use std::sync::OnceLock;
 
@@ -21,7 +22,7 @@ use crate::solver::{
 };
 use crate::spatial::space::body_velocities;
 
-/// A place that holds nothing that moves: c = s = 0 there.
+/// The place of fixed bodies, with c = s = 0.
 const NOWHERE: u32 = 0;
 
 /// Matrices of a step: scratch.
@@ -34,12 +35,12 @@ pub struct GrainParts<const D: usize> {
     pub(super) facing: Vec<Facing<D>>,
     pub(super) pairs: BodyPairs<D>,
     pub(super) machine: MachineParts,
-    /// W, made where it is asked for.
+    /// W, assembled on request.
     operator: OnceLock<BlockSparseDelassus>,
 }
 
 impl<const D: usize> Clone for GrainParts<D> {
-    /// Scratch is not worth copying.
+    /// Scratch is not copied.
     fn clone(&self) -> Self {
         Self::default()
     }
@@ -58,12 +59,12 @@ impl<const D: usize> GrainParts<D> {
     }
 }
 
-/// Grains, with what acts on them in a step.
+/// Grains and the loads on them in a step.
 #[derive(Debug)]
 pub struct GrainSystem<'a, const D: usize> {
     /// The description.
     pub scene: &'a GrainScene<D>,
-    /// Which grains sleep (n): they have no velocity and stay where they are, whatever touches them.
+    /// Which grains sleep (n): they have no velocity and stay in place, whatever touches them.
     pub asleep: &'a [bool],
     /// Torques of the machine, N m.
     pub inputs: &'a [f64],
@@ -73,7 +74,8 @@ pub struct GrainSystem<'a, const D: usize> {
     pub parts: &'a mut GrainParts<D>,
 }
 
-/// Velocity of the rim of a grain that faces along ∓n, in the contact's frame: `r` is negative where n points away from it.
+/// Velocity of the rim of a grain that faces along ∓n, in the contact's
+/// frame: `r` is negative where n points away from it.
 ///
 /// In the plane `v + ω r t`; in space `v − r ω × n`.
 #[inline]
@@ -139,8 +141,8 @@ const fn dimension(dimensions: usize) -> Dimension {
     }
 }
 
-/// Its energy is not audited: frames stay where the step begins and grains have no gyroscopic terms, so that a step with θ ≥ ½ is passive by
-/// construction.
+/// Its energy is not audited: frames are those of the start of the step and grains have no
+/// gyroscopic terms, so a step with θ ≥ ½ is passive by construction.
 impl<const D: usize> MechanicalSystem for GrainSystem<'_, D>
 where
     BodyPairs<D>: Swept<D>,
@@ -306,7 +308,7 @@ where
         };
         for contact in contacts {
             let GrainKey { a, b } = contact.key;
-            // A wheel is none of the grains: its side of the pair holds nothing.
+            // A wheel is not a grain: its side of the pair is empty.
             let (at_a, c_a, s_a) = side(a);
             let (at_b, c_b, s_b) = side(b);
             let frame = contact.frame();
@@ -400,9 +402,10 @@ where
         FrictionContactProblem::from_assembled_sparse(self.parts.operator(), q, mu)
     }
 
-    /// Newton's law for a pair that comes together fast within the step; any other may close by its gap.
+    /// Newton's law for a pair that collides within the step; any other pair may close by its gap.
     ///
-    /// With `e u_N⁻ + s` and any s ≥ 0 a frictionless impact gains no energy, see [`crate::law::newton_impact`]: here s is what the gap allows.
+    /// With `e u_N⁻ + s` and any s ≥ 0 a frictionless impact gains no energy, see
+    /// [`crate::law::newton_impact`]: here s is what the gap allows.
     fn normal_shift(
         &self,
         options: &StepOptions,
@@ -451,7 +454,7 @@ where
     }
 }
 
-/// What the tangential impulses turn, divided by r: p_t in the plane, `b p_t − t p_b` in space.
+/// Moment of the tangential impulses, divided by r: p_t in the plane, `b p_t − t p_b` in space.
 fn moment<const D: usize>(frame: &[SVector<f64, D>; D], p: &[f64; D]) -> SVector<f64, D> {
     if D == 2 {
         return SVector::from_fn(|k, _| if k == 0 { p[1] } else { 0.0 });
