@@ -232,7 +232,7 @@ def shaped_run() -> RoverRun:
     """The same run of a rover whose first beam is made of turned shapes, a ball among them."""
     description = RoverModel().to_dict()
     beam = description["solids"][1]
-    del beam["shape"]
+    del beam["shape"], beam["collides"]
     beam["shapes"] = [
         {"kind": "box", "size": [0.1, 0.2, 0.9], "rotation": [0.0, 0.4, 0.2]},
         {"kind": "sphere", "radius": 0.1, "position": [0.0, 0.2, 0.1]},

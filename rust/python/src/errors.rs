@@ -201,6 +201,7 @@ impl From<ModelError> for BorderError {
             | ModelError::CoupledApart { .. }
             | ModelError::CannotCollide { .. }
             | ModelError::NotWithShapes { .. }
+            | ModelError::HalfGiven { .. }
             | ModelError::NoVolume { .. } => Value::Nothing,
             ModelError::DuplicateName { name, .. }
             | ModelError::UnknownParent { name, .. }

@@ -148,6 +148,14 @@ pub enum ModelError {
         /// The field's name.
         what: &'static str,
     },
+    /// A mass centre without an inertia, or the other way round, beside a list of shapes.
+    #[error(
+        "{field}: is missing; a solid with shapes states inertia and centre_of_mass, or neither"
+    )]
+    HalfGiven {
+        /// Path of the field that is missing.
+        field: String,
+    },
     /// Masses of shapes that are together not the solid's, or leave nothing to the others.
     #[error(
         "{field}: {value} kg contradicts the masses of its shapes, {sum} kg together; they are equal where every shape has one, else the solid's is larger"
@@ -245,6 +253,7 @@ impl ModelError {
             | Self::ImpossibleInertia { field, .. }
             | Self::CannotCollide { field }
             | Self::NotWithShapes { field, .. }
+            | Self::HalfGiven { field }
             | Self::MassesContradict { field, .. }
             | Self::NoVolume { field }
             | Self::OutOfRange { field, .. }

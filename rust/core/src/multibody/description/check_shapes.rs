@@ -37,7 +37,7 @@ pub(super) fn check_shapes(i: usize, solid: &SolidDescription) -> Result<(), Mod
         } else {
             "centre_of_mass"
         };
-        return Err(ModelError::Missing { field: at(missing) });
+        return Err(ModelError::HalfGiven { field: at(missing) });
     }
     Ok(())
 }
