@@ -46,8 +46,8 @@ fn a_differential_is_one_coordinate() {
     );
 }
 
-/// The same differential with a very stiff hold between the rockers is the
-/// limit of what the coupling does exactly.
+/// A very stiff hold between the rockers approaches the differential that the coupling models
+/// exactly.
 #[test]
 fn a_follower_on_a_free_body_stays_where_the_ratio_says() {
     let body = solid("body", None, JointKind::Free);
