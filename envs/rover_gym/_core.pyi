@@ -656,10 +656,18 @@ class Contacts:
 
     @property
     def bodies(self) -> list[str]:
-        """Names of the solids that touch the ground."""
+        """Names of the solids that touch, and of the joints that are at a stop."""
+    @property
+    def kinds(self) -> list[str]:
+        """What touches, one name a contact: "wheel", "box", "sphere", or "limit" for a joint's stop.
+
+        The point of a stop is the origin of the solid that the joint carries, its normal is the
+        joint's axis that opens the gap. Along it, at a revolute joint, the gap is in rad, the
+        impulse in N m s and the velocity in rad/s; tangential entries are zero.
+        """
     @property
     def wheels(self) -> npt.NDArray[np.int64]:
-        """Indices of the wheels that touch, (n,); -1 where it is another solid."""
+        """Indices of the wheels that touch, (n,); -1 where it is another solid or a joint's stop."""
     @property
     def points(self) -> _Array:
         """Contact points, world frame, (n, 3), m."""
@@ -879,7 +887,10 @@ class Simulation:
             CommandError: As of these two methods. Nothing has changed.
         """
     def set_joint_torques(self, torques: npt.ArrayLike) -> None:
-        """Sets torques about the joint axes, added to the wheels' and without a limit.
+        """Sets torques about the joint axes.
+
+        A joint with a drive of its own saturates at its limit and has its motor's line. At all
+        others the torques are added to the wheels' and have no limit.
 
         Args:
             torques: Torques, (n_joints,), N m, in the order of `RoverModel.joint_names`.

@@ -262,3 +262,45 @@ def test_too_few_iterations_are_reported_not_hidden():
     assert not report.is_converged
     assert report.residual > 1e-12
     assert np.isfinite(sim.q).all()
+
+
+def test_a_joint_at_its_stop_is_among_the_contacts():
+    bob = {
+        "name": "bob",
+        "joint": "revolute",
+        "position": [0.0, 5.0, 0.0],
+        "axis": [0.0, 0.0, 1.0],
+        "mass": 2.0,
+        "shape": {"kind": "disc", "radius": 0.1},
+        "centre_of_mass": [0.0, -0.5, 0.0],
+        "limits": {"lower": 0.3, "upper": 1.0},
+        "drive": {"torque_limit": 1.5},
+    }
+    model = rover_gym.RoverModel.from_dict({"name": "pendulum", "solids": [bob]})
+    sim = rover_gym.Simulation(model)
+    sim.set_state([0.5])
+    sim.step(400)
+    contacts = sim.contacts
+    assert contacts.bodies == ["bob"]
+    assert contacts.kinds == ["limit"]
+    assert contacts.wheels.tolist() == [-1]
+    np.testing.assert_allclose(contacts.points, [[0.0, 5.0, 0.0]], atol=1e-15)
+    np.testing.assert_allclose(contacts.frames[0, 0], [0.0, 0.0, 1.0], atol=1e-15)
+    weight = 2.0 * 9.81 * 0.5 * np.sin(0.3)
+    np.testing.assert_allclose(contacts.impulses / sim.time_step, [[weight, 0.0, 0.0]], atol=1e-6)
+    # The drive takes off the stop what it can.
+    sim.set_joint_torques([100.0])
+    sim.step(5)
+    np.testing.assert_allclose(sim.contacts.impulses[0, 0] / sim.time_step, weight - 1.5, atol=1e-6)
+    again = pickle.loads(pickle.dumps(sim))  # noqa: S301
+    assert again.contacts.kinds == ["limit"]
+    assert again.model.to_dict() == model.to_dict()
+
+
+def test_limits_that_exclude_each_other_are_refused():
+    description = rover_gym.RoverModel().to_dict()
+    description["solids"][1]["limits"] = {"lower": 0.2, "upper": 0.1}
+    with pytest.raises(rover_gym.ModelError, match=r"must be below the upper limit 0\.1, is 0\.2") as caught:
+        rover_gym.RoverModel.from_dict(description)
+    assert caught.value.field == "solids[1].limits.lower"
+    assert caught.value.value == 0.2

@@ -19,10 +19,10 @@ from rover_gym import Plane, RoverModel, SphereField
 from rover_gym.cli import app
 from rover_gym.figures import draw_run
 from rover_gym.record import RecordingError, RoverRun, Trajectory, read_run
-from rover_gym.rendering.appearance import rover_parts
+from rover_gym.rendering.appearance import rover_parts, sphere_mesh
 from rover_gym.replay import write_gltf, write_page, write_vrml
 from rover_gym.replay.rotation import axis_angles, continuous, quaternions
-from rover_gym.replay.scenery import ground_tiles, identifiers, sphere_mesh
+from rover_gym.replay.scenery import ground_tiles, identifiers
 
 SLOPE = Plane((-0.1, 1.0, 0.05), 0.2)
 FIELD = SphereField([[1.0, 0.1, -0.5], [2.0, 0.0, 0.7]], [0.2, 0.3], SLOPE)
@@ -228,8 +228,21 @@ def test_vrml_has_the_poses_of_the_run(terrain: Plane | SphereField, tmp_path: P
         assert still["translation"] == pytest.approx(run.positions[0, i], abs=1e-6)
 
 
-def test_vrml_has_the_ground_the_spheres_and_every_part(tmp_path: Path) -> None:
-    run = turning_run(FIELD)
+def shaped_run() -> RoverRun:
+    """The same run of a rover whose first beam is made of turned shapes, a ball among them."""
+    description = RoverModel().to_dict()
+    beam = description["solids"][1]
+    del beam["shape"]
+    beam["shapes"] = [
+        {"kind": "box", "size": [0.1, 0.2, 0.9], "rotation": [0.0, 0.4, 0.2]},
+        {"kind": "sphere", "radius": 0.1, "position": [0.0, 0.2, 0.1]},
+        {"kind": "cylinder", "radius": 0.1, "height": 0.2, "visible": False},
+    ]
+    return replace(turning_run(), model=RoverModel.from_dict(description))
+
+
+@pytest.mark.parametrize("run", [turning_run(FIELD), shaped_run()], ids=["plain", "shaped"])
+def test_vrml_has_the_ground_the_spheres_and_every_part(run: RoverRun, tmp_path: Path) -> None:
     vrml = Vrml(write_vrml(run, tmp_path / "out.wrl").read_text(encoding="utf-8"))
     ground = vrml.named["Ground"].fields["geometry"].fields
     points = np.array(ground["coord"].fields["point"]).reshape(-1, 3)

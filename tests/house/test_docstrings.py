@@ -26,12 +26,13 @@ def is_class(name: str) -> bool:
     return isinstance(runtime(name), type)
 
 
-PUBLIC = [name for name in vars(_core) if not name.startswith("_")]
+# Sorted: PyO3 keeps members in no order that two processes would share.
+PUBLIC = sorted(name for name in vars(_core) if not name.startswith("_"))
 MEMBERS = [
     f"{name}.{member}"
     for name in PUBLIC
     if is_class(name) and not issubclass(runtime(name), Exception)
-    for member in vars(runtime(name))
+    for member in sorted(vars(runtime(name)))
     if not member.startswith("_")
 ]
 # A class is called if it has a constructor; the signature is the class's own, and Python keeps no other.

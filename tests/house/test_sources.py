@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 NOTATION = ROOT / "docs" / "notation.md"
 
 # A sentence may begin with one of these words before a number that is no year.
-NAME = r"(?:\b(?:[Dd]e|[Vv]an|[Vv]on) )?\b(?!(?:After|At|In|Of|With)\b)[A-ZÀ-Þ][\w'-]{1,20}(?<=\w)"
+NAME = r"(?:\b(?:[Dd]e|[Vv]an(?: den)?|[Vv]on) )?\b(?!(?:After|At|In|Of|With)\b)[A-ZÀ-Þ][\w'-]{1,20}(?<=\w)"
 CITATION = re.compile(rf"({NAME}(?:(?:, | and |, and ){NAME})*(?: et al\.)?),? \(?((?:1[6-9]|20)\d\d)\b")
 ENTRY = re.compile(r"^- \*\*(.+?)\.\*\* ", re.MULTILINE)
 
@@ -64,7 +64,7 @@ def test_what_a_comment_calls_its_source_is_cited_by_names_and_year() -> None:
 
 def test_entries_are_sorted_and_spelled_as_they_are_cited() -> None:
     def key(entry: str) -> str:
-        return re.sub(r"^de ", "", entry.lower()) if entry.startswith("de ") else entry.lower()
+        return re.sub(r"^(?:de|van den) ", "", entry).lower()
 
     assert len(ENTRIES) == len(set(ENTRIES))
     assert sorted(ENTRIES, key=key) == ENTRIES

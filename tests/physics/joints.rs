@@ -9,6 +9,10 @@ mod coupling;
 mod derivatives;
 #[path = "joints/descriptions.rs"]
 mod descriptions;
+#[path = "joints/drives.rs"]
+mod drives;
+#[path = "joints/limits.rs"]
+mod limits;
 #[path = "joints/machines.rs"]
 mod machines;
 #[path = "joints/several_trees.rs"]

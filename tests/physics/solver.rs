@@ -638,7 +638,8 @@ fn broken_laws(problem: &Problem, p: &[f64]) -> Vec<String> {
             ),
             (
                 "slip without friction against it",
-                slip > speed && size(&opposed) > 1e-6 * limit + tangential,
+                // The direction of a slip is known to `speed / slip`.
+                slip > speed && size(&opposed) > limit * (1e-6 + speed / slip) + tangential,
             ),
         ] {
             if is_broken {

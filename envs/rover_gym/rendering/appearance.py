@@ -1,4 +1,4 @@
-"""What the rover looks like: boxes and cylinders on its solids, made from the model's own shapes.
+"""What the rover looks like: boxes, cylinders and balls on its solids, made from the model's own shapes.
 
 No renderer is imported here, so that frames, the browser page and the exported scenes all show the same rover. Each
 part rides on one solid: a point `x` of the part lies in the world at `o + R (position + rotation x)`, with `(o, R)` the
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from rover_gym.mechanics import RoverModel
 
@@ -48,19 +48,20 @@ PLATE = 0.012  # m, thickness of what is laid on a surface, and of the forks' pl
 
 @dataclass(frozen=True)
 class Part:
-    """A box or a cylinder on a solid.
+    """A box, a cylinder or a ball on a solid.
 
     Attributes:
         solid: The solid whose frame it rides on, a key of `RoverModel.poses`.
-        kind: "box" or "cylinder".
-        size: m. A box: edge lengths along the part's x, y, z. A cylinder: radius, and height along the part's y.
+        kind: "box", "cylinder" or "sphere".
+        size: m. A box: edge lengths along the part's x, y, z. A cylinder: radius, and height along the part's y. A
+            ball: radius.
         position: Centre in the solid's frame, m.
         rotation: (3, 3), columns are the part's axes in the solid's frame.
         colour: Red, green, blue, 0 to 1.
     """
 
     solid: str
-    kind: Literal["box", "cylinder"]
+    kind: Literal["box", "cylinder", "sphere"]
     size: tuple[float, ...]
     position: Vector
     rotation: npt.NDArray[np.float64]
@@ -70,18 +71,25 @@ class Part:
 def rover_parts(model: RoverModel) -> tuple[Part, ...]:
     """The parts of a rover: its solids' shapes, and the marks that tell front from back and show that wheels turn.
 
-    Solids without a shape are not drawn, unless a wheel is fixed to them. Wheels have the contact's radius.
+    Solids without a visible shape are not drawn, unless a wheel is fixed to them. Wheels have the contact's radius; one
+    whose disc is listed among the solid's shapes as not visible is left out.
     """
     description = model.to_dict()
     solids = {solid["name"]: solid for solid in description["solids"]}
     wheels = {wheel["solid"]: wheel for wheel in description["wheels"]}
     parts: list[Part] = []
     for name, solid in solids.items():
+        shapes = _placed_shapes(solid)
         if name in wheels:
-            parts += _wheel_parts(wheels[name])
-            parts += _fork_parts(solid, wheels[name])
-        elif "shape" in solid:
-            parts += _shape_parts(solid)
+            axle = wheels[name]["axle"]
+            discs = [shape for shape in shapes if "shape" in solid or _is_disc_about(shape, axle)]
+            shapes = [shape for shape in shapes if shape not in discs]
+            if not discs or any(shape.visible for shape in discs):
+                parts += _wheel_parts(wheels[name])
+                parts += _fork_parts(solid, wheels[name])
+        for shape in shapes:
+            if shape.visible:
+                parts += _shape_parts(solid, shape)
     return tuple(parts)
 
 
@@ -89,8 +97,8 @@ def part_mesh(part: Part, resolution: int = 24) -> tuple[npt.NDArray[np.float64]
     """The part's surface as triangles, with vertices of their own on each flat side, so that edges stay sharp.
 
     Args:
-        part: A box or a cylinder.
-        resolution: Number of flat sides that a cylinder's mantle is made of, at least 3.
+        part: A box, a cylinder or a ball.
+        resolution: Number of flat sides that a cylinder's mantle or a ball's equator is made of, at least 3.
 
     Returns:
         Vertices (n, 3) in the part's frame, m, and triangles (m, 3), indices of vertices, counter-clockwise seen from
@@ -98,26 +106,85 @@ def part_mesh(part: Part, resolution: int = 24) -> tuple[npt.NDArray[np.float64]
     """
     if part.kind == "box":
         return _box_mesh(part.size)
+    if part.kind == "sphere":
+        vertices, triangles = sphere_mesh(resolution // 2)
+        return part.size[0] * vertices, triangles
     radius, height = part.size
     return _cylinder_mesh(radius, height, resolution)
 
 
-def _shape_parts(solid: Mapping[str, Any]) -> Iterator[Part]:
-    name, shape = solid["name"], solid["shape"]
-    centre = tuple(solid.get("centre_of_mass", (0.0, 0.0, 0.0)))
+def sphere_mesh(rings: int = 8) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
+    """The unit sphere: vertices (n, 3), on it, and triangles, counter-clockwise seen from outside."""
+    columns = 2 * rings
+    polar, around = np.meshgrid(
+        np.linspace(0.0, np.pi, rings + 1), np.linspace(0.0, 2.0 * np.pi, columns + 1), indexing="ij"
+    )
+    vertices = np.stack((np.sin(polar) * np.cos(around), np.cos(polar), np.sin(polar) * np.sin(around)), axis=-1)
+    i, k = (grid.ravel() for grid in np.meshgrid(np.arange(rings), np.arange(columns), indexing="ij"))
+    a = i * (columns + 1) + k
+    b = a + columns + 1
+    triangles = np.concatenate((np.stack((a, a + 1, b + 1), axis=1), np.stack((a, b + 1, b), axis=1)))
+    proper = np.concatenate((i != 0, i != rings - 1))  # at the poles one of a square's two triangles is a line
+    return vertices.reshape(-1, 3), triangles[proper].astype(np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class _PlacedShape:
+    """A shape of a description, with its pose in the solid's frame."""
+
+    shape: Mapping[str, Any]
+    position: Vector
+    rotation: npt.NDArray[np.float64]
+    visible: bool
+
+
+def _placed_shapes(solid: Mapping[str, Any]) -> list[_PlacedShape]:
+    """The shapes of a solid: the only one, at the mass centre, or those that are listed."""
+    if "shape" in solid:
+        return [_PlacedShape(solid["shape"], _vector(solid.get("centre_of_mass")), np.eye(3), visible=True)]
+    return [
+        _PlacedShape(
+            shape,
+            _vector(shape.get("position")),
+            _turn_by(_vector(shape.get("rotation"))),
+            shape.get("visible", True),
+        )
+        for shape in solid.get("shapes", ())
+    ]
+
+
+def _vector(given: Sequence[float] | None) -> Vector:
+    x, y, z = given or (0.0, 0.0, 0.0)
+    return float(x), float(y), float(z)
+
+
+def _is_disc_about(placed: _PlacedShape, axle: Sequence[float]) -> bool:
+    """Whether a shape is a disc that a wheel with this axle, through the solid's origin, is made of."""
+    if placed.shape["kind"] != "disc":
+        return False
+    across = np.cross(placed.rotation[:, 2], np.array(axle) / np.linalg.norm(axle))
+    off = np.linalg.norm(placed.position)
+    return bool(np.linalg.norm(across) < 1e-9 and off < 1e-9 * placed.shape["radius"])
+
+
+def _shape_parts(solid: Mapping[str, Any], placed: _PlacedShape) -> Iterator[Part]:
+    name, shape, centre, rotation = solid["name"], placed.shape, placed.position, placed.rotation
     if shape["kind"] == "box":
         size = tuple(shape["size"])
         if "parent" not in solid:
-            yield _box(name, size, centre, TRUNK_COLOUR)
-            yield from _trunk_marks(name, size, centre)
+            yield Part(name, "box", size, centre, rotation, TRUNK_COLOUR)
+            if "shape" in solid:
+                yield from _trunk_marks(name, size, centre)
         else:
-            about_x = abs(solid["axis"][0]) > 0.5
-            yield _box(name, size, centre, AXLE_COLOUR if about_x else BOGIE_COLOUR)
+            about_x = abs(solid.get("axis", (0.0, 0.0, 0.0))[0]) > 0.5
+            yield Part(name, "box", size, centre, rotation, AXLE_COLOUR if about_x else BOGIE_COLOUR)
     elif shape["kind"] == "cylinder":
         size = (shape["radius"], shape["height"])
-        yield Part(name, "cylinder", size, centre, np.eye(3), COLUMN_COLOUR)
+        yield Part(name, "cylinder", size, centre, rotation, COLUMN_COLOUR)
+    elif shape["kind"] == "sphere":
+        yield Part(name, "sphere", (shape["radius"],), centre, rotation, COLUMN_COLOUR)
     else:  # a thin disc about z that is no wheel
-        turn = _turn_to(np.array([0.0, 0.0, 1.0]))
+        turn = rotation @ _turn_to(np.array([0.0, 0.0, 1.0]))
         yield Part(name, "cylinder", (shape["radius"], PLATE), centre, turn, HUB_COLOUR)
 
 
@@ -197,6 +264,17 @@ def _fork_box(
 
 def _box(name: str, size: tuple[float, ...], centre: Vector, colour: Colour) -> Part:
     return Part(name, "box", size, centre, np.eye(3), colour)
+
+
+def _turn_by(vector: Vector) -> npt.NDArray[np.float64]:
+    """The rotation about a rotation vector: the axis times the angle, rad."""
+    angle = float(np.linalg.norm(vector))
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = np.array(vector) / angle
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    turned: npt.NDArray[np.float64] = np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
+    return turned
 
 
 def _turn_to(axis: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

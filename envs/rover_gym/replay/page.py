@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR
+from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR, sphere_mesh
 from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server, rgb, rounded, shortened, with_panel
 from rover_gym.replay.rotation import continuous, quaternions
 from rover_gym.replay.scenery import (
@@ -19,7 +19,6 @@ from rover_gym.replay.scenery import (
     ground_tiles,
     identifiers,
     parts_by_solid,
-    sphere_mesh,
     spheres,
     trunk_path,
 )

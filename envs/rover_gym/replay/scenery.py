@@ -141,21 +141,6 @@ def parts_by_solid(run: RoverRun) -> dict[str, tuple[Part, ...]]:
     return {name: tuple(part for part in parts if part.solid == name) for name in run.model.solid_names}
 
 
-def sphere_mesh(rings: int = 8) -> tuple[Array, Triangles]:
-    """The unit sphere: vertices (n, 3), on it, and triangles, counter-clockwise seen from outside."""
-    columns = 2 * rings
-    polar, around = np.meshgrid(
-        np.linspace(0.0, np.pi, rings + 1), np.linspace(0.0, 2.0 * np.pi, columns + 1), indexing="ij"
-    )
-    vertices = np.stack((np.sin(polar) * np.cos(around), np.cos(polar), np.sin(polar) * np.sin(around)), axis=-1)
-    i, k = (grid.ravel() for grid in np.meshgrid(np.arange(rings), np.arange(columns), indexing="ij"))
-    a = i * (columns + 1) + k
-    b = a + columns + 1
-    triangles = np.concatenate((np.stack((a, a + 1, b + 1), axis=1), np.stack((a, b + 1, b), axis=1)))
-    proper = np.concatenate((i != 0, i != rings - 1))  # at the poles one of a square's two triangles is a line
-    return vertices.reshape(-1, 3), triangles[proper].astype(np.int32)
-
-
 def first_view(run: RoverRun, distance: float = 4.0) -> View:
     """From beside and a little behind the rover at its start, so that it drives away from the eye."""
     path = trunk_path(run)

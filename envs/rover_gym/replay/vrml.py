@@ -124,6 +124,8 @@ def _ground(run: RoverRun) -> Iterator[str]:
 def _part(part: Part) -> str:
     if part.kind == "box":
         geometry = f"Box {{ size {_numbers(part.size)} }}"
+    elif part.kind == "sphere":
+        geometry = f"Sphere {{ radius {_numbers(part.size)} }}"
     else:
         radius, height = part.size
         geometry = f"Cylinder {{ radius {_numbers([radius])} height {_numbers([height])} }}"  # about y, as ours

@@ -58,6 +58,7 @@ impl Contacts {
             Part::Wheel(i) => model.description().wheels[i].solid.clone(),
             Part::Box(i) => model.boxes()[i].name.clone(),
             Part::Sphere(i) => model.spheres()[i].name.clone(),
+            Part::Limit(i, _) => model.bodies()[model.joints()[i].body].name.clone(),
         };
         Self {
             active: Columns(active.to_vec()),
@@ -68,18 +69,34 @@ impl Contacts {
 
 #[pymethods]
 impl Contacts {
-    /// Names of the solids that touch the ground.
+    /// Names of the solids that touch, and of the joints that are at a stop.
     #[getter]
     fn bodies(&self) -> Vec<String> {
         self.bodies.clone()
     }
 
-    /// Indices of the wheels that touch, (n,); -1 where it is another solid.
+    /// What touches, one name a contact: "wheel", "box", "sphere", or "limit" for a joint's stop.
+    ///
+    /// The point of a stop is the origin of the solid that the joint carries, its normal is the
+    /// joint's axis that opens the gap. Along it, at a revolute joint, the gap is in rad, the
+    /// impulse in N m s and the velocity in rad/s; tangential entries are zero.
+    #[getter]
+    fn kinds(&self) -> Vec<&'static str> {
+        let kind = |a: &ActiveContact<Contact>| match a.contact.part {
+            Part::Wheel(_) => "wheel",
+            Part::Box(_) => "box",
+            Part::Sphere(_) => "sphere",
+            Part::Limit(..) => "limit",
+        };
+        self.active.0.iter().map(kind).collect()
+    }
+
+    /// Indices of the wheels that touch, (n,); -1 where it is another solid or a joint's stop.
     #[getter]
     fn wheels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         let index = |a: &ActiveContact<Contact>| match a.contact.part {
             Part::Wheel(i) => i64::try_from(i).unwrap_or(-1),
-            Part::Box(_) | Part::Sphere(_) => -1,
+            Part::Box(_) | Part::Sphere(_) | Part::Limit(..) => -1,
         };
         PyArray1::from_iter(py, self.active.0.iter().map(index))
     }

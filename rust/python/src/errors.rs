@@ -199,7 +199,9 @@ impl From<ModelError> for BorderError {
             | ModelError::NotForJoint { .. }
             | ModelError::OtherTree { .. }
             | ModelError::CoupledApart { .. }
-            | ModelError::CollidesWithoutBox { .. } => Value::Nothing,
+            | ModelError::CannotCollide { .. }
+            | ModelError::NotWithShapes { .. }
+            | ModelError::NoVolume { .. } => Value::Nothing,
             ModelError::DuplicateName { name, .. }
             | ModelError::UnknownParent { name, .. }
             | ModelError::UnknownName { name, .. }
@@ -207,8 +209,10 @@ impl From<ModelError> for BorderError {
             | ModelError::SteeringNotAbove { name, .. } => Value::Text(name.clone()),
             ModelError::NotFinite { value, .. }
             | ModelError::NotPositive { value, .. }
+            | ModelError::NotBelow { value, .. }
             | ModelError::Negative { value, .. }
             | ModelError::OutOfRange { value, .. }
+            | ModelError::MassesContradict { value, .. }
             | ModelError::RadiusContradictsShape { value, .. }
             | ModelError::NotASign { value, .. } => Value::Number(*value),
             ModelError::TooMany { count, .. } => Value::Count(*count),

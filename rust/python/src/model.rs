@@ -9,8 +9,8 @@ use pyo3::types::{PyDict, PyMapping};
 use rover_core::contact::{Contact, detection::wheel_contacts};
 use rover_core::multibody::bias::BiasScratch;
 use rover_core::multibody::{
-    Configuration, Joint, Kinematics, MassMatrix, Model, ModelDescription, ModelError,
-    SolidDescription, bias, coordinates, description::MAX_TEXT, momentum,
+    Configuration, Joint, Kinematics, MassMatrix, Model, ModelDescription, ModelError, bias,
+    coordinates, description::MAX_TEXT, momentum,
 };
 use rover_core::nalgebra::{DMatrix, DVector, Vector3};
 
@@ -341,7 +341,7 @@ impl RoverModel {
         }
         if let Some(scale) = read(mass_scale, "mass_scale")? {
             for solid in &mut description.solids {
-                set_mass(solid, solid.mass * scale);
+                solid.set_mass(solid.mass * scale);
             }
         }
         let stiffness = read(steering_stiffness, "steering_stiffness")?;
@@ -887,15 +887,6 @@ impl RoverModel {
     }
 }
 
-/// Changes a mass; an inertia that the description states goes with it.
-fn set_mass(solid: &mut SolidDescription, mass: f64) {
-    let scale = mass / solid.mass;
-    for entry in solid.inertia.iter_mut().flatten() {
-        *entry *= scale;
-    }
-    solid.mass = mass;
-}
-
 /// Masses by name, or one for each solid.
 fn replace_masses(description: &mut ModelDescription, masses: &Bound<'_, PyAny>) -> PyResult<()> {
     if let Ok(map) = masses.cast::<PyMapping>() {
@@ -907,7 +898,7 @@ fn replace_masses(description: &mut ModelDescription, masses: &Bound<'_, PyAny>)
                 let field = "masses".to_owned();
                 return Err(BorderError::from(ModelError::UnknownName { field, name }).into());
             };
-            set_mass(solid, mass);
+            solid.set_mass(mass);
         }
         return Ok(());
     }
@@ -927,7 +918,7 @@ fn replace_masses(description: &mut ModelDescription, masses: &Bound<'_, PyAny>)
         .into());
     }
     for (solid, mass) in description.solids.iter_mut().zip(values) {
-        set_mass(solid, mass);
+        solid.set_mass(mass);
     }
     Ok(())
 }

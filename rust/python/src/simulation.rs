@@ -384,7 +384,10 @@ impl Simulation {
             .map_err(BorderError::from)?)
     }
 
-    /// Sets torques about the joint axes, added to the wheels' and without a limit.
+    /// Sets torques about the joint axes.
+    ///
+    /// A joint with a drive of its own saturates at its limit and has its motor's line. At all
+    /// others the torques are added to the wheels' and have no limit.
     ///
     /// Args:
     ///     torques: Torques, (n_joints,), N m, in the order of `RoverModel.joint_names`.

@@ -71,9 +71,9 @@ fn a_stone_lies_beside_a_rover() {
     use std::sync::Arc;
     let mut description = ModelDescription::rover();
     let mut stone = solid("stone", None, JointKind::Free);
-    stone.shape = rover_core::multibody::Shape::Box {
+    stone.shape = Some(rover_core::multibody::Shape::Box {
         size: [0.4, 0.2, 0.3],
-    };
+    });
     stone.collides = true;
     stone.mass = 20.0;
     description.solids.push(stone);

@@ -7,7 +7,7 @@ use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::bias::BiasScratch;
 use rover_core::multibody::{
-    Kinematics, MassMatrix, Model, ModelDescription, Motor, bias, coordinates,
+    Kinematics, Limits, MassMatrix, Model, ModelDescription, Motor, bias, coordinates,
 };
 use rover_core::planar::{ContactRule, Line, MirroredRover, PlanarError, PlanarMachine, Sine};
 use rover_core::simulation::{MirroredRoverSimulation, RoverSimulation};
@@ -236,6 +236,22 @@ fn a_rover_without_a_mirror_image_is_refused_by_name() {
         panic!("{refused}");
     };
     assert_eq!(body, "left_bogie");
+
+    let mut stopped = ModelDescription::rover();
+    for solid in &mut stopped.solids {
+        if solid.name.ends_with("bogie") {
+            solid.limits = Some(Limits {
+                lower: -0.5,
+                upper: 0.5,
+            });
+        }
+    }
+    let stopped = Model::from_description(stopped).unwrap();
+    let body = "left_bogie".to_owned();
+    assert_eq!(
+        MirroredRover::<7>::new(&stopped).unwrap_err(),
+        PlanarError::NotMirrored { body }
+    );
 
     let bent = Model::rover()
         .with_locked_joints(&[("steering_ML".to_owned(), 0.1)])

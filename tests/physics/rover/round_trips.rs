@@ -113,7 +113,7 @@ fn a_wheel_of_another_radius_is_another_disc() {
     let touching = rover.with_contact_radius(0.25).unwrap();
     assert_eq!(wheel(&touching), wheel(&rover));
     assert!((touching.wheels()[0].radius - 0.25).abs() < 1e-15);
-    // One radius throughout; an explicit inertia is kept.
+    // One radius throughout, and a stated inertia scales with it.
     assert_eq!(
         touching
             .with_wheel_radius(0.25)
@@ -143,7 +143,7 @@ fn a_radius_that_contradicts_the_shape_is_refused() {
     assert!(refused.to_string().contains("contact_radius"), "{refused}");
     let mut description = ModelDescription::rover();
     let solid = description.solids.iter_mut().find(|s| s.name == "wheel_ML");
-    solid.unwrap().shape = Shape::Box { size: [0.2; 3] };
+    solid.unwrap().shape = Some(Shape::Box { size: [0.2; 3] });
     let model = Model::from_description(description).unwrap();
     assert!(matches!(
         model.with_wheel_radius(0.2),

@@ -158,7 +158,7 @@ fn bad_descriptions_are_refused_by_field() {
         }),
         ("solids[1].position", |d| d.solids[1].position = None),
         ("solids[1].shape.radius", |d| {
-            d.solids[1].shape = rover_core::multibody::Shape::Disc { radius: -0.1 }
+            d.solids[1].shape = Some(rover_core::multibody::Shape::Disc { radius: -0.1 });
         }),
         ("solids[1].inertia", |d| {
             d.solids[1].inertia = Some([1.0, 1.0, 3.0, 0.0, 0.0, 0.0]);

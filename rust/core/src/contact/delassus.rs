@@ -7,7 +7,8 @@
 use std::ops::Range;
 
 use super::jacobian::{Columns, columns, columns_of_other, relative_velocity};
-use super::pair::Contact;
+use super::limit;
+use super::pair::{Contact, Opposite};
 use crate::multibody::{BASE, FactoredMassMatrix, Kinematics, Model};
 
 /// The contacts of a step in matrix form. Scratch: grows to what was needed most, then reuses it.
@@ -22,9 +23,9 @@ pub struct ContactSystem {
     stride: usize,
     /// Body of each contact.
     bodies: Vec<usize>,
-    /// From where to where in `unions` a contact of two bodies has its rows; nothing of one with the ground. Empty where there is none of two.
+    /// From where to where in `unions` a contact of two bodies, or a stop, has its rows; nothing of one with the ground. Empty where all are.
     spans: Vec<Range<usize>>,
-    /// Velocities along the unions of two paths, ascending, and Z there.
+    /// Velocities along the unions of two paths, or along a stop's, ascending, and Z there.
     unions: Vec<(usize, Columns)>,
     /// One column a velocity (nv), while a union is made.
     full: Vec<Columns>,
@@ -73,8 +74,14 @@ impl ContactSystem {
         self.u.resize(3 * n, 0.0);
         self.W.resize(9 * n * n, 0.0);
         for (c, contact) in contacts.iter().enumerate() {
-            if let Some(other) = contact.other {
-                let u = self.unite(model, kinematics, factor, contact, other.body, v);
+            if !matches!(contact.key.opposite, Opposite::Ground(_)) {
+                let u = match (limit::row(model, contact), contact.other) {
+                    (Some(row), _) => self.stop(model, factor, row, v),
+                    (None, Some(other)) => {
+                        self.unite(model, kinematics, factor, contact, other.body, v)
+                    }
+                    (None, None) => [0.0; 4],
+                };
                 self.u[3 * c..][..3].copy_from_slice(&u[..3]);
                 self.spans.resize(n, 0..0);
                 let begin = self.spans[..c].iter().map(|span| span.end).max();
@@ -88,17 +95,65 @@ impl ContactSystem {
             self.u[3 * c..][..3].copy_from_slice(&u[..3]);
             factor.half_solve_path(path, rows);
         }
+        if self.spans.is_empty() {
+            self.fill_operator(n, |system, c, d| system.block_on_ground(model, c, d));
+        } else {
+            self.fill_operator(n, |system, c, d| system.block(model, c, d));
+        }
+    }
+
+    /// W from its blocks below the diagonal, and on it.
+    #[inline]
+    fn fill_operator(&mut self, n: usize, block: impl Fn(&Self, usize, usize) -> [Columns; 3]) {
         let size = 3 * n;
         for c in 0..n {
             for d in 0..=c {
-                let block = self.block(model, c, d);
+                let block = block(self, c, d);
                 for i in 0..3 {
                     let row = &mut self.W[(3 * c + i) * size + 3 * d..][..3];
                     row.copy_from_slice(&block[i][..3]);
                 }
+                if c == d {
+                    continue; // Symmetric.
+                }
                 for j in 0..3 {
                     let row = &mut self.W[(3 * d + j) * size + 3 * c..][..3];
                     row.copy_from_slice(&[block[0][j], block[1][j], block[2][j]]);
+                }
+            }
+        }
+        if !self.spans.is_empty() {
+            self.close_stops(contacts);
+        }
+    }
+
+    /// Rows of Z of a joint's stop, along the path of the joint's velocity, and its `Hᵀ v`, rad/s or m/s.
+    fn stop(
+        &mut self,
+        model: &Model,
+        factor: &FactoredMassMatrix,
+        (k, sign): (usize, f64),
+        v: &[f64],
+    ) -> Columns {
+        self.full.resize(model.nv(), [0.0; 4]);
+        let path = model.velocity_path(k);
+        for &j in path {
+            self.full[j] = [0.0; 4];
+        }
+        self.full[k][0] = sign;
+        factor.half_solve_columns(model, path.iter().copied(), &mut self.full);
+        self.unions.extend(path.iter().map(|&j| (j, self.full[j])));
+        [sign * v[k], 0.0, 0.0, 0.0]
+    }
+
+    /// Gives the tangential diagonals of stops, which move nothing, their normal's.
+    fn close_stops(&mut self, contacts: &[Contact]) {
+        let size = 3 * contacts.len();
+        for (c, contact) in contacts.iter().enumerate() {
+            if contact.key.opposite == Opposite::Stop {
+                let normal = self.W[3 * c * (size + 1)];
+                for i in [3 * c + 1, 3 * c + 2] {
+                    self.W[i * (size + 1)] = normal;
                 }
             }
         }
@@ -155,37 +210,38 @@ impl ContactSystem {
     }
 
     /// The block of W of two contacts.
-    #[inline]
-    fn block(&self, model: &Model, c: usize, d: usize) -> [[f64; 4]; 3] {
-        // Nine sums that do not wait for each other.
-        let mut block = [[0.0; 4]; 3];
-        let mut add_product = |x: &Columns, y: &Columns| {
-            for (sums, factor) in block.iter_mut().zip(x) {
-                add(sums, *factor, y);
-            }
-        };
+    fn block(&self, model: &Model, c: usize, d: usize) -> [Columns; 3] {
         if self.union(c).is_empty() && self.union(d).is_empty() {
-            let shared = model.common_path(self.bodies[c], self.bodies[d]);
-            let (a, b) = (
-                &self.Z[c * self.stride..][..shared],
-                &self.Z[d * self.stride..][..shared],
-            );
-            for (x, y) in a.iter().zip(b) {
-                add_product(x, y);
-            }
-        } else {
-            let mut right = self.entries(model, d).peekable();
-            for (k, x) in self.entries(model, c) {
-                while right.next_if(|(j, _)| *j < k).is_some() {}
-                if let Some((_, y)) = right.next_if(|(j, _)| *j == k) {
-                    add_product(x, y);
-                }
+            return self.block_on_ground(model, c, d);
+        }
+        let mut block = [[0.0; 4]; 3];
+        let mut right = self.entries(model, d).peekable();
+        for (k, x) in self.entries(model, c) {
+            while right.next_if(|(j, _)| *j < k).is_some() {}
+            if let Some((_, y)) = right.next_if(|(j, _)| *j == k) {
+                add_product(&mut block, x, y);
             }
         }
         block
     }
 
-    /// Rows of a contact of two bodies; nothing of one with the ground.
+    /// The block of W of two contacts with the ground.
+    #[allow(clippy::inline_always)] // as a call it costs a hundredth of a step
+    #[inline(always)]
+    fn block_on_ground(&self, model: &Model, c: usize, d: usize) -> [Columns; 3] {
+        let shared = model.common_path(self.bodies[c], self.bodies[d]);
+        let (a, b) = (
+            &self.Z[c * self.stride..][..shared],
+            &self.Z[d * self.stride..][..shared],
+        );
+        let mut block = [[0.0; 4]; 3];
+        for (x, y) in a.iter().zip(b) {
+            add_product(&mut block, x, y);
+        }
+        block
+    }
+
+    /// Rows of a contact of two bodies or of a stop; nothing of one with the ground.
     #[inline]
     fn union(&self, c: usize) -> &[(usize, Columns)] {
         if self.spans.is_empty() {
@@ -239,6 +295,10 @@ impl ContactSystem {
         out: &mut [f64],
     ) {
         for (contact, values) in contacts.iter().zip(out.chunks_exact_mut(3)) {
+            if let Some((k, sign)) = limit::row(model, contact) {
+                values[0] += sign * v[k];
+                continue;
+            }
             let velocity = relative_velocity(model, kinematics, contact, v);
             for (value, d) in values.iter_mut().zip(contact.frame.rows()) {
                 *value += velocity.dot(&d);
@@ -271,6 +331,14 @@ impl ContactSystem {
                 y[k] += product(z);
             }
         }
+    }
+}
+
+/// `block += x yᵀ`: nine sums that do not wait for each other.
+#[inline]
+fn add_product(block: &mut [Columns; 3], x: &Columns, y: &Columns) {
+    for (sums, factor) in block.iter_mut().zip(x) {
+        add(sums, *factor, y);
     }
 }
 

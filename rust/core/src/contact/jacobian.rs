@@ -5,6 +5,7 @@
 
 use nalgebra::Vector3;
 
+use super::limit;
 use super::pair::Contact;
 use crate::multibody::{BASE, Kinematics, Model};
 
@@ -83,9 +84,17 @@ fn columns_at(
             rows[3 + i] = [xn[i], xt[i], xb[i], 0.0];
         }
     }
-    for (row, &m) in rest.iter_mut().zip(model.motions(body)) {
-        let velocity = kinematics.motions[m].velocity_at(x);
-        *row = [velocity.dot(&n), velocity.dot(&t), velocity.dot(&b), 0.0];
+    let of_motion =
+        |velocity: &Vector3<f64>| [velocity.dot(&n), velocity.dot(&t), velocity.dot(&b), 0.0];
+    let motions = rest.iter_mut().zip(model.motions(body));
+    if model.only_turns() {
+        for (row, &m) in motions {
+            *row = of_motion(&kinematics.motions[m].velocity_if::<true>(x));
+        }
+    } else {
+        for (row, &m) in motions {
+            *row = of_motion(&kinematics.motions[m].velocity_at(x));
+        }
     }
 }
 
@@ -99,27 +108,61 @@ pub fn generalized_impulse(
 ) {
     out.fill(0.0);
     for (contact, p) in contacts.iter().zip(p.chunks_exact(3)) {
+        if let Some((k, sign)) = limit::row(model, contact) {
+            out[k] += sign * p[0];
+            continue;
+        }
         let [n, t, b] = contact.frame.rows();
         let force = n * p[0] + t * p[1] + b * p[2];
+        push(model, kinematics, contact.body, &contact.point, &force, out);
         // The other side, where it is a body, is pushed at the same place the other way.
-        let mut side = Some((contact.body, contact.point, force));
-        let mut other = contact.other;
-        while let Some((body, x, force)) = side {
-            let moment = x.cross(&force);
-            let (lead, rest) = model.split_path(body);
-            if let Some(out) = out[lead].first_chunk_mut::<BASE>() {
-                for i in 0..3 {
-                    out[i] += force[i];
-                    out[3 + i] += moment[i];
-                }
-            }
-            for (&k, &m) in rest.iter().zip(model.motions(body)) {
-                out[k] += kinematics.motions[m].power(&force, &moment);
-            }
-            side = other.take().map(|other| {
-                let x = place_in_tree_of(kinematics, contact, other.body);
-                (other.body, x, -force)
-            });
+        if let Some(other) = contact.other {
+            let x = place_in_tree_of(kinematics, contact, other.body);
+            push_other(model, kinematics, other.body, &x, &-force, out);
         }
     }
+}
+
+/// Adds the generalized impulse of an impulse on a body at a place.
+#[allow(clippy::inline_always)] // as columns_at
+#[inline(always)]
+fn push(
+    model: &Model,
+    kinematics: &Kinematics,
+    body: usize,
+    x: &Vector3<f64>,
+    force: &Vector3<f64>,
+    out: &mut [f64],
+) {
+    let moment = x.cross(force);
+    let (lead, rest) = model.split_path(body);
+    if let Some(out) = out[lead].first_chunk_mut::<BASE>() {
+        for i in 0..3 {
+            out[i] += force[i];
+            out[3 + i] += moment[i];
+        }
+    }
+    let motions = rest.iter().zip(model.motions(body));
+    if model.only_turns() {
+        for (&k, &m) in motions {
+            out[k] += kinematics.motions[m].power_if::<true>(force, &moment);
+        }
+    } else {
+        for (&k, &m) in motions {
+            out[k] += kinematics.motions[m].power(force, &moment);
+        }
+    }
+}
+
+/// The same, apart from the loop over contacts with the ground.
+#[cold]
+fn push_other(
+    model: &Model,
+    kinematics: &Kinematics,
+    body: usize,
+    x: &Vector3<f64>,
+    force: &Vector3<f64>,
+    out: &mut [f64],
+) {
+    push(model, kinematics, body, x, force, out);
 }

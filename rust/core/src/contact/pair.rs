@@ -1,4 +1,4 @@
-//! One unilateral contact: a part of a body against the ground, or against a part of another body.
+//! One unilateral contact: a part of a body against the ground, or against a part of another body, or a joint against its stop.
 //!
 //! The normal points *to* the contact's own part: from the ground to the machine, or from the other body. Between two bodies the contact's
 //! point is halfway between the surfaces, one and the same place for both, so that its impulse changes neither the linear nor the angular momentum of
@@ -17,6 +17,8 @@ pub enum Opposite {
     Ground(u32),
     /// A part of another body, by its [`Part::code`].
     Part(u16),
+    /// Nothing that has a shape: a joint's stop ([`super::limit`]).
+    Stop,
 }
 
 /// Names a contact from one step to the next: both sides, and which point of the pair.
@@ -25,7 +27,7 @@ pub struct ContactKey {
     /// [`Part::code`] of the part.
     pub part: u16,
     /// On the ground a rim point or a corner; on a sphere of the ground 0, or 1 where it is met and passed in one step. Between bodies
-    /// the feature of [`crate::geometry::query::PairPoint`].
+    /// the feature of [`crate::geometry::query::PairPoint`]. Of a joint's stops 0 is the lower one, 1 the upper one.
     pub feature: u16,
     /// The other side.
     pub opposite: Opposite,
@@ -75,7 +77,7 @@ pub struct OtherSide {
     pub body: usize,
 }
 
-/// A point where a body can touch the ground or another body.
+/// A point where a body can touch the ground or another body, or a joint's stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
     /// Its name from step to step.
@@ -84,7 +86,7 @@ pub struct Contact {
     pub part: Part,
     /// Body that carries the part.
     pub body: usize,
-    /// The other body; none where it is the ground.
+    /// The other body; none where it is the ground or a joint's stop.
     pub other: Option<OtherSide>,
     /// Where, relative to the origin of the body's tree, world axes, m: on the ground the body's own point, between bodies halfway.
     pub point: Vector3<f64>,

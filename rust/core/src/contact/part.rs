@@ -15,17 +15,29 @@ pub enum Part {
     Box(usize),
     /// A ball, by its index in the model.
     Sphere(usize),
+    /// A joint that meets its stop, by its index: it has no shape but a point, the origin of what the joint carries.
+    Limit(usize, Side),
 }
 
-/// From here on a code is a ball's, or a box's.
+/// One of a joint's two stops.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Side {
+    /// `q ≥ lower`.
+    Lower,
+    /// `q ≤ upper`.
+    Upper,
+}
+
+/// From here on a code is a ball's, a box's, or a joint's.
 const SPHERES: u16 = 0x4000;
 const BOXES: u16 = 0x8000;
+const LIMITS: u16 = 0xC000;
 
 impl Part {
-    /// A number of 16 bits for a part: wheels count from 0, balls from 2^14, boxes from 2^15.
+    /// A number of 16 bits for a part: wheels count from 0, balls from 2^14, boxes from 2^15, joints from 3 · 2^14.
     ///
     /// # Panics
-    /// If a model has more than 2^14 wheels, balls or boxes.
+    /// If a model has more than 2^14 wheels, balls, boxes or joints.
     #[inline]
     #[must_use]
     pub fn code(self) -> u16 {
@@ -37,10 +49,11 @@ impl Part {
             Self::Wheel(i) => narrow(i),
             Self::Sphere(i) => narrow(i) | SPHERES,
             Self::Box(i) => narrow(i) | BOXES,
+            Self::Limit(i, _) => narrow(i) | LIMITS,
         }
     }
 
-    /// All parts of a model: wheels, boxes, balls.
+    /// All parts of a model that have a shape: wheels, boxes, balls.
     pub fn all(model: &Model) -> impl Iterator<Item = Self> {
         let wheels = (0..model.wheels().len()).map(Self::Wheel);
         let boxes = (0..model.boxes().len()).map(Self::Box);
@@ -55,6 +68,7 @@ impl Part {
             Self::Wheel(i) => i < model.wheels().len(),
             Self::Box(i) => i < model.boxes().len(),
             Self::Sphere(i) => i < model.spheres().len(),
+            Self::Limit(i, _) => model.limited_joints().contains(&i),
         }
     }
 
@@ -66,6 +80,7 @@ impl Part {
             Self::Wheel(i) => model.wheels()[i].body,
             Self::Box(i) => model.boxes()[i].body,
             Self::Sphere(i) => model.spheres()[i].body,
+            Self::Limit(i, _) => model.joints()[i].body,
         }
     }
 
@@ -77,6 +92,7 @@ impl Part {
             Self::Wheel(i) => model.wheels()[i].centre,
             Self::Box(i) => model.boxes()[i].centre,
             Self::Sphere(i) => model.spheres()[i].centre,
+            Self::Limit(..) => Vector3::zeros(),
         }
     }
 
@@ -87,6 +103,7 @@ impl Part {
             Self::Wheel(i) => model.wheels()[i].radius,
             Self::Box(i) => model.boxes()[i].half_size.norm(),
             Self::Sphere(i) => model.spheres()[i].radius,
+            Self::Limit(..) => 0.0,
         }
     }
 
@@ -120,6 +137,10 @@ impl Part {
                     radius: ball.radius,
                 })
             }
+            Self::Limit(i, _) => PlacedShape::Sphere(Sphere {
+                centre: kinematics.r[model.joints()[i].body],
+                radius: 0.0,
+            }),
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::geometry::query::dispatch;
 use crate::geometry::{PlacedShape, Primitive, Sphere, Terrain};
 use crate::multibody::{Kinematics, Model};
 
-/// Point, frame and gap of a contact at the poses of `kinematics`.
+/// Point, frame and gap of a contact at the poses of `kinematics`; a joint's stop is [`super::relocate_limit`]'s.
 pub fn relocate(
     model: &Model,
     kinematics: &Kinematics,
@@ -23,7 +23,7 @@ pub fn relocate(
             relocate_pair(model, kinematics, other, contact);
             return;
         }
-        (Opposite::Part(_), None) => return,
+        (Opposite::Part(_), None) | (Opposite::Stop, _) => return,
     };
     let base = kinematics.origin(contact.body);
     let feature = usize::from(contact.key.feature);

@@ -98,6 +98,16 @@ pub enum ModelError {
         /// What was given.
         value: f64,
     },
+    /// A lower limit that is not below the upper one.
+    #[error("{field}: must be below the upper limit {upper}, is {value}")]
+    NotBelow {
+        /// Path of the lower limit.
+        field: String,
+        /// What was given.
+        value: f64,
+        /// The upper limit.
+        upper: f64,
+    },
     /// An axis of no direction.
     #[error("{field}: an axis must have a direction, is {value:?}")]
     NoDirection {
@@ -124,9 +134,37 @@ pub enum ModelError {
         /// Principal moments, kg m².
         principal: [f64; 3],
     },
-    /// `collides` on something that is not a box.
-    #[error("{field}: only a solid whose shape is a box can collide")]
-    CollidesWithoutBox {
+    /// `collides` on something that is neither a box nor a ball.
+    #[error("{field}: only boxes and spheres can collide; a disc does as a wheel")]
+    CannotCollide {
+        /// Path of the field.
+        field: String,
+    },
+    /// The short form of one shape beside a list of shapes.
+    #[error("{field}: a solid with shapes has no {what} of its own; the shapes say it")]
+    NotWithShapes {
+        /// Path of the field.
+        field: String,
+        /// The field's name.
+        what: &'static str,
+    },
+    /// Masses of shapes that are together not the solid's, or leave nothing to the others.
+    #[error(
+        "{field}: {value} kg contradicts the masses of its shapes, {sum} kg together; they are equal where every shape has one, else the solid's is larger"
+    )]
+    MassesContradict {
+        /// Path of the field.
+        field: String,
+        /// Mass of the solid, kg.
+        value: f64,
+        /// Masses of its shapes, those that are given, kg.
+        sum: f64,
+    },
+    /// A disc among shapes that share a mass by volume.
+    #[error(
+        "{field}: is missing; a disc has no volume by which it could share the mass with the other shapes"
+    )]
+    NoVolume {
         /// Path of the field.
         field: String,
     },
@@ -201,15 +239,32 @@ impl ModelError {
             | Self::NotFinite { field, .. }
             | Self::NotPositive { field, .. }
             | Self::Negative { field, .. }
+            | Self::NotBelow { field, .. }
             | Self::NoDirection { field, .. }
             | Self::NotASign { field, .. }
             | Self::ImpossibleInertia { field, .. }
-            | Self::CollidesWithoutBox { field }
+            | Self::CannotCollide { field }
+            | Self::NotWithShapes { field, .. }
+            | Self::MassesContradict { field, .. }
+            | Self::NoVolume { field }
             | Self::OutOfRange { field, .. }
             | Self::RadiusContradictsShape { field, .. }
             | Self::SteeringNotAbove { field, .. } => field,
             Self::TooMany { field, .. } | Self::NotADisc { field, .. } => field,
         }
+    }
+}
+
+impl ModelError {
+    /// The same of something inside: its field gets the path of that.
+    pub(super) fn within(mut self, path: &str) -> Self {
+        if let Self::Missing { field }
+        | Self::MassesContradict { field, .. }
+        | Self::NoVolume { field } = &mut self
+        {
+            *field = format!("{path}.{field}");
+        }
+        self
     }
 }
 

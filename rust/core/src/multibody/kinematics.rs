@@ -49,15 +49,28 @@ impl Kinematics {
 
     /// Recomputes all poses.
     pub fn update(&mut self, model: &Model, configuration: &Configuration) {
-        self.update_poses::<true>(model, configuration);
+        if model.only_turns() {
+            self.update_poses::<true, true>(model, configuration);
+        } else {
+            self.update_poses::<true, false>(model, configuration);
+        }
     }
 
     /// Recomputes all that a step needs: spinners ([`super::Body::is_spinner`]) are left unturned about their own axis.
     pub fn update_for_step(&mut self, model: &Model, configuration: &Configuration) {
-        self.update_poses::<false>(model, configuration);
+        if model.only_turns() {
+            self.update_poses::<false, true>(model, configuration);
+        } else {
+            self.update_poses::<false, false>(model, configuration);
+        }
     }
 
-    fn update_poses<const SPIN: bool>(&mut self, model: &Model, configuration: &Configuration) {
+    /// Where `SPIN` spinners are turned, too; where `TURNS` every root must be free and every other joint revolute and on its own.
+    fn update_poses<const SPIN: bool, const TURNS: bool>(
+        &mut self,
+        model: &Model,
+        configuration: &Configuration,
+    ) {
         let (world, nowhere) = (Matrix3::identity(), Vector3::zeros());
         let joints = &configuration.joints;
         for (b, body) in model.bodies().iter().enumerate() {
@@ -82,13 +95,23 @@ impl Kinematics {
                 Joint::Revolute(Revolute { axis, coordinate }) => {
                     let turned;
                     (*own, turned) = if SPIN || !body.is_spinner {
-                        axis.rotate(frame, coordinate.of(joints))
+                        let angle = if TURNS {
+                            joints[coordinate.joint]
+                        } else {
+                            coordinate.of(joints)
+                        };
+                        axis.rotate(frame, angle)
                     } else {
                         (*frame, axis.turned(frame))
                     };
                     let motion = Motion::turn(turned, r);
-                    set_motion(&mut self.motions, body.motion, coordinate, motion);
+                    if TURNS {
+                        self.motions[body.motion] = motion;
+                    } else {
+                        set_motion(&mut self.motions, body.motion, coordinate, motion);
+                    }
                 }
+                _ if TURNS => {}
                 Joint::Prismatic(Prismatic { axis, coordinate }) => {
                     let axis = axis.turned(frame);
                     *own = *frame;

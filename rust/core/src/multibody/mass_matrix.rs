@@ -37,8 +37,8 @@ struct Composite {
 impl Composite {
     /// Linear momentum, and angular momentum about the tree's origin, where it moves with a motion.
     #[inline]
-    fn momentum(&self, motion: &Motion) -> (Vector3<f64>, Vector3<f64>) {
-        let (a, v) = motion.twist();
+    fn momentum<const TURN: bool>(&self, motion: &Motion) -> (Vector3<f64>, Vector3<f64>) {
+        let (a, v) = motion.twist_if::<TURN>();
         let f = v * self.mass + a.cross(&self.moment);
         let n = self.inertia.times(&a) + self.moment.cross(&v);
         (f, n)
@@ -74,10 +74,10 @@ impl MassMatrix {
             };
         }
         for tree in model.trees() {
-            if tree.is_free {
-                self.update_tree::<BASE>(model, tree, kinematics);
-            } else {
-                self.update_tree::<0>(model, tree, kinematics);
+            match (model.only_turns(), tree.is_free) {
+                (true, _) => self.update_tree::<BASE, true>(model, tree, kinematics),
+                (_, true) => self.update_tree::<BASE, false>(model, tree, kinematics),
+                _ => self.update_tree::<0, false>(model, tree, kinematics),
             }
         }
         for &b in model.coupled_bodies() {
@@ -88,28 +88,35 @@ impl MassMatrix {
         }
     }
 
-    /// Rows of a tree of which `LEAD` velocities are a free root's; of the coupled joints nothing but what they carry.
-    fn update_tree<const LEAD: usize>(
+    /// Rows of a tree of which `LEAD` velocities are a free root's and, where `TURNS`, all others those of turns; of the coupled joints
+    /// nothing but what they carry.
+    fn update_tree<const LEAD: usize, const TURNS: bool>(
         &mut self,
         model: &Model,
         tree: &Tree,
         kinematics: &Kinematics,
     ) {
         let bodies = model.bodies();
-        for b in tree.bodies.clone().rev() {
+        let Range { start, end } = tree.bodies;
+        // The root of a tree of turns has neither rows of this kind nor a carrier.
+        for b in (start + usize::from(TURNS)..end).rev() {
             let body = &bodies[b];
             let composite = self.composites[b];
-            if !body.is_coupled {
-                for i in 0..body.n_motions {
-                    let (f, n) = composite.momentum(&kinematics.motions[body.motion + i]);
-                    let row = &mut self.rows[(body.velocity + i) * self.stride..];
-                    let (base, joints) = row.split_at_mut(LEAD);
-                    if let Some(base) = base.first_chunk_mut::<BASE>() {
-                        *base = [f.x, f.y, f.z, n.x, n.y, n.z];
-                    }
-                    for (entry, &m) in joints.iter_mut().zip(model.motions(b)) {
-                        *entry = kinematics.motions[m].power(&f, &n);
-                    }
+            let n_rows = match body.is_coupled {
+                _ if TURNS => 1,
+                true => 0,
+                false => body.n_motions,
+            };
+            for i in 0..n_rows {
+                let motion = &kinematics.motions[body.motion + i];
+                let (f, n) = composite.momentum::<TURNS>(motion);
+                let row = &mut self.rows[(body.velocity + i) * self.stride..];
+                let (base, joints) = row.split_at_mut(LEAD);
+                if let Some(base) = base.first_chunk_mut::<BASE>() {
+                    *base = [f.x, f.y, f.z, n.x, n.y, n.z];
+                }
+                for (entry, &m) in joints.iter_mut().zip(model.motions(b)) {
+                    *entry = kinematics.motions[m].power_if::<TURNS>(&f, &n);
                 }
             }
             if let Some(parent) = body.parent {
@@ -141,7 +148,7 @@ impl MassMatrix {
     fn add_coupled(&mut self, model: &Model, kinematics: &Kinematics, b: usize) {
         let body = &model.bodies()[b];
         let (k, own) = (body.velocity, &kinematics.motions[body.motion]);
-        let (f, n) = self.composites[b].momentum(own);
+        let (f, n) = self.composites[b].momentum::<false>(own);
         let at = last(model, k);
         let w = self.stride;
         self.rows[k * w + at] += own.power(&f, &n);
@@ -232,13 +239,31 @@ pub struct FactoredMassMatrix {
     inverse_root: Vec<f64>,
     /// Whether a velocity belongs to a tree on a free base.
     is_free: Vec<bool>,
+    /// Where in `ancestors` those of each velocity stand.
+    spans: Vec<Range<usize>>,
+    /// The velocities on the path before each one, a free base's left out, counted from the tree's first joint: what the loops over one
+    /// tree index with.
+    ancestors: Vec<usize>,
 }
 
 impl FactoredMassMatrix {
     /// Room for a model.
     #[must_use]
     pub fn new(model: &Model) -> Self {
+        let (mut spans, mut ancestors) = (Vec::new(), Vec::new());
+        for tree in model.trees() {
+            let first = tree.velocities.start + tree.lead();
+            for k in tree.velocities.clone() {
+                let path = model.velocity_path(k);
+                let before = path[..path.len() - 1].iter().skip(tree.lead());
+                let begin = ancestors.len();
+                ancestors.extend(before.map(|i| i - first));
+                spans.push(begin..ancestors.len());
+            }
+        }
         Self {
+            spans,
+            ancestors,
             stride: model.path_stride(),
             rows: vec![0.0; model.nv() * model.path_stride()],
             inverse_root: vec![0.0; model.nv()],
@@ -251,24 +276,24 @@ impl FactoredMassMatrix {
     fn update(&mut self, model: &Model) -> bool {
         (model.trees().iter()).all(|tree| {
             if tree.is_free {
-                self.update_tree::<BASE>(model, tree)
+                self.update_tree::<BASE>(tree)
             } else {
-                self.update_tree::<0>(model, tree)
+                self.update_tree::<0>(tree)
             }
         })
     }
 
-    fn update_tree<const LEAD: usize>(&mut self, model: &Model, tree: &Tree) -> bool {
+    fn update_tree<const LEAD: usize>(&mut self, tree: &Tree) -> bool {
         let w = self.stride;
         let Range { start, end } = tree.velocities;
-        let first = start + LEAD;
+        let spans = &self.spans[start + LEAD..end];
         let roots = &mut self.inverse_root[start..end];
         let rows = &mut self.rows[start * w..end * w];
         let (base_rows, joint_rows) = rows.split_at_mut(LEAD * w);
-        for j in (0..end - first).rev() {
+        for (j, span) in spans.iter().enumerate().rev() {
             let (above, own) = joint_rows.split_at_mut(j * w);
-            let path = &model.velocity_path(first + j)[LEAD..];
-            let n = path.len() - 1;
+            let ancestors = &self.ancestors[span.clone()];
+            let n = ancestors.len();
             let (base, joints) = own[..=LEAD + n].split_at_mut(LEAD);
             let Some(inverse_root) = inverse_root(joints[n]) else {
                 return false;
@@ -277,7 +302,7 @@ impl FactoredMassMatrix {
             let inverse = inverse_root * inverse_root;
             for p in (0..n).rev() {
                 let a = joints[p] * inverse;
-                let (ancestor, rest) = above[(path[p] - first) * w..].split_at_mut(LEAD);
+                let (ancestor, rest) = above[ancestors[p] * w..].split_at_mut(LEAD);
                 subtract(ancestor, a, base);
                 subtract(&mut rest[..=p], a, &joints[..=p]);
                 joints[p] = a;
@@ -308,26 +333,26 @@ impl FactoredMassMatrix {
     pub fn half_solve(&self, model: &Model, y: &mut [f64]) {
         for tree in model.trees() {
             if tree.is_free {
-                self.half_solve_tree::<BASE>(model, tree, y);
+                self.half_solve_tree::<BASE>(tree, y);
             } else {
-                self.half_solve_tree::<0>(model, tree, y);
+                self.half_solve_tree::<0>(tree, y);
             }
         }
     }
 
-    fn half_solve_tree<const LEAD: usize>(&self, model: &Model, tree: &Tree, y: &mut [f64]) {
-        let start = tree.velocities.start;
-        let first = start + LEAD;
-        let rows = &self.rows[start * self.stride..];
-        let roots = &self.inverse_root[tree.velocities.clone()];
-        let (base, joints) = y[tree.velocities.clone()].split_at_mut(LEAD);
-        for j in (0..joints.len()).rev() {
+    fn half_solve_tree<const LEAD: usize>(&self, tree: &Tree, y: &mut [f64]) {
+        let Range { start, end } = tree.velocities;
+        let rows = &self.rows[start * self.stride..end * self.stride];
+        let roots = &self.inverse_root[start..end];
+        let spans = &self.spans[start + LEAD..end];
+        let (base, joints) = y[start..end].split_at_mut(LEAD);
+        let joint_rows = rows[LEAD * self.stride..].chunks_exact(self.stride);
+        for (j, (row, span)) in joint_rows.zip(spans).enumerate().rev() {
             let value = joints[j];
-            let path = &model.velocity_path(first + j)[LEAD..];
-            let (row, rest) = rows[(LEAD + j) * self.stride..].split_at(LEAD);
+            let (row, rest) = row.split_at(LEAD);
             subtract(base, value, row);
-            for (entry, &i) in rest.iter().zip(&path[..path.len() - 1]) {
-                joints[i - first] -= entry * value;
+            for (entry, &i) in rest.iter().zip(&self.ancestors[span.clone()]) {
+                joints[i] -= entry * value;
             }
             joints[j] = value * roots[LEAD + j];
         }
@@ -395,19 +420,19 @@ impl FactoredMassMatrix {
     pub fn half_solve_back(&self, model: &Model, x: &mut [f64]) {
         for tree in model.trees() {
             if tree.is_free {
-                self.half_solve_back_tree::<BASE>(model, tree, x);
+                self.half_solve_back_tree::<BASE>(tree, x);
             } else {
-                self.half_solve_back_tree::<0>(model, tree, x);
+                self.half_solve_back_tree::<0>(tree, x);
             }
         }
     }
 
-    fn half_solve_back_tree<const LEAD: usize>(&self, model: &Model, tree: &Tree, x: &mut [f64]) {
-        let start = tree.velocities.start;
-        let first = start + LEAD;
-        let rows = &self.rows[start * self.stride..];
-        let roots = &self.inverse_root[tree.velocities.clone()];
-        let (base, joints) = x[tree.velocities.clone()].split_at_mut(LEAD);
+    fn half_solve_back_tree<const LEAD: usize>(&self, tree: &Tree, x: &mut [f64]) {
+        let Range { start, end } = tree.velocities;
+        let rows = &self.rows[start * self.stride..end * self.stride];
+        let roots = &self.inverse_root[start..end];
+        let spans = &self.spans[start + LEAD..end];
+        let (base, joints) = x[start..end].split_at_mut(LEAD);
         for k in 0..LEAD {
             let mut value = base[k] * roots[k];
             for (entry, x) in rows[k * self.stride..][..k].iter().zip(&*base) {
@@ -415,15 +440,15 @@ impl FactoredMassMatrix {
             }
             base[k] = value;
         }
-        for j in 0..joints.len() {
-            let path = &model.velocity_path(first + j)[LEAD..];
-            let (row, rest) = rows[(LEAD + j) * self.stride..].split_at(LEAD);
+        let joint_rows = rows[LEAD * self.stride..].chunks_exact(self.stride);
+        for (j, (row, span)) in joint_rows.zip(spans).enumerate() {
+            let (row, rest) = row.split_at(LEAD);
             let mut value = joints[j] * roots[LEAD + j];
             for (entry, x) in row.iter().zip(&*base) {
                 value -= entry * x;
             }
-            for (entry, &i) in rest.iter().zip(&path[..path.len() - 1]) {
-                value -= entry * joints[i - first];
+            for (entry, &i) in rest.iter().zip(&self.ancestors[span.clone()]) {
+                value -= entry * joints[i];
             }
             joints[j] = value;
         }

@@ -20,8 +20,9 @@ pub mod state;
 
 pub use bias::bias;
 pub use description::{
-    CouplingDescription, Hold, JointKind, ModelDescription, Shape, SolidDescription, Spring,
-    TagDescription, WheelDescription,
+    CouplingDescription, DriveDescription, Hold, JointKind, Limits, MassProperties,
+    ModelDescription, Shape, ShapeDescription, SolidDescription, Spring, TagDescription,
+    WheelDescription,
 };
 pub use error::{ModelError, StateError};
 pub use joint::{Joint, JointAxis, Motion, Pose};
@@ -29,8 +30,8 @@ pub use kinematics::Kinematics;
 pub use mass_matrix::{FactoredMassMatrix, MassMatrix};
 pub(crate) use model::fingerprint;
 pub use model::{
-    BASE, Body, CollisionBox, CollisionSphere, Frame, JointProperties, MAX_SOLIDS, Model, Passive,
-    Tree, Wheel,
+    BASE, Body, CollisionBox, CollisionSphere, Frame, JointProperties, MAX_SHAPES, MAX_SOLIDS,
+    Model, Passive, Tree, Wheel,
 };
 pub use momentum::{Energy, EnergyScratch, Momentum};
 pub use motor::{DriveTrial, Motor, MotorRegime};

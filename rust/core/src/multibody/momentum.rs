@@ -43,18 +43,33 @@ pub fn body_momenta(
     about: impl Fn(usize) -> Vector3<f64>,
     out: &mut [Momentum],
 ) -> f64 {
+    if model.only_turns() {
+        body_momenta_if::<true>(model, kinematics, v, about, out)
+    } else {
+        body_momenta_if::<false>(model, kinematics, v, about, out)
+    }
+}
+
+/// The same; where `TURNS` every root must be free and every other joint a turn.
+fn body_momenta_if<const TURNS: bool>(
+    model: &Model,
+    kinematics: &Kinematics,
+    v: &[f64],
+    about: impl Fn(usize) -> Vector3<f64>,
+    out: &mut [Momentum],
+) -> f64 {
     let mut kinetic = 0.0;
     // Velocity of each frame's origin and angular velocity ride along the tree in `out` until overwritten.
     for (b, body) in model.bodies().iter().enumerate() {
-        let (origin, omega) = match (&body.joint, body.parent) {
-            (Joint::Free(_), _) => {
+        let (origin, omega) = match body.parent {
+            None if TURNS || matches!(body.joint, Joint::Free(_)) => {
                 let v = &v[body.velocity..];
                 (
                     Vector3::new(v[0], v[1], v[2]),
                     Vector3::new(v[3], v[4], v[5]),
                 )
             }
-            (Joint::Revolute(_), Some(parent)) => {
+            Some(parent) if TURNS || matches!(body.joint, Joint::Revolute(_)) => {
                 let p = &out[parent];
                 let d = kinematics.r[b] - kinematics.r[parent];
                 (
@@ -62,7 +77,7 @@ pub fn body_momenta(
                     p.angular + kinematics.motions[body.motion].axis() * v[body.velocity],
                 )
             }
-            (_, parent) => {
+            parent => {
                 let (p, d) = match parent {
                     Some(parent) => (out[parent], kinematics.r[b] - kinematics.r[parent]),
                     None => (Momentum::default(), Vector3::zeros()),
@@ -76,24 +91,28 @@ pub fn body_momenta(
             angular: omega,
         };
     }
-    for (b, body) in model.bodies().iter().enumerate() {
-        let Momentum {
-            linear: origin,
-            angular: omega,
-        } = out[b];
-        let velocity = origin + omega.cross(&(kinematics.c[b] - kinematics.r[b]));
-        let A = match &body.principal_axes {
-            None => kinematics.R[b],
-            Some(P) => kinematics.R[b] * P,
-        };
-        let w = A.tr_mul(&omega);
-        let spin = body.principal_inertia.component_mul(&w);
-        let p = velocity * body.mass;
-        kinetic += 0.5 * (p.dot(&velocity) + spin.dot(&w));
-        out[b] = Momentum {
-            linear: p,
-            angular: A * spin + (kinematics.c[b] + about(body.tree)).cross(&p),
-        };
+    for (t, tree) in model.trees().iter().enumerate() {
+        let about = about(t);
+        for b in tree.bodies.clone() {
+            let body = &model.bodies()[b];
+            let Momentum {
+                linear: origin,
+                angular: omega,
+            } = out[b];
+            let velocity = origin + omega.cross(&(kinematics.c[b] - kinematics.r[b]));
+            let A = match &body.principal_axes {
+                None => kinematics.R[b],
+                Some(P) => kinematics.R[b] * P,
+            };
+            let w = A.tr_mul(&omega);
+            let spin = body.principal_inertia.component_mul(&w);
+            let p = velocity * body.mass;
+            kinetic += 0.5 * (p.dot(&velocity) + spin.dot(&w));
+            out[b] = Momentum {
+                linear: p,
+                angular: A * spin + (kinematics.c[b] + about).cross(&p),
+            };
+        }
     }
     for &(k, inertia) in model.armatures() {
         kinetic += 0.5 * inertia * v[k] * v[k];
@@ -147,6 +166,21 @@ pub fn energy_and_momentum(
     gravity: &Vector3<f64>,
     scratch: &mut EnergyScratch,
 ) -> (Energy, Vector3<f64>) {
+    if model.only_turns() {
+        energy_and_momentum_if::<true>(model, q, v, gravity, scratch)
+    } else {
+        energy_and_momentum_if::<false>(model, q, v, gravity, scratch)
+    }
+}
+
+/// The same; where `TURNS` every root must be free and every other joint revolute and on its own.
+fn energy_and_momentum_if<const TURNS: bool>(
+    model: &Model,
+    q: &Configuration,
+    v: &[f64],
+    gravity: &Vector3<f64>,
+    scratch: &mut EnergyScratch,
+) -> (Energy, Vector3<f64>) {
     let bodies = model.bodies();
     let moving = &mut scratch.moving[..bodies.len()];
     let mut sums = Sums::default();
@@ -158,9 +192,8 @@ pub fn energy_and_momentum(
     for (b, body) in bodies.iter().enumerate() {
         let (before, own) = moving.split_at_mut(b);
         let own = &mut own[0];
-        let carrier = || body.parent.map_or(&world, |parent| &before[parent]);
-        match &body.joint {
-            Joint::Free(free) => {
+        match (&body.joint, body.parent) {
+            (Joint::Free(free), _) => {
                 let (pose, v) = (q.pose(*free), &v[body.velocity..]);
                 *own = Moving {
                     R: *pose.attitude.to_rotation_matrix().matrix(),
@@ -170,8 +203,14 @@ pub fn energy_and_momentum(
                 };
                 height += pose.position * model.trees()[body.tree].mass;
             }
-            Joint::Revolute(joint) => own.turn(carrier(), body, joint, q, v),
-            _ => own.follow(carrier(), body, q, v),
+            (Joint::Revolute(joint), Some(parent)) => {
+                own.turn::<TURNS>(&before[parent], body, joint, q, v);
+            }
+            _ if TURNS => {}
+            (_, parent) => {
+                let carrier = parent.map_or(&world, |parent| &before[parent]);
+                own.follow(carrier, body, q, v);
+            }
         }
         sums.add(body, own);
     }
@@ -186,9 +225,9 @@ pub fn energy_and_momentum(
 }
 
 impl Moving {
-    /// Places a body under a revolute joint on its carrier.
+    /// Places a body under a revolute joint, where `OWN` one that follows no other, on its carrier.
     #[inline]
-    fn turn(
+    fn turn<const OWN: bool>(
         &mut self,
         carrier: &Self,
         body: &Body,
@@ -205,14 +244,28 @@ impl Moving {
         (self.R, axis) = if body.is_spinner {
             (*frame, joint.axis.turned(frame))
         } else {
-            joint.axis.rotate(frame, joint.coordinate.of(&q.joints))
+            let angle = if OWN {
+                q.joints[joint.coordinate.joint]
+            } else {
+                joint.coordinate.of(&q.joints)
+            };
+            joint.axis.rotate(frame, angle)
         };
-        self.omega = carrier.omega + axis * joint.coordinate.rate(v[body.velocity]);
+        let rate = if OWN {
+            v[body.velocity]
+        } else {
+            joint.coordinate.rate(v[body.velocity])
+        };
+        self.omega = carrier.omega + axis * rate;
     }
 
     /// Places any other body on its carrier.
     #[cold]
     fn follow(&mut self, carrier: &Self, body: &Body, q: &Configuration, v: &[f64]) {
+        if let Joint::Revolute(joint) = &body.joint {
+            self.turn::<false>(carrier, body, joint, q, v);
+            return;
+        }
         let mut lever = carrier.R * body.position;
         let frame = body.rotation.map_or(carrier.R, |fixed| carrier.R * fixed);
         let k = body.velocity;

@@ -216,7 +216,9 @@ fn pair_bodies(model: &Model) -> Result<Vec<Part>, PlanarError> {
         }
         z[b] = body.parent.map_or(0.0, |parent| z[parent]) + body.position.z;
     }
-    let is_plain = |joint: &&JointProperties| joint.passive == Passive::default();
+    let is_plain = |joint: &&JointProperties| {
+        joint.passive == Passive::default() && joint.limits.is_none() && joint.drive.is_none()
+    };
     if let Some(joint) = model.joints().iter().find(|joint| !is_plain(joint)) {
         return Err(PlanarError::NotMirrored {
             body: bodies[joint.body].name.clone(),

@@ -93,11 +93,12 @@ impl Scene for RoverScene {
         }
     }
 
-    /// Most contacts on a plane: three rim points per wheel, four corners per box, one point per
-    /// ball.
+    /// Most contacts on a plane: three rim points a wheel, four corners a
+    /// box, one point a ball, and both stops of a joint.
     fn contact_capacity(&self) -> usize {
         let model = &self.model;
-        3 * model.wheels().len() + 4 * model.boxes().len() + model.spheres().len()
+        let stops = 2 * model.limited_joints().len();
+        3 * model.wheels().len() + 4 * model.boxes().len() + model.spheres().len() + stops
     }
 
     #[inline]
@@ -154,7 +155,9 @@ impl Scene for RoverScene {
         let is_part = |part: Part, body: usize| part.is_of(model) && part.body(model) == body;
         let is_sound = |contact: &Contact| {
             let is_of_two = matches!(contact.key.opposite, Opposite::Part(_));
+            let is_stop = matches!(contact.key.opposite, Opposite::Stop);
             is_part(contact.part, contact.body)
+                && is_stop == matches!(contact.part, Part::Limit(..))
                 && is_of_two == contact.other.is_some()
                 && (contact.other).is_none_or(|other| is_part(other.part, other.body))
         };
@@ -172,7 +175,7 @@ impl Scene for RoverScene {
 pub struct LastCall {
     /// Report of its steps; empty if one failed.
     pub report: StepReport,
-    /// Work through the wheel motors, Σ |∫ τ_i dφ_i|, driving or braking, J.
+    /// Work through the drives of wheels and other joints, Σ |∫ τ_i dφ_i|, driving or braking, J.
     pub work: f64,
     /// Its driving part, Σ max(∫ τ_i dφ_i, 0), J.
     pub positive_work: f64,

@@ -14,7 +14,8 @@ pub struct RoverCommand {
     pub actuators: Command,
     /// Driving torque of each wheel, positive forward, N m.
     pub wheel_torque: Vec<f64>,
-    /// Additional torque about each joint's axis, N m.
+    /// Torque about each joint's axis, N m: its drive's where it has one,
+    /// else on top of all others.
     pub joint_torque: Vec<f64>,
 }
 
@@ -23,6 +24,12 @@ impl RoverCommand {
     #[must_use]
     pub fn idle(model: &Model) -> Self {
         let mut actuators = Command::idle(model);
+        for (drive, joint) in actuators.drives.iter_mut().zip(model.joints()) {
+            *drive = joint.drive.map(|drive| Drive {
+                torque: 0.0,
+                motor: drive.motor,
+            });
+        }
         for wheel in model.wheels() {
             if let Some(j) = wheel.joint {
                 actuators.drives[j] = Some(Drive {
@@ -101,13 +108,21 @@ impl RoverSimulation {
         Ok(())
     }
 
-    /// Sets additional torques about the joint axes (n_joints, N m), which have no limit.
+    /// Sets torques about the joint axes (n_joints, N m). A joint with a
+    /// drive saturates at its limit and has its motor's line; at all others
+    /// they come on top of the wheels' and have no limit.
     ///
     /// # Errors
     /// Wrong length or an entry that is not finite; nothing is changed then.
     pub fn set_joint_torques(&mut self, torques: &[f64]) -> Result<(), CommandError> {
         check("torques", torques, self.scene.model.n_joints())?;
-        self.command.joint_torque.copy_from_slice(torques);
+        let own = self.command.joint_torque.iter_mut().zip(torques);
+        for ((own, torque), joint) in own.zip(self.scene.model.joints()) {
+            let limit = joint
+                .drive
+                .map_or(f64::INFINITY, |drive| drive.torque_limit);
+            *own = torque.clamp(-limit, limit);
+        }
         self.combine_torques();
         Ok(())
     }
@@ -119,6 +134,13 @@ impl RoverSimulation {
             .copy_from_slice(&self.command.joint_torque);
         for drive in self.command.actuators.drives.iter_mut().flatten() {
             drive.torque = 0.0;
+        }
+        let Command { torque, drives, .. } = &mut self.command.actuators;
+        for ((torque, drive), joint) in torque.iter_mut().zip(drives).zip(self.scene.model.joints())
+        {
+            if let (Some(drive), Some(_)) = (drive, joint.drive) {
+                drive.torque = std::mem::take(torque);
+            }
         }
         for (wheel, torque) in self
             .scene

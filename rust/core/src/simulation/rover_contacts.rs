@@ -52,13 +52,14 @@ impl RoverSimulation {
         forces
     }
 
-    /// Mean normal force of the last step on all parts except wheels, N.
+    /// Mean normal force of the last step on all bodies that are no wheels,
+    /// N; what joints' stops give is left out.
     #[must_use]
     pub fn body_force(&self) -> f64 {
         let boxes = self
             .active
             .iter()
-            .filter(|a| !matches!(a.contact.part, Part::Wheel(_)));
+            .filter(|a| !matches!(a.contact.part, Part::Wheel(_) | Part::Limit(..)));
         boxes.map(|a| a.impulse[0]).sum::<f64>() / self.options.time_step
     }
 }

@@ -81,9 +81,11 @@ impl MotorBranch {
     /// Moves towards the branch of a step between two rates, rad/s; true if the branch changed.
     #[inline]
     pub(crate) fn revise(&mut self, drive: Option<&Drive>, begin: f64, end: f64) -> bool {
-        let (command, motor) = parts(drive);
+        let (command, Some(motor)) = parts(drive) else {
+            return false; // Without a line there is one branch.
+        };
         let rate = self.rate(begin, end);
-        self.trial.revise(motor, command, rate)
+        self.trial.revise(Some(motor), command, rate)
     }
 
     /// Mean torque of a step between two rates (rad/s), N m.

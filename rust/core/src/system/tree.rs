@@ -10,8 +10,8 @@ use super::command::{Command, HeldJoint};
 use super::gyroscopic::{GyroscopicScratch, gravity_load};
 use super::motor_branch::{MotorBranch, line_slope};
 use crate::contact::{
-    Activation, Contact, ContactKey, ContactSystem, PairSearch, detect, detect_pairs,
-    generalized_impulse, relocate,
+    Activation, Contact, ContactKey, ContactSystem, Opposite, PairSearch, detect, detect_limits,
+    detect_pairs, generalized_impulse, relocate, relocate_limit,
 };
 use crate::geometry::Terrain;
 use crate::integrator::{
@@ -67,6 +67,9 @@ pub struct TreeScratch {
     gyroscopic: GyroscopicScratch,
     force: Vec<f64>,
     pairs: PairSearch,
+    /// Coordinates of the joints at the middle and at the end of the step (n_joints); empty where no joint has a stop.
+    joints_middle: Vec<f64>,
+    joints_end: Vec<f64>,
     system: ContactSystem,
 }
 
@@ -75,6 +78,11 @@ impl TreeScratch {
     #[must_use]
     pub fn new(model: &Model, n: usize) -> Self {
         let momenta = vec![Momentum::default(); model.bodies().len()];
+        let limited = if model.limited_joints().is_empty() {
+            Vec::new()
+        } else {
+            vec![0.0; model.n_joints()]
+        };
         Self {
             kinematics: Kinematics::new(model),
             kinematics_end: Kinematics::new(model),
@@ -92,6 +100,8 @@ impl TreeScratch {
             gyroscopic: GyroscopicScratch::default(),
             force: vec![0.0; model.nv()],
             pairs: PairSearch::new(model),
+            joints_middle: limited.clone(),
+            joints_end: limited,
             system: ContactSystem::with_capacity(model, n),
         }
     }
@@ -192,11 +202,13 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn place_middle(&mut self, q: &Configuration) {
         self.parts.kinematics.update_for_step(self.model, q);
+        keep(&mut self.parts.joints_middle, &q.joints);
     }
 
     #[inline]
     fn place_end(&mut self, q: &Configuration) {
         self.parts.kinematics_end.update_for_step(self.model, q);
+        keep(&mut self.parts.joints_end, &q.joints);
     }
 
     #[inline]
@@ -218,20 +230,37 @@ impl MechanicalSystem for TreeSystem<'_> {
             out,
         );
         let TreeScratch {
-            kinematics, pairs, ..
+            kinematics,
+            pairs,
+            joints_middle,
+            ..
         } = &mut *self.parts;
         detect_pairs(self.model, kinematics, v, &activation, pairs, out);
+        detect_limits(self.model, kinematics, joints_middle, v, &activation, out);
     }
 
     #[inline]
     fn relocate(&mut self, contacts: &mut [Contact]) {
+        let parts = &*self.parts;
         for contact in contacts {
-            relocate(
-                self.model,
-                &self.parts.kinematics_end,
-                self.terrain,
-                contact,
-            );
+            if contact.key.opposite == Opposite::Stop {
+                relocate_limit(
+                    self.model,
+                    &parts.kinematics_end,
+                    &parts.joints_end,
+                    contact,
+                );
+            } else {
+                relocate(self.model, &parts.kinematics_end, self.terrain, contact);
+            }
+        }
+    }
+
+    #[inline]
+    fn friction_coefficient(&self, options: &StepOptions, contact: &Contact) -> f64 {
+        match contact.key.opposite {
+            Opposite::Stop => 0.0,
+            Opposite::Ground(_) | Opposite::Part(_) => options.friction_coefficient,
         }
     }
 
@@ -555,6 +584,14 @@ impl MechanicalSystem for TreeSystem<'_> {
                 .fold(largest, |m, d| m.max(d.abs()));
         }
         largest
+    }
+}
+
+/// Keeps the joints' coordinates for those that have stops: nothing where none has.
+#[inline]
+fn keep(kept: &mut [f64], joints: &[f64]) {
+    for (kept, q) in kept.iter_mut().zip(joints) {
+        *kept = *q;
     }
 }
 

@@ -5,8 +5,7 @@
 //! that overlap along x. A search remembers nothing of the last one, so equal scenes give equal
 //! pairs.
 //!
-//! Source: Baraff 1992, *Dynamic simulation of non-penetrating rigid
-//! bodies*; Cohen et al. 1995, *I-COLLIDE*.
+//! Source: Baraff 1992; Cohen et al. 1995.
 
 use crate::geometry::shape::Sphere;
 

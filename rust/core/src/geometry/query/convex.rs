@@ -10,8 +10,7 @@
 //! Round rims take some twenty iterations; the overlap of a wheel a whole radius inside a box is
 //! accurate to 1e-5 of its size.
 //!
-//! Source: Gilbert, Johnson and Keerthi 1988, *IEEE J. Robotics Automation* 4; van den Bergen
-//! 2001, *Proximity queries and penetration depth computation on 3D game objects*.
+//! Source: Gilbert, Johnson and Keerthi 1988 (distance); van den Bergen 2001 (penetration depth).
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -4,10 +4,12 @@ use std::collections::{HashMap, HashSet};
 
 use nalgebra::{Unit, Vector3};
 
-use super::joint::JointKind;
-use super::{ModelDescription, Shape, SolidDescription};
+use super::check_shapes::check_shapes;
+use super::joint::{JointKind, Limits};
+use super::masses::mass_left;
+use super::{ModelDescription, SolidDescription};
 use crate::multibody::error::ModelError;
-use crate::multibody::model::{MAX_SOLIDS, solid_inertia};
+use crate::multibody::model::{MAX_SHAPES, MAX_SOLIDS};
 
 /// Largest length of a description either way, m.
 const MAX_LENGTH: f64 = 1e6;
@@ -44,7 +46,7 @@ pub(in crate::multibody) fn length(field: &str, value: f64) -> Result<(), ModelE
 }
 
 /// A place, m.
-fn place(field: &str, values: &[f64; 3]) -> Result<(), ModelError> {
+pub(super) fn place(field: &str, values: &[f64; 3]) -> Result<(), ModelError> {
     (values.iter()).try_for_each(|&x| in_range(field, x, MAX_LENGTH, "at most 1e6 m either way"))
 }
 
@@ -67,7 +69,7 @@ fn finite(field: &str, values: &[f64]) -> Result<(), ModelError> {
     })
 }
 
-fn positive(field: &str, value: f64) -> Result<(), ModelError> {
+pub(super) fn positive(field: &str, value: f64) -> Result<(), ModelError> {
     finite(field, &[value])?;
     if value > 0.0 {
         Ok(())
@@ -108,17 +110,19 @@ pub(in crate::multibody) fn check(description: &ModelDescription) -> Result<(), 
     if description.solids.is_empty() {
         return Err(ModelError::NoSolids);
     }
-    for (field, count) in [
-        ("solids", description.solids.len()),
-        ("wheels", description.wheels.len()),
-        ("tags", description.tags.len()),
+    let n_shapes = description.solids.iter().map(|s| s.shapes.len()).sum();
+    for (field, what, count, limit) in [
+        ("solids", "solids", description.solids.len(), MAX_SOLIDS),
+        ("wheels", "wheels", description.wheels.len(), MAX_SOLIDS),
+        ("tags", "tags", description.tags.len(), MAX_SOLIDS),
+        ("solids", "shapes", n_shapes, MAX_SHAPES),
     ] {
-        if count > MAX_SOLIDS {
+        if count > limit {
             return Err(ModelError::TooMany {
                 field,
-                what: field,
+                what,
                 count,
-                limit: MAX_SOLIDS,
+                limit,
             });
         }
     }
@@ -166,6 +170,8 @@ fn check_joint(
         (solid.spring.is_some(), "spring", has_axis),
         (solid.damping.is_some(), "damping", has_axis),
         (solid.armature.is_some(), "armature", has_axis),
+        (solid.limits.is_some(), "limits", has_axis),
+        (solid.drive.is_some(), "drive", kind == JointKind::Revolute),
         (solid.coupled.is_some(), "coupled", has_axis),
         (solid.locked.is_some(), "locked", has_axis),
     ];
@@ -223,6 +229,13 @@ fn check_properties(
     }
     moderate(&at("damping"), solid.damping.unwrap_or(0.0))?;
     moderate(&at("armature"), solid.armature.unwrap_or(0.0))?;
+    check_limits(i, solid)?;
+    if let Some(drive) = solid.drive {
+        moderate(&at("drive.torque_limit"), drive.torque_limit)?;
+        if let Some(motor) = drive.motor {
+            motor.check(|field| at(&format!("drive.motor.{field}")))?;
+        }
+    }
     let Some(coupled) = &solid.coupled else {
         return Ok(());
     };
@@ -246,6 +259,8 @@ fn check_properties(
     )?;
     for (is_given, what) in [
         (solid.hold.is_some(), "hold"),
+        (solid.limits.is_some(), "limits"),
+        (solid.drive.is_some(), "drive"),
         (solid.locked.is_some(), "locked"),
     ] {
         if is_given {
@@ -257,6 +272,26 @@ fn check_properties(
         }
     }
     Ok(())
+}
+
+/// Stops of a joint.
+fn check_limits(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
+    let at = |what: &str| format!("solids[{i}].limits.{what}");
+    let Some(limits) = solid.limits else {
+        return Ok(());
+    };
+    let Limits { lower, upper } = limits;
+    for (field, value) in [("lower", lower), ("upper", upper)] {
+        in_range(&at(field), value, 1e9, "at most 1e9 rad or m either way")?;
+    }
+    if lower < upper {
+        return Ok(());
+    }
+    Err(ModelError::NotBelow {
+        field: at("lower"),
+        value: lower,
+        upper,
+    })
 }
 
 /// The solids of a tree are listed together.
@@ -291,18 +326,7 @@ fn check_body(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
             value: solid.mass,
         });
     }
-    match solid.shape {
-        Shape::Box { size } => size
-            .iter()
-            .try_for_each(|&s| length(&at("shape.size"), s))?,
-        Shape::Cylinder { radius, height } => {
-            length(&at("shape.radius"), radius)?;
-            length(&at("shape.height"), height)?;
-        }
-        Shape::Disc { radius } | Shape::Sphere { radius } => {
-            length(&at("shape.radius"), radius)?;
-        }
-    }
+    check_shapes(i, solid)?;
     place(
         &at("centre_of_mass"),
         &solid.centre_of_mass.unwrap_or_default(),
@@ -310,17 +334,15 @@ fn check_body(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
     for entry in solid.inertia.iter().flatten() {
         in_range(&at("inertia"), *entry, 1e24, "at most 1e24 kg m²")?;
     }
-    let principal = solid_inertia(solid.mass, &solid.shape, solid.inertia).symmetric_eigenvalues();
+    let of_solid = |error: ModelError| error.within(&format!("solids[{i}]"));
+    mass_left(solid).map_err(of_solid)?;
+    let inertia = solid.mass_properties().map_err(of_solid)?.inertia;
+    let principal = inertia.symmetric_eigenvalues();
     let (sum, largest) = (principal.sum(), principal.max());
     if principal.min() <= 0.0 || largest > (sum - largest) * (1.0 + 1e-9) {
         return Err(ModelError::ImpossibleInertia {
             field: at("inertia"),
             principal: principal.into(),
-        });
-    }
-    if solid.collides && !matches!(solid.shape, Shape::Box { .. } | Shape::Sphere { .. }) {
-        return Err(ModelError::CollidesWithoutBox {
-            field: at("collides"),
         });
     }
     Ok(())
@@ -371,12 +393,19 @@ fn check_wheels(
             })
         };
         let mut solid = find("solid", &wheel.solid)?;
+        if description.solids[solid].drive.is_some() {
+            return Err(ModelError::NotForJoint {
+                field: format!("solids[{solid}].drive"),
+                what: "drive",
+                joint: "wheel's",
+            });
+        }
         direction(&at("axle"), wheel.axle)?;
         length(&at("radius"), wheel.radius)?;
         if let Some(radius) = wheel.contact_radius {
             length(&at("contact_radius"), radius)?;
         }
-        if let Shape::Disc { radius } = description.solids[solid].shape
+        if let Some(radius) = description.solids[solid].disc_radius(&wheel.axle)
             && (radius - wheel.radius).abs() > 1e-9 * radius
         {
             return Err(ModelError::RadiusContradictsShape {

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::multibody::motor::Motor;
+
 /// Kind of a joint: see [`crate::multibody::joint`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -51,6 +53,27 @@ pub struct Spring {
     /// Where it is slack, rad or m; 0 by default.
     #[serde(default)]
     pub rest: f64,
+}
+
+/// Stops of a joint: `lower ≤ q ≤ upper`, as unilateral as a contact and with the same restitution.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// rad or m.
+    pub lower: f64,
+    /// rad or m.
+    pub upper: f64,
+}
+
+/// Drive of a joint that is no wheel's.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriveDescription {
+    /// Largest torque either way, N m.
+    pub torque_limit: f64,
+    /// Torque–speed line of its motor; without one the torque is the command at any speed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motor: Option<Motor>,
 }
 
 /// How a joint follows another: `q = ratio q_other + offset`.

@@ -5,11 +5,17 @@
 use serde::{Deserialize, Serialize};
 
 pub(super) mod check;
+mod check_shapes;
 pub mod joint;
+mod masses;
+pub mod shape;
 
 use super::error::ModelError;
 use super::motor::Motor;
-pub use joint::{CouplingDescription, Hold, JointKind, Spring};
+pub use joint::{CouplingDescription, DriveDescription, Hold, JointKind, Limits, Spring};
+pub use masses::MassProperties;
+use masses::mass_properties;
+pub use shape::{Shape, ShapeDescription};
 
 /// The built-in rover: Table 4.1 and Fig. 4.5 of the report, in SI units.
 const ROVER: &str = include_str!("../../../models/rover.toml");
@@ -70,15 +76,23 @@ pub struct SolidDescription {
     pub axis: Option<[f64; 3]>,
     /// Mass, kg.
     pub mass: f64,
-    /// Shape: gives the inertia and the looks.
-    pub shape: Shape,
-    /// Mass centre in the solid's frame, m; the origin by default.
+    /// Its only shape, about its mass centre: gives the inertia and the looks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<Shape>,
+    /// Its shapes, each with a pose, instead of `shape` and `collides`. A solid whose inertia is
+    /// given needs none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shapes: Vec<ShapeDescription>,
+    /// Mass centre in the solid's frame, m; the origin by default. A solid with `shapes` states it
+    /// together with `inertia`, or neither.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub centre_of_mass: Option<[f64; 3]>,
-    /// Inertia about the mass centre, frame axes, kg m²: xx, yy, zz, xy, xz, yz. From the shape by default.
+    /// Inertia about the mass centre, frame axes, kg m²: xx, yy, zz, xy, xz, yz. From the shape or
+    /// the shapes by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inertia: Option<[f64; 6]>,
-    /// Whether its box or ball touches the ground and other bodies.
+    /// Whether its box or ball touches the ground and other bodies; of a solid with `shapes` each
+    /// shape says it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub collides: bool,
     /// Gains with which the joint is held at a set-point.
@@ -93,63 +107,18 @@ pub struct SolidDescription {
     /// Inertia of the joint's rotor, reflected to the joint, kg m² or kg; 0 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub armature: Option<f64>,
+    /// Stops of the joint, where it has any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<Limits>,
+    /// Drive of a revolute joint.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drive: Option<DriveDescription>,
     /// Another joint that this one follows: its coordinate is gone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coupled: Option<CouplingDescription>,
     /// Angle (rad) or displacement (m) at which the joint is locked (welded): its coordinate is gone. Free by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub locked: Option<f64>,
-}
-
-/// Shape of a solid, centred at its mass centre.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
-pub enum Shape {
-    /// Box of edge lengths `size` along x, y, z (m).
-    Box {
-        /// Edge lengths, m.
-        size: [f64; 3],
-    },
-    /// Solid cylinder about y.
-    Cylinder {
-        /// m.
-        radius: f64,
-        /// Along y, m.
-        height: f64,
-    },
-    /// Thin disc about z.
-    Disc {
-        /// m.
-        radius: f64,
-    },
-    /// Solid ball.
-    Sphere {
-        /// m.
-        radius: f64,
-    },
-}
-
-impl Shape {
-    /// Principal inertias about the centre for a mass `m` (kg m²), Fig. 4.5 of the report.
-    #[must_use]
-    pub fn inertia(&self, m: f64) -> [f64; 3] {
-        match *self {
-            Self::Box { size: [a, b, c] } => [
-                m / 12.0 * (b * b + c * c),
-                m / 12.0 * (a * a + c * c),
-                m / 12.0 * (a * a + b * b),
-            ],
-            Self::Cylinder {
-                radius: r,
-                height: h,
-            } => {
-                let across = m / 12.0 * (3.0 * r * r + h * h);
-                [across, m * r * r / 2.0, across]
-            }
-            Self::Disc { radius: r } => [m * r * r / 4.0, m * r * r / 4.0, m * r * r / 2.0],
-            Self::Sphere { radius: r } => [0.4 * m * r * r; 3],
-        }
-    }
 }
 
 /// A wheel: a disc of no width, fixed to a solid.
@@ -206,6 +175,59 @@ impl SolidDescription {
         } else {
             JointKind::Free
         })
+    }
+
+    /// Mass centre (m) and inertia about it (kg m²), in the solid's frame: as given, else of its
+    /// shapes.
+    ///
+    /// # Errors
+    /// What makes the masses of its shapes unknown, named by its field in the solid.
+    pub fn mass_properties(&self) -> Result<MassProperties, ModelError> {
+        mass_properties(self)
+    }
+
+    /// Radius of the disc that a wheel with this axle is made of, m: its only shape's, or the
+    /// largest of those about the axle through the origin.
+    pub(super) fn disc_radius(&self, axle: &[f64; 3]) -> Option<f64> {
+        let radius = |shape: &Shape| match *shape {
+            Shape::Disc { radius } => Some(radius),
+            _ => None,
+        };
+        let of_shapes = (self.shapes.iter()).filter(|shape| shape.is_disc_about(axle));
+        let radii = of_shapes.filter_map(|placed| radius(&placed.shape));
+        self.shape
+            .as_ref()
+            .and_then(radius)
+            .or_else(|| radii.reduce(f64::max))
+    }
+
+    /// Gives that disc, and all of its size about the same axle, another radius (m). Returns the
+    /// radius before; none where there is no such disc.
+    pub(super) fn set_disc_radius(&mut self, axle: &[f64; 3], radius: f64) -> Option<f64> {
+        let before = self.disc_radius(axle)?;
+        let of_shapes = (self.shapes.iter_mut()).filter(|shape| shape.is_disc_about(axle));
+        for shape in (self.shape.iter_mut()).chain(of_shapes.map(|placed| &mut placed.shape)) {
+            if let Shape::Disc { radius: own } = shape
+                && *own >= before
+            {
+                *own = radius;
+            }
+        }
+        Some(before)
+    }
+
+    /// Gives it another mass (kg): an inertia and masses of shapes that it states scale with it.
+    pub fn set_mass(&mut self, mass: f64) {
+        let scale = mass / self.mass;
+        let stated = self.inertia.iter_mut().flatten();
+        let of_shapes = self
+            .shapes
+            .iter_mut()
+            .filter_map(|shape| shape.mass.as_mut());
+        for value in stated.chain(of_shapes) {
+            *value *= scale;
+        }
+        self.mass = mass;
     }
 }
 

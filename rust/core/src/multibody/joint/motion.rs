@@ -63,10 +63,16 @@ impl Motion {
     #[inline]
     #[must_use]
     pub fn twist(&self) -> (Vector3<f64>, Vector3<f64>) {
+        self.twist_if::<false>()
+    }
+
+    /// The same; where `TURN` the motion must be a turn, and there is no branch.
+    #[inline]
+    pub(crate) fn twist_if<const TURN: bool>(&self) -> (Vector3<f64>, Vector3<f64>) {
         match self.kind {
-            Kind::Turn => (self.axis, self.place.cross(&self.axis)),
-            Kind::Slide => (Vector3::zeros(), self.axis),
-            Kind::Screw => (self.axis, self.place),
+            Kind::Slide if !TURN => (Vector3::zeros(), self.axis),
+            Kind::Screw if !TURN => (self.axis, self.place),
+            _ => (self.axis, self.place.cross(&self.axis)),
         }
     }
 
@@ -74,10 +80,16 @@ impl Motion {
     #[inline]
     #[must_use]
     pub fn velocity_at(&self, x: &Vector3<f64>) -> Vector3<f64> {
+        self.velocity_if::<false>(x)
+    }
+
+    /// The same; where `TURN` the motion must be a turn, and there is no branch.
+    #[inline]
+    pub(crate) fn velocity_if<const TURN: bool>(&self, x: &Vector3<f64>) -> Vector3<f64> {
         match self.kind {
-            Kind::Turn => self.axis.cross(&(x - self.place)),
-            Kind::Slide => self.axis,
-            Kind::Screw => self.place + self.axis.cross(x),
+            Kind::Slide if !TURN => self.axis,
+            Kind::Screw if !TURN => self.place + self.axis.cross(x),
+            _ => self.axis.cross(&(x - self.place)),
         }
     }
 
@@ -85,11 +97,21 @@ impl Motion {
     #[inline]
     #[must_use]
     pub fn power(&self, force: &Vector3<f64>, moment: &Vector3<f64>) -> f64 {
+        self.power_if::<false>(force, moment)
+    }
+
+    /// The same; where `TURN` the motion must be a turn, and there is no branch.
+    #[inline]
+    pub(crate) fn power_if<const TURN: bool>(
+        &self,
+        force: &Vector3<f64>,
+        moment: &Vector3<f64>,
+    ) -> f64 {
         match self.kind {
+            Kind::Slide if !TURN => self.axis.dot(force),
+            Kind::Screw if !TURN => self.axis.dot(moment) + self.place.dot(force),
             // a · ((x − r) × f) = a · (x × f − r × f)
-            Kind::Turn => self.axis.dot(&(moment - self.place.cross(force))),
-            Kind::Slide => self.axis.dot(force),
-            Kind::Screw => self.axis.dot(moment) + self.place.dot(force),
+            _ => self.axis.dot(&(moment - self.place.cross(force))),
         }
     }
 }

@@ -55,7 +55,7 @@ impl Model {
             let parent = (solid.parent.as_deref()).and_then(|p| index_of.get(p).copied());
             let frame = builder.frame_of(i, solid, parent)?;
             solid_of_body.resize(builder.bodies.len(), i);
-            builder.carry(solid, frame);
+            builder.carry(solid, frame)?;
         }
         builder.settle_masses();
         let Builder {
@@ -81,6 +81,9 @@ impl Model {
             joint.velocity = bodies[joint.body].velocity;
             joint.is_passive = joint.passive.stiffness > 0.0 || joint.passive.damping > 0.0;
         }
+        let limited = (0..joints.len())
+            .filter(|&joint| joints[joint].limits.is_some())
+            .collect();
         let joint_velocities = joints.iter().map(|joint| joint.velocity).collect();
         let is_turn = |k: &usize| {
             let body = &bodies[paths.body_of_velocity[*k]];
@@ -103,6 +106,11 @@ impl Model {
         let has_slides = bodies
             .iter()
             .any(|b| matches!(b.joint, Joint::Prismatic(_)));
+        let only_turns = bodies.iter().all(|body| match &body.joint {
+            Joint::Free(_) => body.parent.is_none(),
+            Joint::Revolute(joint) => body.parent.is_some() && joint.coordinate.coupling.is_none(),
+            Joint::Fixed | Joint::Prismatic(_) | Joint::Spherical(_) => false,
+        });
         let text = description.to_json().unwrap_or_default();
         Ok(Self {
             mass: bodies.iter().map(|b| b.mass).sum(),
@@ -110,7 +118,9 @@ impl Model {
             n_poses,
             n_rotations,
             has_slides,
+            only_turns,
             armatures,
+            limited,
             joint_velocities,
             spinning,
             turning,
@@ -271,36 +281,54 @@ impl Builder {
         })
     }
 
-    /// Adds mass and shape of a solid to the body that its frame is fixed to.
-    fn carry(&mut self, solid: &SolidDescription, frame: Frame) {
-        let centre = frame.position
-            + frame.rotation * Vector3::from(solid.centre_of_mass.unwrap_or_default());
-        let about_centre = frame.rotation
-            * solid_inertia(solid.mass, &solid.shape, solid.inertia)
-            * frame.rotation.transpose();
+    /// Adds mass and shapes of a solid to the body that its frame is fixed to.
+    fn carry(&mut self, solid: &SolidDescription, frame: Frame) -> Result<(), ModelError> {
+        let own = solid.mass_properties()?;
+        let centre = frame.position + frame.rotation * own.centre;
+        let about_centre = frame.rotation * own.inertia * frame.rotation.transpose();
         let lump = &mut self.lumps[frame.body];
         lump.mass += solid.mass;
         lump.moment += centre * solid.mass;
         lump.inertia +=
             about_centre + SymmetricMatrix3::point_mass(solid.mass, &centre).to_matrix();
-        if let (true, Shape::Box { size }) = (solid.collides, solid.shape) {
-            self.boxes.push(CollisionBox {
-                body: frame.body,
-                name: solid.name.clone(),
-                centre,
-                rotation: frame.rotation,
-                half_size: Vector3::from(size) * 0.5,
-            });
+        if let (true, Some(shape)) = (solid.collides, &solid.shape) {
+            self.touch_with(shape, &frame, centre, frame.rotation);
         }
-        if let (true, Shape::Sphere { radius }) = (solid.collides, solid.shape) {
-            self.spheres.push(CollisionSphere {
-                body: frame.body,
-                name: solid.name.clone(),
-                centre,
-                radius,
-            });
+        for placed in solid.shapes.iter().filter(|placed| placed.collides) {
+            let centre = frame.position + frame.rotation * placed.centre();
+            let turn = placed.turn();
+            let rotation = turn.map_or(frame.rotation, |turn| frame.rotation * turn);
+            self.touch_with(&placed.shape, &frame, centre, rotation);
         }
         self.frames.push(frame);
+        Ok(())
+    }
+
+    /// Adds a part that touches, of the solid with this frame; its place is in the body's.
+    fn touch_with(
+        &mut self,
+        shape: &Shape,
+        frame: &Frame,
+        centre: Vector3<f64>,
+        rotation: Matrix3<f64>,
+    ) {
+        let (body, name) = (frame.body, frame.name.clone());
+        match *shape {
+            Shape::Box { size } => self.boxes.push(CollisionBox {
+                body,
+                name,
+                centre,
+                rotation,
+                half_size: Vector3::from(size) * 0.5,
+            }),
+            Shape::Sphere { radius } => self.spheres.push(CollisionSphere {
+                body,
+                name,
+                centre,
+                radius,
+            }),
+            Shape::Cylinder { .. } | Shape::Disc { .. } => {}
+        }
     }
 
     fn settle_masses(&mut self) {
@@ -391,26 +419,6 @@ fn wheels(
         });
     }
     wheels
-}
-
-/// Inertia about the mass centre in the solid's frame, kg m².
-pub(in crate::multibody) fn solid_inertia(
-    mass: f64,
-    shape: &Shape,
-    given: Option<[f64; 6]>,
-) -> Matrix3<f64> {
-    match given {
-        Some([xx, yy, zz, xy, xz, yz]) => SymmetricMatrix3 {
-            xx,
-            yy,
-            zz,
-            xy,
-            xz,
-            yz,
-        }
-        .to_matrix(),
-        None => Matrix3::from_diagonal(&shape.inertia(mass).into()),
-    }
 }
 
 /// Some unit vector perpendicular to a unit vector.

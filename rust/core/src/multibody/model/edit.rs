@@ -1,8 +1,8 @@
 //! The same machine with some of its data changed.
 
 use super::Model;
+use crate::multibody::description::JointKind;
 use crate::multibody::description::check::{in_range, length};
-use crate::multibody::description::{JointKind, Shape};
 use crate::multibody::error::ModelError;
 use crate::multibody::motor::Motor;
 
@@ -30,8 +30,9 @@ impl Model {
         Self::build(description)
     }
 
-    /// The same machine with wheels of another radius (m): the shape, its inertia and the contact change together. An
-    /// inertia that the description states is scaled by the square of the radius.
+    /// The same machine with wheels of another radius (m): the shape, its inertia and the contact
+    /// change together. Of several shapes the wheel's disc changes. An inertia that the description
+    /// states is scaled by the square of the radius.
     ///
     /// # Errors
     /// `NotADisc` for a wheel whose solid has another shape; a radius out of its range.
@@ -42,14 +43,13 @@ impl Model {
             let mut solids = description.solids.iter_mut();
             let solid = solids.find(|s| s.name == wheel.solid);
             if let Some(solid) = solid {
-                let Shape::Disc { radius: before } = &mut solid.shape else {
+                let Some(before) = solid.set_disc_radius(&wheel.axle, radius) else {
                     return Err(ModelError::NotADisc {
                         field: "wheel_radius",
                         solid: wheel.solid.clone(),
                     });
                 };
-                let scale = (radius / *before).powi(2);
-                *before = radius;
+                let scale = (radius / before).powi(2);
                 for entry in solid.inertia.iter_mut().flatten() {
                     *entry *= scale;
                 }

@@ -15,7 +15,6 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-pub(super) use build::solid_inertia;
 pub use parts::{CollisionBox, CollisionSphere, Frame, Wheel};
 pub use properties::{JointProperties, Passive};
 use tree::Paths;
@@ -29,6 +28,9 @@ use super::state::Configuration;
 
 /// Most solids of a model, and most wheels and tags: beyond it a step costs seconds and matrices gigabytes.
 pub const MAX_SOLIDS: usize = 1000;
+
+/// Most shapes that the solids of a model list, all together.
+pub const MAX_SHAPES: usize = 4000;
 
 /// Velocities of a free base, with which every path of its tree begins.
 pub const BASE: usize = free::NV;
@@ -102,9 +104,12 @@ pub struct Model {
     coupled: Vec<usize>,
     /// Velocities of joints with rotors, and the rotors' inertias.
     armatures: Vec<(usize, f64)>,
+    /// Joints with stops.
+    limited: Vec<usize>,
     n_poses: usize,
     n_rotations: usize,
     has_slides: bool,
+    only_turns: bool,
     /// Free and spherical joints, with their first velocities.
     rotating: Vec<(Joint, usize)>,
     mass: f64,
@@ -166,13 +171,13 @@ impl Model {
         &self.wheels
     }
 
-    /// Boxes that touch the ground.
+    /// Boxes that touch, in the order of the solids and their shapes.
     #[must_use]
     pub fn boxes(&self) -> &[CollisionBox] {
         &self.boxes
     }
 
-    /// Balls that touch the ground.
+    /// Balls that touch, in the order of the solids and their shapes.
     #[must_use]
     pub fn spheres(&self) -> &[CollisionSphere] {
         &self.spheres
@@ -244,6 +249,14 @@ impl Model {
         self.has_slides
     }
 
+    /// Whether every root is free and every other joint revolute and on its own, as a rover's are: hot loops then run without a branch on the
+    /// kind of joint.
+    #[inline]
+    #[must_use]
+    pub fn only_turns(&self) -> bool {
+        self.only_turns
+    }
+
     /// Free and spherical joints, which have quaternions, with their first velocities.
     #[inline]
     #[must_use]
@@ -275,6 +288,13 @@ impl Model {
     #[must_use]
     pub fn armatures(&self) -> &[(usize, f64)] {
         &self.armatures
+    }
+
+    /// Numbers of the joints with stops.
+    #[inline]
+    #[must_use]
+    pub fn limited_joints(&self) -> &[usize] {
+        &self.limited
     }
 
     /// Velocity indices that move body `b`, root first.

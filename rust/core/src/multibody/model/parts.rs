@@ -46,7 +46,7 @@ pub struct Wheel {
     pub steering_limit: f64,
 }
 
-/// A box that touches the ground.
+/// A box that touches the ground and other bodies.
 #[derive(Clone, Debug)]
 pub struct CollisionBox {
     /// Body that carries it.
@@ -61,7 +61,7 @@ pub struct CollisionBox {
     pub half_size: Vector3<f64>,
 }
 
-/// A ball that touches the ground.
+/// A ball that touches the ground and other bodies.
 #[derive(Clone, Debug)]
 pub struct CollisionSphere {
     /// Body that carries it.

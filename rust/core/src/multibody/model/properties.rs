@@ -1,6 +1,6 @@
-//! What a joint does by itself: springs, dampers, rotors, and the gains with which it can be held.
+//! What a joint does by itself: springs, dampers, rotors and stops, its drive, and the gains with which it can be held.
 
-use crate::multibody::description::{Hold, SolidDescription};
+use crate::multibody::description::{DriveDescription, Hold, Limits, SolidDescription};
 use crate::multibody::joint::Coupling;
 
 /// A joint with one coordinate of its own.
@@ -14,6 +14,10 @@ pub struct JointProperties {
     pub hold: Hold,
     /// Its spring, damper and rotor, with those of all joints that follow it.
     pub passive: Passive,
+    /// Its stops.
+    pub limits: Option<Limits>,
+    /// Its drive, where it is no wheel's.
+    pub drive: Option<DriveDescription>,
     /// Whether it has a spring or a damper.
     pub is_passive: bool,
 }
@@ -42,6 +46,8 @@ impl JointProperties {
                 damping: 0.0,
             }),
             passive: Passive::of(solid),
+            limits: solid.limits,
+            drive: solid.drive,
             is_passive: false,
         }
     }

@@ -185,27 +185,12 @@ fn lu_of(A: &mut [Chunk], size: usize, pivots: &mut [usize]) -> bool {
     let A = &mut A[..LANES * size * size];
     let pivots = &mut pivots[..LANES * size];
     for block in 0..size {
-        for k in 0..LANES {
-            let column = LANES * block + k;
-            if !exchange(A, size, column, pivots) {
-                return false;
-            }
-            let (own, right) = A[column * size..].split_at_mut(size);
-            let reciprocal = 1.0 / own[block][k];
-            for l in k + 1..LANES {
-                own[block][l] *= reciprocal;
-            }
-            for chunk in &mut own[block + 1..] {
-                *chunk = chunk.map(|x| x * reciprocal);
-            }
-            own[block][k] = reciprocal;
-            for other in right.chunks_exact_mut(size).take(LANES - 1 - k) {
-                let factor = other[block][k];
-                for l in k + 1..LANES {
-                    other[block][l] -= factor * own[block][l];
-                }
-                subtract(other, own, factor, block + 1);
-            }
+        let is_regular = lu_column::<0>(A, size, block, pivots)
+            && lu_column::<1>(A, size, block, pivots)
+            && lu_column::<2>(A, size, block, pivots)
+            && lu_column::<3>(A, size, block, pivots);
+        if !is_regular {
+            return false;
         }
         let (left, right) = A.split_at_mut(LANES * (block + 1) * size);
         let panel = panel_columns(&left[LANES * block * size..], size);
@@ -213,6 +198,38 @@ fn lu_of(A: &mut [Chunk], size: usize, pivots: &mut [usize]) -> bool {
             let factors = eliminate(&mut column[block], panel, block);
             subtract_columns(column, panel, factors, block + 1..size);
         }
+    }
+    true
+}
+
+/// Eliminates column `K` of a panel from those right of it in the panel; a
+/// constant, so that what is left of a chunk has a known length.
+#[inline(always)]
+fn lu_column<const K: usize>(
+    A: &mut [Chunk],
+    size: usize,
+    block: usize,
+    pivots: &mut [usize],
+) -> bool {
+    let column = LANES * block + K;
+    if !exchange(A, size, (block, K), pivots) {
+        return false;
+    }
+    let (own, right) = A[column * size..].split_at_mut(size);
+    let reciprocal = 1.0 / own[block][K];
+    for l in K + 1..LANES {
+        own[block][l] *= reciprocal;
+    }
+    for chunk in &mut own[block + 1..] {
+        *chunk = chunk.map(|x| x * reciprocal);
+    }
+    own[block][K] = reciprocal;
+    for other in right.chunks_exact_mut(size).take(LANES - 1 - K) {
+        let factor = other[block][K];
+        for l in K + 1..LANES {
+            other[block][l] -= factor * own[block][l];
+        }
+        subtract(other, own, factor, block + 1);
     }
     true
 }
@@ -228,12 +245,17 @@ fn eliminate(x: &mut Chunk, panel: [&[Chunk]; LANES], block: usize) -> Chunk {
     *x
 }
 
-/// Brings the largest entry of column `k` at or below the diagonal onto it;
-/// `false` if it is zero or not finite.
+/// Brings the largest entry of a column, named by its diagonal's chunk and place there, at or below
+/// the diagonal onto it; `false` if it is zero or not finite.
 #[inline(always)]
-fn exchange(A: &mut [Chunk], size: usize, k: usize, pivots: &mut [usize]) -> bool {
+fn exchange(
+    A: &mut [Chunk],
+    size: usize,
+    (block, lane): (usize, usize),
+    pivots: &mut [usize],
+) -> bool {
+    let k = LANES * block + lane;
     let column = &A[k * size..(k + 1) * size];
-    let (block, lane) = (k / LANES, k % LANES);
     let mut best = k;
     let mut largest = column[block][lane].abs();
     let mut offer = |row: usize, x: f64| {

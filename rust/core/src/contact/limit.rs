@@ -1,0 +1,103 @@
+//! A joint against its stop: `gap = q − lower` or `upper − q`, rad or m.
+//!
+//! A stop is an item of the contact list, so that forecast, impact law, projection and warm start are those of every contact, and one solve
+//! answers for stops and contacts together. Its normal row of H is ±1 at the joint's velocity. The normal velocity is in rad/s and the impulse
+//! in N m s at a revolute joint. Its tangential rows are zero and μ = 0; in W its tangential diagonal is that of its normal, coupled to
+//! nothing, so that its tangential impulse is zero and W stays regular.
+
+use super::activation::Activation;
+use super::frame::ContactFrame;
+use super::pair::{Contact, ContactKey, Opposite};
+use super::part::{Part, Side};
+use crate::multibody::{Kinematics, Model};
+
+impl Side {
+    /// Rate of the gap per unit of the joint's velocity.
+    #[inline]
+    #[must_use]
+    pub fn sign(self) -> f64 {
+        match self {
+            Self::Lower => 1.0,
+            Self::Upper => -1.0,
+        }
+    }
+}
+
+impl ContactKey {
+    /// Key of a joint's stop.
+    #[must_use]
+    pub fn at_limit(joint: usize, side: Side) -> Self {
+        Self {
+            part: Part::Limit(joint, side).code(),
+            feature: match side {
+                Side::Lower => 0,
+                Side::Upper => 1,
+            },
+            opposite: Opposite::Stop,
+        }
+    }
+}
+
+/// Velocity of the joint and the gap's rate per unit of it, where the contact is a stop.
+#[inline]
+pub(super) fn row(model: &Model, contact: &Contact) -> Option<(usize, f64)> {
+    match contact.part {
+        Part::Limit(joint, side) => Some((model.joint_velocity(joint), side.sign())),
+        _ => None,
+    }
+}
+
+/// Adds the stops that a step must consider to `out`.
+///
+/// `joints`: coordinates of all joints (n_joints) where the poses of `kinematics` are, rad or m; `v`: velocity (nv).
+pub fn detect_limits(
+    model: &Model,
+    kinematics: &Kinematics,
+    joints: &[f64],
+    v: &[f64],
+    activation: &Activation,
+    out: &mut Vec<Contact>,
+) {
+    for &joint in model.limited_joints() {
+        for side in [Side::Lower, Side::Upper] {
+            let gap = gap(model, joints, joint, side);
+            let rate = || side.sign() * v[model.joint_velocity(joint)];
+            if activation.admits(gap, rate) {
+                out.push(contact(model, kinematics, joint, side, gap));
+            }
+        }
+    }
+}
+
+/// The same stop in another configuration.
+pub fn relocate_limit(model: &Model, kinematics: &Kinematics, joints: &[f64], stop: &mut Contact) {
+    if let Part::Limit(joint, side) = stop.part {
+        let gap = gap(model, joints, joint, side);
+        *stop = contact(model, kinematics, joint, side, gap);
+    }
+}
+
+/// Distance to a stop, rad or m; none is near where the joint has none.
+fn gap(model: &Model, joints: &[f64], joint: usize, side: Side) -> f64 {
+    let q = joints[joint];
+    match (model.joints()[joint].limits, side) {
+        (Some(limits), Side::Lower) => q - limits.lower,
+        (Some(limits), Side::Upper) => limits.upper - q,
+        (None, _) => f64::INFINITY,
+    }
+}
+
+/// A stop as a contact: it lies at the origin of what the joint carries, its normal along the axis that opens the gap.
+fn contact(model: &Model, kinematics: &Kinematics, joint: usize, side: Side, gap: f64) -> Contact {
+    let body = model.joints()[joint].body;
+    let axis = kinematics.motions[model.bodies()[body].motion].axis();
+    Contact {
+        key: ContactKey::at_limit(joint, side),
+        part: Part::Limit(joint, side),
+        body,
+        other: None,
+        point: kinematics.r[body],
+        frame: ContactFrame::of_normal(&(axis * side.sign())),
+        gap,
+    }
+}

@@ -1,0 +1,83 @@
+//! What the shapes of a solid must satisfy.
+
+use super::check::{in_range, length, place, positive};
+use super::{Shape, ShapeDescription, SolidDescription};
+use crate::multibody::error::ModelError;
+
+/// The shapes of a solid, one by one, and that it has them in one form.
+pub(super) fn check_shapes(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
+    let at = |what: &str| format!("solids[{i}].{what}");
+    if let Some(shape) = solid.shape {
+        check_lengths(&at("shape"), &shape)?;
+    }
+    let can_collide = solid.shapes.is_empty() && solid.shape.is_some_and(|shape| collides(&shape));
+    for (is_given, what) in [
+        (solid.shape.is_some(), "shape"),
+        (solid.collides, "collides"),
+    ] {
+        if is_given && !solid.shapes.is_empty() {
+            return Err(ModelError::NotWithShapes {
+                field: at(what),
+                what,
+            });
+        }
+    }
+    if solid.collides && !can_collide {
+        return Err(ModelError::CannotCollide {
+            field: at("collides"),
+        });
+    }
+    for (k, shape) in solid.shapes.iter().enumerate() {
+        check_placed_shape(&at(&format!("shapes[{k}]")), shape)?;
+    }
+    let is_half_given = solid.centre_of_mass.is_some() != solid.inertia.is_some();
+    if !solid.shapes.is_empty() && is_half_given {
+        let missing = if solid.inertia.is_none() {
+            "inertia"
+        } else {
+            "centre_of_mass"
+        };
+        return Err(ModelError::Missing { field: at(missing) });
+    }
+    Ok(())
+}
+
+fn check_placed_shape(at: &str, shape: &ShapeDescription) -> Result<(), ModelError> {
+    check_lengths(at, &shape.shape)?;
+    place(
+        &format!("{at}.position"),
+        &shape.position.unwrap_or_default(),
+    )?;
+    for angle in shape.rotation.iter().flatten() {
+        let field = format!("{at}.rotation");
+        in_range(&field, *angle, 1e3, "at most 1e3 rad either way")?;
+    }
+    if let Some(mass) = shape.mass {
+        let field = format!("{at}.mass");
+        positive(&field, mass)?;
+        in_range(&field, mass, 1e12, "at most 1e12 kg")?;
+    }
+    if shape.collides && !collides(&shape.shape) {
+        return Err(ModelError::CannotCollide {
+            field: format!("{at}.collides"),
+        });
+    }
+    Ok(())
+}
+
+fn check_lengths(at: &str, shape: &Shape) -> Result<(), ModelError> {
+    let field = |what: &str| format!("{at}.{what}");
+    match *shape {
+        Shape::Box { size } => (size.iter()).try_for_each(|&s| length(&field("size"), s)),
+        Shape::Cylinder { radius, height } => {
+            length(&field("radius"), radius)?;
+            length(&field("height"), height)
+        }
+        Shape::Disc { radius } | Shape::Sphere { radius } => length(&field("radius"), radius),
+    }
+}
+
+/// Whether a shape can touch; a disc does as a wheel.
+fn collides(shape: &Shape) -> bool {
+    matches!(shape, Shape::Box { .. } | Shape::Sphere { .. })
+}

@@ -1,0 +1,107 @@
+//! Mass centre and inertia of a solid from what its description says.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Shape, ShapeDescription, SolidDescription};
+use crate::multibody::error::ModelError;
+use crate::spatial::SymmetricMatrix3;
+
+/// Mass centre and inertia of a solid, in its frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MassProperties {
+    /// m.
+    pub centre: Vector3<f64>,
+    /// About the mass centre, kg m².
+    pub inertia: Matrix3<f64>,
+}
+
+/// How far the masses of all shapes together may be from the solid's, in parts of it.
+const MASS_TOLERANCE: f64 = 1e-9;
+
+/// As given, else of the shapes.
+pub(super) fn mass_properties(solid: &SolidDescription) -> Result<MassProperties, ModelError> {
+    let centre = Vector3::from(solid.centre_of_mass.unwrap_or_default());
+    if let Some([xx, yy, zz, xy, xz, yz]) = solid.inertia {
+        let inertia = SymmetricMatrix3 {
+            xx,
+            yy,
+            zz,
+            xy,
+            xz,
+            yz,
+        };
+        return Ok(MassProperties {
+            centre,
+            inertia: inertia.to_matrix(),
+        });
+    }
+    if let Some(shape) = solid.shape {
+        let inertia = Matrix3::from_diagonal(&shape.inertia(solid.mass).into());
+        return Ok(MassProperties { centre, inertia });
+    }
+    if solid.shapes.is_empty() {
+        let field = "shape".to_owned();
+        return Err(ModelError::Missing { field });
+    }
+    Ok(together(&solid.shapes, &shape_masses(solid)?))
+}
+
+/// Mass of every shape of a solid, kg.
+fn shape_masses(solid: &SolidDescription) -> Result<Vec<f64>, ModelError> {
+    let shapes = &solid.shapes;
+    let rest = mass_left(solid)?;
+    let mut others = shapes.iter().filter(|shape| shape.mass.is_none());
+    let are_discs = others.all(|shape| shape.shape.volume().is_none());
+    let content = |(k, shape): (usize, &ShapeDescription)| match (shape.mass, shape.shape) {
+        (Some(_), _) => Ok(0.0),
+        (None, Shape::Disc { radius }) if are_discs => Ok(radius * radius),
+        (None, shape) => shape.volume().ok_or_else(|| ModelError::NoVolume {
+            field: format!("shapes[{k}].mass"),
+        }),
+    };
+    let contents: Vec<f64> = (shapes.iter().enumerate())
+        .map(content)
+        .collect::<Result<_, _>>()?;
+    let whole: f64 = contents.iter().sum();
+    let masses = shapes.iter().zip(&contents);
+    Ok(masses
+        .map(|(shape, part)| shape.mass.unwrap_or_else(|| rest * (part / whole)))
+        .collect())
+}
+
+/// What the masses of shapes that have their own leave of the solid's mass to the others, kg.
+pub(super) fn mass_left(solid: &SolidDescription) -> Result<f64, ModelError> {
+    let given = || solid.shapes.iter().filter_map(|shape| shape.mass);
+    let sum: f64 = given().sum();
+    let rest = solid.mass - sum;
+    let is_right = if given().count() == solid.shapes.len() {
+        solid.shapes.is_empty() || rest.abs() <= MASS_TOLERANCE * solid.mass
+    } else {
+        rest > MASS_TOLERANCE * solid.mass
+    };
+    if is_right {
+        return Ok(rest);
+    }
+    Err(ModelError::MassesContradict {
+        field: "mass".to_owned(),
+        value: solid.mass,
+        sum,
+    })
+}
+
+/// Mass centre of shapes, and their inertia about it by parallel axes.
+fn together(shapes: &[ShapeDescription], masses: &[f64]) -> MassProperties {
+    let parts = || shapes.iter().zip(masses.iter().copied());
+    let mass: f64 = masses.iter().sum();
+    let moment: Vector3<f64> = parts().map(|(shape, m)| shape.centre() * m).sum();
+    let centre = moment / mass;
+    let about_centre = |(shape, m): (&ShapeDescription, f64)| {
+        let own = Matrix3::from_diagonal(&shape.shape.inertia(m).into());
+        let turned = shape.turn().map_or(own, |R| R * own * R.transpose());
+        turned + SymmetricMatrix3::point_mass(m, &(shape.centre() - centre)).to_matrix()
+    };
+    MassProperties {
+        centre,
+        inertia: parts().map(about_centre).sum(),
+    }
+}

@@ -1,0 +1,120 @@
+//! Drives of joints that are no wheels'.
+
+use rover_core::integrator::Variant;
+use rover_core::multibody::{
+    DriveDescription, JointKind, Model, ModelDescription, Motor, SolidDescription, WheelDescription,
+};
+
+use crate::machines::{machine, model, options, simulation, solid};
+
+/// About y, so that gravity does nothing.
+const INERTIA: f64 = 0.25 * 0.1 * 0.1;
+
+fn turret(motor: Option<Motor>) -> SolidDescription {
+    let mut turret = solid("turret", None, JointKind::Revolute);
+    turret.axis = Some([0.0, 1.0, 0.0]);
+    turret.drive = Some(DriveDescription {
+        torque_limit: 0.01,
+        motor,
+    });
+    turret
+}
+
+const MOTOR: Motor = Motor {
+    stall_torque: 0.008,
+    no_load_speed: 5.0,
+    regenerating: true,
+};
+
+/// `I ω = h τ` with the torque that was asked for, or the limit; a joint without a drive has none.
+#[test]
+fn a_torque_saturates_at_the_drives_limit() {
+    for (asked, given) in [(0.004, 0.004), (1.0, 0.01), (-1.0, -0.01)] {
+        let mut free = solid("free", Some("turret"), JointKind::Revolute);
+        free.axis = Some([0.0, 1.0, 0.0]);
+        let mut run = simulation(
+            model(vec![turret(None), free]),
+            options(1e-3, Variant::Linearised),
+        );
+        // The other joint has no drive and no limit; its torque acts back on the turret.
+        run.set_joint_torques(&[asked, 0.5]).unwrap();
+        run.step(10).unwrap();
+        let v = &run.state().v;
+        let expected = 0.01 * (given - 0.5) / INERTIA;
+        assert!((v[0] - expected).abs() < 1e-9, "{v:?} {expected}");
+        let last = run.last_call();
+        let work = given * v[0] * 0.5 * 0.01;
+        assert!((last.work - work.abs()).abs() < 1e-9, "{last:?} {work}");
+    }
+}
+
+/// `I ω̇ = τ₀ (1 − ω/ω₀)` on the line of the motor, from rest: `ω = ω₀ (1 − exp(−τ₀ t / (I ω₀)))`.
+#[test]
+fn a_joint_runs_up_along_its_motors_line() {
+    for variant in [Variant::Linearised, Variant::Newton] {
+        let h = 1e-4;
+        let mut run = simulation(model(vec![turret(Some(MOTOR))]), options(h, variant));
+        run.set_joint_torques(&[0.01]).unwrap();
+        for n in [1, 2] {
+            run.step(1000).unwrap();
+            let t = 0.1 * f64::from(n);
+            let rate = MOTOR.stall_torque / (INERTIA * MOTOR.no_load_speed);
+            let expected = MOTOR.no_load_speed * (1.0 - (-rate * t).exp());
+            let found = run.state().v[0];
+            assert!((found - expected).abs() < 1e-5, "{found} {expected}");
+        }
+        let snapshot = run.snapshot();
+        run.restore(&snapshot).unwrap();
+    }
+}
+
+#[test]
+fn drives_survive_both_formats_and_bad_ones_are_refused_by_field() {
+    let sound = machine(vec![
+        turret(Some(MOTOR)),
+        solid("slide", Some("turret"), JointKind::Prismatic),
+    ]);
+    let toml = ModelDescription::from_toml(&sound.to_toml().unwrap()).unwrap();
+    let json = ModelDescription::from_json(&sound.to_json().unwrap()).unwrap();
+    assert_eq!((&toml, &json), (&sound, &sound));
+    let refused = |spoil: fn(&mut ModelDescription), field: &str| {
+        let mut description = sound.clone();
+        spoil(&mut description);
+        let error = Model::from_description(description).unwrap_err();
+        assert_eq!(error.field(), field, "{error}");
+    };
+    let negative = |d: &mut ModelDescription| {
+        d.solids[0].drive = Some(DriveDescription {
+            torque_limit: -1.0,
+            motor: None,
+        });
+    };
+    refused(negative, "solids[0].drive.torque_limit");
+    let no_motor = |d: &mut ModelDescription| {
+        d.solids[0].drive = Some(DriveDescription {
+            torque_limit: 1.0,
+            motor: Some(Motor {
+                stall_torque: 0.0,
+                ..MOTOR
+            }),
+        });
+    };
+    refused(no_motor, "solids[0].drive.motor.stall_torque");
+    let of_a_slide = |d: &mut ModelDescription| d.solids[1].drive = d.solids[0].drive;
+    refused(of_a_slide, "solids[1].drive");
+    let of_a_wheel = |d: &mut ModelDescription| {
+        d.wheels.push(WheelDescription {
+            name: "W".into(),
+            solid: "turret".into(),
+            axle: [0.0, 1.0, 0.0],
+            radius: 0.1,
+            contact_radius: None,
+            torque_limit: 1.0,
+            drive_sign: 1.0,
+            motor: None,
+            steering: None,
+            steering_limit: None,
+        });
+    };
+    refused(of_a_wheel, "solids[0].drive");
+}

@@ -1,0 +1,14 @@
+//! Machines that the tests share.
+
+use rover_core::multibody::{Model, ModelDescription};
+
+/// One free solid of a mass (kg) with what else its description says.
+pub fn described(mass: f64, rest: &str) -> ModelDescription {
+    let text = format!("name = 'machine'\n[[solids]]\nname = 'body'\nmass = {mass}\n{rest}\n");
+    ModelDescription::from_toml(&text).unwrap()
+}
+
+/// The same, checked and built.
+pub fn body(mass: f64, rest: &str) -> Model {
+    Model::from_description(described(mass, rest)).unwrap()
+}
