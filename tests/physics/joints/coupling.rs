@@ -46,8 +46,8 @@ fn a_differential_is_one_coordinate() {
     );
 }
 
-/// On a free body the follower keeps its ratio, and the fall keeps the
-/// energy and the linear momentum that gravity leaves.
+/// On a free body the follower keeps its ratio, and the fall conserves energy and the horizontal
+/// linear momentum.
 #[test]
 fn a_follower_on_a_free_body_stays_where_the_ratio_says() {
     let body = solid("body", None, JointKind::Free);

@@ -99,6 +99,7 @@ impl ContactSystem {
             self.fill_operator(n, |system, c, d| system.block_on_ground(model, c, d));
         } else {
             self.fill_operator(n, |system, c, d| system.block(model, c, d));
+            self.close_stops(contacts);
         }
     }
 
@@ -121,9 +122,6 @@ impl ContactSystem {
                     row.copy_from_slice(&[block[0][j], block[1][j], block[2][j]]);
                 }
             }
-        }
-        if !self.spans.is_empty() {
-            self.close_stops(contacts);
         }
     }
 

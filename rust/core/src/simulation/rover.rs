@@ -93,8 +93,8 @@ impl Scene for RoverScene {
         }
     }
 
-    /// Most contacts on a plane: three rim points a wheel, four corners a
-    /// box, one point a ball, and both stops of a joint.
+    /// Most contacts on a plane: three rim points per wheel, four corners per box, one point per
+    /// ball, and both stops of a joint.
     fn contact_capacity(&self) -> usize {
         let model = &self.model;
         let stops = 2 * model.limited_joints().len();

@@ -14,8 +14,7 @@ pub struct RoverCommand {
     pub actuators: Command,
     /// Driving torque of each wheel, positive forward, N m.
     pub wheel_torque: Vec<f64>,
-    /// Torque about each joint's axis, N m: its drive's where it has one,
-    /// else on top of all others.
+    /// Torque about each joint's axis, N m: its drive's where it has one, else additional.
     pub joint_torque: Vec<f64>,
 }
 
@@ -108,9 +107,10 @@ impl RoverSimulation {
         Ok(())
     }
 
-    /// Sets torques about the joint axes (n_joints, N m). A joint with a
-    /// drive saturates at its limit and has its motor's line; at all others
-    /// they come on top of the wheels' and have no limit.
+    /// Sets torques about the joint axes (n_joints, N m).
+    ///
+    /// A joint with a drive saturates at its limit and on its motor's line. At all others the
+    /// torque is additional to the wheels' and has no limit.
     ///
     /// # Errors
     /// Wrong length or an entry that is not finite; nothing is changed then.

@@ -52,8 +52,7 @@ impl RoverSimulation {
         forces
     }
 
-    /// Mean normal force of the last step on all bodies that are no wheels,
-    /// N; what joints' stops give is left out.
+    /// Mean normal force of the last step on all parts except wheels, N, without joints' stops.
     #[must_use]
     pub fn body_force(&self) -> f64 {
         let boxes = self

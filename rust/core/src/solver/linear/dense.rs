@@ -245,8 +245,8 @@ fn eliminate(x: &mut Chunk, panel: [&[Chunk]; LANES], block: usize) -> Chunk {
     *x
 }
 
-/// Brings the largest entry of a column, named by its diagonal's chunk and place there, at or below
-/// the diagonal onto it; `false` if it is zero or not finite.
+/// Brings the largest entry of a column at or below the diagonal onto it; `false` if it is zero or
+/// not finite. The column is named by its diagonal's chunk and the place there.
 #[inline(always)]
 fn exchange(
     A: &mut [Chunk],
