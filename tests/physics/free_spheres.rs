@@ -15,7 +15,7 @@ use rover_core::nalgebra::Vector3;
 use rover_core::simulation::GrainSimulation;
 use rover_core::system::grains::{GrainFriction, GrainScene, Grains, Wall};
 
-/// No CPU time is wanted here.
+/// No CPU time is measured here.
 fn no_clock() -> f64 {
     0.0
 }
@@ -145,8 +145,7 @@ fn a_box_dropped_askew_comes_to_rest_on_a_face() {
     simulation.start_with(|v| v[3..6].copy_from_slice(&[0.5, 0.1, 1.0]));
     simulation.step(4000).unwrap();
     let height = simulation.centres()[0].y;
-    // A contact that rests within what gravity falls in a step, g h²/2 =
-    // 4.9e-6 m, is left where it is.
+    // A resting contact within the fall of one step, g h²/2 = 4.9e-6 m, is left where it is.
     let face = [0.1, 0.2, 0.4].map(|half: f64| (height - half).abs());
     assert!(face.iter().any(|off| *off < 5e-6), "height {height}");
     assert!(simulation.v().iter().all(|v| v.abs() < 1e-9));
@@ -242,15 +241,15 @@ fn a_sliding_sphere_comes_to_roll_at_five_sevenths() {
     assert!((simulation.centres()[0].y - 0.2).abs() < 1e-12);
 }
 
-/// The core's grains have another law at the contact, `0 ≤ u_N + gap⁺/h ⊥ p_N ≥ 0` with θ = 1, and
-/// find contacts in another way: both come to the same motion as the step shrinks.
+/// The core's grains have a different contact law, `0 ≤ u_N + gap⁺/h ⊥ p_N ≥ 0` with θ = 1, and a
+/// different contact search: both converge to the same motion as the step shrinks.
 #[test]
 fn grains_in_space_and_free_spheres_come_to_the_same_motion() {
     let kind = SphereKind {
         mass: 2.0,
         radius: 0.1,
     };
-    // One falls on three that lie on the ground, beside their middle, and pushes them apart.
+    // One falls on three that lie on the ground, off their centre, and pushes them apart.
     let centres = vec![
         Vector3::new(0.0, 0.1, 0.0),
         Vector3::new(0.22, 0.1, 0.0),

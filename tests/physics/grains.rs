@@ -199,7 +199,7 @@ where
     }
 }
 
-/// Moment of inertia over m r²: what rolls keeps 1/(1 + κ) of its speed.
+/// κ, moment of inertia over m r²: a sliding body that starts to roll keeps 1/(1 + κ) of its speed.
 fn kappa<const D: usize>() -> f64 {
     if D == 2 { 0.5 } else { 0.4 }
 }
@@ -439,7 +439,7 @@ fn balls_fall_in_a_box_and_rest_in_it_and_their_energy_never_grows() {
             now - energy
         );
         energy = now;
-        // M Δv = h M g + what the walls do: nothing else acts.
+        // M Δv = h M g plus the impulses of the walls: nothing else acts.
         let (after, _) = heap.scene.momentum(&heap.q, &heap.v);
         let weight = heap.options.gravity * (mass * heap.options.time_step);
         let off = (after - momentum - weight - heap.impulse_of_walls()).norm();
@@ -449,7 +449,7 @@ fn balls_fall_in_a_box_and_rest_in_it_and_their_energy_never_grows() {
         assert!(depth < 0.01, "step {step}: {depth}");
     }
     assert!(converged > 890, "{converged} of 900 steps");
-    // There is no rolling friction, so one or the other still rolls: 2 cm/s of all together.
+    // Without rolling friction some grains still roll: 2 cm/s in total.
     let kinetic = heap
         .scene
         .energy(&heap.q, &heap.v, &heap.options.gravity)
@@ -501,7 +501,7 @@ fn sweeps_and_a_factorisation_give_balls_the_same_velocities() {
         heap.options.solver.tolerance = 1e-10;
         heap.options.solver.velocity_tolerance = 1e-9;
         heap.options.solver.max_sweeps = 100_000;
-        // Into the thick of it.
+        // Into the middle of the bed.
         heap.step(80);
         heap.options.solver.method = method;
         let report = heap.step(1);
@@ -524,7 +524,7 @@ fn balls_that_rest_fall_asleep_and_wake_when_one_is_struck() {
     heap.step(100);
     assert!(heap.sleep.asleep().iter().all(|sleeps| *sleeps));
     assert_eq!(heap.step(1).n_contacts, 0, "nothing is left to solve");
-    // A blow at one of the three wakes all that are near.
+    // An impact on one of the three wakes all that are near.
     heap.sleep.wake_all(&[false; 4], &mut heap.warm_start);
     heap.v[0] = 0.5;
     heap.step(1);
@@ -533,7 +533,7 @@ fn balls_that_rest_fall_asleep_and_wake_when_one_is_struck() {
     assert!(report.n_contacts >= 3, "{report:?}");
 }
 
-/// A ball, or a disk, that is handed in as a machine.
+/// A ball or disk in the role of a machine.
 #[derive(Debug)]
 struct RoundMachine {
     mass: f64,
@@ -615,8 +615,8 @@ impl<const D: usize> Machine<D> for RoundMachine {
     }
 }
 
-/// A blow of one body against D others on the floor: the same whether the
-/// one is a grain or a machine.
+/// The impact of one body on D others on the floor is the same whether the one is a grain or a
+/// machine.
 fn machine_moves_as_a_grain<const D: usize>()
 where
     for<'a> GrainSystem<'a, D>:

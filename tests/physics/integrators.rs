@@ -83,7 +83,7 @@ fn the_event_driven_scheme_says_that_it_cannot_pass_the_zeno_point() {
         (stopped - zeno).abs() < 5e-3 && stopped <= zeno + 1e-9,
         "{stopped} {zeno}"
     );
-    // Before it there is nothing to say.
+    // Nothing is asserted before it.
     assert_eq!(accumulation(e, 1.3).unwrap(), None);
 }
 
@@ -172,7 +172,7 @@ fn a_block_on_a_slope_stays_but_for_the_penalty_which_creeps() {
 
 #[test]
 fn the_penalty_scheme_breaks_down_above_the_step_that_its_stiffness_allows() {
-    // Undamped, semi-implicit Euler is stable up to 2 √(m/k), whatever else happens in the scene.
+    // Undamped semi-implicit Euler is stable up to 2 √(m/k), whatever happens in the scene.
     let (mass, stiffness) = (2.0_f64, 1e5_f64);
     let limit = 2.0 * (mass / stiffness).sqrt();
     let largest = |h: f64| {
@@ -233,7 +233,7 @@ fn in_persistent_contact_each_has_its_order() {
             Kind::EventDriven => 4.0,
             Kind::Penalty(..) => continue,
         };
-        // Ours takes its coarsest steps from rest in halves, which would blur the slope.
+        // Our scheme halves its coarsest steps from rest, which would blur the slope.
         let coarsest = match scheme.kind {
             Kind::MoreauJean { .. } => 32,
             _ => 16,
@@ -247,8 +247,8 @@ fn in_persistent_contact_each_has_its_order() {
 
 #[test]
 fn the_penalty_scheme_converges_to_another_motion() {
-    // Refining sixteen times, from 0.16 ms to 0.01 ms, gains nothing: what
-    // is left is the spring and the regularised friction.
+    // Refining sixteen times, from 0.16 ms to 0.01 ms, gains nothing: the remaining error is that
+    // of the spring and the regularised friction.
     let curve = order_in(named("Penalty"), Motion::Driving, 4096).unwrap();
     let errors: Vec<f64> = curve.error.iter().map(|e| e.unwrap()).collect();
     assert!(

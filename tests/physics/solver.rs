@@ -233,8 +233,8 @@ fn rank(W: &[f64], n: usize) -> usize {
     n
 }
 
-/// Part of `x` that a symmetric `W` cannot see, up to `1e-9` of the rest:
-/// `(I + W/alpha)^-1 x` by elimination.
+/// Part of `x` in the null space of a symmetric `W`, up to `1e-9` of the rest: `(I + W/alpha)^-1 x`
+/// by elimination.
 fn invisible(W: &[f64], x: &[f64]) -> f64 {
     let n = x.len();
     let alpha = 1e-10 * (0..n).map(|k| W[k * (n + 1)]).sum::<f64>();
@@ -571,7 +571,7 @@ fn random_problem() -> impl Strategy<Value = Problem> {
 }
 
 proptest! {
-    // A failing case prints itself; there is no source folder of this test to keep it in.
+    // A failing case is printed; this test has no source folder to store it in.
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(1000) })]
 
     #[test]
@@ -591,8 +591,8 @@ proptest! {
     }
 }
 
-/// Sum without rounding to speak of (Neumaier), so that a cancellation in
-/// `W p + q` is the answer's and not the test's.
+/// Sum with negligible rounding (Neumaier), so that a cancellation in `W p + q` is due to the
+/// answer and not to the test.
 fn exact_sum(terms: impl Iterator<Item = (f64, f64)>) -> f64 {
     let (mut sum, mut lost) = (0.0_f64, 0.0_f64);
     for (a, b) in terms {
@@ -742,8 +742,8 @@ fn no_friction_coefficient_lets_a_contact_approach() {
     }
 }
 
-/// The unit of mass and of velocity are the caller's: from 1e-300 to 1e300
-/// the answer is the same up to its own unit.
+/// Mass and velocity may be in any unit: from 1e-300 to 1e300 the answer is the same up to its own
+/// unit.
 #[test]
 fn the_answer_does_not_depend_on_the_units() {
     let sound = parked_rover();
@@ -817,7 +817,7 @@ fn the_report_names_the_stage_that_answered_and_those_before_it() {
     };
     let problem = parked_rover();
     let (mut p, _, cold) = solved(&problem);
-    // At rest some mode is a matter of choice, which the guess leaves to Newton.
+    // At rest some mode is ambiguous, which the guess leaves to Newton.
     assert_eq!(
         stages(&cold),
         [
@@ -883,8 +883,8 @@ fn every_solve_lists_its_stages() {
     assert_eq!(scaled.rungs, usual.rungs);
 }
 
-/// A column of discs, whose contacts stand in for W: when the sweeps are
-/// cut short the proximal point goes on, and both are listed.
+/// A column of discs, given by its contacts instead of W: if the sweeps are cut short the proximal
+/// point method continues, and both are listed.
 #[test]
 fn free_bodies_list_their_sweeps_and_what_came_after_them() {
     let (n, mass, radius) = (20, 1.0_f64, 0.1);
@@ -1007,7 +1007,7 @@ fn a_budget_ends_every_method_with_the_nearest_answer_known() {
     }
 }
 
-/// How many of many random problems converge; deterministic, so that a less robust solver shows.
+/// Number of random problems that converge; deterministic, so that a less robust solver shows.
 #[test]
 fn most_random_mechanisms_are_solved() {
     let mut state = 1_u64;

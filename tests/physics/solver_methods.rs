@@ -64,8 +64,7 @@ fn manufactured(
             let gram: f64 = (0..n)
                 .map(|k| numbers[(r * n + k) % 97] * numbers[(c * n + k) % 97])
                 .sum();
-            // A heavy diagonal makes the answer the only one, a skew part
-            // leaves W positive definite.
+            // A dominant diagonal makes the answer unique; a skew part leaves W positive definite.
             W[r * n + c] = 0.3 * gram / n as f64
                 + if r == c { 1.0 } else { 0.0 }
                 + skew * (f64::from(r < c) - f64::from(r > c));
@@ -136,7 +135,7 @@ proptest! {
     }
 }
 
-/// A skew coupling of 10% moves the answer by 10%: a solver that symmetrises W would be found out.
+/// A skew coupling of 10% changes the answer by 10%: a solver that symmetrises W would fail.
 #[test]
 fn an_unsymmetric_operator_is_not_symmetrised() {
     let numbers: Vec<f64> = (0..97).map(|k| (1.7 * f64::from(k)).sin()).collect();
@@ -191,7 +190,8 @@ fn the_relaxed_law_lifts_what_slides() {
             (slip - 1.2).abs() < 1e-10 && (u[0] - mu * slip).abs() < 1e-10,
             "{u:?}"
         );
-        // It says so, and its numbers are Coulomb's: off by a good part of a metre a second.
+        // Its status says so, and its residuals are Coulomb's: a good fraction of a metre per
+        // second.
         assert_eq!(report.status, SolveStatus::SolvedRelaxed);
         assert_eq!(report.method.law(), ContactLaw::Relaxed);
         assert!(
@@ -238,7 +238,7 @@ fn a_wrong_velocity_is_not_accepted_at_a_large_mass_ratio() {
             "{}: {report:?}",
             method.name()
         );
-        // An answer that is refused after all is listed as refused.
+        // An answer that is rejected in the end is listed as rejected.
         let last = report.rungs.as_slice().last().map(|rung| rung.status);
         assert_eq!(last, Some(report.status), "{}", method.name());
     }
@@ -251,9 +251,9 @@ const RADIUS: f64 = 0.05;
 const MASS: f64 = 0.7;
 const STEP: f64 = 9.81e-3;
 
-/// Columns of disks side by side, on the floor or on one plank that lies on the floor with both
-/// ends. Contacts, inverse masses and free velocities after a step of gravity. On the floor every
-/// column is an island; the plank makes one of all.
+/// Columns of disks side by side, on the floor or on one plank whose ends lie on the floor.
+/// Contacts, inverse masses and free velocities after a step of gravity. On the floor every column
+/// is an island; the plank joins them all into one.
 fn columns(
     n_columns: usize,
     height: usize,

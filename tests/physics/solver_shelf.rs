@@ -18,7 +18,7 @@ struct Bounds {
     not_reached: BTreeMap<String, f64>,
 }
 
-/// Work that solves every problem which is solved at all; the default stops four of them earlier.
+/// Work sufficient for every problem that is solved at all; the default stops four of them earlier.
 const AMPLE: u64 = 4_000_000_000;
 
 /// How well a problem is solved from rest with the default options but for
@@ -71,7 +71,7 @@ fn every_problem_of_the_shelf_within_its_bound() {
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }
 
-/// What the rover poses at each step is solved to the tolerance that its simulation uses.
+/// The problems of the rover's steps are solved to the tolerance of its simulation.
 #[test]
 fn the_rovers_steps_to_the_last_digits() {
     let problems = shelf(|name| name.starts_with("rover"));
@@ -86,7 +86,7 @@ fn the_rovers_steps_to_the_last_digits() {
     }
 }
 
-/// The default budget ends every solve, with a finite answer that is nearer than none.
+/// The default budget ends every solve, with a finite answer that is better than zero.
 #[test]
 fn the_default_budget_holds() {
     for problem in shelf(|name| name.contains("460") || name == "wall_hit") {

@@ -1,4 +1,4 @@
-//! Machines whose parts meet.
+//! Machines whose parts touch each other.
 
 use std::sync::Arc;
 
@@ -86,7 +86,7 @@ fn touching(model: &Model, kinematics: &Kinematics, activation: &Activation) -> 
     found
 }
 
-/// Deepest gap between two bodies now, m: 0 where none overlap.
+/// Current deepest gap between two bodies, m: 0 if none overlap.
 pub fn overlap(simulation: &RoverSimulation) -> f64 {
     let found = touching(
         simulation.model(),

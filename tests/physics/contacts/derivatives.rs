@@ -1,5 +1,4 @@
-//! The Jacobian of a contact of two bodies is the gap's derivative, and its
-//! impulse is nobody's from outside.
+//! The Jacobian of a contact of two bodies is the gap's derivative, and its impulse is internal.
 
 use proptest::prelude::*;
 use rover_core::contact::{Contact, generalized_impulse, relocate};
@@ -29,9 +28,9 @@ proptest! {
     ) {
         let model = folding(tips()[tip]);
         let (q, found) = contacts(&model, [yaw, lift, wrist], turn);
-        // Not of a wheel's rim points beside the lowest, which fade in and carry
-        // it only where it lies flat, and not where two edges cross, where the
-        // point slides along them: their pages say how nearly.
+        // Excluded are the rim points beside a wheel's lowest, which support it only when it lies
+        // flat, and crossings of two edges, where the point slides along them: their modules state
+        // the error.
         let is_exact = |c: &&Contact| match (tip, c.key.feature) {
             (0, feature) if feature & (1 << 13) != 0 => feature & 31 < 8,
             (2, feature) if feature & (1 << 13) != 0 => feature % 4 == 0,
@@ -42,7 +41,7 @@ proptest! {
             let kinematics = Kinematics::of(&model, &q);
             let mut row = vec![0.0; model.nv()];
             generalized_impulse(&model, &kinematics, std::slice::from_ref(contact), &[1.0, 0.3, -0.2], &mut row);
-            // An impulse within the machine pushes its base exactly not at all.
+            // An internal impulse does not change the base's momentum at all.
             prop_assert!(row[..6].iter().all(|x| x.abs() < 1e-15), "{row:?}");
             generalized_impulse(&model, &kinematics, std::slice::from_ref(contact), &[1.0, 0.0, 0.0], &mut row);
             for k in 0..model.nv() {

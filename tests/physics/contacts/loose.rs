@@ -76,7 +76,7 @@ fn balls_collide_by_the_closed_form() {
             };
             let mut simulation = run(model, space(), q, v, options);
             assert!(simulation.step(100).unwrap().is_converged());
-            // Momentum is kept, and the balls part e times as fast as they met.
+            // Momentum is conserved, and the balls separate e times as fast as they approached.
             let common = (m1 - 0.5 * m2) / (m1 + m2);
             let apart = 1.5 * restitution / (m1 + m2);
             let v = &simulation.state().v;
@@ -146,8 +146,8 @@ fn a_collision_keeps_the_momentum_and_takes_energy() {
                 let linear = (after.linear - before.linear).norm();
                 assert!(linear < 1e-9, "{shapes:?} {linear}");
                 let angular = (after.angular - before.angular).norm();
-                // The impulse acts where the step predicts its end: half a step of the bodies' way
-                // past each other beside where it ends.
+                // The impulse acts at the predicted end of the step: off the true one by half a
+                // step of the relative sliding.
                 assert!(angular < 5e-3, "{shapes:?} {variant:?}: {angular}");
                 assert!(simulation.energy().kinetic <= energy * (1.0 + 1e-8));
             }
@@ -241,7 +241,7 @@ fn a_rover_pushes_a_stone_which_comes_to_rest() {
         simulation.brake();
         simulation.step(800).unwrap();
         let stone = &simulation.state().v[21..];
-        // A ball has nothing to stop it but what it meets; a block lies.
+        // Only contact stops a ball; a block comes to rest.
         if shape.contains("box") {
             assert!(stone.iter().all(|x| x.abs() < 1e-5), "{shape}: {stone:?}");
         }

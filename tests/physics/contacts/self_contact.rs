@@ -15,14 +15,15 @@ fn a_folded_arm_rests_on_the_chassis() {
             for _ in 0..600 {
                 let report = simulation.step(1).unwrap();
                 assert!(report.is_converged(), "{report:?}");
-                // Nothing but gravity works here, and contacts only take.
+                // Only gravity does work here, and contacts only dissipate.
                 let energy = simulation.energy();
                 let gain = energy.kinetic + energy.potential - before.kinetic - before.potential;
                 assert!(gain < 1e-6 + report.energy_lifted, "{gain}");
                 before = energy;
                 deepest = deepest.min(overlap(&simulation));
             }
-            // A step sees a contact half a step after it has closed, and lifts it out in the next.
+            // A step detects a contact half a step after it has closed, and the next removes the
+            // penetration.
             assert!(deepest > -1e-2, "{tip}: {deepest}");
             assert!(overlap(&simulation) > -1e-7, "{tip}");
             assert!(before.kinetic < 1e-4, "{tip} {variant:?}: {before:?}");
@@ -34,8 +35,8 @@ fn a_folded_arm_rests_on_the_chassis() {
                 .filter(|a| a.contact.other.is_some())
                 .map(|a| a.impulse[0] / 0.005)
                 .sum();
-            // The tip's weight and half the arm's, but for what friction
-            // along the sloping arm carries.
+            // The tip's weight and half the arm's, except for the part that friction along the
+            // sloping arm carries.
             assert!((weight - 9.81 * (3.0 + 1.0)).abs() < 4.0, "{tip}: {weight}");
             let is_wheel = |part| matches!(part, Part::Wheel(_));
             let ground = simulation

@@ -1,4 +1,4 @@
-//! Motions with a formula, one a joint.
+//! Motions with a closed form, one per joint.
 
 use nalgebra::{Rotation3, Vector3};
 use rover_core::integrator::Variant;
@@ -77,7 +77,7 @@ fn a_slide_with_a_spring_and_a_damper_is_an_oscillator() {
     assert!(errors[1] < 0.6 * errors[0], "{errors:?}");
 }
 
-/// However stiff a spring and long a step, the energy with the spring's own does not grow.
+/// The energy, including the spring's, does not grow at any stiffness and any step.
 #[test]
 fn no_spring_and_no_step_give_energy() {
     for stiffness in [1e2, 1e6, 1e12] {

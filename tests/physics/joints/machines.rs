@@ -1,4 +1,4 @@
-//! Machines that the tests share, and how they are run.
+//! Machines of these tests, and their runs.
 
 use std::sync::Arc;
 
@@ -38,7 +38,7 @@ pub fn model(solids: Vec<SolidDescription>) -> Model {
     Model::from_description(machine(solids)).unwrap()
 }
 
-/// Nothing to touch.
+/// Ground out of reach.
 fn nothing() -> Arc<dyn Terrain> {
     Arc::new(SphereField::new(&[[0.0, -1e5, 0.0]], &[1.0], None).unwrap())
 }

@@ -42,7 +42,7 @@ fn a_bouncing_ball_rests_at_the_zeno_time() {
 
 #[test]
 fn bounces_without_loss_keep_the_energy_to_rounding() {
-    // θ = ½, e = 1: in the step of an impact the position stays and the velocity is mirrored.
+    // θ = ½, e = 1: in the step of an impact the position stays and the velocity is reflected.
     for variant in VARIANTS {
         for slope in [0.0, -0.3] {
             let options = StepOptions {
@@ -105,7 +105,7 @@ fn a_ball_rolls_down_a_line_at_the_closed_form() {
 
 #[test]
 fn what_cannot_turn_sticks_or_slides_at_the_friction_angle() {
-    // An inertia that no friction turns makes a block of the disc: it slides where tan α > μ.
+    // With an inertia that friction cannot turn the disc acts as a block: it slides if tan α > μ.
     let block = Ball::new(2.0, 0.3, 1e12).unwrap();
     let alpha = 0.6_f64;
     let run = |mu: f64| {

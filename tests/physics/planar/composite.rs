@@ -163,13 +163,13 @@ fn machines_of_two_kinds_move_as_each_alone() {
     let both = (&mut first, &mut second);
     together(both, &Apart, (&mut q, &mut v), &options, 300);
     assert!(q.0.x > 0.3, "drives: {}", q.0.x);
-    // What a step remembers of persistent impulses is one for both: where
-    // the one lands, the other is of order 1 for a step.
+    // Both systems share the record of persistent impulses: when one lands, the other is of order 1
+    // for a step.
     assert!((q.0 - alone.0).amax() < 1e-3, "{} {}", q.0, alone.0);
     assert!((q.1 - ball.0).amax() < 1e-3, "{} {}", q.1, ball.0);
 }
 
-/// Two balls that meet.
+/// Two balls that collide.
 struct Meeting {
     radii: [f64; 2],
 }

@@ -1,4 +1,4 @@
-//! The six-wheel rover in its plane of symmetry: the full rover, with less of it.
+//! The six-wheel rover in its plane of symmetry moves as the full rover.
 
 use std::sync::Arc;
 
@@ -160,8 +160,8 @@ fn ten_seconds_straight_ahead_are_those_of_the_full_rover() {
     }
 }
 
-/// The motors reach their lines, are driven beyond their no-load speed downhill, and brake; the
-/// image once ignored them and was 90 m ahead.
+/// The motors reach their torque–speed lines, exceed their no-load speed downhill, and brake. The
+/// image once ignored the lines and was 90 m ahead.
 #[test]
 fn full_throttle_is_that_of_the_full_rover_to_the_motors_line_and_beyond() {
     // Downhill in either direction, five seconds full ahead and five full astern.
@@ -192,12 +192,12 @@ fn the_torques_are_those_that_the_motors_can_give() {
     let mut rover =
         MirroredRoverSimulation::new(planar(), ground, rule, options(G, 0.7, 0.0, 0.005)).unwrap();
     rover.set_inputs(&[1e3, -1e3, 10.0]).unwrap();
-    // Once they stood there as they were given, and what acted was another torque.
+    // They once stood there as given, while a different torque acted.
     assert_eq!(*rover.command(), [150.0, -150.0, 10.0]);
 }
 
-/// Wheels in the valleys of a steep wave, held by friction, were to bounce off both slopes at once:
-/// no velocity does, and thousands of iterations looked for one.
+/// Wheels held by friction in the valleys of a steep wave had to bounce off both slopes at once. No
+/// velocity does, and thousands of iterations searched for one.
 #[test]
 fn where_restitution_has_no_answer_the_impact_is_inelastic() {
     for variant in VARIANTS {

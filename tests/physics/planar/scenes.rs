@@ -1,4 +1,4 @@
-//! What the planar tests share.
+//! Scenes and helpers of the planar tests.
 
 use std::sync::Arc;
 

@@ -105,8 +105,8 @@ fn impacts_on_the_incline_come_when_they_did() {
 
 #[test]
 fn the_ball_on_the_sine_is_siconos() {
-    // Impacts move with the step: the reference itself is 3.9 cm from a run at
-    // 20 µs, ours at its step 2.2 cm (linearised) and 4.5 cm.
+    // The times of impacts depend on the step: the reference itself is 3.9 cm from a run at 20 µs;
+    // ours at the same step are 2.2 cm (linearised) and 4.5 cm from it.
     let reference = rows("siconos_ball_sine.json");
     let sine = Sine::new(1.0, std::f64::consts::TAU, 0.0, 0.0).unwrap();
     for (variant, time_step, tolerance) in [

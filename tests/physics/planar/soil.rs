@@ -321,8 +321,9 @@ fn sleep_leaves_the_motion_as_it_is_and_wakes_what_is_struck() {
         .collect();
     let worst = apart.iter().copied().fold(0.0, f64::max);
     let mean = apart.iter().sum::<f64>() / apart.len() as f64;
-    // After an impact that moves disks by several radii: a hundredth of a radius in the mean. Where
-    // a single disk falls is chaotic, it moves by 0.4 mm where the struck place is shifted by 1 nm.
+    // After an impact that moves disks by several radii the mean difference is a hundredth of a
+    // radius. The place of a single disk is chaotic: it changes by 0.4 mm if the point of impact
+    // shifts by 1 nm.
     assert!(mean < 0.00015 && worst < 0.005, "{mean} m, {worst} m");
 }
 
@@ -339,7 +340,7 @@ fn sleeping_costs_less() {
     )
     .expect("a soil");
     sleeping.step(400).expect("finite");
-    // A disk that rolls on goes on rolling: there is no rolling friction.
+    // A rolling disk keeps rolling: there is no rolling friction.
     let slept = sleeping.asleep().iter().filter(|a| **a).count();
     assert!(slept > 120, "{slept} sleep");
     let contacts = sleeping.step(1).expect("finite").n_contacts;
@@ -376,7 +377,7 @@ fn what_is_left_after_a_removal_keeps_its_load_and_old_snapshots_do_not_fit() {
         .expect("a soil");
         soil.step(300).expect("finite");
         let snapshot = soil.snapshot();
-        // The highest disk bears nothing, so those below go on as they were but for its weight.
+        // The highest disk bears no load, so those below only lose its weight.
         let heights = soil.q().chunks_exact(3).map(|disk| disk[1]);
         let highest = heights.fold(f64::MIN, f64::max);
         let marked: Vec<bool> = soil
@@ -433,7 +434,7 @@ fn the_rover_drives_over_the_original_soil() {
     };
     let mut soil = SoilSimulation::new(Arc::new(scene), options, None, q).expect("a soil");
     soil.step(300).expect("finite");
-    // The bed still gives way now and then, so the mean over 0.2 s.
+    // The bed still yields now and then, hence the mean over 0.2 s.
     let mut weight = 0.0;
     for _ in 0..200 {
         soil.step(1).expect("finite");

@@ -291,8 +291,8 @@ fn it_tips_over_where_the_mass_centre_passes_the_lower_contact() {
 
 #[test]
 fn the_steepest_slope_it_climbs_is_the_friction_angle() {
-    // Both wheels driven at their friction limit carry m g sin α = μ m g
-    // cos α; above, it slides back whatever the torque.
+    // Both wheels driven at their friction limit hold m g sin α = μ m g cos α; on a steeper slope
+    // the rover slides back at any torque.
     let mu = 0.5;
     let rover = report_rover();
     for (share, climbs) in [(0.97, true), (1.03, false)] {

@@ -1,4 +1,4 @@
-//! Rovers in a batch go bit for bit as each would alone, whatever the number of threads.
+//! Rovers in a batch move bit for bit as each would alone, at any number of threads.
 
 use std::sync::Arc;
 
@@ -266,7 +266,7 @@ fn a_reading_says_what_the_simulation_says() {
 
 #[test]
 fn the_work_of_the_motors_is_the_energy_gained() {
-    // Free flight without gravity: nothing but the motors does work.
+    // Free flight without gravity: only the motors do work.
     let model = Arc::new(Model::rover());
     let options = StepOptions {
         gravity: nalgebra::Vector3::zeros(),
@@ -283,7 +283,7 @@ fn the_work_of_the_motors_is_the_energy_gained() {
     let gained = sim.energy().kinetic - before;
     let last = sim.last_call();
     assert!(gained > 10.0, "{gained}");
-    // The steering joints' PD takes what it takes: under a hundredth.
+    // The steering joints' PD controllers dissipate less than a hundredth.
     assert!((last.positive_work / gained - 1.0).abs() < 0.01);
     assert!((last.work - last.positive_work).abs() <= 1e-12 * last.work);
 }

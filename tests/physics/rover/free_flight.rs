@@ -70,7 +70,7 @@ fn energy_stays_or_swings_with_second_order() {
         simulation.step(count(2.0, h)).unwrap();
         (simulation.energy().total() - before).abs()
     };
-    // Of 2.3 kJ of kinetic energy beside 9.4 MJ of potential energy: rounding.
+    // Rounding, for 2.3 kJ of kinetic and 9.4 MJ of potential energy.
     for h in [0.08, 0.02, 0.005] {
         let drift = drift(Variant::Linearised, h);
         assert!(drift < 1e-6, "step {h}: {drift}");
@@ -112,8 +112,8 @@ fn no_spin_and_no_step_add_energy() {
                     simulation.step(1).unwrap();
                     let after = simulation.energy();
                     let gained = after.total() - before.total();
-                    // Newton's swings, and does not drift, as long as
-                    // frames turn by less than 0.1 rad in a step.
+                    // That of the Newton variant oscillates without drift as long as frames rotate
+                    // by less than 0.1 rad per step.
                     let allowed = match variant {
                         Variant::Linearised => 1e-9,
                         Variant::Newton => 1e-3,

@@ -61,11 +61,11 @@ fn gaps_stay_above_minus_one_millimetre_at_one_millisecond() {
 
 #[test]
 fn error_falls_with_the_step_down_to_the_branching_of_the_impacts() {
-    // At 2.91 s a wheel still trembles (a Zeno sequence) or already rests when another one strikes;
-    // which of the two depends on the step, also in the reference, and moves the end by 3 mm. The
-    // limit of small steps is the resting branch: at 20 µs both variants, with projection and
-    // without, end 3.09 mm from the 0.2 ms reference and within 0.03 mm of each other. So errors
-    // against that reference fall to these 3 mm and not below.
+    // When a wheel strikes at 2.91 s, another one is still bouncing (a Zeno sequence) or already at
+    // rest. Which of the two depends on the step, also in the reference, and shifts the end by 3
+    // mm. The limit of small steps is the resting branch: at 20 µs both variants, with projection
+    // and without, end 3.09 mm from the 0.2 ms reference and within 0.03 mm of each other. Errors
+    // against that reference therefore do not fall below these 3 mm.
     let at = |h| {
         run(
             report_scene(Variant::Linearised, h, Stabilisation::Projection),

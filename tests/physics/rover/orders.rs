@@ -53,8 +53,8 @@ fn bouncing_ball(clearance: f64, e: f64, t: f64) -> f64 {
 
 #[test]
 fn first_order_through_impacts() {
-    // One trajectory's error is erratic, since it depends on where in the
-    // step the impact falls: 16 heights.
+    // The error of one trajectory is erratic, since it depends on the phase of the impact within
+    // the step: average over 16 heights.
     for variant in VARIANTS {
         let steps = [0.01, 0.005, 0.0025, 0.00125];
         let errors = steps.map(|h| {

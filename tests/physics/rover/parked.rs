@@ -42,8 +42,8 @@ fn loads_on_the_flat_are_the_closed_form() {
 
 #[test]
 fn loads_do_not_depend_on_the_order_of_the_contacts() {
-    // W has rank 14 of 18 here: what pushes the wheels sideways against
-    // each other is not determined by the motion.
+    // W has rank 14 of 18 here: the motion does not determine the lateral forces of the wheels
+    // against each other.
     let mut simulation = at_rest(StepOptions::default());
     simulation.step(1).unwrap();
     let (W, q, mu) = simulation.last_problem();

@@ -62,8 +62,7 @@ fn standing(model: Model) -> RoverSimulation {
     RoverSimulation::new(Arc::new(model), ground, StepOptions::default()).unwrap()
 }
 
-/// Every number of a description tells a machine from others: a snapshot of
-/// one is none of the other.
+/// Every number of a description distinguishes a machine: a snapshot of one does not fit another.
 #[test]
 fn a_snapshot_of_other_masses_is_refused() {
     type Change = fn(&mut ModelDescription);
@@ -87,7 +86,7 @@ fn a_snapshot_of_other_masses_is_refused() {
     }
 }
 
-/// A quaternion of another length turned and stretched the rover, and steps went on.
+/// A quaternion that was not of unit length rotated and stretched the rover, and steps continued.
 #[test]
 fn a_quaternion_that_is_no_rotation_is_refused() {
     let mut simulation = standing(Model::rover());
@@ -114,7 +113,7 @@ fn a_wheel_of_another_radius_is_another_disc() {
     let touching = rover.with_contact_radius(0.25).unwrap();
     assert_eq!(wheel(&touching), wheel(&rover));
     assert!((touching.wheels()[0].radius - 0.25).abs() < 1e-15);
-    // One wheel again, and an inertia that is stated goes with it.
+    // One radius throughout, and a stated inertia scales with it.
     assert_eq!(
         touching
             .with_wheel_radius(0.25)
@@ -153,8 +152,8 @@ fn a_radius_that_contradicts_the_shape_is_refused() {
     assert!(model.with_contact_radius(0.2).is_ok());
 }
 
-/// Which path entries two bodies share was found by comparing all with all:
-/// a chain of 3000 solids never came to an end.
+/// Common path entries of two bodies were found by comparing all with all: a chain of 3000 solids
+/// never finished.
 #[test]
 fn shared_paths_are_those_that_a_comparison_finds() {
     let rover = ModelDescription::rover();

@@ -63,8 +63,8 @@ pub fn slope(degrees: f64) -> Plane {
     Plane::new([-a.sin(), a.cos(), 0.0], 0.0).unwrap()
 }
 
-/// The machine of the report's plane run: 880 kg table, contact radius 0.30
-/// m, gains of 1.5, torques that no speed changes.
+/// The machine of the report's run on the plane: 880 kg table, contact radius 0.30 m, gains of 1.5,
+/// torques independent of speed.
 pub fn report_machine() -> Model {
     let masses = numbers(&golden("rover_model.json")["meta"]["masses_880"]);
     let mut description = ModelDescription::rover();
@@ -77,7 +77,7 @@ pub fn report_machine() -> Model {
 }
 
 /// The machine of the independent check: contact radius 0.20 m, gains of 15000, steering mass
-/// centres 7.5 cm low, torques that no speed changes.
+/// centres 7.5 cm low, torques independent of speed.
 pub fn check_machine() -> Model {
     let mut description = ModelDescription::rover();
     set_steering_gains(&mut description, 15_000.0, 15_000.0);

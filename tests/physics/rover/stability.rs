@@ -1,4 +1,5 @@
-//! Scenes where methods fail: everything stays finite, gains no energy, falls through nothing.
+//! Scenes in which methods fail: everything stays finite, gains no energy and falls through
+//! nothing.
 
 use std::f64::consts::PI;
 
@@ -18,13 +19,13 @@ fn dropped(
     let mut q = [0.0; 21];
     (q[1], q[3], q[4], q[5]) = (height, roll, heading, pitch);
     let mut dropped = simulation(model, Plane::ground(), options, &q, &[0.0; 21]);
-    // Free wheels would keep what speed an impact gives them.
+    // Free wheels would keep the speed that an impact gives them.
     dropped.brake();
     dropped
 }
 
-/// Steps for some seconds; energy never exceeds what there was, nothing
-/// sinks into the ground for good.
+/// Steps for some seconds; the energy never exceeds its initial value, and nothing stays sunk in
+/// the ground.
 fn settle(
     mut simulation: RoverSimulation,
     seconds: f64,
@@ -82,9 +83,9 @@ fn drops_from_two_metres_land_on_the_wheels() {
     }
 }
 
-/// Wheels that spin up and are steered against each other: at 20 ms Newton's iterate
-/// ran away after 3.56 s, to where the mass matrix is no number, and the step ended in
-/// an error where it should have been taken without iteration.
+/// Wheels that spin up and are steered against each other: at 20 ms Newton's iteration diverged
+/// after 3.56 s until the mass matrix was NaN, and the step failed where the scheme should have
+/// fallen back to the linearised step.
 #[test]
 fn an_iterate_that_runs_away_is_reported_and_the_step_is_taken() {
     let options = StepOptions {
@@ -219,7 +220,7 @@ fn mass_ratios_of_a_hundred_thousand_rest() {
 
 #[test]
 fn turning_through_a_full_circle_is_smooth() {
-    // The report's coordinates are singular at a heading of 90 degrees; ours must not notice it.
+    // The report's coordinates are singular at a heading of 90 degrees; ours must not be affected.
     for variant in VARIANTS {
         let mut simulation = at_rest(StepOptions {
             variant,

@@ -1,4 +1,5 @@
-//! Turning the whole scene about gravity turns the answer; a mirror image moves as a mirror image.
+//! Rotating the whole scene about gravity rotates the answer; a mirror image moves as a mirror
+//! image.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use rover_core::geometry::Plane;

@@ -125,7 +125,7 @@ fn tag(name: &str, solid: &str, x: f64) -> TagDescription {
     }
 }
 
-/// Every way to spoil a description, and the field that the error must name.
+/// Invalid descriptions, and the field that each error must name.
 #[test]
 fn bad_descriptions_are_refused_by_field() {
     type Spoil = fn(&mut ModelDescription);

@@ -1,4 +1,4 @@
-//! Work and bits: iteration counts, no allocation, the same twice, snapshots.
+//! Work and reproducibility: iteration counts, no allocation, equal bits in equal runs, snapshots.
 
 use std::sync::Arc;
 
@@ -35,7 +35,7 @@ fn a_step_allocates_nothing() {
 
 #[test]
 fn driving_takes_few_solver_iterations() {
-    // A slower solver shows here without a clock. Measured: 2.7 a step on this drive.
+    // A slower solver shows here without a clock. Measured: 2.7 per step on this drive.
     let mut simulation = driving(StepOptions::default());
     let report = simulation.step(1000).unwrap();
     assert!(report.is_converged());
@@ -67,9 +67,9 @@ fn turning(curvature: f64, options: StepOptions) -> RoverSimulation {
 #[test]
 fn wheels_that_fight_each_other_in_a_turn_take_few_iterations() {
     // The story: with all wheels steered about one centre W has rank 14 of 18, the steering joints
-    // give by 1e-6 rad when the rover speeds up, and four wheels slide at 1e-6 m/s with full
-    // friction. Newton on predicted modes cycled, the proximal method took 60 to 1000 iterations a
-    // step, and a control period seven milliseconds.
+    // yield by 1e-6 rad when the rover accelerates, and four wheels slide at 1e-6 m/s with full
+    // friction. Newton on predicted modes cycled, the proximal method took 60 to 1000 iterations
+    // per step, and a control period took seven milliseconds.
     for curvature in [0.1, 0.7] {
         let mut simulation = turning(curvature, StepOptions::default());
         let mut iterations = 0;
@@ -94,8 +94,8 @@ fn wheels_that_fight_each_other_in_a_turn_take_few_iterations() {
 
 #[test]
 fn every_tolerance_comes_to_an_end() {
-    // With 1e-6 asked of the residual and 1e-9 m/s of the velocity a search
-    // once went on for ever without an iteration.
+    // With tolerances of 1e-6 for the residual and 1e-9 m/s for the velocity a search once looped
+    // for ever without an iteration.
     for tolerance in [1e-2, 1e-6, 1e-9, 1e-13, 1e-15] {
         let mut options = StepOptions::default();
         options.solver.tolerance = tolerance;

@@ -18,11 +18,11 @@ use crate::scenes::simulation;
 const R: f64 = 0.1;
 const EDGE: f64 = 1e-4;
 
-/// A wheel of radius R on a light arm that does not touch and whose torque
-/// reaction an outer weight far ahead takes.
+/// A wheel of radius R on a light arm that touches nothing; a weight far ahead takes the torque
+/// reaction.
 fn driven_wheel() -> Model {
-    // The frame is a very long-armed inertia: it takes the reaction of the
-    // torque nearly without turning, and weighs next to nothing.
+    // The frame has a very large inertia: it takes the reaction of the torque with almost no
+    // rotation, and weighs next to nothing.
     let text = r#"
 name = "driven wheel"
 [[solids]]

@@ -14,10 +14,11 @@ use crate::sphere_scenes::{Random, rocks};
 struct Worst {
     /// Work of the contacts in a step over the kinetic energy before it.
     work: f64,
-    /// Total energy over that of the start, as a share of the start's
-    /// kinetic energy: what the drop as a whole gains.
+    /// Gain of the whole drop: total energy above that of the start, as a fraction of the kinetic
+    /// energy at the start.
     gain: f64,
-    /// The same from one step to the next: projection lifts what an impact left inside a rock.
+    /// The same from one step to the next: projection lifts parts that an impact left inside a
+    /// rock.
     rise: f64,
     unsolved: usize,
     steps: usize,
@@ -78,7 +79,7 @@ fn drop_often(drops: u64, restitution: f64, friction_coefficient: f64) -> Worst 
         let mut v: Vec<f64> = (0..21).map(|_| random.between(-0.5, 0.5)).collect();
         v[1] = random.between(-4.0, -2.0);
         simulation.set_state(start, v);
-        // The steering's springs are not in the energy: let them go.
+        // The energy does not include the steering springs: release them.
         let held: Vec<String> = simulation
             .model()
             .bodies()
@@ -125,7 +126,7 @@ fn without_restitution_energy_never_grows() {
     report("e = 0", &worst);
     assert!(worst.work <= 1e-12, "{}", worst.work);
     assert!(worst.gain < 1e-6, "{}", worst.gain);
-    // Measured 0.0094: projection lifts what an impact left inside a rock.
+    // Measured 0.0094: projection lifts parts that an impact left inside a rock.
     assert!(worst.rise < 0.03, "{}", worst.rise);
     assert!(
         worst.unsolved <= 10,

@@ -1,8 +1,8 @@
 //! A wheel at rest on one, two and three spheres, with the load split that statics gives.
 //!
-//! A lone disc stands in the plane of its axle's normal: on one sphere it
-//! balances, on two in its plane it is wedged, on three it is wedged and leans.
-//! Friction is zero where statics would else be undetermined.
+//! A lone disc stands in the plane of its axle's normal: on one sphere it balances, on two in its
+//! plane it is wedged, on three it is wedged and leans. Friction is zero where the problem would
+//! otherwise be statically indeterminate.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use rover_core::contact::{Contact, Opposite};
@@ -15,7 +15,7 @@ use crate::sphere_scenes::{WHEEL_MASS, WHEEL_RADIUS, field, lone_wheel, placed};
 const R: f64 = WHEEL_RADIUS;
 const G: f64 = 9.81;
 
-/// The ground's number of what a contact lies on.
+/// Number of the ground's primitive under a contact.
 fn primitive(contact: &Contact) -> u32 {
     match contact.key.opposite {
         Opposite::Ground(primitive) => primitive,

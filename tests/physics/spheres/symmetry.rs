@@ -1,4 +1,4 @@
-//! What must not matter: the order of the spheres, the heading of the scene, left and right.
+//! Invariance under the order of the spheres, the heading of the scene, and reflection.
 
 use std::sync::Arc;
 

@@ -148,8 +148,8 @@ fn the_rover_dropped_from_two_metres_at_20_ms_comes_to_rest_on_pebbles_and_bould
             }
             assert!(rover.state().configuration.is_finite());
             println_if_any(300 - converged, &format!("{variant:?}, radius {radius}"));
-            // Between pebbles that are further apart than a wheel is wide it may stand on its
-            // belly; nothing holds it up elsewhere.
+            // Between pebbles farther apart than a wheel is wide it may stand on its belly; nothing
+            // else supports it.
             let height = rover.state().configuration.position.y;
             assert!(
                 height > -0.2,
@@ -164,7 +164,7 @@ fn the_rover_dropped_from_two_metres_at_20_ms_comes_to_rest_on_pebbles_and_bould
     }
 }
 
-/// Says openly how many steps were not solved to tolerance.
+/// Reports how many steps were not solved to tolerance.
 fn println_if_any(count: usize, case: &str) {
     if count > 0 {
         eprint(&format!("{case}: {count} of 300 steps not converged"));

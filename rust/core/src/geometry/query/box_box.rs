@@ -15,7 +15,8 @@
 //! exactly. At a crossing the error is of the order of the tilt between the two faces, since the
 //! crossing slides along the edges; it vanishes for boxes that lie on each other.
 //!
-//! Source: Gottschalk, Lin and Manocha 1996 (separating axes); Sutherland and Hodgman 1974 (clipping).
+//! Source: Gottschalk, Lin and Manocha 1996 (separating axes); Sutherland
+//! and Hodgman 1974 (clipping).
 
 use nalgebra::{Vector2, Vector3};
 

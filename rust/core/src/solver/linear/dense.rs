@@ -202,7 +202,8 @@ fn lu_of(A: &mut [Chunk], size: usize, pivots: &mut [usize]) -> bool {
     true
 }
 
-/// Eliminates column `K` of a panel from those right of it in the panel; a constant, so that what is left of a chunk has a known length.
+/// Eliminates column `K` of a panel from those right of it in the panel; a
+/// constant, so that what is left of a chunk has a known length.
 #[inline(always)]
 fn lu_column<const K: usize>(
     A: &mut [Chunk],

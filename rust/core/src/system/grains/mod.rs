@@ -18,7 +18,8 @@
 //! the velocity errors of rounding and of the solver's tolerance; position projection removes it
 //! once it exceeds a tolerance.
 //!
-//! Source: Moreau 1999; Staron and Hinch 2005 (contact dynamics of disks); Anitescu and Potra 1997 (the gap in the velocity's law).
+//! Source: Moreau 1999; Staron and Hinch 2005 (contact dynamics of disks);
+//! Anitescu and Potra 1997 (the gap in the velocity's law).
 
 pub mod bodies;
 pub mod contact;
