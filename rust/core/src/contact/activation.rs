@@ -1,10 +1,12 @@
 //! When a candidate takes part in a step as a contact.
 
-/// A candidate becomes a contact of the step where `gap + lead · u_N ≤ 0`, or nearly at rest within `hover`.
+/// A candidate becomes a contact of the step where `gap + lead · u_N ≤ 0`, or nearly at rest within
+/// `hover`.
 ///
-/// The first is the forecast of Moreau–Jean stepping; `lead` is what is left of γ h after the configuration that the
-/// gap was measured in. The second keeps a contact that rests a rounding error above the ground closed, instead of
-/// letting it fall for a step: within `hover` metres and slower than `slow` m/s.
+/// The first is the forecast of Moreau–Jean stepping; `lead` is what is left of γ h after the
+/// configuration that the gap was measured in. The second keeps a contact that rests a rounding
+/// error above the ground closed, instead of letting it fall for a step: within `hover` metres and
+/// slower than `slow` m/s.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Activation {
     /// s.
@@ -18,7 +20,8 @@ pub struct Activation {
 }
 
 impl Activation {
-    /// Whether a candidate with this gap (m) and normal velocity (m/s, asked for only where it matters) takes part.
+    /// Whether a candidate with this gap (m) and normal velocity (m/s, asked for only where it
+    /// matters) takes part.
     #[inline]
     #[must_use]
     pub fn admits(&self, gap: f64, u_N: impl FnOnce() -> f64) -> bool {
@@ -31,7 +34,8 @@ impl Activation {
         }
     }
 
-    /// How far from the surface a candidate can be and still take part, m, given the bound `margin`.
+    /// How far from the surface a candidate can be and still take part, m, given the bound
+    /// `margin`.
     #[must_use]
     pub fn reach(&self) -> f64 {
         self.hover.max(self.margin)

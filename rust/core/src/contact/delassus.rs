@@ -1,8 +1,8 @@
 //! Delassus operator `W = Hᵀ M̂⁻¹ H` and the impulses' way back to velocities.
 //!
-//! With `M̂ = Lᵀ D L` and `Z = D^(-1/2) L^(-T) H` the operator is `W = Zᵀ Z`. A column of Z is nonzero only along its body's
-//! path, or along the union of its two bodies' paths, so a block of W is a dot product over the velocities that two contacts share: never a
-//! dense product.
+//! With `M̂ = Lᵀ D L` and `Z = D^(-1/2) L^(-T) H` the operator is `W = Zᵀ Z`. A column of Z is
+//! nonzero only along its body's path, or along the union of its two bodies' paths, so a block of W
+//! is a dot product over the velocities that two contacts share: never a dense product.
 
 use std::ops::Range;
 
@@ -18,12 +18,14 @@ pub struct ContactSystem {
     pub W: Vec<f64>,
     /// Local velocity `Hᵀ v` of the velocity handed to [`Self::assemble`] (3 n_c), m/s.
     pub u: Vec<f64>,
-    /// Z along each path: `Z[c * stride + k]` belongs to the k-th velocity of the path of contact c.
+    /// Z along each path: `Z[c * stride + k]` belongs to the k-th velocity of the path of contact
+    /// c.
     Z: Vec<Columns>,
     stride: usize,
     /// Body of each contact.
     bodies: Vec<usize>,
-    /// From where to where in `unions` a contact of two bodies, or a stop, has its rows; nothing of one with the ground. Empty where all are.
+    /// From where to where in `unions` a contact of two bodies, or a stop, has its rows; nothing of
+    /// one with the ground. Empty where all are.
     spans: Vec<Range<usize>>,
     /// Velocities along the unions of two paths, or along a stop's, ascending, and Z there.
     unions: Vec<(usize, Columns)>,
@@ -125,7 +127,8 @@ impl ContactSystem {
         }
     }
 
-    /// Rows of Z of a joint's stop, along the path of the joint's velocity, and its `Hᵀ v`, rad/s or m/s.
+    /// Rows of Z of a joint's stop, along the path of the joint's velocity, and its `Hᵀ v`, rad/s
+    /// or m/s.
     fn stop(
         &mut self,
         model: &Model,

@@ -14,13 +14,16 @@ use crate::multibody::{Kinematics, Model};
 /// On a sphere: the nearest point of the pose.
 const NEAREST: usize = 0;
 
-/// On a sphere: the point over the tangent plane where it was first met, for a part that passes it in this step.
+/// On a sphere: the point over the tangent plane where it was first met, for a part that passes it
+/// in this step.
 pub(super) const PASSING: u16 = 1;
 
-/// Collects the contacts with the ground of a configuration with velocity `v` (nv) into `out`, cleared first.
+/// Collects the contacts with the ground of a configuration with velocity `v` (nv) into `out`,
+/// cleared first.
 ///
-/// `kinematics`: the poses at the step's midpoint, where they are measured; `end`: at its predicted end, which tells
-/// the motion within the step. They are left where they were measured: see [`super::relocate`].
+/// `kinematics`: the poses at the step's midpoint, where they are measured; `end`: at its predicted
+/// end, which tells the motion within the step. They are left where they were measured: see
+/// [`super::relocate`].
 pub fn detect(
     model: &Model,
     kinematics: &Kinematics,
@@ -99,7 +102,8 @@ impl Gate<'_> {
         }
     }
 
-    /// A contact with a sphere: the nearest point's, or, where `touch` finds a normal, the passing one.
+    /// A contact with a sphere: the nearest point's, or, where `touch` finds a normal, the passing
+    /// one.
     ///
     /// `motion`: how far the part moves in half a step, at most.
     #[inline]
@@ -175,7 +179,8 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
     );
 }
 
-/// Whether a sphere's centre, relative to a shape's, is further than `within` from the shape by a bound that costs little.
+/// Whether a sphere's centre, relative to a shape's, is further than `within` from the shape by a
+/// bound that costs little.
 #[inline]
 fn is_far(shape: &PlacedShape, between: &Vector3<f64>, within: f64) -> bool {
     match shape {
@@ -189,7 +194,8 @@ fn is_far(shape: &PlacedShape, between: &Vector3<f64>, within: f64) -> bool {
     }
 }
 
-/// Normal from a sphere of the ground to a part, where the part first met it in this step, if it passes it.
+/// Normal from a sphere of the ground to a part, where the part first met it in this step, if it
+/// passes it.
 fn touch(
     placed: &Placed,
     end: &Kinematics,
@@ -244,7 +250,8 @@ fn touch(
     }
 }
 
-/// Gap, nearest point (relative to the trunk origin) and frame of every wheel over a terrain: the nearest primitive's.
+/// Gap, nearest point (relative to the trunk origin) and frame of every wheel over a terrain: the
+/// nearest primitive's.
 ///
 /// A wheel with no primitive within 10 km (which no plane allows) keeps a gap of +∞.
 #[must_use]
@@ -266,7 +273,8 @@ pub fn wheel_contacts(
             &SurfacePoint::of_normal(NEAREST, centre, &Vector3::y(), f64::INFINITY),
             0,
         );
-        // What is not visited is further from the centre than `reach`, thus from the wheel than reach − R.
+        // What is not visited is further from the centre than `reach`, thus from the wheel than
+        // reach − R.
         let mut reach = 2.0 * radius;
         while reach < FAR && best.gap + radius > reach {
             let base = kinematics.origin(placed.body);

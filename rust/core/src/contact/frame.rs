@@ -17,7 +17,8 @@ pub struct ContactFrame {
     pub b: Vector3<f64>,
 }
 
-/// Sine of the angle between axle and normal below which the rolling direction is not defined by them.
+/// Sine of the angle between axle and normal below which the rolling direction is not defined by
+/// them.
 const PARALLEL: f64 = 1e-9;
 
 impl ContactFrame {

@@ -1,7 +1,8 @@
 //! Contact Jacobian H: how a velocity moves a contact's two sides past each other, `u = Hᵀ v`.
 //!
-//! On the ground a row is nonzero along the path of the contact's body. Between two bodies it is the difference of two such rows, each at the
-//! contact's one place, so that what moves both alike, a common ancestor's joint or a free base, moves neither past the other: exactly zero.
+//! On the ground a row is nonzero along the path of the contact's body. Between two bodies it is
+//! the difference of two such rows, each at the contact's one place, so that what moves both alike,
+//! a common ancestor's joint or a free base, moves neither past the other: exactly zero.
 
 use nalgebra::Vector3;
 
@@ -9,7 +10,8 @@ use super::limit;
 use super::pair::Contact;
 use crate::multibody::{BASE, Kinematics, Model};
 
-/// One velocity's entries of a contact's three rows n, t, b, padded so that two pairs of lanes carry them.
+/// One velocity's entries of a contact's three rows n, t, b, padded so that two pairs of lanes
+/// carry them.
 pub(super) type Columns = [f64; 4];
 
 /// The contact's place relative to the origin of another body's tree, m.
@@ -35,7 +37,8 @@ pub fn relative_velocity(
     velocity - kinematics.point_velocity(model, other.body, &x, v)
 }
 
-/// Rows of Hᵀ along the path of the contact's own body: what each velocity moves the body's point along n, t, b.
+/// Rows of Hᵀ along the path of the contact's own body: what each velocity moves the body's point
+/// along n, t, b.
 #[inline]
 pub(super) fn columns(
     model: &Model,
@@ -98,7 +101,8 @@ fn columns_at(
     }
 }
 
-/// `out = H p` (nv): generalized impulse, N s and N m s, of the impulses `p` (3 n_c) at the contacts.
+/// `out = H p` (nv): generalized impulse, N s and N m s, of the impulses `p` (3 n_c) at the
+/// contacts.
 pub fn generalized_impulse(
     model: &Model,
     kinematics: &Kinematics,

@@ -1,9 +1,11 @@
 //! A joint against its stop: `gap = q − lower` or `upper − q`, rad or m.
 //!
-//! A stop is an item of the contact list, so that forecast, impact law, projection and warm start are those of every contact, and one solve
-//! answers for stops and contacts together. Its normal row of H is ±1 at the joint's velocity. The normal velocity is in rad/s and the impulse
-//! in N m s at a revolute joint. Its tangential rows are zero and μ = 0; in W its tangential diagonal is that of its normal, coupled to
-//! nothing, so that its tangential impulse is zero and W stays regular.
+//! A stop is an item of the contact list, so that forecast, impact law, projection and warm start
+//! are those of every contact, and one solve answers for stops and contacts together. Its normal
+//! row of H is ±1 at the joint's velocity. The normal velocity is in rad/s and the impulse in N m s
+//! at a revolute joint. Its tangential rows are zero and μ = 0; in W its tangential diagonal is
+//! that of its normal, coupled to nothing, so that its tangential impulse is zero and W stays
+//! regular.
 
 use super::activation::Activation;
 use super::frame::ContactFrame;
@@ -49,7 +51,8 @@ pub(super) fn row(model: &Model, contact: &Contact) -> Option<(usize, f64)> {
 
 /// Adds the stops that a step must consider to `out`.
 ///
-/// `joints`: coordinates of all joints (n_joints) where the poses of `kinematics` are, rad or m; `v`: velocity (nv).
+/// `joints`: coordinates of all joints (n_joints) where the poses of `kinematics` are, rad or m;
+/// `v`: velocity (nv).
 pub fn detect_limits(
     model: &Model,
     kinematics: &Kinematics,
@@ -87,7 +90,8 @@ fn gap(model: &Model, joints: &[f64], joint: usize, side: Side) -> f64 {
     }
 }
 
-/// A stop as a contact: it lies at the origin of what the joint carries, its normal along the axis that opens the gap.
+/// A stop as a contact: it lies at the origin of what the joint carries, its normal along the axis
+/// that opens the gap.
 fn contact(model: &Model, kinematics: &Kinematics, joint: usize, side: Side, gap: f64) -> Contact {
     let body = model.joints()[joint].body;
     let axis = kinematics.motions[model.bodies()[body].motion].axis();

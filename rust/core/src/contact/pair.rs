@@ -1,8 +1,11 @@
-//! One unilateral contact: a part of a body against the ground, or against a part of another body, or a joint against its stop.
+//! One unilateral contact: a part of a body against the ground, or against a part of another body,
+//! or a joint against its stop.
 //!
-//! The normal points *to* the contact's own part: from the ground to the machine, or from the other body. Between two bodies the contact's
-//! point is halfway between the surfaces, one and the same place for both, so that its impulse changes neither the linear nor the angular momentum of
-//! the two together; as the surfaces' points lie along the normal the gap's rate is that of the two places all the same.
+//! The normal points *to* the contact's own part: from the ground to the machine, or from the other
+//! body. Between two bodies the contact's point is halfway between the surfaces, one and the same
+//! place for both, so that its impulse changes neither the linear nor the angular momentum of the
+//! two together; as the surfaces' points lie along the normal the gap's rate is that of the two
+//! places all the same.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -26,8 +29,9 @@ pub enum Opposite {
 pub struct ContactKey {
     /// [`Part::code`] of the part.
     pub part: u16,
-    /// On the ground a rim point or a corner; on a sphere of the ground 0, or 1 where it is met and passed in one step. Between bodies
-    /// the feature of [`crate::geometry::query::PairPoint`]. Of a joint's stops 0 is the lower one, 1 the upper one.
+    /// On the ground a rim point or a corner; on a sphere of the ground 0, or 1 where it is met and
+    /// passed in one step. Between bodies the feature of [`crate::geometry::query::PairPoint`]. Of
+    /// a joint's stops 0 is the lower one, 1 the upper one.
     pub feature: u16,
     /// The other side.
     pub opposite: Opposite,
@@ -88,7 +92,8 @@ pub struct Contact {
     pub body: usize,
     /// The other body; none where it is the ground or a joint's stop.
     pub other: Option<OtherSide>,
-    /// Where, relative to the origin of the body's tree, world axes, m: on the ground the body's own point, between bodies halfway.
+    /// Where, relative to the origin of the body's tree, world axes, m: on the ground the body's
+    /// own point, between bodies halfway.
     pub point: Vector3<f64>,
     /// Frame of the contact, its normal towards the part.
     pub frame: ContactFrame,

@@ -1,8 +1,9 @@
 //! Which contacts between bodies a step must consider.
 //!
 //! Two parts can touch where they belong to different trees, or, in a model that says so
-//! ([`crate::multibody::ModelDescription::self_contact`]), to bodies of one tree that no joint connects. What passes another body within one
-//! step is not seen: between bodies there is no sweep.
+//! ([`crate::multibody::ModelDescription::self_contact`]), to bodies of one tree that no joint
+//! connects. What passes another body within one step is not seen: between bodies there is no
+//! sweep.
 
 use super::activation::Activation;
 use super::frame::ContactFrame;
@@ -46,7 +47,8 @@ fn can_touch(model: &Model, a: Part, b: Part) -> bool {
     model.can_touch(a.body(model), b.body(model))
 }
 
-/// Adds the contacts between bodies of a configuration with velocity `v` (nv) to `out`; `kinematics` as for [`super::detect`].
+/// Adds the contacts between bodies of a configuration with velocity `v` (nv) to `out`;
+/// `kinematics` as for [`super::detect`].
 ///
 /// `activation.margin` bounds the speed of one body; two come together at up to twice that.
 pub fn detect_pairs(

@@ -15,7 +15,8 @@ pub enum Part {
     Box(usize),
     /// A ball, by its index in the model.
     Sphere(usize),
-    /// A joint that meets its stop, by its index: it has no shape but a point, the origin of what the joint carries.
+    /// A joint that meets its stop, by its index: it has no shape but a point, the origin of what
+    /// the joint carries.
     Limit(usize, Side),
 }
 
@@ -34,7 +35,8 @@ const BOXES: u16 = 0x8000;
 const LIMITS: u16 = 0xC000;
 
 impl Part {
-    /// A number of 16 bits for a part: wheels count from 0, balls from 2^14, boxes from 2^15, joints from 3 · 2^14.
+    /// A number of 16 bits for a part: wheels count from 0, balls from 2^14, boxes from 2^15,
+    /// joints from 3 · 2^14.
     ///
     /// # Panics
     /// If a model has more than 2^14 wheels, balls, boxes or joints.

@@ -10,7 +10,8 @@ use crate::geometry::query::dispatch;
 use crate::geometry::{PlacedShape, Primitive, Sphere, Terrain};
 use crate::multibody::{Kinematics, Model};
 
-/// Point, frame and gap of a contact at the poses of `kinematics`; a joint's stop is [`super::relocate_limit`]'s.
+/// Point, frame and gap of a contact at the poses of `kinematics`; a joint's stop is
+/// [`super::relocate_limit`]'s.
 pub fn relocate(
     model: &Model,
     kinematics: &Kinematics,

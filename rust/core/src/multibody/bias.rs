@@ -1,4 +1,5 @@
-//! Bias `N(q, v) v + G(q)` by recursive Newton–Euler: what must be pushed to keep all accelerations zero.
+//! Bias `N(q, v) v + G(q)` by recursive Newton–Euler: what must be pushed to keep all accelerations
+//! zero.
 //!
 //! Source: Luh, Walker and Paul 1980; here in world axes about each tree's origin of places.
 
@@ -44,7 +45,8 @@ impl Moved {
     }
 }
 
-/// Angular velocity, angular acceleration and acceleration of the origin of a body that no revolute joint ties to another one.
+/// Angular velocity, angular acceleration and acceleration of the origin of a body that no revolute
+/// joint ties to another one.
 #[cold]
 fn otherwise_carried(
     body: &Body,

@@ -1,11 +1,13 @@
 //! The numbers that users and references see, and the state behind them: for the rover 21.
 //!
-//! One number a velocity, in the order of the velocities (nv): of a free body its position, then three angles; of a revolute or
-//! prismatic joint its coordinate; of a spherical joint three angles of the body relative to the joint's frame.
+//! One number a velocity, in the order of the velocities (nv): of a free body its position, then
+//! three angles; of a revolute or prismatic joint its coordinate; of a spherical joint three angles
+//! of the body relative to the joint's frame.
 //!
-//! Public `q`: the angles are roll, heading, pitch with `R = Ry(heading) Rz(pitch) Rx(roll)`. Report `q`: Cardan angles about x, y, z with
-//! `R = Rz(q5) Ry(q4) Rx(q3)` (the numbers are a rover's), and velocity `qdot = dq/dt`, so that `v = B(q) qdot` with B the identity but
-//! for the blocks of the angles.
+//! Public `q`: the angles are roll, heading, pitch with `R = Ry(heading) Rz(pitch) Rx(roll)`.
+//! Report `q`: Cardan angles about x, y, z with `R = Rz(q5) Ry(q4) Rx(q3)` (the numbers are a
+//! rover's), and velocity `qdot = dq/dt`, so that `v = B(q) qdot` with B the identity but for the
+//! blocks of the angles.
 
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 

@@ -1,4 +1,5 @@
-//! Coriolis matrix `C(q, v)` with `C v = N(q, v) v` and `C + Cᵀ = Ṁ`: what a step needs to take gyroscopic terms implicitly.
+//! Coriolis matrix `C(q, v)` with `C v = N(q, v) v` and `C + Cᵀ = Ṁ`: what a step needs to take
+//! gyroscopic terms implicitly.
 //!
 //! With the inertia I of a body, its spatial velocity V, and `B = ½ (V×* I + (I V)×̄* − I V×)`,
 //!
@@ -6,10 +7,12 @@
 //! C_jk = Σ S_jᵀ (I Ṡ_k + B S_k)      over the bodies that both j and k move
 //! ```
 //!
-//! Spatial vectors are (angular, linear) at the origin of the tree's places, world axes. A velocity that several joints share, as coupled
-//! ones do, has a screw of each; their products add. `B + Bᵀ = İ` and `B V = V×* I V`, which gives both properties.
+//! Spatial vectors are (angular, linear) at the origin of the tree's places, world axes. A velocity
+//! that several joints share, as coupled ones do, has a screw of each; their products add. `B + Bᵀ
+//! = İ` and `B V = V×* I V`, which gives both properties.
 //!
-//! With V = (ω, v), mass m, first moment m c and inertia J about that origin, and the momentum I V = (n, f)
+//! With V = (ω, v), mass m, first moment m c and inertia J about that origin, and the momentum I V
+//! = (n, f)
 //!
 //! ```text
 //! I = [ J     m c× ]        B = [ K − ½ n×   0 ]        K = ½ (ω× J + (ω× J)ᵀ − m (c vᵀ + v cᵀ)) + m (c·v) 1
@@ -18,8 +21,8 @@
 //!
 //! so that a body and all that it carries have sums of a few 3-vectors and symmetric matrices.
 //!
-//! Source: Echeandia and Wensing 2021, *Numerical methods to compute the Coriolis matrix and Christoffel symbols for rigid-body systems*,
-//! J. Comput. Nonlinear Dynam. 16, 091004.
+//! Source: Echeandia and Wensing 2021, *Numerical methods to compute the Coriolis matrix and
+//! Christoffel symbols for rigid-body systems*, J. Comput. Nonlinear Dynam. 16, 091004.
 
 use std::ops::{Add, AddAssign, Mul, Range};
 
@@ -48,7 +51,8 @@ struct Screw {
     S_dot: Spatial,
 }
 
-/// A motion vector (velocity of the point at the tree's origin) or a force vector (moment about it).
+/// A motion vector (velocity of the point at the tree's origin) or a force vector (moment about
+/// it).
 #[derive(Clone, Copy, Debug, Default)]
 struct Spatial {
     angular: Vector3<f64>,

@@ -2,7 +2,8 @@
 
 use thiserror::Error;
 
-/// A model description that is not readable or not physical. Each variant names the field and what it held.
+/// A model description that is not readable or not physical. Each variant names the field and what
+/// it held.
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum ModelError {
     /// The text is not the format it should be.

@@ -1,6 +1,7 @@
 //! Forward kinematics: attitude, origin, joint axis and mass centre of every body.
 //!
-//! World axes. The places of a tree are relative to its origin: that of its root where the root is free, else the world's.
+//! World axes. The places of a tree are relative to its origin: that of its root where the root is
+//! free, else the world's.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -56,7 +57,8 @@ impl Kinematics {
         }
     }
 
-    /// Recomputes all that a step needs: spinners ([`super::Body::is_spinner`]) are left unturned about their own axis.
+    /// Recomputes all that a step needs: spinners ([`super::Body::is_spinner`]) are left unturned
+    /// about their own axis.
     pub fn update_for_step(&mut self, model: &Model, configuration: &Configuration) {
         if model.only_turns() {
             self.update_poses::<false, true>(model, configuration);
@@ -65,7 +67,8 @@ impl Kinematics {
         }
     }
 
-    /// Where `SPIN` spinners are turned, too; where `TURNS` every root must be free and every other joint revolute and on its own.
+    /// Where `SPIN` spinners are turned, too; where `TURNS` every root must be free and every other
+    /// joint revolute and on its own.
     fn update_poses<const SPIN: bool, const TURNS: bool>(
         &mut self,
         model: &Model,
@@ -140,8 +143,8 @@ impl Kinematics {
         }
     }
 
-    /// World position of the point to which all places of body `b` are relative, m: the origin of its tree's free root, else
-    /// the world's.
+    /// World position of the point to which all places of body `b` are relative, m: the origin of
+    /// its tree's free root, else the world's.
     #[inline]
     #[must_use]
     pub fn origin(&self, b: usize) -> &Vector3<f64> {
@@ -155,7 +158,8 @@ impl Kinematics {
         self.r[b] + self.R[b] * p
     }
 
-    /// Velocity (m/s, world) of the material point of body `b` that is at `x` (relative to its tree's origin).
+    /// Velocity (m/s, world) of the material point of body `b` that is at `x` (relative to its
+    /// tree's origin).
     #[must_use]
     pub fn point_velocity(
         &self,
@@ -177,7 +181,8 @@ impl Kinematics {
         velocity
     }
 
-    /// Row of the point Jacobian along body `b`'s path: `d · (velocity of the point at x)` per unit of each velocity.
+    /// Row of the point Jacobian along body `b`'s path: `d · (velocity of the point at x)` per unit
+    /// of each velocity.
     ///
     /// `row` has the length of the path.
     #[inline]
@@ -201,7 +206,8 @@ impl Kinematics {
     }
 }
 
-/// Enters the motion of a joint's rate, and what the velocity gives in all to the bodies of a coupled joint.
+/// Enters the motion of a joint's rate, and what the velocity gives in all to the bodies of a
+/// coupled joint.
 #[inline]
 fn set_motion(motions: &mut [Motion], m: usize, coordinate: &Coordinate, of_rate: Motion) {
     motions[m] = of_rate;

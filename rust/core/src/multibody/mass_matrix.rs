@@ -1,9 +1,10 @@
 //! Mass matrix by composite rigid bodies, and its factor `M = Lᵀ D L`.
 //!
-//! Rows are stored **along paths**: row `k` holds `M[k][i]` for the ancestors `i` of `k`, base first,
-//! itself last. An ancestor's row is then a prefix of its descendants' rows, so the factorisation and the
-//! solves are dense loops over short contiguous pieces and never touch a structural zero. In a tree on a free base every path begins
-//! with the six velocities of the base: loops over them are kept apart, as their length is known.
+//! Rows are stored **along paths**: row `k` holds `M[k][i]` for the ancestors `i` of `k`, base
+//! first, itself last. An ancestor's row is then a prefix of its descendants' rows, so the
+//! factorisation and the solves are dense loops over short contiguous pieces and never touch a
+//! structural zero. In a tree on a free base every path begins with the six velocities of the base:
+//! loops over them are kept apart, as their length is known.
 //!
 //! Source: Featherstone 2008, *Rigid Body Dynamics Algorithms*, ch. 6 (composite bodies), ch. 8
 //! (branch-induced sparsity).
@@ -88,8 +89,8 @@ impl MassMatrix {
         }
     }
 
-    /// Rows of a tree of which `LEAD` velocities are a free root's and, where `TURNS`, all others those of turns; of the coupled joints
-    /// nothing but what they carry.
+    /// Rows of a tree of which `LEAD` velocities are a free root's and, where `TURNS`, all others
+    /// those of turns; of the coupled joints nothing but what they carry.
     fn update_tree<const LEAD: usize, const TURNS: bool>(
         &mut self,
         model: &Model,
@@ -144,7 +145,8 @@ impl MassMatrix {
         }
     }
 
-    /// Adds what the motion of a coupled joint has in common with all that moves its carrier, and with itself.
+    /// Adds what the motion of a coupled joint has in common with all that moves its carrier, and
+    /// with itself.
     fn add_coupled(&mut self, model: &Model, kinematics: &Kinematics, b: usize) {
         let body = &model.bodies()[b];
         let (k, own) = (body.velocity, &kinematics.motions[body.motion]);
@@ -241,8 +243,8 @@ pub struct FactoredMassMatrix {
     is_free: Vec<bool>,
     /// Where in `ancestors` those of each velocity stand.
     spans: Vec<Range<usize>>,
-    /// The velocities on the path before each one, a free base's left out, counted from the tree's first joint: what the loops over one
-    /// tree index with.
+    /// The velocities on the path before each one, a free base's left out, counted from the tree's
+    /// first joint: what the loops over one tree index with.
     ancestors: Vec<usize>,
 }
 
@@ -396,7 +398,8 @@ impl FactoredMassMatrix {
         }
     }
 
-    /// `y ← D^(-1/2) L^(-T) y` for several columns (nv) that are nonzero only at some velocities: ascending, and with each all of its path.
+    /// `y ← D^(-1/2) L^(-T) y` for several columns (nv) that are nonzero only at some velocities:
+    /// ascending, and with each all of its path.
     pub fn half_solve_columns<const N: usize>(
         &self,
         model: &Model,

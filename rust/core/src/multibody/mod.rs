@@ -1,9 +1,10 @@
 //! Trees of solids: from their description to mass matrix, bias, energy and momentum.
 //!
-//! A machine is one or several trees of bodies under the joints of a catalogue ([`joint`]); the root of a tree is free, or a joint ties
-//! it to the world. All spatial quantities of a tree are taken in **world axes about one origin**, that of its root where the root is
-//! free and the world's otherwise: composite inertias then add without any transformation, and a rover far from the world's origin
-//! loses no digit.
+//! A machine is one or several trees of bodies under the joints of a catalogue ([`joint`]); the
+//! root of a tree is free, or a joint ties it to the world. All spatial quantities of a tree are
+//! taken in **world axes about one origin**, that of its root where the root is free and the
+//! world's otherwise: composite inertias then add without any transformation, and a rover far from
+//! the world's origin loses no digit.
 
 pub mod bias;
 pub mod coordinates;

@@ -33,7 +33,8 @@ pub struct Momentum {
     pub angular: Vector3<f64>,
 }
 
-/// Momentum of each body about a point of its tree, and the kinetic energy of all, rotors included (J).
+/// Momentum of each body about a point of its tree, and the kinetic energy of all, rotors included
+/// (J).
 ///
 /// `about`: the origin of each tree's places relative to that point, m. `out`: one entry a body.
 pub fn body_momenta(
@@ -59,7 +60,8 @@ fn body_momenta_if<const TURNS: bool>(
     out: &mut [Momentum],
 ) -> f64 {
     let mut kinetic = 0.0;
-    // Velocity of each frame's origin and angular velocity ride along the tree in `out` until overwritten.
+    // Velocity of each frame's origin and angular velocity ride along the tree in `out` until
+    // overwritten.
     for (b, body) in model.bodies().iter().enumerate() {
         let (origin, omega) = match body.parent {
             None if TURNS || matches!(body.joint, Joint::Free(_)) => {
@@ -158,7 +160,8 @@ struct Moving {
     omega: Vector3<f64>,
 }
 
-/// Energy and linear momentum (kg m/s) of a state in one sweep, without poses that anything else needs: every step is audited with it.
+/// Energy and linear momentum (kg m/s) of a state in one sweep, without poses that anything else
+/// needs: every step is audited with it.
 pub fn energy_and_momentum(
     model: &Model,
     q: &Configuration,
@@ -281,7 +284,8 @@ impl Moving {
     }
 }
 
-/// Twice the kinetic energy, linear momentum and first moment about their trees' origins of the bodies so far.
+/// Twice the kinetic energy, linear momentum and first moment about their trees' origins of the
+/// bodies so far.
 #[derive(Default)]
 struct Sums {
     twice_kinetic: f64,

@@ -4,11 +4,14 @@
 //! τ = command, within ± stall (1 ∓ ω/ω₀) and ± stall
 //! ```
 //!
-//! Below the line the torque is the command. On it the torque falls linearly with the speed and reaches zero at the no-load speed ω₀, where
-//! the back-EMF equals the supply. A motor that regenerates brakes when it is driven faster, by the line and at most by the stall torque; one
-//! that does not turns freely, and brakes by command alone. With an infinite ω₀ the torque is the command within ± stall, at any speed.
+//! Below the line the torque is the command. On it the torque falls linearly with the speed and
+//! reaches zero at the no-load speed ω₀, where the back-EMF equals the supply. A motor that
+//! regenerates brakes when it is driven faster, by the line and at most by the stall torque; one
+//! that does not turns freely, and brakes by command alone. With an infinite ω₀ the torque is the
+//! command within ± stall, at any speed.
 //!
-//! Source: the permanent-magnet DC motor at its supply voltage, e.g. Siciliano et al. 2009, *Robotics*, ch. 5.
+//! Source: the permanent-magnet DC motor at its supply voltage, e.g. Siciliano et al. 2009,
+//! *Robotics*, ch. 5.
 
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -20,7 +23,8 @@ use super::error::ModelError;
 pub struct Motor {
     /// Torque of the line at rest, N m.
     pub stall_torque: f64,
-    /// ω₀, where the line reaches zero, rad/s; may be infinite (in JSON, which has no infinity: null).
+    /// ω₀, where the line reaches zero, rad/s; may be infinite (in JSON, which has no infinity:
+    /// null).
     #[serde(deserialize_with = "speed")]
     pub no_load_speed: f64,
     /// Whether it brakes when it is driven faster than ω₀.
@@ -97,7 +101,8 @@ impl Motor {
         command.clamp(-self.stall_torque, self.stall_torque)
     }
 
-    /// Number of the branch that holds for a command (N m) at a rate (rad/s), both about the joint's axis; they are in the order of the rate.
+    /// Number of the branch that holds for a command (N m) at a rate (rad/s), both about the
+    /// joint's axis; they are in the order of the rate.
     #[inline]
     fn branch(&self, command: f64, rate: f64) -> usize {
         let command = self.limited(command);
@@ -148,9 +153,10 @@ impl Motor {
 
 /// A drive in a step: the branch of its torque that is tried.
 ///
-/// A step with one branch tells at which rate it ends, and so on which side of the branch the motor works. Going there one branch at a time
-/// ends after at most four steps for a wheel alone, since the torque falls with the rate; going at once to the branch of that rate may
-/// go to and fro for ever.
+/// A step with one branch tells at which rate it ends, and so on which side of the branch the motor
+/// works. Going there one branch at a time ends after at most four steps for a wheel alone, since
+/// the torque falls with the rate; going at once to the branch of that rate may go to and fro for
+/// ever.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveTrial {
     branch: usize,
@@ -167,7 +173,8 @@ impl Default for DriveTrial {
 }
 
 impl DriveTrial {
-    /// The branch that holds for a command (N m) at a rate (rad/s); without a motor the torque is the command.
+    /// The branch that holds for a command (N m) at a rate (rad/s); without a motor the torque is
+    /// the command.
     #[inline]
     #[must_use]
     pub fn at(motor: Option<&Motor>, command: f64, rate: f64) -> Self {
@@ -250,7 +257,8 @@ mod tests {
 
     #[test]
     fn a_hard_brake_finds_its_branch() {
-        // A free wheel of 0.15 kg m² that braking with all that the motor has would turn back four times as fast, in a step of 50 ms.
+        // A free wheel of 0.15 kg m² that braking with all that the motor has would turn back four
+        // times as fast, in a step of 50 ms.
         let motor = Motor {
             stall_torque: 300.0,
             no_load_speed: 0.5,

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::joint::{Free, Joint, Pose, Spherical};
 use super::model::Model;
 
-/// How far the squared length of a unit quaternion may be from 1: the steps keep it within rounding.
+/// How far the squared length of a unit quaternion may be from 1: the steps keep it within
+/// rounding.
 const UNIT: f64 = 1e-12;
 
 /// Where the machine is: a point of the product of its joints' manifolds.
@@ -16,7 +17,8 @@ pub struct Configuration {
     pub position: Vector3<f64>,
     /// Attitude `R_WB` of the first body; the identity where it is not free.
     pub attitude: UnitQuaternion<f64>,
-    /// Coordinates of the revolute (rad) and prismatic (m) joints in the order of the bodies (n_joints).
+    /// Coordinates of the revolute (rad) and prismatic (m) joints in the order of the bodies
+    /// (n_joints).
     pub joints: Vec<f64>,
     /// Poses of the free bodies other than the first.
     pub others: Vec<Pose>,
@@ -80,7 +82,8 @@ impl Configuration {
         }
     }
 
-    /// `self = from ⊕ h v`: moves with the velocity `v` (nv) for `h` seconds along the exponential maps of the joints.
+    /// `self = from ⊕ h v`: moves with the velocity `v` (nv) for `h` seconds along the exponential
+    /// maps of the joints.
     pub fn set_moved(&mut self, model: &Model, from: &Self, v: &[f64], h: f64) {
         let joints = self.joints.iter_mut().zip(&from.joints);
         for ((q, q0), &k) in joints.zip(model.joint_velocities()) {

@@ -1,8 +1,9 @@
 //! The tree of solids on a terrain as a mechanical system: the rover.
 //!
-//! `M̂ = M + h θ_j K_d + h² θ_j θ K_p` on held joints: the PD of a held joint is implicit with an exponentially fitted θ_j
-//! ([`super::fitted_theta`]), so no gain and no step make it unstable; a motor at its torque–speed line is taken in the same way. `M̂ = Lᵀ D L` along the tree; the contact system keeps `Z` along
-//! each contact's path.
+//! `M̂ = M + h θ_j K_d + h² θ_j θ K_p` on held joints: the PD of a held joint is implicit with an
+//! exponentially fitted θ_j ([`super::fitted_theta`]), so no gain and no step make it unstable; a
+//! motor at its torque–speed line is taken in the same way. `M̂ = Lᵀ D L` along the tree; the
+//! contact system keeps `Z` along each contact's path.
 
 use nalgebra::Vector3;
 
@@ -67,7 +68,8 @@ pub struct TreeScratch {
     gyroscopic: GyroscopicScratch,
     force: Vec<f64>,
     pairs: PairSearch,
-    /// Coordinates of the joints at the middle and at the end of the step (n_joints); empty where no joint has a stop.
+    /// Coordinates of the joints at the middle and at the end of the step (n_joints); empty where
+    /// no joint has a stop.
     joints_middle: Vec<f64>,
     joints_end: Vec<f64>,
     system: ContactSystem,
@@ -111,7 +113,8 @@ impl TreeScratch {
         self.drives.fill(DriveAction::default());
     }
 
-    /// What each joint's drive has done since [`Self::begin_step`] (n_joints), in all parts of a step that became the state.
+    /// What each joint's drive has done since [`Self::begin_step`] (n_joints), in all parts of a
+    /// step that became the state.
     #[must_use]
     pub fn drives(&self) -> &[DriveAction] {
         &self.drives
@@ -123,7 +126,8 @@ impl TreeScratch {
         &self.system.W
     }
 
-    /// World position of the origin of a body's places at the pose where contacts were last measured, m.
+    /// World position of the origin of a body's places at the pose where contacts were last
+    /// measured, m.
     #[must_use]
     pub fn origin_of_contacts(&self, body: usize) -> &Vector3<f64> {
         self.kinematics_end.origin(body)
@@ -456,8 +460,8 @@ impl MechanicalSystem for TreeSystem<'_> {
                     impulse: torque.drive * h,
                     work,
                 };
-                // A damper never drives: where the rate changes its sign within the step, its torque at one time and the way at
-                // another may say so.
+                // A damper never drives: where the rate changes its sign within the step, its
+                // torque at one time and the way at another may say so.
                 total += work + torque.other * turned + (torque.damper * turned).min(0.0);
             }
         });
@@ -594,15 +598,17 @@ fn keep(kept: &mut [f64], joints: &[f64]) {
     }
 }
 
-/// Arm at which a joint's turn counts, m. A freely steered wheel that is freed of 2 cm turns by 0.4 rad.
+/// Arm at which a joint's turn counts, m. A freely steered wheel that is freed of 2 cm turns by 0.4
+/// rad.
 const JOINT_ARM: f64 = 0.05;
 
-/// Turn of a frame in a step, rad, beyond which gyroscopic terms are taken implicitly: the explicit ones' error, of third order, is then a
-/// thousandth of the energy.
+/// Turn of a frame in a step, rad, beyond which gyroscopic terms are taken implicitly: the explicit
+/// ones' error, of third order, is then a thousandth of the energy.
 const MOST_TURN: f64 = 0.1;
 
-/// Turn of a wheel about its axle in a step, rad, beyond which they are. Its spin couples the motions across the axle with
-/// a frequency of a few per cent of the spin, so that explicit terms would do up to some twenty times more.
+/// Turn of a wheel about its axle in a step, rad, beyond which they are. Its spin couples the
+/// motions across the axle with a frequency of a few per cent of the spin, so that explicit terms
+/// would do up to some twenty times more.
 const MOST_SPIN: f64 = 1.0;
 
 /// Fastest of some joints, rad/s.
@@ -611,8 +617,8 @@ fn fastest(joints: &[usize], v: &[f64]) -> f64 {
     joints.iter().fold(0.0, |most, &k| most.max(v[k].abs()))
 }
 
-/// Damping (N m s/rad) and stiffness (N m/rad) with which a joint's torque answers to its motion: those of its motor, of what holds it,
-/// of its own damper and spring.
+/// Damping (N m s/rad) and stiffness (N m/rad) with which a joint's torque answers to its motion:
+/// those of its motor, of what holds it, of its own damper and spring.
 #[inline]
 fn feedback(motor: f64, held: Option<&HeldJoint>, passive: &Passive) -> (f64, f64) {
     let (mut damping, mut stiffness) = (motor + passive.damping, passive.stiffness);
@@ -666,7 +672,8 @@ impl Trial<'_> {
         theta * self.v_end[k] + (1.0 - theta) * self.start.v[k]
     }
 
-    /// Torques of every joint; the PD, the spring and the motor's line at the θ_j-weighted position and velocity of the iterate.
+    /// Torques of every joint; the PD, the spring and the motor's line at the θ_j-weighted position
+    /// and velocity of the iterate.
     #[inline]
     fn for_each(&self, model: &Model, mut act: impl FnMut(&JointProperties, Actuation)) {
         let h = self.options.time_step;
@@ -692,7 +699,8 @@ impl Trial<'_> {
     }
 }
 
-/// Torque of the springs (N m) at a place, and damping (N m s/rad), of what holds a joint and of its own.
+/// Torque of the springs (N m) at a place, and damping (N m s/rad), of what holds a joint and of
+/// its own.
 #[inline]
 fn answer(held: Option<&HeldJoint>, passive: &Passive, place: f64) -> (f64, f64) {
     let own = passive.stiffness * (place - passive.rest);
@@ -727,7 +735,8 @@ fn add_command(
     });
 }
 
-/// `y = −(left side)` of the principle of [`crate::integrator::moreau_jean_newton`] at the iterate `v_end`, without commands and contacts.
+/// `y = −(left side)` of the principle of [`crate::integrator::moreau_jean_newton`] at the iterate
+/// `v_end`, without commands and contacts.
 fn momentum_residual(
     model: &Model,
     gravity: &Vector3<f64>,
@@ -756,7 +765,8 @@ fn momentum_residual(
         for b in tree.bodies.clone() {
             let (sum, begin) = (&mut parts.sums[b], &parts.momenta[b]);
             let weight = gravity * (bodies[b].mass * h);
-            // Both mass centres relative to the point of reference, the tree's origin at the start of the step.
+            // Both mass centres relative to the point of reference, the tree's origin at the start
+            // of the step.
             let centre =
                 (parts.kinematics_end.c[b] + end) * theta + parts.c_start[b] * (1.0 - theta);
             sum.linear -= begin.linear + weight;

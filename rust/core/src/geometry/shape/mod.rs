@@ -1,7 +1,8 @@
-//! Shapes of a machine's parts, placed in space: one file a shape, with its data, its bounds and its support map.
+//! Shapes of a machine's parts, placed in space: one file a shape, with its data, its bounds and
+//! its support map.
 //!
-//! All coordinates are in world axes and relative to one origin that the caller chooses, mostly the trunk's, so that a machine far from
-//! the world's origin loses no digit.
+//! All coordinates are in world axes and relative to one origin that the caller chooses, mostly the
+//! trunk's, so that a machine far from the world's origin loses no digit.
 
 pub mod disc;
 pub mod oriented_box;

@@ -50,7 +50,8 @@ pub(super) fn place(field: &str, values: &[f64; 3]) -> Result<(), ModelError> {
     (values.iter()).try_for_each(|&x| in_range(field, x, MAX_LENGTH, "at most 1e6 m either way"))
 }
 
-/// A gain, a torque or an inertia: not negative, and no larger than a double can carry through a step.
+/// A gain, a torque or an inertia: not negative, and no larger than a double can carry through a
+/// step.
 fn moderate(field: &str, value: f64) -> Result<(), ModelError> {
     not_negative(field, value)?;
     in_range(field, value, 1e18, "at most 1e18")

@@ -26,7 +26,8 @@ const ROVER: &str = include_str!("../../../models/rover.toml");
 pub struct ModelDescription {
     /// Name of the machine.
     pub name: String,
-    /// Solids, parents before children, those of one tree together. Their order is the order of the coordinates.
+    /// Solids, parents before children, those of one tree together. Their order is the order of the
+    /// coordinates.
     pub solids: Vec<SolidDescription>,
     /// Wheels in the order of every public array.
     #[serde(default)]
@@ -34,7 +35,8 @@ pub struct ModelDescription {
     /// Points with a name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tags: Vec<TagDescription>,
-    /// Whether parts of one tree touch each other, where no joint connects their bodies. Parts of two trees always do.
+    /// Whether parts of one tree touch each other, where no joint connects their bodies. Parts of
+    /// two trees always do.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub self_contact: bool,
 }
@@ -65,10 +67,12 @@ pub struct SolidDescription {
     /// Kind of the joint: by default free for a root and revolute for all others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint: Option<JointKind>,
-    /// Origin of the joint's frame in the parent's frame, m; in the world for a root that is not free.
+    /// Origin of the joint's frame in the parent's frame, m; in the world for a root that is not
+    /// free.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position: Option<[f64; 3]>,
-    /// Rotation from the joint's frame to the parent's as a rotation vector: the axis times the angle, rad. None by default.
+    /// Rotation from the joint's frame to the parent's as a rotation vector: the axis times the
+    /// angle, rad. None by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<[f64; 3]>,
     /// Axis of a revolute or prismatic joint in the joint's frame; need not be normalised.
@@ -116,7 +120,8 @@ pub struct SolidDescription {
     /// Another joint that this one follows: its coordinate is gone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coupled: Option<CouplingDescription>,
-    /// Angle (rad) or displacement (m) at which the joint is locked (welded): its coordinate is gone. Free by default.
+    /// Angle (rad) or displacement (m) at which the joint is locked (welded): its coordinate is
+    /// gone. Free by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub locked: Option<f64>,
 }
@@ -133,7 +138,8 @@ pub struct WheelDescription {
     pub axle: [f64; 3],
     /// Its radius, m; where the solid's shape is a disc, that disc's.
     pub radius: f64,
-    /// Radius at which it touches the ground, m, where that is meant to be another than the disc's; `radius` by default.
+    /// Radius at which it touches the ground, m, where that is meant to be another than the disc's;
+    /// `radius` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact_radius: Option<f64>,
     /// Largest driving torque, N m.
@@ -151,7 +157,8 @@ pub struct WheelDescription {
     pub steering_limit: Option<f64>,
 }
 
-/// Longest text of a description, bytes: a model of [`MAX_SOLIDS`](super::model::MAX_SOLIDS) solids takes a twentieth.
+/// Longest text of a description, bytes: a model of [`MAX_SOLIDS`](super::model::MAX_SOLIDS) solids
+/// takes a twentieth.
 pub const MAX_TEXT: usize = 16 << 20;
 
 fn check_length(text: &str) -> Result<(), ModelError> {
@@ -252,7 +259,8 @@ impl ModelDescription {
     /// Reads TOML.
     ///
     /// # Errors
-    /// [`ModelError::Unreadable`] with line and column; [`ModelError::TooMany`] beyond [`MAX_TEXT`].
+    /// [`ModelError::Unreadable`] with line and column; [`ModelError::TooMany`] beyond
+    /// [`MAX_TEXT`].
     pub fn from_toml(text: &str) -> Result<Self, ModelError> {
         check_length(text)?;
         toml::from_str(text).map_err(|e| ModelError::Unreadable {
@@ -273,7 +281,8 @@ impl ModelDescription {
     /// Reads JSON.
     ///
     /// # Errors
-    /// [`ModelError::Unreadable`] with line and column; [`ModelError::TooMany`] beyond [`MAX_TEXT`].
+    /// [`ModelError::Unreadable`] with line and column; [`ModelError::TooMany`] beyond
+    /// [`MAX_TEXT`].
     pub fn from_json(text: &str) -> Result<Self, ModelError> {
         check_length(text)?;
         serde_json::from_str(text).map_err(|e| ModelError::Unreadable {

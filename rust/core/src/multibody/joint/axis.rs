@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
-/// Direction of a revolute or prismatic joint; the coordinate axes are kept apart because their product is two columns' work.
+/// Direction of a revolute or prismatic joint; the coordinate axes are kept apart because their
+/// product is two columns' work.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointAxis {
     /// About x.

@@ -1,7 +1,7 @@
 //! Fixed joint: no motion at all.
 //!
-//! A body fixed to another one, and one whose joint is locked, is part of it: masses and shapes are merged and no coordinate is left. A
-//! root that is fixed stands in the world.
+//! A body fixed to another one, and one whose joint is locked, is part of it: masses and shapes are
+//! merged and no coordinate is left. A root that is fixed stands in the world.
 
 use nalgebra::{Matrix3, Vector3};
 

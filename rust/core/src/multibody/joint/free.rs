@@ -1,7 +1,8 @@
 //! Free joint: a root that moves anywhere.
 //!
-//! Its velocity is that of its frame's origin and its angular velocity, both in world axes. The places of its tree are taken relative
-//! to its origin, so a machine far from the world's origin loses no digit.
+//! Its velocity is that of its frame's origin and its angular velocity, both in world axes. The
+//! places of its tree are taken relative to its origin, so a machine far from the world's origin
+//! loses no digit.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -14,7 +15,8 @@ pub const NV: usize = 6;
 /// A free joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Free {
-    /// Number of its pose in the configuration: [`Configuration::pose`](crate::multibody::Configuration::pose).
+    /// Number of its pose in the configuration:
+    /// [`Configuration::pose`](crate::multibody::Configuration::pose).
     pub pose: usize,
 }
 

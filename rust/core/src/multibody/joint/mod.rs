@@ -1,4 +1,5 @@
-//! The catalogue of joints: what lets a body move relative to the one that carries it, or to the world.
+//! The catalogue of joints: what lets a body move relative to the one that carries it, or to the
+//! world.
 //!
 //! | joint | coordinates | velocities | moves |
 //! |---|---|---|---|
@@ -11,8 +12,9 @@
 //!
 //! Each velocity has a [`Motion`]: the screw that its unit gives to all that the joint carries.
 //!
-//! Source: Featherstone 2008, *Rigid Body Dynamics Algorithms*, ch. 4; Carpentier et al. 2019, *The Pinocchio C++ library*, for the
-//! joints as types with their own numbers of coordinates and velocities.
+//! Source: Featherstone 2008, *Rigid Body Dynamics Algorithms*, ch. 4; Carpentier et al. 2019, *The
+//! Pinocchio C++ library*, for the joints as types with their own numbers of coordinates and
+//! velocities.
 
 pub mod axis;
 pub mod coupled;
@@ -59,7 +61,8 @@ impl Joint {
         }
     }
 
-    /// Number of [`Motion`]s: one a velocity beyond those of a free base, and one of a coupled joint.
+    /// Number of [`Motion`]s: one a velocity beyond those of a free base, and one of a coupled
+    /// joint.
     #[must_use]
     pub fn n_motions(&self) -> usize {
         match self {
@@ -102,7 +105,8 @@ impl Joint {
 /// Where the one coordinate of a revolute or prismatic joint comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coordinate {
-    /// Number of the joint in [`Configuration::joints`](super::Configuration::joints): its own, or the one that it follows.
+    /// Number of the joint in [`Configuration::joints`](super::Configuration::joints): its own, or
+    /// the one that it follows.
     pub joint: usize,
     /// How it follows that joint; none where the coordinate is its own.
     pub coupling: Option<Coupling>,

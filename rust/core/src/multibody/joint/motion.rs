@@ -4,15 +4,18 @@ use std::ops::{Add, Mul};
 
 use nalgebra::Vector3;
 
-/// What a unit of one joint velocity gives to all that the joint carries: a turn about an axis, a displacement, or both.
+/// What a unit of one joint velocity gives to all that the joint carries: a turn about an axis, a
+/// displacement, or both.
 ///
-/// World axes; places are relative to the origin of the tree's places ([`Kinematics::origin`](crate::multibody::Kinematics::origin)).
+/// World axes; places are relative to the origin of the tree's places
+/// ([`Kinematics::origin`](crate::multibody::Kinematics::origin)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     kind: Kind,
     /// Angular velocity; of a slide its velocity.
     axis: Vector3<f64>,
-    /// Of a turn a point of its axis, of a screw the velocity of the material point at the origin of places.
+    /// Of a turn a point of its axis, of a screw the velocity of the material point at the origin
+    /// of places.
     place: Vector3<f64>,
 }
 
@@ -59,7 +62,8 @@ impl Motion {
         &self.axis
     }
 
-    /// Angular velocity, and velocity of the material point at the origin of places, per unit of the velocity.
+    /// Angular velocity, and velocity of the material point at the origin of places, per unit of
+    /// the velocity.
     #[inline]
     #[must_use]
     pub fn twist(&self) -> (Vector3<f64>, Vector3<f64>) {
@@ -93,7 +97,8 @@ impl Motion {
         }
     }
 
-    /// Generalized force on the velocity of a force (N) and its moment about the origin of places (N m).
+    /// Generalized force on the velocity of a force (N) and its moment about the origin of places
+    /// (N m).
     #[inline]
     #[must_use]
     pub fn power(&self, force: &Vector3<f64>, moment: &Vector3<f64>) -> f64 {

@@ -1,7 +1,8 @@
 //! Spherical joint: any rotation about a point.
 //!
-//! Its velocity is the angular velocity relative to the carrier, in the axes of the joint's frame, which the carrier takes along. The
-//! motions of the three velocities are then turns about axes fixed in the carrier, as a revolute joint's is.
+//! Its velocity is the angular velocity relative to the carrier, in the axes of the joint's frame,
+//! which the carrier takes along. The motions of the three velocities are then turns about axes
+//! fixed in the carrier, as a revolute joint's is.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 

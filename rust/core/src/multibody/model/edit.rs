@@ -7,11 +7,12 @@ use crate::multibody::error::ModelError;
 use crate::multibody::motor::Motor;
 
 impl Model {
-    /// The same machine with joints locked at angles (rad) or displacements (m): their solids are merged and the coordinates gone.
+    /// The same machine with joints locked at angles (rad) or displacements (m): their solids are
+    /// merged and the coordinates gone.
     ///
     /// # Errors
-    /// `UnknownName` for a joint that is not there or has no single coordinate, `NotFinite` for an angle that is not finite,
-    /// `CoupledApart` where another joint follows one of these.
+    /// `UnknownName` for a joint that is not there or has no single coordinate, `NotFinite` for an
+    /// angle that is not finite, `CoupledApart` where another joint follows one of these.
     pub fn with_locked_joints(&self, joints: &[(String, f64)]) -> Result<Self, ModelError> {
         let mut description = self.description.clone();
         for (i, (name, angle)) in joints.iter().enumerate() {
@@ -60,7 +61,8 @@ impl Model {
         Self::from_description(description)
     }
 
-    /// The same machine whose wheels touch the ground at another radius (m) than their discs': masses, inertias and looks stay.
+    /// The same machine whose wheels touch the ground at another radius (m) than their discs':
+    /// masses, inertias and looks stay.
     ///
     /// # Errors
     /// A radius out of its range.

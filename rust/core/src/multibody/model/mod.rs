@@ -1,8 +1,8 @@
 //! The checked, immutable model: moving bodies, their trees, wheels and frames.
 //!
-//! Built once from a [`ModelDescription`], shared between threads, never changed. A locked (welded) or fixed
-//! joint leaves no trace: the inertia of its solid is merged into the body that carries it and its
-//! coordinate is gone from every matrix.
+//! Built once from a [`ModelDescription`], shared between threads, never changed. A locked (welded)
+//! or fixed joint leaves no trace: the inertia of its solid is merged into the body that carries it
+//! and its coordinate is gone from every matrix.
 
 mod build;
 mod edit;
@@ -26,7 +26,8 @@ use super::error::ModelError;
 use super::joint::{Joint, free};
 use super::state::Configuration;
 
-/// Most solids of a model, and most wheels and tags: beyond it a step costs seconds and matrices gigabytes.
+/// Most solids of a model, and most wheels and tags: beyond it a step costs seconds and matrices
+/// gigabytes.
 pub const MAX_SOLIDS: usize = 1000;
 
 /// Most shapes that the solids of a model list, all together.
@@ -66,8 +67,8 @@ pub struct Body {
     pub principal_inertia: Vector3<f64>,
     /// Principal axes as columns, in the body's frame; none where they are the frame's.
     pub principal_axes: Option<Matrix3<f64>>,
-    /// Whether turning about its own joint changes nothing but its looks: an axisymmetric body about its own axis, with
-    /// nothing on it but wheels of the same axle. A step need not turn it.
+    /// Whether turning about its own joint changes nothing but its looks: an axisymmetric body
+    /// about its own axis, with nothing on it but wheels of the same axle. A step need not turn it.
     pub is_spinner: bool,
 }
 
@@ -87,7 +88,8 @@ impl Body {
     }
 }
 
-/// Trees of bodies. Velocities in the order of the bodies: see [`super::joint`] for those of each joint.
+/// Trees of bodies. Velocities in the order of the bodies: see [`super::joint`] for those of each
+/// joint.
 #[derive(Clone, Debug)]
 pub struct Model {
     description: ModelDescription,
@@ -183,7 +185,8 @@ impl Model {
         &self.spheres
     }
 
-    /// Whether parts of two bodies can touch: in one tree only where it has self-contact, and not across a joint.
+    /// Whether parts of two bodies can touch: in one tree only where it has self-contact, and not
+    /// across a joint.
     #[must_use]
     pub fn can_touch(&self, a: usize, b: usize) -> bool {
         let (first, second) = (&self.bodies[a], &self.bodies[b]);
@@ -198,7 +201,8 @@ impl Model {
         self.paths.body_of_velocity.len()
     }
 
-    /// Number of joints with one coordinate of their own: revolute and prismatic ones that are neither locked nor coupled.
+    /// Number of joints with one coordinate of their own: revolute and prismatic ones that are
+    /// neither locked nor coupled.
     #[inline]
     #[must_use]
     pub fn n_joints(&self) -> usize {
@@ -230,7 +234,8 @@ impl Model {
         self.trees.len() == 1 && self.trees[0].is_free
     }
 
-    /// A number that two models share only if they have the same description and the same locked joints.
+    /// A number that two models share only if they have the same description and the same locked
+    /// joints.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
         self.fingerprint
@@ -249,8 +254,8 @@ impl Model {
         self.has_slides
     }
 
-    /// Whether every root is free and every other joint revolute and on its own, as a rover's are: hot loops then run without a branch on the
-    /// kind of joint.
+    /// Whether every root is free and every other joint revolute and on its own, as a rover's are:
+    /// hot loops then run without a branch on the kind of joint.
     #[inline]
     #[must_use]
     pub fn only_turns(&self) -> bool {
@@ -325,7 +330,8 @@ impl Model {
         self.paths.common(a, b)
     }
 
-    /// How many velocities of a free base begin the path of body `b`: 6, or 0 in a tree without one.
+    /// How many velocities of a free base begin the path of body `b`: 6, or 0 in a tree without
+    /// one.
     #[inline]
     #[must_use]
     pub fn lead(&self, b: usize) -> usize {
@@ -339,15 +345,16 @@ impl Model {
         self.paths.body_of_velocity[k]
     }
 
-    /// The path of body `b` in two parts: the velocities of a free base, which are consecutive, and those of the joints.
+    /// The path of body `b` in two parts: the velocities of a free base, which are consecutive, and
+    /// those of the joints.
     #[inline]
     #[must_use]
     pub fn split_path(&self, b: usize) -> (Range<usize>, &[usize]) {
         self.paths.split(b)
     }
 
-    /// The motions ([`Kinematics::motions`](super::Kinematics::motions)) that the velocities of body `b`'s path beyond its
-    /// [`Self::lead`] give it, in the order of the path.
+    /// The motions ([`Kinematics::motions`](super::Kinematics::motions)) that the velocities of
+    /// body `b`'s path beyond its [`Self::lead`] give it, in the order of the path.
     #[inline]
     #[must_use]
     pub fn motions(&self, b: usize) -> &[usize] {

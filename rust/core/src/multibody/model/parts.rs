@@ -28,7 +28,8 @@ pub struct Wheel {
     pub centre: Vector3<f64>,
     /// Unit axle in the body's frame.
     pub axle: Vector3<f64>,
-    /// A unit vector in the wheel's plane, body's frame: rolling direction where no other is defined.
+    /// A unit vector in the wheel's plane, body's frame: rolling direction where no other is
+    /// defined.
     pub spoke: Vector3<f64>,
     /// Contact radius, m.
     pub radius: f64,
@@ -38,7 +39,7 @@ pub struct Wheel {
     pub drive_sign: f64,
     /// Torque–speed line of its motor, where it has one.
     pub motor: Option<Motor>,
-    /// Its own joint, by its number ([`Model::joint_index`]); none where it is locked.
+    /// Its own joint, by its number ([`Model::joint_index`](super::Model::joint_index)); none where it is locked.
     pub joint: Option<usize>,
     /// Its steering joint, by its number; none where there is none or it is locked.
     pub steering: Option<usize>,

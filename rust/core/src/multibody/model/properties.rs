@@ -1,4 +1,5 @@
-//! What a joint does by itself: springs, dampers, rotors and stops, its drive, and the gains with which it can be held.
+//! What a joint does by itself: springs, dampers, rotors and stops, its drive, and the gains with
+//! which it can be held.
 
 use crate::multibody::description::{DriveDescription, Hold, Limits, SolidDescription};
 use crate::multibody::joint::Coupling;

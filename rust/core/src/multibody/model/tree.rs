@@ -12,7 +12,8 @@ pub struct Tree {
     pub bodies: Range<usize>,
     /// Its velocities; a free root's come first.
     pub velocities: Range<usize>,
-    /// Whether its root is free: the tree's places are then relative to the root's origin, else to the world's.
+    /// Whether its root is free: the tree's places are then relative to the root's origin, else to
+    /// the world's.
     pub is_free: bool,
     /// kg.
     pub mass: f64,
@@ -65,7 +66,8 @@ struct Path {
 }
 
 impl Paths {
-    /// Numbers velocities and motions and writes the numbers into the bodies; the body of a coupling that no path allows otherwise.
+    /// Numbers velocities and motions and writes the numbers into the bodies; the body of a
+    /// coupling that no path allows otherwise.
     pub(super) fn number(bodies: &mut [Body]) -> Result<Self, usize> {
         let mut paths = Self::default();
         let mut grown: Vec<Path> = Vec::with_capacity(bodies.len());
@@ -168,7 +170,8 @@ impl Paths {
             let Some(parent) = body.parent else {
                 continue; // Shares nothing with the trees before it.
             };
-            // A path ends with its own body, which no path of a body before it has, unless it follows one.
+            // A path ends with its own body, which no path of a body before it has, unless it
+            // follows one.
             let own = &grown[parent].velocities.len();
             let follows = grown[a]
                 .velocities
