@@ -41,7 +41,8 @@ fn reaction(run: &RoverSimulation, joint: usize, side: Side) -> f64 {
     found.map_or(0.0, |active| active.impulse[0]) / run.options().time_step
 }
 
-/// `½ I ω² = m g l (cos a − cos b)` down to the stop, there `ω⁺ = −e ω⁻`, and up again to where `e²` of that energy goes.
+/// `½ I ω² = m g l (cos a − cos b)` down to the stop, there `ω⁺ = −e ω⁻`, and up again to where
+/// `e²` of that energy goes.
 #[test]
 fn a_pendulum_bounces_off_its_stop() {
     for variant in VARIANTS {
@@ -186,8 +187,8 @@ fn stops_give_no_energy() {
     }
 }
 
-/// A stop acts between two bodies: in free flight it changes neither momentum, and with e = 1 no energy, but for what the audit
-/// of the energy takes at a strike.
+/// A stop acts between two bodies: in free flight it changes neither momentum, and with e = 1 no
+/// energy, but for what the audit of the energy takes at a strike.
 #[test]
 fn a_stop_keeps_the_momenta() {
     let body = solid("body", None, JointKind::Free);
@@ -214,7 +215,8 @@ fn a_stop_keeps_the_momenta() {
     assert!((energy(&run) - before).abs() < 1e-5 * before);
 }
 
-/// A body on two front feet and an arm: about the front feet `F · 0.9 = 10 g · 0.4 + g · 0.9`, and the stop carries `(F − g) · 0.5`.
+/// A body on two front feet and an arm: about the front feet `F · 0.9 = 10 g · 0.4 + g · 0.9`, and
+/// the stop carries `(F − g) · 0.5`.
 #[test]
 fn a_stop_carries_what_the_ground_presses() {
     let foot = |name: &str, joint| {
@@ -272,7 +274,8 @@ fn a_stop_carries_what_the_ground_presses() {
     }
 }
 
-/// A joint that begins beyond its stop comes back by the projection, which moves it and gives it no rate.
+/// A joint that begins beyond its stop comes back by the projection, which moves it and gives it no
+/// rate.
 #[test]
 fn a_joint_beyond_its_stop_is_put_back() {
     for variant in VARIANTS {

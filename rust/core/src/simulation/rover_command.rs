@@ -109,8 +109,8 @@ impl RoverSimulation {
 
     /// Sets torques about the joint axes (n_joints, N m).
     ///
-    /// A joint with a drive saturates at its limit and on its motor's line. At all others the torque
-    /// is additional to the wheels' and has no limit.
+    /// A joint with a drive saturates at its limit and on its motor's line. At all others the
+    /// torque is additional to the wheels' and has no limit.
     ///
     /// # Errors
     /// Wrong length or an entry that is not finite; nothing is changed then.
