@@ -659,7 +659,7 @@ class Contacts:
         """Names of the solids that touch, and of the joints that are at a stop."""
     @property
     def kinds(self) -> list[str]:
-        """What touches in each contact, "wheel", "box" or "sphere"; "limit" where it is a joint's stop.
+        """What touches in each contact, "wheel", "box" or "sphere"; "limit" for a joint's stop.
 
         The point of a stop is the origin of the solid that the joint carries, its normal is the
         joint's axis that opens the gap. Along it, at a revolute joint, the gap is in rad, the

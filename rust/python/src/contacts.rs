@@ -75,7 +75,7 @@ impl Contacts {
         self.bodies.clone()
     }
 
-    /// What touches in each contact, "wheel", "box" or "sphere"; "limit" where it is a joint's stop.
+    /// What touches in each contact, "wheel", "box" or "sphere"; "limit" for a joint's stop.
     ///
     /// The point of a stop is the origin of the solid that the joint carries, its normal is the
     /// joint's axis that opens the gap. Along it, at a revolute joint, the gap is in rad, the
