@@ -101,7 +101,8 @@ fn an_l_that_stands_on_its_column_tips_over() {
             { kind = 'box', size = [0.1, 0.8, 0.3], position = [0.05, 0.4, 0.0], collides = true },
             { kind = 'box', size = [0.6, 0.1, 0.3], position = [0.4, 0.75, 0.0], collides = true }]",
         );
-        // It lies on the line from the column's corner (0.1, 0) to the arm's (0.7, 0.7), the mass centre at (0.2, 0.55).
+        // It lies on the line from the column's corner (0.1, 0) to the arm's (0.7, 0.7). The mass
+        // centre is at (0.2, 0.55).
         let share = (0.1 * 0.6 + 0.55 * 0.7) / (0.6 * 0.6 + 0.7 * 0.7);
         let weight = 4.2 * GRAVITY;
         let simulation = settled(model, 0.0, 0.0, variant);
