@@ -15,8 +15,10 @@
 //! = (n, f)
 //!
 //! ```text
-//! I = [ J     m c× ]        B = [ K − ½ n×   0 ]        K = ½ (ω× J + (ω× J)ᵀ − m (c vᵀ + v cᵀ)) + m (c·v) 1
+//! I = [ J     m c× ]        B = [ K − ½ n×   0 ]
 //!     [ −m c×  m 1 ]            [ −f×        0 ]
+//!
+//! K = ½ (ω× J + (ω× J)ᵀ − m (c vᵀ + v cᵀ)) + m (c·v) 1
 //! ```
 //!
 //! so that a body and all that it carries have sums of a few 3-vectors and symmetric matrices.
