@@ -420,8 +420,8 @@ impl MechanicalSystem for TreeSystem<'_> {
         Some(MechanicalEnergy {
             kinetic: energy.kinetic,
             potential: energy.potential,
-            // With several trees, or one on a fixed base, the momentum is not conjugate to a single
-            // velocity.
+            // With several trees, or one on a fixed base, no single velocity carries the total
+            // momentum.
             momentum: if self.model.is_free_tree() {
                 momentum
             } else {
