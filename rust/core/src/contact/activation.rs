@@ -1,12 +1,11 @@
-//! When a candidate takes part in a step as a contact.
+//! Activation: which candidates enter a step as contacts.
 
-/// A candidate becomes a contact of the step where `gap + lead · u_N ≤ 0`, or nearly at rest within
-/// `hover`.
+/// A candidate is active if `gap + lead · u_N ≤ 0`, or if it is nearly at rest within `hover`.
 ///
-/// The first is the forecast of Moreau–Jean stepping; `lead` is what is left of γ h after the
-/// configuration that the gap was measured in. The second keeps a contact that rests a rounding
-/// error above the ground closed, instead of letting it fall for a step: within `hover` metres and
-/// slower than `slow` m/s.
+/// The first condition is the forecast of Moreau–Jean stepping; `lead` is the part of γ h that
+/// remains after the configuration in which the gap was measured. The second keeps a resting
+/// contact closed when rounding leaves it slightly above the ground, within `hover` metres and
+/// slower than `slow` m/s; without it the body would fall for one step.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Activation {
     /// s.
@@ -15,13 +14,13 @@ pub struct Activation {
     pub hover: f64,
     /// m/s.
     pub slow: f64,
-    /// m: a bound of `|lead · u_N|` over the machine, so that the search knows how far to look.
+    /// Upper bound of `|lead · u_N|` over the machine, m; limits the search distance.
     pub margin: f64,
 }
 
 impl Activation {
-    /// Whether a candidate with this gap (m) and normal velocity (m/s, asked for only where it
-    /// matters) takes part.
+    /// Whether a candidate with this gap (m) and normal velocity (m/s, evaluated only if needed) is
+    /// active.
     #[inline]
     #[must_use]
     pub fn admits(&self, gap: f64, u_N: impl FnOnce() -> f64) -> bool {
@@ -34,7 +33,7 @@ impl Activation {
         }
     }
 
-    /// How far from the surface a candidate can be and still take part, m, given the bound
+    /// Largest distance from the surface at which a candidate can be active, m, for the bound
     /// `margin`.
     #[must_use]
     pub fn reach(&self) -> f64 {

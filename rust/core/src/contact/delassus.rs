@@ -1,8 +1,8 @@
-//! Delassus operator `W = Hᵀ M̂⁻¹ H` and the impulses' way back to velocities.
+//! Delassus operator `W = Hᵀ M̂⁻¹ H`, and the map from impulses to velocities.
 //!
 //! With `M̂ = Lᵀ D L` and `Z = D^(-1/2) L^(-T) H` the operator is `W = Zᵀ Z`. A column of Z is
-//! nonzero only along its body's path, or along the union of its two bodies' paths, so a block of W
-//! is a dot product over the velocities that two contacts share: never a dense product.
+//! nonzero only along its body's path, or along the union of its two bodies' paths. A block of W is
+//! therefore a dot product over the velocities that two contacts share; no dense product is formed.
 
 use std::ops::Range;
 
@@ -11,32 +11,31 @@ use super::limit;
 use super::pair::{Contact, Opposite};
 use crate::multibody::{BASE, FactoredMassMatrix, Kinematics, Model};
 
-/// The contacts of a step in matrix form. Scratch: grows to what was needed most, then reuses it.
+/// The contacts of a step in matrix form. The storage grows to the largest step and is then reused.
 #[derive(Clone, Debug, Default)]
 pub struct ContactSystem {
     /// Delassus operator, row-major (3 n_c, 3 n_c).
     pub W: Vec<f64>,
-    /// Local velocity `Hᵀ v` of the velocity handed to [`Self::assemble`] (3 n_c), m/s.
+    /// Local velocity `Hᵀ v` for the velocity passed to [`Self::assemble`] (3 n_c), m/s.
     pub u: Vec<f64>,
-    /// Z along each path: `Z[c * stride + k]` belongs to the k-th velocity of the path of contact
-    /// c.
+    /// Z along each path: `Z[c * stride + k]` belongs to the k-th velocity of contact c's path.
     Z: Vec<Columns>,
     stride: usize,
     /// Body of each contact.
     bodies: Vec<usize>,
-    /// From where to where in `unions` a contact of two bodies, or a stop, has its rows; nothing of
-    /// one with the ground. Empty where all are.
+    /// Range in `unions` of the rows of a contact between two bodies, or of a stop; empty for a
+    /// ground contact. The vector is empty if all contacts are ground contacts.
     spans: Vec<Range<usize>>,
-    /// Velocities along the unions of two paths, or along a stop's, ascending, and Z there.
+    /// Velocities along the union of two paths, or along a stop's path, ascending, with Z.
     unions: Vec<(usize, Columns)>,
-    /// One column a velocity (nv), while a union is made.
+    /// One column per velocity (nv), while a union is assembled.
     full: Vec<Columns>,
-    /// Rows along one path, while a union is made.
+    /// Rows along one path, while a union is assembled.
     path_rows: Vec<Columns>,
 }
 
 impl ContactSystem {
-    /// Room for `n` contacts of a model without further allocation.
+    /// Storage for `n` contacts of a model without further allocation.
     #[must_use]
     pub fn with_capacity(model: &Model, n: usize) -> Self {
         Self {
@@ -105,7 +104,7 @@ impl ContactSystem {
         }
     }
 
-    /// W from its blocks below the diagonal, and on it.
+    /// W from its blocks on and below the diagonal.
     #[inline]
     fn fill_operator(&mut self, n: usize, block: impl Fn(&Self, usize, usize) -> [Columns; 3]) {
         let size = 3 * n;
@@ -127,8 +126,7 @@ impl ContactSystem {
         }
     }
 
-    /// Rows of Z of a joint's stop, along the path of the joint's velocity, and its `Hᵀ v`, rad/s
-    /// or m/s.
+    /// Rows of Z of a stop, along the path of the joint's velocity, and its `Hᵀ v`, rad/s or m/s.
     fn stop(
         &mut self,
         model: &Model,
@@ -147,7 +145,8 @@ impl ContactSystem {
         [sign * v[k], 0.0, 0.0, 0.0]
     }
 
-    /// Gives the tangential diagonals of stops, which move nothing, their normal's.
+    /// Sets the tangential diagonals of stops, whose tangential rows are zero, to that of the
+    /// normal.
     fn close_stops(&mut self, contacts: &[Contact]) {
         let size = 3 * contacts.len();
         for (c, contact) in contacts.iter().enumerate() {
@@ -160,7 +159,7 @@ impl ContactSystem {
         }
     }
 
-    /// Rows of Z of a contact of two bodies, and its `Hᵀ v`, m/s.
+    /// Rows of Z of a contact between two bodies, and its `Hᵀ v`, m/s.
     fn unite(
         &mut self,
         model: &Model,
@@ -191,7 +190,7 @@ impl ContactSystem {
         for (row, &k) in self.path_rows.iter().zip(path_of_other) {
             add(&mut self.full[k], -1.0, row);
         }
-        // Both ascend, so their union is merged.
+        // Both are in ascending order, so their union is a merge.
         let (mut left, mut right) = (path, path_of_other);
         while let Some(&k) = smaller(left, right) {
             left = left.strip_prefix(&[k]).unwrap_or(left);
@@ -210,7 +209,7 @@ impl ContactSystem {
         u
     }
 
-    /// The block of W of two contacts.
+    /// The block of W for two contacts.
     fn block(&self, model: &Model, c: usize, d: usize) -> [Columns; 3] {
         if self.union(c).is_empty() && self.union(d).is_empty() {
             return self.block_on_ground(model, c, d);
@@ -226,7 +225,7 @@ impl ContactSystem {
         block
     }
 
-    /// The block of W of two contacts with the ground.
+    /// The block of W for two ground contacts.
     #[allow(clippy::inline_always)] // as a call it costs a hundredth of a step
     #[inline(always)]
     fn block_on_ground(&self, model: &Model, c: usize, d: usize) -> [Columns; 3] {
@@ -242,7 +241,7 @@ impl ContactSystem {
         block
     }
 
-    /// Rows of a contact of two bodies or of a stop; nothing of one with the ground.
+    /// Rows of a contact between two bodies or of a stop; empty for a ground contact.
     #[inline]
     fn union(&self, c: usize) -> &[(usize, Columns)] {
         if self.spans.is_empty() {
@@ -252,7 +251,7 @@ impl ContactSystem {
         }
     }
 
-    /// Velocities of a contact, ascending, and its Z there.
+    /// Velocities of a contact, ascending, with Z.
     fn entries<'a>(
         &'a self,
         model: &'a Model,
@@ -268,7 +267,7 @@ impl ContactSystem {
         along_path.chain(unions.iter().map(|(k, z)| (*k, z)))
     }
 
-    /// `out = Zᵀ y` (3 n_c): what a velocity change `y` in factor coordinates does at the contacts.
+    /// `out = Zᵀ y` (3 n_c): local velocities of a velocity change `y` in factor coordinates.
     pub fn local(&self, model: &Model, y: &[f64], out: &mut [f64]) {
         for (c, values) in out.chunks_exact_mut(3).enumerate() {
             let union = self.union(c);
@@ -286,7 +285,7 @@ impl ContactSystem {
         }
     }
 
-    /// `out += Hᵀ v` for another velocity than the one handed to [`Self::assemble`].
+    /// `out += Hᵀ v` for a velocity other than the one passed to [`Self::assemble`].
     pub fn add_local_of_velocity(
         &self,
         model: &Model,
@@ -307,7 +306,7 @@ impl ContactSystem {
         }
     }
 
-    /// `y += Z p`: impulses to a velocity change in factor coordinates.
+    /// `y += Z p`: velocity change, in factor coordinates, due to impulses `p`.
     pub fn add_impulses(&self, model: &Model, p: &[f64], y: &mut [f64]) {
         for (c, p) in p.chunks_exact(3).enumerate() {
             let product = |z: &Columns| z[0] * p[0] + z[1] * p[1] + z[2] * p[2];
@@ -335,7 +334,7 @@ impl ContactSystem {
     }
 }
 
-/// `block += x yᵀ`: nine sums that do not wait for each other.
+/// `block += x yᵀ`: nine independent sums.
 #[inline]
 fn add_product(block: &mut [Columns; 3], x: &Columns, y: &Columns) {
     for (sums, factor) in block.iter_mut().zip(x) {
@@ -359,7 +358,7 @@ fn smaller<'a>(left: &'a [usize], right: &'a [usize]) -> Option<&'a usize> {
     }
 }
 
-/// Product of columns along a path with a full vector.
+/// Product of the columns along a path with a full vector.
 #[inline]
 fn path_product((lead, rest): (Range<usize>, &[usize]), rows: &[Columns], v: &[f64]) -> Columns {
     let mut sums = [0.0; 4];

@@ -1,4 +1,4 @@
-//! Which contacts with the ground a step must consider.
+//! Detection of the contacts with the ground that a step must consider.
 
 use nalgebra::Vector3;
 
@@ -11,19 +11,19 @@ use crate::geometry::query::{SurfacePoint, box_sphere, disc_sphere, dispatch, sp
 use crate::geometry::{PlacedShape, Primitive, Sphere, Terrain};
 use crate::multibody::{Kinematics, Model};
 
-/// On a sphere: the nearest point of the pose.
+/// On a sphere: the nearest point.
 const NEAREST: usize = 0;
 
-/// On a sphere: the point over the tangent plane where it was first met, for a part that passes it
-/// in this step.
+/// On a sphere: the point over the tangent plane at first contact, for a part that passes the
+/// sphere within this step.
 pub(super) const PASSING: u16 = 1;
 
-/// Collects the contacts with the ground of a configuration with velocity `v` (nv) into `out`,
+/// Collects the ground contacts of a configuration with velocity `v` (nv) into `out`, which is
 /// cleared first.
 ///
-/// `kinematics`: the poses at the step's midpoint, where they are measured; `end`: at its predicted
-/// end, which tells the motion within the step. They are left where they were measured: see
-/// [`super::relocate`].
+/// `kinematics`: poses at the step's midpoint, where gaps are measured. `end`: poses at the
+/// predicted end of the step, which determine the motion within the step. The contacts keep the
+/// geometry of the midpoint; see [`super::relocate`].
 pub fn detect(
     model: &Model,
     kinematics: &Kinematics,
@@ -54,7 +54,7 @@ pub fn detect(
     }
 }
 
-/// Lets in the candidates that become contacts.
+/// Admits the candidates that become contacts.
 struct Gate<'a> {
     model: &'a Model,
     kinematics: &'a Kinematics,
@@ -65,7 +65,7 @@ struct Gate<'a> {
     out: &'a mut Vec<Contact>,
 }
 
-/// A part and where it is.
+/// A part and its placement.
 struct Placed {
     part: Part,
     body: usize,
@@ -102,10 +102,9 @@ impl Gate<'_> {
         }
     }
 
-    /// A contact with a sphere: the nearest point's, or, where `touch` finds a normal, the passing
-    /// one.
+    /// A contact with a sphere: at the nearest point, or the passing one if `touch` finds a normal.
     ///
-    /// `motion`: how far the part moves in half a step, at most.
+    /// `motion`: upper bound on the part's motion in half a step, m.
     #[inline]
     fn offer_sphere(
         &mut self,
@@ -128,7 +127,7 @@ impl Gate<'_> {
     }
 }
 
-/// Offers the contacts of one part with the ground.
+/// Offers the ground contacts of one part.
 #[inline]
 fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Gate<'_>) {
     let (model, kinematics) = (gate.model, gate.kinematics);
@@ -148,7 +147,7 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
     let (half_way, motion) = if gate.can_be_passed {
         let half_way = end.origin(body) - base + end_centre() - centre;
         let turning = match &placed.shape {
-            // A box is swept with its own turning, the others are as good as round.
+            // The sweep of a box includes its rotation; the other shapes are treated as round.
             PlacedShape::Box(_) => (end.R[body] - kinematics.R[body]).norm() * bound,
             PlacedShape::Disc(_) | PlacedShape::Sphere(_) => 0.0,
         };
@@ -179,8 +178,8 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
     );
 }
 
-/// Whether a sphere's centre, relative to a shape's, is further than `within` from the shape by a
-/// bound that costs little.
+/// Whether a sphere's centre, relative to a shape's centre, is further than `within` from the
+/// shape, by an inexpensive bound.
 #[inline]
 fn is_far(shape: &PlacedShape, between: &Vector3<f64>, within: f64) -> bool {
     match shape {
@@ -194,8 +193,8 @@ fn is_far(shape: &PlacedShape, between: &Vector3<f64>, within: f64) -> bool {
     }
 }
 
-/// Normal from a sphere of the ground to a part, where the part first met it in this step, if it
-/// passes it.
+/// Normal from a sphere of the ground to a part at their first contact in this step, if the part
+/// passes the sphere.
 fn touch(
     placed: &Placed,
     end: &Kinematics,
@@ -206,7 +205,7 @@ fn touch(
 ) -> Option<Vector3<f64>> {
     match &placed.shape {
         PlacedShape::Disc(disc) => {
-            // The disc's axes are taken as those of the midpoint all along.
+            // The disc keeps its midpoint axes throughout.
             let middle = ground.centre - base - disc.centre;
             let distance = |x: &Vector3<f64>| {
                 let ball = Sphere {
@@ -250,10 +249,10 @@ fn touch(
     }
 }
 
-/// Gap, nearest point (relative to the trunk origin) and frame of every wheel over a terrain: the
-/// nearest primitive's.
+/// Gap, nearest point (relative to the trunk origin) and frame of every wheel over a terrain, with
+/// respect to the nearest primitive.
 ///
-/// A wheel with no primitive within 10 km (which no plane allows) keeps a gap of +∞.
+/// A wheel with no primitive within 10 km (impossible over a plane) keeps a gap of +∞.
 #[must_use]
 pub fn wheel_contacts(
     model: &Model,
@@ -273,8 +272,8 @@ pub fn wheel_contacts(
             &SurfacePoint::of_normal(NEAREST, centre, &Vector3::y(), f64::INFINITY),
             0,
         );
-        // What is not visited is further from the centre than `reach`, thus from the wheel than
-        // reach − R.
+        // A primitive that is not visited is further from the centre than `reach`, hence further
+        // from the wheel than reach − R.
         let mut reach = 2.0 * radius;
         while reach < FAR && best.gap + radius > reach {
             let base = kinematics.origin(placed.body);
@@ -298,5 +297,5 @@ pub fn wheel_contacts(
     (0..model.wheels().len()).map(nearest).collect()
 }
 
-/// How far a wheel looks for the nearest ground, m.
+/// Search distance of a wheel for the nearest ground, m.
 const FAR: f64 = 1e4;

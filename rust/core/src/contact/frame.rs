@@ -6,23 +6,23 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::PlacedShape;
 use crate::geometry::query::{PairPoint, SurfacePoint};
 
-/// Right-handed orthonormal frame in world axes; `b = t × n`, so `(t, n, b)` stands like (x, y, z).
+/// Right-handed orthonormal frame in world axes; `b = t × n`, so `(t, n, b)` corresponds to (x, y,
+/// z).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ContactFrame {
     /// From the ground, or from the other body, to the contact's own part.
     pub n: Vector3<f64>,
-    /// Rolling direction: forward where the axle points to the right.
+    /// Rolling direction: forward if the axle points to the right.
     pub t: Vector3<f64>,
     /// `t × n`.
     pub b: Vector3<f64>,
 }
 
-/// Sine of the angle between axle and normal below which the rolling direction is not defined by
-/// them.
+/// Sine of the angle between axle and normal below which they do not define the rolling direction.
 const PARALLEL: f64 = 1e-9;
 
 impl ContactFrame {
-    /// Frame of a wheel with unit axle `s`; where s is parallel to n, the wheel's `spoke` gives t.
+    /// Frame of a wheel with unit axle `s`. If s is parallel to n, the wheel's `spoke` defines t.
     #[inline]
     #[must_use]
     pub fn of_wheel(n: &Vector3<f64>, s: &Vector3<f64>, spoke: &Vector3<f64>) -> Self {
@@ -40,7 +40,8 @@ impl ContactFrame {
         }
     }
 
-    /// Frame where no direction is preferred: t is along the world's x, or its z where n is.
+    /// Frame without a preferred direction: t lies along the world's x axis, or along z if n lies
+    /// along x.
     #[must_use]
     pub fn of_normal(n: &Vector3<f64>) -> Self {
         let e = if n.x.abs() < 0.9 {
@@ -56,7 +57,7 @@ impl ContactFrame {
         }
     }
 
-    /// Frame of a shape at a point of the ground: a disc has a rolling direction.
+    /// Frame of a shape at a point of the ground; a disc has a rolling direction.
     #[inline]
     #[must_use]
     pub fn on_ground(shape: &PlacedShape, point: &SurfacePoint) -> Self {
@@ -66,13 +67,13 @@ impl ContactFrame {
         }
     }
 
-    /// Frame of a shape, the second of its pair, at another one.
+    /// Frame of a shape, the second of its pair, in contact with another.
     #[must_use]
     pub fn of_pair(shape: &PlacedShape, point: &PairPoint) -> Self {
         let PlacedShape::Disc(disc) = shape else {
             return Self::of_normal(&point.n);
         };
-        // Struck on its face a disc rolls along its rim.
+        // A disc in contact on its face rolls along its rim.
         let along_rim = disc.axle.cross(&(point.point - disc.centre));
         let along_rim = along_rim.try_normalize(PARALLEL).unwrap_or(disc.spoke);
         Self::of_wheel(&point.n, &disc.axle, &along_rim)

@@ -1,8 +1,8 @@
-//! Contact Jacobian H: how a velocity moves a contact's two sides past each other, `u = Hᵀ v`.
+//! Contact Jacobian H: relative velocity of a contact's two sides, `u = Hᵀ v`.
 //!
-//! On the ground a row is nonzero along the path of the contact's body. Between two bodies it is
-//! the difference of two such rows, each at the contact's one place, so that what moves both alike,
-//! a common ancestor's joint or a free base, moves neither past the other: exactly zero.
+//! For a ground contact a row is nonzero along the path of the contact's body. Between two bodies
+//! it is the difference of two such rows at the common contact point. A velocity that moves both
+//! bodies alike, of a common ancestor's joint or a free base, therefore contributes exactly zero.
 
 use nalgebra::Vector3;
 
@@ -10,17 +10,16 @@ use super::limit;
 use super::pair::Contact;
 use crate::multibody::{BASE, Kinematics, Model};
 
-/// One velocity's entries of a contact's three rows n, t, b, padded so that two pairs of lanes
-/// carry them.
+/// Entries of a contact's three rows n, t, b for one velocity, padded to two pairs of SIMD lanes.
 pub(super) type Columns = [f64; 4];
 
-/// The contact's place relative to the origin of another body's tree, m.
+/// The contact point relative to the origin of another body's tree, m.
 #[inline]
 fn place_in_tree_of(kinematics: &Kinematics, contact: &Contact, body: usize) -> Vector3<f64> {
     contact.point + (kinematics.origin(contact.body) - kinematics.origin(body))
 }
 
-/// Velocity (m/s, world) of the contact's part past its other side, at the contact's place.
+/// Velocity (m/s, world) of the contact's part relative to its other side, at the contact point.
 #[inline]
 #[must_use]
 pub fn relative_velocity(
@@ -37,8 +36,8 @@ pub fn relative_velocity(
     velocity - kinematics.point_velocity(model, other.body, &x, v)
 }
 
-/// Rows of Hᵀ along the path of the contact's own body: what each velocity moves the body's point
-/// along n, t, b.
+/// Rows of Hᵀ along the path of the contact's own body: velocity of the body's point along n, t, b
+/// per unit of each joint velocity.
 #[inline]
 pub(super) fn columns(
     model: &Model,
@@ -56,7 +55,7 @@ pub(super) fn columns(
     );
 }
 
-/// The same along the path of the other body, not yet subtracted.
+/// The same along the path of the other body, before subtraction.
 pub(super) fn columns_of_other(
     model: &Model,
     kinematics: &Kinematics,
@@ -119,7 +118,7 @@ pub fn generalized_impulse(
         let [n, t, b] = contact.frame.rows();
         let force = n * p[0] + t * p[1] + b * p[2];
         push(model, kinematics, contact.body, &contact.point, &force, out);
-        // The other side, where it is a body, is pushed at the same place the other way.
+        // The other body receives the opposite impulse at the same point.
         if let Some(other) = contact.other {
             let x = place_in_tree_of(kinematics, contact, other.body);
             push_other(model, kinematics, other.body, &x, &-force, out);
@@ -127,7 +126,7 @@ pub fn generalized_impulse(
     }
 }
 
-/// Adds the generalized impulse of an impulse on a body at a place.
+/// Adds the generalized impulse of an impulse applied to a body at a point.
 #[allow(clippy::inline_always)] // as columns_at
 #[inline(always)]
 fn push(
@@ -158,7 +157,7 @@ fn push(
     }
 }
 
-/// The same, apart from the loop over contacts with the ground.
+/// The same, kept out of the loop over ground contacts.
 #[cold]
 fn push_other(
     model: &Model,

@@ -1,11 +1,10 @@
 //! A joint against its stop: `gap = q − lower` or `upper − q`, rad or m.
 //!
-//! A stop is an item of the contact list, so that forecast, impact law, projection and warm start
-//! are those of every contact, and one solve answers for stops and contacts together. Its normal
-//! row of H is ±1 at the joint's velocity. The normal velocity is in rad/s and the impulse in N m s
-//! at a revolute joint. Its tangential rows are zero and μ = 0; in W its tangential diagonal is
-//! that of its normal, coupled to nothing, so that its tangential impulse is zero and W stays
-//! regular.
+//! A stop is an entry of the contact list. Forecast, impact law, projection and warm start are
+//! those of every contact, and stops and contacts are solved together. Its normal row of H is ±1 at
+//! the joint's velocity. At a revolute joint the normal velocity is in rad/s and the impulse in N m
+//! s. Its tangential rows are zero and μ = 0. The tangential diagonal of W is set to that of the
+//! normal, without coupling, so the tangential impulse is zero and W stays regular.
 
 use super::activation::Activation;
 use super::frame::ContactFrame;
@@ -14,7 +13,7 @@ use super::part::{Part, Side};
 use crate::multibody::{Kinematics, Model};
 
 impl Side {
-    /// Rate of the gap per unit of the joint's velocity.
+    /// Gap rate per unit of the joint's velocity.
     #[inline]
     #[must_use]
     pub fn sign(self) -> f64 {
@@ -40,7 +39,7 @@ impl ContactKey {
     }
 }
 
-/// Velocity of the joint and the gap's rate per unit of it, where the contact is a stop.
+/// Index of the joint's velocity and the gap rate per unit of it, if the contact is a stop.
 #[inline]
 pub(super) fn row(model: &Model, contact: &Contact) -> Option<(usize, f64)> {
     match contact.part {
@@ -49,10 +48,10 @@ pub(super) fn row(model: &Model, contact: &Contact) -> Option<(usize, f64)> {
     }
 }
 
-/// Adds the stops that a step must consider to `out`.
+/// Adds to `out` the stops that a step must consider.
 ///
-/// `joints`: coordinates of all joints (n_joints) where the poses of `kinematics` are, rad or m;
-/// `v`: velocity (nv).
+/// `joints`: coordinates of all joints (n_joints) at the poses of `kinematics`, rad or m; `v`:
+/// velocity (nv).
 pub fn detect_limits(
     model: &Model,
     kinematics: &Kinematics,
@@ -80,7 +79,7 @@ pub fn relocate_limit(model: &Model, kinematics: &Kinematics, joints: &[f64], st
     }
 }
 
-/// Distance to a stop, rad or m; none is near where the joint has none.
+/// Distance to a stop, rad or m; +∞ for a joint without stops.
 fn gap(model: &Model, joints: &[f64], joint: usize, side: Side) -> f64 {
     let q = joints[joint];
     match (model.joints()[joint].limits, side) {
@@ -90,8 +89,8 @@ fn gap(model: &Model, joints: &[f64], joint: usize, side: Side) -> f64 {
     }
 }
 
-/// A stop as a contact: it lies at the origin of what the joint carries, its normal along the axis
-/// that opens the gap.
+/// A stop as a contact: its point is the origin of the body that the joint carries, its normal the
+/// direction of the axis that opens the gap.
 fn contact(model: &Model, kinematics: &Kinematics, joint: usize, side: Side, gap: f64) -> Contact {
     let body = model.joints()[joint].body;
     let axis = kinematics.motions[model.bodies()[body].motion].axis();

@@ -1,12 +1,12 @@
-//! From bodies near the ground, or near each other, to unilateral contacts: points, frames, gaps
-//! and their Jacobians.
+//! Unilateral contacts of bodies near the ground or near each other: points, frames, gaps and their
+//! Jacobians.
 //!
-//! A contact ([`pair`]) lies between a part of a body and either the ground or a part of another
-//! body. [`detection`] finds those with the ground, [`pair_detection`] those between bodies, and
-//! [`limit`] the joints at their stops: the broad phase says what is near,
-//! [`crate::geometry::query`] measures, and [`activation`] decides which take part in the step.
-//! [`relocation`] measures them again in another configuration. [`jacobian`] and [`delassus`] put
-//! them into matrices.
+//! A contact ([`pair`]) connects a part of a body to the ground or to a part of another body.
+//! [`detection`] finds contacts with the ground, [`pair_detection`] contacts between bodies, and
+//! [`limit`] joints at their stops. The broad phase selects candidates, [`crate::geometry::query`]
+//! computes gaps and normals, and [`activation`] decides which contacts enter the step.
+//! [`relocation`] re-evaluates them in another configuration. [`jacobian`] and [`delassus`]
+//! assemble the matrices.
 
 pub mod activation;
 pub mod delassus;

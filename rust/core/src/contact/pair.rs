@@ -1,10 +1,10 @@
-//! One unilateral contact: a part of a body against the ground, or against a part of another body,
-//! or a joint against its stop.
+//! A unilateral contact: a part of a body against the ground or against a part of another body, or
+//! a joint against its stop.
 //!
 //! The normal points *to* the contact's own part: from the ground to the machine, or from the other
-//! body. Between two bodies the contact's point is halfway between the surfaces, one and the same
-//! place for both, so that its impulse changes neither the linear nor the angular momentum of the
-//! two together; as the surfaces' points lie along the normal the gap's rate is that of the two
+//! body. Between two bodies the contact point lies halfway between the surfaces and is the same for
+//! both, so the impulse conserves their total linear and angular momentum. The surface points lie
+//! along the normal, so the gap rate equals the normal relative velocity at the common point.
 //! places all the same.
 
 use nalgebra::Vector3;
@@ -13,25 +13,25 @@ use serde::{Deserialize, Serialize};
 use super::frame::ContactFrame;
 use super::part::Part;
 
-/// What a contact's part is up against, by number.
+/// The other side of a contact, by index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Opposite {
     /// A primitive of the ground.
     Ground(u32),
     /// A part of another body, by its [`Part::code`].
     Part(u16),
-    /// Nothing that has a shape: a joint's stop ([`super::limit`]).
+    /// None: a joint's stop ([`super::limit`]) has no shape.
     Stop,
 }
 
-/// Names a contact from one step to the next: both sides, and which point of the pair.
+/// Identifies a contact from one step to the next: both sides, and the point of the pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct ContactKey {
     /// [`Part::code`] of the part.
     pub part: u16,
-    /// On the ground a rim point or a corner; on a sphere of the ground 0, or 1 where it is met and
-    /// passed in one step. Between bodies the feature of [`crate::geometry::query::PairPoint`]. Of
-    /// a joint's stops 0 is the lower one, 1 the upper one.
+    /// On the ground, the rim point or corner; on a sphere of the ground, 0 for the nearest point
+    /// and 1 for a part that passes the sphere within one step. Between bodies, the feature of
+    /// [`crate::geometry::query::PairPoint`]. For a joint, 0 is the lower stop and 1 the upper.
     pub feature: u16,
     /// The other side.
     pub opposite: Opposite,
@@ -75,28 +75,28 @@ fn narrow(feature: usize) -> u16 {
 /// The other body of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OtherSide {
-    /// What of it touches.
+    /// Its part in contact.
     pub part: Part,
     /// Body that carries it.
     pub body: usize,
 }
 
-/// A point where a body can touch the ground or another body, or a joint's stop.
+/// A possible contact point of a body with the ground or another body, or a joint's stop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
-    /// Its name from step to step.
+    /// Its identity from step to step.
     pub key: ContactKey,
-    /// What touches.
+    /// The part in contact.
     pub part: Part,
     /// Body that carries the part.
     pub body: usize,
-    /// The other body; none where it is the ground or a joint's stop.
+    /// The other body; `None` for the ground or a joint's stop.
     pub other: Option<OtherSide>,
-    /// Where, relative to the origin of the body's tree, world axes, m: on the ground the body's
-    /// own point, between bodies halfway.
+    /// Contact point relative to the origin of the body's tree, world axes, m: on the ground the
+    /// body's own point, between bodies the midpoint.
     pub point: Vector3<f64>,
-    /// Frame of the contact, its normal towards the part.
+    /// Contact frame; its normal points to the part.
     pub frame: ContactFrame,
-    /// Signed distance, m, positive when apart.
+    /// Signed distance, m, positive when separated.
     pub gap: f64,
 }

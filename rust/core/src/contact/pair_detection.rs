@@ -1,9 +1,9 @@
-//! Which contacts between bodies a step must consider.
+//! Detection of the contacts between bodies that a step must consider.
 //!
-//! Two parts can touch where they belong to different trees, or, in a model that says so
+//! Two parts can touch if they belong to different trees or, in a model with self-contact
 //! ([`crate::multibody::ModelDescription::self_contact`]), to bodies of one tree that no joint
-//! connects. What passes another body within one step is not seen: between bodies there is no
-//! sweep.
+//! connects. There is no sweep between bodies, so a part that passes another body within one step
+//! is not detected.
 
 use super::activation::Activation;
 use super::frame::ContactFrame;
@@ -16,17 +16,17 @@ use crate::geometry::broad_phase::IntervalSweep;
 use crate::geometry::query::dispatch;
 use crate::multibody::{Kinematics, Model};
 
-/// Scratch of a search, sized once for a model.
+/// Scratch of the search, allocated once for a model.
 #[derive(Clone, Debug, Default)]
 pub struct PairSearch {
-    /// Empty where no two parts of the model can touch.
+    /// Empty if no two parts of the model can touch.
     parts: Vec<Part>,
     balls: Vec<Sphere>,
     sweep: IntervalSweep,
 }
 
 impl PairSearch {
-    /// Room for a model.
+    /// Scratch for a model.
     #[must_use]
     pub fn new(model: &Model) -> Self {
         let parts: Vec<Part> = Part::all(model).collect();
@@ -42,7 +42,7 @@ impl PairSearch {
     }
 }
 
-/// Whether two parts are ever looked at together.
+/// Whether two parts are a candidate pair.
 fn can_touch(model: &Model, a: Part, b: Part) -> bool {
     model.can_touch(a.body(model), b.body(model))
 }
@@ -80,7 +80,7 @@ pub fn detect_pairs(
     }));
     let is_wanted = |i: usize, j: usize| can_touch(model, parts[i], parts[j]);
     for &(i, j) in sweep.pairs(balls, reach, is_wanted) {
-        // Wheels come first: where one takes part the contact is the wheel's.
+        // Wheels come first, so a contact that involves a wheel belongs to the wheel.
         let (part, other) = (parts[i as usize], parts[j as usize]);
         let other = OtherSide {
             part: other,

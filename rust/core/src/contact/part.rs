@@ -1,4 +1,4 @@
-//! The parts of a model that can touch, and where they are.
+//! The collision parts of a model and their placement.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::{Disc, OrientedBox, PlacedShape, Sphere};
 use crate::multibody::{Kinematics, Model, Wheel};
 
-/// What of the machine touches.
+/// A part of the machine that can be in contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Part {
     /// A wheel, by its index.
@@ -15,12 +15,12 @@ pub enum Part {
     Box(usize),
     /// A ball, by its index in the model.
     Sphere(usize),
-    /// A joint that meets its stop, by its index: it has no shape but a point, the origin of what
-    /// the joint carries.
+    /// A joint at its stop, by its index. It has no shape, only a point: the origin of the body
+    /// that the joint carries.
     Limit(usize, Side),
 }
 
-/// One of a joint's two stops.
+/// The two stops of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Side {
     /// `q ≥ lower`.
@@ -29,14 +29,14 @@ pub enum Side {
     Upper,
 }
 
-/// From here on a code is a ball's, a box's, or a joint's.
+/// First codes of balls, boxes and joints.
 const SPHERES: u16 = 0x4000;
 const BOXES: u16 = 0x8000;
 const LIMITS: u16 = 0xC000;
 
 impl Part {
-    /// A number of 16 bits for a part: wheels count from 0, balls from 2^14, boxes from 2^15,
-    /// joints from 3 · 2^14.
+    /// A 16-bit code of the part: wheels start at 0, balls at 2^14, boxes at 2^15, joints at 3 ·
+    /// 2^14.
     ///
     /// # Panics
     /// If a model has more than 2^14 wheels, balls, boxes or joints.
@@ -63,7 +63,7 @@ impl Part {
         wheels.chain(boxes).chain(spheres)
     }
 
-    /// Whether a model has it.
+    /// Whether the model contains it.
     #[must_use]
     pub fn is_of(self, model: &Model) -> bool {
         match self {
@@ -98,7 +98,7 @@ impl Part {
         }
     }
 
-    /// Radius of a ball about the centre that holds all of it, m.
+    /// Radius of a bounding ball about the centre, m.
     #[must_use]
     pub fn bound(self, model: &Model) -> f64 {
         match self {
@@ -120,7 +120,7 @@ impl Part {
         }
     }
 
-    /// The same, kept apart from the wheels: what is short is inlined where wheels are looked at.
+    /// The same for balls and boxes, kept separate so that the short code for wheels is inlined.
     fn place_solid(self, model: &Model, kinematics: &Kinematics) -> PlacedShape {
         match self {
             Self::Wheel(i) => PlacedShape::Disc(place_wheel(&model.wheels()[i], kinematics)),

@@ -1,4 +1,4 @@
-//! A contact in another configuration: the same feature of the same pair, measured there.
+//! Re-evaluates a contact in another configuration: the same feature of the same pair.
 
 use nalgebra::Vector3;
 
@@ -10,8 +10,8 @@ use crate::geometry::query::dispatch;
 use crate::geometry::{PlacedShape, Primitive, Sphere, Terrain};
 use crate::multibody::{Kinematics, Model};
 
-/// Point, frame and gap of a contact at the poses of `kinematics`; a joint's stop is
-/// [`super::relocate_limit`]'s.
+/// Updates point, frame and gap of a contact to the poses of `kinematics`. For a joint's stop use
+/// [`super::relocate_limit`].
 pub fn relocate(
     model: &Model,
     kinematics: &Kinematics,

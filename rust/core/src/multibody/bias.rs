@@ -1,5 +1,4 @@
-//! Bias `N(q, v) v + G(q)` by recursive Newton–Euler: what must be pushed to keep all accelerations
-//! zero.
+//! Bias `N(q, v) v + G(q)` by recursive Newton–Euler: the generalized force at zero acceleration.
 //!
 //! Source: Luh, Walker and Paul 1980; here in world axes about each tree's origin of places.
 
@@ -9,20 +8,20 @@ use super::joint::Joint;
 use super::kinematics::{JointRate, Kinematics, joint_rate};
 use super::model::{Body, Model};
 
-/// Scratch of [`bias`]: sized once for a model.
+/// Scratch of [`bias`], allocated once for a model.
 #[derive(Clone, Debug)]
 pub struct BiasScratch {
     bodies: Vec<Moved>,
 }
 
-/// A body whose joints do not accelerate.
+/// A body at zero joint accelerations.
 #[derive(Clone, Copy, Debug, Default)]
 struct Moved {
     omega: Vector3<f64>,
     alpha: Vector3<f64>,
     /// Acceleration of its frame's origin, m/s².
     origin: Vector3<f64>,
-    /// What it and all that it carries need, N and N m about the tree's origin.
+    /// Force (N) and moment about the tree's origin (N m) on it and everything it carries.
     force: Vector3<f64>,
     moment: Vector3<f64>,
 }
@@ -38,7 +37,7 @@ impl BiasScratch {
 }
 
 impl Moved {
-    /// Acceleration of what is fixed to it, `d` from its frame's origin.
+    /// Acceleration of a point fixed to it at `d` from its frame's origin.
     #[inline]
     fn accelerates(&self, d: &Vector3<f64>) -> Vector3<f64> {
         self.origin + self.alpha.cross(d) + self.omega.cross(&self.omega.cross(d))
@@ -85,7 +84,7 @@ pub fn bias(
     }
 }
 
-/// The same; where `TURNS` every root must be free and every other joint a turn.
+/// The same. With `TURNS` every root must be free and every other joint a rotation.
 fn bias_if<const TURNS: bool>(
     model: &Model,
     kinematics: &Kinematics,
@@ -152,7 +151,7 @@ fn bias_if<const TURNS: bool>(
             out[k + 3..k + 6].copy_from_slice(moment.as_slice());
             continue;
         }
-        // A joint that follows another adds to that one's.
+        // A coupled joint adds to the joint that it follows.
         if TURNS || body.n_motions == 1 {
             out[k] += kinematics.motions[body.motion].power_if::<TURNS>(&force, &moment);
         } else {

@@ -1,8 +1,8 @@
-//! The numbers that users and references see, and the state behind them: for the rover 21.
+//! The coordinates that users and references see, and the state behind them; 21 for the rover.
 //!
-//! One number a velocity, in the order of the velocities (nv): of a free body its position, then
-//! three angles; of a revolute or prismatic joint its coordinate; of a spherical joint three angles
-//! of the body relative to the joint's frame.
+//! One number per velocity, in the order of the velocities (nv). A free body has its position and
+//! three angles, a revolute or prismatic joint its coordinate, a spherical joint three angles of
+//! the body relative to the joint's frame.
 //!
 //! Public `q`: the angles are roll, heading, pitch with `R = Ry(heading) Rz(pitch) Rx(roll)`.
 //! Report `q`: Cardan angles about x, y, z with `R = Rz(q5) Ry(q4) Rx(q3)` (the numbers are a
@@ -35,7 +35,7 @@ fn check(field: &'static str, values: &[f64], expected: usize) -> Result<(), Sta
     }
 }
 
-/// The configuration of coordinates (nv) whose angles `turn` turns into a rotation.
+/// The configuration at coordinates (nv), where `turn` maps three angles to a rotation.
 fn from_angles(
     model: &Model,
     q: &[f64],
@@ -65,7 +65,7 @@ fn from_angles(
     Ok(configuration)
 }
 
-/// Coordinates (nv) of a configuration, whose rotations `angles` turns into three angles.
+/// Coordinates (nv) of a configuration, where `angles` maps a rotation to three angles.
 fn to_angles(
     model: &Model,
     configuration: &Configuration,
@@ -126,7 +126,7 @@ pub fn from_report(model: &Model, q: &[f64]) -> Result<Configuration, StateError
     })
 }
 
-/// Where angles stand among the coordinates, and what they are there.
+/// Positions of the angles among the coordinates, and their values.
 #[derive(Clone, Debug)]
 pub struct ReportAngles {
     blocks: Vec<(usize, CardanReport)>,
@@ -144,7 +144,7 @@ pub fn report_angles(model: &Model, q: &[f64]) -> ReportAngles {
     }
 }
 
-/// First velocities of the angular velocities.
+/// First velocity index of each angular velocity.
 fn angular_blocks(model: &Model) -> impl Iterator<Item = usize> + '_ {
     (model.rotating_joints().iter()).map(|(joint, k)| match joint {
         Joint::Free(_) => k + 3,

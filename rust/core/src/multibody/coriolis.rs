@@ -1,5 +1,5 @@
-//! Coriolis matrix `C(q, v)` with `C v = N(q, v) v` and `C + Cᵀ = Ṁ`: what a step needs to take
-//! gyroscopic terms implicitly.
+//! Coriolis matrix `C(q, v)` with `C v = N(q, v) v` and `C + Cᵀ = Ṁ`, used for implicit gyroscopic
+//! terms.
 //!
 //! With the inertia I of a body, its spatial velocity V, and `B = ½ (V×* I + (I V)×̄* − I V×)`,
 //!
@@ -21,7 +21,7 @@
 //! K = ½ (ω× J + (ω× J)ᵀ − m (c vᵀ + v cᵀ)) + m (c·v) 1
 //! ```
 //!
-//! so that a body and all that it carries have sums of a few 3-vectors and symmetric matrices.
+//! so that the sums over a composite body consist of a few 3-vectors and symmetric matrices.
 //!
 //! Source: Echeandia and Wensing 2021, *Numerical methods to compute the Coriolis matrix and
 //! Christoffel symbols for rigid-body systems*, J. Comput. Nonlinear Dynam. 16, 091004.
@@ -35,7 +35,7 @@ use super::kinematics::Kinematics;
 use super::model::{Body, Model};
 use crate::spatial::SymmetricMatrix3;
 
-/// Scratch of [`coriolis_matrix`]: sized once for a model.
+/// Scratch of [`coriolis_matrix`], allocated once for a model.
 #[derive(Clone, Debug, Default)]
 pub struct CoriolisScratch {
     velocity: Vec<Spatial>,
@@ -45,7 +45,7 @@ pub struct CoriolisScratch {
     own: Vec<Range<usize>>,
 }
 
-/// What a unit of a velocity gives to a body by its own joint, and the rate of that.
+/// The screw of a velocity at a body's own joint, and its rate.
 #[derive(Clone, Copy, Debug)]
 struct Screw {
     velocity: usize,
@@ -53,15 +53,15 @@ struct Screw {
     S_dot: Spatial,
 }
 
-/// A motion vector (velocity of the point at the tree's origin) or a force vector (moment about
-/// it).
+/// A motion vector (linear part: velocity of the point at the tree's origin) or a force vector
+/// (moment about the origin).
 #[derive(Clone, Copy, Debug, Default)]
 struct Spatial {
     angular: Vector3<f64>,
     linear: Vector3<f64>,
 }
 
-/// I and B of a body and all that it carries.
+/// I and B of a composite body: a body and everything it carries.
 #[derive(Clone, Copy, Debug, Default)]
 struct Composite {
     mass: f64,
@@ -142,7 +142,7 @@ pub fn coriolis_matrix(
 }
 
 impl CoriolisScratch {
-    /// The six screws of a free body, whose velocity is returned.
+    /// Adds the six screws of a free body and returns its velocity.
     fn add_free(&mut self, first: usize, v: &[f64]) -> Spatial {
         let v = &v[first..];
         let base = Spatial {
@@ -162,7 +162,7 @@ impl CoriolisScratch {
         }
         for k in 0..3 {
             let e = Vector3::ith(k, 1.0);
-            // It turns about its own origin, which moves.
+            // The body rotates about its own origin, which moves.
             self.screws.push(Screw {
                 velocity: first + 3 + k,
                 S: Spatial {
@@ -185,7 +185,7 @@ impl Spatial {
         self.angular.dot(&other.angular) + self.linear.dot(&other.linear)
     }
 
-    /// `V× S`: the rate of a motion vector S that moves with the velocity V.
+    /// `V× S`: the rate of a motion vector S carried along at the velocity V.
     #[inline]
     fn moves(&self, S: &Self) -> Self {
         Self {
@@ -220,7 +220,7 @@ impl Mul<f64> for Spatial {
 }
 
 impl Composite {
-    /// Of one body alone, which moves with V.
+    /// I and B of a single body with velocity V.
     #[inline]
     fn of(body: &Body, kinematics: &Kinematics, b: usize, V: &Spatial) -> Self {
         let (c, m) = (&kinematics.c[b], body.mass);

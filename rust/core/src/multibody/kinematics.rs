@@ -1,7 +1,7 @@
 //! Forward kinematics: attitude, origin, joint axis and mass centre of every body.
 //!
-//! World axes. The places of a tree are relative to its origin: that of its root where the root is
-//! free, else the world's.
+//! World axes. Positions in a tree are relative to the tree's origin: that of its root if the root
+//! is free, otherwise the world's.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,24 +9,24 @@ use super::joint::{Coordinate, Coupling, Joint, Motion, Prismatic, Revolute, Sph
 use super::model::{Body, Model};
 use super::state::Configuration;
 
-/// Poses of all bodies in one configuration. Scratch: sized once for a model, then reused.
+/// Poses of all bodies in one configuration. Scratch: allocated once for a model, then reused.
 #[derive(Clone, Debug)]
 pub struct Kinematics {
-    /// World position of every tree's origin of places, m.
+    /// World position of every tree's reference origin, m.
     origins: Vec<Vector3<f64>>,
     tree_of: Vec<usize>,
     /// `R_WB` of each body.
     pub R: Vec<Matrix3<f64>>,
     /// Origin of each body's frame relative to its tree's origin, world axes, m.
     pub r: Vec<Vector3<f64>>,
-    /// What each joint velocity does, by the numbers of [`Model::motions`].
+    /// Screw of each joint velocity, indexed like [`Model::motions`].
     pub motions: Vec<Motion>,
     /// Mass centre of each body relative to its tree's origin, world axes, m.
     pub c: Vec<Vector3<f64>>,
 }
 
 impl Kinematics {
-    /// Room for a model.
+    /// Scratch for a model.
     #[must_use]
     pub fn new(model: &Model) -> Self {
         let n = model.bodies().len();
@@ -40,7 +40,7 @@ impl Kinematics {
         }
     }
 
-    /// Poses of one configuration, in a room of its own.
+    /// Poses of one configuration, newly allocated.
     #[must_use]
     pub fn of(model: &Model, configuration: &Configuration) -> Self {
         let mut kinematics = Self::new(model);
@@ -57,8 +57,8 @@ impl Kinematics {
         }
     }
 
-    /// Recomputes all that a step needs: spinners ([`super::Body::is_spinner`]) are left unturned
-    /// about their own axis.
+    /// Recomputes the poses that a step needs. Spinners ([`super::Body::is_spinner`]) are not
+    /// rotated about their own axis.
     pub fn update_for_step(&mut self, model: &Model, configuration: &Configuration) {
         if model.only_turns() {
             self.update_poses::<false, true>(model, configuration);
@@ -67,8 +67,8 @@ impl Kinematics {
         }
     }
 
-    /// Where `SPIN` spinners are turned, too; where `TURNS` every root must be free and every other
-    /// joint revolute and on its own.
+    /// With `SPIN` spinners are rotated, too. With `TURNS` every root must be free and every other
+    /// joint revolute and uncoupled.
     fn update_poses<const SPIN: bool, const TURNS: bool>(
         &mut self,
         model: &Model,
@@ -143,23 +143,23 @@ impl Kinematics {
         }
     }
 
-    /// World position of the point to which all places of body `b` are relative, m: the origin of
-    /// its tree's free root, else the world's.
+    /// World position of the reference origin of body `b`'s tree, m: the origin of a free root,
+    /// otherwise the world's.
     #[inline]
     #[must_use]
     pub fn origin(&self, b: usize) -> &Vector3<f64> {
         &self.origins[self.tree_of[b]]
     }
 
-    /// A point of body `b` given in its frame, relative to its tree's origin, world axes.
+    /// A point given in the frame of body `b`, relative to its tree's origin, world axes.
     #[inline]
     #[must_use]
     pub fn point(&self, b: usize, p: &Vector3<f64>) -> Vector3<f64> {
         self.r[b] + self.R[b] * p
     }
 
-    /// Velocity (m/s, world) of the material point of body `b` that is at `x` (relative to its
-    /// tree's origin).
+    /// Velocity (m/s, world) of the material point of body `b` at `x` (relative to its tree's
+    /// origin).
     #[must_use]
     pub fn point_velocity(
         &self,
@@ -206,8 +206,8 @@ impl Kinematics {
     }
 }
 
-/// Enters the motion of a joint's rate, and what the velocity gives in all to the bodies of a
-/// coupled joint.
+/// Stores the motion of a joint velocity and, for a coupled joint, the combined motion of the
+/// bodies that it carries.
 #[inline]
 fn set_motion(motions: &mut [Motion], m: usize, coordinate: &Coordinate, of_rate: Motion) {
     motions[m] = of_rate;
@@ -233,7 +233,7 @@ pub(super) struct JointRate {
     pub slide: Vector3<f64>,
 }
 
-/// What a joint that is not free does at the velocity `v` (nv).
+/// Relative velocity across a joint that is not free, at the velocity `v` (nv).
 #[cold]
 pub(super) fn joint_rate(body: &Body, kinematics: &Kinematics, v: &[f64]) -> JointRate {
     let none = Vector3::zeros();

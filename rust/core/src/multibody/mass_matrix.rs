@@ -1,10 +1,10 @@
-//! Mass matrix by composite rigid bodies, and its factor `M = Lᵀ D L`.
+//! Mass matrix by the composite rigid body algorithm, and its factor `M = Lᵀ D L`.
 //!
 //! Rows are stored **along paths**: row `k` holds `M[k][i]` for the ancestors `i` of `k`, base
-//! first, itself last. An ancestor's row is then a prefix of its descendants' rows, so the
-//! factorisation and the solves are dense loops over short contiguous pieces and never touch a
-//! structural zero. In a tree on a free base every path begins with the six velocities of the base:
-//! loops over them are kept apart, as their length is known.
+//! first and `k` itself last. An ancestor's row is then a prefix of its descendants' rows, so the
+//! factorisation and the solves are dense loops over short contiguous segments and skip all
+//! structural zeros. In a tree on a free base every path begins with the six velocities of the
+//! base; loops over these are separate because their length is known.
 //!
 //! Source: Featherstone 2008, *Rigid Body Dynamics Algorithms*, ch. 6 (composite bodies), ch. 8
 //! (branch-induced sparsity).
@@ -27,7 +27,8 @@ pub struct MassMatrix {
     composites: Vec<Composite>,
 }
 
-/// A body and all that it carries: mass, first moment and inertia about its tree's origin.
+/// A composite body: mass, first moment and inertia of a body and everything it carries, about its
+/// tree's origin.
 #[derive(Clone, Copy, Debug, Default)]
 struct Composite {
     mass: f64,
@@ -36,7 +37,7 @@ struct Composite {
 }
 
 impl Composite {
-    /// Linear momentum, and angular momentum about the tree's origin, where it moves with a motion.
+    /// Linear momentum, and angular momentum about the tree's origin, at unit rate of a motion.
     #[inline]
     fn momentum<const TURN: bool>(&self, motion: &Motion) -> (Vector3<f64>, Vector3<f64>) {
         let (a, v) = motion.twist_if::<TURN>();
@@ -89,8 +90,8 @@ impl MassMatrix {
         }
     }
 
-    /// Rows of a tree of which `LEAD` velocities are a free root's and, where `TURNS`, all others
-    /// those of turns; of the coupled joints nothing but what they carry.
+    /// Rows of a tree in which `LEAD` velocities belong to a free root and, with `TURNS`, all
+    /// others to rotations. Coupled joints contribute only the composite inertia that they carry.
     fn update_tree<const LEAD: usize, const TURNS: bool>(
         &mut self,
         model: &Model,
@@ -99,7 +100,7 @@ impl MassMatrix {
     ) {
         let bodies = model.bodies();
         let Range { start, end } = tree.bodies;
-        // The root of a tree of turns has neither rows of this kind nor a carrier.
+        // With `TURNS` the root has neither rows of this kind nor a carrier.
         for b in (start + usize::from(TURNS)..end).rev() {
             let body = &bodies[b];
             let composite = self.composites[b];
@@ -145,7 +146,7 @@ impl MassMatrix {
         }
     }
 
-    /// Adds what the motion of a coupled joint has in common with all that moves its carrier, and
+    /// Adds the products of a coupled joint's motion with all motions that move its carrier, and
     /// with itself.
     fn add_coupled(&mut self, model: &Model, kinematics: &Kinematics, b: usize) {
         let body = &model.bodies()[b];
@@ -179,7 +180,7 @@ impl MassMatrix {
         self.rows[k * self.stride + last(model, k)]
     }
 
-    /// Adds to the diagonal entry of velocity `k`: the implicit terms of a held joint.
+    /// Adds the implicit terms of a held joint to the diagonal entry of velocity `k`.
     #[inline]
     pub fn add_to_diagonal(&mut self, model: &Model, k: usize, value: f64) {
         self.rows[k * self.stride + last(model, k)] += value;
@@ -220,7 +221,7 @@ impl MassMatrix {
         }
     }
 
-    /// Factor `M = Lᵀ D L` into the room of `factor`. Returns whether M was positive definite.
+    /// Computes `M = Lᵀ D L` in the storage of `factor`. Returns whether M is positive definite.
     pub fn factorise(&self, model: &Model, factor: &mut FactoredMassMatrix) -> bool {
         factor.rows.copy_from_slice(&self.rows);
         factor.update(model)
@@ -241,10 +242,10 @@ pub struct FactoredMassMatrix {
     inverse_root: Vec<f64>,
     /// Whether a velocity belongs to a tree on a free base.
     is_free: Vec<bool>,
-    /// Where in `ancestors` those of each velocity stand.
+    /// Range in `ancestors` of each velocity.
     spans: Vec<Range<usize>>,
-    /// The velocities on the path before each one, a free base's left out, counted from the tree's
-    /// first joint: what the loops over one tree index with.
+    /// The velocities that precede each one on its path, without those of a free base, counted from
+    /// the tree's first joint: the indices of the loops over one tree.
     ancestors: Vec<usize>,
 }
 
@@ -398,8 +399,8 @@ impl FactoredMassMatrix {
         }
     }
 
-    /// `y ← D^(-1/2) L^(-T) y` for several columns (nv) that are nonzero only at some velocities:
-    /// ascending, and with each all of its path.
+    /// `y ← D^(-1/2) L^(-T) y` for several columns (nv) with the given nonzero velocities:
+    /// ascending, and closed under ancestors.
     pub fn half_solve_columns<const N: usize>(
         &self,
         model: &Model,
@@ -419,7 +420,7 @@ impl FactoredMassMatrix {
         }
     }
 
-    /// `x ← L^(-1) D^(-1/2) x`: with [`Self::half_solve`] before it, `M^(-1)`.
+    /// `x ← L^(-1) D^(-1/2) x`; after [`Self::half_solve`] the result is `M^(-1)` times the vector.
     pub fn half_solve_back(&self, model: &Model, x: &mut [f64]) {
         for tree in model.trees() {
             if tree.is_free {
@@ -458,7 +459,7 @@ impl FactoredMassMatrix {
     }
 }
 
-/// Of a pivot; none where the matrix is not positive definite.
+/// `1/√pivot`; `None` if the matrix is not positive definite.
 #[inline]
 fn inverse_root(pivot: f64) -> Option<f64> {
     (pivot > 0.0).then(|| 1.0 / pivot.sqrt())

@@ -1,10 +1,10 @@
 //! Trees of solids: from their description to mass matrix, bias, energy and momentum.
 //!
-//! A machine is one or several trees of bodies under the joints of a catalogue ([`joint`]); the
-//! root of a tree is free, or a joint ties it to the world. All spatial quantities of a tree are
-//! taken in **world axes about one origin**, that of its root where the root is free and the
-//! world's otherwise: composite inertias then add without any transformation, and a rover far from
-//! the world's origin loses no digit.
+//! A machine is one or several kinematic trees, built from the joints of a catalogue ([`joint`]).
+//! The root of a tree is free, or a joint connects it to the world. All spatial quantities of a
+//! tree are expressed in **world axes about one origin**: the origin of its root if the root is
+//! free, otherwise the world's. Composite inertias then add without a transformation, and a rover
+//! far from the world's origin loses no precision.
 
 pub mod bias;
 pub mod coordinates;

@@ -24,7 +24,7 @@ impl Energy {
     }
 }
 
-/// Linear (kg m/s) and angular momentum (kg m²/s, about a point that the caller named).
+/// Linear (kg m/s) and angular momentum (kg m²/s, about a point chosen by the caller).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Momentum {
     /// World axes.
@@ -51,7 +51,7 @@ pub fn body_momenta(
     }
 }
 
-/// The same; where `TURNS` every root must be free and every other joint a turn.
+/// The same. With `TURNS` every root must be free and every other joint a rotation.
 fn body_momenta_if<const TURNS: bool>(
     model: &Model,
     kinematics: &Kinematics,
@@ -60,7 +60,7 @@ fn body_momenta_if<const TURNS: bool>(
     out: &mut [Momentum],
 ) -> f64 {
     let mut kinetic = 0.0;
-    // Velocity of each frame's origin and angular velocity ride along the tree in `out` until
+    // `out` holds each body's angular velocity and the velocity of its frame's origin until
     // overwritten.
     for (b, body) in model.bodies().iter().enumerate() {
         let (origin, omega) = match body.parent {
@@ -135,7 +135,7 @@ pub fn centre_of_mass(model: &Model, kinematics: &Kinematics) -> Vector3<f64> {
     kinematics.origin(0) + moment / model.mass()
 }
 
-/// Scratch of [`energy_and_momentum`]: sized once for a model.
+/// Scratch of [`energy_and_momentum`], allocated once for a model.
 #[derive(Clone, Debug)]
 pub struct EnergyScratch {
     moving: Vec<Moving>,
@@ -160,8 +160,8 @@ struct Moving {
     omega: Vector3<f64>,
 }
 
-/// Energy and linear momentum (kg m/s) of a state in one sweep, without poses that anything else
-/// needs: every step is audited with it.
+/// Energy and linear momentum (kg m/s) of a state in one sweep, without poses for any other use;
+/// every step is audited with it.
 pub fn energy_and_momentum(
     model: &Model,
     q: &Configuration,
@@ -176,7 +176,7 @@ pub fn energy_and_momentum(
     }
 }
 
-/// The same; where `TURNS` every root must be free and every other joint revolute and on its own.
+/// The same. With `TURNS` every root must be free and every other joint revolute and uncoupled.
 fn energy_and_momentum_if<const TURNS: bool>(
     model: &Model,
     q: &Configuration,
@@ -224,7 +224,7 @@ fn energy_and_momentum_if<const TURNS: bool>(
 }
 
 impl Moving {
-    /// Places a body under a revolute joint, where `OWN` one that follows no other, on its carrier.
+    /// Adds a body under a revolute joint to its carrier; with `OWN` the joint follows no other.
     #[inline]
     fn turn<const OWN: bool>(
         &mut self,
@@ -258,7 +258,7 @@ impl Moving {
         self.omega = carrier.omega + axis * rate;
     }
 
-    /// Places any other body on its carrier.
+    /// Adds any other body to its carrier.
     #[cold]
     fn follow(&mut self, carrier: &Self, body: &Body, q: &Configuration, v: &[f64]) {
         let mut lever = carrier.R * body.position;
@@ -284,8 +284,8 @@ impl Moving {
     }
 }
 
-/// Twice the kinetic energy, linear momentum and first moment about their trees' origins of the
-/// bodies so far.
+/// Sums over the bodies so far: twice the kinetic energy, linear momentum, and first moment about
+/// the trees' origins.
 #[derive(Default)]
 struct Sums {
     twice_kinetic: f64,

@@ -4,11 +4,11 @@
 //! τ = command, within ± stall (1 ∓ ω/ω₀) and ± stall
 //! ```
 //!
-//! Below the line the torque is the command. On it the torque falls linearly with the speed and
-//! reaches zero at the no-load speed ω₀, where the back-EMF equals the supply. A motor that
-//! regenerates brakes when it is driven faster, by the line and at most by the stall torque; one
-//! that does not turns freely, and brakes by command alone. With an infinite ω₀ the torque is the
-//! command within ± stall, at any speed.
+//! Below the line the torque is the command. On the line it falls linearly with the speed and
+//! reaches zero at the no-load speed ω₀, where the back-EMF equals the supply voltage. Driven
+//! beyond ω₀, a regenerating motor brakes along the line, at most with the stall torque; any other
+//! motor spins freely and brakes on command only. With an infinite ω₀ the torque is the command
+//! within ± stall at any speed.
 //!
 //! Source: the permanent-magnet DC motor at its supply voltage, e.g. Siciliano et al. 2009,
 //! *Robotics*, ch. 5.
@@ -23,11 +23,10 @@ use super::error::ModelError;
 pub struct Motor {
     /// Torque of the line at rest, N m.
     pub stall_torque: f64,
-    /// ω₀, where the line reaches zero, rad/s; may be infinite (in JSON, which has no infinity:
-    /// null).
+    /// ω₀, the zero of the line, rad/s; may be infinite (null in JSON, which has no infinity).
     #[serde(deserialize_with = "speed")]
     pub no_load_speed: f64,
-    /// Whether it brakes when it is driven faster than ω₀.
+    /// Whether it brakes when driven faster than ω₀.
     #[serde(default = "regenerates")]
     pub regenerating: bool,
 }
@@ -50,7 +49,7 @@ const TORQUES: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
 /// Range of finite no-load speeds, rad/s.
 const SPEEDS: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
 
-/// How the torque depends on the speed nearby.
+/// Local dependence of the torque on the speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MotorRegime {
     /// Constant, N m.
@@ -94,7 +93,7 @@ impl Motor {
         self.stall_torque / self.no_load_speed
     }
 
-    /// The command (N m) as far as the motor has the torque for it.
+    /// The command (N m), limited to the stall torque.
     #[inline]
     #[must_use]
     pub fn limited(&self, command: f64) -> f64 {
@@ -151,12 +150,12 @@ impl Motor {
     }
 }
 
-/// A drive in a step: the branch of its torque that is tried.
+/// The trial branch of a drive's torque in a step.
 ///
-/// A step with one branch tells at which rate it ends, and so on which side of the branch the motor
-/// works. Going there one branch at a time ends after at most four steps for a wheel alone, since
-/// the torque falls with the rate; going at once to the branch of that rate may go to and fro for
-/// ever.
+/// A step with one branch yields the rate at its end, and thus the side of the branch on which the
+/// motor works. For a single wheel, moving one branch at a time terminates after at most four
+/// steps, since the torque falls with the rate. Jumping directly to the branch of that rate may
+/// alternate forever.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveTrial {
     branch: usize,
@@ -189,7 +188,7 @@ impl DriveTrial {
         Self { branch, regime }
     }
 
-    /// Goes one branch towards that of a rate (rad/s); true where the torque is another now.
+    /// Moves one branch towards that of a rate (rad/s); true if the torque changed.
     #[inline]
     pub fn revise(&mut self, motor: Option<&Motor>, command: f64, rate: f64) -> bool {
         let wanted = motor.map_or(2, |motor| motor.branch(command, rate));

@@ -1,4 +1,4 @@
-//! The configuration: small, cloneable, without any scratch.
+//! The configuration: small, cloneable, without scratch.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -6,11 +6,10 @@ use serde::{Deserialize, Serialize};
 use super::joint::{Free, Joint, Pose, Spherical};
 use super::model::Model;
 
-/// How far the squared length of a unit quaternion may be from 1: the steps keep it within
-/// rounding.
+/// Tolerance on the squared length of a unit quaternion; steps keep it within rounding.
 const UNIT: f64 = 1e-12;
 
-/// Where the machine is: a point of the product of its joints' manifolds.
+/// Configuration of the machine: a point in the product of its joints' manifolds.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct Configuration {
     /// Origin of the first body, world, m; zero where that body is not free.
@@ -37,7 +36,7 @@ impl Clone for Configuration {
         }
     }
 
-    /// Does not allocate where the sizes agree.
+    /// Does not allocate if the sizes agree.
     fn clone_from(&mut self, other: &Self) {
         self.position = other.position;
         self.attitude = other.attitude;
@@ -73,7 +72,7 @@ impl Configuration {
         }
     }
 
-    /// Places a free body.
+    /// Sets the pose of a free body.
     #[inline]
     pub fn set_pose(&mut self, free: Free, pose: Pose) {
         match free.pose.checked_sub(1) {
@@ -118,7 +117,7 @@ impl Configuration {
         }
     }
 
-    /// Takes rounding out of the unit quaternions.
+    /// Renormalises the unit quaternions.
     pub fn normalise(&mut self) {
         self.attitude.renormalize_fast();
         for pose in &mut self.others {
@@ -135,7 +134,7 @@ impl Configuration {
             .chain(&self.rotations)
     }
 
-    /// Whether it has the sizes of a model's, and quaternions of length 1.
+    /// Whether it has the sizes of a model's configuration, and unit quaternions.
     #[must_use]
     pub fn is_of(&self, model: &Model) -> bool {
         self.joints.len() == model.n_joints()

@@ -1,4 +1,4 @@
-//! Mechanical systems, which the time-stepping schemes of [`crate::integrator`] advance.
+//! Mechanical systems, advanced by the time-stepping schemes of [`crate::integrator`].
 //!
 //! - [`tree`]: a multibody tree on a terrain, under a [`command`];
 //! - [`planar`]: a planar machine on a ground;

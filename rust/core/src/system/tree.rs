@@ -1,9 +1,9 @@
-//! The tree of solids on a terrain as a mechanical system: the rover.
+//! A multibody tree on a terrain as a mechanical system: the rover.
 //!
-//! `M̂ = M + h θ_j K_d + h² θ_j θ K_p` on held joints: the PD of a held joint is implicit with an
-//! exponentially fitted θ_j ([`super::fitted_theta`]), so no gain and no step make it unstable; a
-//! motor at its torque–speed line is taken in the same way. `M̂ = Lᵀ D L` along the tree; the
-//! contact system keeps `Z` along each contact's path.
+//! `M̂ = M + h θ_j K_d + h² θ_j θ K_p` on held joints. The PD control of a held joint is implicit
+//! with an exponentially fitted θ_j ([`super::fitted_theta`]), so it is stable for every gain and
+//! step size. A motor on its torque–speed line is treated in the same way. `M̂ = Lᵀ D L` along the
+//! tree; the contact system stores `Z` along each contact's path.
 
 use nalgebra::Vector3;
 
@@ -40,16 +40,16 @@ impl UnilateralContact for Contact {
     }
 }
 
-/// What a joint's drive did.
+/// Impulse and work of a joint's drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriveAction {
-    /// Integral of its torque over time, N m s.
+    /// Time integral of its torque, N m s.
     pub impulse: f64,
-    /// J.
+    /// Work, J.
     pub work: f64,
 }
 
-/// Poses, matrices and momenta of a tree: scratch, sized once.
+/// Poses, matrices and momenta of a tree: scratch, allocated once.
 #[derive(Clone, Debug)]
 pub struct TreeScratch {
     kinematics: Kinematics,
@@ -68,15 +68,15 @@ pub struct TreeScratch {
     gyroscopic: GyroscopicScratch,
     force: Vec<f64>,
     pairs: PairSearch,
-    /// Coordinates of the joints at the middle and at the end of the step (n_joints); empty where
-    /// no joint has a stop.
+    /// Joint coordinates at the midpoint and at the end of the step (n_joints); empty if no joint
+    /// has a stop.
     joints_middle: Vec<f64>,
     joints_end: Vec<f64>,
     system: ContactSystem,
 }
 
 impl TreeScratch {
-    /// Room for a model with n contacts.
+    /// Scratch for a model with n contacts.
     #[must_use]
     pub fn new(model: &Model, n: usize) -> Self {
         let momenta = vec![Momentum::default(); model.bodies().len()];
@@ -108,13 +108,13 @@ impl TreeScratch {
         }
     }
 
-    /// Forgets what the drives did: a step begins.
+    /// Resets the impulse and work of the drives at the start of a step.
     pub fn begin_step(&mut self) {
         self.drives.fill(DriveAction::default());
     }
 
-    /// What each joint's drive has done since [`Self::begin_step`] (n_joints), in all parts of a
-    /// step that became the state.
+    /// Impulse and work of each joint's drive since [`Self::begin_step`] (n_joints), summed over
+    /// all accepted parts of a step.
     #[must_use]
     pub fn drives(&self) -> &[DriveAction] {
         &self.drives
@@ -126,28 +126,27 @@ impl TreeScratch {
         &self.system.W
     }
 
-    /// World position of the origin of a body's places at the pose where contacts were last
-    /// measured, m.
+    /// World position of the origin of a body's tree at the pose of the last contact evaluation, m.
     #[must_use]
     pub fn origin_of_contacts(&self, body: usize) -> &Vector3<f64> {
         self.kinematics_end.origin(body)
     }
 }
 
-/// A model on a terrain under a command.
+/// A model on a terrain, with its actuator command.
 pub struct TreeSystem<'a> {
     /// The machine.
     pub model: &'a Model,
     /// The ground.
     pub terrain: &'a dyn Terrain,
-    /// Torques and held joints.
+    /// Actuator torques and held joints.
     pub command: &'a Command,
-    /// Its scratch.
+    /// Scratch of the system.
     pub parts: &'a mut TreeScratch,
 }
 
 impl TreeSystem<'_> {
-    /// No point of a tree is faster, m/s.
+    /// Upper bound on the speed of all points of a tree, m/s.
     fn fastest_point(&self, tree: &Tree, v: &[f64]) -> f64 {
         let v = &v[tree.velocities.clone()];
         let linear = match v {
@@ -155,7 +154,7 @@ impl TreeSystem<'_> {
             _ => 0.0,
         };
         let half = tree.lead() / 2;
-        // A slide counts as a turn at an arm of more than a metre.
+        // A translation counts as a rotation at an arm of more than one metre.
         let turning: f64 = v[half..].iter().map(|w| w.abs()).sum();
         let mut reach = tree.reach + 1.0;
         if self.model.has_slides() {
@@ -217,7 +216,7 @@ impl MechanicalSystem for TreeSystem<'_> {
 
     #[inline]
     fn detect(&mut self, v: &[f64], mut activation: Activation, out: &mut Vec<Contact>) {
-        // Two trees may go towards each other.
+        // Two trees may approach each other.
         let (mut fastest, mut next) = (0.0_f64, 0.0_f64);
         for tree in self.model.trees() {
             let speed = self.fastest_point(tree, v);
@@ -421,7 +420,8 @@ impl MechanicalSystem for TreeSystem<'_> {
         Some(MechanicalEnergy {
             kinetic: energy.kinetic,
             potential: energy.potential,
-            // That of several trees, or of one on a fixed base, is no one velocity's.
+            // With several trees, or one on a fixed base, no single velocity carries the total
+            // momentum.
             momentum: if self.model.is_free_tree() {
                 momentum
             } else {
@@ -460,8 +460,8 @@ impl MechanicalSystem for TreeSystem<'_> {
                     impulse: torque.drive * h,
                     work,
                 };
-                // A damper never drives: where the rate changes its sign within the step, its
-                // torque at one time and the way at another may say so.
+                // A damper only dissipates. In a step that reverses the rate, torque and
+                // displacement are evaluated at different times, and their product may be positive.
                 total += work + torque.other * turned + (torque.damper * turned).min(0.0);
             }
         });
@@ -492,7 +492,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         );
     }
 
-    /// In momentum form, exact at both ends: see [`crate::integrator::moreau_jean_newton`].
+    /// In momentum form, exact at both ends; see [`crate::integrator::moreau_jean_newton`].
     fn balance(
         &mut self,
         options: &StepOptions,
@@ -576,7 +576,7 @@ impl MechanicalSystem for TreeSystem<'_> {
         FrictionContactProblem::from_assembled(Dimension::Three, &self.parts.system.W, q, mu)
     }
 
-    /// The trunk's origin, and what turns by so much at arm's length.
+    /// Largest displacement: of the free bases, and of the joints at their arm.
     fn displacement(&self, y: &[f64]) -> f64 {
         let mut largest = 0.0_f64;
         for tree in self.model.trees() {
@@ -590,7 +590,7 @@ impl MechanicalSystem for TreeSystem<'_> {
     }
 }
 
-/// Keeps the joints' coordinates for those that have stops: nothing where none has.
+/// Copies the joint coordinates; `kept` is empty if no joint has a stop.
 #[inline]
 fn keep(kept: &mut [f64], joints: &[f64]) {
     for (kept, q) in kept.iter_mut().zip(joints) {
@@ -598,27 +598,27 @@ fn keep(kept: &mut [f64], joints: &[f64]) {
     }
 }
 
-/// Arm at which a joint's turn counts, m. A freely steered wheel that is freed of 2 cm turns by 0.4
-/// rad.
+/// Arm that converts a joint rotation to a length, m. A freely steered wheel that is moved out of a
+/// penetration of 2 cm rotates by 0.4 rad.
 const JOINT_ARM: f64 = 0.05;
 
-/// Turn of a frame in a step, rad, beyond which gyroscopic terms are taken implicitly: the explicit
-/// ones' error, of third order, is then a thousandth of the energy.
+/// Rotation of a frame in a step, rad, beyond which gyroscopic terms are implicit. At this angle
+/// the third-order error of the explicit terms is a thousandth of the energy.
 const MOST_TURN: f64 = 0.1;
 
-/// Turn of a wheel about its axle in a step, rad, beyond which they are. Its spin couples the
-/// motions across the axle with a frequency of a few per cent of the spin, so that explicit terms
-/// would do up to some twenty times more.
+/// The same limit for the rotation of a wheel about its axle in a step, rad. The spin couples the
+/// motions across the axle at a frequency of a few per cent of the spin rate, so explicit terms
+/// would stay acceptable up to some twenty times more.
 const MOST_SPIN: f64 = 1.0;
 
-/// Fastest of some joints, rad/s.
+/// Largest rate of a set of joints, rad/s.
 #[inline]
 fn fastest(joints: &[usize], v: &[f64]) -> f64 {
     joints.iter().fold(0.0, |most, &k| most.max(v[k].abs()))
 }
 
-/// Damping (N m s/rad) and stiffness (N m/rad) with which a joint's torque answers to its motion:
-/// those of its motor, of what holds it, of its own damper and spring.
+/// Effective damping (N m s/rad) and stiffness (N m/rad) of a joint's torque: those of its motor,
+/// of its position control, and of its own damper and spring.
 #[inline]
 fn feedback(motor: f64, held: Option<&HeldJoint>, passive: &Passive) -> (f64, f64) {
     let (mut damping, mut stiffness) = (motor + passive.damping, passive.stiffness);
@@ -629,7 +629,7 @@ fn feedback(motor: f64, held: Option<&HeldJoint>, passive: &Passive) -> (f64, f6
     (damping, stiffness)
 }
 
-/// How implicit each joint's PD and motor are.
+/// Sets the implicit weights of each joint's PD control and motor.
 fn set_held_theta(
     model: &Model,
     options: &StepOptions,
@@ -646,15 +646,15 @@ fn set_held_theta(
 
 /// Mean torque of a joint over the step, N m.
 struct Actuation {
-    /// Of its drive.
+    /// Torque of its drive.
     drive: f64,
-    /// Of its dampers.
+    /// Torque of its dampers.
     damper: f64,
-    /// Of everything else.
+    /// All other torques.
     other: f64,
 }
 
-/// A step that is tried: where it starts, the velocity at its end, what acts.
+/// A trial step: its start, the velocity at its end, and the acting forces.
 #[derive(Clone, Copy)]
 struct Trial<'a> {
     options: &'a StepOptions,
@@ -665,15 +665,15 @@ struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    /// Mean of a velocity over the step: rad/s or m/s.
+    /// Mean velocity over the step, rad/s or m/s.
     #[inline]
     fn mean_rate(&self, k: usize) -> f64 {
         let theta = self.options.theta;
         theta * self.v_end[k] + (1.0 - theta) * self.start.v[k]
     }
 
-    /// Torques of every joint; the PD, the spring and the motor's line at the θ_j-weighted position
-    /// and velocity of the iterate.
+    /// Torques of every joint. PD control, spring and motor line are evaluated at the θ_j-weighted
+    /// position and velocity of the iterate.
     #[inline]
     fn for_each(&self, model: &Model, mut act: impl FnMut(&JointProperties, Actuation)) {
         let h = self.options.time_step;
@@ -699,8 +699,8 @@ impl Trial<'_> {
     }
 }
 
-/// Torque of the springs (N m) at a place, and damping (N m s/rad), of what holds a joint and of
-/// its own.
+/// Spring torque (N m) at a coordinate, and damping (N m s/rad), of the position control and of the
+/// joint's own elements.
 #[inline]
 fn answer(held: Option<&HeldJoint>, passive: &Passive, place: f64) -> (f64, f64) {
     let own = passive.stiffness * (place - passive.rest);
@@ -735,8 +735,8 @@ fn add_command(
     });
 }
 
-/// `y = −(left side)` of the principle of [`crate::integrator::moreau_jean_newton`] at the iterate
-/// `v_end`, without commands and contacts.
+/// `y = −(left-hand side)` of the principle of [`crate::integrator::moreau_jean_newton`] at the
+/// iterate `v_end`, without commands and contacts.
 fn momentum_residual(
     model: &Model,
     gravity: &Vector3<f64>,
@@ -765,8 +765,8 @@ fn momentum_residual(
         for b in tree.bodies.clone() {
             let (sum, begin) = (&mut parts.sums[b], &parts.momenta[b]);
             let weight = gravity * (bodies[b].mass * h);
-            // Both mass centres relative to the point of reference, the tree's origin at the start
-            // of the step.
+            // Both mass centres relative to the reference point: the tree's origin at the start of
+            // the step.
             let centre =
                 (parts.kinematics_end.c[b] + end) * theta + parts.c_start[b] * (1.0 - theta);
             sum.linear -= begin.linear + weight;
@@ -779,7 +779,7 @@ fn momentum_residual(
         for b in tree.bodies.clone().rev() {
             let body = &bodies[b];
             let (P, L) = (parts.sums[b].linear, parts.sums[b].angular);
-            // About the tree's origin at the midpoint, where the screws are taken.
+            // About the tree's origin at the midpoint, the reference of the screws.
             let about_middle = L - middle.cross(&P);
             if let Joint::Free(_) = body.joint {
                 for k in 0..3 {

@@ -1,10 +1,10 @@
-//! Disc without width: a wheel.
+//! Disc of zero width: a wheel.
 
 use nalgebra::Vector3;
 
 use super::SupportMap;
 
-/// A wheel in space: centre, unit axle and in-plane spoke.
+/// A wheel in space: centre, unit axle and in-plane unit spoke.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disc {
     /// m.
@@ -17,14 +17,15 @@ pub struct Disc {
     pub radius: f64,
 }
 
-/// Lengths below which a direction is not taken from a difference.
+/// Length below which a difference does not define a direction.
 const NO_DIRECTION: f64 = 1e-12;
 
 impl SupportMap for Disc {
-    /// A point of the rim; along the axle, where all are equally far, the centre.
+    /// A point of the rim; the centre for a direction along the axle, where all rim points are
+    /// equally far.
     fn support(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         let project = |x: Vector3<f64>| x - self.axle * self.axle.dot(&x);
-        // Twice: of a direction along the axle little is left but rounding.
+        // Projected twice: near the axle direction the first projection is dominated by rounding.
         let in_plane = project(project(*direction));
         let length = in_plane.norm();
         if length > NO_DIRECTION * direction.norm() {

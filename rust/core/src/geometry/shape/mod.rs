@@ -1,8 +1,8 @@
-//! Shapes of a machine's parts, placed in space: one file a shape, with its data, its bounds and
-//! its support map.
+//! Shapes of a machine's parts, placed in space: one file per shape with its data, bounding radius
+//! and support map.
 //!
-//! All coordinates are in world axes and relative to one origin that the caller chooses, mostly the
-//! trunk's, so that a machine far from the world's origin loses no digit.
+//! All coordinates are in world axes, relative to an origin chosen by the caller, usually the
+//! trunk's. A machine far from the world's origin then loses no precision.
 
 pub mod disc;
 pub mod oriented_box;
@@ -14,19 +14,19 @@ pub use disc::Disc;
 pub use oriented_box::OrientedBox;
 pub use sphere::Sphere;
 
-/// A convex body as its support map sees it.
+/// A convex body, represented by its support map.
 pub trait SupportMap {
-    /// The point that lies furthest along `direction`, which need not be a unit vector.
+    /// The point furthest along `direction`, which need not be a unit vector.
     fn support(&self, direction: &Vector3<f64>) -> Vector3<f64>;
 
-    /// A point inside, m.
+    /// A point inside the body, m.
     fn centre(&self) -> Vector3<f64>;
 
-    /// Radius of a ball about the centre that holds the whole shape, m.
+    /// Radius of a bounding ball about the centre, m.
     fn bound(&self) -> f64;
 }
 
-/// Any shape of a part.
+/// The shape of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PlacedShape {
     /// A wheel.

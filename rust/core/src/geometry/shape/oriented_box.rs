@@ -1,4 +1,4 @@
-//! Box at any attitude.
+//! Oriented box.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,21 +9,21 @@ use super::SupportMap;
 pub struct OrientedBox {
     /// m.
     pub centre: Vector3<f64>,
-    /// From the box's axes to the world's.
+    /// Rotation from the box's axes to the world's.
     pub R: Matrix3<f64>,
     /// Half edge lengths, m.
     pub half_size: Vector3<f64>,
 }
 
 impl OrientedBox {
-    /// Place of the corner of a number: bits 0, 1, 2 say the side along x, y, z.
+    /// Position of a corner: bits 0, 1, 2 of its index select the side along x, y, z.
     #[inline]
     #[must_use]
     pub fn corner(&self, number: usize) -> Vector3<f64> {
         self.centre + self.R * self.half_size.component_mul(&signs(number))
     }
 
-    /// Unit axis of a number, world axes.
+    /// Unit axis by index, world axes.
     #[inline]
     #[must_use]
     pub fn axis(&self, k: usize) -> Vector3<f64> {
@@ -31,7 +31,7 @@ impl OrientedBox {
     }
 }
 
-/// The sides on which a corner lies, 1 or −1.
+/// The sides of a corner along the three axes, 1 or −1.
 #[inline]
 #[must_use]
 pub(crate) fn signs(number: usize) -> Vector3<f64> {

@@ -1,4 +1,4 @@
-//! What a description must satisfy, in the order of its text.
+//! Checks of a description, in the order of its text.
 
 use std::collections::{HashMap, HashSet};
 
@@ -11,10 +11,10 @@ use super::{ModelDescription, SolidDescription};
 use crate::multibody::error::ModelError;
 use crate::multibody::model::{MAX_SHAPES, MAX_SOLIDS};
 
-/// Largest length of a description either way, m.
+/// Largest magnitude of a length in a description, m.
 const MAX_LENGTH: f64 = 1e6;
 
-/// Finite, and at most `limit` either way.
+/// Checks that a value is finite and at most `limit` in magnitude.
 pub(in crate::multibody) fn in_range(
     field: &str,
     value: f64,
@@ -32,7 +32,7 @@ pub(in crate::multibody) fn in_range(
     })
 }
 
-/// A length that is positive, m.
+/// Checks a positive length, m.
 pub(in crate::multibody) fn length(field: &str, value: f64) -> Result<(), ModelError> {
     positive(field, value)?;
     if (1e-6..=MAX_LENGTH).contains(&value) {
@@ -45,13 +45,13 @@ pub(in crate::multibody) fn length(field: &str, value: f64) -> Result<(), ModelE
     })
 }
 
-/// A place, m.
+/// Checks a position, m.
 pub(super) fn place(field: &str, values: &[f64; 3]) -> Result<(), ModelError> {
     (values.iter()).try_for_each(|&x| in_range(field, x, MAX_LENGTH, "at most 1e6 m either way"))
 }
 
-/// A gain, a torque or an inertia: not negative, and no larger than a double can carry through a
-/// step.
+/// Checks a gain, a torque or an inertia: not negative, and small enough for double precision
+/// throughout a step.
 fn moderate(field: &str, value: f64) -> Result<(), ModelError> {
     not_negative(field, value)?;
     in_range(field, value, 1e18, "at most 1e18")
@@ -106,7 +106,7 @@ fn direction(field: &str, value: [f64; 3]) -> Result<(), ModelError> {
     }
 }
 
-/// Everything that a description must satisfy, in the order of its text.
+/// Checks the whole description, in the order of its text.
 pub(in crate::multibody) fn check(description: &ModelDescription) -> Result<(), ModelError> {
     if description.solids.is_empty() {
         return Err(ModelError::NoSolids);
@@ -144,7 +144,7 @@ pub(in crate::multibody) fn check(description: &ModelDescription) -> Result<(), 
     check_tags(description, &solids)
 }
 
-/// What carries a solid. `before`: the solids listed before it.
+/// Checks the joint of a solid. `before`: the solids listed before it.
 fn check_joint(
     i: usize,
     solid: &SolidDescription,
@@ -176,7 +176,7 @@ fn check_joint(
         (solid.coupled.is_some(), "coupled", has_axis),
         (solid.locked.is_some(), "locked", has_axis),
     ];
-    // A root by mistake would fall out of its machine.
+    // An accidental root would fall out of its machine.
     if i > 0 && solid.parent.is_none() && solid.joint.is_none() {
         return Err(missing("parent"));
     }
@@ -210,7 +210,7 @@ fn check_joint(
     check_properties(i, solid, before)
 }
 
-/// What a revolute or prismatic joint does by itself.
+/// Checks spring, damper, rotor and drive of a revolute or prismatic joint.
 fn check_properties(
     i: usize,
     solid: &SolidDescription,
@@ -275,7 +275,7 @@ fn check_properties(
     Ok(())
 }
 
-/// Stops of a joint.
+/// Checks the stops of a joint.
 fn check_limits(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
     let at = |what: &str| format!("solids[{i}].limits.{what}");
     let Some(limits) = solid.limits else {
@@ -295,7 +295,7 @@ fn check_limits(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
     })
 }
 
-/// The solids of a tree are listed together.
+/// Checks that the solids of a tree are listed together.
 fn check_trees(description: &ModelDescription) -> Result<(), ModelError> {
     let mut roots: HashMap<&str, usize> = HashMap::new();
     let mut current = 0;
@@ -316,7 +316,7 @@ fn check_trees(description: &ModelDescription) -> Result<(), ModelError> {
     Ok(())
 }
 
-/// Mass, shape and inertia of a solid.
+/// Checks mass, shape and inertia of a solid.
 fn check_body(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
     let at = |what: &str| format!("solids[{i}].{what}");
     positive(&at("mass"), solid.mass)?;
@@ -429,7 +429,7 @@ fn check_wheels(
         }
         if let Some(name) = &wheel.steering {
             let steering = find("steering", name)?;
-            // Parents come before their children, so the way up ends.
+            // Parents precede their children, so the ascent terminates.
             while solid > steering {
                 let parent = description.solids[solid].parent.as_deref();
                 solid = parent.and_then(|p| solids.get(p).copied()).unwrap_or(0);

@@ -1,10 +1,10 @@
-//! What the shapes of a solid must satisfy.
+//! Checks of the shapes of a solid.
 
 use super::check::{in_range, length, place, positive};
 use super::{Shape, ShapeDescription, SolidDescription};
 use crate::multibody::error::ModelError;
 
-/// The shapes of a solid, one by one, and that it has them in one form.
+/// Checks each shape of a solid, and that the solid uses only one of the two forms.
 pub(super) fn check_shapes(i: usize, solid: &SolidDescription) -> Result<(), ModelError> {
     let at = |what: &str| format!("solids[{i}].{what}");
     if let Some(shape) = solid.shape {
@@ -77,7 +77,7 @@ fn check_lengths(at: &str, shape: &Shape) -> Result<(), ModelError> {
     }
 }
 
-/// Whether a shape can touch; a disc does as a wheel.
+/// Whether a shape can collide; a disc does so as a wheel.
 fn collides(shape: &Shape) -> bool {
     matches!(shape, Shape::Box { .. } | Shape::Sphere { .. })
 }

@@ -1,27 +1,27 @@
-//! What a description says of a joint.
+//! Description of a joint.
 
 use serde::{Deserialize, Serialize};
 
 use crate::multibody::motor::Motor;
 
-/// Kind of a joint: see [`crate::multibody::joint`].
+/// Joint type; see [`crate::multibody::joint`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum JointKind {
-    /// Moves anywhere; only of a root.
+    /// Six degrees of freedom; roots only.
     Free,
-    /// Does not move relative to its parent, or to the world.
+    /// No motion relative to its parent or to the world.
     Fixed,
-    /// Turns about its axis.
+    /// Rotation about its axis.
     Revolute,
-    /// Slides along its axis.
+    /// Translation along its axis.
     Prismatic,
-    /// Turns about its origin.
+    /// Rotation about its origin.
     Spherical,
 }
 
 impl JointKind {
-    /// As it is written.
+    /// Its name in a file.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -34,7 +34,7 @@ impl JointKind {
     }
 }
 
-/// Gains of a joint held at a set-point: `τ = −stiffness (q − q*) − damping q̇`.
+/// PD gains of a joint held at a set-point: `τ = −stiffness (q − q*) − damping q̇`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hold {
@@ -50,12 +50,12 @@ pub struct Hold {
 pub struct Spring {
     /// N m/rad or N/m.
     pub stiffness: f64,
-    /// Where it is slack, rad or m; 0 by default.
+    /// Rest position, rad or m; 0 by default.
     #[serde(default)]
     pub rest: f64,
 }
 
-/// Stops of a joint: `lower ≤ q ≤ upper`, as unilateral as a contact and with the same restitution.
+/// Stops of a joint: `lower ≤ q ≤ upper`, unilateral like a contact and with the same restitution.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Limits {
@@ -65,13 +65,13 @@ pub struct Limits {
     pub upper: f64,
 }
 
-/// Drive of a joint that is no wheel's.
+/// Drive of a joint other than a wheel's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DriveDescription {
-    /// Largest torque either way, N m.
+    /// Largest torque in either direction, N m.
     pub torque_limit: f64,
-    /// Torque–speed line of its motor; without one the torque is the command at any speed.
+    /// Torque–speed line of its motor. Without one the torque equals the command at any speed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motor: Option<Motor>,
 }
@@ -80,11 +80,11 @@ pub struct DriveDescription {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CouplingDescription {
-    /// The solid whose joint it follows, listed before.
+    /// The solid whose joint it follows; must be listed earlier.
     pub joint: String,
-    /// Its rate per unit of the other's; −1 for a differential.
+    /// Its rate per unit rate of the other joint; −1 for a differential.
     pub ratio: f64,
-    /// Its coordinate where the other's is zero, rad or m; 0 by default.
+    /// Its coordinate at the other joint's zero, rad or m; 0 by default.
     #[serde(default)]
     pub offset: f64,
 }

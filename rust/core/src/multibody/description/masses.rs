@@ -1,4 +1,4 @@
-//! Mass centre and inertia of a solid from what its description says.
+//! Mass centre and inertia of a solid from its description.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,16 +9,16 @@ use crate::spatial::SymmetricMatrix3;
 /// Mass centre and inertia of a solid, in its frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MassProperties {
-    /// m.
+    /// Mass centre, m.
     pub centre: Vector3<f64>,
     /// About the mass centre, kg m².
     pub inertia: Matrix3<f64>,
 }
 
-/// How far the masses of all shapes together may be from the solid's, in parts of it.
+/// Relative tolerance on the sum of the shapes' masses against the solid's mass.
 const MASS_TOLERANCE: f64 = 1e-9;
 
-/// As given, else of the shapes.
+/// As specified, otherwise computed from the shapes.
 pub(super) fn mass_properties(solid: &SolidDescription) -> Result<MassProperties, ModelError> {
     let centre = Vector3::from(solid.centre_of_mass.unwrap_or_default());
     if let Some([xx, yy, zz, xy, xz, yz]) = solid.inertia {
@@ -69,7 +69,7 @@ fn shape_masses(solid: &SolidDescription) -> Result<Vec<f64>, ModelError> {
         .collect())
 }
 
-/// What the masses of shapes that have their own leave of the solid's mass to the others, kg.
+/// Mass of the solid that remains for the shapes without a specified mass, kg.
 pub(super) fn mass_left(solid: &SolidDescription) -> Result<f64, ModelError> {
     let given = || solid.shapes.iter().filter_map(|shape| shape.mass);
     let sum: f64 = given().sum();
@@ -89,7 +89,7 @@ pub(super) fn mass_left(solid: &SolidDescription) -> Result<f64, ModelError> {
     })
 }
 
-/// Mass centre of shapes, and their inertia about it by parallel axes.
+/// Mass centre of the shapes, and their inertia about it by the parallel axis theorem.
 fn together(shapes: &[ShapeDescription], masses: &[f64]) -> MassProperties {
     let parts = || shapes.iter().zip(masses.iter().copied());
     let mass: f64 = masses.iter().sum();

@@ -1,6 +1,6 @@
-//! The model as data: what a machine's file says, readable and writable, not yet checked.
+//! The model as data: the content of a machine's file, readable and writable, not yet checked.
 //!
-//! [`Model::from_description`](super::Model::from_description) checks it and computes the tree.
+//! [`Model::from_description`](super::Model::from_description) checks it and builds the trees.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,23 +20,23 @@ pub use shape::{Shape, ShapeDescription};
 /// The built-in rover: Table 4.1 and Fig. 4.5 of the report, in SI units.
 const ROVER: &str = include_str!("../../../models/rover.toml");
 
-/// Trees of solids, with their wheels.
+/// Kinematic trees of solids, with their wheels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelDescription {
     /// Name of the machine.
     pub name: String,
-    /// Solids, parents before children, those of one tree together. Their order is the order of the
-    /// coordinates.
+    /// Solids. Parents precede their children, and the solids of one tree are listed together.
+    /// Their order is the order of the coordinates.
     pub solids: Vec<SolidDescription>,
     /// Wheels in the order of every public array.
     #[serde(default)]
     pub wheels: Vec<WheelDescription>,
-    /// Points with a name.
+    /// Named points.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tags: Vec<TagDescription>,
-    /// Whether parts of one tree touch each other, where no joint connects their bodies. Parts of
-    /// two trees always do.
+    /// Whether parts of one tree collide with each other, except across a joint. Parts of two trees
+    /// always collide.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub self_contact: bool,
 }
@@ -49,7 +49,7 @@ pub struct TagDescription {
     pub name: String,
     /// The solid that carries it.
     pub solid: String,
-    /// Place in the solid's frame, m.
+    /// Position in the solid's frame, m.
     pub position: [f64; 3],
 }
 
@@ -59,47 +59,47 @@ pub struct TagDescription {
 pub struct SolidDescription {
     /// Name of the solid and of its joint.
     pub name: String,
-    /// Name of the solid that carries it; none for a root, which its joint ties to the world.
+    /// Name of the solid that carries it; `None` for a root, which its joint connects to the world.
     ///
-    /// A root other than the first names its `joint`.
+    /// A root other than the first must specify its `joint`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parent: Option<String>,
-    /// Kind of the joint: by default free for a root and revolute for all others.
+    /// Type of the joint: by default free for a root and revolute for all other solids.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint: Option<JointKind>,
     /// Origin of the joint's frame in the parent's frame, m; in the world for a root that is not
     /// free.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position: Option<[f64; 3]>,
-    /// Rotation from the joint's frame to the parent's as a rotation vector: the axis times the
-    /// angle, rad. None by default.
+    /// Rotation from the joint's frame to the parent's as a rotation vector (axis times angle),
+    /// rad; the identity by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<[f64; 3]>,
-    /// Axis of a revolute or prismatic joint in the joint's frame; need not be normalised.
+    /// Axis of a revolute or prismatic joint in the joint's frame; need not be a unit vector.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<[f64; 3]>,
     /// Mass, kg.
     pub mass: f64,
-    /// Its only shape, about its mass centre: gives the inertia and the looks.
+    /// Its only shape, centred at its mass centre; defines the inertia and the appearance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<Shape>,
-    /// Its shapes, each with a pose, instead of `shape` and `collides`. A solid whose inertia is
-    /// given needs none.
+    /// Its shapes, each with a pose, instead of `shape` and `collides`. Optional for a solid with a
+    /// given inertia.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shapes: Vec<ShapeDescription>,
-    /// Mass centre in the solid's frame, m; the origin by default. A solid with `shapes` states it
-    /// together with `inertia`, or neither.
+    /// Mass centre in the solid's frame, m; the origin by default. A solid with `shapes` specifies
+    /// both this and `inertia`, or neither.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub centre_of_mass: Option<[f64; 3]>,
-    /// Inertia about the mass centre, frame axes, kg m²: xx, yy, zz, xy, xz, yz. From the shape or
-    /// the shapes by default.
+    /// Inertia about the mass centre in the axes of the frame, kg m²: xx, yy, zz, xy, xz, yz.
+    /// Computed from the shape or the shapes by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inertia: Option<[f64; 6]>,
-    /// Whether its box or ball touches the ground and other bodies; of a solid with `shapes` each
-    /// shape says it.
+    /// Whether its box or ball collides with the ground and with other bodies. In a solid with
+    /// `shapes` each shape has its own flag.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub collides: bool,
-    /// Gains with which the joint is held at a set-point.
+    /// PD gains that hold the joint at a set-point.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hold: Option<Hold>,
     /// Spring of the joint.
@@ -108,57 +108,56 @@ pub struct SolidDescription {
     /// Viscous damping of the joint, N m s/rad or N s/m; 0 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub damping: Option<f64>,
-    /// Inertia of the joint's rotor, reflected to the joint, kg m² or kg; 0 by default.
+    /// Rotor inertia reflected to the joint, kg m² or kg; 0 by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub armature: Option<f64>,
-    /// Stops of the joint, where it has any.
+    /// Stops of the joint, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limits: Option<Limits>,
     /// Drive of a revolute joint.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drive: Option<DriveDescription>,
-    /// Another joint that this one follows: its coordinate is gone.
+    /// Another joint that this one follows, so that it has no coordinate of its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coupled: Option<CouplingDescription>,
-    /// Angle (rad) or displacement (m) at which the joint is locked (welded): its coordinate is
-    /// gone. Free by default.
+    /// Angle (rad) or displacement (m) at which the joint is locked (welded), which removes its
+    /// coordinate. Not locked by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub locked: Option<f64>,
 }
 
-/// A wheel: a disc of no width, fixed to a solid.
+/// A wheel: a disc of zero width, fixed to a solid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WheelDescription {
     /// Short name, such as `FL`.
     pub name: String,
-    /// The solid that turns; the wheel's centre is its origin.
+    /// The rotating solid; its origin is the wheel's centre.
     pub solid: String,
     /// Direction of the axle in the solid's frame.
     pub axle: [f64; 3],
-    /// Its radius, m; where the solid's shape is a disc, that disc's.
+    /// Radius, m; equal to that of the disc if the solid's shape is a disc.
     pub radius: f64,
-    /// Radius at which it touches the ground, m, where that is meant to be another than the disc's;
-    /// `radius` by default.
+    /// Contact radius with the ground, m, if it differs from the disc's; `radius` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact_radius: Option<f64>,
     /// Largest driving torque, N m.
     pub torque_limit: f64,
     /// 1 or −1: joint torque of a positive (forward) command.
     pub drive_sign: f64,
-    /// Torque–speed line of its motor; without one the torque is the command at any speed.
+    /// Torque–speed line of its motor. Without one the torque equals the command at any speed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motor: Option<Motor>,
     /// The solid whose joint steers it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steering: Option<String>,
-    /// Largest steering set-point either way, rad.
+    /// Largest steering set-point in either direction, rad.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steering_limit: Option<f64>,
 }
 
-/// Longest text of a description, bytes: a model of [`MAX_SOLIDS`](super::model::MAX_SOLIDS) solids
-/// takes a twentieth.
+/// Largest length of a description's text, bytes: a model of
+/// [`MAX_SOLIDS`](super::model::MAX_SOLIDS) solids needs a twentieth of it.
 pub const MAX_TEXT: usize = 16 << 20;
 
 fn check_length(text: &str) -> Result<(), ModelError> {
@@ -174,7 +173,8 @@ fn check_length(text: &str) -> Result<(), ModelError> {
 }
 
 impl SolidDescription {
-    /// Kind of its joint: what it says, else free for a root and revolute for all others.
+    /// Type of its joint: as specified, otherwise free for a root and revolute for all other
+    /// solids.
     #[must_use]
     pub fn joint_kind(&self) -> JointKind {
         self.joint.unwrap_or(if self.parent.is_some() {
@@ -184,17 +184,17 @@ impl SolidDescription {
         })
     }
 
-    /// Mass centre (m) and inertia about it (kg m²), in the solid's frame: as given, else of its
-    /// shapes.
+    /// Mass centre (m) and inertia about it (kg m²), in the solid's frame: as specified, otherwise
+    /// computed from its shapes.
     ///
     /// # Errors
-    /// What makes the masses of its shapes unknown, named by its field in the solid.
+    /// The field of the solid that leaves the masses of its shapes undetermined.
     pub fn mass_properties(&self) -> Result<MassProperties, ModelError> {
         mass_properties(self)
     }
 
-    /// Radius of the disc that a wheel with this axle is made of, m: its only shape's, or the
-    /// largest of those about the axle through the origin.
+    /// Radius of the disc of a wheel with this axle, m: that of the only shape, or the largest of
+    /// the discs about the axle through the origin.
     pub(super) fn disc_radius(&self, axle: &[f64; 3]) -> Option<f64> {
         let radius = |shape: &Shape| match *shape {
             Shape::Disc { radius } => Some(radius),
@@ -208,8 +208,8 @@ impl SolidDescription {
             .or_else(|| radii.reduce(f64::max))
     }
 
-    /// Gives that disc, and all of its size about the same axle, another radius (m). Returns the
-    /// radius before; none where there is no such disc.
+    /// Changes the radius (m) of that disc and of all discs of the same size about the same axle.
+    /// Returns the previous radius; `None` if there is no such disc.
     pub(super) fn set_disc_radius(&mut self, axle: &[f64; 3], radius: f64) -> Option<f64> {
         let before = self.disc_radius(axle)?;
         let of_shapes = (self.shapes.iter_mut()).filter(|shape| shape.is_disc_about(axle));
@@ -223,7 +223,8 @@ impl SolidDescription {
         Some(before)
     }
 
-    /// Gives it another mass (kg): an inertia and masses of shapes that it states scale with it.
+    /// Sets its mass (kg). A specified inertia and the specified masses of its shapes scale with
+    /// it.
     pub fn set_mass(&mut self, mass: f64) {
         let scale = mass / self.mass;
         let stated = self.inertia.iter_mut().flatten();
@@ -242,7 +243,7 @@ impl ModelDescription {
     /// The built-in rover.
     ///
     /// # Panics
-    /// If the file that was built in is not readable, which the tests exclude.
+    /// If the built-in file cannot be read, which the tests exclude.
     #[must_use]
     pub fn rover() -> Self {
         let parsed = Self::from_toml(ROVER);
@@ -268,10 +269,10 @@ impl ModelDescription {
         })
     }
 
-    /// Writes TOML that [`Self::from_toml`] reads back to the same description.
+    /// Writes TOML from which [`Self::from_toml`] reads the same description.
     ///
     /// # Errors
-    /// [`ModelError::Unreadable`] where a value has no TOML form.
+    /// [`ModelError::Unreadable`] if a value has no TOML form.
     pub fn to_toml(&self) -> Result<String, ModelError> {
         toml::to_string(self).map_err(|e| ModelError::Unreadable {
             message: e.to_string(),
@@ -293,7 +294,7 @@ impl ModelDescription {
     /// Writes JSON.
     ///
     /// # Errors
-    /// [`ModelError::Unreadable`] where a value has no JSON form.
+    /// [`ModelError::Unreadable`] if a value has no JSON form.
     pub fn to_json(&self) -> Result<String, ModelError> {
         serde_json::to_string(self).map_err(|e| ModelError::Unreadable {
             message: e.to_string(),

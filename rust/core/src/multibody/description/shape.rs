@@ -1,4 +1,4 @@
-//! What a description says of the shapes of a solid.
+//! Description of the shapes of a solid.
 
 use std::f64::consts::PI;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::spatial::exp_rotation;
 
-/// A shape about its own centre.
+/// A shape centred at its own origin.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
 pub enum Shape {
@@ -18,25 +18,26 @@ pub enum Shape {
     },
     /// Solid cylinder about y.
     Cylinder {
-        /// m.
+        /// Radius, m.
         radius: f64,
-        /// Along y, m.
+        /// Height along y, m.
         height: f64,
     },
     /// Thin disc about z.
     Disc {
-        /// m.
+        /// Radius, m.
         radius: f64,
     },
     /// Solid ball.
     Sphere {
-        /// m.
+        /// Radius, m.
         radius: f64,
     },
 }
 
 impl Shape {
-    /// Principal inertias about the centre for a mass `m` (kg m²), Fig. 4.5 of the report.
+    /// Principal moments of inertia about the centre for a mass `m` (kg m²), Fig. 4.5 of the
+    /// report.
     #[must_use]
     pub fn inertia(&self, m: f64) -> [f64; 3] {
         match *self {
@@ -57,7 +58,7 @@ impl Shape {
         }
     }
 
-    /// Volume, m³; none of a disc, which is thin.
+    /// Volume, m³; `None` for a disc, which is thin.
     #[must_use]
     pub fn volume(&self) -> Option<f64> {
         match *self {
@@ -69,29 +70,29 @@ impl Shape {
     }
 }
 
-/// One of the shapes of a solid.
+/// One of several shapes of a solid.
 ///
-/// Shapes that overlap count twice where they do: in the mass, in the inertia and in what touches.
+/// Where shapes overlap, the overlap counts twice: in the mass, in the inertia and in the contacts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShapeDescription {
-    /// Its kind and its lengths.
+    /// Its type and dimensions.
     #[serde(flatten)]
     pub shape: Shape,
     /// Centre in the solid's frame, m; the origin by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position: Option<[f64; 3]>,
-    /// Rotation from the shape's axes to the solid's frame as a rotation vector: the axis times the
-    /// angle, rad. None by default.
+    /// Rotation from the shape's axes to the solid's frame as a rotation vector (axis times angle),
+    /// rad; the identity by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotation: Option<[f64; 3]>,
-    /// Whether it touches the ground and other bodies; only boxes and spheres can.
+    /// Whether it collides with the ground and with other bodies; only boxes and spheres can.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub collides: bool,
     /// Whether it is drawn.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub visible: bool,
-    /// Its part of the solid's mass, kg; by default a share, by volume, of what the other shapes
-    /// leave.
+    /// Its share of the solid's mass, kg. By default the mass that remains after the specified ones
+    /// is divided by volume.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mass: Option<f64>,
 }
@@ -112,14 +113,13 @@ impl ShapeDescription {
         self.position.unwrap_or_default().into()
     }
 
-    /// Rotation from its axes to the solid's frame, where there is one.
+    /// Rotation from its axes to the solid's frame; `None` for the identity.
     #[must_use]
     pub fn turn(&self) -> Option<Matrix3<f64>> {
         (self.rotation).map(|turn| *exp_rotation(&turn.into()).to_rotation_matrix().matrix())
     }
 
-    /// Whether it is a disc about an axle through the origin, as a wheel is that is fixed to the
-    /// solid.
+    /// Whether it is a disc about an axle through the origin, like a wheel fixed to the solid.
     #[must_use]
     pub fn is_disc_about(&self, axle: &[f64; 3]) -> bool {
         let Shape::Disc { radius } = self.shape else {

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
-/// Direction of a revolute or prismatic joint; the coordinate axes are kept apart because their
-/// product is two columns' work.
+/// Direction of a revolute or prismatic joint. The coordinate axes are separate variants because a
+/// rotation about one of them changes only two columns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointAxis {
     /// About x.
@@ -12,12 +12,12 @@ pub enum JointAxis {
     Y,
     /// About z.
     Z,
-    /// About any unit vector.
+    /// About an arbitrary unit vector.
     General(Unit<Vector3<f64>>),
 }
 
 impl JointAxis {
-    /// The axis of a direction that need not be normalised; `None` where it has none.
+    /// The axis along a direction of any length; `None` if the direction is degenerate.
     #[must_use]
     pub fn from_direction(direction: &Vector3<f64>) -> Option<Self> {
         let unit = Unit::try_new(*direction, 1e-9)?;

@@ -1,27 +1,27 @@
-//! Coupling: a joint that follows another, `q = ratio q_other + offset`, as the two sides of a
-//! rover's differential do.
+//! Coupling: a joint that follows another, `q = ratio q_other + offset`, like the two rockers of a
+//! differential.
 //!
-//! The joint has neither coordinate nor velocity of its own. It is eliminated exactly: a unit of
-//! the other joint's velocity gives to all that the coupled joint carries `ratio` times its own
-//! screw,
-//!
+//! The coupled joint has no coordinate or velocity of its own. It is eliminated exactly: a unit of
+//! the other joint's velocity moves everything the coupled joint carries by `ratio` times the
+//! coupled joint's screw,
 //! ```text
 //! M = Gᵀ M_all G,        v_all = G v
 //! ```
 //!
-//! with `M_all` the mass matrix of the tree without the coupling. `M` keeps the sparsity of a tree
-//! where both joints lie on one path, or hang on the same body; other couplings are refused.
+//! where `M_all` is the mass matrix of the tree without the coupling. `M` keeps the sparsity of a
+//! tree if both joints lie on one path or are mounted on the same body; other couplings are
+//! rejected.
 
 /// How a joint follows another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coupling {
-    /// Its rate per unit of the other's: 1, rad/m or m/rad.
+    /// Its rate per unit rate of the other joint: 1, rad/m or m/rad.
     pub ratio: f64,
-    /// Its coordinate where the other's is zero, rad or m.
+    /// Its coordinate at the other joint's zero, rad or m.
     pub offset: f64,
-    /// Where it hangs on the joint that it follows: number of the motion that the velocity has
-    /// given to its carrier, and of the motion that it gives to all that the coupled joint carries.
-    /// None where both hang on one body.
+    /// For a joint further along the path of the joint that it follows: the index of the motion
+    /// that the velocity imparts to its carrier, and of the motion that it imparts to everything
+    /// the coupled joint carries. `None` if both are mounted on one body.
     pub combined: Option<(usize, usize)>,
 }
 

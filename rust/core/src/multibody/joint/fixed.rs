@@ -1,20 +1,20 @@
-//! Fixed joint: no motion at all.
+//! Fixed joint: no relative motion.
 //!
-//! A body fixed to another one, and one whose joint is locked, is part of it: masses and shapes are
-//! merged and no coordinate is left. A root that is fixed stands in the world.
+//! A solid that is fixed to a body, or whose joint is locked, becomes part of that body: masses and
+//! shapes are merged and the coordinate disappears. A fixed root is attached to the world.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::JointAxis;
 
-/// A joint held for good at one value of its coordinate: rad about, or m along, its axis.
+/// A joint locked at one value of its coordinate: rad about its axis, or m along it.
 #[derive(Clone, Copy, Debug)]
 pub enum Lock {
-    /// The frames coincide but for the joint's own place and rotation.
+    /// The frames coincide, apart from the joint's own position and rotation.
     AtZero,
-    /// Turned by an angle.
+    /// Rotated by an angle, rad.
     Turned(JointAxis, f64),
-    /// Displaced.
+    /// Displaced, m.
     Displaced(JointAxis, f64),
 }
 

@@ -1,8 +1,8 @@
-//! Free joint: a root that moves anywhere.
+//! Free joint: a root with six degrees of freedom.
 //!
-//! Its velocity is that of its frame's origin and its angular velocity, both in world axes. The
-//! places of its tree are taken relative to its origin, so a machine far from the world's origin
-//! loses no digit.
+//! Its velocity is the linear velocity of its frame's origin and its angular velocity, both in
+//! world axes. Positions in its tree are relative to its origin, so a machine far from the world's
+//! origin loses no precision.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -15,15 +15,15 @@ pub const NV: usize = 6;
 /// A free joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Free {
-    /// Number of its pose in the configuration:
+    /// Index of its pose in the configuration:
     /// [`Configuration::pose`](crate::multibody::Configuration::pose).
     pub pose: usize,
 }
 
-/// Place and attitude of a free body.
+/// Position and attitude of a free body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// Origin of its frame, world, m.
+    /// Origin of its frame in the world, m.
     pub position: Vector3<f64>,
     /// Attitude `R_WB`.
     pub attitude: UnitQuaternion<f64>,
@@ -39,9 +39,9 @@ impl Default for Pose {
 }
 
 impl Pose {
-    /// After `h` seconds at the velocity `v` (6), along the exponential map.
+    /// The pose after `h` seconds at velocity `v` (6), along the exponential map.
     ///
-    /// The angular velocity is in world axes, so the turn multiplies from the left.
+    /// The angular velocity is in world axes, so the increment multiplies from the left.
     #[must_use]
     pub fn moved(&self, v: &[f64], h: f64) -> Self {
         let turn = exp_rotation(&(Vector3::new(v[3], v[4], v[5]) * h));

@@ -1,5 +1,4 @@
-//! The catalogue of joints: what lets a body move relative to the one that carries it, or to the
-//! world.
+//! The joint catalogue: how a body can move relative to its carrier, or to the world.
 //!
 //! | joint | coordinates | velocities | moves |
 //! |---|---|---|---|
@@ -10,7 +9,8 @@
 //! | [`spherical`] | unit quaternion | 3 | about a point |
 //! | [`coupled`] | – | – | as a revolute or prismatic joint, in proportion to another |
 //!
-//! Each velocity has a [`Motion`]: the screw that its unit gives to all that the joint carries.
+//! Each velocity has a [`Motion`]: the screw that a unit of it imparts to everything the joint
+//! carries.
 //!
 //! Source: Featherstone 2008, *Rigid Body Dynamics Algorithms*, ch. 4; Carpentier et al. 2019, *The
 //! Pinocchio C++ library*, for the joints as types with their own numbers of coordinates and
@@ -33,23 +33,23 @@ pub use prismatic::Prismatic;
 pub use revolute::Revolute;
 pub use spherical::Spherical;
 
-/// A joint of a body.
+/// The joint of a body.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Joint {
-    /// Six degrees of freedom, of a root.
+    /// Six degrees of freedom; roots only.
     Free(Free),
-    /// None, of a root: what is fixed to another body is merged with it.
+    /// No degree of freedom; roots only, since a solid fixed to another body is merged with it.
     Fixed,
-    /// A turn about an axis.
+    /// Rotation about an axis.
     Revolute(Revolute),
-    /// A displacement along an axis.
+    /// Translation along an axis.
     Prismatic(Prismatic),
     /// Any rotation about a point.
     Spherical(Spherical),
 }
 
 impl Joint {
-    /// Number of velocities of its own: 0 of a coupled joint.
+    /// Number of its own velocities; 0 for a coupled joint.
     #[must_use]
     pub fn nv(&self) -> usize {
         match self {
@@ -61,8 +61,8 @@ impl Joint {
         }
     }
 
-    /// Number of [`Motion`]s: one a velocity beyond those of a free base, and one of a coupled
-    /// joint.
+    /// Number of [`Motion`]s: one per velocity, not counting those of a free base, and one for a
+    /// coupled joint.
     #[must_use]
     pub fn n_motions(&self) -> usize {
         match self {
@@ -94,7 +94,7 @@ impl Joint {
         }
     }
 
-    /// How it follows another joint, where it does.
+    /// The coupling of a joint that follows another.
     #[inline]
     #[must_use]
     pub fn coupling(&self) -> Option<&Coupling> {
@@ -102,18 +102,18 @@ impl Joint {
     }
 }
 
-/// Where the one coordinate of a revolute or prismatic joint comes from.
+/// Source of the single coordinate of a revolute or prismatic joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coordinate {
-    /// Number of the joint in [`Configuration::joints`](super::Configuration::joints): its own, or
-    /// the one that it follows.
+    /// Index of the joint in [`Configuration::joints`](super::Configuration::joints): itself, or
+    /// the joint that it follows.
     pub joint: usize,
-    /// How it follows that joint; none where the coordinate is its own.
+    /// How it follows that joint; `None` if the coordinate is its own.
     pub coupling: Option<Coupling>,
 }
 
 impl Coordinate {
-    /// Its value: rad or m.
+    /// Its value, rad or m.
     #[inline]
     #[must_use]
     pub fn of(&self, joints: &[f64]) -> f64 {
@@ -121,14 +121,14 @@ impl Coordinate {
         self.coupling.as_ref().map_or(own, |c| c.value(own))
     }
 
-    /// Its rate at the velocity that it has or follows: rad/s or m/s.
+    /// Its rate, rad/s or m/s, from its own velocity or the one that it follows.
     #[inline]
     #[must_use]
     pub fn rate(&self, v: f64) -> f64 {
         self.coupling.as_ref().map_or(v, |c| c.ratio * v)
     }
 
-    /// Number of velocities of its own.
+    /// Number of its own velocities.
     #[must_use]
     pub fn nv(&self) -> usize {
         usize::from(self.coupling.is_none())

@@ -1,21 +1,21 @@
-//! The screw of a joint's velocity.
+//! The screw of a joint velocity.
 
 use std::ops::{Add, Mul};
 
 use nalgebra::Vector3;
 
-/// What a unit of one joint velocity gives to all that the joint carries: a turn about an axis, a
-/// displacement, or both.
+/// Motion that a unit of one joint velocity imparts to everything the joint carries: a rotation
+/// about an axis, a translation, or both.
 ///
-/// World axes; places are relative to the origin of the tree's places
+/// World axes; positions are relative to the reference origin of the tree
 /// ([`Kinematics::origin`](crate::multibody::Kinematics::origin)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     kind: Kind,
-    /// Angular velocity; of a slide its velocity.
+    /// Angular velocity; for a translation, the linear velocity.
     axis: Vector3<f64>,
-    /// Of a turn a point of its axis, of a screw the velocity of the material point at the origin
-    /// of places.
+    /// For a rotation, a point on its axis; for a screw, the velocity of the material point at the
+    /// reference origin.
     place: Vector3<f64>,
 }
 
@@ -33,7 +33,7 @@ impl Default for Motion {
 }
 
 impl Motion {
-    /// About an axis (a unit vector unless the joint follows another) through a place (m).
+    /// Rotation about an axis (a unit vector unless the joint follows another) through a point (m).
     #[inline]
     #[must_use]
     pub fn turn(axis: Vector3<f64>, place: Vector3<f64>) -> Self {
@@ -44,7 +44,7 @@ impl Motion {
         }
     }
 
-    /// Along an axis (a unit vector unless the joint follows another).
+    /// Translation along an axis (a unit vector unless the joint follows another).
     #[inline]
     #[must_use]
     pub fn slide(axis: Vector3<f64>) -> Self {
@@ -55,22 +55,22 @@ impl Motion {
         }
     }
 
-    /// Axis of a turn or a slide.
+    /// Axis of a rotation or translation.
     #[inline]
     #[must_use]
     pub fn axis(&self) -> &Vector3<f64> {
         &self.axis
     }
 
-    /// Angular velocity, and velocity of the material point at the origin of places, per unit of
-    /// the velocity.
+    /// Angular velocity, and linear velocity of the material point at the reference origin, per
+    /// unit of the joint velocity.
     #[inline]
     #[must_use]
     pub fn twist(&self) -> (Vector3<f64>, Vector3<f64>) {
         self.twist_if::<false>()
     }
 
-    /// The same; where `TURN` the motion must be a turn, and there is no branch.
+    /// The same. With `TURN` the motion must be a rotation, and there is no branch.
     #[inline]
     pub(crate) fn twist_if<const TURN: bool>(&self) -> (Vector3<f64>, Vector3<f64>) {
         match self.kind {
@@ -80,14 +80,14 @@ impl Motion {
         }
     }
 
-    /// Velocity of the material point at `x` per unit of the velocity.
+    /// Velocity of the material point at `x` per unit of the joint velocity.
     #[inline]
     #[must_use]
     pub fn velocity_at(&self, x: &Vector3<f64>) -> Vector3<f64> {
         self.velocity_if::<false>(x)
     }
 
-    /// The same; where `TURN` the motion must be a turn, and there is no branch.
+    /// The same. With `TURN` the motion must be a rotation, and there is no branch.
     #[inline]
     pub(crate) fn velocity_if<const TURN: bool>(&self, x: &Vector3<f64>) -> Vector3<f64> {
         match self.kind {
@@ -97,15 +97,15 @@ impl Motion {
         }
     }
 
-    /// Generalized force on the velocity of a force (N) and its moment about the origin of places
-    /// (N m).
+    /// Generalized force on the joint velocity due to a force (N) and its moment about the
+    /// reference origin (N m).
     #[inline]
     #[must_use]
     pub fn power(&self, force: &Vector3<f64>, moment: &Vector3<f64>) -> f64 {
         self.power_if::<false>(force, moment)
     }
 
-    /// The same; where `TURN` the motion must be a turn, and there is no branch.
+    /// The same. With `TURN` the motion must be a rotation, and there is no branch.
     #[inline]
     pub(crate) fn power_if<const TURN: bool>(
         &self,

@@ -1,4 +1,4 @@
-//! Prismatic joint: a displacement along an axis fixed in parent and child.
+//! Prismatic joint: translation along an axis fixed in parent and child.
 
 use super::{Coordinate, JointAxis};
 

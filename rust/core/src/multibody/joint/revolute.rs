@@ -1,4 +1,4 @@
-//! Revolute joint: a turn about an axis fixed in parent and child.
+//! Revolute joint: rotation about an axis fixed in parent and child.
 
 use super::{Coordinate, JointAxis};
 

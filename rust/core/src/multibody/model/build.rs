@@ -1,4 +1,4 @@
-//! From a description to bodies, frames, wheels and boxes.
+//! Builds bodies, frames, wheels and boxes from a description.
 
 use std::collections::HashMap;
 
@@ -19,7 +19,8 @@ use crate::multibody::joint::{
 };
 use crate::spatial::{SymmetricMatrix3, exp_rotation};
 
-/// Mass, first moment and inertia about the body frame's origin, while solids are merged.
+/// Mass, first moment, and inertia about the body frame's origin, accumulated while solids are
+/// merged.
 #[derive(Clone, Default)]
 struct Lump {
     mass: f64,
@@ -27,7 +28,7 @@ struct Lump {
     inertia: Matrix3<f64>,
 }
 
-/// A model that grows solid by solid.
+/// A model under construction, one solid at a time.
 #[derive(Default)]
 struct Builder {
     bodies: Vec<Body>,
@@ -140,7 +141,7 @@ impl Model {
 }
 
 impl Builder {
-    /// The frame of a solid: of a new body, or fixed to one.
+    /// The frame of a solid: that of a new body, or one fixed to an existing body.
     fn frame_of(
         &mut self,
         i: usize,
@@ -179,7 +180,7 @@ impl Builder {
         let mut position = place.map_or(given, |(_, position, _)| position);
         let mut rotation = place.map_or_else(|| turn.unwrap_or_else(Matrix3::identity), |p| p.2);
         let joint = match lock {
-            // A root: its lock is its place in the world.
+            // The lock of a root is its position in the world.
             Some(lock) => {
                 let displacement;
                 (displacement, rotation) = lock.place(&rotation);
@@ -272,7 +273,7 @@ impl Builder {
             offset: coupled.offset,
             combined: None,
         };
-        // Springs, dampers and rotors of a joint that follows another act on that one.
+        // Springs, dampers and rotors of a coupled joint act on the joint that it follows.
         let passive = Passive::of(solid).seen_through(&coupling);
         self.joints[joint].passive = self.joints[joint].passive.with(&passive);
         Ok(Coordinate {
@@ -281,7 +282,7 @@ impl Builder {
         })
     }
 
-    /// Adds mass and shapes of a solid to the body that its frame is fixed to.
+    /// Adds the mass and shapes of a solid to the body that carries its frame.
     fn carry(&mut self, solid: &SolidDescription, frame: Frame) -> Result<(), ModelError> {
         let own = solid.mass_properties()?;
         let centre = frame.position + frame.rotation * own.centre;
@@ -304,7 +305,7 @@ impl Builder {
         Ok(())
     }
 
-    /// Adds a part that touches, of the solid with this frame; its place is in the body's.
+    /// Adds a collision part of the solid with this frame, positioned in the body's frame.
     fn touch_with(
         &mut self,
         shape: &Shape,
@@ -345,7 +346,7 @@ impl Builder {
                 body.principal_inertia = eigen.eigenvalues;
                 let mut axes = eigen.eigenvectors;
                 if axes.determinant() < 0.0 {
-                    // Left-handed axes would turn the gyroscopic moment round.
+                    // Left-handed axes would reverse the gyroscopic moment.
                     axes.column_mut(0).neg_mut();
                 }
                 body.principal_axes = Some(axes);
@@ -388,7 +389,7 @@ fn wheels(
     frames: &[Frame],
     bodies: &[Body],
 ) -> Vec<Wheel> {
-    // A joint that follows another one has no torque of its own.
+    // A coupled joint has no torque of its own.
     let own = |body: &Body| {
         let coordinate = body.joint.coordinate();
         coordinate.filter(|c| c.coupling.is_none()).map(|c| c.joint)
@@ -421,7 +422,7 @@ fn wheels(
     wheels
 }
 
-/// Some unit vector perpendicular to a unit vector.
+/// An arbitrary unit vector perpendicular to a given unit vector.
 fn perpendicular(axle: &Vector3<f64>) -> Vector3<f64> {
     let e = if axle.x.abs() < 0.7 {
         Vector3::x()

@@ -1,4 +1,4 @@
-//! The same machine with some of its data changed.
+//! Copies of a machine with some of its data changed.
 
 use super::Model;
 use crate::multibody::description::JointKind;
@@ -7,12 +7,12 @@ use crate::multibody::error::ModelError;
 use crate::multibody::motor::Motor;
 
 impl Model {
-    /// The same machine with joints locked at angles (rad) or displacements (m): their solids are
-    /// merged and the coordinates gone.
+    /// A copy with joints locked at angles (rad) or displacements (m): their solids are merged and
+    /// their coordinates removed.
     ///
     /// # Errors
-    /// `UnknownName` for a joint that is not there or has no single coordinate, `NotFinite` for an
-    /// angle that is not finite, `CoupledApart` where another joint follows one of these.
+    /// `UnknownName` for a joint that does not exist or has no single coordinate, `NotFinite` for
+    /// an angle that is not finite, `CoupledApart` if another joint follows one of these.
     pub fn with_locked_joints(&self, joints: &[(String, f64)]) -> Result<Self, ModelError> {
         let mut description = self.description.clone();
         for (i, (name, angle)) in joints.iter().enumerate() {
@@ -31,12 +31,12 @@ impl Model {
         Self::build(description)
     }
 
-    /// The same machine with wheels of another radius (m): the shape, its inertia and the contact
-    /// change together. Of several shapes the wheel's disc changes. An inertia that the description
-    /// states is scaled by the square of the radius.
+    /// A copy with another wheel radius (m): shape, inertia and contact radius change together. If
+    /// the solid has several shapes, the wheel's disc changes. An inertia stated in the description
+    /// is scaled by the square of the radius.
     ///
     /// # Errors
-    /// `NotADisc` for a wheel whose solid has another shape; a radius out of its range.
+    /// `NotADisc` for a wheel whose solid has another shape; a radius out of range.
     pub fn with_wheel_radius(&self, radius: f64) -> Result<Self, ModelError> {
         let mut description = self.description.clone();
         length("wheel_radius", radius)?;
@@ -61,11 +61,11 @@ impl Model {
         Self::from_description(description)
     }
 
-    /// The same machine whose wheels touch the ground at another radius (m) than their discs':
-    /// masses, inertias and looks stay.
+    /// A copy whose wheels touch the ground at a radius (m) other than that of their discs. Masses,
+    /// inertias and appearance stay the same.
     ///
     /// # Errors
-    /// A radius out of its range.
+    /// A radius out of range.
     pub fn with_contact_radius(&self, radius: f64) -> Result<Self, ModelError> {
         let mut description = self.description.clone();
         length("contact_radius", radius)?;
@@ -75,10 +75,10 @@ impl Model {
         Self::from_description(description)
     }
 
-    /// The same machine with another torque–speed line, or none, on all wheels.
+    /// A copy with another torque–speed line, or none, on all wheels.
     ///
     /// # Errors
-    /// `NotPositive` or `NotFinite` for a torque or a speed that is none.
+    /// `NotPositive` or `NotFinite` for an invalid torque or speed.
     pub fn with_motors(&self, motor: Option<Motor>) -> Result<Self, ModelError> {
         let mut description = self.description.clone();
         for wheel in &mut description.wheels {

@@ -1,8 +1,8 @@
 //! The checked, immutable model: moving bodies, their trees, wheels and frames.
 //!
-//! Built once from a [`ModelDescription`], shared between threads, never changed. A locked (welded)
-//! or fixed joint leaves no trace: the inertia of its solid is merged into the body that carries it
-//! and its coordinate is gone from every matrix.
+//! A model is built once from a [`ModelDescription`], shared between threads and never changed.
+//! Locked (welded) and fixed joints are eliminated: the inertia of the solid is merged into the
+//! body that carries it, and the coordinate disappears from every matrix.
 
 mod build;
 mod edit;
@@ -26,38 +26,38 @@ use super::error::ModelError;
 use super::joint::{Joint, free};
 use super::state::Configuration;
 
-/// Most solids of a model, and most wheels and tags: beyond it a step costs seconds and matrices
-/// gigabytes.
+/// Largest number of solids in a model, and of wheels and tags. Beyond it a step takes seconds and
+/// matrices take gigabytes.
 pub const MAX_SOLIDS: usize = 1000;
 
-/// Most shapes that the solids of a model list, all together.
+/// Largest total number of shapes in a model.
 pub const MAX_SHAPES: usize = 4000;
 
-/// Velocities of a free base, with which every path of its tree begins.
+/// Number of velocities of a free base. Every path of its tree starts with them.
 pub const BASE: usize = free::NV;
 
-/// A moving body: one or several solids fixed to each other, under one joint.
+/// A moving body: one or several rigidly connected solids, carried by one joint.
 #[derive(Clone, Debug)]
 pub struct Body {
-    /// Name of its first solid, and of its joint.
+    /// Name of its first solid and of its joint.
     pub name: String,
-    /// Index of the body that carries it; none for a root.
+    /// Index of the body that carries it; `None` for a root.
     pub parent: Option<usize>,
     /// Index of its tree.
     pub tree: usize,
-    /// Joint's origin in the parent's frame, m; a root's in the world.
+    /// Joint origin in the parent's frame, m; in the world for a root.
     pub position: Vector3<f64>,
-    /// Fixed rotation from the joint's frame to the parent's, where there is one.
+    /// Fixed rotation from the joint's frame to the parent's; `None` for the identity.
     pub rotation: Option<Matrix3<f64>>,
-    /// What moves it relative to its parent.
+    /// The joint between its parent and it.
     pub joint: Joint,
-    /// Its joint's first velocity: its own or, of a coupled joint, the one that it follows.
+    /// Index of its joint's first velocity; for a coupled joint, of the velocity that it follows.
     pub velocity: usize,
-    /// Its joint's first motion, and their number.
+    /// Index of its joint's first motion, and the number of motions.
     pub motion: usize,
     /// See [`Self::motions`].
     pub n_motions: usize,
-    /// Whether its joint follows another.
+    /// Whether its joint follows another joint.
     pub is_coupled: bool,
     /// kg.
     pub mass: f64,
@@ -65,15 +65,16 @@ pub struct Body {
     pub centre_of_mass: Vector3<f64>,
     /// Principal moments about the mass centre, kg m².
     pub principal_inertia: Vector3<f64>,
-    /// Principal axes as columns, in the body's frame; none where they are the frame's.
+    /// Principal axes as columns, in the body's frame; `None` if they are the frame's axes.
     pub principal_axes: Option<Matrix3<f64>>,
-    /// Whether turning about its own joint changes nothing but its looks: an axisymmetric body
-    /// about its own axis, with nothing on it but wheels of the same axle. A step need not turn it.
+    /// Whether a rotation about its own joint changes only its appearance: an axisymmetric body
+    /// that spins about its axis of symmetry and carries only wheels on the same axle. A step need
+    /// not rotate it.
     pub is_spinner: bool,
 }
 
 impl Body {
-    /// Whether its mass centre is its frame's origin.
+    /// Whether its mass centre coincides with its frame's origin.
     #[inline]
     #[must_use]
     pub fn is_centred(&self) -> bool {
@@ -88,7 +89,7 @@ impl Body {
     }
 }
 
-/// Trees of bodies. Velocities in the order of the bodies: see [`super::joint`] for those of each
+/// Kinematic trees. Velocities are in the order of the bodies; [`super::joint`] lists those of each
 /// joint.
 #[derive(Clone, Debug)]
 pub struct Model {
@@ -102,11 +103,11 @@ pub struct Model {
     paths: Paths,
     joints: Vec<JointProperties>,
     joint_velocities: Vec<usize>,
-    /// Bodies whose joints follow others.
+    /// Bodies with coupled joints.
     coupled: Vec<usize>,
-    /// Velocities of joints with rotors, and the rotors' inertias.
+    /// Velocities of joints with rotors, and the rotor inertias.
     armatures: Vec<(usize, f64)>,
-    /// Joints with stops.
+    /// Indices of the joints with stops.
     limited: Vec<usize>,
     n_poses: usize,
     n_rotations: usize,
@@ -115,23 +116,23 @@ pub struct Model {
     /// Free and spherical joints, with their first velocities.
     rotating: Vec<(Joint, usize)>,
     mass: f64,
-    /// Velocity indices of the joints of spinners, and of all other joints that turn.
+    /// Velocity indices of the joints of spinners, and of all other joints that rotate.
     spinning: Vec<usize>,
     turning: Vec<usize>,
     fingerprint: u64,
 }
 
 impl Model {
-    /// Checks a description and builds the trees; joints that it locks have no coordinate.
+    /// Checks a description and builds the trees. Joints that it locks have no coordinate.
     ///
     /// # Errors
-    /// The first thing found wrong, naming its field.
+    /// The first invalid entry, named by its field.
     pub fn from_description(description: ModelDescription) -> Result<Self, ModelError> {
         check(&description)?;
         Self::build(description)
     }
 
-    /// The built-in rover of the report, 21 degrees of freedom.
+    /// The built-in rover of the report, with 21 degrees of freedom.
     ///
     /// # Panics
     /// If the built-in file is invalid, which the tests exclude.
@@ -143,7 +144,7 @@ impl Model {
         }
     }
 
-    /// The description that it was built from.
+    /// The description from which it was built.
     #[must_use]
     pub fn description(&self) -> &ModelDescription {
         &self.description
@@ -155,38 +156,38 @@ impl Model {
         &self.bodies
     }
 
-    /// Trees of bodies.
+    /// Kinematic trees.
     #[must_use]
     pub fn trees(&self) -> &[Tree] {
         &self.trees
     }
 
-    /// Frames of all solids, in the order of the description.
+    /// Frames of all solids, in description order.
     #[must_use]
     pub fn frames(&self) -> &[Frame] {
         &self.frames
     }
 
-    /// Wheels, in the order of the description.
+    /// Wheels, in description order.
     #[must_use]
     pub fn wheels(&self) -> &[Wheel] {
         &self.wheels
     }
 
-    /// Boxes that touch, in the order of the solids and their shapes.
+    /// Boxes that collide, in the order of the solids and their shapes.
     #[must_use]
     pub fn boxes(&self) -> &[CollisionBox] {
         &self.boxes
     }
 
-    /// Balls that touch, in the order of the solids and their shapes.
+    /// Balls that collide, in the order of the solids and their shapes.
     #[must_use]
     pub fn spheres(&self) -> &[CollisionSphere] {
         &self.spheres
     }
 
-    /// Whether parts of two bodies can touch: in one tree only where it has self-contact, and not
-    /// across a joint.
+    /// Whether parts of two bodies can touch. Within one tree this requires self-contact, and
+    /// bodies connected by a joint never touch.
     #[must_use]
     pub fn can_touch(&self, a: usize, b: usize) -> bool {
         let (first, second) = (&self.bodies[a], &self.bodies[b]);
@@ -194,14 +195,14 @@ impl Model {
         first.tree != second.tree || (self.description.self_contact && a != b && !is_joined)
     }
 
-    /// Number of velocities, of all joints together.
+    /// Number of velocities.
     #[inline]
     #[must_use]
     pub fn nv(&self) -> usize {
         self.paths.body_of_velocity.len()
     }
 
-    /// Number of joints with one coordinate of their own: revolute and prismatic ones that are
+    /// Number of joints with one coordinate of their own: revolute and prismatic joints that are
     /// neither locked nor coupled.
     #[inline]
     #[must_use]
@@ -209,13 +210,13 @@ impl Model {
         self.joints.len()
     }
 
-    /// Number of motions: see [`Self::motions`].
+    /// Number of motions; see [`Self::motions`].
     #[must_use]
     pub fn n_motions(&self) -> usize {
         self.paths.n_motions
     }
 
-    /// Number of poses of a configuration: the first body's, and those of all other free bodies.
+    /// Number of poses in a configuration: the first body's and those of all other free bodies.
     #[must_use]
     pub fn n_poses(&self) -> usize {
         self.n_poses
@@ -227,7 +228,7 @@ impl Model {
         self.n_rotations
     }
 
-    /// Whether it is one tree on a free base, as a rover is.
+    /// Whether it is a single tree on a free base, like a rover.
     #[inline]
     #[must_use]
     pub fn is_free_tree(&self) -> bool {
@@ -247,55 +248,56 @@ impl Model {
         self.mass
     }
 
-    /// Whether a joint is prismatic, so that its displacement adds to [`Tree::reach`].
+    /// Whether any joint is prismatic: its displacement adds to [`Tree::reach`].
     #[inline]
     #[must_use]
     pub fn has_slides(&self) -> bool {
         self.has_slides
     }
 
-    /// Whether every root is free and every other joint revolute and on its own, as a rover's are:
-    /// hot loops then run without a branch on the kind of joint.
+    /// Whether every root is free and every other joint is revolute and uncoupled, as in a rover.
+    /// Hot loops then run without a branch on the joint type.
     #[inline]
     #[must_use]
     pub fn only_turns(&self) -> bool {
         self.only_turns
     }
 
-    /// Free and spherical joints, which have quaternions, with their first velocities.
+    /// Free and spherical joints, whose coordinates are quaternions, with their first velocities.
     #[inline]
     #[must_use]
     pub fn rotating_joints(&self) -> &[(Joint, usize)] {
         &self.rotating
     }
 
-    /// Velocity indices of the joints whose turning changes only looks: see [`Body::is_spinner`].
+    /// Velocity indices of the joints whose rotation changes only the appearance; see
+    /// [`Body::is_spinner`].
     #[must_use]
     pub fn spinning_joints(&self) -> &[usize] {
         &self.spinning
     }
 
-    /// Velocity indices of all other joints that turn.
+    /// Velocity indices of all other joints that rotate.
     #[must_use]
     pub fn turning_joints(&self) -> &[usize] {
         &self.turning
     }
 
-    /// Bodies whose joints follow others.
+    /// Bodies with coupled joints.
     #[inline]
     #[must_use]
     pub fn coupled_bodies(&self) -> &[usize] {
         &self.coupled
     }
 
-    /// Velocities of joints with rotors, and the rotors' inertias (kg m² or kg).
+    /// Velocities of joints with rotors, and the rotor inertias (kg m² or kg).
     #[inline]
     #[must_use]
     pub fn armatures(&self) -> &[(usize, f64)] {
         &self.armatures
     }
 
-    /// Numbers of the joints with stops.
+    /// Indices of the joints with stops.
     #[inline]
     #[must_use]
     pub fn limited_joints(&self) -> &[usize] {
@@ -309,36 +311,36 @@ impl Model {
         self.paths.path(b)
     }
 
-    /// Velocity indices from the root to velocity `k` itself.
+    /// Velocity indices from the root up to and including velocity `k`.
     #[inline]
     #[must_use]
     pub(crate) fn velocity_path(&self, k: usize) -> &[usize] {
         self.paths.velocity_path(k)
     }
 
-    /// Longest path: the stride of everything that is stored along paths.
+    /// Length of the longest path: the stride of all arrays stored along paths.
     #[inline]
     #[must_use]
     pub fn path_stride(&self) -> usize {
         self.paths.stride
     }
 
-    /// How many leading path entries two bodies share.
+    /// Number of leading path entries that two bodies share.
     #[inline]
     #[must_use]
     pub fn common_path(&self, a: usize, b: usize) -> usize {
         self.paths.common(a, b)
     }
 
-    /// How many velocities of a free base begin the path of body `b`: 6, or 0 in a tree without
-    /// one.
+    /// Number of velocities of a free base at the start of body `b`'s path: 6, or 0 in a tree
+    /// without a free base.
     #[inline]
     #[must_use]
     pub fn lead(&self, b: usize) -> usize {
         self.paths.lead(b)
     }
 
-    /// Body whose joint has velocity `k`.
+    /// The body whose joint has velocity `k`.
     #[inline]
     #[must_use]
     pub fn body_of_velocity(&self, k: usize) -> usize {
@@ -353,8 +355,8 @@ impl Model {
         self.paths.split(b)
     }
 
-    /// The motions ([`Kinematics::motions`](super::Kinematics::motions)) that the velocities of
-    /// body `b`'s path beyond its [`Self::lead`] give it, in the order of the path.
+    /// The motions ([`Kinematics::motions`](super::Kinematics::motions)) that move body `b`, one
+    /// for each velocity of its path beyond [`Self::lead`], in path order.
     #[inline]
     #[must_use]
     pub fn motions(&self, b: usize) -> &[usize] {
@@ -369,14 +371,14 @@ impl Model {
         &self.joints
     }
 
-    /// Energy of all springs in a configuration, J.
+    /// Energy stored in all springs at a configuration, J.
     #[must_use]
     pub fn spring_energy(&self, q: &Configuration) -> f64 {
         let joints = self.joints.iter().zip(&q.joints);
         joints.map(|(joint, q)| joint.passive.potential(*q)).sum()
     }
 
-    /// Number of a joint by name: its index in [`Self::joints`].
+    /// Index of a joint in [`Self::joints`], by name.
     #[must_use]
     pub fn joint_index(&self, name: &str) -> Option<usize> {
         let mut joints = self.joints.iter();
@@ -397,14 +399,15 @@ impl Model {
         self.joint_velocities[joint]
     }
 
-    /// Gains with which a joint is held.
+    /// PD gains of a joint.
     #[must_use]
     pub fn hold(&self, joint: usize) -> Hold {
         self.joints[joint].hold
     }
 }
 
-/// FNV-1a over what tells models apart; the same on every machine and in every version.
+/// FNV-1a hash of the data that distinguishes models; the same on every machine and in every
+/// version.
 pub(crate) fn fingerprint(bytes: impl IntoIterator<Item = u8>) -> u64 {
     bytes.into_iter().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)

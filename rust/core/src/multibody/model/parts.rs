@@ -1,4 +1,4 @@
-//! What the bodies carry: frames of the solids, wheels, boxes.
+//! Parts carried by the bodies: frames of the solids, wheels, boxes and balls.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,7 +9,7 @@ use crate::multibody::motor::Motor;
 pub struct Frame {
     /// Name of the solid.
     pub name: String,
-    /// Body that carries it.
+    /// Index of the body that carries it.
     pub body: usize,
     /// Origin in the body's frame, m.
     pub position: Vector3<f64>,
@@ -17,7 +17,7 @@ pub struct Frame {
     pub rotation: Matrix3<f64>,
 }
 
-/// A wheel: disc of radius `radius` and no width, fixed to a body.
+/// A wheel: a disc of radius `radius` and zero width, fixed to a body.
 #[derive(Clone, Debug)]
 pub struct Wheel {
     /// Short name, such as `FL`.
@@ -28,8 +28,8 @@ pub struct Wheel {
     pub centre: Vector3<f64>,
     /// Unit axle in the body's frame.
     pub axle: Vector3<f64>,
-    /// A unit vector in the wheel's plane, body's frame: rolling direction where no other is
-    /// defined.
+    /// A unit vector in the wheel's plane, body's frame: the rolling direction when axle and normal
+    /// define none.
     pub spoke: Vector3<f64>,
     /// Contact radius, m.
     pub radius: f64,
@@ -37,17 +37,18 @@ pub struct Wheel {
     pub torque_limit: f64,
     /// 1 or −1: joint torque of a positive (forward) command.
     pub drive_sign: f64,
-    /// Torque–speed line of its motor, where it has one.
+    /// Torque–speed line of its motor, if any.
     pub motor: Option<Motor>,
-    /// Its own joint, by its number ([`Model::joint_index`](super::Model::joint_index)); none where it is locked.
+    /// Index of its own joint ([`Model::joint_index`](super::Model::joint_index)); `None` if it is
+    /// locked.
     pub joint: Option<usize>,
-    /// Its steering joint, by its number; none where there is none or it is locked.
+    /// Index of its steering joint; `None` if it has none or the joint is locked.
     pub steering: Option<usize>,
-    /// Largest steering set-point either way, rad.
+    /// Largest steering set-point in either direction, rad.
     pub steering_limit: f64,
 }
 
-/// A box that touches the ground and other bodies.
+/// A box that collides with the ground and with other bodies.
 #[derive(Clone, Debug)]
 pub struct CollisionBox {
     /// Body that carries it.
@@ -62,7 +63,7 @@ pub struct CollisionBox {
     pub half_size: Vector3<f64>,
 }
 
-/// A ball that touches the ground and other bodies.
+/// A ball that collides with the ground and with other bodies.
 #[derive(Clone, Debug)]
 pub struct CollisionSphere {
     /// Body that carries it.
@@ -71,6 +72,6 @@ pub struct CollisionSphere {
     pub name: String,
     /// Centre in the body's frame, m.
     pub centre: Vector3<f64>,
-    /// m.
+    /// Radius, m.
     pub radius: f64,
 }

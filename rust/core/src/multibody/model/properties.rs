@@ -1,5 +1,5 @@
-//! What a joint does by itself: springs, dampers, rotors and stops, its drive, and the gains with
-//! which it can be held.
+//! Passive and active elements of a joint: spring, damper, rotor, stops, drive, and the gains of
+//! its position control.
 
 use crate::multibody::description::{DriveDescription, Hold, Limits, SolidDescription};
 use crate::multibody::joint::Coupling;
@@ -9,15 +9,15 @@ use crate::multibody::joint::Coupling;
 pub struct JointProperties {
     /// The body that it moves.
     pub body: usize,
-    /// Its velocity.
+    /// Index of its velocity.
     pub velocity: usize,
-    /// Gains with which it is held.
+    /// PD gains of its position control.
     pub hold: Hold,
-    /// Its spring, damper and rotor, with those of all joints that follow it.
+    /// Its spring, damper and rotor, including those of all joints that follow it.
     pub passive: Passive,
     /// Its stops.
     pub limits: Option<Limits>,
-    /// Its drive, where it is no wheel's.
+    /// Its drive, unless it is a wheel's joint.
     pub drive: Option<DriveDescription>,
     /// Whether it has a spring or a damper.
     pub is_passive: bool,
@@ -37,7 +37,7 @@ pub struct Passive {
 }
 
 impl JointProperties {
-    /// Of the joint that carries a solid.
+    /// The passive elements of the joint that carries a solid.
     pub(super) fn of(body: usize, solid: &SolidDescription) -> Self {
         Self {
             body,
@@ -64,7 +64,7 @@ impl Passive {
         }
     }
 
-    /// What acts at a joint that another one leads, as the leading joint feels it.
+    /// Passive elements of a coupled joint, as felt by the joint that it follows.
     pub(super) fn seen_through(&self, coupling: &Coupling) -> Self {
         let Coupling { ratio, offset, .. } = *coupling;
         let square = ratio * ratio;
@@ -85,7 +85,7 @@ impl Passive {
         }
     }
 
-    /// Both at one joint. Two springs act as one between their places of rest.
+    /// Both in parallel at one joint. Two springs act as one, with a rest position between theirs.
     pub(super) fn with(&self, other: &Self) -> Self {
         let stiffness = self.stiffness + other.stiffness;
         let moment = self.stiffness * self.rest + other.stiffness * other.rest;
@@ -101,7 +101,7 @@ impl Passive {
         }
     }
 
-    /// Energy of the spring at a coordinate, J.
+    /// Energy stored in the spring at a coordinate, J.
     #[must_use]
     pub fn potential(&self, coordinate: f64) -> f64 {
         let stretch = coordinate - self.rest;

@@ -1,4 +1,4 @@
-//! Bodies whose own rotation is only looks.
+//! Bodies whose own rotation changes only their appearance.
 
 use std::collections::{HashMap, HashSet};
 
@@ -8,7 +8,7 @@ use super::Body;
 use super::parts::Wheel;
 use crate::multibody::joint::{Joint, JointAxis, Revolute};
 
-/// Finds the bodies whose own rotation is only looks.
+/// Finds the bodies whose own rotation changes only their appearance.
 pub(super) fn mark_spinners(
     bodies: &mut [Body],
     wheels: &[Wheel],

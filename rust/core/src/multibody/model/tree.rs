@@ -1,28 +1,28 @@
-//! Which velocities move which body: the paths of the trees.
+//! The paths of the trees: which velocities move which body.
 
 use std::ops::Range;
 
 use super::Body;
 use crate::multibody::joint::{Joint, Prismatic, Revolute, free};
 
-/// Bodies and velocities of a tree: one root and all that it carries.
+/// Bodies and velocities of a tree: one root and everything it carries.
 #[derive(Clone, Debug)]
 pub struct Tree {
     /// Its bodies; the first is the root.
     pub bodies: Range<usize>,
-    /// Its velocities; a free root's come first.
+    /// Its velocities; those of a free root come first.
     pub velocities: Range<usize>,
-    /// Whether its root is free: the tree's places are then relative to the root's origin, else to
-    /// the world's.
+    /// Whether its root is free. Positions in the tree are then relative to the root's origin,
+    /// otherwise to the world's.
     pub is_free: bool,
     /// kg.
     pub mass: f64,
-    /// How far a joint can be from the root at most, m, but for what prismatic joints add.
+    /// Largest distance of a joint from the root, m, without the displacements of prismatic joints.
     pub reach: f64,
 }
 
 impl Tree {
-    /// How many velocities of a free root begin every path: 6 or 0.
+    /// Number of velocities of a free root at the start of every path: 6 or 0.
     #[inline]
     #[must_use]
     pub fn lead(&self) -> usize {
@@ -30,35 +30,35 @@ impl Tree {
     }
 }
 
-/// Velocities and motions of all bodies, from the root on.
+/// Velocities and motions of all bodies, from the root outwards.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Paths {
-    /// Those of body `b`: `velocities[b * stride..]`, as many as its span says.
+    /// Those of body `b`: `velocities[b * stride..]`; the body's span holds their number.
     velocities: Vec<usize>,
     spans: Vec<Span>,
     leads: Vec<usize>,
     pub(super) stride: usize,
-    /// Of the velocities beyond the lead, in the same layout.
+    /// Motions of the velocities beyond the lead, in the same layout.
     motions: Vec<usize>,
     pub(super) n_motions: usize,
-    /// Body of each velocity, and where in its body's path the velocity stands.
+    /// Body of each velocity, and the position of the velocity in that body's path.
     pub(super) body_of_velocity: Vec<usize>,
     up_to_velocity: Vec<(usize, usize)>,
-    /// How many leading entries bodies `a` and `b` share: `common[a * n_bodies + b]`.
+    /// Number of leading entries that bodies `a` and `b` share: `common[a * n_bodies + b]`.
     common: Vec<usize>,
 }
 
-/// Where a body's path stands.
+/// Location of a body's path.
 #[derive(Clone, Copy, Debug)]
 struct Span {
     start: usize,
     length: usize,
-    /// How many velocities of a free root begin it, and the first of them.
+    /// Number of velocities of a free root at its start, and the first of them.
     lead: usize,
     first: usize,
 }
 
-/// Path of one body while the tree grows.
+/// Path of one body during construction.
 #[derive(Clone, Default)]
 struct Path {
     velocities: Vec<usize>,
@@ -66,8 +66,8 @@ struct Path {
 }
 
 impl Paths {
-    /// Numbers velocities and motions and writes the numbers into the bodies; the body of a
-    /// coupling that no path allows otherwise.
+    /// Numbers velocities and motions and writes the indices into the bodies. The error is the body
+    /// of a coupling that no path allows.
     pub(super) fn number(bodies: &mut [Body]) -> Result<Self, usize> {
         let mut paths = Self::default();
         let mut grown: Vec<Path> = Vec::with_capacity(bodies.len());
@@ -100,7 +100,7 @@ impl Paths {
         Ok(paths)
     }
 
-    /// Continues the path of a body whose joint follows another.
+    /// Continues the path of a body with a coupled joint.
     fn follow(
         &mut self,
         bodies: &mut [Body],
@@ -170,8 +170,8 @@ impl Paths {
             let Some(parent) = body.parent else {
                 continue; // Shares nothing with the trees before it.
             };
-            // A path ends with its own body, which no path of a body before it has, unless it
-            // follows one.
+            // A path ends with the body's own velocity, which occurs in no earlier path unless the
+            // body follows another.
             let own = &grown[parent].velocities.len();
             let follows = grown[a]
                 .velocities
