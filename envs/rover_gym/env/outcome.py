@@ -112,13 +112,13 @@ class Outcome:
 
 
 def _masked(values: dict[str, Any], n: int) -> dict[str, Any]:
-    """With a mask `_key` after each key: every rover has it."""
+    """Adds a mask `_key` after each key; every rover has the value."""
     masks = np.ones((len(values), n), np.bool_)
     return {name: value for i, key in enumerate(values) for name, value in ((key, values[key]), (f"_{key}", masks[i]))}
 
 
 def reset_outcome(task: Task, progress: Progress, reading: Array) -> Outcome:
-    """The outcome of one rover's reset: nothing has been earned."""
+    """The outcome of one rover's reset, with zero reward."""
     return Outcome(
         observation=progress.observation.copy(),
         reward=0.0,
