@@ -2,8 +2,8 @@
 
 A file describes itself: each data set has the attributes `unit` and `description` (and `columns` where its columns have
 names), and the file stores the scene, the ground, the seed, the versions and the solver settings. Rows are written to
-the disk during the run, and the file is consistent between flushes, so a run that is killed or fills the disk loses only
-its last rows. Reading checks a file's type, links, data types and sizes first.
+the disk during the run, and the file is consistent between flushes, so a run that is killed or fills the disk loses
+only its last rows. Reading checks a file's type, links, data types and sizes first.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Recorder:
     error, and the file stays as the previous flush left it. The file is locked until the recorder is closed.
 
     Args:
-        path: The file to create, along with its folder. An existing file is replaced unless it is being recorded or read.
+        path: The file to create, with its folder. An existing file is replaced unless it is being recorded or read.
         channels: The channels of a row.
         attributes: Metadata of the run, stored at the root: strings, numbers and arrays as they are, the rest as JSON;
             `describe` takes them from a simulation.

@@ -103,9 +103,9 @@ def film_rows(time: npt.NDArray[np.float64], fps: float) -> npt.NDArray[np.int64
         OptionError: `fps` is not a positive number.
     """
     fps = number("fps", fps, above=0.0)
-    frames = np.floor((time[-1] - time[0]) * fps + 1e-6)  # the tolerance keeps the last frame of a 2 s run that ends at 1.999999999 s
-    # Number of frame times k / fps before the midpoint between a sample and the next. Frames are not enumerated, because
-    # a damaged file may state an enormous duration.
+    frames = np.floor((time[-1] - time[0]) * fps + 1e-6)  # a 2 s run that ends at 1.999999999 s keeps its last frame
+    # Number of frame times k / fps before the midpoint between a sample and the next. Frames are not enumerated,
+    # because a damaged file may state an enormous duration.
     before = np.floor((0.5 * (time[1:] + time[:-1]) - time[0]) * fps) + 1.0
     before = np.append(np.minimum(before, frames + 1.0), frames + 1.0)
     return np.flatnonzero(np.diff(before, prepend=0.0) > 0.0)

@@ -145,7 +145,7 @@ class _Reader:
             self._check_chunks(field, data)
 
     def _check_chunks(self, field: str, data: h5py.Dataset) -> None:
-        """Refuses chunks of impossible offset or size: HDF5 reads a checksum past the end of chunks without one."""
+        """Refuses chunks of impossible offset or size: HDF5 reads a checksum even from a chunk too short for one."""
         whole = math.prod(data.chunks) * 8 + 4 * data.fletcher32
         packed = data.compression is not None
         wrong: list[int] = []

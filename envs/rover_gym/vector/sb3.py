@@ -101,7 +101,7 @@ class RoverVecEnv(VecEnv):
         return super().seed(check_seed(seed))
 
     def set_options(self, options: list[dict[str, Any]] | dict[str, Any] | None = None) -> None:
-        """Sets the `RoverEnv.reset` options of the next reset: one mapping for all rovers, or a list with one per rover.
+        """Sets the `RoverEnv.reset` options of the next reset: one mapping for all rovers, or a list of one per rover.
 
         Raises:
             OptionError: The options are neither, or one is unknown or out of range; nothing has changed.
