@@ -16,7 +16,7 @@ from rover_gym.env.wheels import N_ACTIONS, N_WHEELS
 from rover_gym.mechanics import RoverModel, StateError
 from rover_gym.validation import array, refuse
 
-# Scale per entry: m, rad/s, m. Forces are scaled by the mean wheel load, m g / 6.
+# Scales in m, rad/s and m. Forces are scaled by the mean wheel load, m g / 6.
 GAP_SCALE = 0.1
 WHEEL_RATE_SCALE = 10.0
 GOAL_SCALE = 10.0

@@ -22,7 +22,7 @@ def network_of(model: OnPolicyAlgorithm, normalisation: VecNormalize) -> Network
         raise TypeError(f"an actor-critic policy is needed, not {policy!r}")
     layers = [layer for layer in policy.mlp_extractor.policy_net if isinstance(layer, torch.nn.Linear)]
     layers.append(policy.action_net)  # type: ignore[arg-type]
-    statistics: Any = normalisation.obs_rms  # a RunningMeanStd, since observations are arrays and not dictionaries
+    statistics: Any = normalisation.obs_rms  # one set of statistics, since observations are no dictionaries
     return Network(
         mean=statistics.mean.astype(np.float32),
         deviation=np.sqrt(statistics.var + normalisation.epsilon).astype(np.float32),
