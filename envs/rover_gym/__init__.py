@@ -1,19 +1,19 @@
 """rover-gym: a nonsmooth simulator of a six-wheel Mars rover, with Gymnasium environments.
 
-The package stands in rooms. A room may use those above it in this list, never one below:
+The package consists of the subpackages below. Each one may import those above it, never those below it:
 
     mechanics      the compiled core: models, grounds, simulations, the contact solver
-    validation     arguments, refused by name
+    validation     argument checks, with errors that name the field
     extras         optional packages
-    rendering      what a rover looks like: frames and video
-    env            `Rover-v0`: its card, its arguments, a control period
-    vector         many rovers at once, for Gymnasium and for stable-baselines3
-    policy         who drives: the baseline, trained policies, how far each gets
-    planning       what a scene needs, and no more
+    rendering      images of a rover: frames and video
+    env            `Rover-v0`: its card, arguments and control period
+    vector         batches of rovers, for Gymnasium and for stable-baselines3
+    policy         the baseline, trained policies and their evaluation
+    planning       the cheapest model that a scene permits
     record         trajectories in HDF5
     planar         the planar systems: a ball, a two-wheel rover
     soil           granular soil
-    reproduction   the report of 2010, run again
+    reproduction   the experiments of the 2010 report
     replay         saved runs for the browser, VRML and glTF
     figures        figures of saved runs
     learning       training with stable-baselines3

@@ -1,26 +1,26 @@
-"""Optional packages: imported where they are needed; one that is missing names the extra that brings it."""
+"""Imports optional packages on demand; the error for a missing one names the extra that installs it."""
 
 from importlib import import_module
 from typing import Any
 
 
 class MissingExtraError(ImportError):
-    """A command needs packages that the base installation does not bring."""
+    """A feature needs a package that the base installation does not include."""
 
     def __init__(self, package: str, extra: str) -> None:
-        """Names the package that is missing and the extra that brings it."""
+        """Creates the error for a missing package and the extra that installs it."""
         super().__init__(f"{package} is not installed: pip install 'rover-gym[{extra}]'", name=package)
 
 
 def require(package: str, extra: str) -> Any:
-    """Imports a package.
+    """Imports an optional package.
 
     Args:
-        package: Its name for `import`.
-        extra: The extra of rover-gym that brings it.
+        package: Its import name.
+        extra: The rover-gym extra that installs it.
 
     Raises:
-        MissingExtraError: It is not installed.
+        MissingExtraError: The package is not installed.
     """
     try:
         return import_module(package)

@@ -1,8 +1,8 @@
-"""The mechanics: models, grounds, simulations and the contact solver, as the compiled core has them.
+"""The compiled core: models, grounds, simulations and the contact solver.
 
-Everything here is compiled from Rust; `rover_gym._core`, where it is compiled into, is nobody's business but this
-module's. Lengths are in m, masses in kg, times in s, angles in rad. The world has x forward, y up and z to the right;
-wheels are listed FL, FR, ML, BL, MR, BR.
+Everything here is written in Rust and re-exported from the private module `rover_gym._core`; import it from here.
+Lengths are in m, masses in kg, times in s, angles in rad. The world has x forward, y up and z to the right; wheels are
+listed FL, FR, ML, BL, MR, BR.
 """
 
 from rover_gym._core import (

@@ -11,13 +11,13 @@ from rover_gym.env.task import MAX_EPISODE_STEPS
 
 @dataclass(frozen=True)
 class Registration:
-    """What `gymnasium.make` needs to know of an environment.
+    """The registration of one environment with Gymnasium.
 
     Attributes:
-        entry_point: Its class, as "module:class".
-        vector_entry_point: The class of many of it, or None: then Gymnasium makes a vector of single ones.
+        entry_point: The environment's class, as "module:class".
+        vector_entry_point: The vector environment's class; with None, Gymnasium builds a vector of single environments.
         max_episode_steps: Steps until truncation.
-        arguments: Those that differ from the class' defaults.
+        arguments: Keyword arguments that differ from the class's defaults.
     """
 
     entry_point: str
@@ -35,7 +35,7 @@ ENVIRONMENTS: Mapping[str, Registration] = {
 
 
 def register_environments() -> None:
-    """Makes the environments known to `gymnasium.make`; a second call changes nothing."""
+    """Registers the environments for `gymnasium.make`; a second call changes nothing."""
     for name, known in ENVIRONMENTS.items():
         if name not in gym.registry:
             gym.register(

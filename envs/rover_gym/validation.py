@@ -1,7 +1,7 @@
-"""Arguments are refused here, with the field's name and the value that was given.
+"""Argument checks, whose errors name the field and carry the value.
 
-Every function returns the argument in its plain form (floats, tuples of floats) or raises one of
-the errors of the package, with `field` and `value` set.
+Every function returns the argument in its plain form (floats, tuples of floats) or raises one of the package's errors
+with `field` and `value` set.
 """
 
 import math
@@ -17,12 +17,12 @@ from rover_gym.mechanics import OptionError, RoverGymError
 
 Range: TypeAlias = tuple[float, float]
 
-#: Longest piece of a value that a message shows.
+#: A message shows at most this many characters of a value.
 SHOWN = 200
 
 
 def refuse(error: type[RoverGymError], field: str, value: object, reason: str) -> NoReturn:
-    """Raises `error`, which names the field and carries the value."""
+    """Raises `error` with a message that names the field, and with `field` and `value` set."""
     exception = error(f"{field}: {reason}, got {shown(value)}")
     exception.field = field
     exception.value = value
@@ -30,10 +30,10 @@ def refuse(error: type[RoverGymError], field: str, value: object, reason: str) -
 
 
 def shown(value: object) -> str:
-    """How a value looks in a message: whatever it is, and not too long."""
+    """Formats any value for a message, cut to `SHOWN` characters."""
     try:
-        text = repr(value.item() if isinstance(value, np.generic) else value)  # np.float64(0.5) is 0.5 to a reader
-    except Exception:  # an integer of thousands of digits, or whatever a class of somebody's raises
+        text = repr(value.item() if isinstance(value, np.generic) else value)  # show np.float64(0.5) as 0.5
+    except Exception:  # an integer of thousands of digits, or a user class whose repr raises
         text = f"a {type(value).__name__}"
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
@@ -47,12 +47,12 @@ def number(
     at_most: float | None = None,
     error: type[RoverGymError] = OptionError,
 ) -> float:
-    """A finite number within bounds, as a float."""
+    """Checks a finite number within bounds and returns it as a float."""
     if not _is_number(value):
         refuse(error, field, value, "must be a number")
     try:
         result = float(value)  # type: ignore[arg-type]
-    except (OverflowError, ValueError):  # an integer or a fraction beyond all floats, a signalling Decimal
+    except (OverflowError, ValueError):  # an integer or a fraction too large for a float, a signalling Decimal
         result = math.inf
     if not math.isfinite(result):
         refuse(error, field, value, "must be finite")
@@ -73,7 +73,7 @@ def whole(
     at_most: int | None = None,
     error: type[RoverGymError] = OptionError,
 ) -> int:
-    """A whole number within bounds, as an int; 2.0 is none."""
+    """Checks an integer within bounds and returns it as an int; 2.0 is refused."""
     if isinstance(value, (bool, np.timedelta64)) or not isinstance(value, (int, np.integer)) or value < at_least:
         refuse(error, field, value, f"must be a whole number from {at_least}")
     if at_most is not None and value > at_most:
@@ -82,14 +82,14 @@ def whole(
 
 
 def flag(field: str, value: object) -> bool:
-    """True or False."""
+    """Checks a bool and returns it."""
     if not isinstance(value, (bool, np.bool_)):
         refuse(OptionError, field, value, "must be True or False")
     return bool(value)
 
 
 def vector(field: str, value: object, size: int, *, error: type[RoverGymError] = OptionError) -> tuple[float, ...]:
-    """`size` finite numbers, as a tuple of floats."""
+    """Checks `size` finite numbers and returns them as a tuple of floats."""
     entries = _entries(value, size)
     if entries is None or len(entries) != size:
         refuse(error, field, value, f"must be {size} numbers")
@@ -97,16 +97,16 @@ def vector(field: str, value: object, size: int, *, error: type[RoverGymError] =
 
 
 def array(field: str, value: object, *, error: type[RoverGymError]) -> npt.NDArray[np.float64]:
-    """Numbers of any shape, finite or not, as an array of their own."""
-    if isinstance(value, range):  # short to write, and as long as can be
+    """Copies numbers of any shape, finite or not, into a float64 array."""
+    if isinstance(value, range):  # may be arbitrarily long
         refuse(error, field, value, "must be numbers")
     try:
         given = np.asarray(value)
-    except Exception:  # a ragged sequence, or whatever a class of somebody's raises
+    except Exception:  # a ragged sequence, or a user class that raises
         refuse(error, field, value, "must be numbers")
     if given.dtype.kind not in "fiu":
         refuse(error, field, value, "must be numbers")
-    with np.errstate(over="ignore"):  # long doubles beyond all floats become infinite
+    with np.errstate(over="ignore"):  # long doubles out of float64's range become infinite
         return given.astype(np.float64)
 
 
@@ -118,7 +118,7 @@ def span(
     at_least: float | None = None,
     at_most: float | None = None,
 ) -> Range:
-    """A number, or a pair (low, high) to sample from: always returned as (low, high)."""
+    """Checks a number or a sampling range (low, high) and returns it as (low, high)."""
     if _is_number(value):
         single = number(field, value, above=above, at_least=at_least, at_most=at_most)
         return (single, single)
@@ -134,7 +134,7 @@ def span(
 
 
 def mapping(field: str, value: object) -> Mapping[str, Any]:
-    """A mapping, or none as an empty one."""
+    """Checks a mapping and returns it; None gives an empty one."""
     if value is None:
         return {}
     if not isinstance(value, Mapping):
@@ -143,7 +143,7 @@ def mapping(field: str, value: object) -> Mapping[str, Any]:
 
 
 def known_keys(field: str, value: Iterable[object], known: Iterable[str]) -> None:
-    """Refuses the first key that is not known."""
+    """Refuses the first unknown key."""
     names = tuple(known)
     for key in value:
         if not isinstance(key, str) or key not in names:
@@ -152,7 +152,7 @@ def known_keys(field: str, value: Iterable[object], known: Iterable[str]) -> Non
 
 
 def _is_number(value: object) -> bool:
-    """Whether it is a real number: no truth value, time, complex number, text, array or None."""
+    """Whether the value is a real number; bools, times, complex numbers, text, arrays and None are not."""
     if isinstance(value, (float, int)):
         return not isinstance(value, bool)
     if isinstance(value, np.generic):
@@ -161,12 +161,12 @@ def _is_number(value: object) -> bool:
 
 
 def _entries(value: object, most: int) -> list[object] | None:
-    """The entries of something that has an order and at most so many of them."""
+    """The entries of an ordered collection, or None if the value is not one or has more than `most`."""
     if isinstance(value, (str, bytes, bytearray, memoryview, Mapping, Set)):
         return None
     if not isinstance(value, Iterable) or not isinstance(value, Sized):
         return None
     try:
         return list(value) if len(value) <= most else None
-    except TypeError:  # a numpy array without dimensions
+    except TypeError:  # a zero-dimensional NumPy array
         return None

@@ -1,4 +1,4 @@
-"""The environment `Rover-v0`: its card and arguments, its task, and what a control period comes to."""
+"""The environment `Rover-v0`: its card and arguments, its task, and its control period."""
 
 from rover_gym.env.arguments import ARGUMENTS, Argument, RoverArguments
 from rover_gym.env.env_snapshot import EnvSnapshot

@@ -1,7 +1,7 @@
-"""What an argument of the environment may be: checks that say so, and refuse everything else by name.
+"""Checks of the environment's arguments.
 
 A check is called with the argument's name and value. It returns the value in its plain form or raises one of the
-package's errors; as a string it is what the card prints under "may be".
+package's errors. Its string form is what the card prints under "may be".
 """
 
 import math
@@ -27,10 +27,10 @@ SOLVER_OPTIONS = (
     "warm_start",
 )
 
-#: Steeper ground than this is a wall to a wheel.
+#: Largest slope; a wheel treats steeper ground as a wall.
 MAX_SLOPE_DEG = 60.0
 
-#: Ranges far beyond any rover, within which all sums stay finite: m, m/s2, factors, and the rest as named.
+#: Ranges far beyond any real rover, within which all sums stay finite: distances in m, gravities in m/s2, and factors.
 MAX_DISTANCE = 1e6
 MAX_FRICTION = 1e3
 GRAVITIES = (1e-3, 1e3)
@@ -41,20 +41,20 @@ MIN_STEERING_DEG = 0.01
 
 
 def shortest(value: float) -> str:
-    """A number as the card prints it: 60 for 60.0, 1e6 for a million."""
+    """Formats a number as the card prints it: 60 for 60.0, 1e6 for a million."""
     return re.sub(r"e([+-])0?", lambda found: "e" + found[1].replace("+", ""), f"{value:g}")
 
 
 @dataclass(frozen=True)
 class Number:
-    """A finite number within bounds."""
+    """Check of a finite number within bounds."""
 
     above: float | None = None
     at_least: float | None = None
     at_most: float | None = None
 
     def __call__(self, field: str, value: object) -> float:
-        """The number as a float."""
+        """Checks the number and returns it as a float."""
         return number(field, value, above=self.above, at_least=self.at_least, at_most=self.at_most)
 
     def __str__(self) -> str:
@@ -66,10 +66,10 @@ class Number:
 
 @dataclass(frozen=True)
 class NumberOrRange(Number):
-    """A finite number within bounds, or a pair (low, high) of them to draw from."""
+    """Check of a finite number within bounds, or of a range (low, high) to draw from."""
 
     def __call__(self, field: str, value: object) -> Range:  # type: ignore[override] # a number is a range of one
-        """The range, of one number where one was given."""
+        """Checks the value and returns the range; a single number gives both ends."""
         return span(field, value, above=self.above, at_least=self.at_least, at_most=self.at_most)
 
     def __str__(self) -> str:
@@ -78,13 +78,13 @@ class NumberOrRange(Number):
 
 @dataclass(frozen=True)
 class Special:
-    """A check in the words of its own function."""
+    """A check by a function of its own, with the words that the card prints."""
 
     words: str
     check: Callable[[str, Any], Any]
 
     def __call__(self, field: str, value: object) -> Any:
-        """The value, checked."""
+        """Checks the value and returns it."""
         return self.check(field, value)
 
     def __str__(self) -> str:
@@ -92,14 +92,14 @@ class Special:
 
 
 def check_terrain(field: str, value: object) -> str | SphereField:
-    """The name of a terrain, or a field of spheres."""
+    """Checks the name of a terrain, or a field of spheres."""
     if not (isinstance(value, SphereField) or (isinstance(value, str) and value in TERRAINS)):
         refuse(TerrainError, field, value, f"unknown; known are {', '.join(TERRAINS)} and a SphereField")
     return value
 
 
 def check_gravity(field: str, value: object) -> tuple[float, ...]:
-    """(3,) m/s2, not so weak or strong that a rover could not stand."""
+    """Checks gravity `(3,)`, m/s2, whose magnitude must allow a rover to stand."""
     gravity = vector(field, value, 3)
     magnitude = math.hypot(*gravity)
     if not magnitude > 0.0:
@@ -110,7 +110,7 @@ def check_gravity(field: str, value: object) -> tuple[float, ...]:
 
 
 def check_model(field: str, value: object) -> RoverModel:
-    """A model that has what the action drives."""
+    """Checks a model, which must have the wheels and steering joints that actions drive."""
     if not isinstance(value, RoverModel):
         refuse(ModelError, field, value, "must be a RoverModel")
     for name, indices in (
@@ -123,14 +123,14 @@ def check_model(field: str, value: object) -> RoverModel:
 
 
 def check_solver_options(field: str, value: object) -> Mapping[str, Any]:
-    """Options by their names; the core checks their values."""
+    """Checks the names of solver options; the core checks their values."""
     options = mapping(field, value)
     known_keys(field, options, SOLVER_OPTIONS)
     return options
 
 
 def check_reward_weights(field: str, value: object) -> dict[str, float]:
-    """The weight of every term, those that are given instead of the default ones."""
+    """Checks reward weights and fills in the defaults of the terms not given."""
     weights = dict(rewards.WEIGHTS)
     for name, weight in mapping(field, value).items():
         known_keys(field, (name,), rewards.WEIGHTS)

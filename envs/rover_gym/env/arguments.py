@@ -1,7 +1,7 @@
-"""The arguments of the environment, listed once.
+"""The arguments of the environment, defined in one list.
 
-`RoverArguments` is that list: the name, the type, the default, the unit, what each may be and what it means. All else
-is made from it: the signatures of `RoverEnv` and of the vector environments, the checks, and the table of the card.
+`RoverArguments` gives each argument's name, type, default, unit, allowed values and meaning. The signatures of
+`RoverEnv` and of the vector environments, the checks, and the card's table are generated from it.
 """
 
 import inspect
@@ -37,13 +37,13 @@ C = TypeVar("C", bound=type)
 
 @dataclass(frozen=True)
 class Argument:
-    """What is known of one argument.
+    """The specification of one argument.
 
     Attributes:
-        default: Its default. Where that is None, None is allowed, and passes unchecked.
-        check: What it may be.
-        meaning: What it means, in a few words.
-        unit: SI, "deg", or "" for a pure number or none.
+        default: Default value. If it is None, None is allowed and passes unchecked.
+        check: Check of the allowed values.
+        meaning: Meaning, in a few words.
+        unit: SI unit or "deg"; "" for a pure number or a value without unit.
     """
 
     default: Any
@@ -193,13 +193,13 @@ class RoverArguments(TypedDict, total=False):
 
 
 def _listed() -> Iterator[tuple[str, Any, Argument]]:
-    """Name, type and `Argument` of each, in the order of the list."""
+    """Yields name, type and `Argument` of each argument, in the order of the list."""
     for name, hint in get_type_hints(RoverArguments, include_extras=True).items():
         kind, argument = get_args(hint)
         yield name, kind, argument
 
 
-#: What is known of each argument, by name.
+#: Specification of each argument, by name.
 ARGUMENTS: Mapping[str, Argument] = {name: argument for name, _, argument in _listed()}
 
 PARAMETERS = tuple(
@@ -209,15 +209,15 @@ PARAMETERS = tuple(
 
 
 def check_arguments(caller: str, given: Mapping[str, object]) -> dict[str, Any]:
-    """Every argument in its plain form, the default where none is given.
+    """Checks all arguments, fills in defaults, and returns the values in their plain form.
 
     Args:
-        caller: The class whose arguments they are.
-        given: By name.
+        caller: Class name for error messages.
+        given: The arguments, by name.
 
     Raises:
         TypeError: A name is unknown.
-        RoverGymError: A value is out of its range; `field` names the argument.
+        RoverGymError: A value is out of range; `field` names the argument.
     """
     for name in given:
         if name not in ARGUMENTS:
@@ -230,7 +230,7 @@ def check_arguments(caller: str, given: Mapping[str, object]) -> dict[str, Any]:
 
 
 def takes_arguments(function: F) -> F:
-    """Shows the list in the signature of a function that takes it as `**arguments`."""
+    """Replaces `**arguments` in a function's signature by the list."""
     own = inspect.signature(function)
     kept = [entry for entry in own.parameters.values() if entry.kind is not inspect.Parameter.VAR_KEYWORD]
     function.__signature__ = own.replace(parameters=[*kept, *PARAMETERS])  # type: ignore[attr-defined]
@@ -238,8 +238,8 @@ def takes_arguments(function: F) -> F:
 
 
 def with_argument_table(cls: C) -> C:
-    """Puts the list as a table where a class' docstring says {arguments}."""
-    if cls.__doc__ is not None:  # under `python -OO` there is none
+    """Replaces {arguments} in a class's docstring by the list as a table."""
+    if cls.__doc__ is not None:  # `python -OO` strips docstrings
         before, place, after = cls.__doc__.partition("{arguments}")
         if place:
             margin = before.rpartition("\n")[2]
@@ -248,7 +248,7 @@ def with_argument_table(cls: C) -> C:
 
 
 def argument_table(indent: str = "") -> str:
-    """The list as a table in Markdown: name, default, unit, what it may be, meaning."""
+    """The list as a Markdown table: name, default, unit, allowed values, meaning."""
     rows = [("name", "default", "unit", "may be", "meaning")]
     rows += [(name, _plain(a.default), a.unit, str(a.check), a.meaning) for name, a in ARGUMENTS.items()]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -258,7 +258,7 @@ def argument_table(indent: str = "") -> str:
 
 
 def _plain(default: object) -> str:
-    """A default as it is written: strings in double quotes, 60.0 as 60."""
+    """Formats a default for the table: strings in double quotes, 60.0 as 60."""
     if isinstance(default, str):
         return f'"{default}"'
     if isinstance(default, tuple):

@@ -1,4 +1,4 @@
-"""How an episode begins: all of it is drawn and checked first, and only then taken over by whoever asked for it."""
+"""Starts episodes: draws and checks everything first, so that the caller adopts a complete episode or none."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -16,13 +16,13 @@ from rover_gym.env.task import Task
 from rover_gym.mechanics import OptionError, Simulation, StateError, TerrainError
 from rover_gym.validation import Range, refuse, whole
 
-#: A scene in which the rover would stand in the ground or in a sphere is drawn again, at most so often in all.
+#: Most scenes drawn for one reset until the rover penetrates neither the ground nor a sphere.
 PLACING_ATTEMPTS = 100
 
 
 @dataclass(frozen=True)
 class Beginning:
-    """An episode that may begin: its scene, the rover in it, its progress and what is seen first."""
+    """A drawn and checked episode: its scene, simulation, progress and first reading."""
 
     scene: EpisodeScene
     simulation: Simulation
@@ -30,22 +30,22 @@ class Beginning:
     reading: Array
 
     def report(self, task: Task) -> Outcome:
-        """What a reset says."""
+        """The outcome that a reset reports."""
         return reset_outcome(task, self.progress, self.reading)
 
 
 def draw_beginning(task: Task, rng: np.random.Generator, difficulty: Range | None, options: ResetOptions) -> Beginning:
-    """Draws an episode, again and again until the rover can be placed.
+    """Draws an episode and repeats the draw until the rover can be placed.
 
     Args:
         task: The task.
-        rng: What is drawn from.
+        rng: The random generator.
         difficulty: Range of the rocks' difficulty; None for the task's own.
-        options: What is fixed.
+        options: The values that reset options fix.
 
     Raises:
-        TerrainError: In `PLACING_ATTEMPTS` scenes the rover would have stood in the ground or in a sphere.
-        StateError: The given state is too large to be observed in float32.
+        TerrainError: The rover would penetrate the ground or a sphere in each of `PLACING_ATTEMPTS` scenes.
+        StateError: The observation of the given state overflows float32.
     """
     for _ in range(PLACING_ATTEMPTS):
         scene, simulation = draw_scene(task, rng, difficulty, options)
@@ -67,15 +67,15 @@ def draw_beginning(task: Task, rng: np.random.Generator, difficulty: Range | Non
 
 
 def check_seed(seed: object, field: str = "seed") -> int | None:
-    """A seed of a random generator, or None."""
+    """Checks the seed of a random generator; None stays None."""
     return None if seed is None else whole(field, seed)
 
 
 def spread_seeds(seed: object, n: int) -> list[int | None]:
-    """One seed a rover: a number goes up by one from rover to rover.
+    """One seed per rover: a single number seeds the first rover and increases by one per rover.
 
     Raises:
-        OptionError: It is neither None, a whole number from 0, nor n of these.
+        OptionError: The seed is neither None, a whole number from 0, nor a sequence of n of these.
     """
     if isinstance(seed, (list, tuple, range)) or (isinstance(seed, np.ndarray) and seed.ndim == 1):
         if len(seed) != n:
@@ -86,13 +86,13 @@ def spread_seeds(seed: object, n: int) -> list[int | None]:
 
 
 def seeded(seed: int | None) -> tuple[np.random.Generator, int]:
-    """A random generator from a checked seed, as `gymnasium.Env.reset` makes it, and the seed that was used."""
+    """A random generator made from a checked seed as `gymnasium.Env.reset` makes it, and the seed used."""
     return seeding.np_random(seed)
 
 
 @contextmanager
 def put_back(generators: Iterable[np.random.Generator]) -> Iterator[None]:
-    """Gives random generators their states back if anything is raised meanwhile."""
+    """Restores the states of random generators if the `with` block raises."""
     before = [(generator, generator.bit_generator.state) for generator in generators]
     try:
         yield

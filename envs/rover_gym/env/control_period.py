@@ -1,4 +1,4 @@
-"""One control period: what an action asks of the motors, and what the period is worth."""
+"""One control period: motor commands from an action, then reward, observation and termination."""
 
 from collections.abc import Mapping
 
@@ -12,18 +12,18 @@ from rover_gym.env.readings import ReadingScalars, observe
 from rover_gym.env.task import Task
 from rover_gym.env.wheels import N_WHEELS
 
-#: High-centring: the trunk carries much of the weight while the rover stays slower than this, m/s.
+#: A rover is high-centred while its trunk carries `TRUNK_LOAD` of the weight and it is no faster than this, m/s.
 STUCK_SPEED = 0.05
 
-# Of several reasons the one that counts: failed, then goal, then rolled over, then stuck, by the sum of
-# 8 (failed), 4 (stuck), 2 (rolled over) and 1 (goal).
+# Termination by bit mask of reasons: 8 failed, 4 stuck, 2 rolled over, 1 goal. Failed takes precedence, then goal, then
+# rolled over, then stuck.
 _COUNTS = np.array([0, 1, 2, 1, 3, 1, 2, 1] + 8 * [STEP_FAILED])
 
 GAIN = slice(DOMAIN.index("actuator_gain"), DOMAIN.index("actuator_gain") + 1)
 
 
 def motor_commands(task: Task, progress: Progress, commands: Array) -> tuple[Array, Array]:
-    """Wheel torques `(..., 6)` N m and steering set-points `(..., 6)` rad of actions `(..., 12)`."""
+    """Converts actions `(..., 12)` to wheel torques `(..., 6)`, N m, and steering set-points `(..., 6)`, rad."""
     torques = commands[..., :N_WHEELS] * task.torque_limits * progress.domain[..., GAIN]
     return torques, commands[..., N_WHEELS:] * task.max_steering
 
@@ -36,15 +36,15 @@ def advance(
     messages: Mapping[int, str],
     noise: Array | None,
 ) -> Outcome:
-    """Books one control period.
+    """Updates the progress by one control period and computes its outcome.
 
     Args:
         task: The task.
-        progress: Is brought up to date.
-        commands: `(..., 12)` the actions.
-        readings: `(..., size)` after the period.
-        messages: Why a rover could not take a step, by its number.
-        noise: `(..., size)` of the observations, or None.
+        progress: The progress, updated in place.
+        commands: `(..., 12)` actions.
+        readings: `(..., size)` readings after the period.
+        messages: Error messages of failed physics steps, by rover index.
+        noise: `(..., size)` observation noise, or None.
     """
     dt, w = task.dt, task.reward_weights
     broken = ~np.isfinite(readings).all(axis=-1)
@@ -63,7 +63,7 @@ def advance(
     progress.energy_positive = progress.energy_positive + now.positive_work
     stuck = (now.trunk_force > progress.trunk_load_limit) & (now.speed <= STUCK_SPEED)
     progress.stuck_time = (progress.stuck_time + dt) * stuck
-    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite ends the episode
+    with np.errstate(over="ignore", invalid="ignore"):  # a non-finite observation ends the episode
         observation, finite = observe(task, readings, commands, progress.stuck_time, noise)
     finite = finite & ~broken
 
@@ -94,7 +94,7 @@ def advance(
     if finite.ndim:
         terms["time"] = np.full(finite.shape, terms["time"])
     if not sound:
-        # Where the physics failed its numbers earn nothing, and the last finite observation stays.
+        # After a failed physics step only `failure` counts, and the last finite observation is kept.
         terms = {name: term if name == "failure" else np.where(failed, 0.0, term)[()] for name, term in terms.items()}
         observation = np.where(failed[..., None], observation_before, observation)
     progress.observation = observation
@@ -113,7 +113,7 @@ def advance(
 
 
 def _squares(change: Array) -> tuple[Quantity, Quantity]:
-    """Sums of squares over the first and over the last six of twelve entries."""
+    """Sums of squares over the first six and over the last six of twelve entries."""
     squared = change * change
     columns = squared.tolist() if squared.ndim == 1 else squared.T
     t, s = columns[:N_WHEELS], columns[N_WHEELS:]

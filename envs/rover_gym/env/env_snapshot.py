@@ -1,4 +1,4 @@
-"""Everything that a `RoverEnv` needs to continue bit for bit."""
+"""Snapshots of a `RoverEnv`, and the checks made before one is restored."""
 
 import copy
 from collections.abc import Mapping
@@ -16,9 +16,9 @@ from rover_gym.validation import Range, refuse
 
 @dataclass(frozen=True)
 class EnvSnapshot:
-    """Everything that `RoverEnv` needs to continue bit for bit; picklable.
+    """The state from which a `RoverEnv` continues bit for bit; picklable.
 
-    A time limit is a wrapper's business, so the wrapper's count of steps is not in here.
+    It does not include the step count of a `TimeLimit` wrapper.
     """
 
     simulation: Snapshot
@@ -29,10 +29,10 @@ class EnvSnapshot:
 
 
 def check_snapshot(task: Task, snapshot: object) -> None:
-    """Refuses what is no snapshot of an environment with this task.
+    """Checks that a snapshot comes from an environment with this task.
 
     Raises:
-        StateError: It is none, or a damaged one, or one of other arguments.
+        StateError: The value is no snapshot, is damaged, or comes from an environment with other arguments.
     """
     if not isinstance(snapshot, EnvSnapshot):
         refuse(StateError, "snapshot", snapshot, "must come from RoverEnv.snapshot()")
@@ -45,10 +45,10 @@ def check_snapshot(task: Task, snapshot: object) -> None:
 
 
 def check_random_state(generator: np.random.Generator, given: Mapping[str, Any]) -> dict[str, Any]:
-    """A copy of a random generator's state, once a generator of that kind has taken it.
+    """Checks the state of a random generator by loading it into a fresh generator of the same kind; returns a copy.
 
     Raises:
-        StateError: It is no such state.
+        StateError: The value is not a state of this kind of generator.
     """
     trial = type(generator.bit_generator)()
     try:

@@ -1,4 +1,4 @@
-"""The scene of an episode: its ground, rocks, start, goal and properties, drawn or as reset options fix them."""
+"""The scene of an episode: ground, rocks, start, goal and properties, drawn at random or fixed by reset options."""
 
 import math
 from collections.abc import Mapping
@@ -18,16 +18,16 @@ from rover_gym.validation import Range, known_keys, mapping, number, refuse, spa
 
 RESET_OPTIONS = ("difficulty", "slope_deg", "uphill_deg", "position", "heading_deg", "goal", "q", "v")
 
-#: No place on the map is farther from the origin along x or z, m.
+#: Largest magnitude of a map coordinate x or z, m.
 MAX_PLACE = 1e6
 
-# A rover that stands deeper than this in the ground at its start, m, stands wrong.
+# Largest penetration of ground and spheres at the start, m; a deeper start is drawn again.
 START_OVERLAP = 0.01
 
 
 @dataclass(frozen=True)
 class EpisodeScene:
-    """One episode's start, ground plane, terrain (the plane, or a field on it), rocks and properties."""
+    """The start, ground plane, terrain (the plane or a field on it), rocks and properties of one episode."""
 
     start: Start
     plane: Plane
@@ -37,13 +37,13 @@ class EpisodeScene:
 
     @property
     def difficulty(self) -> float:
-        """Of the rocks; 0 where none were drawn."""
+        """The difficulty of the rocks; 0 where none were drawn."""
         return 0.0 if self.rocks is None else self.rocks.difficulty
 
 
 @dataclass(frozen=True)
 class ResetOptions:
-    """What reset options fix: arguments of `sample_start`, the difficulty, the whole state."""
+    """Checked reset options: arguments of `sample_start`, the difficulty, and the whole state."""
 
     start: Mapping[str, Any] = field(default_factory=dict)
     difficulty: float | None = None
@@ -54,13 +54,13 @@ class ResetOptions:
 def draw_scene(
     task: Task, rng: np.random.Generator, difficulty: Range | None, options: ResetOptions
 ) -> tuple[EpisodeScene, Simulation]:
-    """Draws a scene and puts the rover into it, be there room for it or not.
+    """Draws a scene and puts the rover into it, without checking for penetration.
 
     Args:
         task: The task.
-        rng: Every draw is made, whatever the options fix.
+        rng: The random generator; every draw is made, whatever the options fix.
         difficulty: Range of the rocks' difficulty; None for the task's own.
-        options: What is fixed.
+        options: The values that reset options fix.
     """
     distribution, rocks = task.start, None
     if task.rocks is not None:
@@ -85,7 +85,7 @@ def draw_scene(
 
 
 def check_difficulty(task: Task, difficulty: object) -> Range:
-    """A difficulty, or a range of them, for a task that has rocks."""
+    """Checks a difficulty or a range of difficulties; the task must have rocks."""
     checked = span("difficulty", difficulty, at_least=0.0, at_most=1.0)
     if task.rocks is None:
         refuse(OptionError, "difficulty", difficulty, "needs terrain 'sphere_field'")
@@ -93,7 +93,7 @@ def check_difficulty(task: Task, difficulty: object) -> Range:
 
 
 def check_reset_options(task: Task, options: Mapping[str, Any] | None) -> ResetOptions:
-    """What `reset(options=...)` fixes, or the first option that is refused."""
+    """Checks the options of `reset(options=...)` and refuses the first bad one."""
     given = mapping("options", options)
     known_keys("options", given, RESET_OPTIONS)
     fixed: dict[str, Any] = {}

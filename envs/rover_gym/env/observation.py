@@ -2,8 +2,8 @@
 
     observation = value / scale
 
-with a fixed scale per entry, so that a driving rover gives entries of order one. Nothing is ever
-clipped: an entry outside its usual range is shown as it is, and a non-finite one ends the episode.
+with a fixed scale per entry, chosen so that the entries of a driving rover are of order one. Entries are never clipped,
+and a non-finite entry ends the episode.
 """
 
 from collections.abc import Iterator, Mapping
@@ -16,7 +16,7 @@ from rover_gym.env.wheels import N_ACTIONS, N_WHEELS
 from rover_gym.mechanics import RoverModel, StateError
 from rover_gym.validation import array, refuse
 
-# Scales of one entry each; the forces are measured in mean wheel loads, m g / 6.
+# Scales in m, rad/s and m. Forces are scaled by the mean wheel load, m g / 6.
 GAP_SCALE = 0.1
 WHEEL_RATE_SCALE = 10.0
 GOAL_SCALE = 10.0
@@ -27,7 +27,7 @@ LARGEST = float(np.finfo(np.float32).max)
 
 @dataclass(frozen=True)
 class ObservationField:
-    """One named stretch of the observation. `low` and `high` bound the scaled entries."""
+    """One named slice of the observation; `low` and `high` bound the scaled entries."""
 
     name: str
     start: int
@@ -40,15 +40,15 @@ class ObservationField:
 
     @property
     def slice(self) -> slice:
-        """Where the field lies in the observation."""
+        """The field's slice of the observation."""
         return slice(self.start, self.start + self.size)
 
 
 class ObservationLayout(Mapping[str, slice]):
     """Maps the name of a field to its slice of the observation; immutable.
 
-    `layout.fields` holds unit, scale and meaning, `layout.split(observation)` gives the values back
-    in SI units, for one observation `(size,)` or a batch `(n, size)`.
+    `layout.fields` holds the unit, scale and meaning of each field. `layout.split(observation)` converts an observation
+    `(size,)` or a batch `(n, size)` back to SI units.
     """
 
     def __init__(self, fields: tuple[ObservationField, ...]) -> None:
@@ -79,7 +79,7 @@ class ObservationLayout(Mapping[str, slice]):
 
     @property
     def scale(self) -> npt.NDArray[np.float64]:
-        """(size,) what one unit of each entry stands for."""
+        """(size,) value in SI units of an entry of 1."""
         return np.concatenate([np.asarray(field.scale) for field in self.fields])
 
     @property
@@ -98,7 +98,7 @@ class ObservationLayout(Mapping[str, slice]):
         return ((self.low <= -LARGEST) & (self.high >= LARGEST)).astype(np.float64)
 
     def split(self, observation: npt.ArrayLike) -> dict[str, npt.NDArray[np.float64]]:
-        """The fields' values in SI units, as fresh arrays `(..., field size)`.
+        """Splits observations into the fields' values in SI units, as new arrays `(..., field size)`.
 
         Raises:
             StateError: The last axis does not have the layout's size.
@@ -111,7 +111,7 @@ class ObservationLayout(Mapping[str, slice]):
 
 
 def build_layout(model: RoverModel, gravity_magnitude: float, n_scan: int = 0) -> ObservationLayout:
-    """The layout of `Rover-v0` for a model under a gravity of so many m/s2, with a height scan of so many points."""
+    """Builds the layout of `Rover-v0` for a model, a gravity magnitude (m/s2) and a height scan of `n_scan` points."""
     nq, nv = model.nq, model.nv
     wheel_load = model.mass * gravity_magnitude / N_WHEELS
 

@@ -1,4 +1,4 @@
-"""What a control period, or a reset, came to: observation, reward, end and infos."""
+"""The outcome of a control period or a reset: observation, reward, termination and infos."""
 
 import math
 from collections.abc import Mapping
@@ -12,27 +12,27 @@ from rover_gym.env.quantities import Array, Observations, Quantity
 from rover_gym.env.readings import ReadingScalars, tilt_of
 from rover_gym.env.task import Task
 
-#: Why an episode ended, by number; the first while it goes on.
+#: Reasons for termination, by index; the first means that the episode continues.
 TERMINATIONS = np.array(["", "goal", "roll_over", "high_centred", "step_failed"], dtype=object)
 GOAL, ROLL_OVER, HIGH_CENTRED, STEP_FAILED = range(1, 5)
 
-#: How the contact solver fared, by number.
+#: Status of the contact solver, by index.
 STATUSES = np.array(["converged", "not_converged", "failed"], dtype=object)
 FAILED = 2
 
 
 @dataclass
 class Outcome:
-    """What a control period, or a reset, came to: for one rover, or one row a rover.
+    """The outcome of a control period or a reset, for one rover or with one row per rover.
 
     Attributes:
         observation: `(..., size) float32`.
-        reward: The sum of the terms.
+        reward: Sum of the terms.
         termination: Index into `TERMINATIONS`.
-        progress: Of the episodes; it goes on, so infos are to be asked for before the next reset.
-        scalars: From the readings.
-        terms: Of the reward, by name.
-        messages: Why a rover could not take a step, by its number.
+        progress: Progress of the episodes. It is shared and keeps changing, so build the infos before the next reset.
+        scalars: Scalar entries of the readings.
+        terms: Reward terms, by name.
+        messages: Error messages of failed physics steps, by rover index.
     """
 
     observation: Observations
@@ -44,7 +44,7 @@ class Outcome:
     messages: Mapping[int, str] = field(default_factory=dict)
 
     def info(self, i: int | None = None) -> dict[str, Any]:
-        """What `RoverEnv.step` says in its info: of the one rover, or of rover i."""
+        """The info of `RoverEnv.step`, for the only rover or for rover i."""
 
         def of(quantity: Quantity) -> float:
             return float(quantity if i is None else quantity[i])
@@ -76,7 +76,7 @@ class Outcome:
         }
 
     def vector_info(self) -> dict[str, Any]:
-        """The same of all n rovers: an array a key, with Gymnasium's masks."""
+        """The infos of all n rovers, as one array per key with Gymnasium's masks."""
         n = len(self.reward)
         progress, now = self.progress, self.scalars
         status, iterations, n_contacts = (
@@ -112,13 +112,13 @@ class Outcome:
 
 
 def _masked(values: dict[str, Any], n: int) -> dict[str, Any]:
-    """With a mask `_key` after each key: every rover has it."""
+    """Adds a mask `_key` after each key; every rover has the value."""
     masks = np.ones((len(values), n), np.bool_)
     return {name: value for i, key in enumerate(values) for name, value in ((key, values[key]), (f"_{key}", masks[i]))}
 
 
 def reset_outcome(task: Task, progress: Progress, reading: Array) -> Outcome:
-    """The outcome of one rover's reset: nothing has been earned."""
+    """The outcome of one rover's reset, with zero reward."""
     return Outcome(
         observation=progress.observation.copy(),
         reward=0.0,

@@ -1,4 +1,4 @@
-"""What an episode remembers beside the simulation's state: for one rover, or for n at once."""
+"""The state of an episode outside the simulation, for one rover or for n."""
 
 import copy
 from dataclasses import dataclass, fields
@@ -17,18 +17,18 @@ DOMAIN = tuple(entry.name for entry in fields(Domain))
 
 @dataclass
 class Progress:
-    """What episodes remember beside the simulations' states: of one rover, or one row a rover.
+    """The state of an episode outside the simulation, for one rover or with one row per rover.
 
     Attributes:
-        distance: Horizontal, to the goal, m.
-        previous_action: `(..., 12)`.
-        energy: J, braking counted.
-        energy_positive: J, driving only.
-        stuck_time: s.
-        domain: `(..., 4)` what `Domain` holds, in its order.
-        trunk_load_limit: N.
-        difficulty: Of the rocks.
-        observation: `(..., size) float32`, the last one.
+        distance: Horizontal distance to the goal, m.
+        previous_action: `(..., 12)` last action.
+        energy: Motor work since reset, braking counted, J.
+        energy_positive: Motor work since reset, driving only, J.
+        stuck_time: How long the rover has been high-centred, s.
+        domain: `(..., 4)` fields of `Domain`, in its order.
+        trunk_load_limit: Trunk force beyond which the rover is high-centred, N.
+        difficulty: Difficulty of the rocks.
+        observation: `(..., size) float32`, the last observation.
     """
 
     distance: Quantity
@@ -43,7 +43,7 @@ class Progress:
 
     @classmethod
     def of(cls, task: Task, n: int) -> "Progress":
-        """Of n rovers that have not begun."""
+        """The progress of n rovers before their first reset."""
         distance, energy, energy_positive, stuck_time, trunk_load_limit, difficulty = np.zeros((6, n))
         return cls(
             distance=distance,
@@ -59,7 +59,7 @@ class Progress:
 
     @classmethod
     def begin(cls, task: Task, scene: EpisodeScene, reading: Array, noise: Array | None) -> "Progress | None":
-        """Of one rover at the start of an episode; None where float32 cannot hold its observation."""
+        """The progress of one rover at the start of an episode; None if its observation is not finite in float32."""
         previous_action = np.zeros(N_ACTIONS)
         with np.errstate(over="ignore", invalid="ignore"):
             observation, finite = observe(task, reading, previous_action, 0.0, noise)
@@ -78,12 +78,12 @@ class Progress:
         )
 
     def put(self, i: int, one: "Progress") -> None:
-        """Makes one rover's progress that of rover i."""
+        """Sets the row of rover i."""
         for name, value in vars(self).items():
             value[i] = getattr(one, name)
 
     def is_of(self, task: Task) -> bool:
-        """Whether this can be the progress of one rover with a task: its shapes and that all of it is finite."""
+        """Whether the shapes fit one rover with this task and all values are finite."""
         shapes = {"previous_action": (N_ACTIONS,), "domain": (len(DOMAIN),), "observation": (task.layout.size,)}
         return all(
             isinstance(value, np.ndarray if name in shapes else (float, int))

@@ -1,7 +1,7 @@
-"""Quantities of one rover or of n at once: a float, or an array with an entry a rover.
+"""Types of quantities for one rover or for n: a float, or an array with one entry per rover.
 
-The same functions serve both. Their arithmetic is written out, entry by entry, since NumPy's reductions and products
-round differently for different shapes. So a rover sees the same bits alone and among others.
+The same functions serve both. They spell out their arithmetic entry by entry, because NumPy's reductions and matrix
+products round differently for different shapes. A rover's results are therefore bit-identical alone and in a batch.
 """
 
 from typing import Any, TypeAlias

@@ -1,7 +1,7 @@
-"""Domain randomisation: properties of rover and world that may differ from episode to episode.
+"""Domain randomisation: properties of rover and world that may change from episode to episode.
 
-A number fixes a property, a pair (low, high) has it drawn uniformly at each reset. Properties that are fixed draw
-nothing, so that an environment without randomisation starts as it always did.
+A number fixes a property; a pair (low, high) is a range to draw from uniformly at each reset. A fixed property takes no
+random number, so it does not shift the other draws.
 """
 
 from dataclasses import asdict, dataclass
@@ -13,13 +13,13 @@ from rover_gym.validation import Range
 
 @dataclass(frozen=True)
 class Domain:
-    """What an episode's rover and world are like.
+    """The randomised properties of one episode.
 
     Attributes:
-        mass_scale: Masses and inertias over the model's.
-        friction: Coulomb's coefficient.
-        actuator_gain: Torque that a wheel motor gives over the torque that was asked of it, up to its limit.
-        gravity_scale: Gravity over the argument's.
+        mass_scale: Factor on the model's masses and inertias.
+        friction: Coulomb friction coefficient.
+        actuator_gain: Ratio of delivered to commanded wheel torque, up to the motor's limit.
+        gravity_scale: Factor on the argument `gravity`.
     """
 
     mass_scale: float
@@ -34,7 +34,7 @@ class Domain:
 
 @dataclass(frozen=True)
 class DomainDistribution:
-    """Ranges from which `sample` draws uniformly, and the standard deviation of the observation's noise."""
+    """Ranges that `sample` draws from uniformly, and the standard deviation of the observation noise."""
 
     mass_scale: Range
     friction: Range
@@ -43,7 +43,7 @@ class DomainDistribution:
     observation_noise: float
 
     def sample(self, rng: np.random.Generator) -> Domain:
-        """Draws what is not fixed."""
+        """Draws the properties of one episode."""
 
         def draw(span: Range) -> float:
             low, high = span

@@ -1,4 +1,4 @@
-"""What the core reads off a rover, as scalars and as an observation, for one rover or for n at once."""
+"""Splits the core's readings into scalars and observations, for one rover or for n."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -11,7 +11,7 @@ from rover_gym.env.wheels import N_ACTIONS
 
 
 class ReadingScalars(NamedTuple):
-    """What a reading says in single numbers, by the names of the core, in its order."""
+    """The scalar entries of a reading, with the core's names and in its order."""
 
     distance: Quantity
     cos_tilt: Quantity
@@ -28,7 +28,7 @@ class ReadingScalars(NamedTuple):
 
     @classmethod
     def of(cls, task: Task, readings: Array) -> "ReadingScalars":
-        """From a reading `(size,)` or n of them."""
+        """Extracts the scalars of one reading `(size,)` or of readings `(n, size)`."""
         columns = readings[..., task.scalars]
         return cls(*(columns.tolist() if columns.ndim == 1 else columns.T.copy()))
 
@@ -36,9 +36,9 @@ class ReadingScalars(NamedTuple):
 def observe(
     task: Task, readings: Array, previous_action: Array, stuck_time: Quantity, noise: Array | None
 ) -> tuple[Observations, Any]:
-    """Observations `(..., size)`, and which of them float32 can hold; the others are zero."""
+    """Returns observations `(..., size)` and a mask of those that are finite in float32; the others are set to zero."""
     values = np.empty((*readings.shape[:-1], task.layout.size))
-    # A reading begins as an observation does.
+    # Readings and observations begin with the same entries.
     n = task.n_shared
     values[..., :n] = readings[..., :n]
     values[..., n : n + N_ACTIONS] = previous_action
@@ -56,7 +56,7 @@ def observe(
 
 
 def draw_noise(task: Task, generators: Sequence[np.random.Generator | None]) -> Array | None:
-    """`(n, size)` noise of the observations, each rover's from its own generator; None without noise."""
+    """Draws observation noise `(n, size)`, each row from that rover's own generator; None without noise."""
     if task.noisy is None:
         return None
     noise = np.zeros((len(generators), task.layout.size))
@@ -67,5 +67,5 @@ def draw_noise(task: Task, generators: Sequence[np.random.Generator | None]) -> 
 
 
 def tilt_of(cos_tilt: Quantity) -> Quantity:
-    """Angle from the vertical, rad."""
+    """Tilt from the vertical, rad."""
     return np.arccos(np.minimum(np.maximum(cos_tilt, -1.0), 1.0))

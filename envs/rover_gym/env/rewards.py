@@ -1,12 +1,11 @@
-"""The terms of the reward of `Rover-v0`, one function a term.
+"""The reward terms of `Rover-v0`, one function per term.
 
-The reward of a step is the sum of the terms; each term is its weight times a quantity of that step,
-with the weight's sign telling reward from cost. `dt` is the control period in seconds. Quantities
-are numbers, or arrays with one entry a rover.
+The reward of a step is the sum of the terms. Each term is its weight times a quantity of that step; a negative weight
+makes it a cost. `dt` is the control period in seconds. Quantities are numbers, or arrays with one entry per rover.
 
-What one step counts is bounded, whatever the physics did: `MOST_PROGRESS`, `MOST_WORK`, `MOST_TIME`, slip ratios and
-lean up to 2. With the default weights no step is worth more than 90 either way. What the rover does by itself in 10 s
-is within these bounds.
+The quantities of one step are bounded, whatever the physics did: by `MOST_PROGRESS`, `MOST_WORK` and `MOST_TIME`, and
+slip ratio and lean by `MOST_RATIO`. With the default weights the reward of a step never exceeds 90 in magnitude. Normal
+driving stays within these bounds even over 10 s.
 """
 
 from collections.abc import Mapping
@@ -20,7 +19,7 @@ from rover_gym.env.quantities import Quantity
 #: A truth value for one rover, an array `(n,)` for n.
 Flag: TypeAlias = Any
 
-#: Default weights. With them a 7 m drive on flat ground earns about 15: 7 for the way, 10 at the goal.
+#: Default weights. A 7 m drive on flat ground earns about 15: 7 for progress and 10 at the goal, less the costs.
 WEIGHTS: Mapping[str, float] = MappingProxyType(
     {
         "progress": 1.0,
@@ -35,41 +34,41 @@ WEIGHTS: Mapping[str, float] = MappingProxyType(
     }
 )
 
-#: Most that one step counts: metres gained on the goal, or lost.
+#: Largest progress of one step either way, m.
 MOST_PROGRESS = 30.0
-#: Joules.
+#: Largest work of one step, J.
 MOST_WORK = 4e5
-#: Seconds.
+#: Longest control period that counts, s.
 MOST_TIME = 60.0
-#: The largest slip ratio, and `1 - cos tilt` of a rover on its back.
+#: Largest slip ratio, and `1 - cos tilt` of a rover on its back.
 MOST_RATIO = 2.0
 
 
 def progress(weight: float, previous_distance: Quantity, distance: Quantity) -> Quantity:
-    """`w (d_before - d_after)`: metres gained on the goal, at most `MOST_PROGRESS` either way."""
+    """`w (d_before - d_after)`: progress towards the goal, m, at most `MOST_PROGRESS` either way."""
     return weight * _within(previous_distance - distance, MOST_PROGRESS)
 
 
 def time(weight: float, dt: float) -> float:
-    """`w dt`: seconds spent, at most `MOST_TIME`."""
+    """`w dt`: elapsed time, s, at most `MOST_TIME`."""
     return weight * min(dt, MOST_TIME)
 
 
 def energy(weight: float, work: Quantity) -> Quantity:
-    """`w sum_i |tau_i dphi_i|`: joules through the six wheel motors, driving or braking, at most `MOST_WORK`.
+    """`w sum_i |tau_i dphi_i|`: work of the six wheel motors, driving or braking, J, at most `MOST_WORK`.
 
-    tau_i is the torque that the motor gave, which on its line is less than the command.
+    tau_i is the delivered torque, which the motor's torque-speed line may hold below the command.
     """
     return weight * _within(work, MOST_WORK)
 
 
 def slip(weight: float, slip_ratio: Quantity, dt: float) -> Quantity:
-    """`w s dt`: mean slip ratio of the wheels in contact, for as long as it lasts."""
+    """`w s dt`: mean slip ratio of the wheels in contact, times the control period."""
     return weight * _within(slip_ratio, MOST_RATIO) * min(dt, MOST_TIME)
 
 
 def tilt(weight: float, cos_tilt: Quantity, dt: float) -> Quantity:
-    """`w (1 - cos tilt) dt`: the trunk's lean from the vertical."""
+    """`w (1 - cos tilt) dt`: the trunk's lean from the vertical, times the control period."""
     return weight * _within(1.0 - cos_tilt, MOST_RATIO) * min(dt, MOST_TIME)
 
 
@@ -89,12 +88,12 @@ def success(weight: float, reached: Flag) -> Quantity:
 
 
 def failure(weight: float, failed: Flag) -> Quantity:
-    """`w` on a step that ends in a roll-over, a high-centring or a step that could not be taken."""
+    """`w` on a step that ends the episode by roll-over, high-centring or a failed physics step."""
     return weight * failed + 0.0
 
 
 def _within(quantity: Quantity, most: float) -> Quantity:
-    """At most `most` either way."""
+    """Clips a quantity to [-most, most]."""
     if isinstance(quantity, float):
         return min(max(quantity, -most), most)
     return np.clip(quantity, -most, most)

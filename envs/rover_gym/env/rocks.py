@@ -1,12 +1,12 @@
-"""Fields of rocks by difficulty, and the grid by which a rover looks at the ground.
+"""Rock fields by difficulty, and the height scan of the ground around the rover.
 
-One number in [0, 1] says how hard an episode is:
+One number d in [0, 1], the difficulty, sets how hard an episode is:
 
     abundance    k = 0.2 d           fraction of the ground that rocks cover
-    largest rock r = (0.5 + 1.1 d) R in wheel radii R; half of a rock is below the ground
+    largest rock r = (0.5 + 1.1 d) R radius, with R the wheel radius; half of a rock is below the ground
     slope          0 to 10 d         degrees
 
-What an argument fixes does not follow the difficulty.
+An argument that is given overrides the difficulty.
 """
 
 import math
@@ -20,38 +20,38 @@ from rover_gym.env.wheels import wheel_centres
 from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField
 from rover_gym.validation import Range, number, refuse, vector
 
-#: At difficulty 1; landing sites on Mars have 0.03 to 0.2 (Golombek and Rapp 1997).
+#: Rock abundance at difficulty 1; landing sites on Mars have 0.03 to 0.2 (Golombek and Rapp 1997).
 HARDEST_ABUNDANCE = 0.2
-#: Largest rock at difficulty 0 and at difficulty 1, in wheel radii.
+#: Radius of the largest rock at difficulty 0 and at difficulty 1, in wheel radii.
 LARGEST_ROCK = (0.5, 1.6)
 #: Steepest slope at difficulty 1, degrees.
 HARDEST_SLOPE_DEG = 10.0
 DEFAULT_DIFFICULTY = 0.5
 
-#: The law's own range, so that a field stays a field of rocks.
+#: Largest abundance; the size distribution does not hold beyond it.
 MAX_ABUNDANCE = 0.5
-#: In wheel radii. Below the smallest a field would be gravel, beyond the largest hills.
+#: Range of the largest rock's radius, in wheel radii; smaller rocks are gravel, larger ones hills.
 ROCK_RADII = (0.3, 10.0)
-#: Rocks lie up to this far beyond start and goal, m.
+#: Rocks lie up to this far beyond the rectangle that start and goal span, m.
 MARGIN = 4.0
-#: No goal is farther from its start, m: a field between them would not fit.
+#: Largest distance from start to goal, m, which limits the size of the field.
 MAX_GOAL_DISTANCE = 100.0
-#: Of a height scan's points, m.
+#: Range of a height scan's spacing, m.
 SPACINGS = (1e-3, 10.0)
-#: Room that the clearings leave around the rover, m.
+#: Free room that a clearing leaves around the rover, m.
 CLEARANCE = 0.1
 
 
 @dataclass(frozen=True)
 class RockDistribution:
-    """What `sample` draws from: a range of difficulties, and what does not follow the difficulty."""
+    """What `sample` draws from: a range of difficulties, and the values that override the difficulty."""
 
     difficulty: Range = (DEFAULT_DIFFICULTY, DEFAULT_DIFFICULTY)
     abundance: float | None = None
     max_radius: float | None = None
 
     def sample(self, rng: np.random.Generator, difficulty: float | None = None) -> "Rocks":
-        """Draws the rocks of one episode. A given difficulty is taken, yet the draws are the same."""
+        """Draws the rocks of one episode; a given difficulty replaces its draw without shifting the others."""
         drawn = float(rng.uniform(*self.difficulty))
         d = drawn if difficulty is None else difficulty
         smallest, largest = LARGEST_ROCK
@@ -71,7 +71,7 @@ class Rocks:
         difficulty: In [0, 1].
         abundance: Fraction of the ground that rocks cover.
         max_radius: Radius of the largest rocks, in wheel radii.
-        seed: Of sizes and places.
+        seed: Seed of the rocks' sizes and positions.
     """
 
     difficulty: float
@@ -85,7 +85,7 @@ class Rocks:
         return (0.0, math.radians(HARDEST_SLOPE_DEG) * self.difficulty)
 
     def lay_out(self, model: RoverModel, start: Start, ground: Plane, goal_tolerance: float) -> SphereField:
-        """The field around start and goal, with clearings at both in which the rover has room to turn."""
+        """The rock field around start and goal, with a clearing at each in which the rover has room to turn."""
         (x, z), (goal_x, goal_z) = start.position, start.goal
         radius = clear_radius(model)
         return SphereField.rocks(
@@ -99,19 +99,19 @@ class Rocks:
 
 
 def clear_radius(model: RoverModel) -> float:
-    """Radius of the clearings, m: the wheels reach no farther from the trunk's origin, and a little room."""
+    """Radius of the clearings, m: the wheels' largest reach from the trunk's origin plus `CLEARANCE`."""
     reach = np.linalg.norm(wheel_centres(model), axis=1) + model.wheel_radii
     return float(reach.max()) + CLEARANCE
 
 
 @dataclass(frozen=True)
 class HeightScan:
-    """A grid of points around the trunk's origin in the heading frame, at which the ground's height is looked up.
+    """A grid of points around the trunk's origin, in the heading frame, at which the ground's height is sampled.
 
     Attributes:
-        rows: Along the heading, listed from the front.
-        columns: Across, listed from the left.
-        spacing: Between neighbours, m.
+        rows: Points along the heading, listed from the front.
+        columns: Points across the heading, listed from the left.
+        spacing: Distance between neighbours, m.
     """
 
     rows: int = 13
@@ -120,14 +120,14 @@ class HeightScan:
 
     @property
     def offsets(self) -> npt.NDArray[np.float64]:
-        """`(rows * columns, 2)` ahead and to the right of the trunk's origin, m."""
+        """`(rows * columns, 2)` offsets ahead and to the right of the trunk's origin, m."""
         ahead = self.spacing * (0.5 * (self.rows - 1) - np.arange(self.rows))
         right = self.spacing * (np.arange(self.columns) - 0.5 * (self.columns - 1))
         return np.stack(np.meshgrid(ahead, right, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def scan_points(offsets: npt.NDArray[np.float64], position: Point, heading: float) -> npt.NDArray[np.float64]:
-    """`(n, 2)` x and z of the scan's points, m."""
+    """`(n, 2)` x and z of the scan's points on the map, m."""
     c, s = math.cos(heading), math.sin(heading)
     points: npt.NDArray[np.float64] = offsets @ np.array([[c, -s], [s, c]]) + position
     return points
@@ -142,7 +142,7 @@ def heights(terrain: Plane | SphereField, points: npt.NDArray[np.float64]) -> np
 
 
 def rock_distribution(difficulty: Range | None, abundance: float | None, max_radius: float | None) -> RockDistribution:
-    """The distribution that checked arguments ask for; None takes the default."""
+    """Builds the distribution from checked arguments; None takes the default."""
     return RockDistribution(
         difficulty=(DEFAULT_DIFFICULTY, DEFAULT_DIFFICULTY) if difficulty is None else difficulty,
         abundance=abundance,
@@ -151,7 +151,7 @@ def rock_distribution(difficulty: Range | None, abundance: float | None, max_rad
 
 
 def check_scan(field: str, value: object) -> HeightScan | None:
-    """The scan that an argument asks for: False, True, or (rows, columns, spacing)."""
+    """Checks the argument `height_scan`: False, True, or (rows, columns, spacing)."""
     if value is None or value is False:
         return None
     if value is True:

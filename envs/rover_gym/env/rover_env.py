@@ -226,7 +226,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     @property
     def simulation(self) -> Simulation:
-        """The simulation behind the environment, replaced at each reset. Look, do not step."""
+        """The environment's simulation, replaced at each reset; read it, but do not step it."""
         return self._simulation
 
     @property
@@ -260,13 +260,12 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
         """Starts an episode; the class docstring lists the options.
 
-        A reset that is refused changes nothing: the running episode goes on, and the random generator stands where it
-        stood.
+        A refused reset changes nothing: the running episode continues, and the random generator keeps its state.
 
         Raises:
-            OptionError: The seed is no whole number from 0, or an option is unknown or out of its range.
-            StateError: `q` or `v` has a wrong shape or an entry that is not finite, or cannot be observed.
-            TerrainError: The rover would stand in the ground or in a sphere, in each of 100 scenes that were drawn.
+            OptionError: The seed is no whole number from 0, or an option is unknown or out of range.
+            StateError: `q` or `v` has a wrong shape or an entry that is not finite, or its observation overflows float32.
+            TerrainError: The rover would penetrate the ground or a sphere in each of 100 drawn scenes.
         """
         checked = check_reset_options(self.task, options)
         chosen = check_seed(seed)
@@ -307,12 +306,12 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         """Sets the rocks' difficulty, or the range it is drawn from, from the next reset on.
 
         Raises:
-            OptionError: It is not within 0 to 1, or there are no rocks; nothing has changed.
+            OptionError: The difficulty is not within 0 to 1, or there are no rocks; nothing has changed.
         """
         self._difficulty = check_difficulty(self.task, difficulty)
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """The present state as a frame, (height, width, 3) uint8; None, with a warning, without a render mode.
+        """Renders the present state as a frame, (height, width, 3) uint8; warns and returns None without a render mode.
 
         Raises:
             ResetNeeded: The environment has not been reset.
@@ -328,8 +327,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         return self._renderer.render(self._simulation)
 
     def make_renderer(self, scene: EpisodeScene) -> "FrameRenderer":
-        """A renderer with this environment's `render_options`, which whoever asked for it closes."""
-        from rover_gym.rendering import FrameRenderer  # noqa: PLC0415 - only who looks needs a renderer
+        """Creates a renderer with this environment's `render_options`; the caller must close it."""
+        from rover_gym.rendering import FrameRenderer  # noqa: PLC0415 - only rendering needs it
 
         return FrameRenderer(self.model, scene.terrain, **asdict(self.render_options))
 
@@ -340,7 +339,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             self._renderer = None
 
     def snapshot(self) -> EnvSnapshot:
-        """The state of the environment and of its random generator, to `restore` later."""
+        """Returns the state of the environment and of its random generator, for `restore`."""
         return EnvSnapshot(
             scene=self._running(),
             simulation=self._simulation.snapshot(),
@@ -350,10 +349,11 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         )
 
     def restore(self, snapshot: EnvSnapshot) -> None:
-        """Continues from a snapshot, bit for bit, taken from an environment with the same arguments.
+        """Restores a snapshot of an environment with the same arguments, which then continues bit for bit.
 
         Raises:
-            StateError: This is no snapshot, or a damaged one, or one of other arguments; nothing has changed.
+            StateError: The value is no snapshot, is damaged, or comes from an environment with other arguments; nothing
+                has changed.
         """
         check_snapshot(self.task, snapshot)
         state = check_random_state(self.np_random, snapshot.random_state)

@@ -1,7 +1,7 @@
-"""Where an episode starts: the ground's slope, the rover's pose and the goal.
+"""The start of an episode: the ground's slope, the rover's pose and the goal.
 
-Directions on the map are angles about +y from +x, positive to the left (towards -z), as the heading
-is: the direction `a` points to `(cos a, -sin a)` in (x, z).
+A direction on the map, like the heading, is an angle about +y from +x, positive to the left (towards -z): the direction
+`a` points along `(cos a, -sin a)` in (x, z).
 """
 
 import math
@@ -19,7 +19,7 @@ Point: TypeAlias = tuple[float, float]
 
 @dataclass(frozen=True)
 class StartDistribution:
-    """Ranges from which `sample_start` draws uniformly; angles in radians."""
+    """Ranges that `sample_start` draws from uniformly; angles in rad, distances in m."""
 
     slope: Range
     uphill: Range
@@ -49,7 +49,7 @@ def sample_start(
     heading: float | None = None,
     goal: Point | None = None,
 ) -> Start:
-    """Draws a start. What is given is taken, yet every draw is made, so the others do not shift."""
+    """Draws a start; given values replace their draws, which are still made, so that the other draws do not shift."""
     draws = [
         rng.uniform(*span)
         for span in (
@@ -88,10 +88,10 @@ def tilted_plane(slope: float, uphill: float) -> Plane:
 
 
 def slope_of(field: SphereField) -> tuple[float, float]:
-    """Slope and direction of steepest ascent (rad) of a field's ground.
+    """Slope and direction of steepest ascent of a field's ground plane, rad.
 
     Raises:
-        TerrainError: The field has no ground that a rover could stand on.
+        TerrainError: The field has no ground plane that faces up.
     """
     ground = field.ground
     if ground is None or ground.normal[1] <= 0.0:
@@ -101,19 +101,19 @@ def slope_of(field: SphereField) -> tuple[float, float]:
 
 
 def resting_pose(model: RoverModel, plane: Plane, position: Point, heading: float) -> npt.NDArray[np.float64]:
-    """`(nq,)` the rover on the plane, joints at zero: the trunk stands along the normal.
+    """`(nq,)` coordinates of the rover resting on the plane, joints at zero, trunk upright along the normal.
 
-    The trunk's origin is above `position`, and its lowest wheel has gap zero.
+    The trunk's origin is above `position`, and the lowest wheel has gap zero.
     """
     n = plane.normal
-    # The trunk's x axis: horizontal part along the heading, and in the plane.
+    # The trunk's x axis lies in the plane, its horizontal part along the heading.
     forward = np.array(
         [math.cos(heading), -(n[0] * math.cos(heading) - n[2] * math.sin(heading)) / n[1], -math.sin(heading)]
     )
     forward /= np.linalg.norm(forward)
     right = np.cross(forward, n)
 
-    # R = Ry(heading) Rz(pitch) Rx(roll) has the middle row (sin p, cos p cos r, -cos p sin r).
+    # The middle row of R = Ry(heading) Rz(pitch) Rx(roll) is (sin p, cos p cos r, -cos p sin r).
     q = np.zeros(model.nq)
     q[3] = math.atan2(-right[1], n[1])
     q[4] = math.remainder(heading, math.tau)

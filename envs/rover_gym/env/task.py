@@ -1,4 +1,4 @@
-"""The task: the arguments of `Rover-v0` once they are checked, shared by all episodes and all rovers of a batch."""
+"""The task: the checked arguments of `Rover-v0`, shared by all episodes and all rovers of a batch."""
 
 import math
 from collections.abc import Mapping
@@ -26,41 +26,41 @@ from rover_gym.validation import Range, array, number, refuse, span
 #: Steps until truncation: 60 s at the default control frequency of 20 Hz.
 MAX_EPISODE_STEPS = 1200
 
-#: Physics steps a control period, at most.
+#: Most physics steps per control period.
 MAX_SUBSTEPS = 10_000
 
-#: High-centring: the trunk carries this share of the weight.
+#: High-centring: the trunk carries more than this fraction of the weight.
 TRUNK_LOAD = 0.1
 
 
 @dataclass(frozen=True)
 class Task:
-    """What `RoverEnv`'s arguments come to. Angles in radians.
+    """The checked arguments of `RoverEnv` and the quantities derived from them; angles in radians.
 
     Attributes:
         model: The rover, before its masses are scaled.
-        field: A field that was given, the ground of every episode.
-        rocks: What fields of rocks are drawn from; None where none are.
-        slope_by_difficulty: Whether the rocks' difficulty says how steep the ground is.
-        scan: `(n, 2)` the height scan's points in the heading frame, m; None without one.
-        start: What starts are drawn from.
-        domain: What rover and world are drawn from.
-        goal_tolerance: m.
-        cos_max_tilt: A smaller cosine of the tilt is a roll-over.
-        stuck_time: s.
-        gravity: m/s2, before it is scaled.
-        substeps: Physics steps a control period.
+        field: The given field, which is the ground of every episode; None without one.
+        rocks: Distribution of the rock fields; None without rocks.
+        slope_by_difficulty: Whether the rocks' difficulty sets the slope of the ground.
+        scan: `(n, 2)` points of the height scan in the heading frame, m; None without one.
+        start: Distribution of the starts.
+        domain: Distribution of the randomised properties.
+        goal_tolerance: Distance within which the goal is reached, m.
+        cos_max_tilt: Cosine of the tilt below which the rover has rolled over.
+        stuck_time: Time until a high-centred rover ends the episode, s.
+        gravity: Gravity before it is scaled, m/s2.
+        substeps: Physics steps per control period.
         dt: Control period, s.
-        reward_weights: By term.
+        reward_weights: Weights of the reward, by term.
         simulation_options: Keyword arguments of `Simulation`.
-        max_steering: Set-point of a steering action of 1.
+        max_steering: Set-point of a steering action of 1, rad.
         torque_limits: `(6,)` torque of a torque action of 1, N m.
-        layout: Of the observation.
-        inverse_scale: `(size,)` entries of the observation per SI unit.
+        layout: Layout of the observation.
+        inverse_scale: `(size,)` inverse of the observation's scale.
         noisy: `(size,)` standard deviation of each entry's noise; None without noise.
-        places: Where things lie in a reading.
-        n_shared: So many entries a reading and an observation begin with, in the same order.
-        scalars: Where single numbers lie in a reading: the distance to the target and what follows.
+        places: Slices of a reading, by name.
+        n_shared: Number of leading entries that a reading and an observation share, in the same order.
+        scalars: Slice of a reading that holds the scalars, from the distance to the goal on.
     """
 
     model: RoverModel
@@ -88,7 +88,7 @@ class Task:
     scalars: slice
 
     def simulate(self, terrain: Plane | SphereField, domain: Domain) -> Simulation:
-        """A rover on a terrain, at rest in the zero configuration."""
+        """Creates a simulation of the rover on a terrain, at rest in the zero configuration."""
         model = self.model if domain.mass_scale == 1.0 else self.model.replace(mass_scale=domain.mass_scale)
         options = dict(self.simulation_options, friction=domain.friction)
         if domain.gravity_scale != 1.0:
@@ -102,11 +102,11 @@ class Task:
 
 
 def make_task(given: Mapping[str, Any]) -> Task:
-    """The task that arguments come to, each of which `check_arguments` has passed: here they must fit together.
+    """Builds the task from arguments that `check_arguments` has passed, and checks that they are consistent.
 
     Raises:
-        OptionError: Two of them do not go together, or the core refuses an option; `field` names one.
-        TerrainError: The field has no ground that a rover could stand on.
+        OptionError: Two arguments contradict each other, or the core refuses an option; `field` names one.
+        TerrainError: The field has no ground plane that faces up.
     """
     terrain, model, scan = given["terrain"], given["model"], given["height_scan"]
     field = terrain if isinstance(terrain, SphereField) else None
@@ -153,7 +153,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
         **(given["solver_options"] or {}),
     }
     n_scan = 0 if scan is None else len(scan.offsets)
-    # The core validates what it takes.
+    # The core validates the simulation options.
     places = Simulation(rover, Plane(), **options).reading_layout(n_scan)
     layout = build_layout(rover, math.hypot(*gravity), n_scan)
     return Task(
@@ -184,7 +184,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
 
 
 def _substeps(frequency: float, step: float) -> int:
-    """Physics steps a control period, which must come out even."""
+    """Physics steps per control period, which must be a whole number."""
     if frequency * step < (1.0 - 1e-9) / MAX_SUBSTEPS:
         reason = f"must give at most {MAX_SUBSTEPS} physics steps of {step:g} s a period"
         refuse(OptionError, "control_frequency", frequency, reason)
@@ -196,7 +196,7 @@ def _substeps(frequency: float, step: float) -> int:
 
 
 def _steering_limit(rover: RoverModel, asked_deg: float | None) -> float:
-    """Set-point of a steering action of 1, rad: what it stands for must be within every wheel's limit."""
+    """Set-point of a steering action of 1, rad, which must be within every wheel's limit."""
     limit: float = min(wheel["steering_limit"] for wheel in rover.to_dict()["wheels"])
     if asked_deg is None:
         return limit
@@ -207,11 +207,11 @@ def _steering_limit(rover: RoverModel, asked_deg: float | None) -> float:
 
 
 def check_actions(actions: object, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
-    """The actions `(12,)` or `(n, 12)` as floats of their own, within [-1, 1]."""
+    """Checks actions `(12,)` or `(n, 12)` within [-1, 1] and returns a float64 copy."""
     commands = array("action", actions, error=CommandError)
     if commands.shape != shape:
         refuse(CommandError, "action", commands.shape, f"must have shape {shape}")
-    # Written so that a NaN fails too.
+    # `not ... <=` refuses NaN too.
     if not np.abs(commands).max() <= 1.0:
         for index, entry in np.ndenumerate(commands):
             if not abs(entry) <= 1.0:

@@ -1,1 +1,1 @@
-"""Learning with stable-baselines3; needs the extra `train`."""
+"""Training with stable-baselines3; requires the extra `train`."""

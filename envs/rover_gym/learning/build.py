@@ -1,4 +1,4 @@
-"""The vector environment of a configuration."""
+"""Builds the vector environment of a training configuration."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,14 +21,14 @@ def build_env(
     seed: int = 0,
     monitor: Path | None = None,
 ) -> VecEnv:
-    """Rovers that are driven by commands and show features, not yet normalised.
+    """Builds a vector of rovers with commands as actions and features as observations, not yet normalised.
 
     Args:
         config: The configuration.
-        num_envs: How many, where it is not the configuration's number.
-        environment: Arguments that differ from the configuration's.
-        seed: Of the environments' fields.
-        monitor: File of the raw curve: reward, length (control periods) and success of every episode.
+        num_envs: Number of rovers; None for the configuration's.
+        environment: Arguments that override the configuration's.
+        seed: Seed of the environments.
+        monitor: File for the learning curve: reward, length (control periods) and success of every episode.
     """
     arguments = {**config.environment, **(environment or {})}
     rovers = RoverVecEnv(
@@ -46,5 +46,5 @@ def build_env(
 
 
 def normalised(venv: VecEnv, config: TrainingConfig, *, training: bool = True) -> VecNormalize:
-    """With running normalisation of features and, in training, of returns."""
+    """Adds running normalisation of features and, in training, of rewards."""
     return VecNormalize(venv, training=training, norm_reward=training, clip_obs=5.0, gamma=config.ppo.gamma)

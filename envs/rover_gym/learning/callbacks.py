@@ -1,4 +1,4 @@
-"""What happens while a policy learns: curriculum and checkpoints."""
+"""Callbacks of a training: curriculum, evaluation and checkpoints."""
 
 import json
 from collections import deque
@@ -12,11 +12,11 @@ from rover_gym.learning.training_config import CurriculumConfig
 
 
 class CurriculumCallback(BaseCallback):
-    """Raises the difficulty of the fields to come when enough episodes succeed.
+    """Raises the difficulty of the next fields when enough episodes succeed.
 
     Args:
-        curriculum: When, and by how much.
-        hardest: Hardest difficulty to begin with, where it is not the curriculum's start.
+        curriculum: The settings of the curriculum.
+        hardest: Initial hardest difficulty; None for the curriculum's start.
     """
 
     def __init__(self, curriculum: CurriculumConfig, hardest: float | None = None) -> None:
@@ -47,11 +47,12 @@ class CurriculumCallback(BaseCallback):
 
 
 class SameFieldsEvalCallback(EvalCallback):
-    """Evaluates on the same fields every time, so that the curve shows the policy and not the fields.
+    """Evaluates on the same fields every time, so that the curve reflects the policy and not the fields.
 
     Args:
-        seed: Of the fields.
-        arguments: Of stable-baselines3's `EvalCallback`.
+        *args: Arguments of stable-baselines3's `EvalCallback`.
+        seed: Seed of the fields.
+        **arguments: Keyword arguments of `EvalCallback`.
     """
 
     def __init__(self, *args: object, seed: int, **arguments: object) -> None:
@@ -65,12 +66,12 @@ class SameFieldsEvalCallback(EvalCallback):
 
 
 class CheckpointCallback(BaseCallback):
-    """Writes everything that a training needs to go on.
+    """Writes checkpoints from which a training can resume.
 
     Args:
         every: Steps of all environments between two checkpoints.
-        folder: Where `latest` and one file a checkpoint go.
-        curriculum: Its state is part of a checkpoint.
+        folder: Folder of `latest.json` and the checkpoints' files.
+        curriculum: The curriculum, whose state is part of a checkpoint.
     """
 
     def __init__(self, every: int, folder: Path, curriculum: CurriculumCallback | None = None) -> None:

@@ -1,4 +1,4 @@
-"""Vector environments whose actions are commands and whose observations are features."""
+"""A vector environment with commands as actions and features as observations."""
 
 from typing import Any
 
@@ -13,16 +13,16 @@ from rover_gym.policy.features import LARGEST_FEATURE, Features
 
 
 class CommandVecEnv(VecEnvWrapper):
-    """Holds a command for some steps of the rover environments inside, and shows features.
+    """Holds each command for several steps of the wrapped rover environments and returns features.
 
-    An environment that ends while a command is held starts anew and waits without torque for the rest of it, at
-    most `repeat - 1` steps, whose reward counts for nothing.
+    If an episode ends while a command is held, its rover starts the next episode and waits without torque for the
+    remaining steps, at most `repeat - 1`, whose rewards are discarded.
 
     Args:
         venv: Vector of `Rover-v0`.
-        features: What the policy sees.
-        controller: What the commands do.
-        repeat: Steps for which a command holds.
+        features: Maps observations to features.
+        controller: Turns commands into actions.
+        repeat: Steps that a command is held.
     """
 
     def __init__(self, venv: VecEnv, features: Features, controller: CommandController, repeat: int = 4) -> None:
@@ -38,16 +38,16 @@ class CommandVecEnv(VecEnvWrapper):
         self._commands = np.zeros((self.num_envs, N_COMMANDS), np.float32)
 
     def reset(self) -> VecEnvObs:
-        """The features after a reset of all."""
+        """Resets all environments and returns their features."""
         self._seen = np.asarray(self.venv.reset())
         return self.features(self._seen)
 
     def step_async(self, actions: npt.NDArray[Any]) -> None:
-        """Keeps the commands for `step_wait`."""
+        """Stores the commands for `step_wait`."""
         self._commands = actions
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Holds the commands; rewards are summed."""
+        """Holds the commands for `repeat` steps and sums the rewards."""
         rewards = np.zeros(self.num_envs, np.float32)
         ended = np.zeros(self.num_envs, bool)
         final: dict[int, dict[str, Any]] = {}

@@ -1,4 +1,4 @@
-"""From a model of stable-baselines3 to a policy that NumPy runs."""
+"""Exports a stable-baselines3 model as a policy that runs with NumPy alone."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,13 +16,13 @@ from rover_gym.policy.policy_card import PolicyCard
 
 
 def network_of(model: OnPolicyAlgorithm, normalisation: VecNormalize) -> Network:
-    """The actor of a model, and the normalisation of what it sees."""
+    """The actor network of a model, with the normalisation of its features."""
     policy = model.policy
     if not isinstance(policy, ActorCriticPolicy):
         raise TypeError(f"an actor-critic policy is needed, not {policy!r}")
     layers = [layer for layer in policy.mlp_extractor.policy_net if isinstance(layer, torch.nn.Linear)]
     layers.append(policy.action_net)  # type: ignore[arg-type]
-    statistics: Any = normalisation.obs_rms  # of one array, not of a dictionary
+    statistics: Any = normalisation.obs_rms  # one set of statistics, since observations are no dictionaries
     return Network(
         mean=statistics.mean.astype(np.float32),
         deviation=np.sqrt(statistics.var + normalisation.epsilon).astype(np.float32),

@@ -1,4 +1,4 @@
-"""What a run leaves beside its model: versions, revision, times."""
+"""The provenance of a training run: command, versions and revision."""
 
 import platform
 import subprocess
@@ -11,7 +11,7 @@ PACKAGES = ("rover-gym", "numpy", "gymnasium", "stable-baselines3", "torch", "ra
 
 
 def provenance() -> dict[str, Any]:
-    """Versions of what a training depends on, the revision of the sources, and the command."""
+    """The command, machine type, versions of Python and the packages, and revision of the sources."""
     return {
         "command": [Path(sys.argv[0]).name, *sys.argv[1:]],
         "python": platform.python_version(),
@@ -22,7 +22,7 @@ def provenance() -> dict[str, Any]:
 
 
 def revision() -> str | None:
-    """The git revision of the sources, with "-dirty" where they differ from it; None outside a repository."""
+    """The git revision of the sources, with "-dirty" after uncommitted changes; None outside a repository."""
     git = ["git", "-C", str(Path(__file__).parent)]
     try:
         head = subprocess.run([*git, "rev-parse", "HEAD"], check=True, capture_output=True, text=True)  # noqa: S603

@@ -1,10 +1,10 @@
-"""The configuration of a training: a YAML file, every key of which is known and checked.
+"""The configuration of a training: a YAML file whose keys and values are all checked.
 
-environment    arguments of `RoverEnv`; randomisation and reward weights among them
-command        what the policy's actions stand for (`rover_gym.policy.command`)
-curriculum     difficulty of the rocks by what has been learned; none on the plane
+environment    arguments of `RoverEnv`, including randomisation and reward weights
+command        scale of the policy's commands (`rover_gym.policy.command`)
+curriculum     difficulty of the rocks by success rate; none on the plane
 ppo            hyperparameters of stable-baselines3's PPO
-evaluation     of the policy while it learns, on an environment of its own
+evaluation     evaluation during training, on a separate environment
 """
 
 import dataclasses
@@ -28,15 +28,15 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class CurriculumConfig:
-    """Raises the difficulty as the rover learns.
+    """Settings of the curriculum, which raises the difficulty as the policy learns.
 
     Attributes:
-        start: Hardest difficulty at first.
-        end: Hardest difficulty at last.
-        step: What a raise adds.
+        start: Initial hardest difficulty.
+        end: Final hardest difficulty.
+        step: Increase of the hardest difficulty at a raise.
         width: Difficulties are drawn from [hardest - width, hardest].
-        success: A raise follows when this share of the episodes of the last rollouts succeeded.
-        episodes: So many episodes are looked at, at least.
+        success: Success rate over the last rollouts that triggers a raise.
+        episodes: Fewest episodes over which the success rate is taken.
     """
 
     start: float
@@ -83,13 +83,13 @@ class PPOConfig:
 
 @dataclass(frozen=True)
 class EvaluationConfig:
-    """How the policy is watched while it learns.
+    """Settings of the evaluation during training.
 
     Attributes:
-        every: Decisions, of all environments together, between two evaluations.
-        episodes: Of each evaluation; the same ones every time.
-        seed: Of their fields. Training's own are below a million.
-        environment: Arguments that differ from training's.
+        every: Decisions of all environments together between two evaluations.
+        episodes: Episodes per evaluation; the same ones every time.
+        seed: Seed of their fields; training uses seeds below a million.
+        environment: Arguments that override those of the training.
     """
 
     every: int = 50_000
@@ -104,21 +104,21 @@ class EvaluationConfig:
 
 @dataclass(frozen=True)
 class TrainingConfig:
-    """A whole training.
+    """The configuration of a training.
 
     Attributes:
         environment: Arguments of `RoverEnv`.
         total_steps: Decisions of all environments together.
-        num_envs: How many rovers drive at once.
-        threads: That step them.
-        max_episode_steps: Control periods until an episode is cut.
-        repeat: Control periods for which a command holds.
-        pool: Cells of the height scan are so many points long and wide.
-        guided: Whether actions are offsets to the guide's command.
-        command: What a command of one stands for.
-        ppo: Hyperparameters.
-        evaluation: While it learns.
-        curriculum: Of the rocks' difficulty; None leaves `environment`'s.
+        num_envs: Number of rovers.
+        threads: Threads that step the rovers.
+        max_episode_steps: Control periods until truncation.
+        repeat: Control periods that a command is held.
+        pool: Height-scan points per pooling cell, lengthwise and crosswise.
+        guided: Whether actions are offsets from the guide's command.
+        command: The values of a command of 1.
+        ppo: Hyperparameters of PPO.
+        evaluation: Settings of the evaluation during training.
+        curriculum: Curriculum of the rocks' difficulty; None keeps the difficulty of `environment`.
         checkpoint_every: Decisions between two checkpoints.
     """
 
@@ -145,23 +145,23 @@ class TrainingConfig:
             Features(rover(arguments), self.pool)
 
     def to_yaml(self) -> str:
-        """The configuration as `read_config` reads it."""
+        """The configuration as YAML, in the form that `read_config` reads."""
         text: str = yaml.safe_dump(_plain(asdict(self)), sort_keys=False)
         return text
 
 
 def rover(arguments: Mapping[str, Any]) -> RoverEnv:
-    """The environment of these arguments, as YAML gives them.
+    """Makes an environment from arguments as YAML gives them.
 
     Raises:
-        OptionError: One of them is unknown.
-        RoverGymError: One of them is out of its range.
+        OptionError: An argument is unknown.
+        RoverGymError: An argument is out of range.
     """
     return RoverEnv(**environment_arguments(arguments))
 
 
 def environment_arguments(arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Arguments of `RoverEnv`: YAML's lists become pairs, and an unknown name is refused."""
+    """Converts YAML's lists to tuples for `RoverEnv` and refuses unknown names."""
     for name in arguments:
         if name not in ARGUMENTS:
             refuse(OptionError, f"environment.{name}", name, f"unknown; known are {', '.join(sorted(ARGUMENTS))}")
@@ -169,7 +169,7 @@ def environment_arguments(arguments: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def read_config(path: str | Path) -> TrainingConfig:
-    """The configuration of a YAML file.
+    """Reads the configuration from a YAML file.
 
     Raises:
         OptionError: A key is unknown or missing, or a value is of the wrong kind or out of range; `field` names it.
@@ -182,12 +182,12 @@ def read_config(path: str | Path) -> TrainingConfig:
 
 
 def parse_config(given: object) -> TrainingConfig:
-    """The configuration of what a YAML file holds."""
+    """Builds the configuration from parsed YAML."""
     return _build(TrainingConfig, given, "")
 
 
 def _build(cls: type[T], given: object, prefix: str) -> T:
-    """A dataclass of a mapping."""
+    """Builds a dataclass from a mapping."""
     if not isinstance(given, Mapping):
         refuse(OptionError, prefix.rstrip(".") or "config", given, "must be a mapping")
     assert is_dataclass(cls)  # noqa: S101 - the dataclasses of this file
@@ -204,7 +204,7 @@ def _build(cls: type[T], given: object, prefix: str) -> T:
 
 
 def _value(kind: Any, given: object, name: str) -> Any:
-    """A value of a field's kind."""
+    """Converts a value to the type of its field."""
     if isinstance(kind, types.UnionType):  # X | None
         return None if given is None else _value(get_args(kind)[0], given, name)
     if dataclasses.is_dataclass(kind):
@@ -238,7 +238,7 @@ def _as_float(given: object) -> object:
 
 
 def _plain(value: Any) -> Any:
-    """Tuples as lists, for YAML."""
+    """Converts tuples to lists, for YAML."""
     if isinstance(value, Mapping):
         return {key: _plain(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):

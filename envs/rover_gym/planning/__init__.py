@@ -1,4 +1,4 @@
-"""What a scene needs, and no more: from its description to the model, ground, scheme and step that are built for it.
+"""Plans the cheapest simulation of a scene: model, ground, time-stepping scheme and step size from its description.
 
     >>> from rover_gym import Plane
     >>> from rover_gym.planning import Scene, plan
@@ -10,8 +10,8 @@
     >>> rover.step(200).is_converged
     True
 
-A scene says what will never happen in it; whatever it leaves open is built. What was left out is refused when it is
-asked for later. `docs/economy.md` has the error and the cost of each economy, and the command that measures them.
+A scene states what will never happen in it, and the plan leaves out only what that permits. A command that needs a part
+left out is refused. `docs/economy.md` gives the error and the cost of each economy, and the command that measures them.
 """
 
 from rover_gym.planning.economy import Economy, measure_economies

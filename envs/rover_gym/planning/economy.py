@@ -1,4 +1,4 @@
-"""What each economy of a plan costs and saves: the same drive with and without it, in one run."""
+"""Measures the error and the saving of each economy of a plan, by the same drive with and without it."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -10,22 +10,22 @@ import numpy.typing as npt
 from rover_gym.mechanics import Simulation
 from rover_gym.planning.scene_plan import PlannedRover, ScenePlan
 
-#: The trunk's place is compared this often, s.
+#: Interval between comparisons of the trunk's position, s.
 SAMPLE = 0.1
-#: "As stiff as a weld", N m/rad and N m s/rad.
+#: PD gains nearly as stiff as a weld, N m/rad and N m s/rad.
 RIGID = 1e9
 
 
 @dataclass(frozen=True)
 class Economy:
-    """One part of a plan against the same drive without it.
+    """One economy of a plan, compared with the same drive without it.
 
     Attributes:
-        name: What was left out or put in place of something dearer.
-        before: CPU time without the economy, microseconds a step.
-        after: With it.
-        error: Largest distance of the trunk between the two, m.
-        bound: What the plan says of it, m; None where it says nothing.
+        name: The part that was left out or replaced by a cheaper one.
+        before: CPU time without the economy, microseconds per step.
+        after: CPU time with the economy, microseconds per step.
+        error: Largest distance between the trunk positions of the two drives, m.
+        bound: The plan's bound on the error, m; None without a bound.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Economy:
 
     @property
     def ratio(self) -> float:
-        """CPU time with the economy over that without."""
+        """Ratio of the CPU time with the economy to that without."""
         return self.after / self.before
 
 
@@ -50,15 +50,15 @@ def measure_economies(
 ) -> list[Economy]:
     """Drives a plan's scene straight, with and without each economy that applies.
 
-    All drives are run in turn, `repeats` times, and the least CPU time of each is taken, so that a busy machine is
-    busy for all of them.
+    The drives run in turn, `repeats` times, and the least CPU time of each counts, so that other load on the machine
+    affects them alike.
 
     Args:
-        plan: What is built.
-        torque: Of every wheel, N m.
-        duration: s.
-        repeats: How often each is run.
-        progress: Called with the fraction that is done.
+        plan: The plan to measure.
+        torque: Torque of every wheel, N m.
+        duration: Simulated time of each drive, s.
+        repeats: Runs of each drive.
+        progress: Called with the fraction done.
 
     Raises:
         StepError: A step could not be taken.
@@ -82,7 +82,7 @@ def measure_economies(
 def _pairs(
     plan: ScenePlan,
 ) -> tuple[Mapping[str, Callable[[], PlannedRover]], list[tuple[str, str, str, float | None]]]:
-    """Rovers by name, and which two of them show which economy, with the plan's bound."""
+    """Returns rover factories by name, and for each economy its label, the two rovers to compare and its bound."""
     bounds = {decision.part: decision.error for decision in plan.decisions}
     full = replace(plan, kind="full", model=plan.scene.model)
     welded = replace(plan, kind="welded")
@@ -124,7 +124,7 @@ def _rigid(full: ScenePlan) -> PlannedRover:
 
 
 def _drive(rover: PlannedRover, torque: float, duration: float) -> tuple[float, npt.NDArray[np.float64]]:
-    """CPU time, microseconds a step, and the trunk's places `(n, 3)`."""
+    """Returns the CPU time, microseconds per step, and the trunk's positions `(n, 3)`, m."""
     rover.set_wheel_torques(np.full(len(rover.plan.scene.model.wheel_names), torque))
     stride = max(1, round(SAMPLE / rover.simulation.time_step))
     rows = max(1, round(duration / SAMPLE))

@@ -1,4 +1,4 @@
-"""Decides what is built for a scene: model, ground, scheme and step, each with its reason."""
+"""Plans a scene: model, ground, time-stepping scheme and step size, each with a reason."""
 
 import math
 from typing import Any
@@ -23,29 +23,29 @@ from rover_gym.planning.scene import Accuracy, Array, Scene, check_scene, gravit
 from rover_gym.planning.scene_plan import Decision, Kind, ScenePlan
 from rover_gym.validation import flag, number, refuse, vector
 
-# The bounds are for 10 s from rest on a plane while the wheels do not slip; `docs/economy.md` has what was measured.
-#: Largest distance of the trunk from that of the full model with its steering held by the PD, m. On a plane a wheel
-#: touches on its steering axis and nothing turns it. Largest measured: 2.6e-7.
+# The bounds hold for 10 s from rest on a plane while the wheels do not slip; `docs/economy.md` lists the measurements.
+#: Largest distance between the trunks of the welded model and of the full model with PD-held steering, m. On a plane a
+#: wheel touches the ground on its steering axis, so the contact does not turn it. Largest measured: 2.6e-7.
 WELD_ERROR = 1e-6
-#: The same for the planar model against the welded one, m: rounding, the solver's tolerance. Largest measured: 1.9e-8.
+#: The same between the planar and the welded model, m: rounding and solver tolerance. Largest measured: 1.9e-8.
 PLANAR_ERROR = 1e-7
-#: Linearised against Newton scheme over the step squared, m/s2, on the same drives. Largest measured: 3.3e-3.
+#: The same between the linearised and the Newton scheme, over the step size squared, m/s2. Largest measured: 3.3e-3.
 LINEARISED_ERROR = 1e-2
-#: Gap of a wheel (m) up to which the start counts as resting on the plane.
+#: Largest wheel gap (m) at which the start counts as resting on the plane.
 RESTING = 1e-6
-_STRAIGHT = 1e-12  # rad or m: what counts as symmetric, a few roundings away from it
+_STRAIGHT = 1e-12  # rad or m: deviation from symmetry that counts as rounding
 
 
 def plan(scene: Scene, accuracy: Accuracy = "balanced", *, planar: bool = True) -> ScenePlan:
-    """Decides what is built for a scene.
+    """Plans the simulation of a scene.
 
     Args:
-        scene: What the rover will meet and be told.
+        scene: The scene.
         accuracy: As for `Simulation`: a name, or an error in metres.
-        planar: Whether a planar model is welcome; without, the tree is built.
+        planar: Whether a planar model is allowed; without it the plan uses the tree.
 
     Raises:
-        OptionError: The accuracy, reach or heading is out of its range; a scene that contradicts itself, or is none.
+        OptionError: The accuracy, reach or heading is out of range, or `scene` is no scene or contradicts itself.
         StateError: The start has a wrong shape or an entry that is not finite.
         TerrainError: No start was given, and the terrain has no plane to stand on.
     """
@@ -75,7 +75,7 @@ def plan(scene: Scene, accuracy: Accuracy = "balanced", *, planar: bool = True) 
         base = Decision("base", "free: 6 coordinates", f"no planar model: {obstacle}")
     variant, variant_decision = _variant(scene, chosen, calm=weld)
     options = {**scene.options, **chosen, "variant": variant}
-    # Wrong options are refused here, not when the simulation is built.
+    # Check the options now rather than when the simulation is built.
     Simulation(model, terrain, **options)
     decisions = (
         terrain_decision,
@@ -120,7 +120,7 @@ def _ground(scene: Scene) -> tuple[Plane | SphereField, Decision]:
     far = 0
     if reach is not None:
         start = _start(scene)
-        # From the trunk's origin to the farthest rim of the rover, in any pose.
+        # Upper bound on the distance from the trunk's origin to any rim, in any pose.
         own = float(np.linalg.norm(np.abs(_extent(scene.model)).max(axis=0)) + scene.model.wheel_radii.max())
         near = np.hypot(centres[:, 0] - start[0], centres[:, 2] - start[2]) - radii <= reach + own
         far = int((shown & ~near).sum())
@@ -142,7 +142,7 @@ def _ground(scene: Scene) -> tuple[Plane | SphereField, Decision]:
 
 
 def _extent(model: RoverModel) -> Array:
-    """`(n, 3)` origins of the solids and of the wheels' lowest points relative to the trunk, joints at zero, m."""
+    """`(n, 3)` origins of the solids and lowest points of the wheels relative to the trunk, joints at zero, m."""
     origins = [origin for origin, _ in model.poses(np.zeros(model.nq), coordinates="state").values()]
     rims = model.wheel_contact_points(np.zeros(model.nq), Plane(), coordinates="state")
     return np.concatenate([np.array(origins), rims])
@@ -178,7 +178,7 @@ def _rests(scene: Scene, terrain: Plane, start: Array) -> bool:
 
 
 def _steering_offset(model: RoverModel) -> float:
-    """Largest distance of a wheel's centre from its steering axis, straight ahead, m."""
+    """Largest offset of a wheel's centre or contact point from its steering axis, wheels straight ahead, m."""
     description = model.to_dict()
     axes = {solid["name"]: np.array(solid.get("axis", (0.0, 0.0, 0.0)), dtype=float) for solid in description["solids"]}
     poses = model.poses(np.zeros(model.nq), coordinates="state")
@@ -188,13 +188,13 @@ def _steering_offset(model: RoverModel) -> float:
             arm = poses[wheel["solid"]][0] - poses[name][0]
             axis = poses[name][1] @ axes[name]
             offsets.append(float(np.linalg.norm(np.cross(arm, axis)) / np.linalg.norm(axis)))
-            # On a plane it touches straight below its centre.
+            # On a plane a wheel touches straight below its centre.
             offsets.append(float(np.hypot(axis[0], axis[2])))
     return max(offsets)
 
 
 def _obstacle(scene: Scene, terrain: Plane | SphereField, start: Array, *, welded: bool) -> str | None:
-    """Why there is no planar model; None if there is."""
+    """The reason why a planar model is impossible; None if it is possible."""
     if isinstance(terrain, SphereField):
         return "spheres are not the same left and right"
     if not welded:

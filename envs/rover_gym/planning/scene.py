@@ -1,4 +1,4 @@
-"""A scene as its user describes it: what the rover will meet, and what it will never be told."""
+"""The user's description of a scene: the rover, its terrain, and the commands that will not occur."""
 
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
@@ -12,7 +12,7 @@ from rover_gym.validation import flag, known_keys, refuse, vector
 Array: TypeAlias = npt.NDArray[np.float64]
 Accuracy: TypeAlias = Literal["fast", "balanced", "reference"] | float
 
-#: Keyword arguments of `Simulation` that a scene may hold: all but those that the plan chooses.
+#: Keyword arguments of `Simulation` that a scene may set; the plan chooses the others.
 OPTIONS = (
     "gravity",
     "friction",
@@ -28,18 +28,18 @@ OPTIONS = (
 
 @dataclass(frozen=True)
 class Scene:
-    """What a rover will meet and be told.
+    """A rover, its terrain, and the commands that it may receive.
 
     Attributes:
         terrain: The ground.
-        model: The machine.
-        start: `(nq,)` public coordinates; at rest on the terrain's plane at x = z = 0 if not given.
-        heading: Of the start that is made if none is given, rad.
-        steered: Whether a steering set-point other than zero may ever be given.
+        model: The rover.
+        start: `(nq,)` public coordinates; None starts at rest on the terrain's plane at x = z = 0.
+        heading: Heading of the default start, rad.
+        steered: Whether a non-zero steering set-point may occur.
         equal_torques: Whether the two wheels of each axle always get the same torque.
         held: Whether joints may be held or wheels braked.
-        tumbles: Whether the rover turns over in free flight, so that its angular momentum matters.
-        reach: The rover stays within this distance of its start on the map, m; None promises nothing.
+        tumbles: Whether the rover tumbles in free flight, so that its angular momentum matters.
+        reach: Largest distance of the rover from its start on the map, m; None for no limit.
         options: Keyword arguments of `Simulation` that describe the scene: gravity, friction, restitution.
     """
 
@@ -56,7 +56,7 @@ class Scene:
 
 
 def check_scene(scene: Scene) -> None:
-    """Refuses a scene whose parts are not what they must be."""
+    """Checks the types of a scene's parts and the names of its options."""
     if not isinstance(scene, Scene):
         refuse(OptionError, "scene", scene, "must be a Scene")
     if not isinstance(scene.terrain, (Plane, SphereField)):
@@ -76,6 +76,6 @@ def steering_joints(model: RoverModel) -> list[str]:
 
 
 def gravity_of(scene: Scene) -> Array:
-    """(3,) the scene's gravity, m/s2; the Earth's where it names none."""
+    """(3,) gravity of the scene, m/s2; by default the Earth's."""
     gravity = scene.options.get("gravity")
     return np.array(vector("gravity", (0.0, -9.81, 0.0) if gravity is None else gravity, 3))

@@ -1,4 +1,4 @@
-"""What is built for a scene, part by part with its reason, and the rover that comes of it."""
+"""The plan of a scene, with a reason for every part, and the rover built from it."""
 
 import math
 from dataclasses import dataclass
@@ -23,21 +23,21 @@ from rover_gym.validation import refuse, vector
 
 Kind: TypeAlias = Literal["full", "welded", "planar"]
 
-#: CPU time of a step on a plane, relative to the full model, as measured.
+#: Measured CPU time of a step on a plane, relative to the full model.
 COST: dict[Kind, float] = {"full": 1.0, "welded": 0.75, "planar": 0.3}
-#: The planar model's trunk does not touch the ground; this far from parallel to it (rad) it might.
+#: Largest angle (rad) between trunk and ground of the planar model, which has no contacts between the two.
 LARGEST_TILT = 0.2
 
 
 @dataclass(frozen=True)
 class Decision:
-    """One part of what is built.
+    """The decision about one part of a plan.
 
     Attributes:
-        part: What was decided about.
-        built: What is built.
-        reason: Why.
-        error: Bound on what it changes in the trunk's place in 10 s, m; None where nothing was left out.
+        part: The part decided on.
+        built: The choice.
+        reason: The reason for the choice.
+        error: Bound on the change of the trunk's position in 10 s, m; None where nothing was left out.
     """
 
     part: str
@@ -48,16 +48,16 @@ class Decision:
 
 @dataclass(frozen=True)
 class ScenePlan:
-    """What is built for a scene.
+    """The plan of a scene: the model, ground, start and options of its simulation.
 
     Attributes:
-        scene: The scene as it was described.
-        kind: The model: the full tree, the tree with its steering welded, or its planar image.
-        model: The machine as it is built (for the planar image the tree that it is made of).
-        terrain: The ground as it is built.
+        scene: The scene as the user described it.
+        kind: The kind of model: the full tree, the tree with welded steering, or its planar image.
+        model: The model to simulate; for the planar image, the tree it is derived from.
+        terrain: The ground to simulate.
         start: `(21,)` public coordinates of the full model.
         options: Keyword arguments of the simulation.
-        decisions: Every part and why it is as it is.
+        decisions: The decision about every part.
     """
 
     scene: Scene
@@ -70,24 +70,24 @@ class ScenePlan:
 
     @property
     def error(self) -> float:
-        """Bound on the distance of the trunk from the full model's at the same step, 10 s of a drive, m."""
+        """Bound on the distance between the trunk and the full model's over 10 s at the same step size, m."""
         return sum(decision.error or 0.0 for decision in self.decisions)
 
     @property
     def cost(self) -> float:
-        """CPU time to expect of a step, relative to the full model on the same ground."""
+        """Expected CPU time of a step, relative to the full model on the same ground."""
         return COST[self.kind]
 
     def explain(self) -> list[dict[str, Any]]:
-        """Rows of what was built and why: part, built, reason, error (m or None)."""
+        """The decisions as rows: part, built, reason, error (m or None)."""
         return [{"part": d.part, "built": d.built, "reason": d.reason, "error": d.error} for d in self.decisions]
 
     def rover(self) -> "PlannedRover":
-        """The rover at its start."""
+        """Builds the rover at its start."""
         return PlannedRover(self)
 
     def simulation(self) -> Simulation | MirroredRoverSimulation:
-        """The bare simulation at its start: `rover` wraps it so that all kinds are used alike."""
+        """Builds the bare simulation at its start; `rover` wraps it in one interface for all kinds of model."""
         if self.kind == "planar":
             return self._planar()
         sim = Simulation(self.model, self.terrain, **self.options)
@@ -97,7 +97,7 @@ class ScenePlan:
 
     def _planar(self) -> MirroredRoverSimulation:
         plane = self.terrain
-        assert isinstance(plane, Plane)  # noqa: S101 - `plan` makes no planar plan without
+        assert isinstance(plane, Plane)  # noqa: S101 - `plan` makes a planar plan only on a plane
         heading = self.start[4]
         n = plane.normal
         slope = -(n[0] * math.cos(heading) - n[2] * math.sin(heading)) / n[1]
@@ -112,10 +112,10 @@ class ScenePlan:
 
 
 class PlannedRover:
-    """A rover of any plan under the full rover's commands and coordinates.
+    """The rover of any plan, with the commands and coordinates of the full model.
 
     Args:
-        plan: What to build.
+        plan: The plan to build.
     """
 
     def __init__(self, plan: ScenePlan) -> None:
@@ -124,7 +124,7 @@ class PlannedRover:
         names, wheels = plan.scene.model.dof_names, plan.scene.model.wheel_names
         self._pairs: list[list[int]] = []
         if isinstance(self.simulation, MirroredRoverSimulation):
-            # x runs along the heading, so it is put in its place by itself.
+            # The planar x runs along the heading; `q` maps it to x and z.
             joints = [[names.index(name) for name in pair] for pair in self.simulation.joints]
             self._places = [[], [1], [5], *joints]
             self._pairs = [[wheels.index(name) for name in pair] for pair in self.simulation.wheels]
@@ -150,10 +150,10 @@ class PlannedRover:
         return q
 
     def set_wheel_torques(self, torques: npt.ArrayLike) -> None:
-        """`(6,)` N m, positive drives forward.
+        """Sets the wheel torques `(6,)`, N m; positive drives forward.
 
         Raises:
-            CommandError: Not six finite numbers, or unequal on an axle of a planar model.
+            CommandError: The torques are not six finite numbers, or differ on an axle of a planar model.
         """
         if isinstance(self.simulation, Simulation):
             self.simulation.set_wheel_torques(torques)
@@ -165,10 +165,10 @@ class PlannedRover:
         self.simulation.set_torques([values[pair[0]] for pair in self._pairs])
 
     def set_steering(self, set_points: npt.ArrayLike) -> None:
-        """`(6,)` rad.
+        """Sets the steering set-points `(6,)`, rad.
 
         Raises:
-            CommandError: Not six finite numbers, or not zero although the scene was planned without steering.
+            CommandError: The set-points are not six finite numbers, or not zero in a scene planned without steering.
         """
         if self.plan.kind == "full" and isinstance(self.simulation, Simulation):
             self.simulation.set_steering(set_points)
@@ -181,8 +181,8 @@ class PlannedRover:
         """Takes n steps.
 
         Raises:
-            StepError: A step could not be taken, a planar rover has tilted so far that it may touch with its trunk, or
-                the rover has left the scene's reach.
+            StepError: A step failed, a planar rover has tilted so far that its trunk may touch the ground, or the rover
+                has left the scene's reach.
         """
         report = self.simulation.step(n)
         reach = self.plan.scene.reach

@@ -1,4 +1,4 @@
-"""Who drives: the baseline, trained policies, the commands and features they share, and how far each gets."""
+"""Policies: the PD baseline, trained policies, their commands and features, and their evaluation."""
 
 from rover_gym.policy.baseline import ENDS, BaselineInterrupt, BaselineRow, measure_baseline, wilson_interval
 from rover_gym.policy.command import CommandController, CommandLimits

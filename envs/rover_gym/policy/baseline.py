@@ -1,4 +1,4 @@
-"""How far the PD baseline gets among the rocks: its success rate by difficulty."""
+"""Measures the success rate of the PD baseline among rocks, by difficulty."""
 
 import math
 from collections import Counter
@@ -20,17 +20,17 @@ ENDS = ("goal", "time", "high_centred", "roll_over", "step_failed")
 
 @dataclass(frozen=True)
 class BaselineRow:
-    """What the episodes at one difficulty came to.
+    """The results at one difficulty.
 
     Attributes:
-        difficulty: In [0, 1].
-        episodes: How many.
-        successes: How many reached the goal.
-        success_rate: The share of them.
+        difficulty: Difficulty in [0, 1].
+        episodes: Number of episodes.
+        successes: Number of episodes that reached the goal.
+        success_rate: Fraction of episodes that reached the goal.
         interval: Wilson's 95% interval of the success rate.
-        time_to_goal: Mean over the episodes that reached it, s; NaN where none did.
-        energy_per_metre: Work through the wheel motors over way driven, all episodes, J/m.
-        ends: How often episodes ended for each cause.
+        time_to_goal: Mean time of the episodes that reached the goal, s; NaN if none did.
+        energy_per_metre: Work of the wheel motors over path length, all episodes, J/m.
+        ends: Number of episodes by reason for their end.
     """
 
     difficulty: float
@@ -44,10 +44,10 @@ class BaselineRow:
 
 
 class BaselineInterrupt(KeyboardInterrupt):
-    """The user ended a measurement.
+    """The user interrupted a measurement.
 
     Attributes:
-        rows: Of the episodes that are done; the last may have fewer than the others.
+        rows: Results of the finished episodes; the last row may have fewer episodes than the others.
     """
 
     def __init__(self, rows: list[BaselineRow]) -> None:
@@ -63,19 +63,19 @@ def measure_baseline(
     policy: str = "pd",
     progress: Callable[[float, int], None] = lambda _difficulty, _done: None,
 ) -> list[BaselineRow]:
-    """Drives `RoverRocks-v0` with the PD baseline, or another policy, the same seeds at every difficulty.
+    """Drives `RoverRocks-v0` with the PD baseline or another policy, with the same seeds at every difficulty.
 
     Args:
-        difficulties: Each in [0, 1].
-        episodes: How many at each difficulty.
-        seed: Seed of the first; the next ones count up.
-        policy: "pd", "trained" for the package's own, or the folder of a trained one.
-        progress: Called with the difficulty and the number of episodes done, after each.
+        difficulties: The difficulties, each in [0, 1].
+        episodes: Episodes per difficulty.
+        seed: Seed of the first episode; the seed increases by one per episode.
+        policy: "pd", "trained" for the shipped policy, or the folder of a trained policy.
+        progress: Called after each episode with the difficulty and the number of episodes done.
 
     Raises:
-        OptionError: A difficulty is out of its range, there is no such policy, or `episodes` or `seed` is no whole
-            number or out of its range.
-        BaselineInterrupt: The user interrupted it; the episodes that are done are in it.
+        OptionError: A difficulty is out of range, there is no such policy, or `episodes` or `seed` is no whole number
+            or out of range.
+        BaselineInterrupt: The user interrupted the measurement; the exception holds the results so far.
     """
     episodes, seed = whole("episodes", episodes, at_least=1), whole("seed", seed)
     difficulties = tuple(number("difficulty", level, at_least=0.0, at_most=1.0) for level in difficulties)
@@ -99,12 +99,14 @@ def measure_baseline(
 
 
 def wilson_interval(successes: int, n: int, z: float = 1.959963984540054) -> tuple[float, float]:
-    """Wilson's score interval of a proportion: unlike the normal one it stays within [0, 1] and has width at 0 and 1.
+    """Wilson's score interval of a proportion.
+
+    Unlike the normal interval, it stays within [0, 1] and has a positive width at 0 and 1.
 
     Args:
-        successes: How many of the trials succeeded.
-        n: How many trials; at least one.
-        z: Quantile of the normal distribution; the default makes it a 95% interval.
+        successes: Number of successful trials.
+        n: Number of trials; at least one.
+        z: Quantile of the normal distribution; the default gives a 95% interval.
 
     Raises:
         OptionError: There are no trials, or more successes than trials.

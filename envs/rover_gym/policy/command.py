@@ -1,18 +1,18 @@
-"""Driving by three numbers: how fast, how sharply, how far sideways; for many rovers at once.
+"""Drives rovers by three numbers: speed, curvature and sideways direction; vectorised over rovers.
 
-A command says how the point in the middle of the wheelbase shall move: with speed `v` in a direction `beta` off
-the trunk's x axis while the trunk turns by `kappa` per metre of way, both positive to the left. A wheel at
-`(x, z)` from that point then moves, over `v`,
+A command sets the motion of the point in the middle of the wheelbase: speed `v` in a direction `beta` off the trunk's
+x axis, while the trunk turns by `kappa` per metre of path; `beta` and `kappa` are positive to the left. The velocity
+of a wheel at `(x, z)` from that point, divided by `v`, is
 
     ahead    a = cos(beta) + kappa z
     left     l = sin(beta) + kappa x
 
-so it is steered to `delta = atan2(l, a)`, as far as the steering reaches, and its rim turns at
-`v (a cos(delta) + l sin(delta))`. With beta = 0 these are `PDPolicy`'s formulas. Torques come from the same
-regulator of wheel speeds, with the force that holds the rover on a slope.
+The wheel is steered to `delta = atan2(l, a)`, within the steering limit, and its rim speed is
+`v (a cos(delta) + l sin(delta))`. With beta = 0 these are `PDPolicy`'s formulas. The torques come from the same wheel
+speed controller, with a feedforward of the force that holds the rover on a slope.
 
-A policy's action is the command itself, or an offset to the command of a guide that knows nothing of rocks: full
-speed along the circle that is tangential to the heading and meets the goal (pure pursuit).
+A policy's action is the command itself, or an offset from the command of a guide that ignores rocks: full speed along
+the circle that is tangential to the heading and passes through the goal (pure pursuit).
 """
 
 import math
@@ -32,17 +32,20 @@ Array = npt.NDArray[np.float64]
 #: Entries of a command: speed, curvature, sideways.
 N_COMMANDS = 3
 
-#: What an action of one adds to the guide's command.
+#: Offset from the guide's command that an action of 1 adds.
 OFFSET = np.array([2.0, 2.0, 1.0])
 
 
 @dataclass(frozen=True)
 class CommandLimits:
-    """What a command of one stands for, and how hard speeds are regulated.
+    """The values of a command of 1, and the time constant of the speed controller.
 
-    speed: m/s. curvature: 1/m. sideways_deg: direction of travel off the trunk's axis, degrees. response: s, time
-    constant of the speed regulator for the whole rover's mass; a quarter of `PDPolicy`'s, so that a rover that is
-    held by a rock soon pushes with all its torque.
+    Attributes:
+        speed: Speed, m/s.
+        curvature: Curvature of the path, 1/m.
+        sideways_deg: Direction of travel off the trunk's x axis, degrees.
+        response: Time constant of the speed controller for the whole rover's mass, s. It is shorter than `PDPolicy`'s,
+            so that a rover stopped by a rock soon pushes with full torque.
     """
 
     speed: float = 1.2
@@ -60,8 +63,8 @@ class CommandController:
 
     Args:
         rover: The environment, read once for the layout and the rover's constants.
-        limits: What a command of one stands for.
-        guided: Whether actions are offsets to the guide's command.
+        limits: The values of a command of 1.
+        guided: Whether actions are offsets from the guide's command.
     """
 
     def __init__(self, rover: RoverEnv, limits: CommandLimits | None = None, *, guided: bool = True) -> None:
@@ -87,7 +90,7 @@ class CommandController:
         self._load = model.mass * math.hypot(*rover.gravity) / N_WHEELS
 
     def act(self, observations: npt.NDArray[Any], commands: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
-        """The actions `(n, 12)` for observations `(n, size)`, scaled as the environment gives them."""
+        """The actions `(n, 12)` for observations `(n, size)`, scaled as the environment returns them."""
         seen = observations.astype(np.float64, copy=False)
         command = np.clip(commands.astype(np.float64, copy=False), -1.0, 1.0)
         if self.guided:
@@ -99,7 +102,7 @@ class CommandController:
         ahead = np.cos(sideways) + curvature * self._z
         left = np.sin(sideways) + curvature * self._x
         angles = np.clip(np.arctan2(left, ahead), -self._max_steering, self._max_steering)
-        # Wait for the wheels to stand right: they would scrub, and the way would be another.
+        # Slow down until the wheels reach their steering angles; otherwise they scrub and the path deviates.
         off = np.abs(angles - seen[:, self._steering]).max(axis=1, keepdims=True)
         speed = speed * np.maximum(0.2, 1.0 - 2.0 * off)
         wanted = speed * (ahead * np.cos(angles) + left * np.sin(angles))
@@ -112,7 +115,7 @@ class CommandController:
         return actions
 
     def guide(self, seen: Array) -> Array:
-        """The guide's commands `(n, 3)`: pure pursuit of the goal, as sharply as can be where it lies behind."""
+        """The guide's commands `(n, 3)`: pure pursuit of the goal, at the largest curvature if the goal lies behind."""
         ahead, right = (seen[:, self._goal] * self._goal_scale).T
         curvature = -2.0 * right / np.maximum(ahead * ahead + right * right, 1e-6) / self.limits.curvature
         curvature = np.where(ahead > 0.0, np.clip(curvature, -1.0, 1.0), np.where(right > 0.0, -1.0, 1.0))

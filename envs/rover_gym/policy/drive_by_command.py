@@ -1,4 +1,4 @@
-"""`Rover-v0` driven by commands and seen through features, as one Gymnasium environment."""
+"""`Rover-v0` with commands as actions and features as observations, as a Gymnasium wrapper."""
 
 from dataclasses import fields
 from typing import Any, SupportsFloat
@@ -15,24 +15,25 @@ from rover_gym.validation import known_keys, vector, whole
 
 Array = npt.NDArray[np.float32]
 
-#: Steps for which a command may hold, some minutes.
+#: Most steps that a command may be held; a few minutes.
 MAX_REPEAT = 10_000
 
 
 class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
-    """Holds a command for some steps of the rover; the rewards are summed.
+    """Holds each command for several steps of the rover and sums the rewards.
 
-    The same actions and observations as `rover_gym.learning` trains with, for libraries that take single environments.
+    Actions and observations are those that `rover_gym.learning` trains with, for libraries that take single
+    environments.
 
     Args:
         env: A `Rover-v0`, wrapped or not.
-        repeat: Steps for which a command holds.
-        guided: Whether actions are offsets to the guide's command.
-        pool: Cells of the height scan are so many points long and wide.
-        **limits: Those of `CommandLimits`.
+        repeat: Steps that a command is held.
+        guided: Whether actions are offsets from the guide's command.
+        pool: Height-scan points per pooling cell, lengthwise and crosswise.
+        **limits: Fields of `CommandLimits`.
 
     Raises:
-        OptionError: An argument is out of its range.
+        OptionError: An argument is out of range.
     """
 
     def __init__(
@@ -56,7 +57,7 @@ class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
         return self._features(self._seen)[0], info
 
     def step(self, action: Array) -> tuple[Array, SupportsFloat, bool, bool, dict[str, Any]]:
-        """Holds a command until its time or the episode is over; beyond [-1, 1] it is cut.
+        """Holds a command, clipped to [-1, 1], for `repeat` steps or until the episode ends.
 
         Raises:
             CommandError: The command is not three finite numbers; nothing has changed.

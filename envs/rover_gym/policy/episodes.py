@@ -1,4 +1,4 @@
-"""Whole episodes of a rover environment under a policy, and what they came to."""
+"""Runs whole episodes of a rover environment under a policy and records their results."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -13,29 +13,29 @@ from rover_gym.env.rover_env import RoverEnv
 
 
 class Policy(Protocol):
-    """Anything with stable-baselines3's `predict`."""
+    """Any object with stable-baselines3's `predict`."""
 
     def predict(
         self, observation: npt.NDArray[np.float32], state: Any = None, episode_start: Any = None
     ) -> tuple[npt.NDArray[np.float32], Any]:
-        """The action for an observation, and a state to hand in next time."""
+        """Returns the action for an observation, and the state for the next call."""
 
 
 @dataclass(frozen=True)
 class Episode:
-    """What one episode came to.
+    """The result of one episode.
 
     Attributes:
         seed: Seed of the reset.
         success: Whether the goal was reached.
-        end: Why it ended: the environment's termination, or "time" where it was truncated.
-        distance: Way of the trunk's origin, m.
-        distance_to_goal: What was left, m.
+        end: Reason for the end: the environment's termination, or "time" if truncated.
+        distance: Path length of the trunk's origin, m.
+        distance_to_goal: Remaining distance to the goal, m.
         time: Simulated time, s.
-        energy: Work through the wheel motors, driving or braking, J.
+        energy: Work of the wheel motors, driving or braking, J.
         slip: Mean slip ratio.
         reward: Sum of the rewards.
-        real_time_factor: Simulated time over the time that policy and environment took.
+        real_time_factor: Simulated time over the wall time of policy and environment.
     """
 
     seed: int
@@ -62,7 +62,7 @@ def run_episode(
 
     Args:
         env: A rover environment with a time limit, wrapped or not.
-        policy: Chooses the actions.
+        policy: The policy that chooses the actions.
         seed: Seed of the reset.
         options: Options of the reset.
         on_step: Called with the environment and `info` after the reset and after each step; not timed.

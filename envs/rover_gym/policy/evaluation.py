@@ -1,4 +1,4 @@
-"""Policies on the same seeded episodes, many at a time, and what the episodes came to."""
+"""Evaluates policies on the same seeded episodes, in batches, and summarises the results."""
 
 import math
 from collections import Counter
@@ -25,14 +25,14 @@ Z95 = 1.959963984540054
 
 @dataclass(frozen=True)
 class EvaluatedEpisode:
-    """What one episode came to.
+    """The result of one episode.
 
     Attributes:
-        seed: Seed of its reset.
-        end: Why it ended: the environment's termination, or "time".
+        seed: Seed of the reset.
+        end: Reason for the end: the environment's termination, or "time".
         time: Simulated time, s.
-        distance: Way of the trunk's origin over the map, m.
-        energy: Work through the wheel motors, driving or braking, J.
+        distance: Path length of the trunk's origin on the map, m.
+        energy: Work of the wheel motors, driving or braking, J.
         slip: Mean slip ratio.
         tilt: Mean tilt, rad.
         max_tilt: Largest tilt, rad.
@@ -63,21 +63,21 @@ def drive_all(
     threads: int | None = 1,
     progress: Callable[[int], None] = lambda _done: None,
 ) -> list[EvaluatedEpisode]:
-    """One episode a seed.
+    """Runs one episode per seed.
 
-    An episode depends on its seed and the policy alone, but for the rounding of a network's batches.
+    An episode depends only on its seed and the policy, apart from the rounding of batched network evaluations.
 
     Args:
-        make_policy: From an environment, to read layout and constants from, to a policy.
-        seeds: Of the resets.
-        arguments: Of `RoverEnv`.
-        max_episode_steps: Control periods until an episode is cut; None for 60 s.
-        num_envs: Episodes at a time.
-        threads: That step them; None for one a core.
+        make_policy: Makes a policy from an environment, which gives layout and constants.
+        seeds: Seeds of the resets.
+        arguments: Arguments of `RoverEnv`.
+        max_episode_steps: Control periods until truncation; None for 60 s.
+        num_envs: Episodes run at a time.
+        threads: Threads that step the rovers; None for one per core.
         progress: Called with the number of episodes done.
 
     Raises:
-        OptionError: `num_envs` or `max_episode_steps` is less than one, or an argument is out of its range.
+        OptionError: `num_envs` or `max_episode_steps` is less than one, or an argument is out of range.
     """
     number("num_envs", num_envs, at_least=1.0)
     if max_episode_steps is not None:
@@ -94,7 +94,7 @@ def drive_all(
     for i, seed in enumerate(running):
         batch.reset(i, seed)
     active = np.ones(n, np.bool_)
-    sums = np.zeros((n, 4))  # way, slip, tilt, largest tilt
+    sums = np.zeros((n, 4))  # path length, slip, tilt, largest tilt
     steps = np.zeros(n, np.int64)
     observation = batch.observation
     places = _places(batch, observation)
@@ -139,7 +139,7 @@ def drive_all(
 
 @dataclass(frozen=True)
 class IntervalEstimate:
-    """A figure over episodes and its 95% interval."""
+    """An estimate over episodes and its 95% interval."""
 
     value: float
     interval: Interval
@@ -147,18 +147,18 @@ class IntervalEstimate:
 
 @dataclass(frozen=True)
 class PolicySummary:
-    """What a policy's episodes came to.
+    """The results of a policy over its episodes.
 
     Attributes:
-        policy: Its name.
-        episodes: How many.
-        successes: How many reached the goal.
-        success: The share of them, with Wilson's interval.
-        time: Mean over the episodes that reached the goal, s.
-        energy_per_metre: Work through the wheel motors over way driven, all episodes, J/m.
+        policy: Name of the policy.
+        episodes: Number of episodes.
+        successes: Number of episodes that reached the goal.
+        success: Success rate, with Wilson's interval.
+        time: Mean time of the episodes that reached the goal, s.
+        energy_per_metre: Work of the wheel motors over path length, all episodes, J/m.
         slip: Mean over the episodes of their mean slip ratio.
         tilt: Mean over the episodes of their mean tilt, degrees.
-        ends: How often episodes ended for each cause.
+        ends: Number of episodes by reason for their end.
     """
 
     policy: str
@@ -173,10 +173,10 @@ class PolicySummary:
 
 
 def summarise(policy: str, drives: Sequence[EvaluatedEpisode]) -> PolicySummary:
-    """The figures with their intervals: Wilson's for success, the normal one for means, linearised for the ratio.
+    """Summarises episodes with 95% intervals: Wilson's for success, normal for means, linearised for the ratio.
 
     Raises:
-        OptionError: There are no drives.
+        OptionError: `drives` is empty.
     """
     if not drives:
         refuse(OptionError, "drives", len(drives), "must hold an episode or more")
@@ -196,7 +196,7 @@ def summarise(policy: str, drives: Sequence[EvaluatedEpisode]) -> PolicySummary:
 
 
 def mean_estimate(values: Sequence[float]) -> IntervalEstimate:
-    """Mean with its 95% interval, `mean +- z s / sqrt(n)`; NaN where there are too few values."""
+    """Mean with its 95% interval, `mean +- z s / sqrt(n)`; NaN if there are too few values."""
     n = len(values)
     if n == 0:
         return IntervalEstimate(math.nan, (math.nan, math.nan))
@@ -208,7 +208,7 @@ def mean_estimate(values: Sequence[float]) -> IntervalEstimate:
 
 
 def ratio_estimate(over: Sequence[float], under: Sequence[float]) -> IntervalEstimate:
-    """`sum(over) / sum(under)` with its 95% interval by linearisation: the spread of `over - ratio under`."""
+    """`sum(over) / sum(under)` with its 95% interval by linearisation, from the spread of `over - ratio under`."""
     n, total = len(under), math.fsum(under)
     if n == 0 or not total > 0.0:
         return IntervalEstimate(math.nan, (math.nan, math.nan))
@@ -221,6 +221,6 @@ def ratio_estimate(over: Sequence[float], under: Sequence[float]) -> IntervalEst
 
 
 def _places(batch: RoverBatch, observation: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
-    """`(n, 2)` the trunks' places on the map, m, as they are observed."""
+    """`(n, 2)` observed positions of the trunks on the map, m."""
     q = batch.task.layout["q"].start
     return observation[:, [q, q + 2]].astype(np.float64)

@@ -1,9 +1,9 @@
-"""What a learned policy looks at: the observation without what does not carry over to another place.
+"""Features: the part of the observation that carries over to other places.
 
-Place on the map, heading and the wheels' angles say nothing about the way ahead, so they are left out. The goal
-is a direction and a distance, and the height scan becomes heights over the ground plane, so that rocks look alike
-on any slope. Of a fine scan the highest point in each cell of some neighbours is shown: what matters of a rock is
-how tall it is, which a coarse scan that meets its flank does not tell.
+Position on the map, heading and wheel angles say nothing about the ground ahead, so they are left out. The goal becomes
+a direction and a distance. The height scan becomes heights over the ground plane, so that rocks look alike on any
+slope. A fine scan is max-pooled: the highest point of each cell gives the height of a rock, which a coarse scan that
+hits its flank would miss.
 """
 
 import numpy as np
@@ -13,10 +13,10 @@ from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse, whole
 
-# Entries beyond this are cut: they come from impacts and free wheels.
+# Features are clipped to this magnitude; larger values come from impacts and free wheels.
 LARGEST_FEATURE = 5.0
 
-# Rows of the height scan farther behind than this, m, are left out.
+# Cells of the height scan farther behind the trunk than this, m, are left out.
 BEHIND = 1.05
 
 
@@ -25,7 +25,7 @@ class Features:
 
     Args:
         rover: The environment, read once for the layout.
-        pool: Cells of the scan are so many points long and wide; the scan's rows and columns must be multiples.
+        pool: Scan points per pooling cell, lengthwise and crosswise; must divide the scan's rows and columns.
     """
 
     def __init__(self, rover: RoverEnv, pool: int = 1) -> None:
@@ -51,7 +51,7 @@ class Features:
         self.size = len(self._taken) + 7 + (0 if self._scan is None else 1 + len(self._cells))
 
     def __call__(self, observations: npt.NDArray[np.floating]) -> npt.NDArray[np.float32]:
-        """The features of observations, scaled as the environment gives them."""
+        """Computes the features of observations, scaled as the environment returns them."""
         seen = observations
         distance = seen[:, self._distance] * self._goal_scale
         goal = seen[:, self._goal] * self._goal_scale / np.maximum(distance, 0.1)[:, None]
@@ -64,7 +64,7 @@ class Features:
             np.abs(goal[:, 1:]),
         ]
         if self._scan is not None:
-            # Over the ground plane, whose level the lowest point of the scan tells.
+            # Heights over the ground plane; the scan's lowest point gives the plane's level.
             rocks = seen[:, self._scan] - slope @ self._offsets.T
             level = rocks.min(axis=1, keepdims=True)
             parts += [-level, 10.0 * ((rocks - level)[:, self._cells].max(axis=2))]
@@ -85,7 +85,7 @@ class Features:
 
 
 def _cells(offsets: npt.NDArray[np.float64], pool: int) -> npt.NDArray[np.intp]:
-    """`(cells, pool * pool)` the points of each cell that is not too far behind."""
+    """`(cells, pool * pool)` indices of the points of each cell within `BEHIND`."""
     if len(offsets) == 0:
         return np.zeros((0, 1), np.intp)
     columns = int(np.count_nonzero(offsets[:, 0] == offsets[0, 0]))

@@ -1,4 +1,4 @@
-"""The network of a trained policy: a perceptron that runs with NumPy alone."""
+"""The network of a trained policy: a multilayer perceptron that runs with NumPy alone."""
 
 import io
 import math
@@ -13,11 +13,11 @@ import numpy.typing as npt
 from rover_gym.policy.features import LARGEST_FEATURE
 from rover_gym.policy.policy_files import intact, read_bytes, refuse_field
 
-#: Sizes beyond which a file is no policy of ours: bytes of the card and of all arrays, and layers.
+#: Limits of a policy's files: bytes of the card, bytes of all arrays, and layers.
 LARGEST_CARD, LARGEST_NETWORK, MOST_LAYERS = 1 << 20, 1 << 26, 16
-#: Weights and scales beyond which single precision has no room for sums, or for quotients.
+#: Limits within which sums and quotients stay finite in single precision.
 LARGEST_WEIGHT, SMALLEST_DEVIATION = 1e6, 1e-6
-#: Members of an archive that NumPy writes.
+#: Compression types that NumPy writes.
 PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 Array = npt.NDArray[np.float32]
 
@@ -27,10 +27,10 @@ class Network:
     """A multilayer perceptron with tanh between its layers.
 
     Attributes:
-        mean: `(features,)` taken off the features.
-        deviation: `(features,)` by which they are then divided, before they are cut at `LARGEST_FEATURE`.
-        weights: Each `(outputs, inputs)`.
-        biases: Each `(outputs,)`.
+        mean: `(features,)` mean of the features, which is subtracted.
+        deviation: `(features,)` divisor of the result, which is then clipped at `LARGEST_FEATURE`.
+        weights: Weight matrices, each `(outputs, inputs)`.
+        biases: Bias vectors, each `(outputs,)`.
     """
 
     mean: Array
@@ -39,7 +39,7 @@ class Network:
     biases: tuple[Array, ...]
 
     def __call__(self, features: Array) -> Array:
-        """The outputs `(n, outputs)` for features `(n, features)`, cut to [-1, 1] as stable-baselines3 does."""
+        """The outputs `(n, outputs)` for features `(n, features)`, clipped to [-1, 1] as in stable-baselines3."""
         x = np.clip((features - self.mean) / self.deviation, -LARGEST_FEATURE, LARGEST_FEATURE)
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
             x = np.tanh(x @ weight.T + bias)
@@ -47,7 +47,7 @@ class Network:
         return outputs.clip(-1.0, 1.0)
 
     def save(self, path: Path) -> None:
-        """Writes the arrays."""
+        """Writes the arrays as a compressed `.npz` file."""
         layers: dict[str, Any] = {f"weight_{i}": weight for i, weight in enumerate(self.weights)}
         layers |= {f"bias_{i}": bias for i, bias in enumerate(self.biases)}
         layers |= {"mean": self.mean, "deviation": self.deviation}
@@ -59,8 +59,8 @@ class Network:
         """Reads what `save` wrote.
 
         Raises:
-            PolicyError: The file holds other arrays, of other shapes or types, or numbers that no network has.
-            OSError: The file is not there or may not be read.
+            PolicyError: The file holds arrays of other names, shapes or types, or numbers out of range.
+            OSError: The file does not exist or may not be read.
         """
         arrays = _read_arrays(path)
         n = sum(name.startswith("weight_") for name in arrays)
@@ -94,7 +94,7 @@ class Network:
 
 
 def _read_arrays(path: Path) -> dict[str, Array]:
-    """The float32 arrays of an archive; their sizes are known before they are unpacked."""
+    """Reads the float32 arrays of an archive, whose sizes are checked before decompression."""
     data = read_bytes(path, LARGEST_NETWORK)
     arrays: dict[str, Array] = {}
     with intact(path), zipfile.ZipFile(io.BytesIO(data)) as archive:

@@ -1,12 +1,12 @@
-"""A baseline that drives by the observation alone: one turning centre, regulated wheel speeds.
+"""The PD baseline, which drives by the observation alone with one turning centre and wheel speed control.
 
-All six wheels stand tangentially to circles about one turning centre at `(x_c, -1/kappa)` in the
-trunk's (x, z), `kappa` the curvature, positive to the left. A wheel at `(x, z)` then asks for
+All six wheels are tangential to circles about one turning centre at `(x_c, -1/kappa)` in the trunk's (x, z), where
+`kappa` is the curvature, positive to the left. A wheel at `(x, z)` then needs
 
     steering  tan(delta) = kappa (x - x_c) / (1 + kappa z)
     speed     v_i = v sqrt((1 + kappa z)^2 + (kappa (x - x_c))^2)
 
-with `v` the speed of the point `(x_c, 0)`.
+where `v` is the speed of the point `(x_c, 0)`.
 """
 
 import math
@@ -27,12 +27,16 @@ _Row = Sequence[float]
 
 @dataclass(frozen=True)
 class PDGains:
-    """The policy's tuning.
+    """The policy's gains.
 
-    speed: m/s on a straight way. lateral_acceleration: m/s2, slows turns. braking: m/s2, slows
-    the approach. final_speed: m/s at the goal. response: s, time constant of the speed regulator
-    for the whole rover's mass. reverse_cost: a way driven backwards counts so much longer.
-    switch_cost: m of way that a change of direction at `speed` counts.
+    Attributes:
+        speed: Speed on a straight path, m/s.
+        lateral_acceleration: Largest lateral acceleration, which limits the speed in turns, m/s2.
+        braking: Deceleration on the approach to the goal, m/s2.
+        final_speed: Speed at the goal, m/s.
+        response: Time constant of the speed controller for the whole rover's mass, s.
+        reverse_cost: Factor on the length of a path driven backward.
+        switch_cost: Path length that a change of direction at `speed` counts as, m.
     """
 
     speed: float = 1.0
@@ -51,14 +55,13 @@ class PDGains:
 class PDPolicy:
     """Drives `Rover-v0` to its goal; stateless, with stable-baselines3's `predict`.
 
-    The way is the shortest of four: forward or backward, turning to the left or to the right as
-    tightly as the steering allows, then straight. Within the way the curvature is that of the circle
-    through the goal (pure pursuit) where it can be steered.
+    The policy compares four paths and takes the cheapest: forward or backward, a left or right turn at the largest
+    curvature, then straight. On this path it follows the circle through the goal (pure pursuit), within the largest
+    curvature.
 
     Args:
-        env: A `Rover-v0`, wrapped or not, or a vector of them. It is read once, for the layout and
-            the rover's constants.
-        gains: The tuning.
+        env: A `Rover-v0`, wrapped or not, or a vector of them. It is read once, for layout and rover constants.
+        gains: The gains.
     """
 
     def __init__(self, env: Any, gains: PDGains | None = None) -> None:
@@ -96,8 +99,8 @@ class PDPolicy:
     ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...] | None]:
         """The action for an observation `(size,)`, or the actions `(n, 12)` for a batch `(n, size)`.
 
-        The signature is stable-baselines3's; the policy has no state, so `state` comes back as it
-        went in, and neither `episode_start` nor `deterministic` changes anything.
+        The signature is stable-baselines3's. The policy has no state: it returns `state` unchanged and ignores
+        `episode_start` and `deterministic`.
 
         Raises:
             StateError: The observation has a wrong shape or an entry that is not finite.
@@ -116,7 +119,7 @@ class PDPolicy:
         return actions, state
 
     def steering_angles(self, curvature: float) -> list[float]:
-        """The six steering angles, rad, whose axles meet in the turning centre of a curvature, 1/m."""
+        """The six steering angles, rad, at which all axles meet in the turning centre of a curvature, 1/m."""
         return [math.atan2(curvature * x, 1.0 + curvature * z) for x, z in self._wheels]
 
     def _act(self, row: _Row) -> list[float]:
@@ -133,11 +136,11 @@ class PDPolicy:
             math.sqrt(gains.lateral_acceleration / max(abs(curvature), 1e-9)),
             math.sqrt(gains.final_speed**2 + 2.0 * gains.braking * distance),
         )
-        # Wait for the wheels to stand right: they would scrub, and the way would be another.
+        # Slow down until the wheels reach their steering angles; otherwise they scrub and the path deviates.
         off = max(abs(angle - row[i]) for angle, i in zip(angles, self._steering, strict=True))
         speed *= direction * max(0.2, 1.0 - 2.0 * off)
 
-        # Force that holds the rover on the slope, and the regulator's mass per wheel.
+        # Force per wheel that holds the rover on the slope, and the gain of the speed controller.
         hold = self._weight * math.sin(row[self._pitch]) / N_WHEELS
         inertia = self._mass / N_WHEELS / gains.response
         action = [0.0] * N_ACTIONS
@@ -150,7 +153,7 @@ class PDPolicy:
         return action
 
     def _way(self, ahead: float, left: float, speed_now: float) -> tuple[float, float]:
-        """Direction (1 forward, -1 backward) and curvature of the way that costs least."""
+        """Direction (1 forward, -1 backward) and curvature of the cheapest path."""
         radius = 1.0 / self.max_curvature
         best, best_cost = (1.0, 0.0), math.inf
         for direction in (1.0, -1.0):
@@ -170,24 +173,24 @@ class PDPolicy:
     def _find_max_curvature(self) -> float:
         """The largest curvature that keeps every wheel within the steering limit.
 
-        tan(delta) = kappa |x| / (1 - kappa |z|) for the inner wheels, solved for kappa; a wheel
-        between the turning centre and the trunk would have to turn round, so delta < 90 degrees.
+        This solves tan(delta) = kappa |x| / (1 - kappa |z|) of the inner wheels for kappa. delta stays below 90
+        degrees, since a wheel beyond the turning centre would have to turn round.
         """
         tangent = math.tan(min(self._max_steering, math.radians(89.0)))
         return min(tangent / (abs(x) + abs(z) * tangent) for x, z in self._wheels)
 
 
 def _turn_and_straight(ahead: float, left: float, radius: float) -> float:
-    """Length of a left turn of a radius followed by a straight to the goal; inf inside the circle."""
-    # From the turning centre, (0, radius) in (ahead, left), the goal is at distance `reach`.
+    """Length of a left turn followed by a straight line to the goal; inf if the goal lies inside the turning circle."""
+    # `reach` is the distance of the goal from the turning centre, which is (0, radius) in (ahead, left).
     x, y = ahead, left - radius
     reach = math.hypot(x, y)
     if reach < radius:
         return math.inf
     straight = math.sqrt(reach * reach - radius * radius)
-    # Angle of the goal about the centre, from the start at -90 degrees, less that of the tangent.
+    # Angle of the goal about the centre, from the start at -90 degrees, minus that of the tangent.
     turn = (math.atan2(y, x) + 0.5 * math.pi - math.acos(radius / reach)) % math.tau
-    if turn > math.tau - 1e-6:  # a goal straight ahead, seen through round-off
+    if turn > math.tau - 1e-6:  # a goal straight ahead, within round-off
         turn = 0.0
     return radius * turn + straight
 
@@ -202,7 +205,7 @@ def find_rover_env(env: Any) -> RoverEnv:
     within = getattr(inner, "envs", None)
     if not isinstance(inner, RoverEnv) and isinstance(within, (list, tuple)) and within:
         inner = getattr(within[0], "unwrapped", within[0])
-    inner = getattr(inner, "prototype", inner)  # what the rovers of a native batch are made like
+    inner = getattr(inner, "prototype", inner)  # a batched vector environment keeps a prototype
     if not isinstance(inner, RoverEnv):
         refuse(OptionError, "env", env, "must be a Rover-v0, wrapped or not, or a vector of them")
     return inner

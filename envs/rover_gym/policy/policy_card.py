@@ -1,4 +1,4 @@
-"""The card of a trained policy: what it was trained for, what its commands stand for, where it came from."""
+"""The card of a trained policy: its environment, the scale of its commands, and its provenance."""
 
 import json
 from collections.abc import Mapping
@@ -13,21 +13,21 @@ from rover_gym.policy.network import LARGEST_CARD
 from rover_gym.policy.policy_files import FORMAT, PolicyError, intact, read_bytes, refuse_field
 from rover_gym.validation import number, refuse
 
-#: Arguments of the environment that are the caller's, and not the policy's.
+#: Arguments of the environment that the caller chooses, not the policy.
 NOT_A_POLICYS = ("model", "render_mode", "render_options")
 
 
 @dataclass(frozen=True)
 class PolicyCard:
-    """What a policy needs to run, and where it came from.
+    """The settings that a policy needs to run, and its provenance.
 
     Attributes:
         environment: Arguments of the environment that the policy's observation needs.
-        pool: Cells of the height scan are so many points long and wide.
-        hold: How long a command holds, s.
-        command: What its commands stand for.
-        guided: Whether its actions are offsets to the guide's command.
-        source: What it came from, for the reader: seed, steps, versions, revision.
+        pool: Height-scan points per pooling cell, lengthwise and crosswise.
+        hold: Time that a command is held, s.
+        command: The values of a command of 1.
+        guided: Whether actions are offsets from the guide's command.
+        source: Provenance, for information: seed, steps, versions, revision.
     """
 
     environment: Mapping[str, Any]
@@ -47,8 +47,8 @@ class PolicyCard:
         """Reads what `save` wrote.
 
         Raises:
-            PolicyError: The file has another format, or a field is missing, unknown or not as it must be.
-            OSError: The file is not there or may not be read.
+            PolicyError: The file has another format, or a field is missing, unknown or invalid.
+            OSError: The file does not exist or may not be read.
         """
         plain = _read_object(path)
         if plain.get("format") != FORMAT:
@@ -84,14 +84,14 @@ def _read_object(path: Path) -> dict[str, Any]:
     text = read_bytes(path, LARGEST_CARD)
     with intact(path):
         plain = json.loads(text)
-        json.dumps(plain, ensure_ascii=False).encode()  # half a pair of surrogates is no text
+        json.dumps(plain, ensure_ascii=False).encode()  # refuse lone surrogates
     if not isinstance(plain, dict):
         refuse(PolicyError, "policy", str(path), f"must be a policy of format {FORMAT}")
     return plain
 
 
 def check_arguments(path: Path, arguments: Mapping[str, Any]) -> None:
-    """Refuses arguments that no environment has; the environment itself checks their values."""
+    """Refuses unknown arguments; the environment checks the values."""
     known = [name for name in ARGUMENTS if name not in NOT_A_POLICYS]
     for name in arguments:
         if name not in known:

@@ -1,4 +1,4 @@
-"""The files of a policy: read whole, never larger than a policy can be, and refused by name."""
+"""Reads the files of a policy, with a limit on their size and errors that name the file."""
 
 import stat
 from collections.abc import Iterator
@@ -9,22 +9,22 @@ from typing import NoReturn
 from rover_gym.mechanics import OptionError, RoverGymError
 from rover_gym.validation import refuse
 
-# A training file of another make is refused, not misread.
+# Format version of a policy's files; other versions are refused.
 FORMAT = 1
 
 
 class PolicyError(OptionError):
-    """A policy's folder holds no sound policy, or not one for this environment."""
+    """A folder holds no valid policy, or a policy for another environment."""
 
 
 def refuse_field(path: Path, field: str, value: object, reason: str) -> NoReturn:
-    """Refuses a file: names it, and in it the field that is not as it must be."""
+    """Refuses a file with an error that names the file and the invalid field."""
     refuse(PolicyError, f"{path}: {field}", value, reason)
 
 
 @contextmanager
 def intact(path: Path) -> Iterator[None]:
-    """Turns whatever a damaged file makes a library raise into an error that names the file."""
+    """Turns any exception that a damaged file causes into a `PolicyError` that names the file."""
     try:
         yield
     except (RoverGymError, OSError):
@@ -35,14 +35,14 @@ def intact(path: Path) -> Iterator[None]:
 
 
 def read_bytes(path: Path, at_most: int) -> bytes:
-    """All of a file.
+    """Reads a whole file.
 
     Raises:
-        PolicyError: It is no regular file, or larger than `at_most` bytes.
-        OSError: It is not there or may not be read.
+        PolicyError: The file is no regular file, or larger than `at_most` bytes.
+        OSError: The file does not exist or may not be read.
     """
     status = path.stat()
-    if not stat.S_ISREG(status.st_mode):  # to open a pipe would wait for its writer
+    if not stat.S_ISREG(status.st_mode):  # opening a pipe would wait for its writer
         refuse(PolicyError, "policy", str(path), "must be a regular file")
     if status.st_size > at_most:
         refuse_field(path, "size", status.st_size, f"must be at most {at_most} bytes")
@@ -50,8 +50,8 @@ def read_bytes(path: Path, at_most: int) -> bytes:
 
 
 def is_there(path: Path) -> bool:
-    """Whether a file of that name exists; False for a name that no file can have."""
+    """Whether the path exists; False for an impossible path."""
     try:
         return path.exists()
-    except (OSError, ValueError):  # a name that is too long, or that no file can have
+    except (OSError, ValueError):  # a name that is too long or impossible
         return False

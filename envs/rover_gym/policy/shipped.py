@@ -1,4 +1,4 @@
-"""Where policies lie: those that come with the package, by terrain, and anybody's, by folder."""
+"""Finds policies: those shipped with the package, by terrain, and others, by folder."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,16 +8,16 @@ from rover_gym.policy.policy_card import PolicyCard
 from rover_gym.policy.policy_files import PolicyError, is_there
 from rover_gym.validation import refuse
 
-#: The policies that come with the package, by terrain.
+#: Folder names of the shipped policies, by terrain.
 SHIPPED: Mapping[str, str] = {"plane": "plane", "sphere_field": "rocks"}
 FOLDER = Path(__file__).parents[1] / "data" / "policies"
 
 
 def policy_folder(terrain: str) -> Path:
-    """The folder of the policy that comes with the package for a terrain.
+    """The folder of the policy shipped for a terrain.
 
     Raises:
-        PolicyError: There is none.
+        PolicyError: No policy is shipped for this terrain.
     """
     if terrain not in SHIPPED:
         refuse(PolicyError, "policy", terrain, f"none was trained; there are some for {', '.join(SHIPPED)}")
@@ -25,10 +25,10 @@ def policy_folder(terrain: str) -> Path:
 
 
 def find_policy(policy: str, terrain: str) -> Path | None:
-    """The folder of "trained", the package's own for a terrain, or of a path; None for "pd", the baseline.
+    """The folder of a policy: the shipped one for "trained", otherwise the given path; None for "pd", the baseline.
 
     Raises:
-        PolicyError: There is no policy.
+        PolicyError: There is no such policy.
     """
     if policy == "pd":
         return None
@@ -39,10 +39,10 @@ def find_policy(policy: str, terrain: str) -> Path | None:
 
 
 def policy_arguments(folder: Path) -> dict[str, Any]:
-    """The arguments with which a policy's environment must be made.
+    """The arguments that a policy's environment must be made with.
 
     Raises:
-        PolicyError: The folder holds no sound policy.
+        PolicyError: The folder holds no valid policy.
         OSError: The file may not be read.
     """
     arguments = dict(PolicyCard.read(folder / "policy.json").environment)

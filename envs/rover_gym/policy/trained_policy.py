@@ -1,11 +1,11 @@
-"""Trained policies: small networks that came from stable-baselines3 and run with NumPy alone.
+"""Trained policies: small networks trained with stable-baselines3 that run with NumPy alone.
 
 A policy is a folder with
 
-    policy.json   the environment's arguments it was trained for, its commands, what it came from
+    policy.json   the environment's arguments it was trained for, its commands and its provenance
     policy.npz    float32 arrays: the features' mean and standard deviation, weights and biases
 
-and, where it was trained by `training/train_ppo.py`, the run's config, curve and evaluation.
+`training/train_ppo.py` adds the run's config, learning curve and evaluation.
 """
 
 from pathlib import Path
@@ -26,12 +26,12 @@ from rover_gym.validation import refuse
 
 
 class TrainedPolicy:
-    """Drives `Rover-v0` by a trained network, with stable-baselines3's `predict`.
+    """Drives `Rover-v0` with a trained network; it has stable-baselines3's `predict`.
 
     Args:
         env: A `Rover-v0` made with the policy's arguments, wrapped or not, or a vector of them. It is read once.
-        network: From features to commands.
-        card: What the commands stand for.
+        network: The network that maps features to commands.
+        card: The policy's settings.
     """
 
     def __init__(self, env: Any, network: Network, card: PolicyCard) -> None:
@@ -51,10 +51,10 @@ class TrainedPolicy:
 
     @classmethod
     def load(cls, env: Any, folder: str | Path) -> "TrainedPolicy":
-        """The policy of a folder.
+        """Loads the policy of a folder.
 
         Raises:
-            PolicyError: The folder holds no sound policy, or the environment was not made with its arguments.
+            PolicyError: The folder holds no valid policy, or the environment was not made with the policy's arguments.
             OSError: A file may not be read.
         """
         path = Path(folder)
@@ -65,7 +65,7 @@ class TrainedPolicy:
 
     @classmethod
     def untrained(cls, env: Any, card: PolicyCard) -> "TrainedPolicy":
-        """A policy whose actions are zero: the guide alone, or, without one, a rover that stands."""
+        """A policy with zero actions: the guide alone, or a rover that stands still without one."""
         features = Features(find_rover_env(env), card.pool).size
         zero = Network(
             mean=np.zeros(features, np.float32),
@@ -84,8 +84,8 @@ class TrainedPolicy:
     ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...] | None]:
         """The action for an observation `(size,)`, or the actions `(n, 12)` for a batch `(n, size)`.
 
-        A command holds for `card.hold` seconds, which the returned state counts: hand it in again with the next
-        observation, and say with `episode_start` `(n,)` where an episode begins. Without a state the command is new.
+        A command is held for `card.hold` seconds. The returned state counts them: pass it in with the next observation,
+        and mark with `episode_start` `(n,)` where an episode begins. Without a state every command is new.
 
         Raises:
             StateError: The observation has a wrong shape or an entry that is not finite.

@@ -1,4 +1,4 @@
-"""Trajectories in HDF5: recorded row by row, read back, and as the run of a rover."""
+"""Trajectories in HDF5: recording, reading, and rover runs."""
 
 from rover_gym.record.channels import Channel, RoverSampler
 from rover_gym.record.facts import describe, row_count

@@ -1,4 +1,4 @@
-"""What a recording holds: channels, and the sampler that makes their rows of a simulation."""
+"""The channels of a recording, and the sampler that reads their rows from a simulation."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from rover_gym.mechanics import RoverModel, Simulation
 
 @dataclass(frozen=True)
 class Channel:
-    """One data set: a row per sample.
+    """One data set with one row per sample.
 
     Attributes:
-        name: The data set's name.
-        unit: SI unit, or "1" for a pure number; one for all columns.
-        description: What a row holds, its frame and sign.
+        name: Name of the data set.
+        unit: SI unit of all columns, or "1" for a pure number.
+        description: Content of a row, with frame and sign.
         shape: Shape of a row, `()` for a scalar.
         columns: Names along the first axis of a row, or empty.
     """
@@ -30,10 +30,10 @@ class Channel:
 
 
 class RoverSampler:
-    """Makes rows of a simulation.
+    """Samples rows from a simulation.
 
     Args:
-        model: The model of the simulations to look at.
+        model: The model of the simulations to sample.
     """
 
     def __init__(self, model: RoverModel) -> None:
@@ -82,12 +82,12 @@ class RoverSampler:
         )
 
     def row(self, sim: Simulation, *, residual: float = 0.0, iterations: int = 0) -> dict[str, npt.ArrayLike]:
-        """One row of `channels`.
+        """Samples one row of `channels`.
 
         Args:
-            sim: The simulation to look at; it is not changed.
-            residual: Worst residual since the last row, from the step's report.
-            iterations: Iterations since the last row, from the step's report.
+            sim: The simulation to sample; it is not changed.
+            residual: Largest residual since the last row, from the step report.
+            iterations: Iterations since the last row, from the step report.
         """
         energy = sim.energy()
         poses = sim.poses()

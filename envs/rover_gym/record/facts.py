@@ -1,4 +1,4 @@
-"""The facts that a recording carries beside its rows: what was run, on which ground, by which versions."""
+"""The metadata of a recording: scene, ground, seed, solver settings and versions."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     import h5py
 
 
-#: Rows of a run; more, and neither the disk nor the user's patience holds them.
+#: Most rows of a run, which limits file size and run time.
 MOST_ROWS = 10_000_000
 
 
 def versions() -> dict[str, Any]:
-    """The format of the file, and the versions of what wrote it."""
+    """The file format, and the versions of the software that writes it."""
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -44,7 +44,7 @@ def versions() -> dict[str, Any]:
 
 
 def storable(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    """Facts in a form that HDF5 takes: strings, numbers, arrays of numbers, and JSON for the rest."""
+    """Converts metadata to what HDF5 stores: strings, numbers and arrays of numbers as they are, the rest as JSON."""
     result: dict[str, Any] = {}
     for key, value in attributes.items():
         plain = isinstance(value, (str, float, np.number)) or (
@@ -64,16 +64,16 @@ def storable(attributes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def row_count(duration: float, time_step: float, steps_per_row: int = 1) -> int:
-    """How many rows a run has after its first.
+    """The number of rows of a run after the first.
 
     Args:
-        duration: s.
-        time_step: s.
-        steps_per_row: From one row to the next.
+        duration: Simulated time, s.
+        time_step: Step size, s.
+        steps_per_row: Steps between rows.
 
     Raises:
-        OptionError: `duration` is no positive number, `steps_per_row` no positive whole number, or the rows are more
-            than `MOST_ROWS`.
+        OptionError: `duration` is no positive number, `steps_per_row` is no positive whole number, or there would be
+            more than `MOST_ROWS` rows.
     """
     seconds = number("duration", duration, above=0.0)
     per_row = number("steps_per_row", steps_per_row, at_least=1.0)
@@ -89,12 +89,12 @@ def row_count(duration: float, time_step: float, steps_per_row: int = 1) -> int:
 def describe(
     sim: Simulation, title: str, scene: Mapping[str, Any] | None = None, *, seed: int | str = "none"
 ) -> dict[str, Any]:
-    """The attributes of a recording, from the simulation at its start.
+    """The attributes of a recording, taken from the simulation at its start.
 
     Args:
-        sim: The simulation; its model, state, commands and settings are described.
-        title: What is run, in words.
-        scene: What else the scene was made from.
+        sim: The simulation, whose model, state, commands and settings are stored.
+        title: Title of the run.
+        scene: Further parameters of the scene.
         seed: Seed of the run, or why there is none.
     """
     return {
@@ -112,7 +112,7 @@ def describe(
 
 
 def write_attribute(item: Any, key: str, value: Any) -> None:
-    """Stores an attribute: text in UTF-8, of a fixed length."""
+    """Stores an attribute; text is stored as UTF-8 of fixed length."""
     if isinstance(value, str):
         text = value.encode()
         item.attrs.create(key, text, dtype=import_h5py().string_dtype("utf-8", max(1, len(text))))
@@ -121,7 +121,7 @@ def write_attribute(item: Any, key: str, value: Any) -> None:
 
 
 def write_description(data: h5py.Dataset, unit: str, description: str, columns: Sequence[str]) -> None:
-    """Says in a data set what it holds."""
+    """Stores unit, description and column names in a data set's attributes."""
     write_attribute(data, "unit", unit)
     write_attribute(data, "description", description)
     if columns:
@@ -130,7 +130,7 @@ def write_description(data: h5py.Dataset, unit: str, description: str, columns: 
 
 
 def write_terrain(group: h5py.Group, terrain: Plane | SphereField) -> None:
-    """Stores a ground in its group."""
+    """Stores a terrain in an HDF5 group."""
 
     def write(name: str, value: npt.ArrayLike, unit: str, description: str, columns: Sequence[str] = ()) -> None:
         values = np.asarray(value, dtype=np.float64)

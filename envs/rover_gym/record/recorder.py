@@ -1,9 +1,9 @@
-"""Trajectories in HDF5, an open format that any language reads.
+"""Records trajectories in HDF5, an open format that any language reads.
 
-A file describes itself: each data set carries `unit` and `description` (and `columns` where its columns have names),
-the file carries the scene, the ground, the seed, the versions and the solver settings. Rows reach the disk while the
-run goes, and between two flushes the file is at rest, so a run that is killed, or that fills the disk, keeps all but
-the last rows. A file is read only after its kind, its links, its types and its sizes have been checked.
+A file describes itself: each data set has the attributes `unit` and `description` (and `columns` where its columns have
+names), and the file stores the scene, the ground, the seed, the versions and the solver settings. Rows are written to
+the disk during the run, and the file is consistent between flushes, so a run that is killed or fills the disk loses
+only its last rows. Reading checks a file's type, links, data types and sizes first.
 """
 
 from __future__ import annotations
@@ -40,21 +40,21 @@ if TYPE_CHECKING:
 class Recorder:
     """Appends rows to an HDF5 file; a context manager.
 
-    Rows are kept in memory and written `rows_per_flush` at a time. Between two flushes nothing is pending in the file,
-    so a process killed there leaves a readable file (attribute `complete` false). A full disk ends the recording with
-    an error, and the file stays as the flush before left it. The file is locked until the recorder is closed.
+    Rows are buffered in memory and written `rows_per_flush` at a time. Between flushes the file is consistent, so a
+    process killed there leaves a readable file (attribute `complete` false). A full disk ends the recording with an
+    error, and the file stays as the previous flush left it. The file is locked until the recorder is closed.
 
     Args:
-        path: The file to make; an existing one is replaced, unless it is being recorded or read. Its folder is made.
-        channels: What a row holds.
-        attributes: Facts about the run, stored at the root: strings, numbers and arrays as they are, the rest as JSON;
-            `describe` makes them of a simulation.
+        path: The file to create, with its folder. An existing file is replaced unless it is being recorded or read.
+        channels: The channels of a row.
+        attributes: Metadata of the run, stored at the root: strings, numbers and arrays as they are, the rest as JSON;
+            `describe` takes them from a simulation.
         terrain: The ground, stored in the group `terrain`; a replay needs it.
-        rows_per_flush: How many rows may be lost at a kill.
+        rows_per_flush: Most rows that a kill may lose.
 
     Raises:
-        RecordingError: A channel or an attribute cannot be stored, or the file is in use. It was not changed.
-        OSError: The file cannot be made.
+        RecordingError: A channel or an attribute cannot be stored, or the file is in use; it has not changed.
+        OSError: The file cannot be created.
         MissingExtraError: h5py is not installed.
     """
 
@@ -79,7 +79,7 @@ class Recorder:
         self._process = os.getpid()
         self._disk = _new_file(self.path)
         self._file: h5py.File = hdf5.File(self._disk, "w", libver=(LIBRARY, LIBRARY))
-        # The file must be closed before the interpreter ends, as HDF5 would call what is no longer there.
+        # Close the file before the interpreter exits; later, HDF5 would call Python objects that no longer exist.
         self._release = weakref.finalize(self, _release, self._file, self._disk)
         try:
             self._begin(channels, facts, terrain)
@@ -96,11 +96,11 @@ class Recorder:
             data = self._file.create_dataset(
                 channel.name,
                 shape=(0, *channel.shape),
-                # HDF5 knows no empty chunk: a channel of nothing (the wheels of a soil without a machine) may grow.
+                # HDF5 has no empty chunks, so an empty channel (the wheels of a soil without a machine) is resizable.
                 maxshape=(None, *(n or None for n in channel.shape)),
                 chunks=(self._rows_per_flush, *(n or 1 for n in channel.shape)),
                 dtype="f8",
-                fletcher32=True,  # a checksum, so that damage is no motion
+                fletcher32=True,  # a checksum, so that damaged data is not read as motion
             )
             write_description(data, channel.unit, channel.description, channel.columns)
         if terrain is not None:
@@ -111,8 +111,8 @@ class Recorder:
         """Adds one row, with a value for every channel.
 
         Raises:
-            RecordingError: A channel is missing, unknown, not numbers or of another shape, or the recorder is closed:
-                nothing was added. Or the rows cannot be written: the recorder is closed.
+            RecordingError: A channel is missing, unknown, not numeric or of another shape, or the recorder is closed;
+                nothing was added. Or the rows cannot be written; the recorder is then closed.
         """
         self._must_be_open()
         if row.keys() != self._shapes.keys():
@@ -130,10 +130,10 @@ class Recorder:
             self.flush()
 
     def flush(self) -> None:
-        """Brings all rows to the disk.
+        """Writes all buffered rows to the disk.
 
         Raises:
-            RecordingError: They cannot be written, and the recorder is now closed; or it was closed before.
+            RecordingError: The recorder is closed, or the rows cannot be written; the recorder is then closed.
         """
         self._must_be_open()
         for name, rows in self._pending.items():
@@ -145,20 +145,20 @@ class Recorder:
         self._commit()
 
     def note(self, **attributes: str | float) -> None:
-        """Stores facts that are known only now, at the root.
+        """Stores further attributes at the root during the run.
 
         Raises:
-            RecordingError: A fact cannot be stored, or the recorder is closed.
+            RecordingError: An attribute cannot be stored, or the recorder is closed.
         """
         self._must_be_open()
         for key, value in storable(attributes).items():
             write_attribute(self._file, key, value)
 
     def close(self) -> None:
-        """Writes what is pending and marks the file complete; nothing where that was done.
+        """Writes the buffered rows and marks the file complete; a second call does nothing.
 
         Raises:
-            RecordingError: The last rows cannot be written; what was written before stays.
+            RecordingError: The last rows cannot be written; the rows written before remain.
         """
         if self._release.alive:
             self.flush()
@@ -174,7 +174,7 @@ class Recorder:
     ) -> None:
         if kind is None:
             self.close()
-        elif self._release.alive:  # what was recorded stays, and stays marked incomplete
+        elif self._release.alive:  # keep the recorded rows, marked incomplete
             self.flush()
             self._release()
 
@@ -199,7 +199,7 @@ class Recorder:
 
 
 def _numbers(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """A copy of a channel's value."""
+    """Copies a channel's value into a float64 array."""
     try:
         given = np.asarray(value)
     except ValueError:  # rows of unequal length
@@ -220,7 +220,7 @@ def _new_file(path: Path) -> SteadyFile:
 
 
 def _release(file: h5py.File, disk: SteadyFile) -> None:
-    """Closes a file, and leaves on the disk what the last commit wrote."""
+    """Closes a file and leaves it on the disk as the last commit wrote it."""
     file.close()
     disk.close()
 

@@ -1,4 +1,4 @@
-"""A saved run, read back: where every solid of the rover was, over the ground that it drove on.
+"""A saved run of a rover: the poses of all solids over time, and the ground.
 
 run = read_run("episode-0.h5").resample(25.0)
 run.positions[-1, run.model.solid_names.index("trunk")]
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-LARGEST = 1e9  # m, rad or s: what is drawn and written in single precision must have places left
+LARGEST = 1e9  # m, rad or s: largest value that leaves enough digits in single precision
 LONGEST_TITLE = 200
-#: What `rover drive` records besides the simulation, and the shape of its rows.
+#: Channels that `rover drive` records besides the simulation's, with the shapes of their rows.
 OF_EPISODES: Mapping[str, tuple[int, ...]] = {"distance_to_goal": (), "slip_ratio": (), "motor_energy": ()}
 
 
@@ -37,8 +37,8 @@ class RoverRun:
         trajectory: The data sets and attributes of the file.
         model: The rover that drove.
         terrain: The ground.
-        goal: Goal on the map, (x, z), m, or None where the run had none.
-        title: What was run, in words.
+        goal: Goal on the map, (x, z), m; None if the run had none.
+        title: Title of the run.
     """
 
     trajectory: Trajectory
@@ -49,7 +49,7 @@ class RoverRun:
 
     @property
     def n_frames(self) -> int:
-        """How many samples the run has."""
+        """Number of samples."""
         return len(self.time)
 
     @property
@@ -64,7 +64,7 @@ class RoverRun:
 
     @property
     def rotations(self) -> npt.NDArray[np.float64]:
-        """(n, n_solids, 3, 3) rotation matrices that turn the solids' coordinates into the world's."""
+        """(n, n_solids, 3, 3) rotation matrices from the solids' frames to the world frame."""
         return self._poses[1]
 
     @cached_property
@@ -79,10 +79,10 @@ class RoverRun:
         return positions, rotations
 
     def resample(self, fps: float) -> RoverRun:
-        """The run with the samples that lie nearest to the times of a film's frames, none of them twice.
+        """The run reduced to the samples nearest to the frame times of a video, without duplicates.
 
         Args:
-            fps: Frames a second; where the run has fewer, it keeps all that it has.
+            fps: Frames per second; a run with fewer samples per second keeps them all.
 
         Raises:
             OptionError: `fps` is not a positive number.
@@ -93,40 +93,40 @@ class RoverRun:
 
 
 def film_rows(time: npt.NDArray[np.float64], fps: float) -> npt.NDArray[np.int64]:
-    """Numbers of the samples that lie nearest to the times of a film's frames, none of them twice.
+    """Indices of the samples nearest to the frame times of a video, without duplicates.
 
     Args:
-        time: (n,) of the samples, s.
-        fps: Frames a second.
+        time: (n,) times of the samples, s.
+        fps: Frames per second.
 
     Raises:
         OptionError: `fps` is not a positive number.
     """
     fps = number("fps", fps, above=0.0)
-    frames = np.floor((time[-1] - time[0]) * fps + 1e-6)  # a run of 2 s that ends at 1.999999999 s has its last
-    # How many of the frames' times k / fps lie before the middle between a sample and the next: no frame is counted
-    # one by one, as a damaged run may last for ages.
+    frames = np.floor((time[-1] - time[0]) * fps + 1e-6)  # a 2 s run that ends at 1.999999999 s keeps its last frame
+    # Number of frame times k / fps before the midpoint between a sample and the next. Frames are not enumerated,
+    # because a damaged file may state an enormous duration.
     before = np.floor((0.5 * (time[1:] + time[:-1]) - time[0]) * fps) + 1.0
     before = np.append(np.minimum(before, frames + 1.0), frames + 1.0)
     return np.flatnonzero(np.diff(before, prepend=0.0) > 0.0)
 
 
 def read_run(path: str | Path) -> RoverRun:
-    """Reads a run that `rover drive --output` or `rover report` saved, complete or not.
+    """Reads a run saved by `rover drive --output` or `rover report`, complete or not.
 
     Raises:
-        RecordingError: The file is no sound trajectory, or holds no samples, rover or ground.
-        OSError: The file is not there or cannot be read.
+        RecordingError: The file is no valid trajectory, or holds no samples, rover or ground.
+        OSError: The file does not exist or cannot be read.
         MissingExtraError: h5py is not installed.
     """
     return run_of(read_trajectory(path), path)
 
 
 def run_of(trajectory: Trajectory, path: str | Path) -> RoverRun:
-    """The run in a trajectory that was read from `path`.
+    """Extracts the run from a trajectory that was read from `path`.
 
     Raises:
-        RecordingError: It holds no samples, rover or ground, or what it holds does not fit together.
+        RecordingError: The trajectory holds no samples, rover or ground, or its parts are inconsistent.
     """
     scene = trajectory.attributes.get("scene")
     if "q" not in trajectory.data or not isinstance(scene, dict) or not isinstance(scene.get("model"), dict):
@@ -149,16 +149,16 @@ def run_of(trajectory: Trajectory, path: str | Path) -> RoverRun:
 
 
 def title_of(trajectory: Trajectory) -> str:
-    """What was run, in words: one line that can be printed."""
+    """The title of the run, as one printable line."""
     title = str(trajectory.attributes.get("title", "a run"))[:LONGEST_TITLE]
     return " ".join("".join(letter if letter.isprintable() else " " for letter in title).split())
 
 
 def check_time(trajectory: Trajectory, path: str | Path) -> None:
-    """Refuses a trajectory without samples, or whose time does not run forward.
+    """Checks that a trajectory has samples and that its time does not decrease.
 
     Raises:
-        RecordingError: It is such a one.
+        RecordingError: The trajectory has no samples, or its time is not finite, exceeds `LARGEST` or decreases.
     """
     if "time" not in trajectory.data or len(trajectory["time"]) == 0:
         refuse(RecordingError, "path", str(path), "holds no samples: the run was killed before the first were written")
@@ -172,16 +172,16 @@ def check_time(trajectory: Trajectory, path: str | Path) -> None:
 def check_rows(
     trajectory: Trajectory, path: str | Path, shapes: Mapping[str, tuple[int, ...]], *, bounded: tuple[str, ...]
 ) -> None:
-    """Refuses data sets whose rows have other shapes, or whose values cannot be drawn.
+    """Checks the row shapes and the value range of data sets.
 
     Args:
-        trajectory: The data sets; those that it lacks are not looked for.
+        trajectory: The trajectory; data sets that it lacks are skipped.
         path: The file, for the message.
         shapes: Shape of a row, by data set.
-        bounded: Those whose values must be finite and within `LARGEST`.
+        bounded: Data sets whose values must be finite and within `LARGEST`.
 
     Raises:
-        RecordingError: A data set is not as it must be.
+        RecordingError: A data set has rows of another shape, or a value out of range.
     """
     for name, shape in shapes.items():
         values = trajectory.data.get(name)
@@ -195,7 +195,7 @@ def check_rows(
 
 
 def _check_solver(solver: object, path: str | Path) -> None:
-    """Refuses settings that the figures cannot show."""
+    """Checks the solver settings that the figures show."""
     if not isinstance(solver, dict):
         refuse(RecordingError, f"{path}: solver", solver, "must be an object")
     for name in ("time_step", "tolerance"):

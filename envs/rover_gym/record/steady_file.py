@@ -1,8 +1,8 @@
-"""A file that a library writes piece by piece and that changes on the disk only as a whole, at `commit`.
+"""A file object that buffers writes in memory and changes the file on disk only at `commit`.
 
-HDF5 cannot close a file that it failed to write: on a full disk it ends the process. So it writes into memory here, and
-`commit` brings that to the disk: first it reserves the room that is missing, then it writes what is new, then what is
-changed. Where there is no room the file stays as the last commit left it. The file is locked as long as it is open.
+HDF5 aborts the process if it cannot write a file that it closes, for example on a full disk. Here it writes to memory,
+and `commit` writes to the disk: it first reserves the missing space, then writes the new pages, then the changed ones.
+Without enough space the file stays as the last commit left it. The file is locked while it is open.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ if sys.platform != "win32":
 if TYPE_CHECKING:
     from pathlib import Path
 
-PAGE = 1 << 16  # bytes that are kept, and written, together
-NO_LOCKS = frozenset({errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS})  # of a file system that has none
+PAGE = 1 << 16  # bytes that are buffered and written as a unit
+NO_LOCKS = frozenset({errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS})  # file system without locks
 
 
 class FileInUseError(OSError):
-    """A file is locked by someone who writes it, or who reads it while it is to be written."""
+    """A file is locked: it is being written, or it is being read while it is to be written."""
 
 
 def lock(descriptor: int, *, shared: bool = False) -> None:
-    """Locks an open file, without waiting.
+    """Locks an open file without waiting.
 
     Raises:
-        FileInUseError: Someone else holds a lock.
+        FileInUseError: Another open file holds a conflicting lock.
     """
-    if sys.platform == "win32":  # it has no such locks
+    if sys.platform == "win32":  # Windows has no `flock`
         return
     try:
         fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
@@ -44,18 +44,18 @@ def lock(descriptor: int, *, shared: bool = False) -> None:
 
 
 class SteadyFile:
-    """A new file; what it held before is gone. It has the methods that h5py asks of a file.
+    """A new file, or an existing one emptied, with the file methods that h5py needs.
 
     Args:
-        path: Where it is made, or replaced where it is there and free.
+        path: The file to create, or to replace unless it is locked.
 
     Raises:
-        FileInUseError: It is locked; it was not changed.
-        OSError: It cannot be made, or is no regular file.
+        FileInUseError: The file is locked; it has not changed.
+        OSError: The file cannot be created, or is no regular file.
     """
 
     def __init__(self, path: Path) -> None:
-        if path.exists() and not stat.S_ISREG(path.stat().st_mode):  # to open a pipe would wait for its reader
+        if path.exists() and not stat.S_ISREG(path.stat().st_mode):  # opening a pipe would wait for its reader
             raise OSError(errno.EINVAL, "is no regular file")
         self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666)
         try:
@@ -64,20 +64,20 @@ class SteadyFile:
         except OSError:
             os.close(self._descriptor)
             raise
-        self._pages: dict[int, bytearray] = {}  # what changed since the last commit
+        self._pages: dict[int, bytearray] = {}  # pages changed since the last commit
         self._place = self._size = self._committed = 0
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Goes to a place."""
+        """Moves the file position."""
         self._place = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._place, os.SEEK_END: self._size}[whence]
         return self._place
 
     def tell(self) -> int:
-        """The place."""
+        """The file position."""
         return self._place
 
     def readinto(self, buffer: memoryview) -> int:
-        """Reads from the place on."""
+        """Reads into a buffer from the file position on."""
         view = memoryview(buffer).cast("B")
         wanted = max(0, min(len(view), self._size - self._place))
         done = 0
@@ -90,12 +90,12 @@ class SteadyFile:
         return wanted
 
     def read(self, size: int = -1) -> bytes:
-        """Bytes from the place on."""
+        """Reads bytes from the file position on."""
         data = bytearray(self._size - self._place if size < 0 else size)
         return bytes(data[: self.readinto(memoryview(data))])
 
     def write(self, data: bytes) -> int:
-        """Writes at the place, in memory."""
+        """Writes at the file position, in memory."""
         view = memoryview(data).cast("B")
         done = 0
         while done < len(view):
@@ -109,18 +109,18 @@ class SteadyFile:
         return len(view)
 
     def truncate(self, size: int | None = None) -> int:
-        """Gives the file a size, in memory."""
+        """Sets the size of the file, in memory."""
         self._size = self._place if size is None else size
         return self._size
 
     def flush(self) -> None:
-        """Nothing: `commit` writes."""
+        """Does nothing; `commit` writes."""
 
     def commit(self) -> None:
-        """Brings everything to the disk.
+        """Writes all changes to the disk.
 
         Raises:
-            OSError: There is no room, and then the file is as it was; or the disk fails.
+            OSError: There is not enough space, in which case the file has not changed; or the disk fails.
         """
         if self._size > self._committed:
             try:
@@ -128,7 +128,7 @@ class SteadyFile:
             except OSError:
                 os.ftruncate(self._descriptor, self._committed)
                 raise
-        # What is new before what is changed, which may tell of it: a kill between two pages does the least harm.
+        # Changed pages may refer to new ones, so write the new ones first: a kill in between then does the least harm.
         for number in sorted(self._pages, reverse=True):
             page = memoryview(self._pages[number])[: max(0, self._size - number * PAGE)]
             _write_all(self._descriptor, page, number * PAGE)
@@ -137,14 +137,14 @@ class SteadyFile:
         self._pages.clear()
 
     def close(self) -> None:
-        """Frees the file as the last commit left it."""
+        """Closes the file as the last commit left it."""
         if self._descriptor >= 0:
             os.close(self._descriptor)
             self._descriptor = -1
             self._pages.clear()
 
     def _page(self, number: int) -> bytearray:
-        """A page as it is now; a changed one is the one that is kept."""
+        """The present content of a page; for a changed page, the buffer itself."""
         if number in self._pages:
             return self._pages[number]
         page = bytearray(PAGE)
@@ -156,7 +156,7 @@ class SteadyFile:
         return page
 
     def _reserve(self, length: int) -> None:
-        """Makes sure that the disk has room for so many bytes more."""
+        """Reserves space on the disk for `length` more bytes."""
         if hasattr(os, "posix_fallocate"):
             try:
                 os.posix_fallocate(self._descriptor, self._committed, length)

@@ -1,4 +1,4 @@
-"""Trajectories read back: nothing is taken from a file that was not checked first."""
+"""Reads trajectories, and checks everything in a file before it is used."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import h5py
 
 
-#: What a file says it holds is at most so many times as large as the file: packed files are read, bombs are not.
+#: Largest ratio of decompressed data to file size: admits compressed files, refuses decompression bombs.
 LARGEST_EXPANSION = 100
 
 
@@ -44,9 +44,9 @@ class Trajectory:
 
     Attributes:
         data: The data sets by name, (n, ...) float64.
-        units: Their units.
-        attributes: What the file says of the run; JSON values are decoded.
-        terrain: The ground, or None where the file holds none.
+        units: The units of the data sets, by name.
+        attributes: Metadata of the run, with JSON values decoded.
+        terrain: The ground; None if the file holds none.
     """
 
     data: Mapping[str, npt.NDArray[np.float64]]
@@ -55,10 +55,10 @@ class Trajectory:
     terrain: Plane | SphereField | None = None
 
     def __getitem__(self, name: str) -> npt.NDArray[np.float64]:
-        """The data set of that name.
+        """The data set of a name.
 
         Raises:
-            RecordingError: There is none.
+            RecordingError: The run holds no data set of this name.
         """
         if name not in self.data:
             refuse(RecordingError, name, sorted(self.data), "the run holds no such data set; it holds")
@@ -68,12 +68,12 @@ class Trajectory:
 def read_trajectory(path: str | Path) -> Trajectory:
     """Reads a file that `Recorder` wrote, complete or not.
 
-    Nothing is followed out of the file: links, external storage and virtual data sets are refused. Neither is anything
-    read that is larger than `LARGEST_EXPANSION` times the file.
+    Everything must lie in the file itself: links, external storage and virtual data sets are refused. So is data that
+    takes more than `LARGEST_EXPANSION` times the size of the file.
 
     Raises:
-        RecordingError: The file is no sound trajectory of this format and version, or is being recorded.
-        OSError: The file is not there or may not be read.
+        RecordingError: The file is no valid trajectory of this format and version, or is being recorded.
+        OSError: The file does not exist or may not be read.
         MissingExtraError: h5py is not installed.
     """
     h5py = import_h5py()
@@ -84,7 +84,7 @@ def read_trajectory(path: str | Path) -> Trajectory:
 
 
 class _Reader:
-    """Reads one file, and only what it has checked."""
+    """Reads one file, and checks every item first."""
 
     def __init__(self, h5py: Any, path: Path, size: int) -> None:
         self._h5py, self._path, self._size = h5py, path, size
@@ -109,7 +109,7 @@ class _Reader:
                 terrain = self._terrain(item)
         if not sets:
             refuse_field(self._path, "file", None, "holds no data set")
-        rows = min(len(data) for data in sets.values())  # a kill within a flush leaves some a few rows longer
+        rows = min(len(data) for data in sets.values())  # a kill during a flush leaves some data sets longer
         units = {name: self._attribute(data, "unit") for name, data in sets.items()}
         for name, unit in units.items():
             if not isinstance(unit, str):
@@ -122,7 +122,7 @@ class _Reader:
         )
 
     def _item(self, group: h5py.Group, name: str) -> Any:
-        """What is in the file under a name; what is elsewhere is refused."""
+        """The item of a name; links and data outside the file are refused."""
         field = f"{group.name.strip('/')}/{name}".strip("/")
         link = group.get(name, getlink=True)
         if not isinstance(link, self._h5py.HardLink):
@@ -134,7 +134,7 @@ class _Reader:
         return item
 
     def _check(self, field: str, data: h5py.Dataset, *, least_dimensions: int = 0) -> None:
-        """Refuses what is no array of float64, or larger than the file can hold."""
+        """Checks that a data set is an array of float64 no larger than the file can hold."""
         if data.shape is None or data.dtype.kind != "f" or data.dtype.itemsize != 8:
             refuse_field(self._path, field, str(data.dtype), "must be an array of float64")
         if not least_dimensions <= len(data.shape) <= 3:
@@ -145,7 +145,7 @@ class _Reader:
             self._check_chunks(field, data)
 
     def _check_chunks(self, field: str, data: h5py.Dataset) -> None:
-        """Refuses chunks whose place or size cannot be: HDF5 reads the checksum at the end of what has none."""
+        """Refuses chunks of impossible offset or size: HDF5 reads a checksum even from a chunk too short for one."""
         whole = math.prod(data.chunks) * 8 + 4 * data.fletcher32
         packed = data.compression is not None
         wrong: list[int] = []
@@ -167,12 +167,12 @@ class _Reader:
         self._room -= size
 
     def _attribute(self, item: Any, key: str) -> Any:
-        """An attribute's value, a string, a number or an array of them; None where there is none."""
+        """An attribute's value, a string, a number or an array of them; None if it does not exist."""
         if key not in item.attrs:
             return None
         kind = item.attrs.get_id(key)
         field = f"{item.name.strip('/')}.{key}".strip(".")
-        # Text of no fixed length lies elsewhere in the file, and HDF5 believes whatever length is stated.
+        # Text of variable length is stored elsewhere in the file, and HDF5 trusts its stated length.
         if kind.dtype.kind not in "biufS":
             refuse_field(self._path, field, str(kind.dtype), "must be numbers or text of a fixed length")
         self._take(field, kind.shape or (), kind.dtype.itemsize)
@@ -184,14 +184,14 @@ class _Reader:
         return value.item() if isinstance(value, np.generic) else value
 
     def _decoded(self, key: str, value: Any) -> Any:
-        """A value that was stored as JSON, as it was."""
+        """Decodes a value that was stored as JSON."""
         if not isinstance(value, str) or key == "title":
             return value
         if value[:1] in ("{", "["):
             try:
                 result = json.loads(value)
                 if "\\u" in value:
-                    json.dumps(result, ensure_ascii=False).encode()  # half a pair of surrogates is no text
+                    json.dumps(result, ensure_ascii=False).encode()  # refuse lone surrogates
             except (ValueError, RecursionError) as error:
                 refuse_field(self._path, key, value[:40], f"is no JSON ({error}), beginning with")
             if isinstance(result, dict) or key not in OBJECTS:
@@ -224,8 +224,8 @@ class _Reader:
 
 
 def _check_bytes(path: Path) -> int:
-    """Checks what can be without HDF5, and returns the file's size."""
-    if not stat.S_ISREG(path.stat().st_mode):  # one that is not there says so itself; to open a pipe would wait
+    """Makes the checks that do not need HDF5, and returns the file's size."""
+    if not stat.S_ISREG(path.stat().st_mode):  # `stat` raises for a missing file; opening a pipe would wait
         refuse(RecordingError, "path", str(path), "is no regular file")
     with path.open("rb") as file:
         try:

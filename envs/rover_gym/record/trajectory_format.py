@@ -1,4 +1,4 @@
-"""What files of trajectories are: their format, and how one that is not sound is refused."""
+"""The file format of trajectories, and the errors for files that violate it."""
 
 from __future__ import annotations
 
@@ -17,36 +17,36 @@ if TYPE_CHECKING:
 
 FORMAT = "rover-gym trajectory"
 FORMAT_VERSION = 3
-#: Of HDF5's own format: the oldest whose descriptions carry checksums; every HDF5 since 2008 reads it.
+#: HDF5 format version: the oldest with checksummed metadata; every HDF5 since 2008 reads it.
 LIBRARY = "v108"
 TERRAIN = "terrain"  # the group that holds the ground
 OBJECTS = ("scene", "solver")  # attributes that are JSON objects
-SIGNATURE = b"\x89HDF\r\n\x1a\n"  # an HDF5 file begins so
+SIGNATURE = b"\x89HDF\r\n\x1a\n"  # first bytes of an HDF5 file
 
 
 class RecordingError(RoverGymError, ValueError):
-    """A file is no sound trajectory of this format, does not hold what was asked of it, or cannot be written."""
+    """A file is no valid trajectory of this format, lacks the requested data, or cannot be written."""
 
 
 def import_h5py() -> Any:
-    """The module h5py.
+    """Imports the module h5py.
 
     Raises:
-        MissingExtraError: It is not installed.
+        MissingExtraError: h5py is not installed.
     """
     return require("h5py", "demo")
 
 
 def refuse_field(path: str | Path, field: str, value: object, reason: str) -> NoReturn:
-    """Refuses a file: names it, and in it the field that is not as it must be."""
+    """Refuses a file with an error that names the file and the invalid field."""
     refuse(RecordingError, f"{path}: {field}", value, reason)
 
 
 def file_path(path: str | Path) -> Path:
-    """A path that a file can have.
+    """Checks that a path is a possible file path and returns it.
 
     Raises:
-        RecordingError: No file can.
+        RecordingError: No file can have this path.
     """
     try:
         result = Path(path)
@@ -60,11 +60,11 @@ def file_path(path: str | Path) -> Path:
 
 @contextmanager
 def sound(path: str | Path, field: str = "path") -> Iterator[None]:
-    """Turns whatever a damaged file makes a library raise into an error that names the file.
+    """Turns any exception that a damaged file causes into a `RecordingError` that names the file.
 
     Args:
         path: The file.
-        field: What is read from it.
+        field: The field being read.
     """
     try:
         yield

@@ -1,6 +1,7 @@
-"""Many rovers at once, stepped by the compiled core.
+"""Vectorised environments, stepped by the compiled core.
 
-`RoverVectorEnv` is for Gymnasium; `rover_gym.vector.sb3`, which imports stable-baselines3, has the same for that.
+`RoverVectorEnv` is for Gymnasium. `rover_gym.vector.sb3`, which imports stable-baselines3, has its equivalent for that
+library.
 """
 
 from rover_gym.vector.batch import BatchRover, RoverBatch

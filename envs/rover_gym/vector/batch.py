@@ -1,8 +1,8 @@
-"""Many rovers side by side: what the vector environments of Gymnasium and of stable-baselines3 stand on.
+"""A batch of rovers, the base of the vector environments for Gymnasium and stable-baselines3.
 
-Rover i of a batch goes bit for bit as a `RoverEnv` with the same arguments and seed would, whatever the numbers of
-rovers and of threads. The physics is one call of the compiled core a control period; observation, reward and end are
-the functions that `RoverEnv` calls, over arrays.
+Rover i of a batch behaves, bit for bit, like a `RoverEnv` with the same arguments and seed, whatever the numbers of
+rovers and threads. Each control period calls the compiled core once. Observation, reward and termination come from the
+functions that `RoverEnv` uses, applied to arrays.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,23 +35,23 @@ if TYPE_CHECKING:
     from rover_gym.rendering import FrameRenderer
 
 
-#: Each rover takes some 100 kB.
+#: Limits of a batch; each rover takes about 100 kB.
 MAX_ROVERS = 100_000
 MAX_THREADS = 4096
 
 
 class RoverBatch:
-    """Rovers with one task, each with its own episode, terrain and random generator.
+    """Rovers that share one task, each with its own episode, terrain and random generator.
 
     Args:
-        n: How many.
-        threads: That step them; None for one a core.
-        max_episode_steps: Steps until truncation; None for never.
-        **arguments: Those of `RoverEnv`.
+        n: Number of rovers.
+        threads: Threads that step the rovers; None for one per core.
+        max_episode_steps: Steps until truncation; None for no limit.
+        **arguments: Arguments of `RoverEnv`.
 
     Attributes:
-        prototype: An environment with the same arguments, never stepped: spaces, layout, model.
-        rovers: One view a rover.
+        prototype: An environment with the same arguments, never stepped, that gives spaces, layout and model.
+        rovers: One view per rover.
     """
 
     @takes_arguments
@@ -84,15 +84,15 @@ class RoverBatch:
 
     @property
     def observation(self) -> Observations:
-        """`(n, size) float32` a copy of the last observations."""
+        """`(n, size) float32` copy of the last observations."""
         return self._progress.observation.copy()
 
     def check_options(self, options: Mapping[str, Any] | None) -> ResetOptions:
-        """Reset options, or the first that is refused."""
+        """Checks reset options and refuses the first bad one."""
         return check_reset_options(self.task, options)
 
     def reset(self, i: int, seed: int | None = None, options: ResetOptions | None = None) -> dict[str, Any]:
-        """Starts an episode of rover i and returns its info; the others go on.
+        """Starts an episode of rover i and returns its info; the other rovers continue.
 
         Raises:
             OptionError: The seed is no whole number from 0; nothing has changed.
@@ -110,12 +110,12 @@ class RoverBatch:
     ) -> Iterator[list["Drawn"]]:
         """Draws the next episodes of some rovers, which `begin` starts.
 
-        Whatever is raised inside the `with`, too, leaves every random generator as it was.
+        If drawing or the `with` block raises, every random generator keeps its state.
 
         Args:
-            chosen: Which rovers.
-            seeds: One a chosen rover, checked; None to go on with the generators that there are.
-            options: What is fixed.
+            chosen: Indices of the rovers.
+            seeds: One checked seed per chosen rover; None to continue with the present generators.
+            options: The values that reset options fix.
 
         Raises:
             TerrainError: As `RoverEnv.reset`; nothing has changed.
@@ -147,10 +147,10 @@ class RoverBatch:
 
         Args:
             actions: Within [-1, 1].
-            active: `(n,)` rovers that are to move; what is said of the others means nothing. None for all.
+            active: `(n,)` mask of the rovers to move; the results of the others are meaningless. None for all.
 
         Returns:
-            The outcome, which rovers' episodes have ended by themselves, and which by the time limit.
+            The outcome, a mask of terminated episodes, and a mask of episodes that have reached the time limit.
 
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite or outside [-1, 1]; nothing
@@ -174,7 +174,7 @@ class RoverBatch:
         return outcome, terminated, self._steps >= self.max_episode_steps
 
     def generator(self, i: int) -> np.random.Generator:
-        """Rover i's random generator; before its first reset one of no known seed, as `gymnasium.Env` has it."""
+        """Rover i's random generator; before the first reset it is seeded at random, as in `gymnasium.Env`."""
         made = self._generators[i]
         if made is None:
             made, self._seeds[i] = seeded(None)
@@ -191,7 +191,7 @@ class RoverBatch:
 
 
 class Drawn(NamedTuple):
-    """A rover's next episode, the generator that it was drawn from, and the seed of that."""
+    """A rover's next episode, the generator it was drawn from, and that generator's seed."""
 
     beginning: Beginning
     generator: np.random.Generator
@@ -199,7 +199,7 @@ class Drawn(NamedTuple):
 
 
 class BatchRover:
-    """One rover of a batch, by the names that `RoverEnv` has: to look at, and to set its difficulty."""
+    """A view of one rover of a batch, with the names of `RoverEnv`: read-only except for the difficulty."""
 
     spec = None
 
@@ -209,11 +209,11 @@ class BatchRover:
 
     @property
     def render_mode(self) -> str | None:
-        """That of the arguments, for all rovers."""
+        """The render mode, the same for all rovers."""
         return self._batch.prototype.render_mode
 
     def render(self) -> npt.NDArray[np.uint8] | None:
-        """The present state as a frame, as `RoverEnv.render`; None without a render mode."""
+        """Renders the present state as a frame, like `RoverEnv.render`; None without a render mode."""
         if self.render_mode is None:
             return None
         scene, prototype = self._scene, self._batch.prototype
@@ -230,7 +230,7 @@ class BatchRover:
 
     @property
     def simulation(self) -> Simulation:
-        """A copy of its simulation."""
+        """A copy of the rover's simulation."""
         return self._batch.simulations.simulation(self._i)
 
     @property
@@ -270,7 +270,7 @@ class BatchRover:
 
     @property
     def observation_layout(self) -> ObservationLayout:
-        """Names of the observation's parts."""
+        """The layout of the observation."""
         return self._batch.task.layout
 
     @property
@@ -280,20 +280,20 @@ class BatchRover:
 
     @property
     def np_random(self) -> np.random.Generator:
-        """Its random generator."""
+        """The rover's random generator."""
         return self._batch.generator(self._i)
 
     @property
     def np_random_seed(self) -> int:
-        """The seed that its generator was made from."""
+        """The seed of the rover's random generator."""
         self._batch.generator(self._i)
         return self._batch._seeds[self._i]
 
     def set_difficulty(self, difficulty: float | Range) -> None:
-        """Sets the rocks' difficulty, or the range it is drawn from, from its next reset on.
+        """Sets the rocks' difficulty, or the range it is drawn from, from the next reset on.
 
         Raises:
-            OptionError: It is not within 0 to 1, or there are no rocks; nothing has changed.
+            OptionError: The difficulty is not within 0 to 1, or there are no rocks; nothing has changed.
         """
         self._batch._difficulties[self._i] = check_difficulty(self._batch.task, difficulty)
 

@@ -1,4 +1,4 @@
-"""`RoverVecEnv`: many rovers as one vector environment of stable-baselines3.
+"""`RoverVecEnv`: the vector environment for stable-baselines3.
 
 from rover_gym.vector.sb3 import RoverVecEnv
 
@@ -33,22 +33,22 @@ except ImportError as error:
 
 
 class RoverVecEnv(VecEnv):
-    """Rovers that are stepped by the compiled core, many at a time, on several threads.
+    """A vector of rovers that the compiled core steps on several threads.
 
-    Each goes bit for bit as a `RoverEnv` of the same arguments and seed would, inside a `TimeLimit` and a
-    `DummyVecEnv`: an episode that ends is followed by the next at once, the last observation is in
-    `info["terminal_observation"]`, and `info["TimeLimit.truncated"]` says whether only the time was up. For speed the
-    infos are whole only where an episode ends; before that they hold `TimeLimit.truncated` and nothing else.
+    Each rover behaves, bit for bit, like a `RoverEnv` with the same arguments and seed in a `TimeLimit` and a
+    `DummyVecEnv`: when an episode ends the next one starts at once, `info["terminal_observation"]` holds the last
+    observation, and `info["TimeLimit.truncated"]` tells whether the episode ended by the time limit alone. For speed,
+    infos are complete only where an episode ends; otherwise they hold only `TimeLimit.truncated`.
 
     Example:
         >>> venv = RoverVecEnv(64, terrain="sphere_field", height_scan=True)
         >>> model = stable_baselines3.PPO("MlpPolicy", VecMonitor(venv))
 
     Args:
-        n_envs: How many rovers.
-        threads: That step them; None for one a core.
-        max_episode_steps: Steps until truncation; None for never.
-        **arguments: Those of `RoverEnv`.
+        n_envs: Number of rovers.
+        threads: Threads that step the rovers; None for one per core.
+        max_episode_steps: Steps until truncation; None for no limit.
+        **arguments: Arguments of `RoverEnv`.
     """
 
     @takes_arguments
@@ -69,11 +69,11 @@ class RoverVecEnv(VecEnv):
 
     @property
     def prototype(self) -> RoverEnv:
-        """An environment with the same arguments, never stepped: for its layout, model and limits."""
+        """An environment with the same arguments, never stepped, that gives layout, model and limits."""
         return self.batch.prototype
 
     def reset(self) -> VecEnvObs:
-        """Starts an episode of every rover, with the seeds and options that were set for this once.
+        """Starts an episode of every rover with the seeds and options set for this reset.
 
         Raises:
             StateError: As `RoverEnv.reset`; nothing has changed.
@@ -93,18 +93,18 @@ class RoverVecEnv(VecEnv):
         return self.batch.observation
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Sets the seeds of the next reset: of the first rover, then one more from rover to rover.
+        """Sets the seeds of the next reset: the first rover's seed, which increases by one per rover.
 
         Raises:
-            OptionError: It is neither None nor a whole number from 0; nothing has changed.
+            OptionError: The seed is neither None nor a whole number from 0; nothing has changed.
         """
         return super().seed(check_seed(seed))
 
     def set_options(self, options: list[dict[str, Any]] | dict[str, Any] | None = None) -> None:
-        """Sets the options of the next reset: those of `RoverEnv.reset`, for every rover, or one mapping a rover.
+        """Sets the `RoverEnv.reset` options of the next reset: one mapping for all rovers, or a list of one per rover.
 
         Raises:
-            OptionError: They are neither, or one is unknown or out of its range; nothing has changed.
+            OptionError: The options are neither, or one is unknown or out of range; nothing has changed.
             StateError: As `RoverEnv.reset`.
         """
         given = options if isinstance(options, list) else [options] * self.num_envs
@@ -115,21 +115,21 @@ class RoverVecEnv(VecEnv):
         self._options = [copy.deepcopy(dict(one or {})) for one in given]
 
     def step_async(self, actions: npt.NDArray[np.float32]) -> None:
-        """Takes the actions `(n_envs, 12)`.
+        """Stores the actions `(n_envs, 12)` for `step_wait`.
 
         Raises:
-            CommandError: They have a wrong shape or an entry outside [-1, 1]; nothing has changed.
+            CommandError: The actions have a wrong shape or an entry outside [-1, 1]; nothing has changed.
         """
         self._actions = check_actions(actions, (self.num_envs, N_ACTIONS))
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Applies them for one control period; rovers whose episode ends start the next.
+        """Applies the stored actions for one control period; rovers whose episode ends start the next.
 
-        A next episode that cannot begin is refused by the step after, before anything moves.
+        If a next episode cannot begin, the following step refuses it before any rover moves.
 
         Raises:
-            TerrainError: A rover's next episode cannot begin, as `RoverEnv.reset` says; nothing has changed. A reset
-                with another seed or other options helps.
+            TerrainError: A rover's next episode cannot begin (see `RoverEnv.reset`); nothing has changed. Reset with
+                another seed or other options.
         """
         if self._waiting:
             self._restart(self._waiting)
@@ -151,7 +151,7 @@ class RoverVecEnv(VecEnv):
                 self._waiting = ended
             else:
                 observation[ended] = self.batch.observation[ended]
-        # Only a rover that flies off with 1e37 m/s earns what float32 cannot hold.
+        # Only a rover that flies off at 1e37 m/s earns a reward out of float32's range.
         reward = np.clip(outcome.reward, -LARGEST, LARGEST).astype(np.float32)
         return observation, reward, dones, infos
 
@@ -166,14 +166,14 @@ class RoverVecEnv(VecEnv):
             rover.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute of the rovers, or of the environment that they are made like."""
+        """Reads an attribute of the rovers, or of `prototype` where the rovers lack it."""
         return [self._find(rover, attr_name) for rover in self._chosen(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Sets an attribute of the rovers' views; those that `RoverEnv` has are not to be set.
+        """Sets an attribute of the rovers' views; attributes of `RoverEnv` are read-only.
 
         Raises:
-            AttributeError: The attribute is one that `RoverEnv` has.
+            AttributeError: `RoverEnv` has an attribute of this name.
         """
         for rover in self._chosen(indices):
             if attr_name in vars(self.prototype) or hasattr(RoverEnv, attr_name) or hasattr(BatchRover, attr_name):
@@ -187,17 +187,17 @@ class RoverVecEnv(VecEnv):
         return [getattr(rover, method_name)(*method_args, **method_kwargs) for rover in self._chosen(indices)]
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: VecEnvIndices = None) -> list[bool]:  # noqa: ARG002
-        """No rover is."""
+        """False for every rover."""
         return [False for _ in self._chosen(indices)]
 
     def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
-        """A frame of every rover, with `render_mode="rgb_array"`; `render()` puts them side by side."""
+        """One frame per rover with `render_mode="rgb_array"`; `render()` tiles them."""
         return [rover.render() for rover in self.batch.rovers]
 
     def _chosen(self, indices: VecEnvIndices) -> list[BatchRover]:
         return [self.batch.rovers[i] for i in self._get_indices(indices)]
 
     def _find(self, rover: BatchRover, name: str) -> Any:
-        # Not by hasattr, which would call a property.
+        # hasattr would evaluate properties.
         owner = rover if name in vars(rover) or name in vars(BatchRover) else self.prototype
         return getattr(owner, name)

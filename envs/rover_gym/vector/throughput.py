@@ -1,7 +1,7 @@
-"""How fast a batch of rovers is, and where its time goes.
+"""Measures the throughput of a batch of rovers and where its time goes.
 
-Machines are rarely quiet, so everything is measured in many short rounds, one variant after the other, and the fastest
-round of each counts.
+Other processes disturb timings, so the variants are measured in turn in many short rounds, and the fastest round of
+each counts.
 """
 
 import time
@@ -17,23 +17,23 @@ from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.vector.batch import RoverBatch
 from rover_gym.vector.vector_env import RoverVectorEnv
 
-#: Torques within a fifth of the limit, so that rovers drive about and few turn over.
+#: Largest action: torques within a fifth of the limit, so that the rovers drive about and few roll over.
 _EFFORT = 0.2
 
 
 @dataclass(frozen=True)
 class VectorSpeed:
-    """What was measured; times are those of the fastest round, a step of the whole batch.
+    """Measured times; each is per step of the whole batch in the fastest round.
 
     Attributes:
-        num_envs: Rovers.
-        threads: Of the batch.
-        step: A step of `RoverVectorEnv`, automatic resets included, s.
-        physics: Of it, inside the compiled core, s.
-        one_thread: The core's part with one thread, s.
-        all_threads: The core's part with all threads, its own fastest, s.
-        sync: The same of `SyncVectorEnv` over `RoverEnv`, s.
-        reset: Of one rover, s.
+        num_envs: Number of rovers.
+        threads: Threads of the batch.
+        step: Time of a `RoverVectorEnv` step, automatic resets included, s.
+        physics: Part of `step` spent inside the compiled core, s.
+        one_thread: Time inside the core with one thread, s.
+        all_threads: Time inside the core with all threads, in its own fastest round, s.
+        sync: Time of a step of `SyncVectorEnv` over `RoverEnv`, s.
+        reset: Time to reset one rover, s.
     """
 
     num_envs: int
@@ -47,27 +47,27 @@ class VectorSpeed:
 
     @property
     def physics_share(self) -> float:
-        """Of the batch's time."""
+        """Fraction of a step spent inside the core."""
         return self.physics / self.step
 
     @property
     def speed_up(self) -> float:
-        """Of the physics, from the further threads."""
+        """Speed-up of the physics by multithreading."""
         return self.one_thread / self.all_threads
 
     @property
     def gain(self) -> float:
-        """Over `SyncVectorEnv`."""
+        """Speed-up over `SyncVectorEnv`."""
         return self.sync / self.step
 
     @property
     def steps_per_second(self) -> float:
-        """Environment steps a second."""
+        """Environment steps per second."""
         return self.num_envs / self.step
 
 
 class _TimedSimulations:
-    """Stands before a batch's simulations and adds up the time of their steps."""
+    """Wraps a batch's simulations and sums the time of their steps."""
 
     def __init__(self, batch: RoverBatch) -> None:
         self._inner = batch.simulations
@@ -93,15 +93,15 @@ def measure_speed(
     progress: Callable[[], object] = lambda: None,
     **arguments: Unpack[RoverArguments],
 ) -> VectorSpeed:
-    """Steps batches with one thread and with more, and a `SyncVectorEnv`, by the same actions.
+    """Times a multithreaded batch, a single-threaded batch and a `SyncVectorEnv` under the same actions.
 
     Args:
-        num_envs: Rovers.
-        threads: Of the batch; None for one a core.
-        rounds: How often each is measured.
-        steps: In a round.
+        num_envs: Number of rovers.
+        threads: Threads of the batch; None for one per core.
+        rounds: Rounds per variant.
+        steps: Steps per round.
         progress: Called after each round.
-        **arguments: Those of `RoverEnv`.
+        **arguments: Arguments of `RoverEnv`.
     """
     several = RoverVectorEnv(num_envs, threads=threads, **arguments)
     single = RoverVectorEnv(num_envs, threads=1, **arguments)
@@ -125,7 +125,7 @@ def measure_speed(
         whole, _, of_sync = (_mean_step(env, actions) for env in (several, single, sync))
         times.append((whole, watches[0].elapsed / steps, watches[1].elapsed / steps, of_sync))
         progress()
-    # The first round warms up. Share and total are of one round, the fastest.
+    # The first round warms up. `step` and `physics` come from the same round, the fastest.
     measured = times[1:]
     step, physics, _, _ = min(measured)
     return VectorSpeed(

@@ -1,4 +1,4 @@
-"""`RoverVectorEnv`: many rovers as one vector environment of Gymnasium, what `gymnasium.make_vec` makes."""
+"""`RoverVectorEnv`: the Gymnasium vector environment that `gymnasium.make_vec` creates."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -23,17 +23,17 @@ _Info = dict[str, Any]
 
 
 class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
-    """Rovers that are stepped by the compiled core, many at a time, on several threads.
+    """A vector of rovers that the compiled core steps on several threads.
 
-    Each goes bit for bit as a `RoverEnv` of the same arguments and seed would, inside a `TimeLimit` and a
-    `SyncVectorEnv`, which gives the same arrays and infos, only slower.
+    Observations, rewards and infos equal, bit for bit, those of a `SyncVectorEnv` of `RoverEnv`s with a `TimeLimit` and
+    the same arguments and seeds; this class is faster.
 
     Args:
-        num_envs: How many rovers.
-        threads: That step them; None for one a core.
-        max_episode_steps: Steps until truncation; None for never.
+        num_envs: Number of rovers.
+        threads: Threads that step the rovers; None for one per core.
+        max_episode_steps: Steps until truncation; None for no limit.
         autoreset_mode: `"NextStep"`, `"SameStep"` or `"Disabled"`, as Gymnasium defines them.
-        **arguments: Those of `RoverEnv`.
+        **arguments: Arguments of `RoverEnv`.
     """
 
     @takes_arguments
@@ -70,7 +70,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
-        """The seeds that they were made from."""
+        """The seeds of the rovers' random generators."""
         return self.get_attr("np_random_seed")
 
     def reset(
@@ -79,14 +79,14 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         """Starts episodes.
 
         Args:
-            seed: Of the first rover, then one more from rover to rover; or one a rover.
-            options: Those of `RoverEnv.reset`, for every rover, and `reset_mask`, `(num_envs,)` bool: the rovers to
-                reset, where it is not all; the others go on.
+            seed: Seed of the first rover, which increases by one per rover; or one seed per rover.
+            options: Options of `RoverEnv.reset`, for every rover, and `reset_mask`, `(num_envs,)` bool: the rovers to
+                reset, by default all; the others continue.
 
-        A reset that is refused changes nothing, of no rover.
+        A refused reset changes nothing for any rover.
 
         Raises:
-            OptionError: A seed is no whole number from 0, or an option is unknown or out of its range.
+            OptionError: A seed is no whole number from 0, or an option is unknown or out of range.
             StateError: As `RoverEnv.reset`.
             TerrainError: As `RoverEnv.reset`.
         """
@@ -104,18 +104,18 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observations, Array, Mask, Mask, _Info]:
         """Applies actions `(num_envs, 12)` for one control period.
 
-        An episode that cannot begin is refused before anything moves; with autoreset in the same step, that is by the
-        step after.
+        An episode that cannot begin is refused before any rover moves. With autoreset in the same step, the following
+        step refuses it.
 
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite or outside [-1, 1]; nothing
                 has changed.
-            TerrainError: A rover's next episode cannot begin, as `RoverEnv.reset` says; nothing has changed. A reset
-                with another seed or other options helps.
-            ResetNeeded: A rover has not been reset, or, where autoreset is disabled, its episode has ended.
+            TerrainError: A rover's next episode cannot begin (see `RoverEnv.reset`); nothing has changed. Reset with
+                another seed or other options.
+            ResetNeeded: A rover has not been reset, or autoreset is disabled and its episode has ended.
         """
         commands = check_actions(actions, (self.num_envs, N_ACTIONS))
-        # These do not move: their episode starts in this step.
+        # These rovers do not move: their episodes start in this step.
         starting: list[int] = np.flatnonzero(self._ended).tolist()
         if starting and self.autoreset_mode == AutoresetMode.DISABLED:
             raise ResetNeeded(f"rovers {starting}: call reset() with reset_mask first")
@@ -131,7 +131,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
             last = [outcome.info(i) for i in ended]
             for i, info in zip(ended, last, strict=True):
                 self._add_info(infos, {"final_obs": observation[i].copy(), "final_info": info}, i)
-            # What is refused here stays ended, and the next step raises it.
+            # If an episode is refused here, its rover stays ended and the next step raises the error.
             with suppress(RoverGymError), self.batch.beginnings(ended) as drawn:
                 for i, one in zip(ended, drawn, strict=True):
                     self._add_info(infos, self.batch.begin(i, one), i)
@@ -142,7 +142,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         return observation, reward, terminated, truncated, infos
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
-        """A frame of every rover, with `render_mode="rgb_array"`; None without."""
+        """One frame per rover with `render_mode="rgb_array"`; None without a render mode."""
         frames = tuple(frame for rover in self.batch.rovers if (frame := rover.render()) is not None)
         return frames or None
 
@@ -152,12 +152,12 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
             rover.close()
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Calls a method of every rover, such as `set_difficulty`, or gets an attribute."""
+        """Calls a method of every rover, such as `set_difficulty`, or reads an attribute."""
         found = [getattr(rover, name) for rover in self.batch.rovers]
         return tuple(each(*args, **kwargs) if callable(each) else each for each in found)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """An attribute of every rover, by the names that `RoverEnv` has."""
+        """Reads an attribute of every rover, by its name in `RoverEnv`."""
         return tuple(getattr(rover, name) for rover in self.batch.rovers)
 
     def _check_mask(self, mask: object) -> list[int]:
