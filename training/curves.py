@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from rover_gym.cli.console import plain_errors, say_path
 from rover_gym.learning.training_config import read_config
 
-# Episodes over which the share of successes is averaged.
+# Averaging window of the success rate, episodes.
 WINDOW = 200
 
 
@@ -50,7 +50,7 @@ def draw(
 
 
 def _curve(run: Path) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Decisions made and moving share of successes, at each episode's end."""
+    """Decisions made and moving average of the success rate, at the end of each episode."""
     repeat = read_config(run / "config.yaml").repeat
     with (run / "curve.monitor.csv").open(encoding="utf-8") as file:
         next(file)  # the header in JSON

@@ -2,10 +2,9 @@
 
     python training/evaluate.py runs/train/rocks-seed1 runs/train/rocks-seed2 --difficulty 1 --output runs/evaluation
 
-Prints a table and writes evaluation.json, evaluation.md, evaluation.png and every policy's episodes, which a later
-evaluation of the same scene into the same folder reads instead of driving them again: give another folder, or remove
-them, when a policy has changed. Intervals are 95%. The seeds lie beyond
-those of training, so the fields are new to the policies.
+Prints a table and writes evaluation.json, evaluation.md, evaluation.png and every policy's episodes. A later evaluation
+of the same scene into the same folder reuses those episodes: choose another folder, or delete them, when a policy has
+changed. Intervals are 95%. The seeds differ from those of training, so the policies have not seen the fields.
 """
 
 import json
@@ -117,7 +116,7 @@ def _drive(
     threads: int,
     progress: Callable[[int], None],
 ) -> list[EvaluatedEpisode]:
-    """The episodes of one policy, from an earlier evaluation where that was the same."""
+    """The episodes of one policy, reused from an earlier evaluation if that matches."""
     scene = json.loads(json.dumps({"environment": arguments, "seeds": [seeds[0], seeds[-1]]}))
     kept = _kept(path, scene)
     if kept is not None:
@@ -129,7 +128,7 @@ def _drive(
 
 
 def _kept(path: Path, scene: Any) -> list[EvaluatedEpisode] | None:
-    """The episodes of an earlier evaluation; None where that was another one, or its file is damaged."""
+    """The episodes of an earlier evaluation; None if it does not match or its file is damaged."""
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
         return [EvaluatedEpisode(**drive) for drive in kept["drives"]] if kept["scene"] == scene else None
@@ -165,7 +164,7 @@ def _number(estimate: IntervalEstimate, form: str) -> str:
 
 
 def _without_nan(value: Any) -> Any:
-    """JSON knows no NaN."""
+    """Replaces NaN, which JSON lacks."""
     if isinstance(value, dict):
         return {key: _without_nan(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):

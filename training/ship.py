@@ -1,4 +1,4 @@
-"""Copies a trained policy with all that belongs to it into the package, for `rover drive --policy trained`.
+"""Copies a trained policy, its run and its evaluation into the package, for `rover drive --policy trained`.
 
 python training/ship.py runs/train/rocks-seed1 --evaluation runs/evaluation-rocks --terrain sphere_field
 """
@@ -40,7 +40,7 @@ def ship(
 
 
 def _write_curve(raw: Path, path: Path) -> None:
-    """The raw curve with fewer digits: one line an episode."""
+    """Writes the raw curve with fewer digits, one line per episode."""
     with raw.open(encoding="utf-8") as file:
         next(file)  # the header in JSON
         rows = list(csv.DictReader(file))

@@ -2,8 +2,8 @@
 
     python training/train_ppo.py --config training/configs/rocks.yaml --seed 1
 
-The run's folder gets the configuration, seed, versions and revision, the raw curve (`curve.monitor.csv`, one line an
-episode), stable-baselines3's log (CSV and TensorBoard), evaluations, checkpoints and the policy itself.
+The run's folder receives the configuration, seed, versions and revision, the raw curve (`curve.monitor.csv`, one line
+per episode), stable-baselines3's log (CSV and TensorBoard), evaluations, checkpoints and the policy.
 """
 
 import json
@@ -29,7 +29,7 @@ from rover_gym.learning.stopwatch import Stopwatch
 from rover_gym.learning.training_config import PPOConfig, read_config
 from rover_gym.validation import refuse
 
-# Fields of different seeds and of resumed runs differ; all stay below the evaluations' million.
+# Different seeds and resumed runs get different fields; all seeds stay below the evaluations' million.
 SEED_STRIDE = 1000
 
 
@@ -55,7 +55,7 @@ def train(
     origin = provenance()
     clock, cpu_clock = time.perf_counter(), time.process_time()
 
-    # Small networks: a second thread makes them slower.
+    # The networks are small: a second thread slows them down.
     torch.set_num_threads(1)
     part = 0 if latest is None else int(latest["name"])
     stream = SEED_STRIDE * seed + 500_000 * (part > 0) + part % 997
@@ -121,11 +121,11 @@ def train(
 
 
 def _latest(path: Path) -> dict[str, Any]:
-    """What a run's last checkpoint says of itself.
+    """Metadata of a run's last checkpoint.
 
     Raises:
         OptionError: The file is damaged.
-        OSError: There is none.
+        OSError: The run has no checkpoint.
     """
     text = path.read_bytes()
     try:

@@ -1,9 +1,9 @@
-"""Trains Rover-v0 with Ray RLlib's PPO over the env runners of a Ray cluster, and says how many steps a second it made.
+"""Trains Rover-v0 with Ray RLlib's PPO over the env runners of a Ray cluster and reports steps per second.
 
     python training/train_rllib.py --workers 2                       # a Ray of its own on this machine
     python training/train_rllib.py --address auto --workers 32       # the cluster that this machine belongs to
 
-Needs the extra `rllib`, which pins its own Gymnasium: use a virtual environment apart (`make train-rllib`).
+Needs the extra `rllib`, which pins its own Gymnasium: use a separate virtual environment (`make train-rllib`).
 """
 
 import json
@@ -21,12 +21,12 @@ from ray.tune.registry import register_env
 
 from rover_gym.policy import DriveByCommand
 
-# Control periods a decision: 0.3 s, as in configs/plane.yaml.
+# Control periods per decision: 0.3 s, as in configs/plane.yaml.
 REPEAT = 6
 
 
 def make_rover(config: dict[str, Any]) -> gym.Env[Any, Any]:
-    """One rover, made on whatever machine the env runner lives."""
+    """Makes one rover on the machine of the env runner."""
     arguments = dict(config)
     command = arguments.pop("command", {})
     return DriveByCommand(gym.make("rover_gym:Rover-v0", **arguments), **command)
@@ -45,7 +45,7 @@ def train(
     ),
 ) -> None:
     """Train and print the throughput."""
-    # One thread a process: the networks are small.
+    # One thread per process: the networks are small.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     # Ray's own default lets its workers wait for everything else on the machine.
     os.environ.setdefault("RAY_worker_niceness", "0")
@@ -74,7 +74,7 @@ def train(
 def _train_once(
     workers: int, envs: int, iterations: int, batch: int, environment: dict[str, Any], seed: int, folder: Path
 ) -> dict[str, Any]:
-    """One training with so many env runners; the first iteration, in which they start, is not timed."""
+    """One training with this many env runners; the first iteration, in which they start, is not timed."""
     config = (
         PPOConfig()
         .environment("Rover", env_config=environment)

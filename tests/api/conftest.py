@@ -1,4 +1,4 @@
-"""What the tests of the compiled module share."""
+"""Shared fixtures of the compiled module's tests."""
 
 import json
 from pathlib import Path

@@ -1,6 +1,6 @@
 """Sizes and ranges are checked before anything is allocated or searched.
 
-These asked for terabytes and died with an abort, or never came back.
+Unchecked, these inputs would allocate terabytes and abort, or run forever.
 """
 
 import time

@@ -1,4 +1,4 @@
-"""Long calls leave the interpreter free and end at Ctrl-C between two steps; an object in use says so."""
+"""Long calls release the GIL and stop at Ctrl-C between two steps; an object in use raises an error."""
 
 import copy
 import pickle

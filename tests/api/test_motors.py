@@ -1,4 +1,4 @@
-"""The wheels' motors: their torque-speed line, what they give, and how a model carries them."""
+"""The wheel motors: torque-speed line, delivered torque, and their place in a model."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""`rover_gym.planar`: what Python sees of the planar systems."""
+"""`rover_gym.planar`: the Python interface of the planar systems."""
 
 import math
 import pickle

@@ -1,7 +1,7 @@
 """Recorded friction-contact problems: Siconos' public collection and synthetic ones with hard mass ratios.
 
-They are no part of the repository. ROVER_GYM_CONTACT_PROBLEMS names their folder; where it is not set these tests are
-skipped and say so. The shelf (`tests/shelf`) is always tested.
+The problems are not part of the repository. ROVER_GYM_CONTACT_PROBLEMS names their folder; without it these tests are
+skipped with a message. The shelf (`tests/shelf`) is always tested.
 """
 
 import numpy as np

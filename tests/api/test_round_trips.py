@@ -1,7 +1,7 @@
-"""Pickles, copies, snapshots and files bring back the same, to the bit.
+"""Pickles, copies, snapshots and files restore the same state, bit for bit.
 
-One third of all generic planes changed by a bit when they were unpickled, since their normal was normalised once more,
-and a copied simulation drifted off. Welds were lost in files and recordings.
+Normalising a plane's normal again on unpickling changes one third of generic planes by a bit, and a copied simulation
+then drifts. Files and recordings must keep welds.
 """
 
 import copy
@@ -211,7 +211,7 @@ def test_a_soils_snapshot_goes_on_alike() -> None:
 
 
 def test_snapshots_of_other_masses_are_refused() -> None:
-    """A planar or a soil's snapshot knew how many numbers it had, and nothing of what moved."""
+    """A snapshot of a planar system or a soil identifies its system, not just its number of coordinates."""
     rover = RoverModel()
     heavy = soil().mass.copy()
     heavy[3] *= 2.0

@@ -1,4 +1,4 @@
-"""Plans: what a scene excludes is left out, within the stated error, and refused when it is asked for."""
+"""Plans: omit what a scene excludes, within the stated error, and refuse commands that need it."""
 
 import math
 from dataclasses import replace

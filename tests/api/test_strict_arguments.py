@@ -1,7 +1,7 @@
-"""The border takes numbers for numbers, and refuses the rest under its name.
+"""The compiled module accepts only numbers as numbers, and refuses everything else with the argument's name.
 
-A `timedelta64`, a complex number and a truth value passed as floats; a text, an integer of 400 digits and a wrong
-object came back as `TypeError` or `OverflowError` from somewhere in the conversion.
+A `timedelta64`, a complex number or a bool must not pass as a float; a string, an integer of 400 digits or a wrong
+object must not surface as a bare `TypeError` or `OverflowError` from the conversion.
 """
 
 import datetime

@@ -1,4 +1,4 @@
-"""The replay page in a real browser: it loads alone, shows the rover, and timeline, scene and curves go together."""
+"""The replay page in a real browser: it loads offline, shows the rover, and synchronises timeline, scene and curves."""
 
 import io
 import json
@@ -116,7 +116,7 @@ def opened(page: Path, profile: Path) -> Iterator[webdriver.Chrome]:
         browser.get_log("performance")  # what the browser's own first tab did
         browser.get(page.as_uri())
         await_that(lambda: slider(browser) is not None, "the player's timeline")
-        go_to(browser, 0.0)  # it plays from the start; what follows looks at times of its own choice
+        go_to(browser, 0.0)  # the page plays on load; the tests below set the time
         yield browser
     finally:
         browser.quit()
@@ -185,7 +185,7 @@ def test_the_page_loads_without_errors_and_without_the_network(shown: Shown) -> 
 
 
 def assert_alone(shown: Shown | SoilShown) -> None:
-    """The page asked for nothing outside itself, and the browser told of no error."""
+    """The page makes no external request, and the browser reports no error."""
     asked = [params["request"]["url"] for params in messages(shown.browser, "Network.requestWillBeSent")]
     assert shown.page.as_uri() in asked
     inside = ("data:", "blob:", "chrome:", shown.page.as_uri())
@@ -204,7 +204,7 @@ def test_the_scene_shows_rover_rocks_and_ground_the_right_way_up(shown: Shown) -
     ground = (red - blue > 0.5 * 255 * (GROUND_COLOUR[0] - GROUND_COLOUR[2])) & (red > green)
     assert ground[height // 2 :].mean() > 0.5  # warm below
     assert ground[: height // 12].mean() < 0.2  # sky above
-    # The trunk is the one thing that is both light and grey, and stands in the middle.
+    # Only the trunk is both light and grey; it is in the centre.
     light = (image.min(axis=-1) > 0.5 * 255 * min(TRUNK_COLOUR)) & (np.ptp(image, axis=-1) < 60.0)
     light[: height // 6] = False  # the sky
     rows, columns = np.nonzero(light)
@@ -261,7 +261,7 @@ def test_the_curves_stand_beside_the_scene_and_follow_the_timeline(shown: Shown)
         expected = [word for name, load in zip(names, loads, strict=True) for word in (name, f"{load:.1f}")]
         assert readings(browser)[0] == expected
     assert len(positions[0]) == 2
-    # One impact does not flatten the other curves: the axis ends below it, and says so.
+    # One impact must not flatten the other curves: the axis ends below it and notes that.
     assert browser.find_element(By.CSS_SELECTOR, "#panel .peak").text == "cut off, peak 100000 N"
     curves = browser.find_elements(By.CSS_SELECTOR, "#panel .curve")[:6]
     heights = [float(y) for curve in curves for y in re.findall(r"[\d.]+ ([\d.]+)", curve.get_attribute("d") or "")]

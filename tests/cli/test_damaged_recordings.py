@@ -1,4 +1,4 @@
-"""Recordings that are damaged, forged, written twice or on a full disk: one kind of error, and no sound row lost."""
+"""Recordings that are damaged, forged, written twice or on a full disk: one error type, and no intact row lost."""
 
 import os
 import struct
@@ -94,7 +94,7 @@ def refusal(path: Path) -> str:
 
 
 def test_a_second_writer_is_refused_and_the_run_is_whole(tmp_path: Path) -> None:
-    """The second one used to empty the file before it found the lock."""
+    """A second writer finds the lock before it truncates the file."""
     path = tmp_path / "run.h5"
     with Recorder(path, [TIME], rows_per_flush=2) as recorder:
         for i in range(4):

@@ -1,4 +1,4 @@
-"""Whatever happens to a command, the user sees one line and an exit code, and keeps what was finished."""
+"""Every failure of a command gives one line and an exit code, and finished results are kept."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Saved runs, read back with rover and ground."""
+"""Saved runs, read back with their rover and ground."""
 
 import signal
 import subprocess

@@ -1,4 +1,4 @@
-"""What the simulator reaches beside other engines: error against cost, and the scenes where methods fail."""
+"""Comparison with other engines: error against cost, and scenes on which methods fail."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""Where results go: to the documentation, or, from a quick run, where they spoil nothing."""
+"""Output folders: the documentation, or a scratch folder for quick runs."""
 
 import shutil
 from pathlib import Path

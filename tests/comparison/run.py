@@ -22,7 +22,7 @@ def run(variant: Variant, scene: RoverScene, time_step: float, cap: float = 20.0
                 runner.advance(chunk)
             except (RuntimeError, ArithmeticError) as error:  # an engine's own word that it cannot go on
                 failure = f"{type(error).__name__}: {str(error).splitlines()[0][:120]}"
-            # an engine in a process of its own tells its time itself
+            # an engine in a separate process reports its own time
             cpu = runner.cpu if hasattr(runner, "cpu") else cpu + time.process_time() - begin
             simulated += SAMPLE
             samples.append(runner.position())

@@ -1,8 +1,8 @@
 """Solves friction-contact problems with Siconos; run by an interpreter that has it, fed by `solver_profiles.py`.
 
-Says so when it is ready, then reads one job per line (JSON: the problem's .npz, solver, tolerance, repetitions) and
-answers with one line each. Needs nothing of this package: Debian's python3-siconos wants numpy < 2 and so an
-interpreter of its own.
+Reports when it is ready, then reads one job per line (JSON: the problem's .npz, solver, tolerance, repetitions) and
+answers each with one line. It does not import this package: Debian's python3-siconos needs numpy < 2 and therefore a
+separate interpreter.
 """
 
 import json

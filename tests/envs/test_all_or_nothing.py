@@ -1,4 +1,4 @@
-"""What is refused changes nothing: no rover, no random generator, no command."""
+"""A refused call changes nothing: no rover, no random generator, no command."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""What an episode does: starts, commands, rewards, ends."""
+"""Episodes: starts, commands, rewards, ends."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""What is made before a fork works in the child as well."""
+"""Objects created before a fork work in the child process."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Full throttle, and what it is worth: the motors' line in the environment, and the bounds of the reward."""
+"""Full throttle: the motors' torque-speed line in the environment, and the bounds of the reward."""
 
 import math
 from dataclasses import replace

@@ -1,7 +1,7 @@
-"""Nonsense at every argument: refused by an error of ours that names the field, and nothing changes.
+"""Nonsense in every argument is refused with an error of ours that names the field, and nothing changes.
 
-The table's values are thrown at each argument, option and method that takes a value. What a field takes all the same
-must work: a reset and some steps with finite numbers. Any other exception, and any warning, fails.
+Each argument, option and method that takes a value gets every value of the table. If a field accepts one, a reset and
+some steps must give finite numbers. Any other exception, and any warning, fails the test.
 """
 
 import datetime

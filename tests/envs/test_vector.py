@@ -1,4 +1,4 @@
-"""The native vector environment: each rover goes as it would alone, resets by the rules, threads do not show."""
+"""The native vector environment: a rover moves as it would alone, resets follow the rules, threads have no effect."""
 
 from typing import Any
 

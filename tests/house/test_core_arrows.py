@@ -1,4 +1,4 @@
-"""The chapters of the Rust core know only those below them."""
+"""The chapters of the Rust core import only chapters below them."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The Makefile says what it offers, and continuous integration runs what the README tells."""
+"""The Makefile lists its targets, and continuous integration runs the commands of the README."""
 
 import os
 import re

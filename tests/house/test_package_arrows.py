@@ -1,4 +1,4 @@
-"""The rooms of the package know only those before them, and every public name means one thing."""
+"""The subpackages import only those before them, and every public name has one meaning."""
 
 import ast
 import re

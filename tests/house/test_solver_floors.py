@@ -1,4 +1,4 @@
-"""Inside the solver no page knows one of a higher floor, no two know each other, and its table is the manual's."""
+"""Solver files import no higher floor and form no cycle, and the solver's table matches the manual's."""
 
 import re
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 SOLVER = ROOT / "rust" / "core" / "src" / "solver"
 
-# From the ground up; what stands on one line may use what stands below, and its own floor where that makes no circle.
+# From the bottom up: a file may import lower floors, and its own floor if that forms no cycle.
 FLOORS = [
     {"options", "report", "work"},
     {"local"},

@@ -1,4 +1,4 @@
-"""What must not be in the tree: places of one machine, registries' addresses, large files."""
+"""The tree contains no machine paths, no registry addresses and no large files."""
 
 import re
 import runpy

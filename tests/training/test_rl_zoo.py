@@ -1,6 +1,6 @@
 """RL Zoo trains by its own command line with the hyperparameters that we keep.
 
-In a process of its own only: to import it changes Gymnasium's TimeLimit, for all other tests too.
+It runs in a separate process, because importing it changes Gymnasium's TimeLimit for all other tests.
 """
 
 import subprocess

@@ -1,4 +1,4 @@
-"""Whether the soil behaves as granular matter does: what is measured against papers and closed forms."""
+"""Validation of the soil as granular matter, against papers and closed forms."""
 
 import os
 

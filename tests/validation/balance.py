@@ -1,4 +1,4 @@
-"""Runs made for momentum and energy alone: a cloud that collides in empty space, a box of disks that bounce."""
+"""Runs that test momentum and energy balance: a cloud colliding in free space, and disks bouncing in a box."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Columns of disks that are let go: how far they run out.
+"""Runout of collapsing columns of disks.
 
 Source: Staron and Hinch 2005, *Study of the collapse of granular columns using two-dimensional discrete-grain
 simulation*, J. Fluid Mech. 545, 1-27.
@@ -19,7 +19,7 @@ FRICTION = 1.0
 #: Paper's power laws of (R - R0)/R0 in the aspect ratio: prefactor, exponent; the first below ASPECT, the second above.
 PAPER = ((2.5, 1.0), (3.25, 0.7))
 ASPECT = 2.0
-#: How long a column is watched, in units of the time that its height takes to fall.
+#: Observation time of a column, in free-fall times of its height.
 FALLS = 4.0
 #: Disks of a column: as many for each aspect ratio, so that its area is a given number of disks.
 COUNT = 4000

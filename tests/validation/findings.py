@@ -1,4 +1,4 @@
-"""What the measurements are held against, one row each."""
+"""Reference values of the measurements, one row each."""
 
 from __future__ import annotations
 

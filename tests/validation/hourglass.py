@@ -1,4 +1,4 @@
-"""How fast disks run out through an opening in a silo's floor."""
+"""Discharge rate of disks through an orifice in a silo's floor."""
 
 from __future__ import annotations
 

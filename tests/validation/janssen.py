@@ -1,4 +1,4 @@
-"""A silo whose bottom bears less than the filling weighs: the walls bear the rest."""
+"""Janssen effect: a silo's bottom carries less than the weight of the filling; the walls carry the rest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A settled bed: how densely disks pack and how many others each touches."""
+"""Packing fraction and coordination number of a settled bed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs side by side, on all cores."""
+"""Parallel runs on all cores."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def side_by_side(run: Callable[..., Run], options: Iterable[dict[str, Any]], led
     """What a function returns for each of some keyword arguments, in their order.
 
     Args:
-        run: Called with each and a ledger of its own; a function of a module.
+        run: Called with each and a separate ledger; a module-level function.
         options: Keyword arguments.
         ledger: What all ledgers are merged into.
     """

@@ -1,4 +1,4 @@
-"""The slope that stays when one wall of a bed on a rough floor is taken away and what runs over the edge falls."""
+"""Angle of repose: the slope that remains after one wall of a bed on a rough floor is removed and disks run off."""
 
 from __future__ import annotations
 

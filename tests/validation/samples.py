@@ -1,4 +1,4 @@
-"""Samples of disks: what the runs begin with."""
+"""Initial samples of disks for the runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What must hold in every step of every run: momentum, energy, no overlap. Measured while a soil is stepped."""
+"""Invariants measured in every step of every run: momentum balance, energy balance and no overlap."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class Watched:
         self._look()
 
     def remove(self, which: np.ndarray) -> None:
-        """Takes disks (n,) out; their energy is no longer counted."""
+        """Removes disks (n,); their energy no longer counts."""
         if which.any():
             self.sim.remove(which)
             self._look()

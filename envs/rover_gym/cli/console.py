@@ -1,4 +1,4 @@
-"""What the commands share: where they print, their progress bars, where they may write, and how they fail."""
+"""Shared parts of the commands: output, progress bars, checks of output paths, and error handling."""
 
 import errno
 import functools
@@ -30,7 +30,7 @@ SET_BY = {
     "format": ("file_format", "--format"),
     "torques": ("torque", "--torque"),
 }
-#: Set to anything, the commands show where an error came from.
+#: If set to any value, the commands show the traceback of an error.
 DEBUG = "ROVER_DEBUG"
 
 MENDABLE, UNFORESEEN, INTERRUPTED = 2, 1, 130  # exit codes
@@ -40,12 +40,12 @@ MOST_EPISODES = 1_000_000
 
 
 def console() -> Console:
-    """Where results go."""
+    """The console for results."""
     return Console(highlight=False)
 
 
 def progress_bar() -> Progress:
-    """A bar on standard error that leaves no trace, and is silent where nobody watches."""
+    """A transient progress bar on standard error, silent if that is not a terminal."""
     errors = Console(stderr=True)
     return Progress(
         TextColumn("{task.description}"),
@@ -59,13 +59,13 @@ def progress_bar() -> Progress:
 
 
 def say_path(what: str, path: Path) -> None:
-    """Prints where something was written, on a line of its own that no terminal width breaks."""
+    """Prints the path of a written file on a separate line that is never wrapped."""
     typer.echo(_printable(f"{what}: {path}"))
 
 
 @contextmanager
 def keeping(what: str, *paths: Path) -> Iterator[None]:
-    """Prints, where the user interrupts what stands below, which files hold what was done until then."""
+    """If the user interrupts the block, prints which files hold the results so far."""
     try:
         yield
     except KeyboardInterrupt:
@@ -76,7 +76,7 @@ def keeping(what: str, *paths: Path) -> Iterator[None]:
 
 
 def check_file(option: str, path: Path | None) -> None:
-    """Refuses a file that cannot be written, before the work is done whose result it takes. Leaves nothing behind.
+    """Refuses a file that cannot be written, before the work starts. Leaves nothing behind.
 
     Raises:
         OptionError: It cannot be written.
@@ -94,7 +94,7 @@ def check_file(option: str, path: Path | None) -> None:
 
 
 def check_folder(option: str, path: Path | None) -> None:
-    """Refuses a folder that cannot be written into, before the work is done whose results it takes. Leaves nothing.
+    """Refuses a folder that cannot be written into, before the work starts. Leaves nothing behind.
 
     Raises:
         OptionError: It cannot be written into.
@@ -109,7 +109,7 @@ def check_folder(option: str, path: Path | None) -> None:
 
 @contextmanager
 def _tried(option: str, path: Path, folder: Path) -> Iterator[None]:
-    """Makes a folder for what stands below, and takes away what was not there."""
+    """Creates a folder for the block, and afterwards removes the parts that did not exist before."""
     try:
         missing = [place for place in (folder, *folder.parents) if not place.exists()]
         try:
@@ -127,8 +127,8 @@ def _tried(option: str, path: Path, folder: Path) -> Iterator[None]:
 def plain_errors(command: Callable[P, R]) -> Callable[P, R]:
     """Turns every error of a command into one line on standard error and an exit code.
 
-    2 is for what the user can mend, 1 for what nobody foresaw, 130 for an interruption. Numbers that are not finite are
-    refused here, for all options. An error that names an argument of ours names the option that sets it.
+    The exit code is 2 for errors that the user can fix, 1 for unexpected ones, and 130 for an interruption. Numbers
+    that are not finite are refused here, for all options. An error that names an argument names its option instead.
     """
     parameters = inspect.signature(command).parameters
     options = {name: f"--{name.replace('_', '-')}" for name in parameters}
@@ -146,15 +146,15 @@ def plain_errors(command: Callable[P, R]) -> Callable[P, R]:
 
 @contextmanager
 def one_line(options: Mapping[str, str]) -> Iterator[None]:
-    """Ends the program with one line where what stands below raises.
+    """Ends the program with one line if the block raises.
 
     Args:
-        options: Names of the command's options by those of arguments, as errors have them.
+        options: Option names of the command by argument names, as errors use them.
     """
     try:
         yield
     except (typer.Exit, typer.Abort, BrokenPipeError):
-        raise  # these have their own ways
+        raise  # these handle themselves
     except KeyboardInterrupt:
         _end("interrupted", INTERRUPTED)
     except (RoverGymError, MissingExtraError, OSError) as error:
@@ -168,7 +168,7 @@ def one_line(options: Mapping[str, str]) -> Iterator[None]:
 
 
 def _with_option(error: Exception, options: Mapping[str, str]) -> str:
-    """The error's message, with the option's name in the place of the argument's."""
+    """The error's message, with the option's name in place of the argument's."""
     text, field = str(error), getattr(error, "field", None)
     if isinstance(field, str) and text.startswith(f"{field}:"):
         name = field.partition("[")[0]
@@ -184,7 +184,7 @@ def _end(line: str, code: int) -> NoReturn:
 
 
 def _printable(text: str) -> str:
-    """Text that every terminal takes: bytes of a file's name that are no Unicode are written as escapes."""
+    """Text that every terminal can print: bytes of a file name that are not valid Unicode are escaped."""
     return text.encode("utf-8", "backslashreplace").decode()
 
 

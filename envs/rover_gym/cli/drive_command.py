@@ -142,7 +142,7 @@ def drive(
 
 
 def _check_time_step(time_step: float) -> None:
-    """Refuses a step of which no whole number makes a control period."""
+    """Refuses a time step that does not divide the control period."""
     number("time_step", time_step, at_least=SHORTEST_STEP)
     steps = CONTROL_PERIOD / time_step
     if not (round(steps) >= 1 and math.isclose(steps, round(steps), rel_tol=1e-9)):
@@ -161,7 +161,7 @@ def _drive_one(
     bar: Progress,
     film: VideoWriter | None,
 ) -> Episode:
-    """One episode, recorded if there is a path, filmed if there is a film."""
+    """Drives one episode, recorded if there is a path, filmed if there is a film."""
     task = bar.add_task(f"seed {seed}", total=None, state="")
     with ExitStack() as stack:
         tape: _Tape | None = None
@@ -183,7 +183,7 @@ def _drive_one(
 
 
 class _Tape:
-    """Records an episode: the simulation, and what the environment makes of it."""
+    """Records an episode: the simulation and the environment's signals."""
 
     def __init__(self, path: Path, rover: RoverEnv, policy: str, seed: int, arguments: Mapping[str, Any]) -> None:
         self._sampler = RoverSampler(rover.model)
@@ -200,7 +200,7 @@ class _Tape:
         self.recorder = Recorder(path, channels, attributes, terrain=rover.simulation.terrain)
 
     def append(self, rover: RoverEnv, info: Mapping[str, Any]) -> None:
-        """Adds the environment's present state."""
+        """Adds the environment's current state."""
         solver = info["solver"]
         self.recorder.append(
             {
@@ -214,7 +214,7 @@ class _Tape:
 
 
 def _rocks(rover: RoverEnv) -> dict[str, Any]:
-    """What `SphereField.rocks` was made from, for a scene's description."""
+    """Arguments of `SphereField.rocks`, for a scene's description."""
     return {} if rover.rocks is None else {"rocks": asdict(rover.rocks)}
 
 

@@ -153,7 +153,7 @@ def _ground(
 
 
 def _lift(sim: PlanarSimulation, clearance: float) -> None:
-    """Moves the machine up until its smallest gap is at least `clearance`, m (0: it touches)."""
+    """Raises the machine until its smallest gap is at least `clearance`, m (0: contact)."""
     for _ in range(200):
         short = clearance - float(sim.gaps.min())
         if short <= 1e-12:

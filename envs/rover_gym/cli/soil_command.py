@@ -167,7 +167,7 @@ def _cross(
 
 
 def _check_width(option: str, disks: int, layers: int, needed: float, radius_max: float = 0.0165) -> None:
-    """Refuses a bed that is too narrow, m, before it is settled."""
+    """Refuses a bed that is too narrow (m) before settling it."""
     from rover_gym.soil.bed import bed_width  # noqa: PLC0415 - h5py is slow to load
 
     width = bed_width(disks, layers, radius_max)
@@ -196,7 +196,7 @@ def _sweep(
     _check_width("pull_disks", pull_disks, pull_layers, PULLING, UNEQUAL["radius_max"])
     scale = -options["gravity"][1] / EARTH
     slowness = float(scale**-0.5)
-    # Means over seconds and beds need no closer solution, and most of a bed lies still.
+    # Means over seconds and beds need no tighter tolerance, and most of a bed is at rest.
     cheap = {"tolerance": 1e-3, "sleep": True, "sleep_speed": 5e-4 / slowness}
     rest = {**options, **cheap, "wheel_friction": wheel_friction}
     drive = partial(drive_on_soil, run_in=0.5 * slowness, duration=2.0 * slowness, **rest)
@@ -245,7 +245,7 @@ def _sweep(
 
 
 def _say_fits(fits: dict[float, "Traction"]) -> None:
-    """The numbers of the pull's curve for each load."""
+    """Prints the parameters of the pull curve for each load."""
     first = next(iter(fits.values())).first
     table = Table(title="pull / load = A (1 - exp(-(s - s₀) / K)) of the slip s", title_justify="left")
     for column in ("load", "A", "s₀", "K", f"slope from s = {first:g} on"):

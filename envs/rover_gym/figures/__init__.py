@@ -1,4 +1,4 @@
-"""Figures of recorded runs: those of any run, and those of the report's sections 6.1 and 6.2."""
+"""Figures of recorded runs: general ones for any run, and those of the report's sections 6.1 and 6.2."""
 
 from rover_gym.figures.run_figures import draw_run
 from rover_gym.figures.section_6_1 import draw_section_6_1

@@ -1,6 +1,6 @@
 """Figures 3.2 to 3.5 of the report: the ball on a line and on a sine.
 
-Beside the report's ball, whose centre stops at the ground, stands the same ball touching with its rim.
+The report's ball makes contact with its centre; for comparison, a second ball makes contact with its rim.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def draw_chapter_3(folder: str | Path) -> list[Path]:
         for contact in ("centre_height", "nearest"):
             sim, duration = scene(contact)
             path = folder / f"ball-{name}-{contact.replace('_', '-')}.h5"
-            # The impulses are those of a row's last step, and drawn of the report's rule only.
+            # Impulses are those of a row's last step, drawn for the report's contact rule only.
             steps_per_row = 1 if contact == "centre_height" else 10
             title = f"chapter 3 of the report: ball, {name}"
             record_planar(sim, path, describe_planar(sim, title), duration=duration, steps_per_row=steps_per_row)
@@ -134,7 +134,7 @@ def _against(
     label: str,
     scale: float = 1.0,
 ) -> None:
-    """Ours over the report's; `scale` turns its abscissa into seconds."""
+    """Our curve over the report's; `scale` converts its abscissa to seconds."""
     t, value = _curve(figure, curve)
     is_first = not axes.lines
     axes.plot(scale * t, value, color=PUBLISHED, linewidth=3.0, alpha=0.7, label="the report's" if is_first else "")

@@ -1,4 +1,4 @@
-"""What the figures compute from a recording: how the wheels slide, what the motors did, and smoothed curves."""
+"""Signals derived from a recording: wheel slip, motor work, and smoothed curves."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 def contact_velocities(run: RoverRun) -> Array:
     """(n, 6, 3) velocities of the wheels at the ground along n, t, b, m/s; nan where a wheel carried no load.
 
-    A wheel that touches two spheres is looked at where its gap is smallest.
+    For a wheel that touches two spheres, the contact with the smaller gap counts.
     """
     states = zip(run.trajectory["q"], run.trajectory["v"], strict=True)
     velocities = np.array([run.model.wheel_jacobians(q, run.terrain, "state") @ v for q, v in states])
@@ -27,7 +27,7 @@ def contact_velocities(run: RoverRun) -> Array:
 
 
 def slip_ratios(run: RoverRun) -> Array:
-    """(n, 6) speed of the rim over the ground over the faster of rim and wheel, as `slip_ratio` of `Rover-v0`.
+    """(n, 6) rim speed over the ground divided by the larger of rim and wheel speed, as `slip_ratio` of `Rover-v0`.
 
     It is nan where a wheel carried no load.
     """
@@ -41,7 +41,7 @@ def slip_ratios(run: RoverRun) -> Array:
 def motor_work(run: RoverRun) -> Array:
     """(n, 6) work of the wheel motors since the start, J, positive where they drove.
 
-    The torque that a drive gave in the last step before a row counts for the time since the row before.
+    The drive torque of the last step before a row is taken as constant since the previous row.
     """
     angles = _of_wheels(run, "q")
     turned = np.diff(angles, axis=0, prepend=angles[:1])
@@ -49,12 +49,12 @@ def motor_work(run: RoverRun) -> Array:
 
 
 def smooth(time: Array, values: Array, window: float) -> Array:
-    """Weighted mean over a window, with Hann's weights; what is nan has no weight.
+    """Moving average with a Hann window; nan has zero weight.
 
     Args:
-        time: (n,) s, at equal distances.
+        time: (n,) s, equally spaced.
         values: (n,) or (n, m).
-        window: Whole width, s; the weights' mean distance from the middle is about a fifth of it.
+        window: Full width, s; the weights' mean distance from the centre is about a fifth of it.
     """
     if len(time) < 3:
         return values

@@ -1,4 +1,4 @@
-"""The figure of any planar run: its way over the ground, speed, gaps and energy."""
+"""The figure of any planar run: path over the ground, speed, gaps and energy."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ OURS, GROUND, FRICTION = "#0072B2", "#8c6d46", "#D55E00"
 
 
 def draw_planar_run(sim: PlanarSimulation, recording: str | Path, path: str | Path) -> Path:
-    """Draws a recorded planar run: the machine's way over its ground, and speed, gaps, loads and energy against time.
+    """Draws a recorded planar run: the machine's path over its ground, and speed, gaps, loads and energy against time.
 
     Args:
         sim: A simulation on the same ground.

@@ -1,6 +1,6 @@
 """Curves over time of any recorded run: gaps, loads, slip, attitude, torques, energy and the contact solver.
 
-Signals that jump from step to step are drawn twice: every sample in a light line, and the smoothed curve in a bold one.
+Signals that jump from step to step are drawn twice: every sample as a light line, and the smoothed curve as a bold one.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ if TYPE_CHECKING:
     from rover_gym.figures.style import Sheet
     from rover_gym.record.rover_run import RoverRun
 
-#: A load at which the axis ends at the least, N: without weight there is no other.
+#: Minimum upper end of the load axis, N, for runs without weight.
 LEAST_LOAD = 1.0
 
 SET_POINT: dict[str, Any] = {"linestyle": (0, (1, 1.5)), "linewidth": 1.0}
 
 
 def wheel_gaps(figure: Sheet, run: RoverRun) -> None:
-    """The distance of each wheel from the ground, left and right wheels apart."""
+    """Gap between each wheel and the ground, left and right wheels in separate panels."""
     panels = figure.subplots(2, 1, sharex=True, sharey=True)
     gaps = 1e3 * finite(run.trajectory["wheel_gaps"])
     for axes, wheels, name in zip(panels, SIDES, ("left", "right"), strict=True):
@@ -49,7 +49,7 @@ def wheel_gaps(figure: Sheet, run: RoverRun) -> None:
 
 
 def wheel_loads(figure: Sheet, run: RoverRun) -> None:
-    """The normal force on each wheel, left and right wheels apart."""
+    """Normal force on each wheel, left and right wheels in separate panels."""
     panels = figure.subplots(2, 1, sharex=True, sharey=True)
     forces = finite(run.trajectory["wheel_forces"][:, :, 0])
     gravity = run.trajectory.attributes.get("solver", {}).get("gravity", (0.0, -9.81, 0.0))
@@ -66,7 +66,7 @@ def wheel_loads(figure: Sheet, run: RoverRun) -> None:
 
 
 def slip(figure: Sheet, run: RoverRun) -> None:
-    """How fast each loaded wheel slides over the ground, and the slip ratio of all."""
+    """Sliding speed of each loaded wheel, and the mean slip ratio."""
     left, right, below = figure.subplots(3, 1, sharex=True)
     right.sharey(left)
     u = contact_velocities(run)
@@ -110,7 +110,7 @@ def attitude(figure: Sheet, run: RoverRun) -> None:
 
 
 def torques(figure: Sheet, run: RoverRun) -> None:
-    """Driving torques, and steering angles with their set-points, left and right wheels apart."""
+    """Driving torques, and steering angles with their set-points, left and right wheels in separate panels."""
     panels = figure.subplots(2, 2, sharex=True, sharey="row")
     trajectory = run.trajectory
     columns = np.array(run.model.steering_joint_indices)
@@ -130,14 +130,14 @@ def torques(figure: Sheet, run: RoverRun) -> None:
     panels[1, 0].set(ylabel="steering angle (°)")
     low, high = panels[0, 0].get_ylim()
     margin = 0.05 * max(high, -low)
-    panels[0, 0].set_ylim(min(low, -margin), max(high, margin))  # a constant torque is seen against zero
+    panels[0, 0].set_ylim(min(low, -margin), max(high, margin))  # include zero, as a reference for a constant torque
     _at_least(panels[1, 0], 1.0)
     title(figure, "Driving torques and steering", run)
     wheel_legend(figure, {"steering set-point": {"color": DARK, **SET_POINT}})
 
 
 def energy(figure: Sheet, run: RoverRun) -> None:
-    """Kinetic and potential energy, the work of the motors, and what was lost."""
+    """Kinetic and potential energy, motor work, and dissipation."""
     above, below = figure.subplots(2, 1, sharex=True)
     kinetic = run.trajectory["kinetic_energy"]
     potential = run.trajectory["potential_energy"] - run.trajectory["potential_energy"][0]
@@ -164,7 +164,7 @@ def energy(figure: Sheet, run: RoverRun) -> None:
 
 
 def contact_solver(figure: Sheet, run: RoverRun) -> None:
-    """Residual and iterations of the contact solver, one point a row."""
+    """Residual and iterations of the contact solver, one point per row."""
     above, below = figure.subplots(2, 1, sharex=True)
     residual = run.trajectory["solver_residual"]
     tolerance = run.trajectory.attributes.get("solver", {}).get("tolerance")
@@ -194,7 +194,7 @@ def contact_solver(figure: Sheet, run: RoverRun) -> None:
 
 
 def _mean_over_wheels(values: Array) -> Array:
-    """(n,) mean of what is not nan, 0 where all is, as the environment has it."""
+    """(n,) mean over the values that are not nan, 0 if all are, as in the environment."""
     known = np.isfinite(values)
     return np.asarray(np.where(known, values, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1))
 
@@ -206,13 +206,13 @@ def _forward(q: Array) -> Array:
 
 
 def _averaged(run: RoverRun) -> str:
-    """Over what the recorded forces are means."""
+    """Averaging interval of the recorded forces."""
     step = run.trajectory.attributes.get("solver", {}).get("time_step")
     return "the last time step" if step is None else f"the last time step of {1e3 * step:g} ms"
 
 
 def _at_least(axes: Axes, span: float) -> None:
-    """Widens the axis to a span at least, so that round-off does not fill it."""
+    """Widens the axis to a minimum span, so that round-off does not fill it."""
     low, high = axes.get_ylim()
     if high - low < span:
         middle = 0.5 * (low + high)

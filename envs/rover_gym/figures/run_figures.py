@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 
 class Drawing(NamedTuple):
-    """A figure that any run may have.
+    """A figure available for any run.
 
     Attributes:
         draw: Fills an empty figure.
-        height: Of the figure, inches.
-        needs: Data sets of the recording without which there is nothing to draw.
+        height: Figure height, inches.
+        needs: Data sets that the figure requires.
     """
 
     draw: Callable[[Sheet, RoverRun], None]
@@ -52,20 +52,20 @@ def drawable(run: RoverRun) -> dict[str, Drawing]:
 
 
 def draw_run(run: RoverRun, folder: str | Path, *, file_format: str = "png", with_overview: bool = False) -> list[Path]:
-    """Draws the figures of a run, those for which its recording has the data.
+    """Draws all figures of a run for which its recording has the data.
 
     Args:
         run: From `read_run`.
-        folder: Where the files go; made if it is not there.
+        folder: Output folder; created if it does not exist.
         file_format: "png", "svg" or "pdf".
         with_overview: Whether to add one page with all figures.
 
     Returns:
-        The files.
+        Paths of the files.
 
     Raises:
-        OptionError: There is no such file format.
-        RecordingError: The rover's wheels are not those that the figures show.
+        OptionError: The file format is unknown.
+        RecordingError: The rover does not have the wheels that the figures show.
         MissingExtraError: matplotlib is not installed.
     """
     check_format(file_format)

@@ -1,4 +1,4 @@
-"""Draws figures with the style of this package and saves them, one file each."""
+"""Draws figures in the style of this package and saves each to a file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rover_gym.validation import refuse
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: How a figure may be saved.
+#: Supported file formats.
 FORMATS = ("png", "svg", "pdf")
 
 
@@ -29,17 +29,17 @@ def save_figures(
     """Draws figures and saves each under its name.
 
     Args:
-        drawings: What fills an empty figure, by file name without ending.
-        folder: Made if it is not there.
-        height: Of each figure, inches.
-        width: Of each figure, inches.
+        drawings: Functions that fill an empty figure, by file name without extension.
+        folder: Output folder; created if it does not exist.
+        height: Height of each figure, inches.
+        width: Width of each figure, inches.
         file_format: One of `FORMATS`.
 
     Returns:
-        The files, in the order of the drawings.
+        Paths of the files, in the order of the drawings.
 
     Raises:
-        OptionError: There is no such file format.
+        OptionError: The file format is unknown.
         MissingExtraError: matplotlib is not installed.
     """
     check_format(file_format)
@@ -58,6 +58,6 @@ def save_figures(
 
 
 def check_format(file_format: str) -> None:
-    """Refuses a file format that is none of `FORMATS` with an OptionError."""
+    """Raises an OptionError if the file format is not one of `FORMATS`."""
     if file_format not in FORMATS:
         refuse(OptionError, "format", file_format, f"must be one of {', '.join(FORMATS)}")

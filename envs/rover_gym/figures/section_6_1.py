@@ -1,7 +1,7 @@
 """The report's figures 6.2 to 6.5, drawn from a recorded run.
 
-Ours in colour, one colour a wheel; a Siconos run of the same scene dotted in black where it exists; the report's own
-curves in grey or in a panel of their own, since they were made with other parameters (the data's `meta` says which).
+Our run is in colour, one colour per wheel, and a Siconos run of the same scene, if there is one, dotted in black. The
+report's curves are in grey or in a separate panel, because their parameters differ (listed in the data's `meta`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ PUBLISHED_STEP = 0.02  # s, of the runs behind the report's figures (inferred fr
 
 
 def draw_section_6_1(recording: str | Path, folder: str | Path) -> list[Path]:
-    """Draws the report's figures 6.2 to 6.5, and our way beside Siconos', as PNG files and returns their paths.
+    """Draws the report's figures 6.2 to 6.5, and our path beside Siconos', as PNG files and returns their paths.
 
     Raises:
         MissingExtraError: matplotlib or h5py is not installed.
@@ -92,7 +92,7 @@ def reaction_force(figure: Figure, trajectory: Trajectory) -> None:
     forces = trajectory["wheel_forces"][:, :, 0]
     for wheel in ("FR", "FL"):
         ours.plot(trajectory["time"], forces[:, WHEELS.index(wheel)], color=COLOURS[wheel], label=NAMES[wheel])
-    # Its percussions are in kg cm/s a step, and cut at 500; labelled FL, they are FR's.
+    # Its percussions are in kg cm/s per step, clipped at 500; the label says FL, the data are FR's.
     _plot_published(published, "fig_6_4_reaction", 0.01 / PUBLISHED_STEP, ("FR",))
     ours.set(
         title=f"ours, mean over each step of {step_size(trajectory)}",
@@ -128,7 +128,7 @@ def steering_angles(figure: Figure, trajectory: Trajectory) -> None:
 
 
 def beside_siconos(figure: Figure, trajectory: Trajectory) -> None:
-    """The trunk's way in our run and in those of Siconos 4.4 over the same scene, and the distance between them."""
+    """The trunk's path in our run and in those of Siconos 4.4 of the same scene, and the distance between them."""
     ways, distances = figure.subplots(1, 2)
     time, trunk = trajectory["time"], trajectory["q"][:, :3]
     for i, name in enumerate(("x, forward", "y, up", "z, to the right")):

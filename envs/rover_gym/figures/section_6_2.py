@@ -1,4 +1,4 @@
-"""Figures of the report's section 6.2, the run over the rug of spheres; the report prints no curves of it."""
+"""Figures of the report's section 6.2, the run over the rug of spheres; the report shows no curves of this run."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def wheel_traces(figure: Figure, trajectory: Trajectory) -> None:
 
 
 def contact_distances(figure: Figure, trajectory: Trajectory) -> None:
-    """Section 6.2: the six gaps against time, left and right wheels apart."""
+    """Section 6.2: the six gaps against time, left and right wheels in separate panels."""
     panels = figure.subplots(1, 2, sharey=True, sharex=True)
     for axes, wheels, name in zip(panels, SIDES, ("left", "right"), strict=True):
         plot_wheels(axes, trajectory["time"], 100.0 * trajectory["wheel_gaps"], wheels)
@@ -80,7 +80,7 @@ def contact_distances(figure: Figure, trajectory: Trajectory) -> None:
 
 
 def reaction_forces(figure: Figure, trajectory: Trajectory) -> None:
-    """Section 6.2: normal force on each wheel against time, left and right wheels apart."""
+    """Section 6.2: normal force on each wheel against time, left and right wheels in separate panels."""
     panels = figure.subplots(1, 2, sharey=True, sharex=True)
     for axes, wheels, name in zip(panels, SIDES, ("left", "right"), strict=True):
         plot_raw_and_smooth(axes, trajectory["time"], trajectory["wheel_forces"][:, :, 0], wheels)

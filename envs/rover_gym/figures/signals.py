@@ -1,4 +1,4 @@
-"""How signals are drawn that jump from step to step, and axes for values of very different size."""
+"""Drawing of signals that jump from step to step, and axes for values of very different magnitude."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from rover_gym.figures.style import COLOURS, WHEELS, plot_wheels
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-WINDOW = 0.5  # s, of the smoothed curves: a few strides of the chatter, far less than a manoeuvre
+WINDOW = 0.5  # s, smoothing window: a few periods of the contact chatter, far less than a manoeuvre
 SMOOTHED = f"bold: smoothed over {WINDOW:g} s; light: every sample"
 
 
 def plot_raw_and_smooth(axes: Axes, time: Array, values: Array, wheels: tuple[str, ...]) -> None:
-    """Every sample in a light line, and the smoothed curve; values (n, 6)."""
+    """Draws every sample as a light line, and the smoothed curve; values (n, 6)."""
     measured = np.array(values)
     measured[0] = np.nan  # no step had been taken
     smoothed = smooth(time, measured, WINDOW)
@@ -28,18 +28,18 @@ def plot_raw_and_smooth(axes: Axes, time: Array, values: Array, wheels: tuple[st
 
 
 def finite(values: Array) -> Array:
-    """Values with holes where they are not finite: what is not known is not drawn."""
+    """Values with nan for those that are not finite, so that they are not drawn."""
     return np.where(np.isfinite(values), values, np.nan)
 
 
 def extremes(values: Array, low: float, high: float) -> tuple[float, float]:
-    """The least and the largest of finite values with holes, and of two more."""
+    """Smallest and largest of the finite values, `low` and `high`."""
     known = values[np.isfinite(values)]
     return float(known.min(initial=low)), float(known.max(initial=high))
 
 
 def linear_then_log(axes: Axes, threshold: float, low: float, high: float) -> None:
-    """A linear axis, or, where the values go far beyond the threshold, one that is logarithmic from there on."""
+    """Makes the axis linear, or logarithmic above the threshold if the values go far beyond it."""
     if high <= 2.0 * threshold and low >= -2.0 * threshold:
         margin = 0.05 * (high - low)
         axes.set_ylim(low - margin if low < 0.0 else 0.0, max(high + margin, 0.1 * threshold))
@@ -67,7 +67,7 @@ def round_up(value: float) -> float:
 
 
 def _explain(axes: Axes, threshold: float) -> None:
-    """Marks where an axis turns logarithmic."""
+    """Marks where an axis becomes logarithmic."""
     axes.axhline(threshold, color="0.6", linewidth=0.5)
     axes.annotate(
         "logarithmic above this line",

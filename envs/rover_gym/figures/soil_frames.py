@@ -1,4 +1,4 @@
-"""Pictures of a run on a soil: disks, wheels and force chains at one time, or all of it as a video."""
+"""Pictures of a soil run: disks, wheels and force chains at one time, or the whole run as a video."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ MARGIN = 0.02  # m about the soil
 
 
 def draw_soil(run: SoilRun, path: str | Path, *, row: int = -1) -> Path:
-    """Draws one sample; the width of a red line goes with the root of the contact's mean force since the sample before.
+    """Draws one sample; a red line's width scales with the root of the contact's mean force since the previous sample.
 
     Args:
         run: The run.
-        path: Picture to write.
-        row: Number of the sample; negative ones count from the end.
+        path: Image file to write.
+        row: Index of the sample; negative indices count from the end.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -42,7 +42,7 @@ def draw_soil(run: SoilRun, path: str | Path, *, row: int = -1) -> Path:
 
 
 def film_soil(run: SoilRun, path: str | Path, *, frames_per_second: int = 25) -> Path:
-    """Writes all samples of a run as an MP4 video (H.264).
+    """Writes all samples of a run to an MP4 video (H.264).
 
     Raises:
         MissingExtraError: matplotlib or imageio-ffmpeg is not installed.
@@ -100,7 +100,7 @@ def _paint(axes: Axes, run: SoilRun, row: int) -> None:
             linewidths=0.4,
         )
     )
-    # A mark on each disk shows how it turns.
+    # A mark on each disk shows its rotation.
     tips = np.stack((x + run.radius * np.cos(angle), y + run.radius * np.sin(angle)), axis=1)
     axes.add_collection(LineCollection(list(np.stack((centres, tips), axis=1)), colors=GRAIN_EDGE, linewidths=0.4))
     chains = run.force_chains[row]
@@ -118,6 +118,6 @@ def _paint(axes: Axes, run: SoilRun, row: int) -> None:
 
 
 def _bearing(run: SoilRun) -> float:
-    """A force to scale the chains by, N: the largest that a wheel bore most of the time."""
+    """Force scale of the chains, N: the largest load that a wheel carried most of the time."""
     loads: npt.NDArray[np.float64] = np.linalg.norm(run.wheel_forces[1:], axis=-1)
     return float(np.median(loads, axis=0).max()) if loads.size else float(run.force_chains[..., 4].max())

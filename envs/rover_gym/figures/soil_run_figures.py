@@ -1,6 +1,6 @@
-"""Curves over time of a recorded run on a soil: speed, slip and sinkage, the wheels' forces, energy and the contacts.
+"""Curves over time of a recorded soil run: speed, slip and sinkage, wheel forces, energy and contacts.
 
-Signals that jump from row to row are drawn twice: every sample in a light line, and the smoothed curve in a bold one.
+Signals that jump from row to row are drawn twice: every sample as a light line, and the smoothed curve as a bold one.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SOIL_DRAWINGS", "draw_soil_run"]
 
-#: Of the wheels, back to front (Okabe and Ito's).
+#: Wheel colours, back to front (Okabe and Ito's palette).
 COLOURS = ("#D55E00", "#0072B2")
 
 
@@ -38,15 +38,15 @@ def draw_soil_run(
 
     Args:
         run: From `read_soil_run`.
-        folder: Where the files go; made if it is not there. Of a soil without wheels only its disks are drawn.
+        folder: Output folder; created if it does not exist. For a soil without wheels only the disks are drawn.
         file_format: "png", "svg" or "pdf".
         with_overview: Whether to add one page with all figures.
 
     Returns:
-        The files.
+        Paths of the files.
 
     Raises:
-        OptionError: There is no such file format.
+        OptionError: The file format is unknown.
         MissingExtraError: matplotlib is not installed.
     """
     check_format(file_format)
@@ -60,7 +60,7 @@ def draw_soil_run(
 
 
 def driving(figure: Sheet, run: SoilRun) -> None:
-    """Speed of rover and rims, slip, sinkage of the wheels."""
+    """Speed of rover and rims, wheel slip and sinkage."""
     speed, slip, depth = figure.subplots(3, 1, sharex=True)
     rates = run.trajectory["machine_rate"]
     forward = rates[:, 0]
@@ -119,7 +119,7 @@ SOIL_DRAWINGS: dict[str, Callable[[Sheet, SoilRun], None]] = {
     "wheel-forces": wheel_forces,
     "disks-and-contacts": disks_and_contacts,
 }
-#: Those that a soil without wheels has not.
+#: Figures that need wheels.
 OF_WHEELS = frozenset({"driving", "wheel-forces"})
 
 
@@ -135,13 +135,13 @@ def _wheels(run: SoilRun) -> list[tuple[str, str]]:
 
 
 def _raw_and_smooth(axes: Axes, run: SoilRun, values: Array, colour: str, name: str) -> None:
-    """Every sample in a light line, and the smoothed curve; values (n,)."""
+    """Draws every sample as a light line, and the smoothed curve; values (n,)."""
     axes.plot(run.time, values, color=colour, linewidth=0.5, alpha=0.35, label=f"_{name} samples")
     axes.plot(run.time, smooth(run.time, values, WINDOW), color=colour, label=f"{name}, mean over {WINDOW:g} s")
 
 
 def _finish(figure: Sheet, panels: tuple[Axes, ...], what: str, run: SoilRun) -> None:
-    """Legends, and over all what is shown of which run."""
+    """Adds legends, and a title naming the figure and the run."""
     for axes in panels:
         panel_legend(axes)
     broken_off = "" if run.trajectory.attributes.get("complete", True) else " (the recording was broken off)"
@@ -149,7 +149,7 @@ def _finish(figure: Sheet, panels: tuple[Axes, ...], what: str, run: SoilRun) ->
 
 
 def _overview(figure: Sheet, draws: list[Callable[[Sheet, SoilRun], None]], run: SoilRun) -> None:
-    """All figures on one page, below one another."""
+    """All figures stacked on one page."""
     parts = figure.subfigures(len(draws), 1, squeeze=False).flat
     for part, draw in zip(parts, draws, strict=True):
         draw(part, run)

@@ -1,4 +1,4 @@
-"""What every figure shares: the wheels, their colours, sizes of type, and a few strokes."""
+"""Shared style of the figures: wheels, their colours, type sizes, and drawing helpers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from rover_gym.record.rover_run import RoverRun
 
-    #: A figure, or a part of a page.
+    #: A figure or part of a page.
     Sheet: TypeAlias = Figure | SubFigure
 
 WHEELS = ("FL", "FR", "ML", "BL", "MR", "BR")
@@ -30,9 +30,9 @@ NAMES = {
     "BR": "back right",
 }
 SIDES = (("FL", "ML", "BL"), ("FR", "MR", "BR"))
-# Okabe and Ito's colours, told apart by colour-blind readers too.
+# Okabe and Ito's palette, safe for colour-blind readers.
 COLOURS = {"FL": "#0072B2", "FR": "#56B4E9", "ML": "#009E73", "BL": "#D55E00", "MR": "#CC79A7", "BR": "#E69F00"}
-#: For what is not a wheel's (Paul Tol's "muted" colours, told apart by colour-blind readers too).
+#: Colours for everything but wheels (Paul Tol's "muted" palette, safe for colour-blind readers).
 QUANTITY_COLOURS = ("#332288", "#CC6677", "#117733", "#882255", "#999933")
 DARK = "0.25"
 #: Of nested lines: front, middle and back wheels, points.
@@ -53,17 +53,17 @@ STYLE: dict[str, Any] = {
     "legend.fontsize": 9.0,
     "legend.framealpha": 0.9,
     "lines.linewidth": 1.2,
-    "svg.hashsalt": "rover-gym",  # the same figure gives the same file
+    "svg.hashsalt": "rover-gym",  # identical figures give identical files
 }
 
 
 def plain(text: str) -> str:
-    """Text of a file, whose dollars begin no formula."""
+    """Escapes dollar signs in a file's text, so that they start no formula."""
     return text.replace("$", r"\$")
 
 
 def title(figure: Sheet, what: str, run: RoverRun) -> None:
-    """Writes over a figure what it shows, and of which run."""
+    """Titles a figure with its subject and its run."""
     broken_off = "" if run.trajectory.attributes.get("complete", True) else " (the recording was broken off)"
     figure.suptitle(f"{what}\n{plain(run.title)}{broken_off}")
 
@@ -84,13 +84,13 @@ def panel_legend(axes: Axes) -> None:
 
 
 def circle(axes: Axes, x: float, y: float, radius: float, color: str) -> None:
-    """Draws a circle's line."""
+    """Draws the outline of a circle."""
     turn = np.linspace(0.0, 2.0 * np.pi, 60)
     axes.plot(x + radius * np.cos(turn), y + radius * np.sin(turn), color=color, linewidth=0.8)
 
 
 def close_up(axes: Axes, x: npt.NDArray[np.float64], y: npt.NDArray[np.float64], margin: float) -> None:
-    """Shows the traces with a margin (m), at one scale; what lies beyond is cut."""
+    """Limits the view to the traces plus a margin (m), with equal scales."""
     axes.set_xlim(x.min() - margin, x.max() + margin)
     axes.set_ylim(y.min() - margin, y.max() + margin)
     axes.set_aspect("equal", adjustable="box")
@@ -99,10 +99,10 @@ def close_up(axes: Axes, x: npt.NDArray[np.float64], y: npt.NDArray[np.float64],
 def plot_wheels(
     axes: Axes, time: Any, values: Any, wheels: tuple[str, ...] = WHEELS, *, nested: bool = False, **style: Any
 ) -> None:
-    """One line a wheel, in its colour: values (n, 6) over time (n,), s.
+    """Draws one line per wheel, in its colour: values (n, 6) over time (n,), s.
 
-    Nested lines are wide for the back wheels and narrow for the front ones, over them: all of several equal curves
-    are seen.
+    Nested lines are wide for the back wheels and narrow for the front ones on top, so that coinciding curves all stay
+    visible.
     """
     for wheel in reversed(wheels) if nested else wheels:
         width: dict[str, Any] = {"linewidth": NESTED_WIDTHS[wheel[0]]} if nested else {}

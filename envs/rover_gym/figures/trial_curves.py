@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_curves"]
 
-#: Of the loads (Okabe and Ito's).
+#: Load colours (Okabe and Ito's palette).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 
 
@@ -29,13 +29,13 @@ def draw_curves(
     fits: Mapping[float, Traction],
     path: str | Path,
 ) -> Path:
-    """Draws means over the beds, with bars of one standard error where there are several beds, and the fitted pulls.
+    """Draws means over the beds, with one-standard-error bars if there are several beds, and the fitted pulls.
 
     Args:
-        drives: By torque, then by bed.
-        pulls: By load (kg), then by slip, then by bed.
-        fits: By load.
-        path: PNG file.
+        drives: Drives by torque, then by bed.
+        pulls: Pulls by load (kg), then by slip, then by bed.
+        fits: Fits by load.
+        path: PNG file to write.
 
     Raises:
         MissingExtraError: matplotlib is not installed.
@@ -92,7 +92,7 @@ def _curve(
     fmt: str = "o-",
     color: str = COLOURS[0],
 ) -> None:
-    """Means of the rows, numbers only, with their standard errors."""
+    """Means of the rows over their finite values, with standard errors."""
     means, errors = [], []
     for row in rows:
         known = np.array(row)[np.isfinite(row)]

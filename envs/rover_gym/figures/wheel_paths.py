@@ -1,4 +1,4 @@
-"""The way of a recorded run from above, over the ground that it drove on."""
+"""The path of a recorded run from above, over its ground."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 MARGIN = 0.1  # shown around the way, of its larger extent
 RATIO = 1.5  # of the map, width to height
-HEADING_DISTANCE = 1.8  # between the arrows that show the heading, in their lengths
+HEADING_DISTANCE = 1.8  # spacing of the heading arrows, in arrow lengths
 ARROW = 0.045  # of the map's width
 
 
 class Footprints(NamedTuple):
-    """What shows of the spheres of a field, from above.
+    """The visible parts of a field's spheres, from above.
 
     Attributes:
         centres: (n, 2) x and z, m.
@@ -38,7 +38,7 @@ class Footprints(NamedTuple):
 
 
 def path_from_above(figure: Sheet, run: RoverRun) -> None:
-    """The way of trunk and wheels, start, goal and heading; spheres as circles, by the height of their tops."""
+    """Paths of trunk and wheels, start, goal and heading; spheres as circles shaded by the height of their tops."""
     axes = figure.subplots()
     trajectory = run.trajectory
     trunk, centres = trajectory["q"][:, :3], trajectory["wheel_centres"]
@@ -46,7 +46,7 @@ def path_from_above(figure: Sheet, run: RoverRun) -> None:
     others: dict[str, dict[str, Any]] = {}
     if isinstance(run.terrain, SphereField):
         _draw_spheres(figure, axes, run.terrain)
-    for wheel in reversed(WHEELS):  # the tracks of the wheels behind wide, those ahead narrow over them
+    for wheel in reversed(WHEELS):  # wide tracks for the back wheels, narrow ones for the front wheels on top
         x, _, z = centres[:, WHEELS.index(wheel)].T
         axes.plot(z, x, color=COLOURS[wheel], linewidth=NESTED_WIDTHS[wheel[0]], label=f"_{wheel} track")
     axes.plot(trunk[:, 2], trunk[:, 0], color="black", linewidth=1.0, label="_trunk")
@@ -65,7 +65,7 @@ def path_from_above(figure: Sheet, run: RoverRun) -> None:
 
 
 def footprints(field: SphereField) -> Footprints:
-    """What shows of a field's spheres above its ground."""
+    """The parts of a field's spheres above its ground."""
     centres, radii, ground = field.centres, field.radii, field.ground
     if ground is None:
         return Footprints(centres[:, [0, 2]], radii, centres[:, 1] + radii)
@@ -79,7 +79,7 @@ def _draw_spheres(figure: Sheet, axes: Axes, field: SphereField) -> None:
     prints = _within(axes, footprints(field))
     if len(prints.radii) == 0:
         return
-    upward = np.argsort(prints.heights)  # the highest last, so that it covers the others
+    upward = np.argsort(prints.heights)  # highest last, on top of the others
     diameters = 2.0 * prints.radii[upward]
     circles = collections.EllipseCollection(
         diameters,
@@ -104,7 +104,7 @@ def _draw_spheres(figure: Sheet, axes: Axes, field: SphereField) -> None:
 
 
 def _within(axes: Axes, prints: Footprints) -> Footprints:
-    """The spheres that the axes show."""
+    """The spheres within the axes' limits."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     x, z = prints.centres.T
     r = prints.radii
@@ -113,7 +113,7 @@ def _within(axes: Axes, prints: Footprints) -> Footprints:
 
 
 def _draw_headings(axes: Axes, q: Array) -> None:
-    """Arrows along the heading, none near another: a rover that rocks to and fro would blacken the map."""
+    """Arrows along the heading, spaced apart: a rover rocking back and forth would otherwise blacken the map."""
     length = ARROW * float(np.ptp(axes.get_xlim()))
     rows = [0]
     for row, place in enumerate(q[:, [0, 2]]):
@@ -135,7 +135,7 @@ def _draw_headings(axes: Axes, q: Array) -> None:
 
 
 def _show_extent(axes: Axes, run: RoverRun) -> None:
-    """Shows way and goal with a margin, at one scale, and no more of the ground than fills the axes."""
+    """Limits the view to path and goal plus a margin, at equal scales, with just enough ground to fill the axes."""
     places = [run.trajectory["wheel_centres"][..., [2, 0]].reshape(-1, 2)]
     if run.goal is not None:
         places.append(np.array([[run.goal[1], run.goal[0]]]))
@@ -150,7 +150,7 @@ def _show_extent(axes: Axes, run: RoverRun) -> None:
 
 
 def _slope(terrain: Plane | SphereField) -> str:
-    """The slope of the ground, where there is one."""
+    """The ground's slope, if it has one."""
     ground = terrain if isinstance(terrain, Plane) else terrain.ground
     if ground is None:
         return ""

@@ -1,7 +1,7 @@
 """The planar systems of the report's chapter 3: a ball and a two-wheel rover on a line, a curve or a step.
 
-They are stepped by the rover's own schemes, laws and contact solver. x points forward, y up, angles turn to the left; a
-positive torque drives forward.
+They use the rover's time-stepping schemes, contact laws and contact solver. x points forward, y up; angles are
+counter-clockwise positive, and a positive torque drives forward.
 
     >>> from rover_gym.planar import BallSimulation, Line
     >>> ball = BallSimulation(Line(slope=-0.2), radius=0.3)

@@ -1,4 +1,4 @@
-"""Recordings of planar simulations: the sampler that makes their rows, and a run that is recorded."""
+"""Recordings of planar simulations: the sampler that makes their rows, and recorded runs."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class PlanarSampler:
     """Makes rows of a planar simulation for a `Recorder`.
 
     Args:
-        sim: A simulation of the kind to look at.
+        sim: A simulation of the kind to sample.
     """
 
     def __init__(self, sim: PlanarSimulation) -> None:
@@ -65,8 +65,8 @@ class PlanarSampler:
         """One row of `channels`; the simulation is not changed.
 
         Args:
-            sim: The simulation to look at.
-            residual: Worst residual since the last row, from the step's report.
+            sim: The simulation to sample.
+            residual: Largest residual since the previous row, from the step report.
         """
         contacts, energy = sim.contacts, sim.energy()
         impulses = np.zeros((len(sim.centres), 2))
@@ -86,7 +86,7 @@ class PlanarSampler:
 
 
 def describe_planar(sim: PlanarSimulation, title: str) -> dict[str, Any]:
-    """The attributes of a recording, from the simulation at its start."""
+    """Attributes of a recording, from the simulation's initial state."""
     ground = sim.ground
     names = {
         Line: ("slope", "offset"),
@@ -122,24 +122,24 @@ def record_planar(
     steps_per_row: int = 1,
     progress: Callable[[float], None] = lambda _: None,
 ) -> int:
-    """Runs a simulation from its present state and records it.
+    """Runs a simulation from its current state and records it.
 
     Args:
         sim: The simulation.
         path: HDF5 file to write.
-        attributes: Facts about the run, from `describe_planar`.
+        attributes: Attributes of the run, from `describe_planar`.
         duration: Time to simulate, s.
         steps_per_row: Steps from one row to the next.
-        progress: Called with the simulated time now and then.
+        progress: Called periodically with the simulated time.
 
     Returns:
-        How many rows' steps were not solved to the tolerance.
+        Number of rows with steps that did not converge to the tolerance.
 
     Raises:
-        OptionError: `duration` or `steps_per_row` is not positive, or there would be too many rows.
+        OptionError: `duration` or `steps_per_row` is not positive, or the run has too many rows.
         RecordingError: The file is in use, or the disk is full.
         MissingExtraError: h5py is not installed.
-        StepError: A step could not be taken; what came before is on the disk.
+        StepError: A step failed; the rows before it are on disk.
     """
     sampler = PlanarSampler(sim)
     unconverged = 0

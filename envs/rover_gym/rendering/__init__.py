@@ -1,7 +1,7 @@
 """What a rover looks like: its parts, frames of a simulation as arrays of pixels, and video.
 
-Frames are drawn by VTK off screen: no display and no graphics card are needed. VTK is imported when `FrameRenderer` is
-asked for; everything else here does without.
+VTK draws frames off screen, without a display or a graphics card. VTK is imported on first access to `FrameRenderer`;
+nothing else here needs it.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ __all__ = ["FrameRenderer", "RenderOptions", "VideoWriter"]
 
 
 def __getattr__(name: str) -> Any:
-    """`FrameRenderer`, imported with VTK now that it is asked for."""
+    """`FrameRenderer`, imported with VTK on first access."""
     if name != "FrameRenderer":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:

@@ -1,8 +1,8 @@
-"""What the rover looks like: boxes, cylinders and balls on its solids, made from the model's own shapes.
+"""The rover's appearance: boxes, cylinders and spheres on its solids, made from the model's shapes.
 
-No renderer is imported here, so that frames, the browser page and the exported scenes all show the same rover. Each
-part rides on one solid: a point `x` of the part lies in the world at `o + R (position + rotation x)`, with `(o, R)` the
-solid's entry in `RoverModel.poses`.
+This module imports no renderer, so that frames, the browser page and the exported scenes all show the same rover. Each
+part is fixed to one solid: the world position of a point `x` of the part is `o + R (position + rotation x)`, with
+`(o, R)` the solid's entry in `RoverModel.poses`.
 """
 
 from __future__ import annotations
@@ -40,18 +40,18 @@ TREAD_COLOUR: Colour = (0.40, 0.40, 0.43)
 HUB_COLOUR: Colour = (0.74, 0.75, 0.77)
 SPOKE_COLOUR: Colour = (0.25, 0.26, 0.29)
 
-# A wheel's contact is the rim of a thin disc; a wheel is drawn this wide, in radii, about that disc.
+# A wheel's contact is the rim of a thin disc; the drawn wheel has this width about that disc, in radii.
 WHEEL_WIDTH = 0.7
-TREAD_BARS = 4  # across the diameter: each shows at both of its ends
+TREAD_BARS = 4  # each spans the diameter and shows at both ends
 PLATE = 0.012  # m, thickness of what is laid on a surface, and of the forks' plates
 
 
 @dataclass(frozen=True)
 class Part:
-    """A box, a cylinder or a ball on a solid.
+    """A box, a cylinder or a sphere on a solid.
 
     Attributes:
-        solid: The solid whose frame it rides on, a key of `RoverModel.poses`.
+        solid: The solid it is fixed to, a key of `RoverModel.poses`.
         kind: "box", "cylinder" or "sphere".
         size: m. A box: edge lengths along the part's x, y, z. A cylinder: radius, and height along the part's y. A
             ball: radius.
@@ -69,10 +69,10 @@ class Part:
 
 
 def rover_parts(model: RoverModel) -> tuple[Part, ...]:
-    """The parts of a rover: its solids' shapes, and the marks that tell front from back and show that wheels turn.
+    """The parts of a rover: the shapes of its solids, and marks that show its front and the rotation of its wheels.
 
-    Solids without a visible shape are not drawn, unless a wheel is fixed to them. Wheels have the contact's radius; one
-    whose disc is listed among the solid's shapes as not visible is left out.
+    Solids without a visible shape are not drawn, unless a wheel is fixed to them. Wheels have the contact radius; a
+    wheel whose disc is listed among the solid's shapes as not visible is not drawn.
     """
     description = model.to_dict()
     solids = {solid["name"]: solid for solid in description["solids"]}
@@ -94,11 +94,11 @@ def rover_parts(model: RoverModel) -> tuple[Part, ...]:
 
 
 def part_mesh(part: Part, resolution: int = 24) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int32]]:
-    """The part's surface as triangles, with vertices of their own on each flat side, so that edges stay sharp.
+    """The part's surface as triangles, with separate vertices on each flat side, so that edges stay sharp.
 
     Args:
-        part: A box, a cylinder or a ball.
-        resolution: Number of flat sides that a cylinder's mantle or a ball's equator is made of, at least 3.
+        part: A box, a cylinder or a sphere.
+        resolution: Number of facets around a cylinder or along a sphere's equator, at least 3.
 
     Returns:
         Vertices (n, 3) in the part's frame, m, and triangles (m, 3), indices of vertices, counter-clockwise seen from
@@ -124,7 +124,7 @@ def sphere_mesh(rings: int = 8) -> tuple[npt.NDArray[np.float64], npt.NDArray[np
     a = i * (columns + 1) + k
     b = a + columns + 1
     triangles = np.concatenate((np.stack((a, a + 1, b + 1), axis=1), np.stack((a, b + 1, b), axis=1)))
-    proper = np.concatenate((i != 0, i != rings - 1))  # at the poles one of a square's two triangles is a line
+    proper = np.concatenate((i != 0, i != rings - 1))  # at the poles one of a square's two triangles is degenerate
     return vertices.reshape(-1, 3), triangles[proper].astype(np.int32)
 
 
@@ -139,7 +139,7 @@ class _PlacedShape:
 
 
 def _placed_shapes(solid: Mapping[str, Any]) -> list[_PlacedShape]:
-    """The shapes of a solid: the only one, at the mass centre, or those that are listed."""
+    """The shapes of a solid: the single one at the mass centre, or the listed ones."""
     if "shape" in solid:
         return [_PlacedShape(solid["shape"], _vector(solid.get("centre_of_mass")), np.eye(3), visible=True)]
     return [
@@ -159,7 +159,7 @@ def _vector(given: Sequence[float] | None) -> Vector:
 
 
 def _is_disc_about(placed: _PlacedShape, axle: Sequence[float]) -> bool:
-    """Whether a shape is a disc that a wheel with this axle, through the solid's origin, is made of."""
+    """Whether a shape is the disc of a wheel whose axle passes through the solid's origin."""
     if placed.shape["kind"] != "disc":
         return False
     across = np.cross(placed.rotation[:, 2], np.array(axle) / np.linalg.norm(axle))
@@ -183,13 +183,13 @@ def _shape_parts(solid: Mapping[str, Any], placed: _PlacedShape) -> Iterator[Par
         yield Part(name, "cylinder", size, centre, rotation, COLUMN_COLOUR)
     elif shape["kind"] == "sphere":
         yield Part(name, "sphere", (shape["radius"],), centre, rotation, COLUMN_COLOUR)
-    else:  # a thin disc about z that is no wheel
+    else:  # a thin disc about z that is not a wheel
         turn = rotation @ _turn_to(np.array([0.0, 0.0, 1.0]))
         yield Part(name, "cylinder", (shape["radius"], PLATE), centre, turn, HUB_COLOUR)
 
 
 def _trunk_marks(name: str, size: tuple[float, ...], centre: Vector) -> Iterator[Part]:
-    """A coloured strip over the front edge, seen from before and behind, and a dark deck of panels on the rest."""
+    """A coloured strip over the front edge, visible from front and back, and a dark deck of panels on the rest."""
     x, y, z = size
     front, top = centre[0] + x / 2, centre[1] + y / 2
     yield _box(name, (PLATE, 0.25 * y, 0.8 * z), (front, top - 0.125 * y + PLATE / 4, centre[2]), NOSE_COLOUR)
@@ -212,7 +212,7 @@ def _rim(wheel: Mapping[str, Any]) -> float:
 
 
 def _wheel_parts(wheel: Mapping[str, Any]) -> Iterator[Part]:
-    """Tyre with treads, hub, and spokes of which one arm has the colour of the nose, so that a turn shows."""
+    """Tyre with treads, hub, and spokes; one spoke has the colour of the nose, so that rotation is visible."""
     name, radius = wheel["solid"], _rim(wheel)
     width = WHEEL_WIDTH * radius
     turn = _turn_to(np.array(wheel["axle"], dtype=np.float64))
@@ -221,7 +221,7 @@ def _wheel_parts(wheel: Mapping[str, Any]) -> Iterator[Part]:
     yield Part(name, "cylinder", (0.72 * radius, width + 0.04 * radius), centre, turn, HUB_COLOUR)
     for bar in range(TREAD_BARS):
         spin = turn @ _about_y(np.pi * (bar + 0.5) / TREAD_BARS)
-        # The tread stands out just enough to be seen: it does not touch.
+        # The tread stands out just enough to be visible; it makes no contact.
         yield Part(name, "box", (2.02 * radius, width, 0.1 * radius), centre, spin, TREAD_COLOUR)
     for spoke, spin in enumerate(turn @ _about_y(angle) for angle in (0.0, np.pi / 2)):
         size = (1.44 * radius, width + 0.06 * radius, 0.12 * radius)
@@ -239,11 +239,11 @@ def _fork_parts(solid: Mapping[str, Any], wheel: Mapping[str, Any]) -> Iterator[
     clearance = length - 1.1 * radius
     if "parent" not in solid or clearance <= 0.0:
         return
-    # The part's x lies along the axle, its y up the fork.
+    # The part's x points along the axle, its y up the fork.
     axle = np.array(wheel["axle"], dtype=np.float64)
     up = -arm / length
     side = np.cross(axle, up)
-    if float(np.linalg.norm(side)) < 0.9:  # the wheel hangs along its own axle: no fork holds that
+    if float(np.linalg.norm(side)) < 0.9:  # the wheel hangs along its own axle, where no fork fits
         return
     side /= np.linalg.norm(side)
     rotation = np.column_stack((np.cross(up, side), up, side))
@@ -267,7 +267,7 @@ def _box(name: str, size: tuple[float, ...], centre: Vector, colour: Colour) -> 
 
 
 def _turn_by(vector: Vector) -> npt.NDArray[np.float64]:
-    """The rotation about a rotation vector: the axis times the angle, rad."""
+    """The rotation matrix of a rotation vector (axis times angle, rad)."""
     angle = float(np.linalg.norm(vector))
     if angle == 0.0:
         return np.eye(3)
@@ -278,7 +278,7 @@ def _turn_by(vector: Vector) -> npt.NDArray[np.float64]:
 
 
 def _turn_to(axis: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """A rotation whose y axis is the given direction; its x axis lies as near to the solid's x as it can."""
+    """A rotation whose y axis is the given direction and whose x axis is as near as possible to the solid's x."""
     y = axis / np.linalg.norm(axis)
     near = np.eye(3)[0] if abs(y[0]) < 0.9 else np.eye(3)[1]
     z = np.cross(near, y)
@@ -313,7 +313,7 @@ def _cylinder_mesh(
     angle = np.arange(resolution) * (2.0 * np.pi / resolution)
     ring = np.column_stack((radius * np.cos(angle), np.zeros(resolution), radius * np.sin(angle)))
     up = np.array([0.0, height / 2.0, 0.0])
-    # Twice the rim above and below: for the mantle, and for the caps with their centres.
+    # Each rim twice: once for the mantle, once for the cap with its centre.
     vertices = np.vstack((ring + up, ring - up, ring + up, ring - up, up, -up))
     k = np.arange(resolution)
     following = (k + 1) % resolution

@@ -1,4 +1,4 @@
-"""The frame: the rover, what stands around it, contact forces and the camera."""
+"""Frames of a simulation: the rover, its surroundings, contact forces and the camera."""
 
 import contextlib
 import ctypes
@@ -23,21 +23,21 @@ from rover_gym.rendering.meshes import Array, Faces, actor_of, actor_with, level
 from rover_gym.rendering.render_options import Camera, check_render_options
 from rover_gym.rendering.scenery_actors import FAR, Goal, GroundActors, RockActors, flag, headlight, shadow_of, sky, sun
 
-FORCE_LENGTH = 0.45  # m, of the arrow of a wheel's mean share of the weight
+FORCE_LENGTH = 0.45  # m, arrow length for a wheel's mean share of the weight
 
 VIEW_ANGLE = 34.0  # degrees, vertical
 # Eye and target in the trunk's heading frame, m: ahead, up, right.
 FOLLOW_EYE, FOLLOW_TARGET = np.array([-3.5, 1.5, 1.95]), np.array([0.5, 0.22, 0.25])
 SIDE_EYE, SIDE_TARGET = np.array([0.1, 0.45, 4.0]), np.array([0.1, 0.05, 0.0])
 TOP_HEIGHT = 8.0  # m above the trunk
-FOLLOW_TIME = 0.25, 0.8  # s, time constants with which the view's centre and heading catch up
-EYE_HEIGHT = 0.4  # m, the least above the ground
+FOLLOW_TIME = 0.25, 0.8  # s, time constants of the view's centre and heading
+EYE_HEIGHT = 0.4  # m, minimum height above the ground
 
 
 class FrameRenderer:
     """Draws frames of a rover on its terrain; a context manager.
 
-    Equal sequences of simulated states give equal frames. Not to be shared between threads.
+    Equal sequences of simulated states give equal frames. A renderer must not be shared between threads.
 
     Args:
         model: The rover.
@@ -47,12 +47,12 @@ class FrameRenderer:
         camera: "follow", "side", "top" or a fixed pair (eye, target), m: see `RenderOptions`.
         show_forces: Draws contact forces as arrows.
         antialiasing: Smooths edges.
-        goal: A flag stands at this (x, z), m.
+        goal: Position (x, z) of the flag, m.
         goal_tolerance: Radius of the ring around the flag, m.
 
     Raises:
-        OptionError: An option is out of its range.
-        OSError: No OpenGL library works on this machine; the message names the packages that bring one.
+        OptionError: An option is out of range.
+        OSError: No OpenGL library works on this machine; the message names the packages that provide one.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class FrameRenderer:
         self.set_scene(terrain, goal=goal, goal_tolerance=goal_tolerance)
 
     def set_scene(self, terrain: Plane | SphereField, *, goal: Goal | None = None, goal_tolerance: float = 0.5) -> None:
-        """Changes ground and goal, as at the reset of an episode; costs nothing where they are the same objects."""
+        """Sets ground and goal, as at the reset of an episode; free of cost if they are the same objects."""
         if terrain is self._terrain and (goal, goal_tolerance) == self._goal:
             return
         self._terrain, self._goal = terrain, (goal, goal_tolerance)
@@ -127,7 +127,7 @@ class FrameRenderer:
         self._view: tuple[tuple[float, ...], Array, float] | None = None
 
     def render(self, simulation: Simulation) -> npt.NDArray[np.uint8]:
-        """The simulation's present state, (height, width, 3) uint8, the first row on top."""
+        """The simulation's current state as an image (height, width, 3) uint8, top row first."""
         self._place_rover(simulation)
         position = simulation.q[:3]
         if self._ground is not None:
@@ -142,10 +142,10 @@ class FrameRenderer:
         width, height = self.options.width, self.options.height
         self._window.GetPixelData(0, 0, width - 1, height - 1, 0, self._pixels, 0)
         pixels: npt.NDArray[np.uint8] = vtk_to_numpy(self._pixels)
-        return pixels.reshape(height, width, 3)[::-1].copy()  # VTK's first row is the lowest
+        return pixels.reshape(height, width, 3)[::-1].copy()  # VTK's first row is the bottom one
 
     def close(self) -> None:
-        """Frees the window and its memory; the renderer cannot be used afterwards."""
+        """Frees the window and its memory; the renderer is unusable afterwards."""
         self._window.Finalize()
 
     def __enter__(self) -> Self:
@@ -195,14 +195,14 @@ class FrameRenderer:
         camera.SetFocalPoint(*target)
         camera.SetViewUp(*view_up)
         camera.SetClippingRange(0.1, 2.5 * FAR)
-        # The sky stands level around the eye, so that a slope is seen against it.
+        # The sky stays level around the eye, so that slopes are visible against it.
         ahead = level(np.array([1.0, 0.0, 0.0]), up)
         dome = np.eye(4)
         dome[:3] = np.column_stack((ahead, up, np.cross(ahead, up), eye))
         set_pose(self._sky, dome)
 
     def _follow(self, simulation: Simulation, position: Array, up: Array) -> tuple[Array, float]:
-        """Centre and heading of the view: they follow the rover's as time goes on, and jump when its state is set."""
+        """Centre and heading of the view: they follow the rover's over time, and jump when its state is set."""
         ahead = level(simulation.rotation[:, 0], up)
         heading = float(np.arctan2(-ahead[2], ahead[0]))
         seen = (simulation.time, *position, heading)
@@ -219,7 +219,7 @@ class FrameRenderer:
         return position, heading
 
     def _above_ground(self, eye: Array, up: Array) -> Array:
-        """The eye, lifted where a slope would bury it."""
+        """The eye, raised where a slope would bury it."""
         if self._plane is None:
             return eye
         n = self._plane.normal
@@ -230,13 +230,13 @@ class FrameRenderer:
 def contact_forces(simulation: Simulation) -> tuple[Array, Array]:
     """Points (n, 3), m, and mean forces (n, 3) on the rover over the last step, N, both in the world frame."""
     contacts = simulation.contacts
-    # Rows of a frame are n, t, b: a force in the world is the sum of its components times the rows.
+    # The rows of a contact frame are n, t, b: a world force is the sum of its components times the rows.
     forces = np.einsum("ci,cij->cj", contacts.impulses, contacts.frames) / simulation.time_step
     return contacts.points.reshape(-1, 3), forces.reshape(-1, 3)
 
 
 class _Quiet:
-    """Keeps VTK's log off the standard error: which displays it tried before one worked is no news to a user."""
+    """Keeps VTK's log off standard error: users do not need the list of displays that it tried."""
 
     def __enter__(self) -> None:
         self._verbosity = vtkLogger.ConvertToVerbosity(vtkLogger.GetCurrentVerbosityCutoff())
@@ -250,7 +250,7 @@ def _open_window(width: int, height: int) -> vtkRenderWindow:
     _load_triton()
     with _Quiet():
         window = vtkRenderWindow()
-        # The last kind that VTK tries; without its library it would end the process at the first frame.
+        # VTK tries this kind last; without its library it would end the process at the first frame.
         if window.IsA("vtkOSOpenGLRenderWindow") and not _has_osmesa():
             raise OSError(
                 "no OpenGL library works here: install Mesa's, on Debian with apt-get install libegl1 libgl1-mesa-dri"
@@ -264,13 +264,13 @@ def _open_window(width: int, height: int) -> vtkRenderWindow:
 def _load_triton() -> None:
     """Loads the library of triton, which PyTorch brings on Linux, before Mesa's drivers where it is installed.
 
-    Mesa makes the symbols of its LLVM global, and triton's library, loaded later, would take them for those of its own
-    LLVM: PyTorch then ends the process when it makes an optimizer (Mesa 22.3 with LLVM 15, triton 3.9).
+    Mesa exports the symbols of its LLVM globally. Triton's library, loaded later, would bind to them instead of its own
+    LLVM, and PyTorch then aborts when it makes an optimizer (Mesa 22.3 with LLVM 15, triton 3.9).
     """
     package = importlib.util.find_spec("triton")
     if package is not None and package.origin is not None:
         library = Path(package.origin).parent / "_C" / "libtriton.so"
-        with contextlib.suppress(OSError):  # then nobody can import it later either
+        with contextlib.suppress(OSError):  # nothing can import it later either
             ctypes.CDLL(str(library))
 
 
@@ -285,7 +285,7 @@ def _has_osmesa() -> bool:
 
 
 def _solids(model: RoverModel) -> dict[str, vtkActor]:
-    """One actor a solid, of all the parts that ride on it."""
+    """One actor per solid, with all parts fixed to it."""
     pieces: dict[str, list[tuple[Array, Faces, Array]]] = {}
     for part in look.rover_parts(model):
         vertices, triangles = look.part_mesh(part)
@@ -302,7 +302,7 @@ def _solids(model: RoverModel) -> dict[str, vtkActor]:
 
 
 def _arrow_actor(data: vtkPolyData) -> vtkActor:
-    """An arrow at each point along the array "force", as long as it says."""
+    """An arrow at each point, with the direction and length of the array "force"."""
     source = vtkArrowSource(tip_length=0.28, tip_radius=0.07, shaft_radius=0.025, tip_resolution=12, shaft_resolution=8)
     mapper = vtkGlyph3DMapper()
     mapper.SetInputData(data)

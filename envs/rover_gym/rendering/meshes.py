@@ -1,4 +1,4 @@
-"""Meshes and actors: what VTK draws, made from arrays."""
+"""VTK meshes and actors made from arrays."""
 
 from typing import Any, TypeAlias
 
@@ -18,10 +18,10 @@ def mesh(vertices: Array, faces: Faces, colours: Array, *, smooth: bool = True) 
     """A surface.
 
     Args:
-        vertices: (n, 3), m.
+        vertices: (n, 3) points, m.
         faces: (m, 3) or (m, 4), indices of vertices, counter-clockwise from outside.
-        colours: (n, 3), 0 to 1.
-        smooth: Gives vertices normals, so that light runs smoothly over faces that share them.
+        colours: (n, 3) red, green, blue, 0 to 1.
+        smooth: Adds vertex normals, so that shading is smooth across faces that share vertices.
     """
     data = vtkPolyData()
     set_points(data, vertices)
@@ -44,7 +44,7 @@ def mesh(vertices: Array, faces: Faces, colours: Array, *, smooth: bool = True) 
 
 
 def lattice(rows: int, columns: int) -> Faces:
-    """(rows * columns, 4): quadrangles between rows + 1 closed rings of `columns` vertices each, ring after ring."""
+    """(rows * columns, 4) quadrilaterals between rows + 1 closed rings of `columns` vertices each, ring after ring."""
     row, column = (index.ravel() for index in np.meshgrid(np.arange(rows), np.arange(columns)))
     following = (column + 1) % columns
     near, far = row * columns, (row + 1) * columns
@@ -74,14 +74,14 @@ def set_pose(actor: vtkActor, pose: Array) -> None:
 
 
 def actor_of(data: vtkPolyData, *, lit: bool = True) -> vtkActor:
-    """An actor for a surface; without light its colours are shown as they are."""
+    """An actor for a surface; without light its colours are unshaded."""
     mapper = vtkPolyDataMapper()
     mapper.SetInputData(data)
     return actor_with(mapper, lit=lit)
 
 
 def actor_with(mapper: vtkMapper, *, lit: bool = True) -> vtkActor:
-    """An actor with this project's one kind of surface: matt."""
+    """An actor with the matt surface that all actors of this project share."""
     actor = vtkActor()
     actor.SetMapper(mapper)
     surface = actor.GetProperty()
@@ -93,9 +93,9 @@ def actor_with(mapper: vtkMapper, *, lit: bool = True) -> vtkActor:
 
 
 def level(direction: Array, up: Array) -> Array:
-    """The unit vector at right angles to `up` that points most nearly along the direction."""
+    """The unit vector perpendicular to `up` that is closest to the direction."""
     flat: Array = direction - (direction @ up) * up
     length = float(np.linalg.norm(flat))
     if length > 1e-6:
         return flat / length
-    return level(np.array([0.0, 0.0, 1.0]), up)  # straight up or down: any level direction serves
+    return level(np.array([0.0, 0.0, 1.0]), up)  # straight up or down: any level direction will do

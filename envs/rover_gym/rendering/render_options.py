@@ -1,4 +1,4 @@
-"""What a frame shall show, checked without importing a renderer."""
+"""Render options, checked without importing a renderer."""
 
 import importlib.util
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ CAMERAS = ("follow", "side", "top")
 
 Camera: TypeAlias = str | tuple[tuple[float, ...], tuple[float, ...]]
 
-# A frame must hold something, and fit into a video and into memory.
+# A frame must not be empty, and must fit into a video and into memory.
 SMALLEST, LARGEST = 16, 8192
 
 
@@ -26,8 +26,8 @@ class RenderOptions:
         width: Pixels, even: a video's frames must be.
         height: Pixels, even.
         camera: "follow" looks from behind, above and the right and turns smoothly with the rover; "side" looks from
-            its right, low above the ground; "top" from straight above, x up. A pair (eye, target) of points in the
-            world, m, stands still.
+            its right, low above the ground; "top" looks straight down, x up. A pair (eye, target) of world points, m,
+            fixes the camera.
         show_forces: Draws contact forces as arrows, in front of everything.
         antialiasing: Smooths edges; in software a frame then takes about twice as long.
     """
@@ -40,14 +40,14 @@ class RenderOptions:
 
 
 def check_render_options(field: str, given: Mapping[str, Any]) -> RenderOptions:
-    """The options with their defaults.
+    """The given options, completed with defaults.
 
     Args:
         field: The argument's name, which errors name before the option's; may be empty.
         given: Attributes of `RenderOptions` by name.
 
     Raises:
-        OptionError: A name is unknown or a value out of its range.
+        OptionError: A name is unknown or a value is out of range.
     """
     known_keys(field or "options", given, [entry.name for entry in fields(RenderOptions)])
     options = dict(given)
@@ -67,7 +67,7 @@ def check_render_options(field: str, given: Mapping[str, Any]) -> RenderOptions:
 
 
 def check_render_mode(field: str, render_mode: object) -> str:
-    """A mode that the environment can render, and whose packages are installed.
+    """Checks that the environment knows the mode and that its packages are installed.
 
     Raises:
         OptionError: The mode is unknown.

@@ -1,4 +1,4 @@
-"""What stands around the rover: sun and sky, checkered ground, rocks, shadows and the goal's flag."""
+"""The rover's surroundings: sun and sky, checkered ground, rocks, shadows and the goal's flag."""
 
 import math
 
@@ -22,24 +22,24 @@ from rover_gym.rendering.meshes import (
     set_pose,
 )
 
-# The sun stands still: direction to it, x forward, y up, z right.
+# Direction to the sun, fixed: x forward, y up, z right.
 SUN = np.array([-0.35, 0.80, 0.50]) / math.sqrt(0.35**2 + 0.80**2 + 0.50**2)
-SHADOW = 0.55  # brightness of ground in the shadow
-LIFT = 0.004  # m, of shadows above the ground and of the goal's ring above shadows, so that they do not flicker
+SHADOW = 0.55  # brightness of shadowed ground
+LIFT = 0.004  # m, offset of shadows above the ground and of the goal's ring above shadows, against flicker
 
 TILE = 0.5  # m, of the checkered ground
 NEAR, FAR = 20.0, 160.0  # m, half edges of the checkered ground and of the ground beyond
-HAZE = 12.0, 60.0  # m, where it begins and where the ground has the horizon's colour
+HAZE = 12.0, 60.0  # m, where the haze begins and where the ground has the horizon's colour
 
-# Spheres are drawn with as many facets as their size in the picture deserves, since most of a frame's time goes into
-# facets: (within this many radii of the rover, but at most so many m; facets around; with a shadow).
+# The number of facets of a sphere depends on its size in the picture, since most of a frame's time goes into facets:
+# (within this many radii of the rover, but at most so many m; facets around; with a shadow).
 SPHERE_RANGES = ((40.0, 4.0, 18, True), (250.0, 12.0, 8, True), (math.inf, math.inf, 6, False))
 
 Goal = tuple[float, float]
 
 
 def sun(intensity: float) -> vtkLight:
-    """The light that throws the shadows."""
+    """The light that casts the shadows."""
     light = vtkLight()
     light.SetLightTypeToSceneLight()
     light.PositionalOff()
@@ -76,7 +76,7 @@ class GroundActors:
 
     Attributes:
         actor: What VTK draws.
-        flatten: (4, 4), brings a point along the sun's rays onto the plane, a hair above it; shadows are made with it.
+        flatten: (4, 4) projection along the sun's rays onto a plane just above the ground; it makes the shadows.
     """
 
     def __init__(self, plane: Plane) -> None:
@@ -91,7 +91,7 @@ class GroundActors:
         self.actor = self._draw(brightness=0.45 + 0.55 * across / float(SUN[1]))
 
     def follow(self, position: Array) -> None:
-        """Moves the mesh near to a place by whole pairs of tiles: the checkers stay where they are in the world."""
+        """Moves the mesh towards a position by whole pairs of tiles, so that the checkers stay fixed in the world."""
         pairs = np.round((position - self._foot) @ self._along / (2.0 * TILE))
         shift = np.eye(4)
         shift[:3, 3] = self._along @ (2.0 * TILE * pairs)
@@ -102,7 +102,7 @@ class GroundActors:
         column, row = (index.ravel() for index in np.meshgrid(np.arange(count), np.arange(count)))
         corners = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])
         tiles = ((np.column_stack((column, row))[:, None, :] + corners) * TILE - NEAR).reshape(-1, 2)
-        # Beyond: rings of squares, as coarse as their distance allows.
+        # Beyond: rings of squares, coarser with distance.
         edges = np.array([NEAR, 30.0, 45.0, 70.0, FAR])
         square = np.array([[-1, -1], [-1, 1], [1, 1], [1, -1]])
         steps = np.linspace(0.0, 1.0, 8, endpoint=False)[:, None]
@@ -119,7 +119,7 @@ class GroundActors:
         odd = np.repeat((column + row) % 2, 4)[:, None] == 1
         colours = np.vstack((np.where(odd, dark, light), np.broadcast_to(mean, (len(beyond), 3))))
         colours = mean + np.clip(1.0 - distance / NEAR, 0.0, 1.0) * (colours - mean)
-        colours *= brightness  # lit here, once, since haze has no light of its own
+        colours *= brightness  # lit here, once, since haze is drawn unlit
         haze = np.clip((distance - HAZE[0]) / (HAZE[1] - HAZE[0]), 0.0, 1.0)
         haze = haze * haze * (3.0 - 2.0 * haze)
         colours += haze * (np.array(look.SKY_COLOUR) - colours)
@@ -136,7 +136,7 @@ class RockActors:
 
     def __init__(self, terrain: SphereField, ground: GroundActors | None) -> None:
         self._centres, self._radii = terrain.centres, terrain.radii
-        # No two rocks are quite alike: the golden ratio spreads the shades evenly.
+        # Each rock has its own shade: the golden ratio spreads the shades evenly.
         shade = 0.86 + 0.28 * (np.arange(len(self._radii)) * 0.6180339887 % 1.0)
         self._colours = shade[:, None] * np.array(look.ROCK_COLOUR)
         self._place: tuple[float, ...] | None = None
@@ -148,7 +148,7 @@ class RockActors:
                 self.actors.append(_shadow(actor_with(_spheres(points, min(facets, 10), coloured=False)), ground))
 
     def follow(self, position: Array) -> None:
-        """Sorts the spheres by their distance from a place."""
+        """Sorts the spheres into levels of detail by their distance from a position."""
         place = tuple(np.round(position).tolist())
         if place == self._place:
             return
@@ -175,7 +175,7 @@ def shadow_of(actor: vtkActor, ground: GroundActors) -> vtkActor:
 
 
 def flag(goal: Goal, tolerance: float, terrain: Plane | SphereField, ground: GroundActors | None) -> list[vtkActor]:
-    """A pole with a pennant, and on a plane the ring within which the goal is reached."""
+    """A pole with a pennant and, on a plane, the ring within which the goal counts as reached."""
     x, z = goal
     height = terrain.height(x, z) if isinstance(terrain, Plane) else float(terrain.heights([[x, z]])[0])
     foot = np.array([x, 0.0 if math.isnan(height) else height, z])
@@ -197,7 +197,7 @@ def flag(goal: Goal, tolerance: float, terrain: Plane | SphereField, ground: Gro
 
 
 def _ring(centre: Array, radius: float, plane: Plane) -> vtkActor:
-    """Where a point of the plane has the radius as its horizontal distance."""
+    """The circle on the plane at a given horizontal radius."""
     n, around = plane.normal, 64
     angle = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
     circle = np.column_stack((np.cos(angle), np.zeros(around), np.sin(angle)))

@@ -1,4 +1,4 @@
-"""Frames into an mp4 file (H.264), one at a time, so that a long run does not gather them in memory."""
+"""Writes frames to an mp4 file (H.264) one at a time, so that a long run does not hold them in memory."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ class VideoWriter:
     """Writes frames of one size to an mp4 file; a context manager.
 
     Args:
-        path: The file to make; an existing one is replaced. Its folder is made with the first frame.
+        path: The file to write; an existing file is replaced. Its folder is created with the first frame.
         fps: Frames per second.
 
     Raises:
-        OptionError: The file's name has another ending.
+        OptionError: The file name has another extension.
         MissingExtraError: imageio-ffmpeg is not installed.
     """
 
     def __init__(self, path: str | Path, fps: float) -> None:
         try:
-            import imageio_ffmpeg  # noqa: PLC0415 - only who makes a video needs it
+            import imageio_ffmpeg  # noqa: PLC0415 - only needed for videos
         except ModuleNotFoundError as error:
             raise MissingExtraError("imageio-ffmpeg", "render") from error
         self.path = Path(path)
@@ -44,7 +44,7 @@ class VideoWriter:
         self._writer: Generator[None, npt.NDArray[np.uint8] | None, None] | None = None
 
     def append(self, frame: npt.NDArray[np.uint8]) -> None:
-        """Adds a frame, (height, width, 3) uint8, both even."""
+        """Adds a frame (height, width, 3) uint8 with even height and width."""
         if self._writer is None:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             height, width, _ = frame.shape

@@ -1,4 +1,4 @@
-"""Saved runs as files that other programs show: a page for the browser, VRML97, glTF."""
+"""Exports saved runs for other programs: a browser page, VRML97, glTF."""
 
 from rover_gym.replay.gltf import write_gltf
 from rover_gym.replay.page import write_page

@@ -1,7 +1,7 @@
-"""glTF 2.0 in one binary file (.glb) with the whole motion: what today's viewers and modellers read.
+"""Export of a run as glTF 2.0: one binary file (.glb) with the whole motion.
 
-Every solid is a node with a translation and a rotation channel; its parts are one mesh with a primitive a colour.
-glTF's units and axes are the world's: metres, y up, quaternions x, y, z, w.
+Every solid is a node with a translation and a rotation channel; its parts form one mesh with one primitive per colour.
+glTF uses the world's units and axes: metres, y up; its quaternions are x, y, z, w.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ def write_gltf(run: RoverRun, path: str | Path) -> Path:
     """Writes a run as binary glTF.
 
     Args:
-        run: The run; every sample becomes a key of the motion.
-        path: The file to write, by custom `.glb`. Its folder is made.
+        run: The run; every sample becomes a keyframe.
+        path: The file to write, usually `.glb`. Its folder is created.
 
     Raises:
         MissingExtraError: pygltflib is not installed.
@@ -61,7 +61,7 @@ def write_gltf(run: RoverRun, path: str | Path) -> Path:
 
 
 class _Writer:
-    """Gathers nodes, meshes and one animation; numbers go into one buffer."""
+    """Collects nodes, meshes and one animation; all numbers go into one buffer."""
 
     def __init__(self, library: Any) -> None:
         self._lib = library
@@ -75,11 +75,11 @@ class _Writer:
         self._materials: dict[Colour, int] = {}
 
     def add_parts(self, name: str, parts: tuple[Part, ...]) -> int | None:
-        """A mesh of parts, or None where there are none."""
+        """A mesh of parts, or None if there are none."""
         return self.add_mesh(name, coloured_meshes(parts)) if parts else None
 
     def add_mesh(self, name: str, surfaces: Iterable[tuple[Colour, Array, Array]]) -> int:
-        """A mesh with one primitive a surface (colour, vertices, triangles)."""
+        """A mesh with one primitive per surface (colour, vertices, triangles)."""
         lib = self._lib
         primitives = []
         for colour, vertices, triangles in surfaces:
@@ -133,7 +133,7 @@ class _Writer:
 
     def _accessor(self, values: Array, form: str, target: int | None, *, bounds: bool = False) -> int:
         lib = self._lib
-        data = values.tobytes()  # 4-byte numbers all of them, so every view is aligned
+        data = values.tobytes()  # all numbers have 4 bytes, so every view is aligned
         self._gltf.bufferViews.append(
             lib.BufferView(buffer=0, byteOffset=self._size, byteLength=len(data), target=target)
         )

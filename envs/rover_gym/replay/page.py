@@ -1,4 +1,4 @@
-"""A page for the browser: the run in 3D with a timeline, its curves beside it, in one file that needs no network."""
+"""Export of a run as a browser page: 3D view, timeline and curves in one file that needs no network."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ from rover_gym.replay.scenery import (
 if TYPE_CHECKING:
     from rover_gym.record.rover_run import RoverRun
 
-#: One colour a wheel, Okabe and Ito's, told apart by colour-blind readers too.
+#: One colour per wheel: Okabe and Ito's palette, safe for colour-blind readers.
 WHEEL_COLOURS = ("#0072B2", "#56B4E9", "#009E73", "#D55E00", "#CC79A7", "#E69F00")
-LARGE = 0.12  # m, radius from which a sphere is drawn with more triangles
-MANY = 1000  # spheres, from which it is drawn with fewer again
-FOLLOW_TIME = 1.0  # s, over which the path that the eye follows is smoothed
+LARGE = 0.12  # m, radius above which a sphere gets more triangles
+MANY = 1000  # number of spheres above which each gets fewer again
+FOLLOW_TIME = 1.0  # s, smoothing window of the path that the eye follows
 
 Array = npt.NDArray[np.float64]
 
 
 def write_page(run: RoverRun, path: str | Path, *, follow: bool = True) -> Path:
-    """Writes a run as one page for the browser.
+    """Writes a run as a single browser page.
 
     Args:
         run: The run; every sample becomes a frame of the replay.
-        path: The file to write, by custom `.html`. Its folder is made.
-        follow: Whether the eye goes with the rover; otherwise the ground stands still.
+        path: The file to write, usually `.html`. Its folder is created.
+        follow: Whether the eye follows the rover; otherwise the ground stays fixed.
 
     Raises:
         MissingExtraError: viser is not installed.
@@ -55,7 +55,7 @@ def write_page(run: RoverRun, path: str | Path, *, follow: bool = True) -> Path:
         server.initial_camera.fov = view.field_of_view
         recording = server.get_scene_serializer()
         turns = continuous(quaternions(run.rotations))
-        with server.atomic():  # or each of the thousands of updates would wake the server's thread
+        with server.atomic():  # otherwise each of the thousands of updates would wake the server's thread
             for frame, pause in enumerate(np.diff(run.time, append=run.time[-1])):
                 world.position = shortened(-centre[frame])
                 for i, solid in enumerate(solids):
@@ -70,14 +70,14 @@ def write_page(run: RoverRun, path: str | Path, *, follow: bool = True) -> Path:
 
 
 def _build(run: RoverRun, scene: Any) -> tuple[Any, list[Any]]:
-    """Builds the scene and returns what moves: the frame of the whole world, and those of the solids."""
+    """Builds the scene and returns the moving frames: the whole world's, and those of the solids."""
     add_surroundings(scene)
     world = scene.add_frame("/world", show_axes=False)
     solids = []
     named = parts_by_solid(run)
     nodes = identifiers(named)
     for name, parts in named.items():
-        # In a folder of their own: a solid may be called as the ground is.
+        # In a separate folder: a solid may have the same name as the ground.
         solids.append(scene.add_frame(f"/world/solids/{nodes[name]}", show_axes=False))
         add_meshes(scene, f"/world/solids/{nodes[name]}", coloured_meshes(parts))
     tiles = ground_tiles(run)
@@ -108,7 +108,7 @@ def _build(run: RoverRun, scene: Any) -> tuple[Any, list[Any]]:
 
 
 def _followed(run: RoverRun) -> Array:
-    """(n, 3) the trunk's path, smoothed, so that the eye does not shake with the rover."""
+    """(n, 3) smoothed path of the trunk, so that the eye does not shake with the rover."""
     path = trunk_path(run)
     spans = np.abs(run.time[:, None] - run.time) <= FOLLOW_TIME / 2
     result: Array = spans @ path / spans.sum(axis=1, keepdims=True)
@@ -116,7 +116,7 @@ def _followed(run: RoverRun) -> Array:
 
 
 def _curves(run: RoverRun) -> dict[str, Any]:
-    """What the panel draws: its title, the time, and for each chart a curve a wheel."""
+    """Contents of the panel: its title, the time, and for each chart one curve per wheel."""
     data, wheels = run.trajectory, run.model.wheel_names
     charts = [
         ("wheel load", "N", data["wheel_forces"][:, :, 0], 1),

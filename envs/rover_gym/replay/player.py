@@ -1,7 +1,7 @@
-"""What all pages for the browser share: viser's scene and player, and our curves beside them.
+"""Shared parts of the browser pages: viser's scene and player, and our curves beside them.
 
-The scene and its player are viser's [https://viser.studio]: its recording of scene updates, within the client that its
-package carries. The curves are drawn by a small script of ours, `panel.js`, that follows the player's own clock.
+Scene and player come from viser [https://viser.studio]: its recording of scene updates, embedded in the client that
+its package includes. Our script `panel.js` draws the curves and follows the player's clock.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ Array = npt.NDArray[np.float64]
 
 @contextmanager
 def hidden_server() -> Iterator[Any]:
-    """A viser server that only this process sees: it holds the scene that is recorded.
+    """A viser server for this process only; it holds the recorded scene.
 
     Raises:
         MissingExtraError: viser is not installed.
     """
     viser = require("viser", "replay")
-    with redirect_stdout(io.StringIO()):  # it announces its address, which nobody needs
+    with redirect_stdout(io.StringIO()):  # suppresses the announcement of its address
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
         yield server
@@ -44,7 +44,7 @@ def hidden_server() -> Iterator[Any]:
 
 
 def add_surroundings(scene: Any) -> None:
-    """Says where up is, and adds light and sky."""
+    """Sets the up direction, and adds light and sky."""
     scene.set_up_direction("+y")
     scene.configure_environment_map(None)  # a third of the time of a frame without it, where there is no GPU
     scene.add_light_hemisphere("/sky", sky_color=rgb(SKY_COLOUR), ground_color=rgb(GROUND_COLOUR), intensity=1.2)
@@ -55,7 +55,7 @@ def add_surroundings(scene: Any) -> None:
 def add_meshes(
     scene: Any, name: str, meshes: Iterable[tuple[Colour, Array, npt.NDArray[np.int32]]], *, cast_shadow: bool = True
 ) -> None:
-    """Adds surfaces, each a colour, vertices (n, 3) and triangles (m, 3)."""
+    """Adds surfaces, each given by a colour, vertices (n, 3) and triangles (m, 3)."""
     for i, (colour, vertices, triangles) in enumerate(meshes):
         used, corners = np.unique(triangles, return_inverse=True)
         scene.add_mesh_simple(
@@ -64,27 +64,27 @@ def add_meshes(
 
 
 def rgb(colour: Colour) -> tuple[int, int, int]:
-    """A colour in viser's numbers, 0 to 255."""
+    """A colour in viser's range, 0 to 255."""
     red, green, blue = (round(255 * value) for value in colour)
     return red, green, blue
 
 
 def shortened(values: Array, bits: int = 18) -> Array:
-    """Values to 2^-bits, 4 micrometres or microradians, as binary fractions: their zeros make the recording smaller."""
+    """Values rounded to 2^-bits (4 micrometres or microradians): the trailing zero bits compress well."""
     result: Array = np.round(values * 2.0**bits) / 2.0**bits
     return result
 
 
 def rounded(values: Array, digits: int) -> list[float | None]:
-    """Values for JSON, which knows neither nan nor infinity: where one is not known, the curve has a hole."""
+    """Values for JSON, which has neither nan nor infinity: unknown values leave gaps in the curve."""
     return [round(float(value), digits) if np.isfinite(value) else None for value in values]
 
 
 def with_panel(page: str, title: str, curves: Mapping[str, Any]) -> str:
-    """Viser's page with our panel beside its scene."""
+    """Viser's page with our panel beside the scene."""
     files = resources.files("rover_gym.replay")
     style, script = (files.joinpath(name).read_text(encoding="utf-8") for name in ("panel.css", "panel.js"))
-    data = json.dumps(curves, separators=(",", ":")).replace("<", "\\u003c")  # no tag may end the script
+    data = json.dumps(curves, separators=(",", ":")).replace("<", "\\u003c")  # no closing tag may end the script early
     panel = (
         f"<style>{style}</style>"
         '<aside id="panel"></aside>'

@@ -1,8 +1,8 @@
-"""Rotations as the formats want them: unit quaternions, and axis with angle; safe at angle 0 and at angle pi.
+"""Rotations for export: unit quaternions, and axis with angle; accurate near angle 0 and angle pi.
 
-An axis taken from the skew part of a matrix is lost at both: there the skew part vanishes. A quaternion is taken from
-the largest of its four components instead (Shepperd 1978), and the axis from the quaternion's vector part, which is
-small only where the rotation is small and then still has its direction.
+The skew part of a rotation matrix vanishes at both angles, and with it the axis. The quaternion is therefore computed
+from the largest of its four components (Shepperd 1978), and the axis from the quaternion's vector part, which is small
+only for small rotations and still has the right direction there.
 """
 
 import numpy as np
@@ -37,7 +37,7 @@ def quaternions(rotations: Array) -> Array:
 
 
 def continuous(q: Array) -> Array:
-    """The same rotations along the first axis without a change of sign, so that in-betweens take the short way.
+    """The same rotations without sign flips along the first axis, so that interpolation takes the short way.
 
     Args:
         q: (n, ..., 4) unit quaternions.
@@ -55,7 +55,7 @@ def axis_angles(q: Array) -> Array:
         q: (..., 4) w, x, y, z.
 
     Returns:
-        (..., 4) unit axis and angle, rad, in 0 to 2 pi; the axis is y where there is no rotation at all.
+        (..., 4) unit axis and angle, rad, in 0 to 2 pi; the axis of the identity is y.
     """
     vector = q[..., 1:]
     length = np.linalg.norm(vector, axis=-1, keepdims=True)

@@ -1,4 +1,4 @@
-"""What stands around the rover in every format: a checkered patch of ground, spheres, the goal, an eye."""
+"""The scenery of every export format: a checkered patch of ground, spheres, the goal and a viewpoint."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
     from rover_gym.record.rover_run import RoverRun
 
-TILE = 0.5  # m, edge of the ground's squares, doubled until the ground has not too many
+TILE = 0.5  # m, edge of the ground's squares, doubled until their number is acceptable
 MOST_TILES = 20_000
-MARGIN = 5.0  # m of ground about the path
+MARGIN = 5.0  # m of ground around the path
 LONGEST_NAME = 60
 GOAL_POLE = 0.8  # m, height
 
@@ -29,7 +29,7 @@ Triangles = npt.NDArray[np.int32]
 
 @dataclass(frozen=True)
 class View:
-    """Where to look from: eye and target, world, m, and the vertical field of view, rad."""
+    """A viewpoint: eye and target in the world frame, m, and the vertical field of view, rad."""
 
     eye: Array
     target: Array
@@ -37,14 +37,14 @@ class View:
 
 
 def identifiers(names: Iterable[str], taken: Iterable[str] = (), endings: Iterable[str] = ()) -> dict[str, str]:
-    """A name for each name that needs no escape in any format: letters, digits and underscores, a letter first.
+    """Identifiers for names, valid in every format: letters, digits and underscores, a letter first.
 
-    Names that are so already stay; others get underscores, and a number where two would be one.
+    Valid names stay; others get underscores, and a number where two would collide.
 
     Args:
-        names: As a file gives them: any text.
-        taken: Names that are used for something else.
-        endings: With each of these added, a name must be free too.
+        names: Names from a file, any text.
+        taken: Names already in use.
+        endings: A name must also be free with each of these suffixes.
     """
     used, result, forms = set(taken), {}, ("", *endings)
     for name in names:
@@ -60,7 +60,7 @@ def identifiers(names: Iterable[str], taken: Iterable[str] = (), endings: Iterab
 
 
 def trunk_path(run: RoverRun) -> Array:
-    """(n, 3) origin of the trunk, world, m."""
+    """(n, 3) trunk origin in the world frame, m."""
     path: Array = run.trajectory["q"][:, :3]
     return path
 
@@ -78,9 +78,9 @@ def spheres(run: RoverRun) -> tuple[Array, Array]:
 
 
 def ground_tiles(run: RoverRun) -> tuple[Array, Triangles, Triangles] | None:
-    """Squares of the plane about path and goal: vertices (n, 3), m, and the triangles of both colours.
+    """Squares of the plane around path and goal: vertices (n, 3), m, and the triangles of both colours.
 
-    Each square has vertices of its own: two triangles, counter-clockwise seen from above. None without a plane.
+    Each square has separate vertices and two triangles, counter-clockwise seen from above. None without a plane.
     """
     plane = ground_plane(run)
     if plane is None:
@@ -110,7 +110,7 @@ def ground_tiles(run: RoverRun) -> tuple[Array, Triangles, Triangles] | None:
 
 
 def goal_parts(run: RoverRun) -> tuple[Part, ...]:
-    """A pole with a knob at the goal, in the world's frame; none where there is no goal."""
+    """A pole with a knob at the goal, in the world frame; empty without a goal."""
     if run.goal is None:
         return ()
     x, z = run.goal
@@ -123,7 +123,7 @@ def goal_parts(run: RoverRun) -> tuple[Part, ...]:
 
 
 def coloured_meshes(parts: tuple[Part, ...]) -> Iterator[tuple[Colour, Array, Triangles]]:
-    """The parts' surfaces in their solid's frame, one mesh a colour."""
+    """The parts' surfaces in their solid's frame, one mesh per colour."""
     for colour in dict.fromkeys(part.colour for part in parts):
         vertices, triangles, n = [], [], 0
         for part in parts:
@@ -136,7 +136,7 @@ def coloured_meshes(parts: tuple[Part, ...]) -> Iterator[tuple[Colour, Array, Tr
 
 
 def parts_by_solid(run: RoverRun) -> dict[str, tuple[Part, ...]]:
-    """The rover's parts, by the solid that they ride on; every solid has its entry."""
+    """The rover's parts by solid; every solid has an entry."""
     parts = rover_parts(run.model)
     return {name: tuple(part for part in parts if part.solid == name) for name in run.model.solid_names}
 
@@ -145,7 +145,7 @@ def first_view(run: RoverRun, distance: float = 4.0) -> View:
     """From beside and a little behind the rover at its start, so that it drives away from the eye."""
     path = trunk_path(run)
     way = (path[-1] - path[0])[[0, 2]]
-    if np.linalg.norm(way) < 0.1:  # it stays: look at its nose
+    if np.linalg.norm(way) < 0.1:  # it stands still: look at its nose
         heading = run.trajectory["q"][0, 4]
         way = -np.array([np.cos(heading), -np.sin(heading)])
     ahead = way / np.linalg.norm(way)

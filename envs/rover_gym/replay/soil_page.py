@@ -1,4 +1,4 @@
-"""The page of a run on a soil of disks: disks, wheels and force chains on a timeline, curves beside them."""
+"""Export of a soil run as a browser page: disks, wheels and force chains on a timeline, with curves."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ from rover_gym.replay.player import add_meshes, add_surroundings, hidden_server,
 if TYPE_CHECKING:
     from rover_gym.soil.soil_run import SoilRun
 
-#: Curves of the back and of the front wheel.
+#: Curve colours of the back and front wheel.
 WHEEL_COLOURS = ("#0072B2", "#D55E00")
 SAND_COLOURS: tuple[Colour, Colour] = (
     (0.86, 0.74, 0.54),
     (0.66, 0.51, 0.33),
-)  # of a disk's halves: they show its turning
-DEPTH = 1.0  # of disks along the axis that the plane does not have, in their mean diameter
-BATCH = 100  # disks that are drawn at once: those of a batch where nothing moves need no update
-CHAINS = 300  # contacts that are drawn, the strongest
-SEEN = 2.6  # m of the soil that the eye sees at once
-ASPECT = 1.2  # of the picture, width over height, that they fill
-FIELD_OF_VIEW = 0.35  # rad, vertical: narrow and from afar, so that the plane stays a plane
-FOLLOW_TIME = 1.0  # s, over which the path that the eye follows is smoothed
+)  # of a disk's halves: they show its rotation
+DEPTH = 1.0  # out-of-plane thickness of disks, in mean diameters
+BATCH = 100  # disks per batch: a batch in which nothing moves needs no update
+CHAINS = 300  # strongest contacts drawn
+SEEN = 2.6  # m of soil in view
+ASPECT = 1.2  # width over height of the picture
+FIELD_OF_VIEW = 0.35  # rad, vertical: narrow and far away, for little perspective
+FOLLOW_TIME = 1.0  # s, smoothing window of the path that the eye follows
 
 Array = npt.NDArray[np.float64]
 
 
 def write_soil_page(run: SoilRun, path: str | Path, *, follow: bool = True) -> Path:
-    """Writes a run on a soil as one page for the browser.
+    """Writes a soil run as a single browser page.
 
     Args:
         run: The run; every sample becomes a frame of the replay.
-        path: The file to write, by custom `.html`. Its folder is made.
-        follow: Whether the eye goes with the rover over a soil that is wider than the picture.
+        path: The file to write, usually `.html`. Its folder is created.
+        follow: Whether the eye follows the rover over a soil wider than the picture.
 
     Raises:
         MissingExtraError: viser is not installed.
@@ -57,7 +57,7 @@ def write_soil_page(run: SoilRun, path: str | Path, *, follow: bool = True) -> P
     with hidden_server() as server:
         scene = server.scene
         add_surroundings(scene)
-        scene.add_light_directional("/front", intensity=1.5, position=(1.0, 2.0, 6.0))  # the disks' faces look there
+        scene.add_light_directional("/front", intensity=1.5, position=(1.0, 2.0, 6.0))  # the disks face this way
         world = scene.add_frame("/world", show_axes=False)
         moving: list[_Disks | _Wheels | _Chains] = [_Disks(run, scene), _Wheels(run, scene), _Chains(run, scene)]
         _add_walls(run, scene)
@@ -81,7 +81,7 @@ def write_soil_page(run: SoilRun, path: str | Path, *, follow: bool = True) -> P
 
 
 def _about_z(angles: Array) -> Array:
-    """(n, 4) unit quaternions w, x, y, z of turns about z."""
+    """(n, 4) unit quaternions w, x, y, z of rotations about z."""
     turns = np.zeros((len(angles), 4))
     turns[:, 0], turns[:, 3] = np.cos(0.5 * angles), np.sin(0.5 * angles)
     return turns
@@ -117,7 +117,7 @@ class _Disks:
         ]
 
     def show(self, frame: int) -> None:
-        """Moves what moved since the frame before."""
+        """Updates the disks that moved since the previous frame."""
         for i, (batch, handle) in enumerate(zip(self._batches, self._handles, strict=True)):
             places = shortened(self._run.positions[frame, batch], 13)
             if not np.array_equal(places, self._shown[i]):
@@ -127,7 +127,7 @@ class _Disks:
 
 
 class _Wheels:
-    """Wheels and, between two of them, the body."""
+    """The wheels and, between two wheels, the body."""
 
     def __init__(self, run: SoilRun, scene: Any) -> None:
         self._run, self._depth = run, _depth(run)
@@ -179,7 +179,7 @@ class _Chains:
         )
 
     def show(self, frame: int) -> None:
-        """Lays the bars anew."""
+        """Updates the bars."""
         chains = self._run.force_chains[frame, : self._n]
         start, end = chains[:, :2], chains[:, 2:4]
         along = end - start
@@ -193,7 +193,7 @@ class _Chains:
 
 
 def _disk_mesh(sides: int) -> Any:
-    """A trimesh cylinder about z of radius 1 and height 1 with two colours; its back, which nobody sees, is open."""
+    """A trimesh cylinder about z of radius 1 and height 1 with two colours; its hidden back is open."""
     trimesh = require("trimesh", "replay")
     around = 2.0 * np.pi * np.arange(sides) / sides
     rim = np.stack((np.cos(around), np.sin(around), np.full(sides, 0.5)), axis=1)
@@ -252,7 +252,7 @@ def _add_walls(run: SoilRun, scene: Any) -> None:
 
 
 def _eye(run: SoilRun, *, follow: bool) -> Array:
-    """(n, 2) the point in the picture's middle: the rover's, smoothed, kept so that the picture is full of soil."""
+    """(n, 2) centre of the picture: the rover's smoothed path, clamped so that soil fills the picture."""
     x = run.positions[0, :, 0]
     left, right = float(x.min()), float(x.max())
     height = float(run.wheels[0, :, 1].mean()) if run.wheels.size else 0.0
@@ -265,7 +265,7 @@ def _eye(run: SoilRun, *, follow: bool) -> Array:
 
 
 def _curves(run: SoilRun) -> dict[str, Any]:
-    """What the panel draws."""
+    """Contents of the panel."""
     names = ("wheel",) if run.wheels.shape[1] == 1 else ("back", "front")
     charts = [
         ("load of the wheel", "N", run.wheel_forces[..., 1], 1),

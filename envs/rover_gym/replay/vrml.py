@@ -1,7 +1,7 @@
-"""VRML97 (ISO/IEC 14772): a text file with the whole motion, which old and new VRML and X3D viewers play.
+"""Export of a run as VRML97 (ISO/IEC 14772): a text file with the whole motion, for VRML and X3D viewers.
 
-Every solid is a `Transform` whose place and turn come from a `PositionInterpolator` and an `OrientationInterpolator`,
-both driven by one `TimeSensor`. VRML's axes are the world's: y up, metres, rotations as axis and angle.
+Every solid is a `Transform` moved by a `PositionInterpolator` and an `OrientationInterpolator`; one `TimeSensor`
+drives all of them. VRML uses the world's axes and units: y up, metres; its rotations are axis and angle.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from rover_gym.record.rover_run import RoverRun
 
-#: Words that name no node: VRML's own, and what is defined below.
+#: Reserved node names: VRML's keywords, and the names defined below.
 TAKEN = (
     *("DEF", "EXTERNPROTO", "FALSE", "IS", "NULL", "PROTO", "ROUTE", "TO", "TRUE", "USE"),
     *("eventIn", "eventOut", "exposedField", "field", "Clock", "Ground", "Rock", "Spheres"),
@@ -42,8 +42,8 @@ def write_vrml(run: RoverRun, path: str | Path) -> Path:
     """Writes a run as VRML97.
 
     Args:
-        run: The run; every sample becomes a key of the motion.
-        path: The file to write, by custom `.wrl`. Its folder is made.
+        run: The run; every sample becomes a keyframe.
+        path: The file to write, usually `.wrl`. Its folder is created.
 
     Raises:
         OSError: The file cannot be written.
@@ -128,7 +128,7 @@ def _part(part: Part) -> str:
         geometry = f"Sphere {{ radius {_numbers(part.size)} }}"
     else:
         radius, height = part.size
-        geometry = f"Cylinder {{ radius {_numbers([radius])} height {_numbers([height])} }}"  # about y, as ours
+        geometry = f"Cylinder {{ radius {_numbers([radius])} height {_numbers([height])} }}"  # about y, as in the model
     turn = axis_angles(quaternions(part.rotation))
     return (
         f"Transform {{ translation {_numbers(part.position)} rotation {_numbers(turn)}"
@@ -141,7 +141,7 @@ def _appearance(colour: Colour) -> str:
 
 
 def _looking(way: Array) -> Array:
-    """Rotation of a camera, which looks along its -z with y up, to look along `way`."""
+    """Rotation that points a camera, which looks along its -z with y up, along `way`."""
     z = -way / np.linalg.norm(way)
     x = np.cross((0.0, 1.0, 0.0), z)
     x /= np.linalg.norm(x)
@@ -149,12 +149,12 @@ def _looking(way: Array) -> Array:
 
 
 def _numbers(values: Iterable[float]) -> str:
-    # Places to 0.1 micrometre and turns to 1e-7; a viewer keeps single precision anyway.
+    # Positions to 0.1 micrometre and rotations to 1e-7; viewers use single precision anyway.
     return " ".join(f"{round(float(value), 7) + 0.0:.9g}" for value in values)
 
 
 def _string(text: str) -> str:
-    # A string may hold any character but an unescaped quote; what cannot be printed says nothing to a reader.
+    # A string may hold any character except an unescaped quote; unprintable characters become spaces.
     text = "".join(letter if letter.isprintable() else " " for letter in text)
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'

@@ -1,8 +1,9 @@
 """The balls of the report's figures 3.2 to 3.5: on a line and on a sine.
 
-The report's text states other parameters than its figures were made with. These are the figures' own, SI: a ball of
-3 kg, radius 1.5 m, inertia 4.05 kg m2, restitution 0.7, g = 9.8, step 0.5 ms; first y = -x/2 + 1/2 from (5, 10), then
-y = sin x from (-2.5, 1). In both the ball's *centre* stops at the ground ("centre_height").
+The parameters in the report's text differ from those of its figures. This module uses those of the figures, in SI: a
+ball of 3 kg, radius 1.5 m, inertia 4.05 kg m2, restitution 0.7, g = 9.8, step 0.5 ms; first y = -x/2 + 1/2 from
+(5, 10), then y = sin x from (-2.5, 1). In both, contact occurs when the ball's *centre* reaches the ground
+("centre_height").
 """
 
 from __future__ import annotations
@@ -28,17 +29,17 @@ BALL: dict[str, Any] = {
 
 @cache
 def published() -> dict[str, Any]:
-    """The report's curves of figures 3.2 to 3.5, by figure and curve."""
+    """The report's curves in figures 3.2 to 3.5, by figure and curve."""
     text = resources.files("rover_gym").joinpath("data/chapter_3.json").read_text(encoding="utf-8")
     data: dict[str, Any] = json.loads(text)
     return data["published"]  # type: ignore[no-any-return]
 
 
 def ball_on_incline(contact: str = "centre_height") -> tuple[BallSimulation, float]:
-    """The ball of figures 3.2 and 3.3 at its start, and how long it runs, s.
+    """The ball of figures 3.2 and 3.3 in its initial state, and the duration of its run, s.
 
     Args:
-        contact: "centre_height" as the report's, or "nearest".
+        contact: "centre_height" as in the report, or "nearest".
     """
     sim = BallSimulation(Line(-0.5, 0.5), friction=0.6, contact=contact, stabilisation="none", **BALL)
     sim.set_state([5.0, 10.0, 0.0])
@@ -46,10 +47,10 @@ def ball_on_incline(contact: str = "centre_height") -> tuple[BallSimulation, flo
 
 
 def ball_on_sine(contact: str = "centre_height") -> tuple[BallSimulation, float]:
-    """The ball of figures 3.4 and 3.5 at its start, and how long it runs, s.
+    """The ball of figures 3.4 and 3.5 in its initial state, and the duration of its run, s.
 
     Args:
-        contact: "centre_height" as the report's, or "nearest": then the ball starts higher by its radius.
+        contact: "centre_height" as in the report, or "nearest", with which the ball starts one radius higher.
     """
     ground = Sine(1.0, 2.0 * np.pi)
     sim = BallSimulation(ground, friction=0.5, contact=contact, stabilisation="none", **BALL)

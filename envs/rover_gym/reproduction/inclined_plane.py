@@ -1,7 +1,7 @@
-"""Section 6.1 of the report: the rover dropped on an inclined plane, driven, its front wheels turned.
+"""Section 6.1 of the report: the rover dropped on an inclined plane and driven with its front wheels turned.
 
-The scene is the report's in SI units (docs/notation.md tells how they map): lengths times 0.01, gravity 0.0981 m/s²,
-wheel torque 0.2 N m, steering gains 1.5. The same scene was run with Siconos 4.4; those runs are in the package's data.
+The scene is the report's in SI units (docs/notation.md gives the mapping): lengths times 0.01, gravity 0.0981 m/s²,
+wheel torque 0.2 N m, steering gains 1.5. The package's data include runs of the same scene with Siconos 4.4.
 """
 
 import json
@@ -32,14 +32,14 @@ def plane() -> Plane:
 
 
 def simulation(time_step: float = 0.005, **options: Any) -> Simulation:
-    """The simulation at its start, motors on.
+    """The simulation in its initial state, motors on.
 
     Args:
-        time_step: s.
-        options: Passed on to `Simulation` (variant, theta, solver, ...).
+        time_step: Time step, s.
+        options: Passed to `Simulation` (variant, theta, solver, ...).
 
     Raises:
-        OptionError: An option is out of its range.
+        OptionError: An option is out of range.
     """
     model = report_model()
     sim = Simulation(
@@ -68,14 +68,14 @@ def run(
     Args:
         path: HDF5 file to write.
         duration: Time to simulate, s.
-        time_step: s.
-        progress: Called with the simulated time now and then.
-        options: Passed on to `Simulation`.
+        time_step: Time step, s.
+        progress: Called periodically with the simulated time.
+        options: Passed to `Simulation`.
 
     Raises:
-        OptionError: An option is out of its range.
+        OptionError: An option is out of range.
         MissingExtraError: h5py is not installed.
-        StepError: A step could not be taken; what came before is on the disk.
+        StepError: A step failed; the rows before it are on disk.
     """
     sim = simulation(time_step, **options)
     terrain = {"kind": "plane", "made_by": "rover_gym.reproduction.inclined_plane.plane()"}
@@ -87,16 +87,16 @@ def run(
 
 @cache
 def reference_data() -> dict[str, Any]:
-    """The report's curves (`published`) and the Siconos runs (`siconos`) that the package carries."""
+    """The report's curves (`published`) and the Siconos runs (`siconos`) in the package."""
     text = resources.files("rover_gym").joinpath("data/section_6_1.json").read_text(encoding="utf-8")
     data: dict[str, Any] = json.loads(text)
     return data
 
 
 def distance_to_siconos(trajectory: Trajectory) -> list[tuple[float, float, float]]:
-    """How far our trunk is from Siconos' when its run ends, as (Siconos' step, time, distance): s, s, m.
+    """Distance between our trunk and Siconos' at the end of each Siconos run: (Siconos' step, s; time, s; distance, m).
 
-    Runs that last longer than ours are left out.
+    Siconos runs longer than ours are omitted.
     """
     rows = []
     for reference in reference_data()["siconos"]:

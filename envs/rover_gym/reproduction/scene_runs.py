@@ -1,4 +1,4 @@
-"""A scene of the report, run and recorded."""
+"""Recorded runs of the report's scenes."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -16,15 +16,15 @@ SEED = "none: the scene has no randomness"
 
 @dataclass(frozen=True)
 class SceneResult:
-    """What `run` measured.
+    """Result of `run`.
 
     Attributes:
         path: The recorded trajectory.
         duration: Simulated time, s.
         wall_time: Time spent stepping and recording, s.
-        first_contact: First time at which a wheel carried load, s, or None.
+        first_contact: Time at which a wheel first carried load, s, or None.
         smallest_gap: Smallest wheel gap of the run, m; negative means overlap.
-        unconverged_steps: Steps whose contact problem was not solved to the tolerance.
+        unconverged_steps: Steps whose contact problem did not converge to the tolerance.
         worst_residual: Largest residual of the contact solver.
     """
 
@@ -45,20 +45,20 @@ def record_scene(
     duration: float,
     progress: Callable[[float], None] = lambda _: None,
 ) -> SceneResult:
-    """Runs a simulation from its present state and records every step.
+    """Runs a simulation from its current state and records every step.
 
     Args:
         sim: The simulation.
         path: HDF5 file to write.
-        attributes: Facts about the run, from `describe`.
+        attributes: Attributes of the run, from `describe`.
         duration: Time to simulate, s.
-        progress: Called with the simulated time now and then.
+        progress: Called periodically with the simulated time.
 
     Raises:
-        OptionError: `duration` is not positive, or there would be too many rows.
+        OptionError: `duration` is not positive, or the run has too many rows.
         RecordingError: The file is in use, or the disk is full.
         MissingExtraError: h5py is not installed.
-        StepError: A step could not be taken; what came before is on the disk.
+        StepError: A step failed; the rows before it are on disk.
     """
     steps = row_count(duration, sim.time_step)
     first_contact: float | None = None

@@ -1,8 +1,8 @@
-"""Section 6.2 of the report: the rover dropped on a rug of 1250 fixed spheres, driven, its front wheels turned.
+"""Section 6.2 of the report: the rover dropped on a rug of 1250 fixed spheres and driven with its front wheels turned.
 
 The rug is that of the report's Fig. 6.6, in SI units; rover, gravity and steering are those of section 6.1. The rover
-weighs 86 N and its motors push with 8 N, too little to lift the wheels out of the dimples between the spheres: it
-lands, rocks to and fro and has come to rest before 25 s.
+weighs 86 N and its motors push with 8 N, too little to lift the wheels out of the dimples between the spheres. The
+rover lands, rocks back and forth, and comes to rest before 25 s.
 """
 
 from collections.abc import Callable
@@ -21,14 +21,14 @@ WHEEL_TORQUE = -0.4  # N m, drives towards -x
 
 
 def simulation(time_step: float = 0.005, **options: Any) -> Simulation:
-    """The simulation at its start, motors on.
+    """The simulation in its initial state, motors on.
 
     Args:
-        time_step: s.
-        options: Passed on to `Simulation` (variant, theta, solver, ...).
+        time_step: Time step, s.
+        options: Passed to `Simulation` (variant, theta, solver, ...).
 
     Raises:
-        OptionError: An option is out of its range.
+        OptionError: An option is out of range.
     """
     sim = Simulation(
         report_model(),
@@ -56,14 +56,14 @@ def run(
     Args:
         path: HDF5 file to write.
         duration: Time to simulate, s.
-        time_step: s.
-        progress: Called with the simulated time now and then.
-        options: Passed on to `Simulation`.
+        time_step: Time step, s.
+        progress: Called periodically with the simulated time.
+        options: Passed to `Simulation`.
 
     Raises:
-        OptionError: An option is out of its range.
+        OptionError: An option is out of range.
         MissingExtraError: h5py is not installed.
-        StepError: A step could not be taken; what came before is on the disk.
+        StepError: A step failed; the rows before it are on disk.
     """
     sim = simulation(time_step, **options)
     terrain = {"kind": "sphere_field", "made_by": "SphereField.rug()"}

@@ -1,4 +1,4 @@
-"""Beds of granular soil: disks that fell into a box and came to rest."""
+"""Beds of granular soil: disks that settled in a box under gravity."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import numpy.typing as npt
 from rover_gym.mechanics import OptionError, SoilSimulation, soil_packing
 from rover_gym.validation import number, refuse
 
-#: The original's disk: mean radius (m) and mass (kg); other disks have its density.
+#: Reference disk: mean radius (m) and mass (kg). Other disks take its density.
 DISK_RADIUS, DISK_MASS = 0.01625, 0.7
 EARTH = 9.81  # m/s^2
 MOST_DISKS = 1_000_000
-MOST_STEPS = 100_000_000  # of one call: more would not end
+MOST_STEPS = 100_000_000  # limit of one call: more would not finish
 
 Array = npt.NDArray[np.float64]
 
@@ -29,8 +29,8 @@ class Bed:
         radius: (n,) m.
         mass: (n,) kg.
         position: (n, 3) m and rad.
-        walls: (3, 4) floor, left and right: a point and the normal to the free side.
-        width: m.
+        walls: (3, 4) floor, left and right wall, each as a point and the normal towards the free side.
+        width: Distance between the side walls, m.
     """
 
     radius: Array
@@ -41,11 +41,11 @@ class Bed:
 
     @property
     def surface(self) -> float:
-        """Mean height of the surface, m."""
+        """Mean surface height, m."""
         return surface_height(self.radius, self.position)
 
     def clear_height(self, x: float, radius: float) -> float:
-        """Lowest height of a wheel's centre at `x` that touches no disk, m."""
+        """Lowest height of a wheel centre at `x` at which the wheel clears all disks, m."""
         reach = radius + self.radius
         across = self.position[:, 0] - x
         near = np.abs(across) < reach
@@ -54,7 +54,9 @@ class Bed:
 
 
 def surface_height(radius: Array, position: Array) -> float:
-    """Mean height of a bed's surface: of the highest rim in each of the strips, 2.5 largest radii wide, that it has, m.
+    """Mean surface height of a bed, m: the mean over vertical strips of the highest rim in each.
+
+    The strips are 2.5 largest radii wide.
 
     Args:
         radius: (n,) m.
@@ -78,24 +80,24 @@ def settled_bed(
     settle: float | None = None,
     **options: Any,
 ) -> Bed:
-    """Lets disks fall into a box.
+    """Settles disks in a box under gravity.
 
-    Disks of nearly one size, as the original's, keep the rows that they fell in; radii from 13 to 19.5 mm do not.
+    Nearly monodisperse disks, the default, keep the rows they fell in; radii from 13 to 19.5 mm do not.
 
     Args:
-        count: How many disks.
-        layers: How many lie upon one another; the box is as wide as that needs.
-        radius_min: m.
-        radius_max: m.
-        mass: Of a disk of the mean radius, kg; the density is that of the original's, 0.7 kg at 16.25 mm, if not given.
-        seed: Of radii and places.
-        settle: How long they may fall, s; half a second at 9.81 m/s^2, and longer as gravity is weaker, if not given.
-        **options: Of `SoilSimulation`.
+        count: Number of disks.
+        layers: Number of layers; it sets the width of the box.
+        radius_min: Smallest radius, m.
+        radius_max: Largest radius, m.
+        mass: Mass of a disk of mean radius, kg; by default the density is that of a 0.7 kg disk of 16.25 mm.
+        seed: Seed of the radii and initial positions.
+        settle: Settling time, s; by default half a second at 9.81 m/s^2, and longer under weaker gravity.
+        **options: Options of `SoilSimulation`.
 
     Raises:
-        OptionError: `count` or `layers` is no positive whole number or more than a million, a radius is not positive,
+        OptionError: `count` or `layers` is not a positive integer or exceeds a million, a radius is not positive,
             or `settle` is negative or takes more than a hundred million steps.
-        ModelError: A mass cannot be.
+        ModelError: A mass is not valid.
     """
     count, layers = _whole("count", count), _whole("layers", layers)
     radius_min = number("radius_min", radius_min, above=0.0)
@@ -114,12 +116,12 @@ def settled_bed(
 
 
 def bed_width(count: int, layers: int, radius_max: float) -> float:
-    """Width of the box into which `settled_bed` lets so many disks fall, m."""
+    """Width of the box that `settled_bed` uses for this many disks, m."""
     return -(-count // layers) * 2.0 * radius_max * 1.004
 
 
 def step_count(field: str, duration: float, time_step: float) -> int:
-    """How many steps a time takes; an OptionError that names `field` where they would not end."""
+    """Number of steps in a time; raises an OptionError that names `field` above the step limit."""
     steps = duration / time_step
     if not steps <= MOST_STEPS:
         refuse(OptionError, field, duration, f"must take at most {MOST_STEPS} steps of {time_step:g} s")
@@ -134,6 +136,6 @@ def _whole(field: str, value: object) -> int:
 
 
 def slowness(sim: SoilSimulation) -> float:
-    """By how much a fall takes longer than at 9.81 m/s^2."""
+    """Ratio of the fall time to that at 9.81 m/s^2."""
     gravity = float(np.hypot(*sim.settings["gravity"]))
     return float(np.sqrt(EARTH / gravity)) if gravity > 0.0 else 1.0

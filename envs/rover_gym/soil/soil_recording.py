@@ -1,4 +1,4 @@
-"""Recordings of a soil: where its disks are, what it does to the wheels, its strongest contacts."""
+"""Recordings of a soil: disk poses, wheel forces and the strongest contacts."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from rover_gym.record.facts import row_count
 from rover_gym.record.recorder import Recorder
 from rover_gym.soil.bed import Array
 
-MOST_CHAINS = 2000  # contacts of a row that are kept, the strongest
+MOST_CHAINS = 2000  # strongest contacts kept per row
 
 
 class _MeanForces:
-    """Mean forces of a soil's contacts over some steps: single steps carry knocks."""
+    """Contact forces of a soil averaged over several steps, since single steps carry impacts."""
 
     def __init__(self, sim: SoilSimulation) -> None:
         self._n, self._wheels = len(sim.radius), len(sim.wheels)
         self.clear()
 
     def clear(self) -> None:
-        """Begins anew."""
+        """Resets the sums."""
         self._steps = 0
         self._pairs: list[npt.NDArray[np.int64]] = []
         self._points: list[Array] = []
         self._impulses: list[Array] = []
 
     def add(self, sim: SoilSimulation) -> None:
-        """Adds the last step's contacts."""
+        """Adds the contacts of the last step."""
         contacts = sim.contacts
         pairs, normals = contacts.bodies, contacts.normals
         steep = np.abs(normals[:, 0]) > np.abs(normals[:, 1])
@@ -43,13 +43,13 @@ class _MeanForces:
         self._impulses.append(contacts.world_impulses)
 
     def read(self, sim: SoilSimulation, n_chains: int) -> tuple[Array, Array]:
-        """(n_chains, 5) the strongest as lines x, y to x, y with a force, zeros where there are fewer; (wheels, 2)."""
+        """Strongest contacts (n_chains, 5): x, y to x, y and a force, zero-padded; and wheel forces (n_wheels, 2)."""
         chains, on_wheels = np.zeros((n_chains, 5)), np.zeros((self._wheels, 2))
         if not self._pairs or sum(map(len, self._pairs)) == 0:
             return chains, on_wheels
         duration = self._steps * sim.time_step
         points, impulses = np.concatenate(self._points), np.concatenate(self._impulses)
-        # The last of a pair's places is its place now.
+        # Later entries overwrite earlier ones: a pair keeps its latest position.
         _, last, which = np.unique(np.concatenate(self._pairs)[::-1], axis=0, return_index=True, return_inverse=True)
         which, last = which.ravel()[::-1], len(which) - 1 - last
         pairs = np.concatenate(self._pairs)[last]
@@ -68,7 +68,7 @@ class _MeanForces:
 
 
 class SoilSampler:
-    """Makes rows of a soil for a `Recorder`; steps it from row to row.
+    """Steps a soil from row to row and makes the rows for a `Recorder`.
 
     Args:
         sim: The soil.
@@ -102,10 +102,10 @@ class SoilSampler:
         )
 
     def step(self, n: int) -> bool:
-        """Takes steps that the next row tells of; returns whether all of them were solved to the tolerance.
+        """Takes the steps that the next row covers; returns whether all of them converged to the tolerance.
 
         Raises:
-            StepError: A step could not be taken.
+            StepError: A step failed.
         """
         converged = True
         for _ in range(n):
@@ -116,7 +116,7 @@ class SoilSampler:
         return converged
 
     def row(self) -> dict[str, npt.ArrayLike]:
-        """One row of `channels`: the state now, and means since the row before."""
+        """One row of `channels`: the current state, and means since the previous row."""
         sim = self._sim
         energy = sim.energy()
         chains, on_wheels = self._forces.read(sim, self._n_chains)
@@ -151,26 +151,26 @@ def record_soil(
     until: Callable[[SoilSimulation], bool] = lambda _: False,
     progress: Callable[[float], None] = lambda _: None,
 ) -> int:
-    """Runs a soil from its present state and records it.
+    """Runs a soil from its current state and records it.
 
     Args:
         sim: The soil.
         path: HDF5 file to write.
-        title: Of the recording.
+        title: Title of the recording.
         duration: Time to simulate, s.
         steps_per_row: Steps from one row to the next.
-        walls: (n, 4) the soil's walls, for pictures.
-        until: Asked after each row whether to stop.
+        walls: (n, 4) walls of the soil, for drawing.
+        until: Called after each row; the run stops when it returns true.
         progress: Called with the simulated time after each row.
 
     Returns:
-        How many rows' steps were not solved to the tolerance.
+        Number of rows with steps that did not converge to the tolerance.
 
     Raises:
-        OptionError: `duration` or `steps_per_row` is not positive, or there would be too many rows.
+        OptionError: `duration` or `steps_per_row` is not positive, or the run has too many rows.
         RecordingError: The file is in use, or the disk is full.
         MissingExtraError: h5py is not installed.
-        StepError: A step could not be taken; what came before is on the disk.
+        StepError: A step failed; the rows before it are on disk.
     """
     rows, steps_per_row = row_count(duration, sim.time_step, steps_per_row), int(steps_per_row)
     sampler = SoilSampler(sim)

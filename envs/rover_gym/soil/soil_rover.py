@@ -1,4 +1,4 @@
-"""The two-wheel rover, put down on a bed and come to rest."""
+"""The two-wheel rover, placed on a bed and settled."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from rover_gym.mechanics import OptionError, SoilSimulation
 from rover_gym.soil.bed import Bed, settled_bed, slowness, step_count
 from rover_gym.validation import number, refuse, vector
 
-#: Radius of the rover's wheels and distance of its axles from its middle, m.
+#: Wheel radius of the rover and distance of its axles from its centre, m.
 WHEEL_RADIUS, HALF_LENGTH = 0.2, 0.4
-SETTLING = 0.2  # s, in which the rover comes to rest, at 9.81 m/s^2
+SETTLING = 0.2  # s, settling time of the rover at 9.81 m/s^2
 
 
 def rover_on_soil(
@@ -26,22 +26,22 @@ def rover_on_soil(
     rover: Mapping[str, Any] | None = None,
     **options: Any,
 ) -> SoilSimulation:
-    """The two-wheel rover, at rest on a settled bed at its left end.
+    """The two-wheel rover, at rest at the left end of a settled bed.
 
-    It is put down just above the disks and comes to rest in 0.2 s (at 9.81 m/s^2), which are before time 0.
+    The rover starts just above the disks and settles for 0.2 s (at 9.81 m/s^2) before time 0.
 
     Args:
-        bed: The soil; the original's if not given.
-        count: Disks of a bed that is not given.
-        layers: Its layers.
-        seed: Its seed.
-        start: Place of the rover's middle, m.
+        bed: The soil; by default `settled_bed` makes one from `count`, `layers` and `seed`.
+        count: Number of disks of the default bed.
+        layers: Number of layers of the default bed.
+        seed: Seed of the default bed.
+        start: x of the rover's centre, m.
         rover: Keyword arguments of `TwoWheelRoverSimulation` that describe another rover: `mass`, `wheel_mass`, ...
-        **options: Of `SoilSimulation`.
+        **options: Options of `SoilSimulation`.
 
     Raises:
-        OptionError: The rover would stand in a wall, or an option is out of its range.
-        ModelError: The rover cannot be.
+        OptionError: The rover would overlap a wall, or an option is out of range.
+        ModelError: The rover is not valid.
     """
     if bed is None:
         shared = {name: options[name] for name in ("gravity", "friction", "time_step") if name in options}

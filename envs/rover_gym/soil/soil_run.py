@@ -1,4 +1,4 @@
-"""A saved run on a soil, read back: where every disk and wheel was, and what the soil did to the wheels.
+"""Saved runs on a soil, read back: disk and wheel poses, and the forces of the soil on the wheels.
 
 run = read_soil_run("soil.h5").resample(25.0)
 run.wheels[-1, 0, :2]
@@ -30,9 +30,9 @@ class SoilRun:
     Attributes:
         trajectory: The data sets and attributes of the file.
         radius: (n_disks,) m.
-        walls: (n_walls, 4) a point of each wall and the normal to its free side.
+        walls: (n_walls, 4) a point on each wall and the normal towards its free side.
         surface: Mean height of the soil's surface at the start, m.
-        title: What was run, in words.
+        title: Title of the run.
     """
 
     trajectory: Trajectory
@@ -43,12 +43,12 @@ class SoilRun:
 
     @property
     def n_frames(self) -> int:
-        """How many samples the run has."""
+        """Number of samples in the run."""
         return len(self.time)
 
     @property
     def time(self) -> Array:
-        """(n,) time of the samples, s."""
+        """(n,) sample times, s."""
         return self.trajectory["time"]
 
     @property
@@ -58,7 +58,7 @@ class SoilRun:
 
     @property
     def asleep(self) -> npt.NDArray[np.bool_]:
-        """(n, n_disks) which disks slept."""
+        """(n, n_disks) whether each disk was asleep."""
         return self.trajectory["asleep"] > 0.0
 
     @property
@@ -68,38 +68,38 @@ class SoilRun:
 
     @property
     def wheel_angles(self) -> Array:
-        """(n, n_wheels) angles of the wheels, rad, positive to the left."""
+        """(n, n_wheels) wheel angles, rad, counter-clockwise positive."""
         return self.trajectory["machine"][:, 3 : 3 + self.wheels.shape[1]]
 
     @property
     def wheel_forces(self) -> Array:
-        """(n, n_wheels, 2) x and y of the soil on the wheels, mean since the row before, N."""
+        """(n, n_wheels, 2) x and y of the soil's force on each wheel, mean since the previous row, N."""
         return self.trajectory["wheel_forces"]
 
     @property
     def force_chains(self) -> Array:
-        """(n, n_chains, 5) contacts as lines x, y to x, y (m) with their mean force since the row before (N)."""
+        """(n, n_chains, 5) contacts as lines x, y to x, y (m) with their mean force since the previous row (N)."""
         return self.trajectory["force_chains"]
 
     @property
     def sinkage(self) -> Array:
-        """(n, n_wheels) how far the wheels' lowest points are below the surface, m."""
+        """(n, n_wheels) depth of the wheels' lowest points below the surface, m."""
         result: Array = self.surface - (self.wheels[..., 1] - self.wheels[..., 2])
         return result
 
     @property
     def slip_speeds(self) -> Array:
-        """(n, n_wheels) how much faster the rims turn than the machine drives, m/s."""
+        """(n, n_wheels) rim speed minus travel speed, m/s."""
         rates = self.trajectory["machine_rate"]
         rims = -rates[:, 3 : 3 + self.wheels.shape[1]] * self.wheels[..., 2]
         result: Array = rims - rates[:, :1]
         return result
 
     def resample(self, fps: float) -> SoilRun:
-        """The run with the samples that lie nearest to the times of a film's frames, none of them twice.
+        """The run reduced to the samples nearest to the frame times of a video, each at most once.
 
         Args:
-            fps: Frames a second; where the run has fewer, it keeps all that it has.
+            fps: Frames per second; a run sampled more coarsely keeps all its samples.
 
         Raises:
             OptionError: `fps` is not a positive number.
@@ -110,7 +110,7 @@ class SoilRun:
 
 
 def is_soil(trajectory: Trajectory) -> bool:
-    """Whether a trajectory is one of a soil."""
+    """Whether a trajectory is a soil run."""
     scene = trajectory.attributes.get("scene")
     return isinstance(scene, dict) and scene.get("kind") == "SoilSimulation"
 
@@ -119,18 +119,18 @@ def read_soil_run(path: str | Path) -> SoilRun:
     """Reads a run that `record_soil` saved, complete or not.
 
     Raises:
-        RecordingError: The file is no trajectory, or not one of a soil, or holds no samples.
-        OSError: The file is not there or cannot be read.
+        RecordingError: The file is not a trajectory, not a soil run, or holds no samples.
+        OSError: The file does not exist or cannot be read.
         MissingExtraError: h5py is not installed.
     """
     return soil_run_of(read_trajectory(path), path)
 
 
 def soil_run_of(trajectory: Trajectory, path: str | Path) -> SoilRun:
-    """The run in a trajectory that was read from `path`.
+    """The soil run of a trajectory read from `path`.
 
     Raises:
-        RecordingError: It is not one of a soil, or holds no samples.
+        RecordingError: It is not a soil run, or holds no samples.
     """
     if not is_soil(trajectory) or "force_chains" not in trajectory.data:
         refuse(RecordingError, "path", str(path), "holds no soil: `rover planar soil` writes one")
@@ -154,7 +154,7 @@ def soil_run_of(trajectory: Trajectory, path: str | Path) -> SoilRun:
 
 
 def _shapes(trajectory: Trajectory, path: str | Path, disks: int) -> dict[str, tuple[int, ...]]:
-    """What the rows of a soil's data sets must be."""
+    """Required row shapes of a soil run's data sets."""
     wheels, machine = (trajectory[name].shape[1] if trajectory[name].ndim > 1 else 0 for name in ("wheels", "machine"))
     if wheels > 2 or machine < 3 * bool(wheels) + wheels:
         refuse(RecordingError, f"{path}: wheels", wheels, "must be none, one or two, with their machine's coordinates")

@@ -1,4 +1,4 @@
-"""Trials on granular soil: how far the rover comes with a torque, what a wheel pulls at a slip; each over several beds.
+"""Trials on granular soil over several beds: rover travel against torque, and drawbar pull against slip.
 
 >>> from rover_gym.soil import drawbar_pull, settled_bed
 >>> bed = settled_bed(300, 4, radius_min=0.013, radius_max=0.0195)
@@ -24,9 +24,9 @@ from rover_gym.validation import number, refuse
 
 __all__ = ["Pull", "SoilDrive", "drawbar_pull", "drive_on_soil", "over_beds"]
 
-#: Distance of a trial wheel's centre from the walls, radii: nearer, the walls carry.
+#: Distance of a trial wheel's centre from the walls, radii: nearer, the walls carry load.
 CLEAR_OF_WALLS = 2.0
-#: Way of a rim below which a wheel counts as standing, m: less than a disk.
+#: Rim travel below which a wheel counts as standing, m: less than a disk.
 STANDS = 0.01
 
 T = TypeVar("T")
@@ -34,14 +34,14 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class SoilDrive:
-    """What came of a drive with one torque.
+    """Result of a drive at one torque.
 
     Attributes:
-        torque: Of each wheel, N m.
-        distance: Way of the rover over the measured time, m.
-        speed: Its mean over that time, m/s.
-        slip: 1 - distance / way of the rims; not a number where the wheels stood.
-        sinkage: Of the wheels' lowest points below the bed's mean surface, mean over that time, m.
+        torque: Torque of each wheel, N m.
+        distance: Travel of the rover over the measured time, m.
+        speed: Mean speed of the rover over that time, m/s.
+        slip: 1 - distance / rim travel; nan if the wheels stood.
+        sinkage: Mean depth of the wheels' lowest points below the bed's mean surface over that time, m.
     """
 
     torque: float
@@ -53,14 +53,14 @@ class SoilDrive:
 
 @dataclass(frozen=True)
 class Pull:
-    """What a wheel that turns and travels at given rates does.
+    """Forces and sinkage of a wheel that turns and travels at prescribed rates.
 
     Attributes:
         slip: 1 - speed / (radius x turning rate).
-        speed: Of its travel, mean over the measurement, m/s.
-        pull: Mean horizontal force of the soil on the wheel, N: positive where it could pull something.
+        speed: Mean travel speed over the measurement, m/s.
+        pull: Mean horizontal force of the soil on the wheel, N: positive if the wheel can pull a load.
         weight: Mean vertical force of the soil on the wheel, N.
-        sinkage: Of its lowest point below the bed's mean surface, mean, m.
+        sinkage: Mean depth of the wheel's lowest point below the bed's mean surface, m.
     """
 
     slip: float
@@ -71,21 +71,21 @@ class Pull:
 
 
 def drive_on_soil(bed: Bed, torque: float, *, run_in: float = 0.5, duration: float = 2.0, **options: Any) -> SoilDrive:
-    """Drives the rover from rest with one torque at both wheels.
+    """Drives the rover from rest with the same torque at both wheels.
 
     Args:
         bed: The soil.
-        torque: Of each wheel, N m, positive forward.
+        torque: Torque of each wheel, N m, positive forward.
         run_in: Time before the measurement begins, s.
-        duration: Time of the measurement, s; it ends earlier where the front wheel comes near the end of the bed.
-        **options: Of `rover_on_soil`.
+        duration: Time of the measurement, s; it ends early if the front wheel nears the end of the bed.
+        **options: Options of `rover_on_soil`.
 
     Raises:
-        OptionError: A time is out of its range, or the rover reached the end of the bed before the measurement began.
+        OptionError: A time is out of range, or the rover reached the end of the bed before the measurement began.
     """
     run_in, duration = number("run_in", run_in, at_least=0.0), number("duration", duration, above=0.0)
     sim = rover_on_soil(bed, **options)
-    step_count("duration", run_in + duration, sim.time_step)  # without a torque no other end comes
+    step_count("duration", run_in + duration, sim.time_step)  # without a torque nothing else ends the run
     sim.set_torques([torque, torque])
     surface = bed.surface
     depths: list[float] = []
@@ -128,25 +128,25 @@ def drawbar_pull(
     radius: float = WHEEL_RADIUS,
     **options: Any,
 ) -> Pull:
-    """One wheel on the carriage of a single-wheel test bed: it turns and travels at given rates and is free to sink.
+    """Drawbar pull of one wheel on a single-wheel test rig: its slip is prescribed, and it sinks freely.
 
-    The rim has one speed at every slip, so that a large slip throws no soil; the wheel travels at 1 - slip times it.
-    Run-in and measurement are the same stretches of the bed at every slip, as a wheel settles by leaving the hole that
-    it began in; they take 1 / (1 - slip) times as long.
+    The rim speed is the same at every slip, so that a large slip throws no soil; the wheel travels at 1 - slip times
+    the rim speed. Run-in and measurement cover the same stretches of the bed at every slip, because a wheel reaches a
+    steady state only after it leaves its initial hole; they take 1 / (1 - slip) times as long.
 
     Args:
         bed: The soil.
-        slip: Below 1; negative where the wheel is braked. A wheel that stands, at 1, digs a hole instead of reaching
-            a steady state.
+        slip: Below 1; negative for a braked wheel. At 1 the wheel stands and digs itself in without reaching a steady
+            state.
         load: Mass that the wheel carries, kg.
         rim_speed: Radius x turning rate, m/s; the wheel travels at 1 - slip times it.
-        run_in: Travel before the measurement begins, m: the wheel sinks in.
-        distance: Travel of the measurement, m.
-        radius: Of the wheel, m.
-        **options: Of `SoilSimulation`.
+        run_in: Travel before the measurement begins, m, over which the wheel sinks in.
+        distance: Travel during the measurement, m.
+        radius: Wheel radius, m.
+        **options: Options of `SoilSimulation`.
 
     Raises:
-        OptionError: A number is out of its range, or the bed is too short for the travel.
+        OptionError: A number is out of range, or the bed is too short for the travel.
         ModelError: Load or radius is not positive.
     """
     slip, rim_speed = number("slip", slip), number("rim_speed", rim_speed, above=0.0)
@@ -192,17 +192,17 @@ def over_beds(
     workers: int | None = None,
     progress: Callable[[int], None] = lambda _: None,
 ) -> list[list[T]]:
-    """Makes a trial with every value on every bed, several at a time: what they tell does not depend on how many.
+    """Runs a trial for every value on every bed in parallel; the number of workers does not change the results.
 
     Args:
         trial: Called with a bed and a value.
-        values: What is varied.
+        values: Values of the varied parameter.
         beds: The beds.
-        workers: How many trials at a time; as many as there are cores if not given.
-        progress: Called with the number of trials that are done, after each.
+        workers: Number of parallel trials; by default the number of cores.
+        progress: Called after each trial with the number of finished trials.
 
     Returns:
-        For each value a list with what `trial` returned on each bed.
+        For each value, the list of the results of `trial` on each bed.
 
     Raises:
         OptionError: `workers` is less than one.

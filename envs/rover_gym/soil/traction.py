@@ -1,10 +1,10 @@
-"""The curve of a wheel's pull against slip: Janosi and Hanamoto's form, and whether it levels off.
+"""Wheel pull against slip: a fit of Janosi and Hanamoto's curve, and a test of whether the pull levels off.
 
     P / W = A (1 − exp(−(s − s₀) / K))
 
-with the pull `P` and the load `W` of a trial, its slip `s`, the limit `A` of `P / W`, the slip `s₀` at which the wheel
-pulls nothing, and the slip `K` over which the distance from the limit falls to 1/e of it. Janosi and Hanamoto (1961)
-wrote it for the shear stress under a track against the displacement of the soil, which grows with the slip.
+with the pull `P`, load `W` and slip `s` of a trial, the limit `A` of `P / W`, the slip `s₀` of zero pull, and the slip
+scale `K` over which the distance from the limit falls by a factor e. Janosi and Hanamoto (1961) proposed the form for
+the shear stress under a track against the shear displacement of the soil, which grows with the slip.
 """
 
 from __future__ import annotations
@@ -23,35 +23,35 @@ __all__ = ["BedEstimate", "Traction", "fit_traction"]
 
 Array = npt.NDArray[np.float64]
 
-#: Slips `K` that are tried, from a jump to a straight line.
+#: Trial values of `K`, from a step to a straight line.
 SCALES = np.geomspace(0.01, 10.0, 601)
 
 
 @dataclass(frozen=True)
 class BedEstimate:
-    """A number with its standard error over the beds, nan where there is one bed."""
+    """An estimate with its standard error over the beds, nan for a single bed."""
 
     value: float
     error: float
 
     def __str__(self) -> str:
-        """Three digits after the point, and the standard error if there is one."""
+        """The value to three decimals, with its standard error if there is one."""
         return f"{self.value:.3f}" + (f" ± {self.error:.3f}" if np.isfinite(self.error) else "")
 
 
 @dataclass(frozen=True)
 class Traction:
-    """What the pulls of one load tell.
+    """Traction parameters fitted to the pulls at one load.
 
     Attributes:
-        limit: `A`, 1.
-        free_slip: `s₀`, the slip at which the wheel neither pulls nor is dragged.
-        scale: `K`, slip.
-        rms: Of what the fit leaves of the means over the beds, 1.
-        chi_square: Of the fit, by the beds' standard errors and a degree of freedom; nan where there is one bed.
-        line_chi_square: The same of a straight line through all slips: what the levelling off explains.
-        first: Slip from which on the last slope is taken.
-        last_slope: Of a straight line through pull / load from that slip on; 0 where the curve has levelled off.
+        limit: `A`, dimensionless.
+        free_slip: `s₀`, the slip of zero pull.
+        scale: `K`, a slip.
+        rms: RMS residual of the fit to the means over the beds, dimensionless.
+        chi_square: Reduced chi-square of the fit with the beds' standard errors; nan for a single bed.
+        line_chi_square: Reduced chi-square of a straight line through all slips, for comparison.
+        first: Lowest slip of the range in which `last_slope` is fitted.
+        last_slope: Slope of a straight line through pull / load from that slip on; 0 if the curve has levelled off.
     """
 
     limit: BedEstimate
@@ -64,17 +64,17 @@ class Traction:
     last_slope: BedEstimate
 
     def __call__(self, slip: npt.ArrayLike) -> Array:
-        """Pull / load at slips, of the fit."""
+        """Fitted pull / load at the given slips."""
         slips = np.asarray(slip, dtype=np.float64)
         return _curve(slips, self.limit.value, self.free_slip.value, self.scale.value)
 
 
 def fit_traction(pulls: Sequence[Sequence[Pull]], *, first: float = 0.5) -> Traction:
-    """Fits the curve to the means over the beds by least squares; standard errors by leaving out one bed at a time.
+    """Fits the curve to the means over the beds by least squares, with jackknife standard errors over the beds.
 
     Args:
-        pulls: By slip, then by bed.
-        first: Slip from which on the last slope is taken.
+        pulls: Pulls by slip, then by bed.
+        first: Lowest slip of the range in which `last_slope` is fitted.
 
     Raises:
         OptionError: There are fewer than four slips, or fewer than two from `first` on.
@@ -104,13 +104,13 @@ def fit_traction(pulls: Sequence[Sequence[Pull]], *, first: float = 0.5) -> Trac
 
 
 def _curve(s: Array, A: float, free_slip: float, K: float) -> Array:
-    """Pull / load of the form at slips (n,)."""
+    """Pull / load of the curve at slips (n,)."""
     result: Array = A * (1.0 - np.exp(-(s - free_slip) / K))
     return result
 
 
 def _chi_square(left: Array, ratios: Array, n_fitted: int) -> float:
-    """Squares of what a fit leaves of the means (n,) in their standard errors, by the degrees of freedom."""
+    """Reduced chi-square of a fit to the means (n,)."""
     n_slips, n_beds = ratios.shape
     if n_beds == 1 or n_slips <= n_fitted:
         return float("nan")
@@ -120,7 +120,7 @@ def _chi_square(left: Array, ratios: Array, n_fitted: int) -> float:
 
 
 def _over_beds(of: Callable[[Array], Array], ratios: Array) -> list[BedEstimate]:
-    """Numbers of the means over the beds, with their standard errors by the jackknife."""
+    """Estimates from the means over the beds, with jackknife standard errors."""
     values, n = of(ratios.mean(axis=1)), ratios.shape[1]
     if n == 1:
         return [BedEstimate(float(value), float("nan")) for value in values]
@@ -130,7 +130,7 @@ def _over_beds(of: Callable[[Array], Array], ratios: Array) -> list[BedEstimate]
 
 
 def _fit(s: Array, y: Array) -> Array:
-    """(3,) A, s₀ and K of least squares; with K given, A and B = A exp(s₀ / K) are linear."""
+    """(3,) least-squares A, s₀ and K; for a given K the problem is linear in A and B = A exp(s₀ / K)."""
     best, found = np.inf, np.zeros(3)
     for K in SCALES:
         columns = np.stack((np.ones_like(s), -np.exp(-s / K)), axis=1)

@@ -1,4 +1,4 @@
-"""One file an engine, each with `VARIANTS`, a tuple of `Variant`; ImportError where its engine is missing."""
+"""One file per engine, each with `VARIANTS`, a tuple of `Variant`; ImportError if the engine is missing."""
 
 import importlib
 from types import ModuleType

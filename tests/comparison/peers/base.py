@@ -1,4 +1,4 @@
-"""The interface that every engine is driven by, and what the builders share."""
+"""The common interface of the engines, and helpers that their builders share."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

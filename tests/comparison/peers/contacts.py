@@ -1,4 +1,4 @@
-"""Where discs touch planes and spheres, for the engines that are only a solver: the geometry is theirs from here."""
+"""Contact geometry of discs on planes and spheres, for engines that provide only a solver."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""This project, through its Python class: many steps a call."""
+"""This project, through its Python class: many steps per call."""
 
 from functools import partial
 from typing import Any

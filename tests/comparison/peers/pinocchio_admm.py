@@ -1,7 +1,7 @@
 """Pinocchio's dynamics and its ADMM contact solver, time stepping written here in Python.
 
-Pinocchio is a library and no simulator: the loop around its solver (contact points, implicit steering, Moreau's rule
-that a contact takes part where it would close within the step) is ours and in Python, which is most of its cost.
+Pinocchio is a library, not a simulator: the loop around its solver (contact points, implicit steering, Moreau's rule
+that a contact is active if it would close within the step) is our Python code and accounts for most of the cost.
 """
 
 from functools import partial
@@ -52,7 +52,7 @@ class PinocchioRunner:
         self.last: dict[int, Array] = {}
 
     def _add(self, index: int) -> None:
-        """Adds a body and what hangs on it, depth first, as crba demands."""
+        """Adds a body and its subtree, depth first, as crba requires."""
         body = self.bodies[index]
         if body.parent < 0:
             kind, parent = pin.JointModelFreeFlyer(), 0
