@@ -8,8 +8,8 @@ use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription};
 use rover_core::simulation::RoverSimulation;
 
-/// A chassis with an arm of two links over it: the second link, a box, a
-/// ball or a wheel, folds down onto the chassis.
+/// A chassis with a two-link arm; the second link, a box, a ball or a wheel, folds down onto the
+/// chassis.
 pub fn folding(last: &str) -> Model {
     let text = format!(
         r#"
@@ -61,7 +61,7 @@ pub fn tips() -> [&'static str; 3] {
     ]
 }
 
-/// Contacts of a machine's bodies with each other that are no further apart than 20 cm.
+/// Contacts between a machine's bodies with a gap of at most 20 cm.
 pub fn near(model: &Model, kinematics: &Kinematics) -> Vec<Contact> {
     let activation = Activation {
         lead: 0.0,
@@ -98,7 +98,7 @@ pub fn overlap(simulation: &RoverSimulation) -> f64 {
         .fold(0.0, |deepest, contact| deepest.min(contact.gap))
 }
 
-/// A simulation on flat ground that begins at rest, its base's centre at a height.
+/// A simulation on flat ground that starts at rest, with its base centre at the given height.
 pub fn at_rest(model: Model, height: f64, joints: &[f64], variant: Variant) -> RoverSimulation {
     let mut start = Configuration::zero(&model);
     start.position.y = height;

@@ -1,4 +1,5 @@
-//! The Jacobian of a contact of two bodies is the gap's derivative, and its impulse is internal.
+//! The Jacobian of a contact between two bodies is the derivative of the gap, and its impulse is
+//! internal.
 
 use proptest::prelude::*;
 use rover_core::contact::{Contact, generalized_impulse, relocate};
@@ -7,7 +8,7 @@ use rover_core::multibody::{Configuration, Kinematics, Model};
 
 use crate::contact_scenes::{folding, near, tips};
 
-/// Where the machine is, and its contacts with itself that are no further apart than 20 cm.
+/// The configuration of the machine, and its self-contacts with a gap of at most 20 cm.
 fn contacts(model: &Model, joints: [f64; 3], turn: [f64; 3]) -> (Configuration, Vec<Contact>) {
     let mut q = Configuration::zero(model);
     q.joints.copy_from_slice(&joints);

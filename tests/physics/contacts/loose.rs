@@ -1,5 +1,4 @@
-//! Loose bodies: balls that collide, stones that lie on each other and are
-//! pushed, machines that meet.
+//! Free bodies: colliding balls, stacked and pushed stones, colliding machines.
 
 use std::sync::Arc;
 
@@ -15,7 +14,7 @@ use crate::contact_scenes::{near, overlap};
 const BALL: &str = "shape = { kind = \"sphere\", radius = 0.1 }";
 const BLOCK: &str = "shape = { kind = \"box\", size = [0.4, 0.2, 0.3] }";
 
-/// Free solids that touch.
+/// Free solids that collide.
 fn loose(shapes: &[(&str, f64)]) -> Model {
     let solids = shapes.iter().enumerate().map(|(i, (shape, mass))| {
         format!("[[solids]]\nname = \"stone{i}\"\njoint = \"free\"\nmass = {mass}\ncollides = true\n{shape}\n")
@@ -24,7 +23,7 @@ fn loose(shapes: &[(&str, f64)]) -> Model {
     Model::from_description(ModelDescription::from_toml(&text).unwrap()).unwrap()
 }
 
-/// Where the free bodies are, in their order.
+/// Configuration of the free bodies, in order.
 fn at(model: &Model, places: &[([f64; 3], [f64; 3])]) -> Configuration {
     let mut q = Configuration::zero(model);
     for (i, (x, turn)) in places.iter().enumerate() {
@@ -99,7 +98,7 @@ fn an_impulse_between_two_bodies_is_no_force_and_no_couple_on_both_together() {
         let contacts = near(&model, &kinematics);
         assert!(!contacts.is_empty(), "{shapes:?}");
         for contact in contacts {
-            // A gap that is not zero, and friction across it.
+            // A nonzero gap, and friction across it.
             let mut push = vec![0.0; 12];
             generalized_impulse(
                 &model,
@@ -146,8 +145,8 @@ fn a_collision_keeps_the_momentum_and_takes_energy() {
                 let linear = (after.linear - before.linear).norm();
                 assert!(linear < 1e-9, "{shapes:?} {linear}");
                 let angular = (after.angular - before.angular).norm();
-                // The impulse acts at the predicted end of the step: off the true one by half a
-                // step of the relative sliding.
+                // The impulse acts at the predicted end of the step, displaced from the true one by
+                // half a step of relative sliding.
                 assert!(angular < 5e-3, "{shapes:?} {variant:?}: {angular}");
                 assert!(simulation.energy().kinetic <= energy * (1.0 + 1e-8));
             }
@@ -241,7 +240,7 @@ fn a_rover_pushes_a_stone_which_comes_to_rest() {
         simulation.brake();
         simulation.step(800).unwrap();
         let stone = &simulation.state().v[21..];
-        // Only contact stops a ball; a block comes to rest.
+        // A ball rolls until a contact stops it; a block comes to rest.
         if shape.contains("box") {
             assert!(stone.iter().all(|x| x.abs() < 1e-5), "{shape}: {stone:?}");
         }

@@ -1,4 +1,4 @@
-//! An arm that folds down onto its own chassis rests there.
+//! An arm that folds down onto its own chassis comes to rest there.
 
 use rover_core::contact::Part;
 use rover_core::integrator::Variant;

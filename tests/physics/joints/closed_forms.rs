@@ -1,4 +1,4 @@
-//! Motions with a closed form, one per joint.
+//! Motions with a closed form, one per joint type.
 
 use nalgebra::{Rotation3, Vector3};
 use rover_core::integrator::Variant;
@@ -77,7 +77,7 @@ fn a_slide_with_a_spring_and_a_damper_is_an_oscillator() {
     assert!(errors[1] < 0.6 * errors[0], "{errors:?}");
 }
 
-/// The energy, including the spring's, does not grow at any stiffness and any step.
+/// The energy, including that of the spring, does not grow for any stiffness and step size.
 #[test]
 fn no_spring_and_no_step_give_energy() {
     for stiffness in [1e2, 1e6, 1e12] {
@@ -111,7 +111,7 @@ fn no_spring_and_no_step_give_energy() {
     }
 }
 
-/// A heavy symmetric top precesses steadily at Ω where `(I₃ ω₃ − I₁ Ω cos θ) Ω = m g l`.
+/// A heavy symmetric top precesses steadily at the rate Ω with `(I₃ ω₃ − I₁ Ω cos θ) Ω = m g l`.
 #[test]
 fn a_top_on_a_spherical_joint_precesses() {
     for variant in [Variant::Linearised, Variant::Newton] {
@@ -122,7 +122,7 @@ fn a_top_on_a_spherical_joint_precesses() {
         let model = model(vec![top]);
         let (I1, I3, mgl) = (0.02 + 0.09, 0.03, 9.81 * 0.3);
         let (theta, precession): (f64, f64) = (0.6, 2.0);
-        // Spin ω₃ about the axis of the figure, from the formula.
+        // Spin ω₃ about the axis of symmetry, from the formula.
         let spin = (mgl / precession + I1 * precession * theta.cos()) / I3;
         let h = 1e-4;
         let mut run = simulation(model, options(h, variant));
@@ -143,7 +143,7 @@ fn a_top_on_a_spherical_joint_precesses() {
     }
 }
 
-/// The accelerations of a double pendulum, from its Lagrangian; both links are points.
+/// Accelerations of a double pendulum from its Lagrangian; both links are point masses.
 #[test]
 fn a_double_pendulum_falls_as_its_lagrangian_says() {
     let mut upper = solid("upper", None, JointKind::Revolute);
@@ -182,8 +182,8 @@ fn a_double_pendulum_falls_as_its_lagrangian_says() {
     assert!((found[1] - expected.y).abs() < 1e-3, "{found:?} {expected}");
 }
 
-/// Held joints of a machine on a fixed base go to their set-points; the
-/// origin's rotation turns the axis.
+/// Held joints of a machine on a fixed base reach their set-points; the rotation of the joint
+/// origin rotates the axis.
 #[test]
 fn an_arm_on_a_turned_base_is_held() {
     let mut base = solid("base", None, JointKind::Fixed);

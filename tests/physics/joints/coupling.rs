@@ -1,4 +1,4 @@
-//! Joints that follow others.
+//! Coupled joints.
 
 use rover_core::integrator::Variant;
 use rover_core::multibody::{
@@ -23,8 +23,8 @@ fn rocker(name: &str, z: f64, bob: f64) -> SolidDescription {
     rocker
 }
 
-/// The rockers of a differential on a fixed body: one coordinate with the
-/// inertia of both, `q̈ = Σ c τ / Σ I`.
+/// The rockers of a differential on a fixed body: one coordinate with the inertia of both, `q̈ = Σ
+/// c τ / Σ I`.
 #[test]
 fn a_differential_is_one_coordinate() {
     let base = solid("body", None, JointKind::Fixed);
@@ -37,7 +37,7 @@ fn a_differential_is_one_coordinate() {
     run.step(1).unwrap();
     let disc = 0.5 * 0.1 * 0.1;
     let inertia = 2.0 * disc + (0.04 + 0.09) + (0.36 + 0.09);
-    // Gravity turns each about z by −m g x; the right one turns the other way.
+    // The gravity torque on each about z is −m g x; the right rocker rotates the other way.
     let expected = -9.81 * (0.2 - 0.6) / inertia;
     let found = run.state().v[0] / h;
     assert!(
@@ -46,7 +46,7 @@ fn a_differential_is_one_coordinate() {
     );
 }
 
-/// On a free body the follower keeps its ratio, and the fall conserves energy and the horizontal
+/// On a free body the coupled joint keeps its ratio, and free fall conserves energy and horizontal
 /// linear momentum.
 #[test]
 fn a_follower_on_a_free_body_stays_where_the_ratio_says() {
@@ -67,9 +67,9 @@ fn a_follower_on_a_free_body_stays_where_the_ratio_says() {
         let relative = kinematics.R[0].transpose() * kinematics.R[2];
         let angle = relative[(1, 0)].atan2(relative[(0, 0)]);
         assert!((angle - (0.3 - 0.5 * q)).abs() < 1e-12);
-        // It falls with some 150 J.
+        // The fall releases some 150 J.
         assert!((energy(&run) - before).abs() < 1e-3);
-        // Only gravity acts on it: m g t, and the angular momentum stays sideways to it.
+        // Gravity is the only external force: the linear momentum changes by m g t.
         let change = run.momentum().linear - momentum.linear;
         assert!(
             (change.y + 3.0 * 9.81).abs() < 2e-5 && change.xz().norm() < 2e-5,
@@ -78,8 +78,7 @@ fn a_follower_on_a_free_body_stays_where_the_ratio_says() {
     }
 }
 
-/// A telescope whose second stage slides as far again as the first: the tip
-/// moves at twice the speed.
+/// A telescope whose second stage extends as far as the first: the tip moves at twice the speed.
 #[test]
 fn a_telescope_is_one_mass() {
     let mut first = solid("first", None, JointKind::Prismatic);
@@ -124,19 +123,19 @@ fn couplings_that_no_tree_has_are_refused() {
         ]
     };
     let refused = |solids| Model::from_description(machine(solids)).unwrap_err();
-    // On another branch, further out.
+    // On another branch, further from the root.
     let mut solids = chain();
     solids[3].coupled = Some(follows("b", 1.0, 0.0));
     let error = refused(solids);
     assert_eq!(error.field(), "solids[3].coupled.joint", "{error}");
     assert!(matches!(error, ModelError::CoupledApart { .. }));
-    // A joint that follows one itself.
+    // A coupled joint cannot lead another.
     let mut solids = chain();
     solids[2].coupled = Some(follows("a", 1.0, 0.0));
     solids.push(solid("d", Some("b"), JointKind::Revolute));
     solids[4].coupled = Some(follows("b", 1.0, 0.0));
     assert_eq!(refused(solids).field(), "solids[4].coupled.joint");
-    // One that is locked, one that is not there, one that has no coordinate.
+    // A locked joint, an unknown joint, and a joint without a single coordinate.
     let mut solids = chain();
     solids[3].coupled = Some(follows("a", 1.0, 0.0));
     let model = Model::from_description(machine(solids.clone())).unwrap();

@@ -1,5 +1,5 @@
-//! Mass matrix, bias, Coriolis matrix and Jacobians of trees with every
-//! kind of joint, against differences of the poses.
+//! Mass matrix, bias, Coriolis matrix and Jacobians of trees with every joint type, against finite
+//! differences of the poses.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rover_core::multibody::bias::{BiasScratch, bias};
@@ -23,13 +23,13 @@ fn mass_matrix(model: &Model, q: &Configuration) -> DMatrix<f64> {
     M.to_dense(model)
 }
 
-/// World place of a point of a body.
+/// World position of a point of a body.
 fn point(model: &Model, q: &Configuration, b: usize, p: &Vector3<f64>) -> Vector3<f64> {
     let kinematics = Kinematics::of(model, q);
     kinematics.origin(b) + kinematics.point(b, p)
 }
 
-/// `½ vᵀ M v` is the kinetic energy of masses whose velocities are differences of their places.
+/// `½ vᵀ M v` equals the kinetic energy of point masses with finite-difference velocities.
 #[test]
 fn the_mass_matrix_is_that_of_the_moving_points() {
     for root in ROOTS {
@@ -38,8 +38,8 @@ fn the_mass_matrix_is_that_of_the_moving_points() {
             let (q, v) = somewhere(&model, seed);
             let mut kinetic = 0.0;
             for (b, body) in model.bodies().iter().enumerate() {
-                // A rigid body is its mass at the centre and, along each
-                // principal axis, a pair of points.
+                // A rigid body is equivalent to its mass at the centre and a pair of points along
+                // each principal axis.
                 let c = body.centre_of_mass;
                 let axes = body.principal_axes.unwrap_or_default();
                 let axes = if body.principal_axes.is_some() {
@@ -107,7 +107,7 @@ fn the_factor_solves_what_the_mass_matrix_multiplies() {
     }
 }
 
-/// `C v` is the bias, and `C + Cᵀ` the rate of the mass matrix.
+/// `C v` equals the bias, and `C + Cᵀ` the rate of the mass matrix.
 #[test]
 fn the_coriolis_matrix_has_both_of_its_properties() {
     for root in ROOTS {
@@ -150,7 +150,7 @@ fn the_coriolis_matrix_has_both_of_its_properties() {
     }
 }
 
-/// The gravity part of the bias is the slope of the potential energy.
+/// The gravity part of the bias equals the gradient of the potential energy.
 #[test]
 fn gravity_is_the_slope_of_the_potential_energy() {
     for root in ROOTS {

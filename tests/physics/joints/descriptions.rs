@@ -1,4 +1,4 @@
-//! Descriptions of joints: both ways, and refused by field.
+//! Descriptions of joints: round trips, and errors that name the field.
 
 use rover_core::multibody::{JointKind, Model, ModelDescription, Spring};
 
@@ -82,7 +82,7 @@ fn bad_joints_are_refused_by_field() {
     assert_eq!(error.field(), "solids[1].parent", "{error}");
 }
 
-/// A joint locked at a value is where the free one is at that value.
+/// A joint locked at a value has the pose of the free joint at that value.
 #[test]
 fn a_locked_slide_stands_where_the_free_one_is() {
     let mut slide = solid("slide", Some("body"), JointKind::Prismatic);

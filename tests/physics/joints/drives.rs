@@ -1,4 +1,4 @@
-//! Drives of joints that are no wheels'.
+//! Drives of joints other than wheels'.
 
 use rover_core::integrator::Variant;
 use rover_core::multibody::{
@@ -7,7 +7,7 @@ use rover_core::multibody::{
 
 use crate::machines::{machine, model, options, simulation, solid};
 
-/// About y, so that gravity does nothing.
+/// About y, so that gravity exerts no torque.
 const INERTIA: f64 = 0.25 * 0.1 * 0.1;
 
 fn turret(motor: Option<Motor>) -> SolidDescription {
@@ -26,7 +26,7 @@ const MOTOR: Motor = Motor {
     regenerating: true,
 };
 
-/// `I ω = h τ` with the torque that was asked for, or the limit; a joint without a drive has none.
+/// `I ω = h τ` with the commanded torque or the limit; a joint without a drive has no limit.
 #[test]
 fn a_torque_saturates_at_the_drives_limit() {
     for (asked, given) in [(0.004, 0.004), (1.0, 0.01), (-1.0, -0.01)] {
@@ -48,7 +48,7 @@ fn a_torque_saturates_at_the_drives_limit() {
     }
 }
 
-/// `I ω̇ = τ₀ (1 − ω/ω₀)` on the line of the motor, from rest: `ω = ω₀ (1 − exp(−τ₀ t / (I ω₀)))`.
+/// `I ω̇ = τ₀ (1 − ω/ω₀)` on the motor's line, from rest: `ω = ω₀ (1 − exp(−τ₀ t / (I ω₀)))`.
 #[test]
 fn a_joint_runs_up_along_its_motors_line() {
     for variant in [Variant::Linearised, Variant::Newton] {

@@ -17,10 +17,10 @@ use crate::machines::{energy, machine, model, options, simulation, solid};
 const VARIANTS: [Variant; 2] = [Variant::Linearised, Variant::Newton];
 const G: f64 = 9.81;
 const LENGTH: f64 = 0.8;
-/// Of the pendulum about its axis.
+/// Inertia of the pendulum about its axis, kg m².
 const INERTIA: f64 = LENGTH * LENGTH + 0.5 * 0.1 * 0.1;
 
-/// A bob of 1 kg that hangs at zero.
+/// A pendulum with a bob of 1 kg, hanging at zero.
 fn pendulum(lower: f64, upper: f64) -> SolidDescription {
     let mut bob = solid("bob", None, JointKind::Revolute);
     bob.centre_of_mass = Some([0.0, -LENGTH, 0.0]);
@@ -34,15 +34,15 @@ fn start(run: &mut RoverSimulation, joints: &[f64], v: &[f64]) {
     run.set_state(q, v.to_vec());
 }
 
-/// Impulse of a joint's stop over the last step, divided by the step: N m or N.
+/// Impulse of a joint's stop over the last step divided by the step size, N m or N.
 fn reaction(run: &RoverSimulation, joint: usize, side: Side) -> f64 {
     let key = ContactKey::at_limit(joint, side);
     let found = run.contacts().iter().find(|a| a.contact.key == key);
     found.map_or(0.0, |active| active.impulse[0]) / run.options().time_step
 }
 
-/// `½ I ω² = m g l (cos a − cos b)` down to the stop, there `ω⁺ = −e ω⁻`,
-/// and up again to where `e²` of that energy goes.
+/// `½ I ω² = m g l (cos a − cos b)` down to the stop, `ω⁺ = −e ω⁻` at the stop, and a rebound to
+/// the angle of `e²` times that energy.
 #[test]
 fn a_pendulum_bounces_off_its_stop() {
     for variant in VARIANTS {
@@ -83,7 +83,7 @@ fn a_pendulum_bounces_off_its_stop() {
     }
 }
 
-/// On its stop at an angle a the pendulum presses with `m g l sin a`.
+/// A pendulum at rest on its stop at an angle a exerts the torque `m g l sin a`.
 #[test]
 fn a_pendulum_rests_on_its_stop() {
     for variant in VARIANTS {
@@ -104,7 +104,7 @@ fn a_pendulum_rests_on_its_stop() {
     }
 }
 
-/// With the whole step as forecast a stop is met before it is passed.
+/// With a forecast over the whole step the joint does not overshoot its stop.
 #[test]
 fn a_stop_that_is_foreseen_is_never_passed() {
     for variant in VARIANTS {
@@ -129,7 +129,7 @@ fn a_stop_that_is_foreseen_is_never_passed() {
     }
 }
 
-/// A slide on its stop carries the weight of all that hangs on it.
+/// A prismatic joint on its stop carries the weight of everything below it.
 #[test]
 fn a_slide_rests_on_its_stop() {
     for variant in VARIANTS {
@@ -153,7 +153,7 @@ fn a_slide_rests_on_its_stop() {
     }
 }
 
-/// Two links that strike their stops in turn and at once.
+/// Two links that strike their stops successively and simultaneously.
 #[test]
 fn stops_give_no_energy() {
     for variant in VARIANTS {
@@ -187,8 +187,8 @@ fn stops_give_no_energy() {
     }
 }
 
-/// A stop acts between two bodies: in free flight it changes neither momentum and, with e = 1, no
-/// energy but for what the energy audit removes at a strike.
+/// A stop acts between two bodies. In free flight it conserves momentum and, with e = 1, energy
+/// except for what the energy audit removes at an impact.
 #[test]
 fn a_stop_keeps_the_momenta() {
     let body = solid("body", None, JointKind::Free);
@@ -215,8 +215,8 @@ fn a_stop_keeps_the_momenta() {
     assert!((energy(&run) - before).abs() < 1e-5 * before);
 }
 
-/// A body on two front feet and an arm: about the front feet
-/// `F · 0.9 = 10 g · 0.4 + g · 0.9`, and the stop carries `(F − g) · 0.5`.
+/// A body on two front feet and an arm: moments about the front feet require `F · 0.9 = 10 g · 0.4
+/// + g · 0.9`, and the stop carries `(F − g) · 0.5`.
 #[test]
 fn a_stop_carries_what_the_ground_presses() {
     let foot = |name: &str, joint| {
@@ -264,7 +264,7 @@ fn a_stop_carries_what_the_ground_presses() {
             (torque - expected).abs() < 1e-4 * expected,
             "{torque} {expected}"
         );
-        // Bit for bit the same from a snapshot, whose contacts name the stop.
+        // Bitwise identical from a snapshot, whose contacts include the stop.
         let snapshot = run.snapshot();
         run.step(5).unwrap();
         let end = run.state().clone();
@@ -274,8 +274,7 @@ fn a_stop_carries_what_the_ground_presses() {
     }
 }
 
-/// A joint that begins beyond its stop comes back by the projection, which
-/// moves it and gives it no rate.
+/// The projection returns a joint that starts beyond its stop, without adding to its rate.
 #[test]
 fn a_joint_beyond_its_stop_is_put_back() {
     for variant in VARIANTS {
@@ -290,7 +289,7 @@ fn a_joint_beyond_its_stop_is_put_back() {
             run.step(1).unwrap();
             let (q, v) = (run.state().configuration.joints[0], run.state().v[0]);
             assert!(q <= 0.5 + 1e-8, "{variant:?} {q}");
-            // No more than gravity gives in a step.
+            // No more than gravity adds in one step.
             assert!(v.abs() <= -gravity * 5e-3 / LENGTH, "{v}");
             assert!(energy(&run) <= before + 1e-12);
         }

@@ -1,4 +1,4 @@
-//! Machines of these tests, and their runs.
+//! Machines and simulations of these tests.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use rover_core::integrator::{StepOptions, Variant};
 use rover_core::multibody::{Configuration, JointKind, Model, ModelDescription, SolidDescription};
 use rover_core::simulation::RoverSimulation;
 
-/// A solid of 1 kg with a joint; everything else by default.
+/// A solid of 1 kg with a joint; all other fields have their defaults.
 pub fn solid(name: &str, parent: Option<&str>, joint: JointKind) -> SolidDescription {
     let text = "mass = 1.0\nname = ''\nshape = { kind = 'disc', radius = 0.1 }";
     let plain: ModelDescription =
@@ -55,7 +55,7 @@ pub fn simulation(model: Model, options: StepOptions) -> RoverSimulation {
     RoverSimulation::new(Arc::new(model), nothing(), options).unwrap()
 }
 
-/// A machine somewhere, moving somehow: smooth functions of the seed.
+/// A generic configuration and velocity: smooth functions of the seed.
 pub fn somewhere(model: &Model, seed: f64) -> (Configuration, Vec<f64>) {
     let mut q = Configuration::zero(model);
     let way: Vec<f64> = (0..model.nv())
@@ -68,7 +68,7 @@ pub fn somewhere(model: &Model, seed: f64) -> (Configuration, Vec<f64>) {
     (q, v)
 }
 
-/// A tree with every kind of joint, under a root of the given kind.
+/// A tree with every joint type, on a root of the given type.
 pub fn menagerie(root: JointKind) -> Model {
     let mut solids = vec![
         solid("root", None, root),
@@ -116,7 +116,7 @@ pub const ROOTS: [JointKind; 5] = [
     JointKind::Spherical,
 ];
 
-/// Total energy with gravity g, J.
+/// Total energy including gravity, J.
 pub fn energy(simulation: &RoverSimulation) -> f64 {
     simulation.energy().total()
 }

@@ -22,7 +22,7 @@ fn renamed(description: &ModelDescription, prefix: &str) -> Vec<SolidDescription
     description.solids.iter().map(rename).collect()
 }
 
-/// Two trees that do not touch move as each does alone, but for the audit of their common energy.
+/// Without contact two trees move as each does alone, except for the audit of their total energy.
 #[test]
 fn two_trees_move_as_each_alone() {
     for (first, second) in [
@@ -64,7 +64,7 @@ fn two_trees_move_as_each_alone() {
     }
 }
 
-/// A stone beside a rover: the rover falls and drives as without it, and each rests on the ground.
+/// A stone beside a rover does not affect the rover's fall and drive, and both rest on the ground.
 #[test]
 fn a_stone_lies_beside_a_rover() {
     use rover_core::geometry::Plane;

@@ -1,4 +1,4 @@
-//! Descriptions of shapes: both ways, in a model, and refused by field.
+//! Descriptions of shapes: round trips, models, and errors that name the field.
 
 use rover_core::multibody::{
     MAX_SHAPES, Model, ModelDescription, ModelError, Shape, ShapeDescription,
@@ -33,7 +33,7 @@ fn a_single_shape_is_written_as_before() {
     assert!(!text.contains("shapes") && !text.contains("visible"));
 }
 
-/// Places of parts on a solid that is fixed to another one.
+/// Positions of parts on a solid fixed to another one.
 #[test]
 fn parts_are_placed_by_all_poses_on_the_way() {
     let text = format!(
@@ -62,7 +62,7 @@ fn parts_are_placed_by_all_poses_on_the_way() {
     assert_eq!((ball.radius, ball.name.as_str()), (0.1, "fixed"));
 }
 
-/// A wheel with a hub, a rim inside the tyre, and a disc that is no part of it.
+/// A wheel with a hub, a rim inside the tyre, and a disc that does not belong to the wheel.
 fn hubbed() -> ModelDescription {
     let mut description = ModelDescription::rover();
     let solid = description.solids.iter_mut().find(|s| s.name == "wheel_ML");
@@ -128,7 +128,7 @@ fn of_several_shapes_the_wheels_disc_takes_another_radius() {
     assert!(matches!(refused, ModelError::NotADisc { .. }), "{refused}");
 }
 
-/// Every way to spoil the shapes of a solid, and the field that the error must name.
+/// Every invalid combination of shapes, and the field that the error must name.
 #[test]
 fn bad_shapes_are_refused_by_field() {
     type Spoil = fn(&mut ModelDescription);

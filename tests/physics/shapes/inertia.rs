@@ -1,4 +1,4 @@
-//! Mass centre and inertia of several shapes.
+//! Mass centre and inertia of solids with several shapes.
 
 use rover_core::multibody::{MassProperties, Shape, SolidDescription};
 use rover_core::nalgebra::{Matrix3, Rotation3, Vector3};
@@ -29,7 +29,7 @@ fn two_boxes_are_the_box_that_they_make_together() {
     assert_same(&halves, &whole, 1e-15);
 }
 
-/// A square tube of outer width a, inner width b and length l: the outer bar without the inner one.
+/// A square tube of outer width a, inner width b and length l: the outer bar minus the inner one.
 #[test]
 fn four_walls_are_a_bar_without_its_inside() {
     let (a, b, l, mass) = (0.4, 0.3, 1.2, 11.0);
@@ -68,7 +68,7 @@ fn spread(shape: &Shape) -> Vector3<f64> {
     }
 }
 
-/// The same from eight points a shape, which have its mass, its centre and its second moments.
+/// The same from eight point masses per shape with its mass, centre and second moments.
 fn of_points(solid: &SolidDescription, masses: &[f64]) -> MassProperties {
     let mut points = Vec::new();
     for (placed, mass) in solid.shapes.iter().zip(masses) {
@@ -118,7 +118,7 @@ fn turned_shapes_of_every_kind_are_the_points_that_they_are_made_of() {
         mass = 2.5",
     )
     .solids[0];
-    // 6 kg are left to box and cylinder, by volume.
+    // 6 kg remain for box and cylinder, divided by volume.
     let (cuboid, cylinder) = (0.03, std::f64::consts::PI * 0.04 * 0.7);
     let share = 6.0 / (cuboid + cylinder);
     let expected = of_points(solid, &[share * cuboid, share * cylinder, 1.5, 2.5]);
@@ -153,7 +153,7 @@ fn a_given_inertia_is_taken_whatever_the_shapes() {
     }
 }
 
-/// A solid of another mass is the same solid, denser.
+/// Another mass makes a solid denser without changing its shape.
 #[test]
 fn masses_of_shapes_scale_with_the_solids() {
     let text = "shapes = [{ kind = 'sphere', radius = 0.1, mass = 1.0 },

@@ -2,7 +2,7 @@
 
 use rover_core::multibody::{Model, ModelDescription};
 
-/// One free solid of a mass (kg) with what else its description says.
+/// One free solid with a mass (kg) and further fields of its description.
 pub fn described(mass: f64, rest: &str) -> ModelDescription {
     let text = format!("name = 'machine'\n[[solids]]\nname = 'body'\nmass = {mass}\n{rest}\n");
     ModelDescription::from_toml(&text).unwrap()

@@ -1,4 +1,4 @@
-//! Bodies of several shapes on flat ground, against statics.
+//! Bodies with several shapes at rest on flat ground, against statics.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::machines::body;
 
 const GRAVITY: f64 = 9.81;
 
-/// Dropped from a height (m) at an angle about z (rad), and left alone for three seconds.
+/// Dropped from a height (m) at an angle about z (rad) and simulated for three seconds.
 fn settled(model: Model, height: f64, angle: f64, variant: Variant) -> RoverSimulation {
     let mut start = Configuration::zero(&model);
     start.position.y = height;
@@ -34,7 +34,7 @@ fn settled(model: Model, height: f64, angle: f64, variant: Variant) -> RoverSimu
     simulation
 }
 
-/// Force of the ground on a part, N.
+/// Ground reaction on a part, N.
 fn force(simulation: &RoverSimulation, part: Part) -> f64 {
     let contacts = simulation.contacts().iter();
     let own = contacts.filter(|a| a.contact.part == part);
@@ -60,13 +60,13 @@ fn each_ball_of_a_dumbbell_bears_what_it_weighs() {
         let kinematics = simulation.kinematics();
         for ball in simulation.model().spheres() {
             let place = kinematics.point(ball.body, &ball.centre) + kinematics.origin(ball.body);
-            // A gap that closes within a step is left as it is: less than g h² = 0.2 mm.
+            // A gap that closes within a step is not corrected: less than g h² = 0.2 mm.
             assert!((place.y - ball.radius).abs() < 1e-4, "{place}");
         }
     }
 }
 
-/// Foot and column of 0.1 m width: the foot's heel bears what the mass centre's place says.
+/// Foot and column of 0.1 m width: the position of the mass centre determines the load on the heel.
 #[test]
 fn an_l_stands_on_its_foot() {
     for variant in VARIANTS {
@@ -76,7 +76,7 @@ fn an_l_stands_on_its_foot() {
             { kind = 'box', size = [0.6, 0.1, 0.3], position = [0.3, 0.05, 0.0], collides = true },
             { kind = 'box', size = [0.1, 0.8, 0.3], position = [0.05, 0.5, 0.0], collides = true }]",
         );
-        // By volume 1.8 kg are the foot's and 2.4 kg the column's.
+        // By volume the foot has 1.8 kg and the column 2.4 kg.
         let toe = (1.8 * 0.3 + 2.4 * 0.05) * GRAVITY / 0.6;
         let simulation = settled(model, 0.01, 0.0, variant);
         let of_toe: f64 = (simulation.contacts().iter())
@@ -91,7 +91,7 @@ fn an_l_stands_on_its_foot() {
     }
 }
 
-/// The same L upside down has its mass centre beyond its foot: it tips over and lies on both boxes.
+/// The inverted L has its mass centre beyond its foot: it tips over and lies on both boxes.
 #[test]
 fn an_l_that_stands_on_its_column_tips_over() {
     for variant in VARIANTS {

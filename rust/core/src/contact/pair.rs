@@ -5,7 +5,6 @@
 //! body. Between two bodies the contact point lies halfway between the surfaces and is the same for
 //! both, so the impulse conserves their total linear and angular momentum. The surface points lie
 //! along the normal, so the gap rate equals the normal relative velocity at the common point.
-//! places all the same.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
