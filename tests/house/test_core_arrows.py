@@ -8,6 +8,7 @@ SOURCE = Path(__file__).parents[2] / "rust" / "core" / "src"
 # From the ground up: a chapter may use those before it.
 CHAPTERS = [
     "quantity",
+    "scalar",
     "spatial",
     "cone",
     "law",
@@ -19,6 +20,7 @@ CHAPTERS = [
     "integrator",
     "planar",
     "system",
+    "lanes",
     "simulation",
 ]
 

@@ -11,7 +11,8 @@
 //!
 //! Chapters, each using only those above it:
 //!
-//! - [`quantity`]: admissible numbers of a description; [`spatial`]: rotations and inertias;
+//! - [`quantity`]: admissible numbers of a description; [`scalar`]: one rover or several to a
+//!   register; [`spatial`]: rotations and inertias;
 //! - [`multibody`]: model, state, kinematics, mass matrix, bias, energy, momentum;
 //! - [`geometry`]: shapes, the ground, distances between them; [`contact`]: points, frames, gaps,
 //!   the Delassus operator;
@@ -20,6 +21,7 @@
 //! - [`integrator`]: one step of any mechanical system;
 //! - [`planar`]: grounds and machines in the plane; [`system`]: the mechanical systems that a step
 //!   moves, such as the multibody tree;
+//! - [`lanes`]: the ordinary step of one rover or several to a register;
 //! - [`simulation`]: many steps of any scene.
 #![forbid(unsafe_code)]
 
@@ -29,11 +31,13 @@ pub mod cone;
 pub mod contact;
 pub mod geometry;
 pub mod integrator;
+pub mod lanes;
 pub mod law;
 pub mod multibody;
 pub mod planar;
 pub mod problem;
 pub mod quantity;
+pub mod scalar;
 pub mod simulation;
 pub mod solver;
 pub mod spatial;

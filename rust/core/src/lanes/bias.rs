@@ -1,0 +1,1 @@
+//! Bias forces of a block.

@@ -1,0 +1,1 @@
+//! Contacts of the wheels of a block.

@@ -1,0 +1,1 @@
+//! Kinetic and potential energy of a block.

@@ -1,0 +1,1 @@
+//! The ground under each rover of a block.

@@ -1,0 +1,1 @@
+//! Mass matrix of a block and its factor.

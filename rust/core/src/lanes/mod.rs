@@ -1,0 +1,26 @@
+//! The ordinary step of a rover, one or several to a register.
+//!
+//! Most steps of a wheeled rover are alike: a tree of revolute joints on a free base, wheels that
+//! roll and slip, motors and held joints. These sources take such a step over a scalar
+//! ([`crate::scalar`]) that is one rover or four or eight. A step that is not ordinary is declined,
+//! rover by rover, before anything has changed; [`crate::integrator`] then takes it.
+//!
+//! - [`machine`]: what the rovers share; [`place`]: configurations;
+//! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
+//! - [`ground`], [`contacts`], [`rows`]: contacts, Jacobian and Delassus operator;
+//! - [`problem`], [`newton`]: the friction-contact problems;
+//! - [`step`]: the step.
+#![allow(clippy::inline_always)] // a call would leave the instruction set that its caller is compiled for
+
+pub mod bias;
+pub mod contacts;
+pub mod energy;
+pub mod ground;
+pub mod machine;
+pub mod mass_matrix;
+pub mod newton;
+pub mod place;
+pub mod poses;
+pub mod problem;
+pub mod rows;
+pub mod step;

@@ -1,0 +1,1 @@
+//! Semismooth Newton on several contact problems side by side.

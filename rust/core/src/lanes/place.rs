@@ -1,0 +1,1 @@
+//! Configurations of the rovers of a block.

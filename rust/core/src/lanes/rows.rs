@@ -1,0 +1,1 @@
+//! Contact Jacobian, Delassus operator and impulses of a block.

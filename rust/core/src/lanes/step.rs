@@ -1,0 +1,1 @@
+//! The ordinary step of a block.

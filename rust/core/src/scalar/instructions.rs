@@ -1,0 +1,237 @@
+//! The instruction set of this machine, found at run time, and its lane types.
+
+use std::sync::OnceLock;
+
+#[cfg(target_arch = "x86_64")]
+use fearless_simd::{Avx2, Avx512};
+use fearless_simd::{
+    Level, Select, Simd, SimdBase, SimdFloat, SimdMask, f64x4, f64x8, mask64x4, mask64x8,
+};
+
+use super::lane::{Lane, LaneMask};
+
+/// Instructions that a single rover's step is compiled for. Its bits do not depend on them.
+#[derive(Clone, Copy, Debug)]
+pub enum Single {
+    /// Those that every machine of its kind has.
+    Baseline,
+    /// AVX2.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+    /// AVX-512.
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
+}
+
+impl Single {
+    /// The best of this machine.
+    #[must_use]
+    pub fn best() -> Self {
+        match Instructions::of_this_machine() {
+            Instructions::Baseline => Self::Baseline,
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2(token) => Self::Avx2(token),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx512(token) => Self::Avx512(token),
+        }
+    }
+
+    /// Runs `f` compiled for these instructions.
+    #[inline(always)]
+    pub fn vectorize<R>(self, f: impl FnOnce() -> R) -> R {
+        match self {
+            Self::Baseline => f(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(token) => token.vectorize(f),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(token) => token.vectorize(f),
+        }
+    }
+}
+
+/// What this machine can do.
+#[derive(Clone, Copy, Debug)]
+pub enum Instructions {
+    /// One rover at a time.
+    Baseline,
+    /// Four rovers to a register.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+    /// Eight rovers to a register.
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
+}
+
+impl Instructions {
+    /// Asks the processor once.
+    #[must_use]
+    pub fn of_this_machine() -> Self {
+        static FOUND: OnceLock<Instructions> = OnceLock::new();
+        *FOUND.get_or_init(|| {
+            let level = Level::new();
+            #[cfg(target_arch = "x86_64")]
+            if let Some(token) = level.as_avx512() {
+                return Self::Avx512(token);
+            }
+            #[cfg(target_arch = "x86_64")]
+            if let Some(token) = level.as_avx2() {
+                return Self::Avx2(token);
+            }
+            let _ = level;
+            Self::Baseline
+        })
+    }
+
+    /// Rovers to a register.
+    #[must_use]
+    pub fn lanes(self) -> usize {
+        match self {
+            Self::Baseline => 1,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => 4,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => 8,
+        }
+    }
+
+    /// Name of the instruction set.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Baseline => "baseline",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => "AVX2",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => "AVX-512",
+        }
+    }
+}
+
+/// A lane type of the SIMD library, for every instruction set that it knows.
+macro_rules! lanes {
+    ($vector:ident, $mask:ident, $n:literal) => {
+        impl<S: Simd> LaneMask for $mask<S> {
+            #[inline(always)]
+            fn bits(self) -> u32 {
+                self.to_bitmask() as u32
+            }
+
+            #[inline(always)]
+            fn any(self) -> bool {
+                self.any_true()
+            }
+
+            #[inline(always)]
+            fn all(self) -> bool {
+                self.all_true()
+            }
+        }
+
+        impl<S: Simd> Lane for $vector<S> {
+            type Mask = $mask<S>;
+            type Token = S;
+
+            const LANES: usize = $n;
+
+            #[inline(always)]
+            fn splat(token: S, x: f64) -> Self {
+                SimdBase::splat(token, x)
+            }
+
+            #[inline(always)]
+            fn load(token: S, x: &[f64]) -> Self {
+                Self::from_slice(token, x)
+            }
+
+            #[inline(always)]
+            fn store(self, out: &mut [f64]) {
+                self.store_slice(out);
+            }
+
+            #[inline(always)]
+            fn mask(token: S, bits: u32) -> $mask<S> {
+                $mask::from_bitmask(token, u64::from(bits))
+            }
+
+            #[inline(always)]
+            fn token(self) -> S {
+                self.simd
+            }
+
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                SimdFloat::sqrt(self)
+            }
+
+            #[inline(always)]
+            fn abs(self) -> Self {
+                SimdBase::abs(self)
+            }
+
+            #[inline(always)]
+            fn lt(self, other: Self) -> $mask<S> {
+                self.simd_lt(other)
+            }
+
+            #[inline(always)]
+            fn le(self, other: Self) -> $mask<S> {
+                self.simd_le(other)
+            }
+
+            #[inline(always)]
+            fn select(mask: $mask<S>, yes: Self, no: Self) -> Self {
+                mask.select(yes, no)
+            }
+
+            #[inline(always)]
+            fn vectorize<R>(token: S, f: impl FnOnce() -> R) -> R {
+                token.vectorize(f)
+            }
+        }
+    };
+}
+
+lanes!(f64x4, mask64x4, 4);
+lanes!(f64x8, mask64x8, 8);
+
+#[cfg(test)]
+mod tests {
+    use super::super::lane::MAX_LANES;
+    use super::*;
+
+    /// A formula with every operation, over any scalar.
+    #[inline(always)]
+    fn formula<T: Lane>(a: T, b: T) -> T {
+        let c = (a * b - b / a + a.like(0.3)).abs().sqrt();
+        T::select(a.lt(b), c.max(a), -c.min(b))
+    }
+
+    fn agrees<T: Lane>(token: T::Token) {
+        let number = |k: usize| 1.7 * (3.1 * k as f64).sin();
+        let mut a = [0.0; MAX_LANES];
+        for (k, a) in a.iter_mut().enumerate() {
+            *a = number(k);
+        }
+        let mut b = a;
+        b.reverse();
+        let x = T::load(token, &a[..T::LANES]);
+        let y = T::load(token, &b[..T::LANES]);
+        let found = T::vectorize(token, || formula(x, y));
+        for k in 0..T::LANES {
+            let alone = formula(a[k], b[k]);
+            assert_eq!(found.get(k).to_bits(), alone.to_bits(), "lane {k}");
+            assert_eq!(x.lt(y).get(k), a[k] < b[k]);
+        }
+        assert_eq!(T::mask(token, 0b10).bits(), 0b10 & ((1 << T::LANES) - 1));
+    }
+
+    #[test]
+    fn every_lane_has_the_bits_of_f64() {
+        agrees::<f64>(Single::best());
+        let level = Level::new();
+        fearless_simd::dispatch!(level, token => {
+            agrees::<f64x4<_>>(token);
+            agrees::<f64x8<_>>(token);
+        });
+    }
+}

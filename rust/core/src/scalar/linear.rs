@@ -1,0 +1,160 @@
+//! Vectors and matrices of three dimensions over lanes.
+
+use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
+
+use super::lane::Lane;
+
+/// A vector.
+#[derive(Clone, Copy, Debug)]
+pub struct Vec3<T> {
+    /// First component.
+    pub x: T,
+    /// Second component.
+    pub y: T,
+    /// Third component.
+    pub z: T,
+}
+
+impl<T: Lane> Vec3<T> {
+    /// From its components.
+    #[inline(always)]
+    pub fn new(x: T, y: T, z: T) -> Self {
+        Self { x, y, z }
+    }
+
+    /// The same vector in every lane.
+    #[inline(always)]
+    pub fn splat(token: T::Token, v: [f64; 3]) -> Self {
+        let [x, y, z] = v.map(|x| T::splat(token, x));
+        Self { x, y, z }
+    }
+
+    /// Scalar product.
+    #[inline(always)]
+    pub fn dot(self, other: Self) -> T {
+        self.x * other.x + self.y * other.y + self.z * other.z
+    }
+
+    /// Vector product.
+    #[inline(always)]
+    #[must_use]
+    pub fn cross(self, other: Self) -> Self {
+        Self {
+            x: self.y * other.z - self.z * other.y,
+            y: self.z * other.x - self.x * other.z,
+            z: self.x * other.y - self.y * other.x,
+        }
+    }
+
+    /// Length.
+    #[inline(always)]
+    pub fn norm(self) -> T {
+        self.dot(self).sqrt()
+    }
+
+    /// `self` where the mask is true, `other` elsewhere.
+    #[inline(always)]
+    #[must_use]
+    pub fn select(mask: T::Mask, yes: Self, no: Self) -> Self {
+        Self {
+            x: T::select(mask, yes.x, no.x),
+            y: T::select(mask, yes.y, no.y),
+            z: T::select(mask, yes.z, no.z),
+        }
+    }
+
+    /// The vector of a lane.
+    #[inline(always)]
+    pub fn get(self, lane: usize) -> [f64; 3] {
+        [self.x.get(lane), self.y.get(lane), self.z.get(lane)]
+    }
+
+    /// Replaces the vector of a lane.
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, v: [f64; 3]) {
+        self.x.set(lane, v[0]);
+        self.y.set(lane, v[1]);
+        self.z.set(lane, v[2]);
+    }
+}
+
+impl<T: Lane> Add for Vec3<T> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self::new(self.x + other.x, self.y + other.y, self.z + other.z)
+    }
+}
+
+impl<T: Lane> Sub for Vec3<T> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self::new(self.x - other.x, self.y - other.y, self.z - other.z)
+    }
+}
+
+impl<T: Lane> Mul<T> for Vec3<T> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, a: T) -> Self {
+        Self::new(self.x * a, self.y * a, self.z * a)
+    }
+}
+
+impl<T: Lane> Neg for Vec3<T> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self::new(-self.x, -self.y, -self.z)
+    }
+}
+
+impl<T: Lane> AddAssign for Vec3<T> {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl<T: Lane> SubAssign for Vec3<T> {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}
+
+/// A matrix, by its columns.
+#[derive(Clone, Copy, Debug)]
+pub struct Mat3<T> {
+    /// First column.
+    pub x: Vec3<T>,
+    /// Second column.
+    pub y: Vec3<T>,
+    /// Third column.
+    pub z: Vec3<T>,
+}
+
+impl<T: Lane> Mat3<T> {
+    /// `A v`.
+    #[inline(always)]
+    pub fn times(&self, v: Vec3<T>) -> Vec3<T> {
+        self.x * v.x + self.y * v.y + self.z * v.z
+    }
+
+    /// `A v` for a vector that all lanes share.
+    #[inline(always)]
+    pub fn times_shared(&self, v: [f64; 3]) -> Vec3<T> {
+        self.times(Vec3::splat(self.x.x.token(), v))
+    }
+
+    /// `Aᵀ v`.
+    #[inline(always)]
+    pub fn transpose_times(&self, v: Vec3<T>) -> Vec3<T> {
+        Vec3::new(self.x.dot(v), self.y.dot(v), self.z.dot(v))
+    }
+}

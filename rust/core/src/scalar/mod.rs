@@ -1,0 +1,14 @@
+//! The scalar: one rover, or several to a register.
+//!
+//! - [`lane`]: the scalar and its mask, and `f64` as one lane;
+//! - [`instructions`]: what this machine can do, found at run time, and the lane types;
+//! - [`linear`]: vectors and matrices of three dimensions over lanes.
+#![allow(clippy::inline_always)] // a call would leave the instruction set that its caller is compiled for
+
+pub mod instructions;
+pub mod lane;
+pub mod linear;
+
+pub use instructions::{Instructions, Single};
+pub use lane::{Lane, LaneMask, MAX_LANES};
+pub use linear::{Mat3, Vec3};
