@@ -1,9 +1,9 @@
 """Drives of random policies, recorded: what a policy does before it has learned anything.
 
-Torques and set-points of the steering are redrawn every 50 ms. A drive is recorded as numbers in [-1, 1], which a torque
-(N m) and the steering's limit scale, so that one record serves all torques. Its rocks are those of `Rover-v0` with
-`terrain="sphere_field"` at difficulty 0.5, slope included; the rover starts halfway to the goal, since the clearing at
-the environment's start has no rocks. Rust plays the same file (`tests/physics/exploring_scenes.rs`).
+Torques and set-points of the steering are redrawn every 50 ms. A drive is recorded as numbers in [-1, 1], which a
+torque (N m) and the steering's limit scale, so that one record serves all torques. Its rocks are those of `Rover-v0`
+with `terrain="sphere_field"` at difficulty 0.5, slope included; the rover starts halfway to the goal, since the
+clearing at the environment's start has no rocks. Rust plays the same file (`tests/physics/exploring_scenes.rs`).
 
 `python -m comparison.exploring` records `exploring.json` anew.
 """
@@ -66,9 +66,7 @@ def drives() -> tuple[Drive, ...]:
     """All records."""
     data = json.loads(FILE.read_text(encoding="utf-8"))
     return tuple(
-        Drive(
-            d["seed"], np.array(d["actions"]), tuple(d["normal"]), np.array(d["q"]), np.array(d["spheres"])
-        )
+        Drive(d["seed"], np.array(d["actions"]), tuple(d["normal"]), np.array(d["q"]), np.array(d["spheres"]))
         for d in data["drives"]
     )
 
