@@ -17,12 +17,16 @@ use super::ground::{Ground, GroundSphere, turning};
 use super::machine::{Axis, Machine, velocity};
 use super::poses::{Pose, Poses};
 use super::problem::MAX_CONTACTS;
-use crate::contact::detection::passes_disc;
+use crate::contact::detection::touch_of_disc;
 use crate::contact::{ContactKey, Part};
 use crate::geometry::query::NEAREST;
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::{Disc, Sphere};
+use crate::integrator::WarmStart;
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Mat3, Vec3};
+
+/// Number of the plane in every terrain that has one.
+const PLANE: u32 = 0;
 
 /// Slots of a wheel.
 pub const SLOTS: usize = 2;
@@ -182,6 +186,8 @@ pub struct Contacts<T: Lane> {
     slots: Vec<Slot<T>>,
     used: Vec<usize>,
     lists: [Listed; MAX_LANES],
+    /// Place of each slot among the contacts of each lane.
+    places: Vec<[u8; MAX_LANES]>,
 }
 
 /// What one detection looks at.
@@ -210,8 +216,12 @@ impl<T: Lane> Contacts<T> {
         let wheels: Vec<Wheel> = (machine.wheels.iter())
             .map(|wheel| {
                 let link = &machine.links[wheel.body];
-                let axle = axle_of(&link.axis, wheel.axle);
-                let spins = link.is_spinner && wheel.body > 0 && matches!(axle, Axle::Joint(_));
+                let axle = if wheel.body > 0 {
+                    axle_of(&link.axis, wheel.axle)
+                } else {
+                    Axle::Fixed(wheel.axle)
+                };
+                let spins = link.is_spinner && matches!(axle, Axle::Joint(_));
                 let mover = if spins { link.parent } else { wheel.body };
                 Wheel {
                     body: wheel.body,
@@ -267,6 +277,7 @@ impl<T: Lane> Contacts<T> {
             wheels,
             boxes,
             lists: [Listed::NONE; MAX_LANES],
+            places: vec![[0; MAX_LANES]; SLOTS * machine.wheels.len()],
         }
     }
 
@@ -302,6 +313,51 @@ impl<T: Lane> Contacts<T> {
     #[must_use]
     pub fn list(&self, lane: usize) -> &Listed {
         &self.lists[lane]
+    }
+
+    /// Place of a slot among the contacts of each lane in which it is active.
+    #[inline(always)]
+    pub(super) fn places(&self, slot: usize) -> &[u8; MAX_LANES] {
+        &self.places[slot]
+    }
+
+    /// Key of a rover's contact, by its place in the list.
+    #[inline(always)]
+    fn key(list: &Listed, place: usize) -> ContactKey {
+        let wheel = Part::Wheel(Self::wheel(usize::from(list.slots[place])));
+        ContactKey::on_ground(wheel, NEAREST, list.primitives[place])
+    }
+
+    /// Fills `p` (3 n_c) with the impulses that a rover remembers of its contacts, N s, zero for new
+    /// ones. Returns whether the last step had exactly these contacts.
+    #[inline(always)]
+    pub fn recall(&self, lane: usize, memory: &WarmStart, p: &mut [f64]) -> bool {
+        let list = &self.lists[lane];
+        let mut is_same = memory.impulses.len() == list.n;
+        for (place, out) in p.chunks_exact_mut(3).enumerate().take(list.n) {
+            let wanted = Self::key(list, place);
+            let same = memory.impulses.get(place);
+            let known = if let Some((_, known)) = same.filter(|(key, _)| *key == wanted) {
+                *known
+            } else {
+                is_same = false;
+                let found = memory.impulses.iter().find(|(key, _)| *key == wanted);
+                found.map_or([0.0; 3], |(_, known)| *known)
+            };
+            out.copy_from_slice(&known);
+        }
+        is_same
+    }
+
+    /// Makes a rover remember the impulses of its contacts, `p` (3 n_c), N s.
+    #[inline(always)]
+    pub fn remember(&self, lane: usize, p: &[f64], memory: &mut WarmStart) {
+        let list = &self.lists[lane];
+        memory.impulses.clear();
+        for (place, p) in p.chunks_exact(3).enumerate().take(list.n) {
+            let known = (Self::key(list, place), [p[0], p[1], p[2]]);
+            memory.impulses.push(known);
+        }
     }
 
     /// Finds the contacts of a step and moves them to its end.
@@ -553,7 +609,7 @@ impl<T: Lane> Contacts<T> {
             };
             let base = Vector3::from(sight.middle.origin.get(lane));
             let half_way = Vector3::from(half_way.get(lane));
-            if passes_disc(&disc, &ball, &base, &half_way).is_some() {
+            if touch_of_disc(&disc, &ball, &base, &half_way).is_some() {
                 passes |= 1 << lane;
             }
         }
@@ -628,12 +684,13 @@ impl<T: Lane> Contacts<T> {
         }
         let mut too_many = 0;
         for &slot in &self.used {
-            let own = &self.slots[slot];
+            let own = &mut self.slots[slot];
             let on_sphere = own.on_sphere.bits();
             let mut numbers = [0.0; MAX_LANES];
             if on_sphere != 0 {
                 own.sphere.number.store(&mut numbers[..T::LANES]);
             }
+            let places = &mut self.places[slot];
             let mut lanes = own.active.bits();
             while lanes != 0 {
                 let lane = lanes.trailing_zeros() as usize;
@@ -643,13 +700,17 @@ impl<T: Lane> Contacts<T> {
                     too_many |= 1 << lane;
                     continue;
                 }
+                places[lane] = list.n as u8;
                 list.slots[list.n] = slot as u8;
                 list.primitives[list.n] = if on_sphere >> lane & 1 == 1 {
                     numbers[lane] as u32
                 } else {
-                    0
+                    PLANE
                 };
                 list.n += 1;
+            }
+            if too_many != 0 {
+                own.active = own.active & !T::mask(self.token, too_many);
             }
         }
         T::mask(self.token, too_many)
