@@ -18,7 +18,7 @@ use super::machine::{Axis, Machine, velocity};
 use super::poses::{Pose, Poses};
 use super::problem::MAX_CONTACTS;
 use crate::contact::detection::touch_of_disc;
-use crate::contact::{ContactKey, Part};
+use crate::contact::{Contact, ContactFrame, ContactKey, Part};
 use crate::geometry::query::NEAREST;
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::{Disc, Sphere};
@@ -315,6 +315,29 @@ impl<T: Lane> Contacts<T> {
         &self.lists[lane]
     }
 
+    /// A contact of a rover by its place in the list, with its slot.
+    #[must_use]
+    pub fn contact(&self, machine: &Machine, lane: usize, place: usize) -> (usize, Contact) {
+        let list = &self.lists[lane];
+        let slot = usize::from(list.slots[place]);
+        let (own, wheel) = (&self.slots[slot], Self::wheel(slot));
+        let frame = ContactFrame {
+            n: own.n.get(lane).into(),
+            t: own.t.get(lane).into(),
+            b: own.b.get(lane).into(),
+        };
+        let contact = Contact {
+            key: Self::key(list, place),
+            part: Part::Wheel(wheel),
+            body: machine.wheels[wheel].body,
+            other: None,
+            point: own.point.get(lane).into(),
+            frame,
+            gap: own.gap.get(lane),
+        };
+        (slot, contact)
+    }
+
     /// Place of a slot among the contacts of each lane in which it is active.
     #[inline(always)]
     pub(super) fn places(&self, slot: usize) -> &[u8; MAX_LANES] {
@@ -468,12 +491,7 @@ impl<T: Lane> Contacts<T> {
 
     /// Fills the slots of a wheel with its contacts at the midpoint.
     #[inline(always)]
-    fn look_at_wheel(
-        &mut self,
-        w: usize,
-        ground: &mut Ground<T>,
-        sight: &Sight<'_, T>,
-    ) -> T::Mask {
+    fn look_at_wheel(&mut self, w: usize, ground: &mut Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
         let wheel = &self.wheels[w];
         let pose = &sight.middle.bodies[wheel.body];
         let (n, s, centre) = (ground.normal, wheel.axle(pose), wheel.centre(pose));

@@ -50,7 +50,12 @@ impl<T: Lane> Rows<T> {
         let movers = (machine.wheels.iter())
             .map(|wheel| {
                 let own = (wheel.body > 0).then_some(wheel.body);
-                machine.ancestors(wheel.body).iter().copied().chain(own).collect()
+                machine
+                    .ancestors(wheel.body)
+                    .iter()
+                    .copied()
+                    .chain(own)
+                    .collect()
             })
             .collect();
         let stride = paths.iter().map(|path| path.len()).max().unwrap_or(0);
