@@ -112,17 +112,23 @@ def instructions(ground: str, torque: float) -> dict[str, float]:
             capture_output=True,
             text=True,
         )
-        return by_part(done.stdout.split(), Path(folder))
+        steps, *parts = done.stdout.split()
+        return by_part(int(steps), parts, Path(folder))
 
 
-def by_part(parts: list[str], folder: Path) -> dict[str, float]:
-    """Adds up callgrind's files `out.1`, `out.2`, ..., the k-th of which holds what the k-th part took."""
+def by_part(steps: int, parts: list[str], folder: Path) -> dict[str, float]:
+    """What a step takes on average of each part.
+
+    Args:
+        steps: Number of steps. One that was taken twice has its parts twice.
+        parts: Names, one for each of callgrind's files `out.1`, `out.2`, ..., in their order.
+        folder: Of the files.
+    """
     total: Counter[str] = Counter()
     for number, part in enumerate(parts, 1):
         text = (folder / f"out.{number}").read_text(encoding="utf-8", errors="replace")
         found = re.search(r"^(?:summary|totals): (\d+)", text, flags=re.MULTILINE)
         total[part] += int(found[1]) if found else 0
-    steps = parts.count("Kinematics")
     return {part: total[part] / steps for part in PARTS}
 
 

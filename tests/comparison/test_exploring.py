@@ -37,7 +37,7 @@ def test_callgrinds_files_are_added_up_by_part(tmp_path: Path) -> None:
     parts = ["Kinematics", "Solve", "Kinematics", "Solve", "Solve"]
     for number, count in enumerate((100, 1000, 300, 2000, 500), 1):
         (tmp_path / f"out.{number}").write_text(f"events: Ir\nsummary: {count}\n", encoding="utf-8")
-    found = bench.by_part(parts, tmp_path)
+    found = bench.by_part(2, parts, tmp_path)
     assert found["Kinematics"] == 200.0
     assert found["Solve"] == 1750.0
     assert sum(found.values()) == 1950.0

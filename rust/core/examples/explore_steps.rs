@@ -6,8 +6,8 @@
 //! It plays the first DRIVES drives of `tests/comparison/exploring.json` (GROUND: `plane`, `rocks`,
 //! `plane, wheels 0.20 m`) with torques of up to TORQUE N m, and counts every seventh step. Each
 //! part of a counted step ends with a call of `part_ends`, at which callgrind writes what the part
-//! took; the names of the parts are printed in the same order, one a line. `make bench` adds them
-//! up.
+//! took. The number of counted steps is printed, and the names of the parts in the same order, one
+//! a line. `make bench` adds them up.
 
 #![allow(clippy::print_stdout)] // its purpose
 
@@ -71,6 +71,7 @@ fn main() -> Result<(), StepError> {
             }
         }
     }
+    println!("{}", step / EVERY);
     for phase in parts.0 {
         println!("{phase:?}");
     }
