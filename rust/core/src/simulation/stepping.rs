@@ -205,6 +205,19 @@ impl<S: Scene> Simulation<S> {
         Ok(stopwatch)
     }
 
+    /// Takes `n` steps and tells `probe` where each part of a step ends.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_probed(
+        &mut self,
+        n: usize,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError> {
+        let variant = self.options.variant;
+        self.call(&variant, true, n, &mut || true, probe)
+    }
+
     /// One call: its report is kept. `may_be_quick`: whether steps that the scene takes in its own
     /// way are the integrator's.
     fn call<I>(
@@ -218,10 +231,22 @@ impl<S: Scene> Simulation<S> {
     where
         I: for<'a> Integrator<S::System<'a>>,
     {
-        self.scene.begin_call(&mut self.parts);
+        self.begin_call();
         let result = self.steps(integrator, may_be_quick, n, go_on, probe);
-        self.last_report = result.clone().unwrap_or_default();
+        self.end_call(result.clone().unwrap_or_default());
         result
+    }
+
+    /// Resets what counts over a call.
+    pub(super) fn begin_call(&mut self) {
+        self.scene.begin_call(&mut self.parts);
+        self.last_report = StepReport::default();
+        self.active.clear();
+    }
+
+    /// Keeps the report of a call.
+    pub(super) fn end_call(&mut self, report: StepReport) {
+        self.last_report = report;
     }
 
     fn steps<I>(
@@ -236,7 +261,6 @@ impl<S: Scene> Simulation<S> {
         I: for<'a> Integrator<S::System<'a>>,
     {
         let mut total = StepReport::default();
-        self.active.clear();
         for _ in 0..n {
             let quick = may_be_quick.then(|| self.quick_step(probe)).flatten();
             let report = match quick {
@@ -300,7 +324,7 @@ impl<S: Scene> Simulation<S> {
         Ok(report)
     }
 
-    fn list_active(&mut self) {
+    pub(super) fn list_active(&mut self) {
         let d = <S::Contact as LocatedContact>::Vector::N;
         let (scene, parts) = (&self.scene, &self.parts);
         let impulses = self.scratch.impulses().chunks_exact(d);
