@@ -91,7 +91,15 @@ def here() -> dict[str, list[str]]:
     return drives()
 
 
-@pytest.mark.parametrize("other", OTHER_MACHINES)
+@pytest.mark.parametrize(
+    "other",
+    [
+        pytest.param("blas", marks=pytest.mark.xfail(strict=False, reason="starts on slopes are drawn with NumPy")),
+        "blas_haswell",
+        "numpy",
+        "libc",
+    ],
+)
 def test_other_instructions_same_bits(other: str, here: dict[str, list[str]]) -> None:
     there = drives_elsewhere(OTHER_MACHINES[other])
     parted = {
