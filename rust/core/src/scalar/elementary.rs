@@ -180,6 +180,24 @@ pub fn ln(x: f64) -> f64 {
     libm::log(x)
 }
 
+/// `ln(1 + x)` within 1 ulp, also near 0.
+#[must_use]
+pub fn ln_1p(x: f64) -> f64 {
+    libm::log1p(x)
+}
+
+/// Angle (rad) of a cosine, in 0..=π, within 1 ulp; not a number outside −1..=1.
+#[must_use]
+pub fn acos(x: f64) -> f64 {
+    libm::acos(x)
+}
+
+/// Angle (rad) of a sine, in −π/2..=π/2, within 1 ulp; not a number outside −1..=1.
+#[must_use]
+pub fn asin(x: f64) -> f64 {
+    libm::asin(x)
+}
+
 /// Angle (rad) of the point (x, y), in −π..=π, within 1 ulp.
 #[must_use]
 pub fn atan2(y: f64, x: f64) -> f64 {
@@ -248,6 +266,9 @@ mod tests {
         one_argument("exp_m1", exp_m1, 1.5);
         one_argument("exp", exp, 1.0);
         one_argument("ln", ln, 1.0);
+        one_argument("ln_1p", ln_1p, 1.0);
+        one_argument("acos", acos, 1.0);
+        one_argument("asin", asin, 1.0);
         two_arguments("atan2", atan2);
         two_arguments("hypot", hypot);
     }
