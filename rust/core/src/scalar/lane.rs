@@ -143,21 +143,10 @@ pub trait Lane:
     }
 
     /// The number of a lane.
-    #[inline(always)]
-    fn get(self, lane: usize) -> f64 {
-        let mut lanes = [0.0; MAX_LANES];
-        self.store(&mut lanes[..Self::LANES]);
-        lanes[lane]
-    }
+    fn get(self, lane: usize) -> f64;
 
     /// Replaces the number of a lane.
-    #[inline(always)]
-    fn set(&mut self, lane: usize, x: f64) {
-        let mut lanes = [0.0; MAX_LANES];
-        self.store(&mut lanes[..Self::LANES]);
-        lanes[lane] = x;
-        *self = Self::load(self.token(), &lanes[..Self::LANES]);
-    }
+    fn set(&mut self, lane: usize, x: f64);
 }
 
 /// Most lanes of any scalar.
