@@ -80,12 +80,18 @@ pub fn solve_all<T: Lane>(
         }
     }
     if most > 0 {
-        T::vectorize(token, || solve_some::<T, FEW>(token, problems, options, 1));
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || solve_some::<T, FEW>(token, problems, options, 1),
+        );
     }
     if most > FEW {
-        T::vectorize(token, || {
-            solve_some::<T, MAX_CONTACTS>(token, problems, options, FEW + 1);
-        });
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || solve_some::<T, MAX_CONTACTS>(token, problems, options, FEW + 1),
+        );
     }
 }
 
