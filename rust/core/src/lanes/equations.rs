@@ -33,14 +33,15 @@ fn block_of<T: Lane>(W: &[Block<T>; MAX_BLOCKS], i: usize, j: usize) -> Block<T>
     }
 }
 
-/// `W p + q`.
+/// `u = W p + q`.
 #[inline(always)]
 pub fn velocities<T: Lane, const C: usize>(
     W: &[Block<T>; MAX_BLOCKS],
     q: &[Triple<T>; C],
     p: &[Triple<T>; C],
-) -> [Triple<T>; C] {
-    let mut u = *q;
+    u: &mut [Triple<T>; C],
+) {
+    *u = *q;
     for i in 0..C {
         let [p0, p1, p2] = p[i];
         let mut own = u[i];
@@ -60,7 +61,6 @@ pub fn velocities<T: Lane, const C: usize>(
         }
         u[i] = own;
     }
-    u
 }
 
 /// Block (i, j) of `Bᵀ (W + α I) C + γ`.
@@ -165,7 +165,7 @@ fn under_lower<T: Lane>(x: &Block<T>, f: &Block<T>) -> Block<T> {
     out
 }
 
-/// The impulses `C y` of the Newton step; `factors` is scratch.
+/// The impulses `C y` of the Newton step, into `y`; `factors` is scratch.
 #[inline(always)]
 pub fn newton_point<T: Lane, const C: usize>(
     W: &[Block<T>; MAX_BLOCKS],
@@ -174,8 +174,8 @@ pub fn newton_point<T: Lane, const C: usize>(
     alpha: T,
     modes: &[Mode<T>; C],
     factors: &mut Factors<T, C>,
-) -> [Triple<T>; C] {
-    let mut y = *q;
+    y: &mut [Triple<T>; C],
+) {
     for k in 0..C {
         let mut diagonal = assemble(W[block(k, k)], Some(alpha), &modes[k], &modes[k]);
         for m in 0..k {
@@ -202,7 +202,12 @@ pub fn newton_point<T: Lane, const C: usize>(
         let Mode {
             closed, b, stick, ..
         } = &modes[k];
-        let rhs: Triple<T> = std::array::from_fn(|r| alpha * centre[k][r] - q[k][r]);
+        let (c, q) = (&centre[k], &q[k]);
+        let rhs = [
+            alpha * c[0] - q[0],
+            alpha * c[1] - q[1],
+            alpha * c[2] - q[2],
+        ];
         let mut own = [
             *closed * rhs[0],
             b[0] * rhs[1] + b[1] * rhs[2],
@@ -241,5 +246,4 @@ pub fn newton_point<T: Lane, const C: usize>(
         let [y0, y1, y2] = y[k];
         y[k] = [y0, a[0] * y0 + b[0] * y1, a[1] * y0 + b[1] * y1 + y2];
     }
-    y
 }

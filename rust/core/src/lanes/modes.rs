@@ -102,10 +102,10 @@ impl<T: Lane> Mode<T> {
         let (zero, one) = (mu.like(0.0), mu.like(1.0));
         let slides = closed & !stick & has_friction;
         let sticks = closed & stick;
-        let along = |x| T::select(slides, x, zero);
+        let e = [T::select(slides, e[0], zero), T::select(slides, e[1], zero)];
         Self {
-            a: [along(mu * e[0]), along(mu * e[1])],
-            b: [T::select(sticks, one, along(-e[1])), along(e[0])],
+            a: [mu * e[0], mu * e[1]],
+            b: [T::select(sticks, one, -e[1]), e[0]],
             closed: T::select(closed, one, zero),
             stick: T::select(sticks, one, zero),
             gamma: T::select(slides, gamma, T::select(sticks, zero, one)),
@@ -115,13 +115,18 @@ impl<T: Lane> Mode<T> {
     /// `yes` where the mask is true, `no` elsewhere.
     #[inline(always)]
     pub fn select(mask: T::Mask, yes: &Self, no: &Self) -> Self {
-        let pick = |yes, no| T::select(mask, yes, no);
         Self {
-            a: [pick(yes.a[0], no.a[0]), pick(yes.a[1], no.a[1])],
-            b: [pick(yes.b[0], no.b[0]), pick(yes.b[1], no.b[1])],
-            closed: pick(yes.closed, no.closed),
-            stick: pick(yes.stick, no.stick),
-            gamma: pick(yes.gamma, no.gamma),
+            a: [
+                T::select(mask, yes.a[0], no.a[0]),
+                T::select(mask, yes.a[1], no.a[1]),
+            ],
+            b: [
+                T::select(mask, yes.b[0], no.b[0]),
+                T::select(mask, yes.b[1], no.b[1]),
+            ],
+            closed: T::select(mask, yes.closed, no.closed),
+            stick: T::select(mask, yes.stick, no.stick),
+            gamma: T::select(mask, yes.gamma, no.gamma),
         }
     }
 
@@ -268,27 +273,34 @@ pub struct Limit<T: Lane> {
     pub slides: T::Mask,
 }
 
+/// `x_T y_T − μ² x_N y_N`; for x = y positive outside the cone of friction.
+#[inline(always)]
+fn outside<T: Lane>(mu: T, x: &Triple<T>, y: &Triple<T>) -> T {
+    x[1] * y[1] + x[2] * y[2] - mu * mu * (x[0] * y[0])
+}
+
 /// Smallest fraction of the step from `p` to `trial` at which a sticking contact reaches the limit
 /// of friction, or a sliding one opens.
 #[inline(always)]
 pub fn limit<T: Lane>(mode: &Mode<T>, mu: T, p: &Triple<T>, trial: &Triple<T>) -> Limit<T> {
     let (zero, one) = (mu.like(0.0), mu.like(1.0));
-    let d: Triple<T> = std::array::from_fn(|k| trial[k] - p[k]);
-    let product =
-        |x: &Triple<T>, y: &Triple<T>| x[1] * y[1] + x[2] * y[2] - mu * mu * (x[0] * y[0]);
+    let d = [trial[0] - p[0], trial[1] - p[1], trial[2] - p[2]];
     // |p_T + t d_T|² = μ² (p_N + t d_N)²
-    let (a, b, c) = (product(&d, &d), product(p, &d), product(p, p));
+    let a = outside(mu, &d, &d);
+    let b = outside(mu, p, &d);
+    let c = outside(mu, p, p);
     let root = (b * b - a * c).max(zero).sqrt();
     // In the form without cancellation.
     let ahead = zero.le(b);
     let first = T::select(ahead, -c / (b + root), (root - b) / a);
     let second = T::select(ahead, (-b - root) / a, -c / (b + root));
-    let positive = |x: T| T::select(zero.le(x) & x.is_finite(), x, one);
-    let inside = positive(first).min(positive(second)).min(one);
+    let first = T::select(zero.le(first), first, one);
+    let second = T::select(zero.le(second), second, one);
+    let inside = first.min(second).min(one);
     let at_the_limit = T::select(ahead, zero, one);
     let sticks = mode.sticks();
     let pressed = zero.lt(p[0]);
-    let stays = product(trial, trial).le(zero) & zero.lt(trial[0]);
+    let stays = outside(mu, trial, trial).le(zero) & zero.lt(trial[0]);
     let leaves = T::select(zero.le(c), at_the_limit, inside);
     let opens = T::select(trial[0].lt(zero), p[0] / -d[0], one);
     let closed = zero.lt(mode.closed);

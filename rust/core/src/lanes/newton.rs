@@ -132,6 +132,9 @@ struct Bench<T: Lane, const C: usize> {
     regularisation: f64,
     /// Squares of `1/|q|` and `1/|(ρ_i q_i)|`.
     inverses: [T; 2],
+    /// The Newton point, and one on the way to it.
+    trial: Point<T, C>,
+    some: Point<T, C>,
     /// Of the present impulses.
     sums: Violations<T>,
     seen: [Projected<T>; C],
@@ -164,6 +167,8 @@ impl<T: Lane, const C: usize> Bench<T, C> {
             laws: [law; C],
             p: [[zero; 3]; C],
             u: [[zero; 3]; C],
+            trial: Point::new(zero),
+            some: Point::new(zero),
             alpha: one,
             floor: one,
             mean: one,
@@ -272,8 +277,8 @@ impl<T: Lane, const C: usize> Bench<T, C> {
     /// Velocities of the lanes with a new problem, and the violations of all.
     #[inline(always)]
     fn place(&mut self, is_new: T::Mask) {
-        let u = velocities(&self.W, &self.q, &self.p);
-        pick(is_new, &u, &mut self.u);
+        velocities(&self.W, &self.q, &self.p, &mut self.trial.u);
+        pick(is_new, &self.trial.u, &mut self.u);
         self.judge();
     }
 
@@ -309,26 +314,27 @@ impl<T: Lane, const C: usize> Bench<T, C> {
     #[inline(always)]
     fn step(&mut self, active: T::Mask, factors: &mut Factors<T, C>) {
         let like = self.alpha;
-        let trial = newton_point(&self.W, &self.q, &self.p, self.alpha, &self.modes, factors);
-        let trial_u = velocities(&self.W, &self.q, &trial);
+        let Point { p, u } = &mut self.trial;
+        newton_point(&self.W, &self.q, &self.p, like, &self.modes, factors, p);
+        velocities(&self.W, &self.q, p, u);
+        let after = judge(&self.laws, p, u, &mut self.seen);
         let bound = like.like(GROWTH) * self.sums.weighted;
-        let after = judge(&self.laws, &trial, &trial_u, &mut self.seen);
         let refused = active & !after.weighted.le(bound);
         let gentler = (like.like(FALL) * like).max(self.floor);
         if refused.any() {
             self.alpha = T::select(refused, like, gentler);
-            let t = self.shorten(refused, bound, &trial, &trial_u);
-            let (p, u) = self.between(t, &trial, &trial_u);
-            self.p = trial;
-            self.u = trial_u;
-            pick(refused, &p, &mut self.p);
-            pick(refused, &u, &mut self.u);
-            self.judge();
+            let t = self.shorten(refused, bound);
+            self.between(t);
+            pick(refused, &self.some.p, &mut self.trial.p);
+            pick(refused, &self.some.u, &mut self.trial.u);
         } else {
             self.alpha = gentler;
-            self.p = trial;
-            self.u = trial_u;
             self.sums = after;
+        }
+        self.p = self.trial.p;
+        self.u = self.trial.u;
+        if refused.any() {
+            self.judge();
         }
         for lane in 0..T::LANES {
             self.steps[lane] += 1;
@@ -340,20 +346,12 @@ impl<T: Lane, const C: usize> Bench<T, C> {
 
     /// Fraction of the refused steps to take.
     #[inline(always)]
-    fn shorten(
-        &mut self,
-        refused: T::Mask,
-        bound: T,
-        trial: &[Triple<T>; C],
-        trial_u: &[Triple<T>; C],
-    ) -> T {
+    fn shorten(&mut self, refused: T::Mask, bound: T) -> T {
         let (one, half) = (bound.like(1.0), bound.like(0.5));
         let mut left = refused;
         let mut t = half;
         for _ in 0..HALVINGS {
-            let (p, u) = self.between(t, trial, trial_u);
-            let sums = judge(&self.laws, &p, &u, &mut self.seen);
-            left = left & !sums.weighted.le(bound);
+            left = left & !self.between(t).weighted.le(bound);
             if !left.any() {
                 return t;
             }
@@ -376,7 +374,12 @@ impl<T: Lane, const C: usize> Bench<T, C> {
             slides: left,
         }; C];
         for i in 0..C {
-            limits[i] = limit(&self.modes[i], self.laws[i].mu, &self.p[i], &trial[i]);
+            limits[i] = limit(
+                &self.modes[i],
+                self.laws[i].mu,
+                &self.p[i],
+                &self.trial.p[i],
+            );
             first = limits[i].t.min(first);
         }
         let changes = left & !persists & first.lt(one);
@@ -394,22 +397,36 @@ impl<T: Lane, const C: usize> Bench<T, C> {
         T::select(changes, first, t)
     }
 
-    /// The point at a fraction of the step to `(trial, trial_u)`.
+    /// Impulses and velocities at a fraction of the step to the trial, and their violations.
     #[inline(always)]
-    fn between(
-        &self,
-        t: T,
-        trial: &[Triple<T>; C],
-        trial_u: &[Triple<T>; C],
-    ) -> ([Triple<T>; C], [Triple<T>; C]) {
-        let (mut p, mut u) = (self.p, self.u);
+    fn between(&mut self, t: T) -> Violations<T> {
+        let Self {
+            p, u, trial, some, ..
+        } = self;
         for i in 0..C {
             for k in 0..3 {
-                p[i][k] += t * (trial[i][k] - p[i][k]);
-                u[i][k] += t * (trial_u[i][k] - u[i][k]);
+                some.p[i][k] = p[i][k] + t * (trial.p[i][k] - p[i][k]);
+                some.u[i][k] = u[i][k] + t * (trial.u[i][k] - u[i][k]);
             }
         }
-        (p, u)
+        judge(&self.laws, &some.p, &some.u, &mut self.seen)
+    }
+}
+
+/// Impulses and velocities.
+#[derive(Clone, Debug)]
+struct Point<T, const C: usize> {
+    p: [Triple<T>; C],
+    u: [Triple<T>; C],
+}
+
+impl<T: Lane, const C: usize> Point<T, C> {
+    #[inline(always)]
+    fn new(zero: T) -> Self {
+        Self {
+            p: [[zero; 3]; C],
+            u: [[zero; 3]; C],
+        }
     }
 }
 
