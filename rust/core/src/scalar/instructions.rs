@@ -194,6 +194,16 @@ macro_rules! lanes {
             fn vectorize<R>(token: S, f: impl FnOnce() -> R) -> R {
                 token.vectorize(f)
             }
+
+            #[inline(always)]
+            fn get(self, lane: usize) -> f64 {
+                self.as_slice()[lane]
+            }
+
+            #[inline(always)]
+            fn set(&mut self, lane: usize, x: f64) {
+                self.as_mut_slice()[lane] = x;
+            }
         }
     };
 }
