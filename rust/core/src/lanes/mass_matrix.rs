@@ -147,7 +147,11 @@ impl<T: Lane> MassMatrix<T> {
     /// # Panics
     /// If an argument is of another machine.
     pub fn update(&mut self, machine: &Machine, inertias: &Inertias<T>, poses: &Poses<T>) {
-        T::vectorize(self.token, || self.update_here(machine, inertias, poses));
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || self.update_here(machine, inertias, poses),
+        );
     }
 
     #[inline(always)]
@@ -243,7 +247,11 @@ impl<T: Lane> MassMatrix<T> {
     /// # Panics
     /// If an argument is of another machine.
     pub fn factorise(&self, machine: &Machine, factor: &mut Factor<T>) -> T::Mask {
-        T::vectorize(self.token, || factor.update_here(machine, self))
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || factor.update_here(machine, self),
+        )
     }
 }
 

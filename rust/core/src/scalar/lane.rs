@@ -96,7 +96,8 @@ pub trait Lane:
     /// `yes` where the mask is true, `no` elsewhere.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
 
-    /// Runs `f` compiled for the instructions of the token; whatever `f` calls must be inlined.
+    /// Runs `f` compiled for the instructions of the token; whatever `f` calls must be inlined, and
+    /// `f` itself, so write the closure as `#[inline(always)] || ...`.
     fn vectorize<R>(token: Self::Token, f: impl FnOnce() -> R) -> R;
 
     /// The number `x` in every lane.
