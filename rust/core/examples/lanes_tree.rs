@@ -134,6 +134,13 @@ impl<T: Lane> Block<T> {
         }
     }
 
+    /// The same between two lines of output, by which a tracer finds it.
+    fn announce(&mut self, phase: &str, n: usize) {
+        println!("{phase}, {n} times");
+        self.repeat(phase, n);
+        println!("done");
+    }
+
     /// Time of a phase per rover, ns: the best of several runs.
     fn time(&mut self, phase: &str) -> f64 {
         let n = 2000;
@@ -152,14 +159,14 @@ fn main() {
     if let [phase, width, n] = &args[..] {
         let n = n.parse().expect("repetitions");
         match (&width[..], Instructions::of_this_machine()) {
-            ("1", _) => Block::<f64>::new(Single::best(), &model).repeat(phase, n),
+            ("1", _) => Block::<f64>::new(Single::best(), &model).announce(phase, n),
             #[cfg(target_arch = "x86_64")]
             ("4", Instructions::Avx2(token)) => {
-                Block::<fearless_simd::f64x4<_>>::new(token, &model).repeat(phase, n);
+                Block::<fearless_simd::f64x4<_>>::new(token, &model).announce(phase, n);
             }
             #[cfg(target_arch = "x86_64")]
             ("8", Instructions::Avx512(token)) => {
-                Block::<fearless_simd::f64x8<_>>::new(token, &model).repeat(phase, n);
+                Block::<fearless_simd::f64x8<_>>::new(token, &model).announce(phase, n);
             }
             _ => panic!("no {width} lanes on this machine"),
         }
