@@ -77,6 +77,18 @@ impl<T: Lane> Place<T> {
         self.attitude = [x * factor, y * factor, z * factor, w * factor];
     }
 
+    /// Takes another configuration in the lanes of a mask.
+    #[inline(always)]
+    pub fn select_from(&mut self, lanes: T::Mask, other: &Self) {
+        self.position = Vec3::select(lanes, other.position, self.position);
+        for (own, other) in self.attitude.iter_mut().zip(other.attitude) {
+            *own = T::select(lanes, other, *own);
+        }
+        for (own, other) in self.joints.iter_mut().zip(&other.joints) {
+            *own = T::select(lanes, *other, *own);
+        }
+    }
+
     /// Whether every entry is finite.
     #[inline(always)]
     pub fn is_finite(&self) -> T::Mask {
