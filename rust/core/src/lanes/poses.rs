@@ -5,7 +5,8 @@
 
 use super::inertias::Inertias;
 use super::machine::{Axis, Machine};
-use super::place::{Place, sin_cos};
+use super::place::Place;
+use crate::scalar::elementary::sin_cos;
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Poses of all bodies.
