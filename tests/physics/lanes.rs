@@ -3,3 +3,5 @@
 
 #[path = "lanes/contacts.rs"]
 mod contacts;
+#[path = "lanes/tree.rs"]
+mod tree;

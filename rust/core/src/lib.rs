@@ -24,6 +24,7 @@
 //! - [`lanes`]: the ordinary step of one rover or several to a register;
 //! - [`simulation`]: many steps of any scene.
 #![forbid(unsafe_code)]
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))] // same bits on every machine: `scalar::elementary`
 
 pub use nalgebra;
 

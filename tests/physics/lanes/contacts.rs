@@ -312,7 +312,8 @@ fn assert_close(name: &str, a: &[f64], b: &[f64], tolerance: f64) {
 /// A rover whose lowest wheel is about as deep as `depth`, m, over its plane or a random place.
 fn rover(model: &Model, terrain: &Arc<dyn Terrain>, random: &mut Random, depth: f64, tilt: f64) -> Rover {
     let mut q = Configuration::zero(model);
-    q.position = Vector3::new(8.0 * random.next(), 0.0, 8.0 * random.next());
+    // Over every ground of these tests: the rug of spheres begins at the origin.
+    q.position = Vector3::new(5.5 + 3.0 * random.next(), 0.0, 5.5 + 3.0 * random.next());
     let about = Vector3::new(random.next(), 3.0 * random.next() / tilt.max(1e-3), random.next());
     q.attitude = UnitQuaternion::from_scaled_axis(about * tilt);
     for angle in &mut q.joints {
@@ -367,7 +368,6 @@ fn check(model: &Model, rover: &Rover, step: Step, found: &Found) -> bool {
         assert!(is_nearly_rare(model, rover, step), "declined: {right:?}");
         return false;
     }
-    if found.keys != right.keys { eprintln!("{:?} {:?} {:?} {:?}", rover.q, rover.v, found.geometry, right.geometry); }
     assert_eq!(found.keys, right.keys);
     assert_close("geometry", &found.geometry, &right.geometry, 1e-13);
     assert_close("velocity before", &found.u_before, &right.u_before, 1e-12);
@@ -480,6 +480,7 @@ fn impulses_are_remembered_by_contact() {
     let mut rover = rover(&model, &terrain, &mut Random(4), 0.0, 0.0);
     rover.q = Configuration::zero(&model);
     rover.q.position.y = 0.3499;
+    rover.v.fill(0.0);
     let here = std::slice::from_ref(&rover);
     let mut block = Block::<f64>::new(Single::best(), &model, here);
     let found = block.step(here, STEPS[0]);

@@ -18,7 +18,7 @@ use super::machine::{Axis, Machine, velocity};
 use super::poses::{Pose, Poses};
 use super::problem::MAX_CONTACTS;
 use crate::contact::detection::touch_of_disc;
-use crate::contact::{ContactKey, Part};
+use crate::contact::{Contact, ContactFrame, ContactKey, Part};
 use crate::geometry::query::NEAREST;
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::{Disc, Sphere};
@@ -315,6 +315,29 @@ impl<T: Lane> Contacts<T> {
         &self.lists[lane]
     }
 
+    /// A contact of a rover by its place in the list, with its slot.
+    #[must_use]
+    pub fn contact(&self, machine: &Machine, lane: usize, place: usize) -> (usize, Contact) {
+        let list = &self.lists[lane];
+        let slot = usize::from(list.slots[place]);
+        let (own, wheel) = (&self.slots[slot], Self::wheel(slot));
+        let frame = ContactFrame {
+            n: own.n.get(lane).into(),
+            t: own.t.get(lane).into(),
+            b: own.b.get(lane).into(),
+        };
+        let contact = Contact {
+            key: Self::key(list, place),
+            part: Part::Wheel(wheel),
+            body: machine.wheels[wheel].body,
+            other: None,
+            point: own.point.get(lane).into(),
+            frame,
+            gap: own.gap.get(lane),
+        };
+        (slot, contact)
+    }
+
     /// Place of a slot among the contacts of each lane in which it is active.
     #[inline(always)]
     pub(super) fn places(&self, slot: usize) -> &[u8; MAX_LANES] {
@@ -375,7 +398,8 @@ impl<T: Lane> Contacts<T> {
         v: &[T],
         forecast: &Forecast<T>,
     ) -> T::Mask {
-        T::vectorize(self.token, || {
+        T::vectorize(self.token, #[inline(always)]
+        || {
             self.detect_here(ground, middle, end, v, forecast)
         })
     }
@@ -434,17 +458,19 @@ impl<T: Lane> Contacts<T> {
         let pose = &sight.middle.bodies[solid.body];
         let n = ground.normal;
         let centre = place(pose, solid.centre.as_ref());
-        let reach = (sight.forecast).reach(|| self.speed_of_box(solid, centre));
+        let reach = (sight.forecast).reach(#[inline(always)] || self.speed_of_box(solid, centre));
         let local = pose.R.transpose_times(n);
         let local = match &solid.rotation {
             None => local,
-            Some([x, y, z]) => {
-                let along = |e: &[f64; 3]| local.dot(Vec3::splat(self.token, *e));
-                Vec3::new(along(x), along(y), along(z))
-            }
+            Some([x, y, z]) => Vec3::new(
+                local.dot(Vec3::splat(self.token, *x)),
+                local.dot(Vec3::splat(self.token, *y)),
+                local.dot(Vec3::splat(self.token, *z)),
+            ),
         };
-        let [x, y, z] = solid.half_size.map(|x| T::splat(self.token, x));
-        let drop = (local.x * x).abs() + (local.y * y).abs() + (local.z * z).abs();
+        let half = Vec3::splat(self.token, solid.half_size);
+        let drop =
+            (local.x * half.x).abs() + (local.y * half.y).abs() + (local.z * half.z).abs();
         let near_plane = (sight.height + n.dot(centre) - drop).le(reach);
         if !ground.has_spheres() {
             return near_plane;
@@ -468,12 +494,7 @@ impl<T: Lane> Contacts<T> {
 
     /// Fills the slots of a wheel with its contacts at the midpoint.
     #[inline(always)]
-    fn look_at_wheel(
-        &mut self,
-        w: usize,
-        ground: &mut Ground<T>,
-        sight: &Sight<'_, T>,
-    ) -> T::Mask {
+    fn look_at_wheel(&mut self, w: usize, ground: &mut Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
         let wheel = &self.wheels[w];
         let pose = &sight.middle.bodies[wheel.body];
         let (n, s, centre) = (ground.normal, wheel.axle(pose), wheel.centre(pose));
@@ -491,7 +512,7 @@ impl<T: Lane> Contacts<T> {
         };
         let on_plane = sight.forecast.admits(gap, u_N);
         // The second and third point of the rim.
-        let reach = (sight.forecast).reach(|| self.speed_of_wheel(wheel, sight, centre));
+        let reach = (sight.forecast).reach(#[inline(always)] || self.speed_of_wheel(wheel, sight, centre));
         let half = radius.like(0.5);
         let mut declined = (height + half * radius * length).le(reach);
         let none = T::mask(self.token, 0);

@@ -14,12 +14,14 @@
 
 pub mod bias;
 pub mod contacts;
+pub mod drives;
 pub mod energy;
 pub mod ground;
 pub mod inertias;
 pub mod machine;
 pub mod mass_matrix;
 pub mod newton;
+pub mod passenger;
 pub mod place;
 pub mod poses;
 pub mod problem;

@@ -68,4 +68,11 @@ impl ContactProblem {
     pub fn n_unknowns(&self) -> usize {
         3 * self.n_contacts
     }
+
+    /// Entry of W, 1/kg.
+    #[must_use]
+    pub fn entry(&self, i: usize, j: usize) -> f64 {
+        let (i, j) = (i.max(j), i.min(j));
+        self.W[block(i / 3, j / 3)][3 * (i % 3) + j % 3]
+    }
 }
