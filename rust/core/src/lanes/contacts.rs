@@ -398,7 +398,8 @@ impl<T: Lane> Contacts<T> {
         v: &[T],
         forecast: &Forecast<T>,
     ) -> T::Mask {
-        T::vectorize(self.token, || {
+        T::vectorize(self.token, #[inline(always)]
+        || {
             self.detect_here(ground, middle, end, v, forecast)
         })
     }
@@ -457,17 +458,19 @@ impl<T: Lane> Contacts<T> {
         let pose = &sight.middle.bodies[solid.body];
         let n = ground.normal;
         let centre = place(pose, solid.centre.as_ref());
-        let reach = (sight.forecast).reach(|| self.speed_of_box(solid, centre));
+        let reach = (sight.forecast).reach(#[inline(always)] || self.speed_of_box(solid, centre));
         let local = pose.R.transpose_times(n);
         let local = match &solid.rotation {
             None => local,
-            Some([x, y, z]) => {
-                let along = |e: &[f64; 3]| local.dot(Vec3::splat(self.token, *e));
-                Vec3::new(along(x), along(y), along(z))
-            }
+            Some([x, y, z]) => Vec3::new(
+                local.dot(Vec3::splat(self.token, *x)),
+                local.dot(Vec3::splat(self.token, *y)),
+                local.dot(Vec3::splat(self.token, *z)),
+            ),
         };
-        let [x, y, z] = solid.half_size.map(|x| T::splat(self.token, x));
-        let drop = (local.x * x).abs() + (local.y * y).abs() + (local.z * z).abs();
+        let half = Vec3::splat(self.token, solid.half_size);
+        let drop =
+            (local.x * half.x).abs() + (local.y * half.y).abs() + (local.z * half.z).abs();
         let near_plane = (sight.height + n.dot(centre) - drop).le(reach);
         if !ground.has_spheres() {
             return near_plane;
@@ -509,7 +512,7 @@ impl<T: Lane> Contacts<T> {
         };
         let on_plane = sight.forecast.admits(gap, u_N);
         // The second and third point of the rim.
-        let reach = (sight.forecast).reach(|| self.speed_of_wheel(wheel, sight, centre));
+        let reach = (sight.forecast).reach(#[inline(always)] || self.speed_of_wheel(wheel, sight, centre));
         let half = radius.like(0.5);
         let mut declined = (height + half * radius * length).le(reach);
         let none = T::mask(self.token, 0);

@@ -147,7 +147,11 @@ impl<T: Lane> MassMatrix<T> {
     /// # Panics
     /// If an argument is of another machine.
     pub fn update(&mut self, machine: &Machine, inertias: &Inertias<T>, poses: &Poses<T>) {
-        T::vectorize(self.token, || self.update_here(machine, inertias, poses));
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || self.update_here(machine, inertias, poses),
+        );
     }
 
     #[inline(always)]
@@ -174,8 +178,8 @@ impl<T: Lane> MassMatrix<T> {
             base[b - 1] = [f.x, f.y, f.z, l.x, l.y, l.z];
             let ancestors = machine.ancestors(b);
             let row = &mut self.joints[link.row..][..=ancestors.len()];
-            for (entry, &a) in row.iter_mut().zip(ancestors) {
-                *entry = bodies[a].power(f, l);
+            for p in 0..ancestors.len() {
+                row[p] = bodies[ancestors[p]].power(f, l);
             }
             row[ancestors.len()] = pose.power(f, l);
             carried[link.parent] = if link.is_last {
@@ -243,7 +247,11 @@ impl<T: Lane> MassMatrix<T> {
     /// # Panics
     /// If an argument is of another machine.
     pub fn factorise(&self, machine: &Machine, factor: &mut Factor<T>) -> T::Mask {
-        T::vectorize(self.token, || factor.update_here(machine, self))
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || factor.update_here(machine, self),
+        )
     }
 }
 
@@ -306,8 +314,8 @@ impl<T: Lane> Factor<T> {
                 let ancestor = ancestors[p];
                 subtract(&mut base_above[ancestor - 1], a, base);
                 let row = &mut above[machine.links[ancestor].row..][..=p];
-                for (x, y) in row.iter_mut().zip(&*own) {
-                    *x -= a * *y;
+                for i in 0..=p {
+                    row[i] -= a * own[i];
                 }
                 own[p] = a;
             }
@@ -319,8 +327,8 @@ impl<T: Lane> Factor<T> {
                     at += 1;
                 }
             }
-            for x in base {
-                *x *= inverse;
+            for i in 0..BASE {
+                base[i] *= inverse;
             }
         }
         for k in (0..BASE).rev() {
@@ -356,8 +364,8 @@ impl<T: Lane> Factor<T> {
             subtract(&mut sum, value, &rows[j]);
             let ancestors = machine.ancestors(j + 1);
             let entries = &self.joints[machine.links[j + 1].row..][..ancestors.len()];
-            for (entry, &a) in entries.iter().zip(ancestors) {
-                joints[a - 1] -= *entry * value;
+            for p in 0..entries.len() {
+                joints[ancestors[p] - 1] -= entries[p] * value;
             }
             joints[j] = value * roots[j];
         }
@@ -394,8 +402,8 @@ impl<T: Lane> Factor<T> {
             }
             let ancestors = machine.ancestors(j + 1);
             let entries = &self.joints[machine.links[j + 1].row..][..ancestors.len()];
-            for (entry, &a) in entries.iter().zip(ancestors) {
-                value -= *entry * joints[a - 1];
+            for p in 0..entries.len() {
+                value -= entries[p] * joints[ancestors[p] - 1];
             }
             joints[j] = value;
         }
@@ -420,9 +428,9 @@ impl<T: Lane> Factor<T> {
                     }
                 }
                 let entries = &self.joints[machine.links[body].row..][..p];
-                for (x, entry) in joints.iter_mut().zip(entries) {
+                for i in 0..p {
                     for c in 0..3 {
-                        x[c] -= *entry * value[c];
+                        joints[i][c] -= entries[i] * value[c];
                     }
                 }
                 let root = self.root[body - 1];
