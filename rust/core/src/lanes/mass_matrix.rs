@@ -332,20 +332,13 @@ impl<T: Lane> Factor<T> {
             subtract_product(&mut block, &factors, &base);
             base_row[0] = factors;
         }
-        for k in (0..BASE).rev() {
-            let start = k * (k + 1) / 2;
-            let pivot = block[start + k];
-            is_positive = is_positive & pivot.gt(zero);
-            let inverse = one / pivot;
-            self.block_root[k] = inverse.sqrt();
-            for p in (0..k).rev() {
-                let a = block[start + p] * inverse;
-                for i in 0..=p {
-                    block[p * (p + 1) / 2 + i] -= a * block[start + i];
-                }
-                block[start + p] = a;
-            }
-        }
+        let roots = &mut self.block_root;
+        is_positive = is_positive & eliminate::<T, 5>(&mut block, roots);
+        is_positive = is_positive & eliminate::<T, 4>(&mut block, roots);
+        is_positive = is_positive & eliminate::<T, 3>(&mut block, roots);
+        is_positive = is_positive & eliminate::<T, 2>(&mut block, roots);
+        is_positive = is_positive & eliminate::<T, 1>(&mut block, roots);
+        is_positive = is_positive & eliminate::<T, 0>(&mut block, roots);
         self.block = block;
         is_positive
     }
@@ -467,6 +460,24 @@ fn subtract_columns<T: Lane>(x: &mut [T; 3], a: T, y: &[T; 3]) {
 #[inline(always)]
 fn scaled<T: Lane>(y: &[T; BASE], a: T) -> [T; BASE] {
     [y[0] * a, y[1] * a, y[2] * a, y[3] * a, y[4] * a, y[5] * a]
+}
+
+/// Eliminates velocity K of the base, when all after it are. Returns where its pivot is positive. K is
+/// a constant so that the block stays in registers.
+#[inline(always)]
+fn eliminate<T: Lane, const K: usize>(block: &mut [T; BLOCK], roots: &mut [T; BASE]) -> T::Mask {
+    let start = K * (K + 1) / 2;
+    let pivot = block[start + K];
+    let inverse = pivot.like(1.0) / pivot;
+    roots[K] = inverse.sqrt();
+    for p in (0..K).rev() {
+        let a = block[start + p] * inverse;
+        for i in 0..=p {
+            block[p * (p + 1) / 2 + i] -= a * block[start + i];
+        }
+        block[start + p] = a;
+    }
+    pivot.gt(pivot.like(0.0))
 }
 
 /// `A −= a yᵀ`, where the product is symmetric; the lower triangle by its rows.
