@@ -42,6 +42,9 @@ from rover_gym._core import (
     TwoWheelRoverSimulation,
     __version__,
     accuracy_options,
+    atan2,
+    exp,
+    sin_cos,
     soil_packing,
     solve_friction_contact,
 )
@@ -83,6 +86,9 @@ __all__ = [
     "TwoWheelRoverSimulation",
     "__version__",
     "accuracy_options",
+    "atan2",
+    "exp",
+    "sin_cos",
     "soil_packing",
     "solve_friction_contact",
 ]

@@ -24,7 +24,8 @@
 //! - [`lanes`]: the ordinary step of one rover or several to a register;
 //! - [`simulation`]: many steps of any scene.
 #![forbid(unsafe_code)]
-#![cfg_attr(not(test), deny(clippy::disallowed_methods))] // same bits on every machine: `scalar::elementary`
+// Same bits on every machine: sines and their like come from `scalar::elementary`.
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub use nalgebra;
 

@@ -6,6 +6,7 @@ mod arguments;
 mod arrays;
 mod batch;
 mod contacts;
+mod elementary;
 mod errors;
 mod files;
 mod friction_contact;
@@ -48,6 +49,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<friction_contact::SolverReport>()?;
     module.add_class::<friction_contact::FrictionContactSolution>()?;
     module.add_function(wrap_pyfunction!(accuracy::accuracy_options, module)?)?;
+    module.add_function(wrap_pyfunction!(elementary::sin_cos, module)?)?;
+    module.add_function(wrap_pyfunction!(elementary::atan2, module)?)?;
+    module.add_function(wrap_pyfunction!(elementary::exp, module)?)?;
     module.add_function(wrap_pyfunction!(
         friction_contact::solve_friction_contact,
         module

@@ -62,6 +62,8 @@ pub enum Decline {
 
 /// Number of reasons.
 pub const REASONS: usize = 8;
+/// LAB
+pub static DECLINED: [std::sync::atomic::AtomicUsize; 8] = [const { std::sync::atomic::AtomicUsize::new(0) }; 8];
 
 /// Whether steps with these options can be ordinary.
 #[must_use]
@@ -341,6 +343,7 @@ impl<T: Lane> Block<T> {
         self.going = self.going & !lanes;
         while lost != 0 {
             self.reasons[lost.trailing_zeros() as usize] = Some(reason);
+            DECLINED[reason as usize].fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             lost &= lost - 1;
         }
     }

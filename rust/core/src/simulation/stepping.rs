@@ -205,6 +205,19 @@ impl<S: Scene> Simulation<S> {
         Ok(stopwatch)
     }
 
+    /// Takes `n` steps and tells `probe` where each part of a step ends.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_probed(
+        &mut self,
+        n: usize,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError> {
+        let variant = self.options.variant;
+        self.call(&variant, true, n, &mut || true, probe)
+    }
+
     /// One call: its report is kept. `may_be_quick`: whether steps that the scene takes in its own
     /// way are the integrator's.
     fn call<I>(
