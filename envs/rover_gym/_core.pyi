@@ -1904,7 +1904,6 @@ class SolverReport:
         "sweeps",
         "body_sweeps",
         "islands",
-        "warm_newton",
         "pivoting",
         "guided_newton",
         "newton",
