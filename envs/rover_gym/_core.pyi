@@ -1907,7 +1907,6 @@ class SolverReport:
         "sweeps",
         "body_sweeps",
         "islands",
-        "warm_newton",
         "pivoting",
         "guided_newton",
         "newton",
