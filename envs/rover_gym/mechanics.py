@@ -10,6 +10,7 @@ from rover_gym._core import (
     BusyError,
     CommandError,
     Contacts,
+    DrawnScenes,
     Energy,
     FrictionContactSolution,
     Line,
@@ -25,6 +26,7 @@ from rover_gym._core import (
     ProblemError,
     RoverGymError,
     RoverModel,
+    SceneDistribution,
     Simulation,
     SimulationBatch,
     Sine,
@@ -42,8 +44,10 @@ from rover_gym._core import (
     TwoWheelRoverSimulation,
     __version__,
     accuracy_options,
+    seed_generators,
     soil_packing,
     solve_friction_contact,
+    standard_normals,
 )
 
 __all__ = [
@@ -51,6 +55,7 @@ __all__ = [
     "BusyError",
     "CommandError",
     "Contacts",
+    "DrawnScenes",
     "Energy",
     "FrictionContactSolution",
     "Line",
@@ -66,6 +71,7 @@ __all__ = [
     "ProblemError",
     "RoverGymError",
     "RoverModel",
+    "SceneDistribution",
     "Simulation",
     "SimulationBatch",
     "Sine",
@@ -83,6 +89,8 @@ __all__ = [
     "TwoWheelRoverSimulation",
     "__version__",
     "accuracy_options",
+    "seed_generators",
     "soil_packing",
     "solve_friction_contact",
+    "standard_normals",
 ]
