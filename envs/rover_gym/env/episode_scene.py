@@ -48,11 +48,12 @@ def scene_of(
 ) -> EpisodeScene:
     """The scene of one episode from rows of `DrawnScenes`: `starts`, `rocks`, `rock_seeds`, `domains`."""
     slope, uphill, x, z, heading, goal_x, goal_z = start.tolist()
+    difficulty, abundance, max_radius = rocks.tolist()
     return EpisodeScene(
         start=Start(slope, uphill, (x, z), heading, (goal_x, goal_z)),
         plane=terrain if isinstance(terrain, Plane) else _ground_of(terrain),
         terrain=terrain,
-        rocks=None if task.rocks is None else Rocks(*rocks.tolist(), seed=int(rock_seed)),
+        rocks=None if task.rocks is None else Rocks(difficulty, abundance, max_radius, int(rock_seed)),
         domain=Domain(*domain.tolist()),
     )
 

@@ -3,6 +3,7 @@
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -82,7 +83,8 @@ class Progress:
 
     def row(self, i: int) -> "Progress":
         """A copy of the progress of rover i."""
-        return Progress(**{k: row[i].copy() if row.ndim > 1 else float(row[i]) for k, row in vars(self).items()})
+        own: dict[str, Any] = {k: v[i].copy() if v.ndim > 1 else float(v[i]) for k, v in vars(self).items()}
+        return Progress(**own)
 
     def put(self, chosen: Sequence[int], begun: "Progress") -> None:
         """Sets the rows of some rovers."""

@@ -279,8 +279,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         self._scene = scene_of(
             self.task, scenes.starts[0], scenes.rocks[0], scenes.rock_seeds[0], scenes.domains[0], scenes.terrain(0)
         )
-        outcome = begun.report(self.task)
-        return outcome.observation[0], outcome.info(0)
+        return self._progress.observation.copy(), begun.report(self.task).info(0)
 
     def step(
         self, action: npt.NDArray[np.float32]

@@ -110,7 +110,7 @@ class RoverBatch:
         seeds: Sequence[int | None] | None = None,
         options: ResetOptions | Sequence[ResetOptions] | None = None,
     ) -> "Drawn":
-        """Draws the next episodes of some rovers on the batch's threads; `begin` starts them, until then nothing changes.
+        """Draws the next episodes of some rovers on the batch's threads. Nothing changes until `begin` starts them.
 
         Args:
             chosen: Indices of the rovers.

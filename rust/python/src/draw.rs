@@ -438,8 +438,9 @@ impl DrawnScenes {
         Ok((size > 0).then_some(noise))
     }
 
-    /// Starts, (m, 7): slope, direction of steepest ascent, x and z of the start, heading, x and z
-    /// of the goal; rad and m.
+    /// Starts, (m, 7), rad and m.
+    ///
+    /// Slope, direction of steepest ascent, x and z of the start, heading, x and z of the goal.
     #[getter]
     fn starts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let row = |one: &Beginning| {
@@ -458,8 +459,9 @@ impl DrawnScenes {
         fresh_table(py, self.drawn.iter().map(row))
     }
 
-    /// Properties of rover and world, (m, 4): factor of the masses, friction, gain of the motors,
-    /// factor of gravity.
+    /// Properties of rover and world, (m, 4).
+    ///
+    /// Factor of the masses, friction, gain of the motors, factor of gravity.
     #[getter]
     fn domains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let row = |one: &Beginning| {
@@ -470,8 +472,9 @@ impl DrawnScenes {
         fresh_table(py, self.drawn.iter().map(row))
     }
 
-    /// Rocks, (m, 3): difficulty, abundance, radius of the largest in wheel radii; zeros where there
-    /// are none.
+    /// Rocks, (m, 3); zeros where there are none.
+    ///
+    /// Difficulty, abundance, radius of the largest in wheel radii.
     #[getter]
     fn rocks<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let row = |one: &Beginning| {
