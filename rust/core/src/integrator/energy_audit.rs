@@ -49,7 +49,7 @@ pub const GAIN: f64 = 5e-10;
 const COARSE: f64 = 1e-3;
 
 /// Rounding errors allowed in the difference of two energies.
-const ROUNDINGS: f64 = 64.0;
+pub(crate) const ROUNDINGS: f64 = 64.0;
 
 /// Largest relative increase of the energy of free motion in a step.
 const RAISE: f64 = 1.0;

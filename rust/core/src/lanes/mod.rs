@@ -5,7 +5,7 @@
 //! ([`crate::scalar`]) that is one rover or four or eight. A step that is not ordinary is declined,
 //! rover by rover, before anything has changed; [`crate::integrator`] then takes it.
 //!
-//! - [`machine`]: what the rovers share; [`place`]: configurations;
+//! - [`machine`]: what the rovers share; [`inertias`]: what they need not; [`place`]: configurations;
 //! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
 //! - [`ground`], [`contacts`], [`rows`]: contacts, Jacobian and Delassus operator;
 //! - [`problem`], [`newton`]: the friction-contact problems;
@@ -14,11 +14,14 @@
 
 pub mod bias;
 pub mod contacts;
+pub mod drives;
 pub mod energy;
 pub mod ground;
+pub mod inertias;
 pub mod machine;
 pub mod mass_matrix;
 pub mod newton;
+pub mod passenger;
 pub mod place;
 pub mod poses;
 pub mod problem;

@@ -5,10 +5,11 @@ use std::sync::OnceLock;
 #[cfg(target_arch = "x86_64")]
 use fearless_simd::{Avx2, Avx512};
 use fearless_simd::{
-    Level, Select, Simd, SimdBase, SimdFloat, SimdMask, f64x4, f64x8, mask64x4, mask64x8,
+    Bytes, Level, Select, Simd, SimdBase, SimdFloat, SimdMask, f64x4, f64x8, mask64x4, mask64x8,
+    u64x4, u64x8,
 };
 
-use super::lane::{Lane, LaneMask};
+use super::lane::{EXPONENT_IN_LAST_BITS, Lane, LaneMask, MANTISSA_BITS};
 
 /// Instructions that a single rover's step is compiled for. Its bits do not depend on them.
 #[derive(Clone, Copy, Debug)]
@@ -109,7 +110,7 @@ impl Instructions {
 
 /// A lane type of the SIMD library, for every instruction set that it knows.
 macro_rules! lanes {
-    ($vector:ident, $mask:ident, $n:literal) => {
+    ($vector:ident, $mask:ident, $whole:ident, $n:literal) => {
         impl<S: Simd> LaneMask for $mask<S> {
             #[inline(always)]
             fn bits(self) -> u32 {
@@ -169,6 +170,12 @@ macro_rules! lanes {
             }
 
             #[inline(always)]
+            fn exp2_of_integer(self) -> Self {
+                let sum: $whole<S> = (self + self.like(EXPONENT_IN_LAST_BITS)).bitcast();
+                (sum << MANTISSA_BITS).bitcast()
+            }
+
+            #[inline(always)]
             fn lt(self, other: Self) -> $mask<S> {
                 self.simd_lt(other)
             }
@@ -191,8 +198,8 @@ macro_rules! lanes {
     };
 }
 
-lanes!(f64x4, mask64x4, 4);
-lanes!(f64x8, mask64x8, 8);
+lanes!(f64x4, mask64x4, u64x4, 4);
+lanes!(f64x8, mask64x8, u64x8, 8);
 
 #[cfg(test)]
 mod tests {

@@ -87,6 +87,10 @@ pub trait Lane:
     #[must_use]
     fn abs(self) -> Self;
 
+    /// `2ⁿ` of a whole number `−1022 <= n <= 1023`.
+    #[must_use]
+    fn exp2_of_integer(self) -> Self;
+
     /// `self < other`.
     fn lt(self, other: Self) -> Self::Mask;
 
@@ -159,6 +163,12 @@ pub trait Lane:
 /// Most lanes of any scalar.
 pub const MAX_LANES: usize = 8;
 
+/// Added to a whole number n, it leaves the exponent field of 2ⁿ in the last bits of the sum.
+pub(super) const EXPONENT_IN_LAST_BITS: f64 = 6_755_399_441_056_767.0; // 1.5 · 2⁵² + 1023
+
+/// Bits of an `f64` behind its exponent field.
+pub(super) const MANTISSA_BITS: u32 = 52;
+
 impl LaneMask for bool {
     #[inline(always)]
     fn bits(self) -> u32 {
@@ -215,6 +225,11 @@ impl Lane for f64 {
     #[inline(always)]
     fn abs(self) -> Self {
         f64::abs(self)
+    }
+
+    #[inline(always)]
+    fn exp2_of_integer(self) -> Self {
+        f64::from_bits((self + EXPONENT_IN_LAST_BITS).to_bits() << MANTISSA_BITS)
     }
 
     #[inline(always)]

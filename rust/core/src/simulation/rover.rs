@@ -7,13 +7,15 @@ use nalgebra::Vector3;
 
 use super::active_contact::LocatedContact;
 use super::rover_command::RoverCommand;
-use super::scene::{DenseOperator, Scene, StepTaken};
+use super::rover_quick::Quick;
+use super::scene::{DenseOperator, QuickStep, Scene, SceneScratch, StepTaken};
 use super::snapshot::Snapshot;
 use super::state::State;
 use super::stepping::Simulation;
 use crate::contact::{Contact, Opposite, Part};
 use crate::geometry::Terrain;
-use crate::integrator::{OptionsError, StepOptions, StepReport};
+use crate::integrator::{OptionsError, Probe, StepOptions, StepReport};
+use crate::lanes::machine::Machine;
 use crate::multibody::{Configuration, Energy, Kinematics, Model, Momentum, momentum};
 use crate::system::{TreeScratch, TreeSystem};
 
@@ -24,6 +26,21 @@ pub struct RoverScene {
     pub model: Arc<Model>,
     /// The ground.
     pub terrain: Arc<dyn Terrain>,
+    /// The machine of its ordinary steps, if it has any.
+    pub(super) machine: Option<Arc<Machine>>,
+}
+
+impl RoverScene {
+    /// A machine on a terrain.
+    #[must_use]
+    pub fn new(model: Arc<Model>, terrain: Arc<dyn Terrain>) -> Self {
+        let machine = Machine::of(&model).ok().map(Arc::new);
+        Self {
+            model,
+            terrain,
+            machine,
+        }
+    }
 }
 
 impl fmt::Debug for RoverScene {
@@ -53,9 +70,10 @@ pub struct Placement {
 /// Scratch of a rover's steps.
 #[derive(Clone, Debug)]
 pub struct RoverParts {
-    tree: TreeScratch,
+    pub(super) tree: TreeScratch,
+    pub(super) quick: Quick,
     /// Work of each joint's drive in the last call, J.
-    drive_work: Vec<f64>,
+    pub(super) drive_work: Vec<f64>,
 }
 
 impl DenseOperator for RoverParts {
@@ -102,6 +120,7 @@ impl Scene for RoverScene {
     fn parts(&self) -> RoverParts {
         RoverParts {
             tree: TreeScratch::new(&self.model, self.contact_capacity()),
+            quick: Quick::default(),
             drive_work: vec![0.0; self.model.n_joints()],
         }
     }
@@ -148,6 +167,26 @@ impl Scene for RoverScene {
         for (torque, wheel) in taken.memory.iter_mut().zip(self.model.wheels()) {
             let impulse = wheel.joint.map_or(0.0, |j| drives[j].impulse);
             *torque = wheel.drive_sign * impulse / taken.options.time_step;
+        }
+    }
+
+    fn quick_step(&self, step: QuickStep<'_, Self>, probe: &mut dyn Probe) -> Option<StepReport> {
+        self.take_ordinary_step(step, probe)
+    }
+
+    fn publish(&self, parts: &mut RoverParts, scratch: &mut SceneScratch<Self>) {
+        let RoverParts { tree, quick, .. } = parts;
+        if let Some((block, problem)) = quick.last() {
+            tree.show(block.origin(0), problem.n_unknowns(), |i, j| {
+                problem.entry(i, j)
+            });
+            scratch.show(
+                |show| {
+                    block.visit_contacts(0, |contact, _, p, u| show(contact, p, u));
+                },
+                &problem.q,
+                &problem.mu,
+            );
         }
     }
 
@@ -205,7 +244,7 @@ impl RoverSimulation {
         options: StepOptions,
     ) -> Result<Self, OptionsError> {
         let configuration = Configuration::zero(&model);
-        Self::of(RoverScene { model, terrain }, configuration, options)
+        Self::of(RoverScene::new(model, terrain), configuration, options)
     }
 
     /// As [`Self::new`], then [`Self::begin`].

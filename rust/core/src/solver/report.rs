@@ -130,6 +130,8 @@ pub struct Rung {
     pub status: SolveStatus,
     /// Its sweeps and linear solves.
     pub iterations: usize,
+    /// Matrices that it factored for them; islands and sweeps over bodies count none.
+    pub factorisations: usize,
 }
 
 /// The stages that were tried, in their order.
@@ -198,6 +200,20 @@ impl SolveReport {
     pub(super) fn amend(&mut self, status: SolveStatus) {
         self.status = status;
         self.rungs.amend(status);
+    }
+
+    /// Matrices factored by all stages together.
+    #[must_use]
+    pub fn factorisations(&self) -> usize {
+        self.rungs.as_slice().iter().map(|r| r.factorisations).sum()
+    }
+
+    /// Systems solved while pivoting: one contact changes its mode between two of them.
+    #[must_use]
+    pub fn pivots(&self) -> usize {
+        let rungs = self.rungs.as_slice().iter();
+        let pivoting = rungs.filter(|rung| rung.stage == Stage::Pivoting);
+        pivoting.map(|rung| rung.iterations).sum()
     }
 
     /// Whether the answer meets the tolerances.

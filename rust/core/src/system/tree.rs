@@ -120,6 +120,16 @@ impl TreeScratch {
         &self.drives
     }
 
+    /// Makes a step of the first tree that was taken elsewhere the last one: the world position of
+    /// its origin where contacts were evaluated (m), and the entries of its (n, n) operator.
+    pub(crate) fn show(&mut self, origin: [f64; 3], n: usize, entry: impl Fn(usize, usize) -> f64) {
+        self.kinematics_end.set_origin(0, origin.into());
+        self.system.W.clear();
+        for i in 0..n {
+            self.system.W.extend((0..n).map(|j| entry(i, j)));
+        }
+    }
+
     /// Delassus operator of the last step, row-major, 1/kg.
     #[must_use]
     pub fn operator(&self) -> &[f64] {
@@ -600,16 +610,16 @@ fn keep(kept: &mut [f64], joints: &[f64]) {
 
 /// Arm that converts a joint rotation to a length, m. A freely steered wheel that is moved out of a
 /// penetration of 2 cm rotates by 0.4 rad.
-const JOINT_ARM: f64 = 0.05;
+pub(crate) const JOINT_ARM: f64 = 0.05;
 
 /// Rotation of a frame in a step, rad, beyond which gyroscopic terms are implicit. At this angle
 /// the third-order error of the explicit terms is a thousandth of the energy.
-const MOST_TURN: f64 = 0.1;
+pub(crate) const MOST_TURN: f64 = 0.1;
 
 /// The same limit for the rotation of a wheel about its axle in a step, rad. The spin couples the
 /// motions across the axle at a frequency of a few per cent of the spin rate, so explicit terms
 /// would stay acceptable up to some twenty times more.
-const MOST_SPIN: f64 = 1.0;
+pub(crate) const MOST_SPIN: f64 = 1.0;
 
 /// Largest rate of a set of joints, rad/s.
 #[inline]

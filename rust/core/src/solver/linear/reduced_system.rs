@@ -341,6 +341,7 @@ impl ReducedSystem {
         allow_symmetric: bool,
         work: &mut Work,
     ) -> Factors {
+        work.factorisations += 1;
         let m = prediction.m;
         let W = match data.W {
             Operator::Dense(W) => W,
@@ -400,6 +401,7 @@ impl ReducedSystem {
                 ..Linearised::default()
             };
         }
+        work.factorisations += 1;
         match data.W {
             Operator::Dense(W) => {
                 let (n, size) = (data.n, dense::chunks(data.n));
