@@ -171,10 +171,7 @@ impl SceneDistribution {
             rocks,
             domain,
             placement: Placement {
-                scene: RoverScene {
-                    model,
-                    terrain: ground.terrain(),
-                },
+                scene: RoverScene::new(model, ground.terrain()),
                 options,
                 configuration,
                 v,
@@ -187,7 +184,7 @@ impl SceneDistribution {
 impl DrawnScene {
     /// Deepest gap (m) of any wheel or box with the ground: 0 where nothing overlaps, else negative.
     fn deepest_overlap(&self) -> f64 {
-        let RoverScene { model, terrain } = &self.placement.scene;
+        let RoverScene { model, terrain, .. } = &self.placement.scene;
         let kinematics = Kinematics::of(model, &self.placement.configuration);
         let (at_rest, touching) = (vec![0.0; model.nv()], Activation::default());
         let mut contacts = Vec::new();

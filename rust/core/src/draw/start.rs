@@ -185,7 +185,7 @@ mod tests {
             let lowest = gaps.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
             assert!(lowest.abs() < 1e-12, "{lowest}");
             let up = configuration.attitude.to_rotation_matrix() * Vector3::y();
-            assert!((up - plane.normal().into_inner()).norm() < 1e-12);
+            assert!((up - plane.normal()).norm() < 1e-12);
         }
     }
 }
