@@ -10,6 +10,7 @@ from rover_gym._core import (
     BusyError,
     CommandError,
     Contacts,
+    DrawnScenes,
     Energy,
     FrictionContactSolution,
     Line,
@@ -25,6 +26,7 @@ from rover_gym._core import (
     ProblemError,
     RoverGymError,
     RoverModel,
+    SceneDistribution,
     Simulation,
     SimulationBatch,
     Sine,
@@ -44,9 +46,11 @@ from rover_gym._core import (
     accuracy_options,
     atan2,
     exp,
+    seed_generators,
     sin_cos,
     soil_packing,
     solve_friction_contact,
+    standard_normals,
 )
 
 __all__ = [
@@ -54,6 +58,7 @@ __all__ = [
     "BusyError",
     "CommandError",
     "Contacts",
+    "DrawnScenes",
     "Energy",
     "FrictionContactSolution",
     "Line",
@@ -69,6 +74,7 @@ __all__ = [
     "ProblemError",
     "RoverGymError",
     "RoverModel",
+    "SceneDistribution",
     "Simulation",
     "SimulationBatch",
     "Sine",
@@ -88,7 +94,9 @@ __all__ = [
     "accuracy_options",
     "atan2",
     "exp",
+    "seed_generators",
     "sin_cos",
     "soil_packing",
     "solve_friction_contact",
+    "standard_normals",
 ]

@@ -398,10 +398,11 @@ impl<T: Lane> Contacts<T> {
         v: &[T],
         forecast: &Forecast<T>,
     ) -> T::Mask {
-        T::vectorize(self.token, #[inline(always)]
-        || {
-            self.detect_here(ground, middle, end, v, forecast)
-        })
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || self.detect_here(ground, middle, end, v, forecast),
+        )
     }
 
     #[inline(always)]
@@ -458,7 +459,10 @@ impl<T: Lane> Contacts<T> {
         let pose = &sight.middle.bodies[solid.body];
         let n = ground.normal;
         let centre = place(pose, solid.centre.as_ref());
-        let reach = (sight.forecast).reach(#[inline(always)] || self.speed_of_box(solid, centre));
+        let reach = (sight.forecast).reach(
+            #[inline(always)]
+            || self.speed_of_box(solid, centre),
+        );
         let local = pose.R.transpose_times(n);
         let local = match &solid.rotation {
             None => local,
@@ -469,8 +473,7 @@ impl<T: Lane> Contacts<T> {
             ),
         };
         let half = Vec3::splat(self.token, solid.half_size);
-        let drop =
-            (local.x * half.x).abs() + (local.y * half.y).abs() + (local.z * half.z).abs();
+        let drop = (local.x * half.x).abs() + (local.y * half.y).abs() + (local.z * half.z).abs();
         let near_plane = (sight.height + n.dot(centre) - drop).le(reach);
         if !ground.has_spheres() {
             return near_plane;
@@ -512,7 +515,10 @@ impl<T: Lane> Contacts<T> {
         };
         let on_plane = sight.forecast.admits(gap, u_N);
         // The second and third point of the rim.
-        let reach = (sight.forecast).reach(#[inline(always)] || self.speed_of_wheel(wheel, sight, centre));
+        let reach = (sight.forecast).reach(
+            #[inline(always)]
+            || self.speed_of_wheel(wheel, sight, centre),
+        );
         let half = radius.like(0.5);
         let mut declined = (height + half * radius * length).le(reach);
         let none = T::mask(self.token, 0);
