@@ -356,7 +356,11 @@ impl<T: Lane> Block<T> {
         let token = self.token;
         self.going = self.occupied;
         self.reasons = [None; MAX_LANES];
-        T::vectorize(token, || self.predict());
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.predict(),
+        );
         self.poses_middle
             .update(&self.machine, &self.inertias, &self.middle);
         self.poses_end
@@ -366,7 +370,11 @@ impl<T: Lane> Block<T> {
         probe.end(Phase::Detection);
         self.mass_matrix
             .update(&self.machine, &self.inertias, &self.poses_middle);
-        T::vectorize(token, || self.add_implicit());
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.add_implicit(),
+        );
         probe.end(Phase::MassMatrix);
         let is_definite = self.mass_matrix.factorise(&self.machine, &mut self.factor);
         self.decline(Decline::MassMatrix, !is_definite);
@@ -444,11 +452,23 @@ impl<T: Lane> Block<T> {
     fn load(&mut self, problems: &[ContactProblem]) {
         let token = self.token;
         let is_any = (self.persists & self.going).any();
-        T::vectorize(token, || self.push_and_drive(is_any, problems));
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.push_and_drive(is_any, problems),
+        );
         self.weigh(true);
-        T::vectorize(token, || self.add_torque_and_pushed(is_any));
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.add_torque_and_pushed(is_any),
+        );
         self.weigh(false);
-        T::vectorize(token, || self.add_torque_and_correction(is_any));
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.add_torque_and_correction(is_any),
+        );
     }
 
     #[inline(always)]
@@ -546,7 +566,11 @@ impl<T: Lane> Block<T> {
             }
         }
         self.decline(Decline::Solver, !T::mask(token, solved));
-        T::vectorize(token, || self.move_on(problems));
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.move_on(problems),
+        );
         let after = energy(
             &self.machine,
             &self.inertias,
@@ -557,7 +581,11 @@ impl<T: Lane> Block<T> {
         );
         self.after = [after.kinetic, after.potential];
         self.momentum = after.momentum;
-        T::vectorize(token, || self.audit());
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.audit(),
+        );
         if self.is_corrected.any() {
             self.weigh_again();
         }
@@ -565,7 +593,11 @@ impl<T: Lane> Block<T> {
         let Some(tolerated) = self.tolerated() else {
             return false;
         };
-        T::vectorize(token, || self.measure(tolerated))
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.measure(tolerated),
+        )
     }
 
     #[inline(always)]
@@ -726,27 +758,31 @@ impl<T: Lane> Block<T> {
     /// # Panics
     /// If there are fewer problems than lanes.
     pub fn set_gaps(&mut self, problems: &mut [ContactProblem]) {
-        T::vectorize(self.token, || {
-            let (h, theta) = self.time_step();
-            for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
-                if !self.is_deep.get(lane) {
-                    problem.n_contacts = 0;
-                }
-                let n = problem.n_unknowns();
-                problem.q[..n].fill(0.0);
-                problem.p[..n].fill(0.0);
-            }
-            for &slot in self.contacts.used() {
-                let gap = self.gap_at_end(slot, h, theta);
-                let places = self.contacts.places(slot);
-                let active = self.contacts.slot(slot).active & self.is_deep;
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || {
+                let (h, theta) = self.time_step();
                 for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
-                    if active.get(lane) {
-                        problem.q[3 * usize::from(places[lane])] = gap.get(lane);
+                    if !self.is_deep.get(lane) {
+                        problem.n_contacts = 0;
+                    }
+                    let n = problem.n_unknowns();
+                    problem.q[..n].fill(0.0);
+                    problem.p[..n].fill(0.0);
+                }
+                for &slot in self.contacts.used() {
+                    let gap = self.gap_at_end(slot, h, theta);
+                    let places = self.contacts.places(slot);
+                    let active = self.contacts.slot(slot).active & self.is_deep;
+                    for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
+                        if active.get(lane) {
+                            problem.q[3 * usize::from(places[lane])] = gap.get(lane);
+                        }
                     }
                 }
-            }
-        });
+            },
+        );
     }
 
     /// Last part of a step. `problems`: those of [`Self::set_gaps`], solved, if a lane's position
@@ -760,7 +796,11 @@ impl<T: Lane> Block<T> {
             self.project(&problems[..T::LANES]);
         }
         probe.end(Phase::Projection);
-        T::vectorize(token, || self.accept());
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.accept(),
+        );
         let going = self.going.bits();
         for lane in 0..T::LANES {
             if going >> lane & 1 == 1 {
@@ -782,7 +822,11 @@ impl<T: Lane> Block<T> {
             }
         }
         self.decline(Decline::Projection, T::mask(token, unsolved));
-        T::vectorize(token, || self.displace(problems));
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.displace(problems),
+        );
         let lifted = energy(
             &self.machine,
             &self.inertias,
