@@ -85,13 +85,16 @@ impl<T: Lane> Rows<T> {
         contacts: &Contacts<T>,
         v: &[T],
     ) {
-        T::vectorize(self.token, #[inline(always)]
-        || {
-            for &slot in contacts.used() {
-                self.build(machine, end, factor, contacts, v, slot);
-            }
-            self.multiply(contacts.used());
-        });
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || {
+                for &slot in contacts.used() {
+                    self.build(machine, end, factor, contacts, v, slot);
+                }
+                self.multiply(contacts.used());
+            },
+        );
     }
 
     /// Z and `Hᵀ v` of a slot.
@@ -251,43 +254,62 @@ impl<T: Lane> Rows<T> {
         mu: T,
         problems: &mut [ContactProblem],
     ) {
-        T::vectorize(self.token, #[inline(always)]
-        || {
-            let problems = &mut problems[..T::LANES];
-            let mut friction = [0.0; MAX_LANES];
-            mu.store(&mut friction[..T::LANES]);
-            for (lane, problem) in problems.iter_mut().enumerate() {
-                problem.n_contacts = contacts.list(lane).n;
-                problem.mu[..problem.n_contacts].fill(friction[lane]);
-            }
-            let mut at = 0;
-            for (i, &row) in contacts.used().iter().enumerate() {
-                let of_row = contacts.places(row);
-                let values = store_all(&q[row]);
-                each::<T>(contacts.slot(row).active, #[inline(always)]
-                |lane| {
-                    let place = usize::from(of_row[lane]);
-                    let q = &mut problems[lane].q[3 * place..][..3];
-                    for i in 0..3 {
-                        q[i] = values[i][lane];
-                    }
-                });
-                for &column in &contacts.used()[..=i] {
-                    let of_column = contacts.places(column);
-                    let values = store_all(&self.W[at]);
-                    at += 1;
-                    let both = contacts.slot(row).active & contacts.slot(column).active;
-                    each::<T>(both, #[inline(always)]
-                |lane| {
-                        let (c, d) = (of_row[lane], of_column[lane]);
-                        let out = &mut problems[lane].W[block(c.into(), d.into())];
-                        for i in 0..9 {
-                            out[i] = values[i][lane];
-                        }
-                    });
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || {
+                let problems = &mut problems[..T::LANES];
+                let mut friction = [0.0; MAX_LANES];
+                mu.store(&mut friction[..T::LANES]);
+                for (lane, problem) in problems.iter_mut().enumerate() {
+                    problem.n_contacts = contacts.list(lane).n;
+                    problem.mu[..problem.n_contacts].fill(friction[lane]);
                 }
-            }
-        });
+                let mut at = 0;
+                for (i, &row) in contacts.used().iter().enumerate() {
+                    let of_row = contacts.places(row);
+                    let values = store_all(&q[row]);
+                    each::<T>(
+                        contacts.slot(row).active,
+                        #[inline(always)]
+                        |lane| {
+                            let place = usize::from(of_row[lane]);
+                            let q = &mut problems[lane].q[3 * place..][..3];
+                            for i in 0..3 {
+                                q[i] = values[i][lane];
+                            }
+                        },
+                    );
+                    for &column in &contacts.used()[..=i] {
+                        let of_column = contacts.places(column);
+                        let [first @ .., last] = &self.W[at];
+                        let (mut rows, mut ends) = ([[0.0; 8]; MAX_LANES], [0.0; MAX_LANES]);
+                        T::transpose(first, &mut rows);
+                        last.store(&mut ends[..T::LANES]);
+                        if contacts.is_full() {
+                            for (lane, problem) in problems.iter_mut().enumerate() {
+                                let out = &mut problem.W[at];
+                                out[..8].copy_from_slice(&rows[lane]);
+                                out[8] = ends[lane];
+                            }
+                        } else {
+                            let both = contacts.slot(row).active & contacts.slot(column).active;
+                            each::<T>(
+                                both,
+                                #[inline(always)]
+                                |lane| {
+                                    let (c, d) = (of_row[lane], of_column[lane]);
+                                    let out = &mut problems[lane].W[block(c.into(), d.into())];
+                                    out[..8].copy_from_slice(&rows[lane]);
+                                    out[8] = ends[lane];
+                                },
+                            );
+                        }
+                        at += 1;
+                    }
+                }
+            },
+        );
     }
 
     /// Reads impulses by slot from the problems, N s. Slots that a lane does not use are left as
@@ -302,7 +324,13 @@ impl<T: Lane> Rows<T> {
         problems: &[ContactProblem],
         p: &mut [Triple<T>],
     ) {
-        self.read(contacts, problems, #[inline(always)] |problem| &problem.p, p);
+        self.read(
+            contacts,
+            problems,
+            #[inline(always)]
+            |problem| &problem.p,
+            p,
+        );
     }
 
     /// Reads velocities by slot from the problems, m/s, likewise.
@@ -316,7 +344,13 @@ impl<T: Lane> Rows<T> {
         problems: &[ContactProblem],
         u: &mut [Triple<T>],
     ) {
-        self.read(contacts, problems, #[inline(always)] |problem| &problem.u, u);
+        self.read(
+            contacts,
+            problems,
+            #[inline(always)]
+            |problem| &problem.u,
+            u,
+        );
     }
 
     #[inline(always)]
@@ -331,13 +365,16 @@ impl<T: Lane> Rows<T> {
         for &slot in contacts.used() {
             let mut values = store_all(&out[slot]);
             let places = contacts.places(slot);
-            each::<T>(contacts.slot(slot).active, #[inline(always)]
+            each::<T>(
+                contacts.slot(slot).active,
+                #[inline(always)]
                 |lane| {
-                let own = &of(&problems[lane])[3 * usize::from(places[lane])..][..3];
-                for i in 0..3 {
-                    values[i][lane] = own[i];
-                }
-            });
+                    let own = &of(&problems[lane])[3 * usize::from(places[lane])..][..3];
+                    for i in 0..3 {
+                        values[i][lane] = own[i];
+                    }
+                },
+            );
             for (out, values) in out[slot].iter_mut().zip(&values) {
                 *out = T::load(self.token, &values[..T::LANES]);
             }
@@ -381,7 +418,15 @@ fn add_scaled<T: Lane>(sums: &mut Triple<T>, x: &Triple<T>, a: T) {
 fn product<T: Lane>(x: &[Triple<T>], y: &[Triple<T>]) -> [T; 9] {
     let ([a, b, c], [d, e, f]) = (x[0], y[0]);
     let mut sums = [
-        a * d, a * e, a * f, b * d, b * e, b * f, c * d, c * e, c * f,
+        a * d,
+        a * e,
+        a * f,
+        b * d,
+        b * e,
+        b * f,
+        c * d,
+        c * e,
+        c * f,
     ];
     for (x, y) in x[1..].iter().zip(&y[1..]) {
         for i in 0..3 {

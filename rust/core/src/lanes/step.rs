@@ -16,9 +16,10 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::bias::{BiasScratch, bias};
-use super::contacts::{Contacts, Forecast};
+use super::contacts::Contacts;
 use super::drives::Drives;
 use super::energy::{EnergyScratch, energy};
+use super::forecast::Forecast;
 use super::ground::Ground;
 use super::inertias::Inertias;
 use super::machine::{Machine, velocity};
@@ -63,7 +64,8 @@ pub enum Decline {
 /// Number of reasons.
 pub const REASONS: usize = 8;
 /// LAB
-pub static DECLINED: [std::sync::atomic::AtomicUsize; 8] = [const { std::sync::atomic::AtomicUsize::new(0) }; 8];
+pub static DECLINED: [std::sync::atomic::AtomicUsize; 8] =
+    [const { std::sync::atomic::AtomicUsize::new(0) }; 8];
 
 /// Whether steps with these options can be ordinary.
 #[must_use]
