@@ -16,9 +16,10 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::bias::{BiasScratch, bias};
-use super::contacts::{Contacts, Forecast};
+use super::contacts::Contacts;
 use super::drives::Drives;
 use super::energy::{EnergyScratch, energy};
+use super::forecast::Forecast;
 use super::ground::Ground;
 use super::inertias::Inertias;
 use super::machine::{Machine, velocity};

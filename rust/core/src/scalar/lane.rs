@@ -76,6 +76,9 @@ pub trait Lane:
     /// A mask whose lane k is bit k.
     fn mask(token: Self::Token, bits: u32) -> Self::Mask;
 
+    /// Writes lane k of eight numbers to `out[k]`, for [`Self::LANES`] lanes.
+    fn transpose(x: &[Self; 8], out: &mut [[f64; 8]; MAX_LANES]);
+
     /// The token that this number was made with.
     fn token(self) -> Self::Token;
 
@@ -200,6 +203,11 @@ impl Lane for f64 {
     #[inline(always)]
     fn mask(_: Single, bits: u32) -> bool {
         bits & 1 == 1
+    }
+
+    #[inline(always)]
+    fn transpose(x: &[Self; 8], out: &mut [[f64; 8]; MAX_LANES]) {
+        out[0] = *x;
     }
 
     #[inline(always)]
