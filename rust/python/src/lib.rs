@@ -6,9 +6,12 @@ mod arguments;
 mod arrays;
 mod batch;
 mod contacts;
+mod draw;
+mod elementary;
 mod errors;
 mod files;
 mod friction_contact;
+mod generators;
 mod model;
 mod motor;
 mod options;
@@ -42,16 +45,23 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<contacts::Contacts>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<batch::SimulationBatch>()?;
+    module.add_class::<draw::SceneDistribution>()?;
+    module.add_class::<draw::DrawnScenes>()?;
     module.add_class::<report::StepReport>()?;
     module.add_class::<report::Energy>()?;
     module.add_class::<snapshot::Snapshot>()?;
     module.add_class::<friction_contact::SolverReport>()?;
     module.add_class::<friction_contact::FrictionContactSolution>()?;
     module.add_function(wrap_pyfunction!(accuracy::accuracy_options, module)?)?;
+    module.add_function(wrap_pyfunction!(elementary::sin_cos, module)?)?;
+    module.add_function(wrap_pyfunction!(elementary::atan2, module)?)?;
+    module.add_function(wrap_pyfunction!(elementary::exp, module)?)?;
     module.add_function(wrap_pyfunction!(
         friction_contact::solve_friction_contact,
         module
     )?)?;
+    module.add_function(wrap_pyfunction!(generators::seed_generators, module)?)?;
+    module.add_function(wrap_pyfunction!(generators::standard_normals, module)?)?;
     planar::register(module)?;
     planar_soil::register(module)?;
     Ok(())

@@ -8,6 +8,7 @@ use super::rover::RoverSimulation;
 use crate::contact::Part;
 use crate::integrator::StepStatus;
 use crate::multibody::{Model, coordinates};
+use crate::scalar::elementary::{hypot, sin_cos};
 
 /// Speed below which, for both rim and ground, a slip ratio is meaningless, m/s.
 pub const SLIP_SPEED: f64 = 0.05;
@@ -160,18 +161,18 @@ impl RoverSimulation {
         let normal = R_WB.inverse() * normal.unwrap_or_default();
         row.put(normal.iter().copied());
 
-        let (sine, cosine) = heading.sin_cos();
+        let (sine, cosine) = sin_cos(heading);
         let (dx, dz) = (look.target[0] - x, look.target[1] - z);
         row.put([
             dx * cosine - dz * sine,
             dx * sine + dz * cosine,
-            dx.hypot(dz),
+            hypot(dx, dz),
         ]);
         let gravity = &self.options().gravity;
         let up = gravity.try_normalize(0.0).map_or(Vector3::y(), |g| -g);
         row.put([
             up.dot(&R_WB.matrix().column(1)),
-            base[0].hypot(base[2]),
+            hypot(base[0], base[2]),
             self.body_force(),
             self.slip_ratio(),
         ]);
@@ -209,8 +210,8 @@ impl RoverSimulation {
                 let rate = rate.map_or(0.0, |j| self.state().v[self.model().joint_velocity(j)]);
                 let rim = wheel.radius * wheel.drive_sign * rate;
                 let [_, u_t, u_b] = active.velocity;
-                let ground = (rim + u_t).hypot(u_b);
-                total += u_t.hypot(u_b) / rim.abs().max(ground).max(SLIP_SPEED);
+                let ground = hypot(rim + u_t, u_b);
+                total += hypot(u_t, u_b) / rim.abs().max(ground).max(SLIP_SPEED);
                 n += 1;
             }
         }
