@@ -34,7 +34,7 @@ QUICK_STEPS, QUICK_SIZE = (1e-2, 5e-3), 3
 #: First step of the references, the change of the path at which halving ends, and the last step.
 COARSE, SETTLED, FINEST = 1e-4, 2e-6, 1.25e-5  # s, m, s
 #: CPU time that a drive may take, s.
-CAP = 2.0
+CAP = 0.4
 
 
 def members(ground: str, torque: float) -> list[RoverScene]:
@@ -86,7 +86,7 @@ def point(variant: Variant, played: list[RoverScene], paths: list[Array], step: 
     for one, path in zip(played, paths, strict=True):
         try:
             traces = [run(variant, one, step, CAP)]
-            if traces[0].cpu < 0.5:
+            if traces[0].cpu < 0.1:
                 traces.append(run(variant, one, step, CAP))
         except LeftOut as left_out:
             return {"failure": f"left out: {left_out.reason}"}
