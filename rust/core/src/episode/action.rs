@@ -46,11 +46,15 @@ pub fn commands(
     set_points: &mut [f64],
 ) {
     let (drive, steer) = action.split_at(rules.n_wheels());
-    for ((own, a), limit) in torques.iter_mut().zip(drive).zip(rules.torque_limits()) {
+    for ((own, a), limit) in torques
+        .iter_mut()
+        .zip(drive)
+        .zip(&rules.settings().torque_limits)
+    {
         *own = a * limit * gain;
     }
     for (own, a) in set_points.iter_mut().zip(steer) {
-        *own = a * rules.max_steering();
+        *own = a * rules.settings().max_steering;
     }
 }
 

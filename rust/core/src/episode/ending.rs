@@ -1,8 +1,8 @@
 //! Whether and why an episode ends.
 
+use super::outcome::Quantities;
 use super::progress::Progress;
 use super::rules::Rules;
-use super::outcome::Quantities;
 
 /// A rover is high-centred while its trunk carries too much of the weight and it is no faster than
 /// this, m/s.
@@ -64,11 +64,11 @@ impl Ending {
     pub fn of(rules: &Rules, now: &Quantities, progress: &Progress, has_failed: bool) -> Self {
         if has_failed {
             Self::StepFailed
-        } else if now.distance <= rules.goal_tolerance() {
+        } else if now.distance <= rules.settings().goal_tolerance {
             Self::Goal
-        } else if now.cos_tilt < rules.cos_max_tilt() {
+        } else if now.cos_tilt < rules.settings().cos_max_tilt {
             Self::RollOver
-        } else if progress.stuck_time >= rules.stuck_time() {
+        } else if progress.stuck_time >= rules.settings().stuck_time {
             Self::HighCentred
         } else {
             Self::None

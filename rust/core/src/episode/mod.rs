@@ -23,10 +23,9 @@ pub mod reward;
 pub mod rules;
 pub mod running;
 
-pub use batch::{EpisodeBatch, PeriodReport};
+pub use batch::EpisodeBatch;
 pub use ending::Ending;
 pub use error::EpisodeError;
-pub use noise::Noise;
 pub use outcome::{Outcome, Quantities};
 pub use progress::Progress;
 pub use reward::{TERMS, Weights};

@@ -1,12 +1,14 @@
 //! Noise of the sensors.
 //!
-//! Every entry of an observation that is measured gets `standard deviation · z` with a standard
-//! normal number z of its own. Flags, fractions, unit vectors, distances and actions stay exact:
-//! their standard deviation is zero, but their numbers are drawn too.
+//! Every entry of an observation that is measured gets `σ z`, with its own standard deviation σ and
+//! its own standard normal number z, drawn anew each period. Flags, fractions, unit vectors,
+//! distances and actions stay exact: their σ is zero, but their numbers are drawn too.
 
-/// Standard deviation of each entry's noise, in units of the observation.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Noise {
-    /// (size of the observation).
-    pub deviations: Vec<f64>,
+use crate::draw::Pcg64;
+
+/// Fills `normals` with standard normal numbers, in order.
+pub fn draw(generator: &mut Pcg64, normals: &mut [f64]) {
+    for z in normals {
+        *z = generator.normal();
+    }
 }

@@ -59,10 +59,10 @@ pub struct Earned<'a> {
     pub now: &'a Quantities,
     /// Distance to the goal before it, m.
     pub distance_before: f64,
-    /// Its action, (2 n_wheels): torques, then steering.
-    pub action: &'a [f64],
-    /// The action before it.
-    pub previous_action: &'a [f64],
+    /// Sums over the wheels of the squared changes of the actions: torques, steering.
+    pub changes: [f64; 2],
+    /// Number of wheels.
+    pub n_wheels: usize,
     /// Its length, s.
     pub dt: f64,
     /// How it ended.
@@ -84,9 +84,6 @@ pub fn terms(weights: &Weights, earned: &Earned<'_>) -> [f64; N_TERMS] {
         success,
         failure,
     ] = *weights;
-    let n_wheels = earned.action.len() / 2;
-    let (drive, steer) = earned.action.split_at(n_wheels);
-    let (drive_before, steer_before) = earned.previous_action.split_at(n_wheels);
     let dt = earned.dt.min(MOST_TIME);
     let one_if = |is_so: bool| f64::from(u8::from(is_so));
     let mut terms = [
@@ -95,8 +92,8 @@ pub fn terms(weights: &Weights, earned: &Earned<'_>) -> [f64; N_TERMS] {
         energy * within(now.work, MOST_WORK),
         slip * within(now.slip_ratio, MOST_RATIO) * dt,
         tilt * within(1.0 - now.cos_tilt, MOST_RATIO) * dt,
-        torque_change * squared_change(drive, drive_before) / n_wheels as f64,
-        steering_change * squared_change(steer, steer_before) / n_wheels as f64,
+        torque_change * earned.changes[0] / earned.n_wheels as f64,
+        steering_change * earned.changes[1] / earned.n_wheels as f64,
         success * one_if(earned.ending == Ending::Goal) + 0.0, // no negative zero
         failure * one_if(earned.ending.is_failure()) + 0.0,
     ];
@@ -111,10 +108,18 @@ fn within(quantity: f64, most: f64) -> f64 {
     quantity.clamp(-most, most)
 }
 
-/// Σ (a_i − b_i)².
-fn squared_change(a: &[f64], b: &[f64]) -> f64 {
-    let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
-    squares.reduce(|sum, square| sum + square).unwrap_or(0.0)
+/// Sums over the wheels of the squared changes between two actions (2 n_wheels): of the torques,
+/// and of the steering.
+#[must_use]
+pub fn squared_changes(action: &[f64], before: &[f64]) -> [f64; 2] {
+    let sum = |a: &[f64], b: &[f64]| {
+        let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
+        squares.fold(0.0, |sum, square| sum + square)
+    };
+    let n_wheels = action.len() / 2;
+    let (drive, steer) = action.split_at(n_wheels);
+    let (drive_before, steer_before) = before.split_at(n_wheels);
+    [sum(drive, drive_before), sum(steer, steer_before)]
 }
 
 #[cfg(test)]
@@ -124,12 +129,11 @@ mod tests {
     const WEIGHTS: Weights = [1.0, -0.05, -5e-5, -0.1, -0.1, -0.02, -0.02, 10.0, -10.0];
 
     fn reward(now: &Quantities, dt: f64, ending: Ending) -> [f64; N_TERMS] {
-        let (action, before) = ([1.0; 12], [-1.0; 12]);
         let earned = Earned {
             now,
             distance_before: 1e30,
-            action: &action,
-            previous_action: &before,
+            changes: squared_changes(&[1.0; 12], &[-1.0; 12]),
+            n_wheels: 6,
             dt,
             ending,
         };

@@ -108,6 +108,7 @@ impl Batch {
         self.check(index, &rover)?;
         self.rovers[index] = rover;
         self.targets[index] = target;
+        self.errors[index] = None;
         Ok(())
     }
 

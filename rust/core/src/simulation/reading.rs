@@ -122,6 +122,8 @@ impl Row<'_> {
 pub struct ReadingScratch {
     kinematics: Option<Kinematics>,
     forces: WheelForces,
+    /// Room for the numbers of a reader.
+    pub numbers: Vec<f64>,
 }
 
 impl ReadingScratch {

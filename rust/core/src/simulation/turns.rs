@@ -27,7 +27,13 @@ pub trait Turn<P>: Sync {
     fn begin(&self, rover: &mut RoverSimulation, place: &mut P);
 
     /// Reads the rover, whether it has moved or not. `error`: the step that it could not take.
-    fn end(&self, rover: &RoverSimulation, done: Done<'_>, place: &mut P, scratch: &mut ReadingScratch);
+    fn end(
+        &self,
+        rover: &RoverSimulation,
+        done: Done<'_>,
+        place: &mut P,
+        scratch: &mut ReadingScratch,
+    );
 }
 
 /// How a rover's steps went.
