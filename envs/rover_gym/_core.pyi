@@ -6,13 +6,14 @@ listed FL, FR, ML, BL, MR, BR. Every array returned is new.
 
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from typing import Any, Literal, TypeAlias, final, overload
+from typing import Any, ClassVar, Literal, TypeAlias, final, overload
 
 import numpy as np
 import numpy.typing as npt
 from typing_extensions import disjoint_base
 
 _Array: TypeAlias = npt.NDArray[np.float64]
+_Observation: TypeAlias = npt.NDArray[np.float32]
 _Coordinates: TypeAlias = Literal["report", "state"]
 
 __all__ = [
@@ -21,6 +22,9 @@ __all__ = [
     "CommandError",
     "Contacts",
     "Energy",
+    "Episode",
+    "EpisodeBatch",
+    "EpisodeRules",
     "FrictionContactSolution",
     "Line",
     "MirroredRoverSimulation",
@@ -1557,6 +1561,310 @@ class SimulationBatch:
 
         Raises:
             OptionError: There is no such rover, or an argument is invalid. Nothing has changed.
+        """
+    def simulation(self, index: int) -> Simulation:
+        """Returns a copy of one rover.
+
+        Args:
+            index: Index of the rover.
+
+        Returns:
+            The copy; stepping it does not move the rover.
+
+        Raises:
+            OptionError: There is no such rover.
+        """
+    def __len__(self) -> int: ...
+
+@final
+class EpisodeRules:
+    """What all episodes of a driving task share.
+
+    Args:
+        model: The machine.
+        substeps: Physics steps of a control period.
+        dt: Control period, s.
+        torque_limits: Torque of a torque action of 1, (n_wheels,), N m.
+        max_steering: Set-point of a steering action of 1, rad.
+        goal_tolerance: Distance within which the goal is reached, m.
+        cos_max_tilt: Cosine of the tilt beyond which the rover has rolled over.
+        stuck_time: Time until a high-centred rover ends the episode, s.
+        weights: Weights of the reward, one for each of its terms.
+        scale: Value of an entry of 1 of the observation, (size,).
+        noise: Standard deviation of each entry's noise, (size,); no noise by default.
+        scan: Points of the height scan ahead and to the right of the trunk's origin in the heading
+            frame, (n, 2), m; none by default.
+
+    Raises:
+        ModelError: `model` is not a RoverModel.
+        OptionError: A number is out of its range, a list has a wrong length, or the weights are not
+            those of the terms.
+    """
+
+    terms: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        model: RoverModel,
+        *,
+        substeps: int,
+        dt: float,
+        torque_limits: npt.ArrayLike,
+        max_steering: float,
+        goal_tolerance: float,
+        cos_max_tilt: float,
+        stuck_time: float,
+        weights: Mapping[str, float],
+        scale: npt.ArrayLike,
+        noise: npt.ArrayLike | None = None,
+        scan: npt.ArrayLike | None = None,
+    ) -> EpisodeRules: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[RoverModel], dict[str, Any]]: ...
+
+@final
+class Episode:
+    """One episode of a driving task: what its simulation does not hold.
+
+    Args:
+        rules: What all episodes of the task share.
+        goal: The goal (x, z), m.
+        domain: Properties of rover and world: mass_scale, friction, actuator_gain, gravity_scale.
+        trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
+        difficulty: Difficulty of the rocks.
+        distance: Horizontal distance to the goal, m.
+        previous_action: The last action, (2 n_wheels,).
+        energy: Work of the motors since the beginning, driving or braking, J.
+        energy_positive: Its driving part, J.
+        stuck_time: How long the rover has been high-centred, s.
+        observation: The last observation, (size,).
+
+    Raises:
+        OptionError: An argument has a wrong shape or a number that is not finite.
+    """
+
+    def __new__(
+        cls,
+        rules: EpisodeRules,
+        *,
+        goal: Sequence[float],
+        domain: npt.ArrayLike,
+        trunk_load_limit: float,
+        difficulty: float,
+        distance: float,
+        previous_action: npt.ArrayLike,
+        energy: float,
+        energy_positive: float,
+        stuck_time: float,
+        observation: npt.ArrayLike,
+    ) -> Episode: ...
+    @staticmethod
+    def begin(
+        rules: EpisodeRules,
+        simulation: Simulation,
+        *,
+        goal: Sequence[float],
+        domain: npt.ArrayLike,
+        trunk_load_limit: float,
+        difficulty: float,
+        normals: npt.ArrayLike | None = None,
+    ) -> Episode | None:
+        """The beginning of an episode.
+
+        Args:
+            rules: What all episodes of the task share.
+            simulation: The rover at its start.
+            goal: The goal (x, z), m.
+            domain: As of the class.
+            trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
+            difficulty: Difficulty of the rocks.
+            normals: A standard normal number for each entry of the observation, (size,), where the
+                rules have noise.
+
+        Returns:
+            The episode; None if its observation is not finite in float32.
+
+        Raises:
+            OptionError: An argument has a wrong shape or a number that is not finite, or the
+                rover's model does not fit the rules.
+        """
+    def step(
+        self,
+        simulation: Simulation,
+        action: npt.ArrayLike,
+        normals: npt.ArrayLike | None = None,
+        *,
+        has_scan: bool = True,
+    ) -> tuple[_Observation, float, bool, dict[str, Any]]:
+        """Gives the simulation an action for one control period.
+
+        Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
+        after a whole physics step, whose state stays; the episode then stays as before the call.
+
+        Args:
+            simulation: The rover of this episode.
+            action: Torques, then steering, within [-1, 1], (2 n_wheels,).
+            normals: A standard normal number for each entry of the observation, (size,), where the
+                rules have noise.
+            has_scan: Whether the heights are taken. Without, only a period that ends the episode
+                takes them; otherwise the last ones stay until `complete`.
+
+        Returns:
+            Observation (size,) float32, reward, whether the episode has ended, and info.
+
+        Raises:
+            CommandError: The action has a wrong shape or an entry that is not finite or outside
+                [-1, 1]. Nothing has changed.
+            OptionError: `normals` has a wrong length. Nothing has changed.
+        """
+    def advance(
+        self,
+        reading: npt.ArrayLike,
+        action: npt.ArrayLike,
+        normals: npt.ArrayLike | None = None,
+        *,
+        message: str | None = None,
+    ) -> tuple[_Observation, float, bool, dict[str, Any]]:
+        """Goes on by a control period that ended with a reading, without a simulation.
+
+        Args:
+            reading: As of `Simulation.reading` with the goal as its target and the rules' scan.
+            action: As of `step`.
+            normals: As of `step`.
+            message: The message of the physics step that failed, if one did.
+
+        Returns:
+            As `step`.
+
+        Raises:
+            CommandError: As `step`.
+            OptionError: `reading` or `normals` has a wrong length.
+        """
+    def complete(self, simulation: Simulation) -> _Observation:
+        """Takes the heights that the last observation lacks, if it lacks any.
+
+        Args:
+            simulation: The rover of this episode, which has not moved since.
+
+        Returns:
+            The last observation, (size,) float32.
+        """
+    @property
+    def observation(self) -> _Observation:
+        """The last observation, (size,) float32."""
+    def info(self) -> dict[str, Any]:
+        """The info of the last period, or of the beginning."""
+    def state(self) -> dict[str, Any]:
+        """The keyword arguments that make an episode which continues as this one."""
+    def __getnewargs_ex__(self) -> tuple[tuple[EpisodeRules], dict[str, Any]]: ...
+
+@final
+class EpisodeBatch:
+    """Many rovers with their episodes, each bit for bit as it would be alone.
+
+    One call at a time: a call during another one raises BusyError.
+
+    Args:
+        rules: What all episodes share.
+        simulation: A rover of the task; the batch begins with copies of it, without episodes.
+        n: Number of rovers.
+        max_steps: Control periods until an episode is truncated; no limit by default.
+        threads: Number of threads; one a core by default.
+
+    Raises:
+        OptionError: An argument is out of its range, or the model does not fit the rules.
+    """
+
+    def __new__(
+        cls,
+        rules: EpisodeRules,
+        simulation: Simulation,
+        n: int,
+        *,
+        max_steps: int | None = None,
+        threads: int | None = None,
+    ) -> EpisodeBatch: ...
+    @property
+    def threads(self) -> int:
+        """Number of threads."""
+    def step(
+        self, actions: object, active: npt.NDArray[np.bool_] | None = None, *, has_scan: bool = True
+    ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+        """Gives all rovers their actions for one control period.
+
+        Ctrl-C ends the call after a whole physics step of each rover, which need not be the same
+        one.
+
+        Args:
+            actions: As of `Episode.step`, (n_rovers, 2 n_wheels).
+            active: Which rovers move, (n_rovers,); all by default. The others stay as they are.
+            has_scan: Whether the heights are taken. Without, only episodes that end or reach the
+                time limit take them; the others keep the last ones.
+
+        Returns:
+            Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes have ended,
+            and which have reached the time limit, (n_rovers,). A rover that stays has the values of
+            its last period.
+
+        Raises:
+            CommandError: The actions have a wrong shape or an entry that is not finite or outside
+                [-1, 1]. No rover has moved.
+            OptionError: `active` is invalid, or an episode has not begun. No rover has moved.
+        """
+    def infos(self) -> dict[str, Any]:
+        """The infos of all rovers, of their last periods or beginnings.
+
+        Returns:
+            For each entry an array (n_rovers,), and under its name after an underscore the mask of
+            the rovers that have it: all.
+
+        Raises:
+            OptionError: An episode has not begun.
+        """
+    def info(self, index: int) -> dict[str, Any]:
+        """The info of one rover, of its last period or beginning.
+
+        Args:
+            index: Index of the rover.
+
+        Raises:
+            OptionError: There is no such rover, or its episode has not begun.
+        """
+    def observations(self) -> _Observation:
+        """The last observations of all rovers, (n_rovers, size) float32; zeros before an episode."""
+    def replace(
+        self, index: int, simulation: Simulation, episode: Episode, random_state: tuple[int, int] | None = None
+    ) -> None:
+        """Puts copies of a simulation and its episode in the place of a rover.
+
+        Args:
+            index: Index of the rover.
+            simulation: Its replacement.
+            episode: The episode, which begins or goes on.
+            random_state: The numbers `state` and `inc` of the PCG64 that its noise is drawn from;
+                any by default.
+
+        Raises:
+            OptionError: There is no such rover, the episode has other rules, or an argument is
+                invalid. Nothing has changed.
+        """
+    def random_state(self, index: int) -> tuple[int, int]:
+        """The numbers `state` and `inc` of the PCG64 that a rover's noise is drawn from.
+
+        Args:
+            index: Index of the rover.
+
+        Raises:
+            OptionError: There is no such rover, or its episode has not begun.
+        """
+    def set_random_state(self, index: int, random_state: tuple[int, int]) -> None:
+        """Sets the numbers that `random_state` returns.
+
+        Args:
+            index: Index of the rover.
+            random_state: `state` and `inc`.
+
+        Raises:
+            OptionError: There is no such rover, or its episode has not begun; or the numbers are
+                none of a PCG64.
         """
     def simulation(self, index: int) -> Simulation:
         """Returns a copy of one rover.

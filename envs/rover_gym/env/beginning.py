@@ -8,12 +8,8 @@ import numpy as np
 from gymnasium.utils import seeding
 
 from rover_gym.env.episode_scene import START_OVERLAP, EpisodeScene, ResetOptions, draw_scene
-from rover_gym.env.outcome import Outcome, reset_outcome
-from rover_gym.env.progress import Progress
-from rover_gym.env.quantities import Array
-from rover_gym.env.readings import draw_noise
 from rover_gym.env.task import Task
-from rover_gym.mechanics import OptionError, Simulation, StateError, TerrainError
+from rover_gym.mechanics import Episode, OptionError, Simulation, StateError, TerrainError
 from rover_gym.validation import Range, refuse, whole
 
 #: Most scenes drawn for one reset until the rover penetrates neither the ground nor a sphere.
@@ -22,16 +18,11 @@ PLACING_ATTEMPTS = 100
 
 @dataclass(frozen=True)
 class Beginning:
-    """A drawn and checked episode: its scene, simulation, progress and first reading."""
+    """A drawn and checked beginning: the scene, the simulation at its start, and the episode."""
 
     scene: EpisodeScene
     simulation: Simulation
-    progress: Progress
-    reading: Array
-
-    def report(self, task: Task) -> Outcome:
-        """The outcome that a reset reports."""
-        return reset_outcome(task, self.progress, self.reading)
+    episode: Episode
 
 
 def draw_beginning(task: Task, rng: np.random.Generator, difficulty: Range | None, options: ResetOptions) -> Beginning:
@@ -58,12 +49,18 @@ def draw_beginning(task: Task, rng: np.random.Generator, difficulty: Range | Non
             f"{PLACING_ATTEMPTS} scenes"
         )
         refuse(TerrainError, "terrain", overlap, reason)
-    reading = simulation.reading(scene.start.goal, task.scan)
-    noise = draw_noise(task, (rng,))
-    progress = Progress.begin(task, scene, reading, None if noise is None else noise[0])
-    if progress is None:
+    episode = Episode.begin(
+        task.rules,
+        simulation,
+        goal=scene.start.goal,
+        domain=tuple(scene.domain.as_info().values()),
+        trunk_load_limit=task.trunk_load_limit(scene.domain),
+        difficulty=scene.difficulty,
+        normals=task.draw_normals(rng),
+    )
+    if episode is None:
         refuse(StateError, "options.q", options.q, "must be observable in float32, with v and goal")
-    return Beginning(scene, simulation, progress, reading)
+    return Beginning(scene, simulation, episode)
 
 
 def check_seed(seed: object, field: str = "seed") -> int | None:

@@ -1,8 +1,8 @@
 """A batch of rovers, the base of the vector environments for Gymnasium and stable-baselines3.
 
 Rover i of a batch behaves, bit for bit, like a `RoverEnv` with the same arguments and seed, whatever the numbers of
-rovers and threads. Each control period calls the compiled core once. Observation, reward and termination come from the
-functions that `RoverEnv` uses, applied to arrays.
+rovers and threads. Each control period is one call of the compiled core: the thread that steps a rover also computes
+its observation, reward and termination, as it does for `RoverEnv`.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,20 +15,16 @@ from gymnasium.error import ResetNeeded
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.beginning import Beginning, check_seed, draw_beginning, put_back, seeded
-from rover_gym.env.control_period import advance, motor_commands
 from rover_gym.env.episode_scene import EpisodeScene, ResetOptions, check_difficulty, check_reset_options
 from rover_gym.env.observation import ObservationLayout
-from rover_gym.env.outcome import Outcome
-from rover_gym.env.progress import Progress
 from rover_gym.env.quantities import Array, Mask, Observations
 from rover_gym.env.randomisation import Domain
-from rover_gym.env.readings import draw_noise
 from rover_gym.env.rocks import Rocks
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import Start
 from rover_gym.env.task import Task, check_actions
 from rover_gym.env.wheels import N_ACTIONS
-from rover_gym.mechanics import Plane, RoverModel, Simulation, SimulationBatch
+from rover_gym.mechanics import EpisodeBatch, Plane, RoverModel, Simulation
 from rover_gym.validation import Range, whole
 
 if TYPE_CHECKING:
@@ -51,6 +47,7 @@ class RoverBatch:
 
     Attributes:
         prototype: An environment with the same arguments, never stepped, that gives spaces, layout and model.
+        episodes: The rovers' simulations and episodes in the core.
         rovers: One view per rover.
     """
 
@@ -72,20 +69,22 @@ class RoverBatch:
         self.prototype = RoverEnv(**arguments)
         self.task: Task = self.prototype.task
         simulation = Simulation(self.task.model, Plane(), **self.task.simulation_options)
-        self.simulations = SimulationBatch([simulation] * self.n, scan=self.task.scan, threads=threads)
+        self.episodes = EpisodeBatch(
+            self.task.rules, simulation, self.n, max_steps=self.max_episode_steps, threads=threads
+        )
         self.rovers = tuple(BatchRover(self, i) for i in range(self.n))
-        self._progress = Progress.of(self.task, self.n)
         self._scenes: list[EpisodeScene | None] = [None] * self.n
         self._generators: list[np.random.Generator | None] = [None] * self.n
         self._seeds: list[int] = [-1] * self.n
         self._difficulties: list[Range | None] = [None] * self.n
-        self._steps = np.zeros(self.n, np.int64)
         self._started = False
+        #: With noise: rovers whose generator here is ahead of the core's, which draws the noise.
+        self._ahead: set[int] = set()
 
     @property
     def observation(self) -> Observations:
         """`(n, size) float32` copy of the last observations."""
-        return self._progress.observation.copy()
+        return self.episodes.observations()
 
     def check_options(self, options: Mapping[str, Any] | None) -> ResetOptions:
         """Checks reset options and refuses the first bad one."""
@@ -99,7 +98,8 @@ class RoverBatch:
             TerrainError: As `RoverEnv.reset`; nothing has changed.
         """
         with self.beginnings([i], [check_seed(seed)], options) as drawn:
-            return self.begin(i, drawn[0])
+            self.begin(i, drawn[0])
+        return self.info(i)
 
     @contextmanager
     def beginnings(
@@ -132,62 +132,73 @@ class RoverBatch:
                 for i, (generator, seed) in zip(chosen, made, strict=True)
             ]
 
-    def begin(self, i: int, drawn: "Drawn") -> dict[str, Any]:
-        """Starts a drawn episode of rover i and returns its info."""
+    def begin(self, i: int, drawn: "Drawn") -> None:
+        """Starts a drawn episode of rover i."""
         beginning = drawn.beginning
-        self.simulations.replace(i, beginning.simulation, beginning.scene.start.goal)
-        self._progress.put(i, beginning.progress)
+        state = _numbers(drawn.generator) if self.task.is_noisy else None
+        self.episodes.replace(i, beginning.simulation, beginning.episode, state)
+        self._ahead.discard(i)
         self._scenes[i] = beginning.scene
-        self._steps[i] = 0
         self._generators[i], self._seeds[i] = drawn.generator, drawn.seed
-        return beginning.report(self.task).info()
 
-    def step(self, actions: object, active: Mask | None = None) -> tuple[Outcome, Mask, Mask]:
+    def step(
+        self, actions: object, active: Mask | None = None, *, has_scan: bool = True
+    ) -> tuple[Observations, Array, Mask, Mask]:
         """Applies actions `(n, 12)` for one control period.
 
         Args:
             actions: Within [-1, 1].
-            active: `(n,)` mask of the rovers to move; the results of the others are meaningless. None for all.
+            active: `(n,)` mask of the rovers to move; the others keep the values of their last period. None for all.
+            has_scan: Whether the height scan is taken. Without, only observations of episodes that end here have new
+                heights; the others keep the last ones.
 
         Returns:
-            The outcome, a mask of terminated episodes, and a mask of episodes that have reached the time limit.
+            Observations `(n, size) float32`, rewards `(n,)`, a mask of terminated episodes, and a mask of episodes
+            that have reached the time limit.
 
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite or outside [-1, 1]; nothing
                 has changed.
             ResetNeeded: A rover has not been reset.
         """
-        commands = check_actions(actions, (self.n, N_ACTIONS))
         if not self._started:
+            check_actions(actions, (self.n, N_ACTIONS))
             if None in self._scenes:
                 raise ResetNeeded("a batch of rovers: call reset() first")
             self._started = True
-        task = self.task
-        torques, set_points = motor_commands(task, self._progress, commands)
-        readings, messages = self.simulations.step(torques, set_points, task.substeps, active=active)
-        noise = self._draw_noise(active)
-        outcome = advance(task, self._progress, commands, readings, messages, noise)
-        self._steps += 1
-        terminated = outcome.termination != 0
-        if self.max_episode_steps is None:
-            return outcome, terminated, np.zeros(self.n, np.bool_)
-        return outcome, terminated, self._steps >= self.max_episode_steps
+        for i in self._ahead:
+            self.episodes.set_random_state(i, _numbers(self.generator(i)))
+        self._ahead.clear()
+        return self.episodes.step(actions, active, has_scan=has_scan)
+
+    def info(self, i: int) -> dict[str, Any]:
+        """The info of rover i's last period or reset, as `RoverEnv` returns it."""
+        return self.episodes.info(i)
+
+    def infos(self) -> dict[str, Any]:
+        """The infos of all n rovers, as one array per key with Gymnasium's masks."""
+        return self.episodes.infos()
 
     def generator(self, i: int) -> np.random.Generator:
-        """Rover i's random generator; before the first reset it is seeded at random, as in `gymnasium.Env`."""
+        """Rover i's random generator; before the first reset it is seeded at random, as in `gymnasium.Env`.
+
+        With noise the batch draws from it too: after a step, ask for it anew.
+        """
         made = self._generators[i]
         if made is None:
             made, self._seeds[i] = seeded(None)
             self._generators[i] = made
+        elif self.task.is_noisy and i not in self._ahead:
+            state, inc = self.episodes.random_state(i)
+            made.bit_generator.state = {**made.bit_generator.state, "state": {"state": state, "inc": inc}}
+            self._ahead.add(i)
         return made
 
-    def _draw_noise(self, active: Mask | None) -> Array | None:
-        if self.task.noisy is None:
-            return None
-        if active is None:
-            return draw_noise(self.task, self._generators)
-        chosen = zip(self._generators, active.tolist(), strict=True)
-        return draw_noise(self.task, [generator if moves else None for generator, moves in chosen])
+
+def _numbers(generator: np.random.Generator) -> tuple[int, int]:
+    """The numbers of a PCG64's state."""
+    numbers = generator.bit_generator.state["state"]
+    return numbers["state"], numbers["inc"]
 
 
 class Drawn(NamedTuple):
@@ -231,7 +242,7 @@ class BatchRover:
     @property
     def simulation(self) -> Simulation:
         """A copy of the rover's simulation."""
-        return self._batch.simulations.simulation(self._i)
+        return self._batch.episodes.simulation(self._i)
 
     @property
     def start(self) -> Start:

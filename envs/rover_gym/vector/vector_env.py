@@ -94,11 +94,15 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         given = dict(mapping("options", options))
         chosen = self._check_mask(given.pop("reset_mask")) if "reset_mask" in given else list(range(self.num_envs))
         fixed = self.batch.check_options(given)
-        infos: _Info = {}
         with self.batch.beginnings(chosen, [seeds[i] for i in chosen], fixed) as drawn:
             for i, one in zip(chosen, drawn, strict=True):
-                infos = self._add_info(infos, self.batch.begin(i, one), i)
+                self.batch.begin(i, one)
                 self._ended[i] = False
+        if len(chosen) == self.num_envs:
+            return self.batch.observation, self.batch.infos()
+        infos: _Info = {}
+        for i in chosen:
+            infos = self._add_info(infos, self.batch.info(i), i)
         return self.batch.observation, infos
 
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observations, Array, Mask, Mask, _Info]:
@@ -114,29 +118,33 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
                 another seed or other options.
             ResetNeeded: A rover has not been reset, or autoreset is disabled and its episode has ended.
         """
-        commands = check_actions(actions, (self.num_envs, N_ACTIONS))
         # These rovers do not move: their episodes start in this step.
-        starting: list[int] = np.flatnonzero(self._ended).tolist()
-        if starting and self.autoreset_mode == AutoresetMode.DISABLED:
-            raise ResetNeeded(f"rovers {starting}: call reset() with reset_mask first")
+        starting: list[int] = []
+        active = None
+        if self._ended.any():
+            check_actions(actions, (self.num_envs, N_ACTIONS))
+            starting, active = np.flatnonzero(self._ended).tolist(), ~self._ended
+            if self.autoreset_mode == AutoresetMode.DISABLED:
+                raise ResetNeeded(f"rovers {starting}: call reset() with reset_mask first")
         with self.batch.beginnings(starting) as drawn:
-            outcome, terminated, truncated = self.batch.step(commands, ~self._ended if starting else None)
-            observation, reward, infos = outcome.observation, outcome.reward, outcome.vector_info()
+            observation, reward, terminated, truncated = self.batch.step(actions, active)
             for i, one in zip(starting, drawn, strict=True):
                 reward[i], terminated[i], truncated[i] = 0.0, False, False
-                self._add_info(infos, self.batch.begin(i, one), i)
+                self.batch.begin(i, one)
         self._ended = terminated | truncated
+        finals: dict[int, _Info] = {}
         if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
             ended: list[int] = np.flatnonzero(self._ended).tolist()
-            last = [outcome.info(i) for i in ended]
-            for i, info in zip(ended, last, strict=True):
-                self._add_info(infos, {"final_obs": observation[i].copy(), "final_info": info}, i)
+            finals = {i: {"final_obs": observation[i].copy(), "final_info": self.batch.info(i)} for i in ended}
             # If an episode is refused here, its rover stays ended and the next step raises the error.
             with suppress(RoverGymError), self.batch.beginnings(ended) as drawn:
                 for i, one in zip(ended, drawn, strict=True):
-                    self._add_info(infos, self.batch.begin(i, one), i)
+                    self.batch.begin(i, one)
                 self._ended = np.zeros(self.num_envs, np.bool_)
                 starting += ended
+        infos = self.batch.infos()
+        for i, final in finals.items():
+            infos = self._add_info(infos, final, i)
         if starting:
             observation[starting] = self.batch.observation[starting]
         return observation, reward, terminated, truncated, infos
