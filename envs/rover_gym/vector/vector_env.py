@@ -17,7 +17,7 @@ from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.mechanics import OptionError, RoverGymError
 from rover_gym.validation import mapping, refuse
-from rover_gym.vector.batch import Drawn, RoverBatch
+from rover_gym.vector.batch import RoverBatch
 
 _Info = dict[str, Any]
 
@@ -94,10 +94,13 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         given = dict(mapping("options", options))
         chosen = self._check_mask(given.pop("reset_mask")) if "reset_mask" in given else list(range(self.num_envs))
         fixed = self.batch.check_options(given)
+        self.batch.begin(self.batch.draw(chosen, [seeds[i] for i in chosen], fixed))
+        self._ended[chosen] = False
+        if len(chosen) == self.num_envs:
+            return self.batch.observation, self.batch.infos()
         infos: _Info = {}
-        if chosen:
-            self._begin(self.batch.draw(chosen, [seeds[i] for i in chosen], fixed), infos)
-            self._ended[chosen] = False
+        for i in chosen:
+            infos = self._add_info(infos, self.batch.info(i), i)
         return self.batch.observation, infos
 
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observations, Array, Mask, Mask, _Info]:
@@ -113,28 +116,32 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
                 another seed or other options.
             ResetNeeded: A rover has not been reset, or autoreset is disabled and its episode has ended.
         """
-        commands = check_actions(actions, (self.num_envs, N_ACTIONS))
         # These rovers do not move: their episodes start in this step.
-        starting: list[int] = np.flatnonzero(self._ended).tolist()
-        if starting and self.autoreset_mode == AutoresetMode.DISABLED:
-            raise ResetNeeded(f"rovers {starting}: call reset() with reset_mask first")
+        starting: list[int] = []
+        active = None
+        if self._ended.any():
+            check_actions(actions, (self.num_envs, N_ACTIONS))
+            starting, active = np.flatnonzero(self._ended).tolist(), ~self._ended
+            if self.autoreset_mode == AutoresetMode.DISABLED:
+                raise ResetNeeded(f"rovers {starting}: call reset() with reset_mask first")
         drawn = self.batch.draw(starting) if starting else None
-        outcome, terminated, truncated = self.batch.step(commands, ~self._ended if starting else None)
-        observation, reward, infos = outcome.observation, outcome.reward, outcome.vector_info()
+        observation, reward, terminated, truncated = self.batch.step(actions, active)
         if drawn is not None:
             reward[starting], terminated[starting], truncated[starting] = 0.0, False, False
-            self._begin(drawn, infos)
+            self.batch.begin(drawn)
         self._ended = terminated | truncated
+        finals: dict[int, _Info] = {}
         if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
             ended: list[int] = np.flatnonzero(self._ended).tolist()
-            last = [outcome.info(i) for i in ended]
-            for i, info in zip(ended, last, strict=True):
-                self._add_info(infos, {"final_obs": observation[i].copy(), "final_info": info}, i)
+            finals = {i: {"final_obs": observation[i].copy(), "final_info": self.batch.info(i)} for i in ended}
             # If an episode is refused here, its rover stays ended and the next step raises the error.
             with suppress(RoverGymError):
-                self._begin(self.batch.draw(ended), infos)
+                self.batch.begin(self.batch.draw(ended))
                 self._ended = np.zeros(self.num_envs, np.bool_)
                 starting += ended
+        infos = self.batch.infos()
+        for i, final in finals.items():
+            infos = self._add_info(infos, final, i)
         if starting:
             observation[starting] = self.batch.observation[starting]
         return observation, reward, terminated, truncated, infos
@@ -158,25 +165,10 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         """Reads an attribute of every rover, by its name in `RoverEnv`."""
         return tuple(getattr(rover, name) for rover in self.batch.rovers)
 
-    def _begin(self, drawn: Drawn, infos: _Info) -> None:
-        """Begins drawn episodes and writes their infos into those of all rovers."""
-        _write_infos(infos, self.batch.begin(drawn).vector_info(), drawn.chosen, self.num_envs)
-
     def _check_mask(self, mask: object) -> list[int]:
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
             refuse(OptionError, "options.reset_mask", mask, f"must be an array of {self.num_envs} bool")
         return [int(i) for i in np.flatnonzero(mask)]
-
-
-def _write_infos(infos: _Info, begun: _Info, chosen: Sequence[int], n: int) -> None:
-    """Writes the infos of chosen rovers into those of n rovers, as `VectorEnv._add_info` does for one rover."""
-    for name, values in begun.items():
-        if isinstance(values, dict):
-            _write_infos(infos.setdefault(name, {}), values, chosen, n)
-            continue
-        if name not in infos:
-            infos[name] = np.full(n, None, object) if values.dtype == object else np.zeros(n, values.dtype)
-        infos[name][chosen] = values
 
 
 def _check_mode(mode: object) -> AutoresetMode:

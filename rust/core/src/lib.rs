@@ -23,7 +23,8 @@
 //!   moves, such as the multibody tree;
 //! - [`lanes`]: the ordinary step of one rover or several to a register;
 //! - [`simulation`]: many steps of any scene;
-//! - [`draw`]: random numbers, for scenes that are drawn.
+//! - [`draw`]: random numbers, for scenes that are drawn;
+//! - [`episode`]: the episodes of a driving task: actions, observations, rewards, ends.
 #![forbid(unsafe_code)]
 
 pub use nalgebra;
@@ -31,6 +32,7 @@ pub use nalgebra;
 pub mod cone;
 pub mod contact;
 pub mod draw;
+pub mod episode;
 pub mod geometry;
 pub mod integrator;
 pub mod lanes;

@@ -257,52 +257,62 @@ pub(crate) fn touch_of_disc(
     first_touch(distance, &middle, &(middle - half_way), ground.radius)
 }
 
-/// Gap, nearest point (relative to the trunk origin) and frame of every wheel over a terrain, with
-/// respect to the nearest primitive.
-///
-/// A wheel with no primitive within 10 km (impossible over a plane) keeps a gap of +∞.
+/// Gap, nearest point (relative to the trunk origin) and frame of every wheel over a terrain, as
+/// [`wheel_contact`] gives them.
 #[must_use]
 pub fn wheel_contacts(
     model: &Model,
     kinematics: &Kinematics,
     terrain: &dyn Terrain,
 ) -> Vec<Contact> {
-    let nearest = |i: usize| {
-        let part = Part::Wheel(i);
-        let placed = Placed {
-            part,
-            body: part.body(model),
-            shape: part.place(model, kinematics),
-        };
-        let centre = kinematics.point(placed.body, &part.centre(model));
-        let radius = part.bound(model);
-        let mut best = placed.contact(
-            &SurfacePoint::of_normal(NEAREST, centre, &Vector3::y(), f64::INFINITY),
-            0,
-        );
-        // A primitive that is not visited is further from the centre than `reach`, hence further
-        // from the wheel than reach − R.
-        let mut reach = 2.0 * radius;
-        while reach < FAR && best.gap + radius > reach {
-            let base = kinematics.origin(placed.body);
-            terrain.visit_near(&(base + centre), reach, &mut |id, primitive| {
-                let point = match primitive {
-                    Primitive::Plane(plane) => {
-                        dispatch::point_on_plane(&placed.shape, plane, base, NEAREST)
-                    }
-                    Primitive::Sphere(sphere) => {
-                        dispatch::point_on_sphere(&placed.shape, sphere, base)
-                    }
-                };
-                if point.gap < best.gap {
-                    best = placed.contact(&point, id);
-                }
-            });
-            reach *= 2.0;
-        }
-        best
+    let wheels = 0..model.wheels().len();
+    wheels
+        .map(|i| wheel_contact(model, kinematics, terrain, i))
+        .collect()
+}
+
+/// Gap, nearest point (relative to the trunk origin) and frame of wheel `i` with respect to the
+/// nearest primitive.
+///
+/// A wheel with no primitive within 10 km (impossible over a plane) keeps a gap of +∞.
+#[must_use]
+pub fn wheel_contact(
+    model: &Model,
+    kinematics: &Kinematics,
+    terrain: &dyn Terrain,
+    i: usize,
+) -> Contact {
+    let part = Part::Wheel(i);
+    let placed = Placed {
+        part,
+        body: part.body(model),
+        shape: part.place(model, kinematics),
     };
-    (0..model.wheels().len()).map(nearest).collect()
+    let centre = kinematics.point(placed.body, &part.centre(model));
+    let radius = part.bound(model);
+    let mut best = placed.contact(
+        &SurfacePoint::of_normal(NEAREST, centre, &Vector3::y(), f64::INFINITY),
+        0,
+    );
+    // A primitive that is not visited is further from the centre than `reach`, hence further
+    // from the wheel than reach − R.
+    let mut reach = 2.0 * radius;
+    while reach < FAR && best.gap + radius > reach {
+        let base = kinematics.origin(placed.body);
+        terrain.visit_near(&(base + centre), reach, &mut |id, primitive| {
+            let point = match primitive {
+                Primitive::Plane(plane) => {
+                    dispatch::point_on_plane(&placed.shape, plane, base, NEAREST)
+                }
+                Primitive::Sphere(sphere) => dispatch::point_on_sphere(&placed.shape, sphere, base),
+            };
+            if point.gap < best.gap {
+                best = placed.contact(&point, id);
+            }
+        });
+        reach *= 2.0;
+    }
+    best
 }
 
 /// Search distance of a wheel for the nearest ground, m.
