@@ -1973,7 +1973,7 @@ class EpisodeBatch:
         """Number of threads."""
     def step(
         self, actions: object, active: npt.NDArray[np.bool_] | None = None, *, has_scan: bool = True
-    ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_], list[int]]:
         """Gives all rovers their actions for one control period.
 
         Ctrl-C ends the call after a whole physics step of each rover, which need not be the same
@@ -1987,8 +1987,8 @@ class EpisodeBatch:
 
         Returns:
             Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes have ended,
-            and which have reached the time limit, (n_rovers,). A rover that stays has the values of
-            its last period.
+            which have reached the time limit, (n_rovers,), and the indices of all that have done
+            either. A rover that stays has the values of its last period.
 
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite or outside

@@ -101,7 +101,7 @@ def drive_all(
     state = None
     while active.any():
         actions, state = policy.predict(observation, state, steps == 0)
-        observation, _, terminated, _ = batch.step(actions, active)
+        observation, _, terminated, _, _ = batch.step(actions, active)
         infos = batch.infos()
         now = _places(batch, observation)
         sums[:, 0] += np.linalg.norm(now - places, axis=1)

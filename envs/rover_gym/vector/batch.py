@@ -146,7 +146,7 @@ class RoverBatch:
 
     def step(
         self, actions: object, active: Mask | None = None, *, has_scan: bool = True
-    ) -> tuple[Observations, Array, Mask, Mask]:
+    ) -> tuple[Observations, Array, Mask, Mask, list[int]]:
         """Applies actions `(n, 12)` for one control period.
 
         Args:
@@ -156,8 +156,8 @@ class RoverBatch:
                 heights; the others keep the last ones.
 
         Returns:
-            Observations `(n, size) float32`, rewards `(n,)`, a mask of terminated episodes, and a mask of episodes
-            that have reached the time limit.
+            Observations `(n, size) float32`, rewards `(n,)`, a mask of terminated episodes, a mask of episodes that
+            have reached the time limit, and the indices of those that are over, one way or the other.
 
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite or outside [-1, 1]; nothing

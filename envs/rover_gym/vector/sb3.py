@@ -127,11 +127,10 @@ class RoverVecEnv(VecEnv):
             check_actions(self._actions, (self.num_envs, N_ACTIONS))
             self._begin(self.batch.draw(self._waiting))
             self._waiting = []
-        observation, earned, terminated, timed_out = self.batch.step(self._actions, has_scan=self.has_scan)
+        observation, earned, terminated, timed_out, ended = self.batch.step(self._actions, has_scan=self.has_scan)
         dones = terminated | timed_out
         infos: list[dict[str, Any]] = [{"TimeLimit.truncated": False} for _ in range(self.num_envs)]
-        if dones.any():
-            ended = np.flatnonzero(dones).tolist()
+        if ended:
             for i in ended:
                 last = self.batch.info(i)
                 last["TimeLimit.truncated"] = bool(timed_out[i] and not terminated[i])

@@ -57,7 +57,8 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         self.single_action_space = self.prototype.action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._ended: Mask = np.zeros(self.num_envs, np.bool_)
+        #: Rovers whose episode is over and whose next has not begun, in order.
+        self._over: list[int] = []
 
     @property  # type: ignore[override] # as SyncVectorEnv's
     def np_random(self) -> tuple[np.random.Generator, ...]:
@@ -95,7 +96,8 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         chosen = self._check_mask(given.pop("reset_mask")) if "reset_mask" in given else list(range(self.num_envs))
         fixed = self.batch.check_options(given)
         self.batch.begin(self.batch.draw(chosen, [seeds[i] for i in chosen], fixed))
-        self._ended[chosen] = False
+        begun = set(chosen)
+        self._over = [i for i in self._over if i not in begun]
         if len(chosen) == self.num_envs:
             return self.batch.observation, self.batch.infos()
         infos: _Info = {}
@@ -116,35 +118,40 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
                 another seed or other options.
             ResetNeeded: A rover has not been reset, or autoreset is disabled and its episode has ended.
         """
-        # These rovers do not move: their episodes start in this step.
-        starting: list[int] = []
-        active = None
-        if self._ended.any():
-            check_actions(actions, (self.num_envs, N_ACTIONS))
-            starting, active = np.flatnonzero(self._ended).tolist(), ~self._ended
-            if self.autoreset_mode == AutoresetMode.DISABLED:
-                raise ResetNeeded(f"rovers {starting}: call reset() with reset_mask first")
-        drawn = self.batch.draw(starting) if starting else None
-        observation, reward, terminated, truncated = self.batch.step(actions, active)
-        if drawn is not None:
-            reward[starting], terminated[starting], truncated[starting] = 0.0, False, False
-            self.batch.begin(drawn)
-        self._ended = terminated | truncated
+        starting = self._over
+        if starting:
+            observation, reward, terminated, truncated, over = self._start_and_step(actions)
+        else:
+            observation, reward, terminated, truncated, over = self.batch.step(actions)
+        self._over = over
         finals: dict[int, _Info] = {}
-        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
-            ended: list[int] = np.flatnonzero(self._ended).tolist()
-            finals = {i: {"final_obs": observation[i].copy(), "final_info": self.batch.info(i)} for i in ended}
-            # If an episode is refused here, its rover stays ended and the next step raises the error.
+        if over and self.autoreset_mode == AutoresetMode.SAME_STEP:
+            finals = {i: {"final_obs": observation[i].copy(), "final_info": self.batch.info(i)} for i in over}
+            # If an episode is refused here, its rover stays over and the next step raises the error.
             with suppress(RoverGymError):
-                self.batch.begin(self.batch.draw(ended))
-                self._ended = np.zeros(self.num_envs, np.bool_)
-                starting += ended
+                self.batch.begin(self.batch.draw(over))
+                self._over = []
+                starting = starting + over
         infos = self.batch.infos()
         for i, final in finals.items():
             infos = self._add_info(infos, final, i)
         if starting:
             observation[starting] = self.batch.observation[starting]
         return observation, reward, terminated, truncated, infos
+
+    def _start_and_step(self, actions: object) -> tuple[Observations, Array, Mask, Mask, list[int]]:
+        """Steps all rovers but those whose episode is over, and starts theirs."""
+        check_actions(actions, (self.num_envs, N_ACTIONS))
+        starting = self._over
+        if self.autoreset_mode == AutoresetMode.DISABLED:
+            raise ResetNeeded(f"rovers {starting}: call reset() with reset_mask first")
+        active = np.ones(self.num_envs, np.bool_)
+        active[starting] = False
+        drawn = self.batch.draw(starting)
+        observation, reward, terminated, truncated, over = self.batch.step(actions, active)
+        self.batch.begin(drawn)
+        reward[starting], terminated[starting], truncated[starting] = 0.0, False, False
+        return observation, reward, terminated, truncated, [i for i in over if active[i]]
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
         """One frame per rover with `render_mode="rgb_array"`; None without a render mode."""

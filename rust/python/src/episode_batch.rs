@@ -17,12 +17,14 @@ use crate::infos::{Told, info, infos};
 use crate::shared::{Shared, Watch};
 use crate::simulation::{Origin, Simulation};
 
-/// Observations, rewards, which episodes have ended, which have reached the time limit.
+/// Observations, rewards, which episodes have ended, which have reached the time limit, and the
+/// indices of both.
 type Step<'py> = (
     Bound<'py, PyArray2<f32>>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<bool>>,
     Bound<'py, PyArray1<bool>>,
+    Vec<usize>,
 );
 
 /// Many rovers with their episodes, each bit for bit as it would be alone.
@@ -124,8 +126,8 @@ impl EpisodeBatch {
     ///
     /// Returns:
     ///     Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes have ended,
-    ///     and which have reached the time limit, (n_rovers,). A rover that stays has the values of
-    ///     its last period.
+    ///     which have reached the time limit, (n_rovers,), and the indices of all that have done
+    ///     either. A rover that stays has the values of its last period.
     ///
     /// Raises:
     ///     CommandError: The actions have a wrong shape or an entry that is not finite or outside
@@ -155,18 +157,24 @@ impl EpisodeBatch {
             });
             watch.result(done)?;
         }
-        let (mut rewards, mut ended, mut truncated) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut rewards, mut ended, mut truncated) =
+            (vec![0.0; n], vec![false; n], vec![false; n]);
+        let mut over = Vec::new();
         for i in 0..n {
             let outcome = batch.episode(i).map_err(BorderError::from)?.outcome();
-            rewards.push(outcome.reward);
-            ended.push(outcome.ending.is_end());
-            truncated.push(batch.is_truncated(i).map_err(BorderError::from)?);
+            rewards[i] = outcome.reward;
+            ended[i] = outcome.ending.is_end();
+            truncated[i] = batch.is_truncated(i).map_err(BorderError::from)?;
+            if ended[i] || truncated[i] {
+                over.push(i);
+            }
         }
         Ok((
             rows,
             PyArray1::from_slice(py, &rewards),
             PyArray1::from_slice(py, &ended),
             PyArray1::from_slice(py, &truncated),
+            over,
         ))
     }
 

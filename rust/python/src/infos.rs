@@ -81,20 +81,21 @@ pub fn info<'py>(py: Python<'py>, told: &Told<'_>) -> PyResult<Bound<'py, PyDict
     Ok(info)
 }
 
-/// A dictionary of arrays with one entry a rover, each with a mask of those that have it: all.
+/// A dictionary of arrays with one entry a rover, each with the mask of those that have it: all.
 struct Columns<'py, 'a> {
     py: Python<'py>,
     told: &'a [Told<'a>],
-    everyone: Vec<bool>,
+    everyone: &'a Bound<'py, PyArray1<bool>>,
     out: Bound<'py, PyDict>,
 }
 
 impl<'py, 'a> Columns<'py, 'a> {
-    fn new(py: Python<'py>, told: &'a [Told<'a>]) -> Self {
+    fn new(told: &'a [Told<'a>], everyone: &'a Bound<'py, PyArray1<bool>>) -> Self {
+        let py = everyone.py();
         Self {
             py,
             told,
-            everyone: vec![true; told.len()],
+            everyone,
             out: PyDict::new(py),
         }
     }
@@ -124,8 +125,7 @@ impl<'py, 'a> Columns<'py, 'a> {
     }
 
     fn mask(&self, name: &Bound<'py, PyString>) -> PyResult<()> {
-        let mask = PyArray1::from_slice(self.py, &self.everyone);
-        self.out.set_item(name, mask)
+        self.out.set_item(name, self.everyone)
     }
 }
 
@@ -147,7 +147,8 @@ pub fn infos<'py>(py: Python<'py>, told: &[Told<'_>]) -> PyResult<Bound<'py, PyD
     let statuses = STATUSES.map(text);
     let empty = text("");
 
-    let domain = Columns::new(py, told);
+    let everyone = PyArray1::from_slice(py, &vec![true; told.len()]);
+    let domain = Columns::new(told, &everyone);
     add!(domain, "mass_scale", |t| t.0.setting().domain.mass_scale);
     add!(domain, "friction", |t| t.0.setting().domain.friction);
     add!(domain, "actuator_gain", |t| t
@@ -160,13 +161,13 @@ pub fn infos<'py>(py: Python<'py>, told: &[Told<'_>]) -> PyResult<Bound<'py, PyD
         .setting()
         .domain
         .gravity_scale);
-    let terms = Columns::new(py, told);
+    let terms = Columns::new(told, &everyone);
     for (i, name) in TERMS.iter().enumerate() {
         let mask = PyString::intern(py, &format!("_{name}"));
         let name = PyString::intern(py, name);
         terms.add(&name, &mask, |t| t.0.outcome().terms[i])?;
     }
-    let solver = Columns::new(py, told);
+    let solver = Columns::new(told, &everyone);
     add!(solver, "status", |t| statuses[Solver::of(t).status]
         .clone_ref(py));
     add!(solver, "iterations", |t| Solver::of(t).iterations);
@@ -177,7 +178,7 @@ pub fn infos<'py>(py: Python<'py>, told: &[Told<'_>]) -> PyResult<Bound<'py, PyD
         None => empty.clone_ref(py),
     });
 
-    let all = Columns::new(py, told);
+    let all = Columns::new(told, &everyone);
     let is_success = |t: &Told<'_>| t.0.outcome().ending == Ending::Goal;
     add!(all, "time", |t| t.0.outcome().now.time);
     add!(all, "success", is_success);

@@ -31,9 +31,10 @@ pub fn write_state(
     out: &mut [f32],
 ) -> bool {
     let stuck = (progress.stuck_time / rules.settings().stuck_time).min(1.0);
-    let values = reading[..rules.n_shared()].iter();
-    let values = values.chain(&progress.previous_action).chain([&stuck]);
-    write(rules, 0, values, normals, out)
+    let (shared, actions) = (rules.n_shared(), rules.n_actions());
+    write(rules, 0, &reading[..shared], normals, out)
+        & write(rules, shared, &progress.previous_action, normals, out)
+        & write(rules, shared + actions, &[stuck], normals, out)
 }
 
 /// Writes the entries of the heights and says whether all of them are finite; slices as for
@@ -47,34 +48,32 @@ pub fn write_heights(
     normals: Option<&[f64]>,
     out: &mut [f32],
 ) -> bool {
-    write(rules, rules.n_state(), heights.iter(), normals, out)
+    write(rules, rules.n_state(), heights, normals, out)
 }
 
 /// Writes values from entry `start` on.
 #[allow(clippy::cast_possible_truncation)] // float32 is what an agent gets
-fn write<'a>(
+fn write(
     rules: &Rules,
     start: usize,
-    values: impl Iterator<Item = &'a f64>,
+    values: &[f64],
     normals: Option<&[f64]>,
     out: &mut [f32],
 ) -> bool {
-    let mut is_finite = true;
-    let entries = out[start..].iter_mut().zip(&rules.inverse_scale()[start..]);
-    match normals {
-        None => {
-            for ((entry, inverse), value) in entries.zip(values) {
-                *entry = (value * inverse) as f32;
-                is_finite &= entry.is_finite();
-            }
+    let place = start..start + values.len();
+    let out = &mut out[place.clone()];
+    let entries = out.iter_mut().zip(&rules.inverse_scale()[place.clone()]);
+    let entries = entries.zip(values);
+    if let Some(normals) = normals {
+        let noise = normals[place.clone()].iter().zip(&rules.noise()[place]);
+        for (((entry, inverse), value), (z, deviation)) in entries.zip(noise) {
+            *entry = (value * inverse + z * deviation) as f32;
         }
-        Some(normals) => {
-            let noise = normals[start..].iter().zip(&rules.noise()[start..]);
-            for (((entry, inverse), value), (z, deviation)) in entries.zip(values).zip(noise) {
-                *entry = (value * inverse + z * deviation) as f32;
-                is_finite &= entry.is_finite();
-            }
+    } else {
+        for ((entry, inverse), value) in entries {
+            *entry = (value * inverse) as f32;
         }
     }
-    is_finite
+    // A fold without a branch, since all entries but few are finite.
+    out.iter().fold(true, |all, entry| all & entry.is_finite())
 }

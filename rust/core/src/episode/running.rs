@@ -248,7 +248,8 @@ impl Episode {
     pub fn advance(&mut self, reading: &mut [f64], period: &Period<'_>, observation: &mut [f32]) {
         let rules = &*self.rules;
         let heights = period.heights.unwrap_or_default();
-        let is_readable = reading.iter().chain(heights).all(|x| x.is_finite());
+        let is_finite = |numbers: &[f64]| numbers.iter().fold(true, |all, x| all & x.is_finite());
+        let is_readable = is_finite(reading) & is_finite(heights);
         if !is_readable {
             for x in reading.iter_mut().filter(|x| !x.is_finite()) {
                 *x = 0.0;
@@ -264,14 +265,14 @@ impl Episode {
         (self.progress).advance(period.action, &now, dt, self.setting.trunk_load_limit);
 
         let normals = period.normals;
-        let mut is_finite = write_state(rules, reading, &self.progress, normals, observation);
+        let mut is_sound = write_state(rules, reading, &self.progress, normals, observation);
         let n_state = rules.n_state();
         if period.heights.is_some() {
-            is_finite &= write_heights(rules, heights, normals, observation);
+            is_sound &= write_heights(rules, heights, normals, observation);
         } else {
             observation[n_state..].copy_from_slice(&self.observation[n_state..]);
         }
-        let has_failed = period.has_failed || !is_readable || !is_finite;
+        let has_failed = period.has_failed || !is_readable || !is_sound;
         if has_failed {
             observation.copy_from_slice(&self.observation);
         } else {

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::rover::RoverSimulation;
 use super::rover_contacts::WheelForces;
-use crate::contact::{Part, detection::wheel_contact};
+use crate::contact::{Part, detection::wheel_gap};
 use crate::integrator::StepStatus;
 use crate::multibody::{Kinematics, Model, coordinates};
 use crate::spatial::HeadingPitchRoll;
@@ -187,7 +187,7 @@ impl RoverSimulation {
         let n_wheels = model.wheels().len();
         let kinematics = scratch.kinematics(model);
         kinematics.update_for_step(model, &state.configuration);
-        let gap = |i| wheel_contact(model, kinematics, &**self.terrain(), i).gap;
+        let gap = |i| wheel_gap(model, kinematics, &**self.terrain(), i);
         let first = row.filled;
         row.put((0..n_wheels).map(gap));
         for i in first..row.filled {
