@@ -60,7 +60,10 @@ __all__ = [
     "TwoWheelRoverSimulation",
     "__version__",
     "accuracy_options",
+    "atan2",
+    "exp",
     "seed_generators",
+    "sin_cos",
     "soil_packing",
     "solve_friction_contact",
     "standard_normals",
@@ -2455,7 +2458,6 @@ class SolverReport:
         "sweeps",
         "body_sweeps",
         "islands",
-        "warm_newton",
         "pivoting",
         "guided_newton",
         "newton",
@@ -2507,6 +2509,64 @@ def accuracy_options(accuracy: Literal["fast", "balanced", "reference"] | float)
         OptionError: The name is unknown, or the error is finer than any choice of options gives.
     """
 
+@overload
+def sin_cos(x: float) -> tuple[float, float]:
+    """Sine and cosine of angles.
+
+    Unlike those of NumPy and of `math` they have the same bits on every machine. They are within
+    1 ulp; of what is not finite they are NaN.
+
+    Args:
+        x: An angle, or an array of any shape, rad.
+
+    Returns:
+        Sine and cosine: two numbers, or two new arrays of the shape of x.
+
+    Raises:
+        OptionError: x is no number and no array of numbers.
+    """
+
+@overload
+def sin_cos(x: npt.NDArray[Any]) -> tuple[_Array, _Array]: ...
+@overload
+def atan2(y: float, x: float) -> float:
+    """Angles of the points (x, y), in [-pi, pi].
+
+    Unlike those of NumPy and of `math` they have the same bits on every machine. They are within
+    1 ulp.
+
+    Args:
+        y: A number or an array of any shape.
+        x: The same; the two shapes must be equal.
+
+    Returns:
+        The angle, rad: a number, or a new array.
+
+    Raises:
+        OptionError: An argument is no number and no array of numbers, or the shapes differ.
+    """
+
+@overload
+def atan2(y: npt.NDArray[Any], x: npt.NDArray[Any]) -> _Array: ...
+@overload
+def exp(x: float) -> float:
+    """Exponentials.
+
+    Unlike those of NumPy and of `math` they have the same bits on every machine. They are within
+    1 ulp.
+
+    Args:
+        x: A number or an array of any shape.
+
+    Returns:
+        The exponential: a number, or a new array of the shape of x.
+
+    Raises:
+        OptionError: x is no number and no array of numbers.
+    """
+
+@overload
+def exp(x: npt.NDArray[Any]) -> _Array: ...
 def solve_friction_contact(
     W: npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
     q: npt.ArrayLike,

@@ -29,6 +29,7 @@ def pack() -> str:
     angles += [float(n * mpmath.pi / 2) for n in quarters] + spread(-9, 0, 20) + spread(0, 5, 40) + [1e9, -1e22]
     exponents = spread(-12, 0, 30) + [draws.uniform(-40, 40) for _ in range(30)] + [700.1, 709.7, -37.0, 0.35, -0.35]
     points = [(draws.uniform(-1, 1), draws.uniform(-1, 1)) for _ in range(30)] + [(1e-9, -1.0), (3.0, 1e-12)]
+    ratios = [x for point in points for x in point if abs(x) <= 1]
     packed = {
         "meta": {
             "what": "Arguments, then the nearest number to each value and what it leaves.",
@@ -38,6 +39,9 @@ def pack() -> str:
         "exp_m1": [[x, *_halves(mpmath.expm1, x)] for x in exponents],
         "exp": [[x, *_halves(mpmath.exp, x)] for x in exponents],
         "ln": [[abs(x), *_halves(mpmath.log, abs(x))] for x in exponents],
+        "ln_1p": [[abs(x), *_halves(mpmath.log1p, abs(x))] for x in exponents],
+        "acos": [[x, *_halves(mpmath.acos, x)] for x in ratios],
+        "asin": [[x, *_halves(mpmath.asin, x)] for x in ratios],
         "atan2": [[y, x, *_halves(mpmath.atan2, y, x)] for y, x in points],
         "hypot": [[y, x, *_halves(mpmath.hypot, y, x)] for y, x in [*points, (1e200, -1e200), (3e-170, 4e-170)]],
     }

@@ -7,6 +7,7 @@ mod arrays;
 mod batch;
 mod contacts;
 mod draw;
+mod elementary;
 mod episode;
 mod episode_batch;
 mod episode_rules;
@@ -59,6 +60,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<friction_contact::SolverReport>()?;
     module.add_class::<friction_contact::FrictionContactSolution>()?;
     module.add_function(wrap_pyfunction!(accuracy::accuracy_options, module)?)?;
+    module.add_function(wrap_pyfunction!(elementary::sin_cos, module)?)?;
+    module.add_function(wrap_pyfunction!(elementary::atan2, module)?)?;
+    module.add_function(wrap_pyfunction!(elementary::exp, module)?)?;
     module.add_function(wrap_pyfunction!(
         friction_contact::solve_friction_contact,
         module

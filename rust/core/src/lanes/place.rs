@@ -2,6 +2,7 @@
 
 use super::machine::Machine;
 use crate::multibody::Configuration;
+use crate::scalar::elementary::sin_cos;
 use crate::scalar::{Lane, LaneMask, Vec3};
 use nalgebra::Quaternion;
 
@@ -139,16 +140,4 @@ fn product<T: Lane>(a: &[T; 4], b: &[T; 4]) -> [T; 4] {
         aw * bz + ax * by - ay * bx + az * bw,
         aw * bw - ax * bx - ay * by - az * bz,
     ]
-}
-
-/// Sine and cosine.
-#[inline(always)]
-pub(super) fn sin_cos<T: Lane>(x: T) -> (T, T) {
-    let (mut sin, mut cos) = (x, x);
-    for lane in 0..T::LANES {
-        let (s, c) = x.get(lane).sin_cos();
-        sin.set(lane, s);
-        cos.set(lane, c);
-    }
-    (sin, cos)
 }

@@ -5,7 +5,8 @@
 
 use super::inertias::Inertias;
 use super::machine::{Axis, Machine};
-use super::place::{Place, sin_cos};
+use super::place::Place;
+use crate::scalar::elementary::sin_cos;
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Poses of all bodies.
@@ -66,7 +67,11 @@ impl<T: Lane> Poses<T> {
     /// # Panics
     /// If an argument is of another machine.
     pub fn update(&mut self, machine: &Machine, inertias: &Inertias<T>, place: &Place<T>) {
-        T::vectorize(self.token, || self.update_here(machine, inertias, place));
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || self.update_here(machine, inertias, place),
+        );
     }
 
     #[inline(always)]

@@ -7,8 +7,8 @@
 //! [`sin_cos`] and [`exp_m1`] run in lanes. Their rare arguments, and the functions that a step
 //! does not need, go to the crate `libm`, which is plain Rust and asks no processor.
 //!
-//! Sources of the constants: fdlibm (Sun Microsystems 1993), `e_rem_pio2.c`, `k_sin.c`, `k_cos.c`
-//! and `s_expm1.c`.
+//! Source: Cody and Waite 1980 for the reduction; the constants are those of fdlibm 5.3 of Sun
+//! Microsystems (`e_rem_pio2.c`, `k_sin.c`, `k_cos.c`, `s_expm1.c`).
 
 use super::lane::{Lane, LaneMask, MAX_LANES};
 
@@ -70,7 +70,7 @@ const NOTHING_LEFT: f64 = -56.0 * std::f64::consts::LN_2;
 #[must_use]
 pub fn sin_cos<T: Lane>(x: T) -> (T, T) {
     let number = |value: f64| x.like(value);
-    // x = n π/2 + r + low, with n whole and |r| ≤ π/4 (Cody and Waite, three parts)
+    // x = n π/2 + r + low, with n whole and |r| ≤ π/4 (three parts)
     let magic = number(MAGIC);
     let n = (x * number(std::f64::consts::FRAC_2_PI) + magic) - magic;
     let first = x - n * number(HALF_PI[0]); // exact
@@ -180,6 +180,24 @@ pub fn ln(x: f64) -> f64 {
     libm::log(x)
 }
 
+/// `ln(1 + x)` within 1 ulp, also near 0.
+#[must_use]
+pub fn ln_1p(x: f64) -> f64 {
+    libm::log1p(x)
+}
+
+/// Angle (rad) of a cosine, in 0..=π, within 1 ulp; not a number outside −1..=1.
+#[must_use]
+pub fn acos(x: f64) -> f64 {
+    libm::acos(x)
+}
+
+/// Angle (rad) of a sine, in −π/2..=π/2, within 1 ulp; not a number outside −1..=1.
+#[must_use]
+pub fn asin(x: f64) -> f64 {
+    libm::asin(x)
+}
+
 /// Angle (rad) of the point (x, y), in −π..=π, within 1 ulp.
 #[must_use]
 pub fn atan2(y: f64, x: f64) -> f64 {
@@ -248,6 +266,9 @@ mod tests {
         one_argument("exp_m1", exp_m1, 1.5);
         one_argument("exp", exp, 1.0);
         one_argument("ln", ln, 1.0);
+        one_argument("ln_1p", ln_1p, 1.0);
+        one_argument("acos", acos, 1.0);
+        one_argument("asin", asin, 1.0);
         two_arguments("atan2", atan2);
         two_arguments("hypot", hypot);
     }

@@ -21,6 +21,7 @@ use super::error::TerrainError;
 use super::plane::Plane;
 use super::sphere_field::{MAX_SIZE, check_count};
 use crate::geometry::shape::Sphere;
+use crate::scalar::elementary::{exp, hypot};
 
 /// A circle that no rock reaches into, seen from above.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,7 +92,7 @@ impl Rocks {
     #[must_use]
     pub fn covered_fraction(&self, diameter: f64) -> f64 {
         if self.abundance > 0.0 {
-            self.abundance * (-self.decay() * diameter).exp()
+            self.abundance * exp(-self.decay() * diameter)
         } else {
             0.0
         }
@@ -125,7 +126,7 @@ impl Rocks {
         }
         for i in 0..CELLS {
             let y = low + (i as f64 + 0.5) * step;
-            sum += 4.0 * k * q / PI * (-q / y).exp() * step;
+            sum += 4.0 * k * q / PI * exp(-q / y) * step;
             table.push(sum);
         }
         table
@@ -238,7 +239,7 @@ impl Rocks {
                 let is_clear = self
                     .clearings
                     .iter()
-                    .all(|c| (x - c.x).hypot(z - c.z) >= c.radius + radius);
+                    .all(|c| hypot(x - c.x, z - c.z) >= c.radius + radius);
                 is_clear.then_some((x, z))
             });
             if let Some((x, z)) = place {
