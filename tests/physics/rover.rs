@@ -8,6 +8,8 @@ mod scenes;
 mod batch;
 #[path = "rover/driving.rs"]
 mod driving;
+#[path = "rover/episodes.rs"]
+mod episodes;
 #[path = "rover/free_flight.rs"]
 mod free_flight;
 #[path = "rover/inclined_plane.rs"]
