@@ -13,17 +13,21 @@ import numpy.typing as npt
 from typing_extensions import disjoint_base
 
 _Array: TypeAlias = npt.NDArray[np.float64]
+_Rows: TypeAlias = npt.NDArray[np.uint64]
 _Observation: TypeAlias = npt.NDArray[np.float32]
 _Coordinates: TypeAlias = Literal["report", "state"]
+_Range: TypeAlias = tuple[float, float]
 
 __all__ = [
     "BallSimulation",
     "BusyError",
     "CommandError",
     "Contacts",
+    "DrawnEpisodes",
     "Energy",
     "Episode",
     "EpisodeBatch",
+    "EpisodeDistribution",
     "EpisodeRules",
     "FrictionContactSolution",
     "Line",
@@ -56,8 +60,13 @@ __all__ = [
     "TwoWheelRoverSimulation",
     "__version__",
     "accuracy_options",
+    "atan2",
+    "exp",
+    "seed_generators",
+    "sin_cos",
     "soil_packing",
     "solve_friction_contact",
+    "standard_normals",
 ]
 
 __version__: str
@@ -283,6 +292,13 @@ class RoverModel:
     def wheel_radii(self) -> _Array:
         """Radius at which each wheel touches the ground, (n_wheels,), m."""
     @property
+    def clear_radius(self) -> float:
+        """Radius of the place that the rover needs to turn on the spot, m.
+
+        It is the largest distance from the trunk's origin to a wheel's contact, joints at zero, plus
+        the wheel's radius and 0.1 m.
+        """
+    @property
     def wheel_torque_limits(self) -> _Array:
         """Largest torque of each wheel, (n_wheels,), N m."""
     @property
@@ -405,6 +421,24 @@ class RoverModel:
             TerrainError: `terrain` is not a terrain.
             OptionError: `coordinates` is neither of the two.
         """
+    def resting_pose(self, plane: Plane, position: Sequence[float], heading: float) -> _Array:
+        """The coordinates of the rover at rest on a plane.
+
+        The joints are at zero, the trunk is upright along the normal with its origin above the
+        position, and the lowest wheel has gap zero.
+
+        Args:
+            plane: The plane, which must not be vertical.
+            position: x and z, (2,), m.
+            heading: Heading, rad.
+
+        Returns:
+            Coordinates of the state, (nq,).
+
+        Raises:
+            TerrainError: `plane` is no plane.
+            StateError: A number is not finite, or the plane is vertical.
+        """
     def wheel_contact_points(
         self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
     ) -> _Array:
@@ -495,6 +529,20 @@ class Plane:
     @property
     def offset(self) -> float:
         """Gap between the world's origin and the plane, m; flat ground at height y has the offset -y."""
+    @staticmethod
+    def tilted(slope: float, uphill: float) -> Plane:
+        """The plane through the origin that rises by a slope in a direction.
+
+        Args:
+            slope: Slope, rad.
+            uphill: Direction of steepest ascent, rad: an angle about +y from +x.
+
+        Returns:
+            The plane.
+
+        Raises:
+            TerrainError: An angle is no finite number.
+        """
     def height(self, x: float, z: float) -> float:
         """The height of the plane at a place.
 
@@ -1757,6 +1805,147 @@ class Episode:
     def __getnewargs_ex__(self) -> tuple[tuple[EpisodeRules], dict[str, Any]]: ...
 
 @final
+class EpisodeDistribution:
+    """What the episodes of a task are drawn from.
+
+    Draws come from generators that are number for number NumPy's `PCG64`; a generator is given and
+    returned as four unsigned 64-bit numbers: high and low half of its state, high and low half of
+    its increment.
+
+    Args:
+        rules: What all episodes share; rocks leave the goal clear within its tolerance.
+        simulation: The rover, before its masses are scaled, and the options of its steps.
+        start: Ranges (low, high) of `slope`, `uphill`, `heading`, `goal_distance` and
+            `goal_bearing`, by name, rad and m.
+        domain: Ranges of `mass_scale`, `friction`, `actuator_gain` and `gravity_scale`, by name.
+        trunk_load_limit: Force on the trunk beyond which the rover is high-centred, before masses
+            and gravity are scaled, N.
+        rocks: Range of `difficulty`, and `abundance` and `max_radius` or None, by name; None for no
+            rocks.
+        slope_by_difficulty: Whether the slope follows from the difficulty of the rocks.
+        field: The ground of every episode, a field on a plane; None for a tilted plane.
+
+    Raises:
+        OptionError: An argument is missing, no number, or out of its range.
+        TerrainError: `field` is no SphereField on a plane.
+    """
+
+    def __new__(
+        cls,
+        rules: EpisodeRules,
+        simulation: Simulation,
+        *,
+        start: Mapping[str, _Range],
+        domain: Mapping[str, _Range],
+        trunk_load_limit: float,
+        rocks: Mapping[str, Any] | None = None,
+        slope_by_difficulty: bool = False,
+        field: SphereField | None = None,
+    ) -> EpisodeDistribution: ...
+    def draw(
+        self,
+        generators: _Rows,
+        *,
+        attempts: int = 100,
+        difficulties: Sequence[_Range | None] | None = None,
+        fixed: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
+    ) -> DrawnEpisodes:
+        """Draws one episode from each generator; `EpisodeBatch.draw` does it on several threads.
+
+        A scene in which the rover would stand deeper than 1 cm in the ground or in a sphere is
+        drawn again. The given generators do not change: see `DrawnEpisodes.generators`.
+
+        Args:
+            generators: Generators, (m, 4) uint64.
+            attempts: Most scenes drawn for a rover until it has room.
+            difficulties: For each generator a range (low, high) that replaces that of the rocks'
+                difficulty, or None; by default none.
+            fixed: Values that replace draws, which are made all the same, by name: `slope`,
+                `uphill`, `position` (x, z), `heading`, `goal` (x, z), `difficulty`, `q` and `v`; one
+                mapping for all or a list of one for each generator; none by default.
+
+        Returns:
+            The episodes.
+
+        Raises:
+            TerrainError: A rover has no room in `attempts` scenes, or the ground refuses a number.
+            StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
+                cannot hold the observation.
+            ModelError: A scaled mass is out of its range.
+            OptionError: Any other argument is invalid.
+        """
+    def __getnewargs_ex__(self) -> tuple[tuple[EpisodeRules, Simulation], dict[str, Any]]: ...
+
+@final
+class DrawnEpisodes:
+    """Drawn episodes, in the order of the generators."""
+
+    @property
+    def generators(self) -> _Rows:
+        """The generators after the draws, (m, 4) uint64."""
+    @property
+    def observations(self) -> _Observation:
+        """First observations, (m, size) float32."""
+    @property
+    def starts(self) -> _Array:
+        """Starts, (m, 7), rad and m.
+
+        Slope, direction of steepest ascent, x and z of the start, heading, x and z of the goal.
+        """
+    @property
+    def domains(self) -> _Array:
+        """Properties of rover and world, (m, 4).
+
+        Factor of the masses, friction, gain of the motors, factor of gravity.
+        """
+    @property
+    def rocks(self) -> _Array:
+        """Rocks, (m, 3); zeros where there are none.
+
+        Difficulty, abundance, radius of the largest in wheel radii.
+        """
+    @property
+    def rock_seeds(self) -> _Rows:
+        """Seeds of the rocks, (m,) uint64; zeros where there are none."""
+    def episode(self, index: int) -> Episode:
+        """An episode, which has begun.
+
+        Args:
+            index: Number of the episode.
+
+        Raises:
+            OptionError: There is no such episode.
+        """
+    def terrain(self, index: int) -> Plane | SphereField:
+        """The ground of an episode.
+
+        Args:
+            index: Number of the episode.
+
+        Raises:
+            OptionError: There is no such episode.
+        """
+    def plane(self, index: int) -> Plane:
+        """The plane of an episode, under rocks too.
+
+        Args:
+            index: Number of the episode.
+
+        Raises:
+            OptionError: There is no such episode.
+        """
+    def simulation(self, index: int) -> Simulation:
+        """A new simulation of the rover at the start of an episode.
+
+        Args:
+            index: Number of the episode.
+
+        Raises:
+            OptionError: There is no such episode.
+        """
+    def __len__(self) -> int: ...
+
+@final
 class EpisodeBatch:
     """Many rovers with their episodes, each bit for bit as it would be alone.
 
@@ -1830,41 +2019,71 @@ class EpisodeBatch:
         """
     def observations(self) -> _Observation:
         """The last observations of all rovers, (n_rovers, size) float32; zeros before an episode."""
-    def replace(
-        self, index: int, simulation: Simulation, episode: Episode, random_state: tuple[int, int] | None = None
-    ) -> None:
-        """Puts copies of a simulation and its episode in the place of a rover.
+    def draw(
+        self,
+        distribution: EpisodeDistribution,
+        generators: _Rows,
+        *,
+        attempts: int = 100,
+        difficulties: Sequence[_Range | None] | None = None,
+        fixed: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
+    ) -> DrawnEpisodes:
+        """Draws episodes on the threads of this batch, as `EpisodeDistribution.draw` does; no rover changes.
 
         Args:
-            index: Index of the rover.
-            simulation: Its replacement.
-            episode: The episode, which begins or goes on.
-            random_state: The numbers `state` and `inc` of the PCG64 that its noise is drawn from;
-                any by default.
+            distribution: What the episodes are drawn from.
+            generators: Generators, (m, 4) uint64.
+            attempts: As of `EpisodeDistribution.draw`.
+            difficulties: As of `EpisodeDistribution.draw`.
+            fixed: As of `EpisodeDistribution.draw`.
+
+        Returns:
+            The episodes, the same for any number of threads.
 
         Raises:
-            OptionError: There is no such rover, the episode has other rules, or an argument is
-                invalid. Nothing has changed.
+            RoverGymError: As of `EpisodeDistribution.draw`, for the first rover that has one.
         """
-    def random_state(self, index: int) -> tuple[int, int]:
-        """The numbers `state` and `inc` of the PCG64 that a rover's noise is drawn from.
+    def begin(self, indices: Sequence[int], episodes: DrawnEpisodes) -> None:
+        """Begins drawn episodes.
 
         Args:
-            index: Index of the rover.
+            indices: Indices of the rovers, one for each episode.
+            episodes: Drawn episodes with the rules of the batch.
+
+        Raises:
+            OptionError: There is no such rover, or the episodes do not fit. Nothing has changed.
+        """
+    def generators(self, indices: Sequence[int]) -> _Rows:
+        """The generators of rovers, from which their noise is drawn.
+
+        Args:
+            indices: Indices of the rovers.
+
+        Returns:
+            (m, 4) uint64: high and low half of each state, high and low half of each increment.
 
         Raises:
             OptionError: There is no such rover, or its episode has not begun.
         """
-    def set_random_state(self, index: int, random_state: tuple[int, int]) -> None:
-        """Sets the numbers that `random_state` returns.
+    def set_generators(self, indices: Sequence[int], generators: _Rows) -> None:
+        """Sets the generators of rovers.
+
+        Args:
+            indices: Indices of the rovers.
+            generators: As `generators` returns them, (m, 4) uint64.
+
+        Raises:
+            OptionError: There is no such rover, its episode has not begun, or `generators` has a
+                wrong shape. Nothing has changed.
+        """
+    def terrain(self, index: int) -> Plane | SphereField:
+        """The ground of one rover.
 
         Args:
             index: Index of the rover.
-            random_state: `state` and `inc`.
 
         Raises:
-            OptionError: There is no such rover, or its episode has not begun; or the numbers are
-                none of a PCG64.
+            OptionError: There is no such rover.
         """
     def simulation(self, index: int) -> Simulation:
         """Returns a copy of one rover.
@@ -2144,6 +2363,33 @@ class SoilSimulation:
             StateError: The snapshot belongs to another soil or is damaged. Nothing has changed.
         """
 
+def seed_generators(seeds: Sequence[int]) -> _Rows:
+    """Seeds generators as `numpy.random.PCG64` does.
+
+    Args:
+        seeds: Whole numbers from 0, of any size.
+
+    Returns:
+        (m, 4) uint64: high and low half of each state, high and low half of each increment.
+
+    Raises:
+        OptionError: A seed is no whole number from 0.
+    """
+
+def standard_normals(generators: _Rows, size: int) -> tuple[_Array, _Rows]:
+    """Draws standard normal numbers as `numpy.random.Generator.standard_normal` does.
+
+    Args:
+        generators: Generators, (m, 4) uint64.
+        size: Numbers for each.
+
+    Returns:
+        The numbers, (m, size), and the generators after the draws, (m, 4) uint64.
+
+    Raises:
+        OptionError: An argument has a wrong shape or type.
+    """
+
 def soil_packing(
     count: int = 222,
     *,
@@ -2212,7 +2458,6 @@ class SolverReport:
         "sweeps",
         "body_sweeps",
         "islands",
-        "warm_newton",
         "pivoting",
         "guided_newton",
         "newton",
@@ -2264,6 +2509,64 @@ def accuracy_options(accuracy: Literal["fast", "balanced", "reference"] | float)
         OptionError: The name is unknown, or the error is finer than any choice of options gives.
     """
 
+@overload
+def sin_cos(x: float) -> tuple[float, float]:
+    """Sine and cosine of angles.
+
+    Unlike those of NumPy and of `math` they have the same bits on every machine. They are within
+    1 ulp; of what is not finite they are NaN.
+
+    Args:
+        x: An angle, or an array of any shape, rad.
+
+    Returns:
+        Sine and cosine: two numbers, or two new arrays of the shape of x.
+
+    Raises:
+        OptionError: x is no number and no array of numbers.
+    """
+
+@overload
+def sin_cos(x: npt.NDArray[Any]) -> tuple[_Array, _Array]: ...
+@overload
+def atan2(y: float, x: float) -> float:
+    """Angles of the points (x, y), in [-pi, pi].
+
+    Unlike those of NumPy and of `math` they have the same bits on every machine. They are within
+    1 ulp.
+
+    Args:
+        y: A number or an array of any shape.
+        x: The same; the two shapes must be equal.
+
+    Returns:
+        The angle, rad: a number, or a new array.
+
+    Raises:
+        OptionError: An argument is no number and no array of numbers, or the shapes differ.
+    """
+
+@overload
+def atan2(y: npt.NDArray[Any], x: npt.NDArray[Any]) -> _Array: ...
+@overload
+def exp(x: float) -> float:
+    """Exponentials.
+
+    Unlike those of NumPy and of `math` they have the same bits on every machine. They are within
+    1 ulp.
+
+    Args:
+        x: A number or an array of any shape.
+
+    Returns:
+        The exponential: a number, or a new array of the shape of x.
+
+    Raises:
+        OptionError: x is no number and no array of numbers.
+    """
+
+@overload
+def exp(x: npt.NDArray[Any]) -> _Array: ...
 def solve_friction_contact(
     W: npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
     q: npt.ArrayLike,

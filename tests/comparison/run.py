@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 from comparison.peers import Variant
-from comparison.scene import SAMPLE, RoverScene, Trace, steps_in
+from comparison.scene import RoverScene, Trace, steps_in
 
 
 def run(variant: Variant, scene: RoverScene, time_step: float, cap: float = 20.0) -> Trace:
@@ -13,10 +13,10 @@ def run(variant: Variant, scene: RoverScene, time_step: float, cap: float = 20.0
     runner = variant.build(scene, time_step)
     samples = [runner.position()]
     cpu, simulated, failure = 0.0, 0.0, ""
-    chunk = steps_in(SAMPLE, time_step)
+    chunk = steps_in(scene.sample, time_step)
     for phase in scene.phases:
         runner.command(phase)
-        for _ in range(steps_in(phase.duration, SAMPLE)):
+        for _ in range(steps_in(phase.duration, scene.sample)):
             begin = time.process_time()
             try:
                 runner.advance(chunk)
@@ -24,7 +24,7 @@ def run(variant: Variant, scene: RoverScene, time_step: float, cap: float = 20.0
                 failure = f"{type(error).__name__}: {str(error).splitlines()[0][:120]}"
             # an engine in a separate process reports its own time
             cpu = runner.cpu if hasattr(runner, "cpu") else cpu + time.process_time() - begin
-            simulated += SAMPLE
+            simulated += scene.sample
             samples.append(runner.position())
             if not failure and not np.all(np.isfinite(samples[-1])):
                 failure = "the state is not finite"

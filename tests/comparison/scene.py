@@ -13,7 +13,7 @@ Array = npt.NDArray[np.float64]
 
 #: The chart's steps, s. All divide the sampling interval.
 STEPS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 1e-1)
-#: Between two samples of the trunk's place, s.
+#: Between two samples of the trunk's place, unless the scene says otherwise, s.
 SAMPLE = 0.1
 
 
@@ -49,6 +49,7 @@ class RoverScene:
         brake: Whether the wheels are held where they are by the model's gains.
         thin_wheels: Whether a peer must model a wheel as a thin cylinder. Where the ground is flat and the axles are
             parallel to it, a sphere touches at the same point as a disc, and spheres are what the engines do best.
+        sample: Between two samples of the trunk's place, s; divides every phase.
     """
 
     name: str
@@ -62,6 +63,7 @@ class RoverScene:
     gravity: tuple[float, float, float] = (0.0, -9.81, 0.0)
     brake: bool = False
     thin_wheels: bool = False
+    sample: float = SAMPLE
 
     @property
     def duration(self) -> float:
@@ -74,7 +76,8 @@ class Trace:
     """What one run of one engine gave.
 
     Attributes:
-        positions: (n, 3) trunk origin every `SAMPLE` s, the start first; fewer rows where the run was stopped.
+        positions: (n, 3) trunk origin, sampled as the scene asks, the start first; fewer rows where the run was
+            stopped.
         cpu: CPU time of the process spent stepping, s.
         simulated: Time reached, s.
         failure: Why it stopped early, or "".

@@ -10,7 +10,7 @@ import pytest
 
 from rover_gym import CommandError, OptionError, RoverEnv
 from rover_gym.env.rewards import WEIGHTS
-from rover_gym.mechanics import Episode, EpisodeBatch, EpisodeRules
+from rover_gym.mechanics import Episode, EpisodeBatch, EpisodeRules, seed_generators
 from rover_gym.vector import RoverVectorEnv
 from rover_gym.vector.sb3 import RoverVecEnv
 
@@ -127,9 +127,7 @@ def batch(n: int, arguments: dict[str, Any]) -> tuple[EpisodeBatch, RoverEnv]:
     env = RoverEnv(**arguments)
     env.reset(seed=0)
     made = EpisodeBatch(env.task.rules, env.simulation, n, threads=1)
-    for i in range(n):
-        env.reset(seed=i)
-        made.replace(i, env.simulation, env._episode, (i, 1))
+    made.begin(range(n), made.draw(env.task.episodes, seed_generators(range(n))))
     return made, env
 
 
@@ -155,13 +153,13 @@ def test_rovers_that_do_not_move_keep_their_last_period() -> None:
     rovers, _ = batch(3, {"observation_noise": 0.1})
     actions = np.full((3, 12), 0.3, np.float32)
     before, told = rovers.step(actions), rovers.info(1)
-    states = [rovers.random_state(i) for i in range(3)]
+    states = rovers.generators(range(3))
     after = rovers.step(actions, np.array([True, False, True]))
     for one, other in zip(before[:4], after[:4], strict=True):
         assert one[1].tobytes() == other[1].tobytes()
     assert before[0][0].tobytes() != after[0][0].tobytes()
     assert rovers.info(1) == told
-    assert [states[i] == rovers.random_state(i) for i in range(3)] == [False, True, False]
+    assert (states == rovers.generators(range(3))).all(axis=1).tolist() == [False, True, False]
 
 
 SCAN: dict[str, Any] = {"terrain": "sphere_field", "height_scan": (5, 3, 0.4), "difficulty": 1.0}
@@ -256,16 +254,10 @@ def test_bad_rules_are_refused(changed: dict[str, Any], field: str) -> None:
 def test_what_does_not_fit_a_batch_is_refused() -> None:
     rovers, env = batch(2, {})
     before = rovers.observations().tobytes(), rovers.simulation(0).snapshot()
-    other = RoverEnv(stuck_time=1.0)
-    other.reset(seed=0)
-    for arguments in (
-        (0, env.simulation, other._episode),
-        (2, env.simulation, env._episode),
-        (0, env.simulation, None),
-        (0, env.simulation, env._episode, (1, "x")),
-    ):
+    drawn, other = (one.task.episodes.draw(seed_generators([5])) for one in (env, RoverEnv(stuck_time=1.0)))
+    for arguments in (([0], other), ([2], drawn), ([0], None), ([0, 1], drawn), ("x", drawn)):
         with pytest.raises(OptionError):
-            rovers.replace(*arguments)  # type: ignore[arg-type]
+            rovers.begin(*arguments)  # type: ignore[arg-type]
     for actions in (np.zeros((2, 11)), np.full((2, 12), 2.0), "x", range(10**12)):
         with pytest.raises(CommandError):
             rovers.step(actions)

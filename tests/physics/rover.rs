@@ -1,6 +1,8 @@
 //! Whole behaviour of the rover: against references, closed forms and conservation laws.
 #![allow(clippy::unwrap_used)]
 
+#[path = "exploring_scenes.rs"]
+mod exploring_scenes;
 #[path = "rover/scenes.rs"]
 mod scenes;
 
@@ -10,6 +12,8 @@ mod batch;
 mod driving;
 #[path = "rover/episodes.rs"]
 mod episodes;
+#[path = "rover/exploring.rs"]
+mod exploring;
 #[path = "rover/free_flight.rs"]
 mod free_flight;
 #[path = "rover/inclined_plane.rs"]

@@ -10,9 +10,10 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from rover_gym.env.arguments import RoverArguments, check_arguments, takes_arguments, with_argument_table
-from rover_gym.env.beginning import check_seed, draw_beginning, put_back, seeded
+from rover_gym.env.beginning import draw_episodes
 from rover_gym.env.env_snapshot import EnvSnapshot, check_random_state, check_snapshot
-from rover_gym.env.episode_scene import EpisodeScene, check_difficulty, check_reset_options
+from rover_gym.env.episode_scene import EpisodeScene, check_difficulty, check_reset_options, scene_of
+from rover_gym.env.generators import check_seed, row_of, seeded, set_row
 from rover_gym.env.observation import ObservationLayout
 from rover_gym.env.progress import Progress
 from rover_gym.env.randomisation import Domain
@@ -20,7 +21,7 @@ from rover_gym.env.rocks import Rocks
 from rover_gym.env.start import Start
 from rover_gym.env.task import Task, make_task
 from rover_gym.env.wheels import N_ACTIONS
-from rover_gym.mechanics import Episode, Plane, Simulation
+from rover_gym.mechanics import Episode, Plane, Simulation, standard_normals
 from rover_gym.rendering.render_options import RENDER_MODES, RenderOptions
 from rover_gym.validation import Range
 
@@ -274,10 +275,13 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         checked = check_reset_options(self.task, options)
         chosen = check_seed(seed)
         generator, used = (self.np_random, self._np_random_seed) if chosen is None else seeded(chosen)
-        with put_back((generator,)):
-            beginning = draw_beginning(self.task, generator, self._difficulty, checked)
+        drawn = draw_episodes(self.task, row_of(generator)[None], [self._difficulty], checked)
+        set_row(generator, drawn.generators[0])
         self._np_random, self._np_random_seed = generator, used
-        self._simulation, self._scene, self._episode = beginning.simulation, beginning.scene, beginning.episode
+        self._simulation, self._episode = drawn.simulation(0), drawn.episode(0)
+        self._scene = scene_of(
+            self.task, drawn.starts[0], drawn.rocks[0], drawn.rock_seeds[0], drawn.domains[0], drawn.terrain(0)
+        )
         return self._episode.observation, self._episode.info()
 
     def step(
@@ -292,12 +296,10 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         """
         if self._scene is None:
             raise ResetNeeded(NOT_RUNNING)
-        normals = None
         if self.task.is_noisy:
-            generator = self.np_random
-            with put_back((generator,)):
-                normals = self.task.draw_normals(generator)
-                result = self._episode.step(self._simulation, action, normals, has_scan=self.has_scan)
+            normals, after = standard_normals(row_of(self.np_random)[None], self.task.layout.size)
+            result = self._episode.step(self._simulation, action, normals[0], has_scan=self.has_scan)
+            set_row(self.np_random, after[0])
         else:
             result = self._episode.step(self._simulation, action, has_scan=self.has_scan)
         observation, reward, terminated, info = result

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from rover_gym.env.rocks import MAX_GOAL_DISTANCE, RockDistribution, rock_distri
 from rover_gym.env.start import StartDistribution, slope_of
 from rover_gym.mechanics import (
     CommandError,
+    EpisodeDistribution,
     EpisodeRules,
     OptionError,
     Plane,
@@ -54,6 +55,7 @@ class Task:
         max_steering: Set-point of a steering action of 1, rad.
         layout: Layout of the observation.
         rules: What the core needs to run an episode.
+        episodes: What the core draws episodes from.
     """
 
     model: RoverModel
@@ -71,6 +73,7 @@ class Task:
     max_steering: float
     layout: ObservationLayout
     rules: EpisodeRules
+    episodes: EpisodeDistribution
 
     def simulate(self, terrain: Plane | SphereField, domain: Domain) -> Simulation:
         """Creates a simulation of the rover on a terrain, at rest in the zero configuration."""
@@ -80,19 +83,10 @@ class Task:
             options["gravity"] = tuple(domain.gravity_scale * g for g in self.gravity)
         return Simulation(model, terrain, **options)
 
-    def draw_normals(self, rng: np.random.Generator) -> npt.NDArray[np.float64] | None:
-        """Draws the standard normal numbers `(size,)` of an observation's noise; None without noise."""
-        return rng.standard_normal(self.layout.size) if self.is_noisy else None
-
     @property
     def is_noisy(self) -> bool:
         """Whether observations have noise."""
         return self.domain.observation_noise > 0.0
-
-    def trunk_load_limit(self, domain: Domain) -> float:
-        """Force on the trunk beyond which it is high-centred, N."""
-        weight = self.model.mass * math.hypot(*self.gravity)
-        return TRUNK_LOAD * weight * domain.mass_scale * domain.gravity_scale
 
 
 def make_task(given: Mapping[str, Any]) -> Task:
@@ -146,7 +140,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
         "time_step": step,
         **(given["solver_options"] or {}),
     }
-    Simulation(rover, Plane(), **options)  # the core validates the simulation options
+    simulation = Simulation(rover, Plane(), **options)  # the core validates the simulation options
     points = None if scan is None else scan.offsets
     layout = build_layout(rover, math.hypot(*gravity), 0 if points is None else len(points))
     max_steering = _steering_limit(rover, given["max_steering_deg"])
@@ -165,11 +159,22 @@ def make_task(given: Mapping[str, Any]) -> Task:
         noise=domain.observation_noise * layout.unbounded if domain.observation_noise > 0.0 else None,
         scan=points,
     )
+    slope_by_difficulty = slope_deg is None and rocks is not None
+    episodes = EpisodeDistribution(
+        rules,
+        simulation,
+        start=asdict(start),
+        domain=asdict(domain),
+        trunk_load_limit=TRUNK_LOAD * (rover.mass * math.hypot(*gravity)),
+        rocks=None if rocks is None else asdict(rocks),
+        slope_by_difficulty=slope_by_difficulty,
+        field=field,
+    )
     return Task(
         model=rover,
         field=field,
         rocks=rocks,
-        slope_by_difficulty=slope_deg is None and rocks is not None,
+        slope_by_difficulty=slope_by_difficulty,
         scan=points,
         start=start,
         domain=domain,
@@ -181,6 +186,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
         max_steering=max_steering,
         layout=layout,
         rules=rules,
+        episodes=episodes,
     )
 
 

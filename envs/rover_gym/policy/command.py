@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.wheels import N_ACTIONS, N_WHEELS, drive_signs, wheel_centres
-from rover_gym.mechanics import OptionError
+from rover_gym.mechanics import OptionError, atan2, sin_cos
 from rover_gym.validation import flag, number, refuse
 
 Array = npt.NDArray[np.float64]
@@ -99,16 +99,18 @@ class CommandController:
         curvature = self.limits.curvature * command[:, 1:2]
         sideways = math.radians(self.limits.sideways_deg) * command[:, 2:3]
 
-        ahead = np.cos(sideways) + curvature * self._z
-        left = np.sin(sideways) + curvature * self._x
-        angles = np.clip(np.arctan2(left, ahead), -self._max_steering, self._max_steering)
+        sine, cosine = sin_cos(sideways)
+        ahead = cosine + curvature * self._z
+        left = sine + curvature * self._x
+        angles = np.clip(atan2(left, ahead), -self._max_steering, self._max_steering)
         # Slow down until the wheels reach their steering angles; otherwise they scrub and the path deviates.
         off = np.abs(angles - seen[:, self._steering]).max(axis=1, keepdims=True)
         speed = speed * np.maximum(0.2, 1.0 - 2.0 * off)
-        wanted = speed * (ahead * np.cos(angles) + left * np.sin(angles))
+        sine, cosine = sin_cos(angles)
+        wanted = speed * (ahead * cosine + left * sine)
 
         rim = self._rim_per_rate * self._rate_scale * seen[:, self._rates]
-        hold = self._load * np.sin(seen[:, self._pitch, None])
+        hold = self._load * sin_cos(seen[:, self._pitch, None])[0]
         actions = np.empty((len(seen), N_ACTIONS), dtype=np.float32)
         actions[:, :N_WHEELS] = np.clip(self._lever * (hold + self._inertia * (wanted - rim)), -1.0, 1.0)
         actions[:, N_WHEELS:] = np.clip(angles / self._max_steering, -1.0, 1.0)

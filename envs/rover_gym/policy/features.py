@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.mechanics import OptionError
+from rover_gym.mechanics import OptionError, exp, sin_cos
 from rover_gym.validation import refuse, whole
 
 # Features are clipped to this magnitude; larger values come from impacts and free wheels.
@@ -59,13 +59,14 @@ class Features:
         parts = [
             seen[:, self._taken],
             goal,
-            np.stack((np.minimum(distance, 10.0) / 5.0, np.exp(-distance)), axis=1),
+            np.stack((np.minimum(distance, 10.0) / 5.0, exp(-distance)), axis=1),
             slope * 5.0,
             np.abs(goal[:, 1:]),
         ]
         if self._scan is not None:
             # Heights over the ground plane; the scan's lowest point gives the plane's level.
-            rocks = seen[:, self._scan] - slope @ self._offsets.T
+            rise = slope[:, :1] * self._offsets[:, 0] + slope[:, 1:] * self._offsets[:, 1]  # no BLAS: same bits
+            rocks = seen[:, self._scan] - rise
             level = rocks.min(axis=1, keepdims=True)
             parts += [-level, 10.0 * ((rocks - level)[:, self._cells].max(axis=2))]
         features: npt.NDArray[np.float32] = np.concatenate(parts, axis=1).astype(np.float32)
@@ -76,10 +77,12 @@ class Features:
         n = seen[:, self._normal]
         roll, pitch = seen[:, self._roll], seen[:, self._pitch]
         # The normal in the heading frame is Rz(pitch) Rx(roll) n.
-        y = np.cos(roll) * n[:, 1] - np.sin(roll) * n[:, 2]
-        right = np.sin(roll) * n[:, 1] + np.cos(roll) * n[:, 2]
-        ahead = np.cos(pitch) * n[:, 0] - np.sin(pitch) * y
-        up = np.sin(pitch) * n[:, 0] + np.cos(pitch) * y
+        sine, cosine = sin_cos(roll)
+        y = cosine * n[:, 1] - sine * n[:, 2]
+        right = sine * n[:, 1] + cosine * n[:, 2]
+        sine, cosine = sin_cos(pitch)
+        ahead = cosine * n[:, 0] - sine * y
+        up = sine * n[:, 0] + cosine * y
         rise: npt.NDArray[np.floating] = -np.stack((ahead, right), axis=1) / np.maximum(up, 0.1)[:, None]
         return rise
 

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.wheels import N_ACTIONS, N_WHEELS, drive_signs, wheel_centres
-from rover_gym.mechanics import OptionError, StateError
+from rover_gym.mechanics import OptionError, StateError, atan2, sin_cos
 from rover_gym.validation import array, number, refuse
 
 _Row = Sequence[float]
@@ -80,7 +80,7 @@ class PDPolicy:
         self._goal = layout["goal"].start
 
         centres = wheel_centres(model)
-        self._x_c = 0.5 * (centres[:, 0].min() + centres[:, 0].max())
+        self._x_c = 0.5 * float(centres[:, 0].min() + centres[:, 0].max())
         self._wheels: list[tuple[float, float]] = [(float(x - self._x_c), float(z)) for x, z in centres]
         self._radii: list[float] = model.wheel_radii.tolist()
         self._rim_per_rate: list[float] = (model.wheel_radii * drive_signs(model)).tolist()
@@ -120,7 +120,7 @@ class PDPolicy:
 
     def steering_angles(self, curvature: float) -> list[float]:
         """The six steering angles, rad, at which all axles meet in the turning centre of a curvature, 1/m."""
-        return [math.atan2(curvature * x, 1.0 + curvature * z) for x, z in self._wheels]
+        return [atan2(curvature * x, 1.0 + curvature * z) for x, z in self._wheels]
 
     def _act(self, row: _Row) -> list[float]:
         """The action for one observation in SI units."""
@@ -134,14 +134,14 @@ class PDPolicy:
         speed = min(
             gains.speed,
             math.sqrt(gains.lateral_acceleration / max(abs(curvature), 1e-9)),
-            math.sqrt(gains.final_speed**2 + 2.0 * gains.braking * distance),
+            math.sqrt(gains.final_speed * gains.final_speed + 2.0 * gains.braking * distance),
         )
         # Slow down until the wheels reach their steering angles; otherwise they scrub and the path deviates.
         off = max(abs(angle - row[i]) for angle, i in zip(angles, self._steering, strict=True))
         speed *= direction * max(0.2, 1.0 - 2.0 * off)
 
         # Force per wheel that holds the rover on the slope, and the gain of the speed controller.
-        hold = self._weight * math.sin(row[self._pitch]) / N_WHEELS
+        hold = self._weight * sin_cos(row[self._pitch])[0] / N_WHEELS
         inertia = self._mass / N_WHEELS / gains.response
         action = [0.0] * N_ACTIONS
         for i, (x, z) in enumerate(self._wheels):
@@ -176,7 +176,8 @@ class PDPolicy:
         This solves tan(delta) = kappa |x| / (1 - kappa |z|) of the inner wheels for kappa. delta stays below 90
         degrees, since a wheel beyond the turning centre would have to turn round.
         """
-        tangent = math.tan(min(self._max_steering, math.radians(89.0)))
+        sine, cosine = sin_cos(min(self._max_steering, math.radians(89.0)))
+        tangent = sine / cosine
         return min(tangent / (abs(x) + abs(z) * tangent) for x, z in self._wheels)
 
 
@@ -189,7 +190,7 @@ def _turn_and_straight(ahead: float, left: float, radius: float) -> float:
         return math.inf
     straight = math.sqrt(reach * reach - radius * radius)
     # Angle of the goal about the centre, from the start at -90 degrees, minus that of the tangent.
-    turn = (math.atan2(y, x) + 0.5 * math.pi - math.acos(radius / reach)) % math.tau
+    turn = (atan2(y, x) + 0.5 * math.pi - atan2(straight, radius)) % math.tau
     if turn > math.tau - 1e-6:  # a goal straight ahead, within round-off
         turn = 0.0
     return radius * turn + straight

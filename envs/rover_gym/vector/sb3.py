@@ -8,14 +8,13 @@ model = stable_baselines3.PPO("MlpPolicy", VecMonitor(venv))
 
 import copy
 from collections.abc import Sequence
-from contextlib import ExitStack
 from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.beginning import check_seed
+from rover_gym.env.generators import check_seed
 from rover_gym.env.observation import LARGEST
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
@@ -23,7 +22,7 @@ from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import OptionError, RoverGymError
 from rover_gym.validation import refuse
-from rover_gym.vector.batch import BatchRover, RoverBatch
+from rover_gym.vector.batch import BatchRover, Drawn, RoverBatch
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
@@ -82,14 +81,7 @@ class RoverVecEnv(VecEnv):
             TerrainError: As `RoverEnv.reset`; nothing has changed.
         """
         options = [self.batch.check_options(given) for given in self._options]
-        with ExitStack() as stack:
-            drawn = [
-                stack.enter_context(self.batch.beginnings([i], [seed], fixed))[0]
-                for i, (seed, fixed) in enumerate(zip(self._seeds, options, strict=True))
-            ]
-            for i, one in enumerate(drawn):
-                self.batch.begin(i, one)
-                self.reset_infos[i] = self.batch.info(i)
+        self._begin(self.batch.draw(range(self.num_envs), self._seeds, options))
         self._waiting = []
         self._reset_seeds()
         self._reset_options()
@@ -133,7 +125,7 @@ class RoverVecEnv(VecEnv):
         """
         if self._waiting:
             check_actions(self._actions, (self.num_envs, N_ACTIONS))
-            self._restart(self._waiting)
+            self._begin(self.batch.draw(self._waiting))
             self._waiting = []
         observation, earned, terminated, timed_out, ended = self.batch.step(self._actions, has_scan=self.has_scan)
         dones = terminated | timed_out
@@ -145,7 +137,7 @@ class RoverVecEnv(VecEnv):
                 last["terminal_observation"] = observation[i].copy()
                 infos[i] = last
             try:
-                self._restart(ended)
+                self._begin(self.batch.draw(ended))
             except RoverGymError:
                 self._waiting = ended
             else:
@@ -154,11 +146,10 @@ class RoverVecEnv(VecEnv):
         reward = np.clip(earned, -LARGEST, LARGEST).astype(np.float32)
         return observation, reward, dones, infos
 
-    def _restart(self, chosen: list[int]) -> None:
-        with self.batch.beginnings(chosen) as drawn:
-            for i, one in zip(chosen, drawn, strict=True):
-                self.batch.begin(i, one)
-                self.reset_infos[i] = self.batch.info(i)
+    def _begin(self, drawn: Drawn) -> None:
+        self.batch.begin(drawn)
+        for i in drawn.chosen:
+            self.reset_infos[i] = self.batch.info(i)
 
     def close(self) -> None:
         """Frees the renderers, if there are any."""

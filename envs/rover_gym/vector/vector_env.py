@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.beginning import spread_seeds
+from rover_gym.env.generators import spread_seeds
 from rover_gym.env.quantities import Array, Mask, Observations
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.env.wheels import N_ACTIONS
@@ -95,9 +95,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         given = dict(mapping("options", options))
         chosen = self._check_mask(given.pop("reset_mask")) if "reset_mask" in given else list(range(self.num_envs))
         fixed = self.batch.check_options(given)
-        with self.batch.beginnings(chosen, [seeds[i] for i in chosen], fixed) as drawn:
-            for i, one in zip(chosen, drawn, strict=True):
-                self.batch.begin(i, one)
+        self.batch.begin(self.batch.draw(chosen, [seeds[i] for i in chosen], fixed))
         begun = set(chosen)
         self._over = [i for i in self._over if i not in begun]
         if len(chosen) == self.num_envs:
@@ -130,9 +128,8 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         if over and self.autoreset_mode == AutoresetMode.SAME_STEP:
             finals = {i: {"final_obs": observation[i].copy(), "final_info": self.batch.info(i)} for i in over}
             # If an episode is refused here, its rover stays over and the next step raises the error.
-            with suppress(RoverGymError), self.batch.beginnings(over) as drawn:
-                for i, one in zip(over, drawn, strict=True):
-                    self.batch.begin(i, one)
+            with suppress(RoverGymError):
+                self.batch.begin(self.batch.draw(over))
                 self._over = []
                 starting = starting + over
         infos = self.batch.infos()
@@ -150,10 +147,9 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
             raise ResetNeeded(f"rovers {starting}: call reset() with reset_mask first")
         active = np.ones(self.num_envs, np.bool_)
         active[starting] = False
-        with self.batch.beginnings(starting) as drawn:
-            observation, reward, terminated, truncated, over = self.batch.step(actions, active)
-            for i, one in zip(starting, drawn, strict=True):
-                self.batch.begin(i, one)
+        drawn = self.batch.draw(starting)
+        observation, reward, terminated, truncated, over = self.batch.step(actions, active)
+        self.batch.begin(drawn)
         reward[starting], terminated[starting], truncated[starting] = 0.0, False, False
         return observation, reward, terminated, truncated, [i for i in over if active[i]]
 

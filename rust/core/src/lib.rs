@@ -26,6 +26,8 @@
 //! - [`draw`]: random numbers, for scenes that are drawn;
 //! - [`episode`]: the episodes of a driving task: actions, observations, rewards, ends.
 #![forbid(unsafe_code)]
+// Same bits on every machine: sines and their like come from `scalar::elementary`.
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub use nalgebra;
 

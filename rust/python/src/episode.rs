@@ -5,8 +5,9 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyRange};
+use rover_core::draw::Domain;
 use rover_core::episode::running::{Period, check_normals};
-use rover_core::episode::{Domain, Episode as CoreEpisode, Progress, Rules, Setting, action};
+use rover_core::episode::{Episode as CoreEpisode, Progress, Rules, Setting, action};
 use rover_core::simulation::{ReadingScratch, RoverSimulation};
 
 use crate::arguments::{number, refused};

@@ -3,13 +3,16 @@
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::draw::{Pcg64, Pcg64State};
+use rover_core::draw::Pcg64;
 use rover_core::episode::{EpisodeBatch as CoreBatch, EpisodeError};
 
-use crate::arguments::{count, refused, whole};
+use crate::arguments::{Given, count, refused, whole};
+use crate::arrays::fresh_table;
 use crate::batch::{index, mask};
-use crate::episode::{Episode, actions, rules, simulation};
+use crate::draw::{DrawnEpisodes, EpisodeDistribution, Request};
+use crate::episode::{actions, rules, simulation};
 use crate::errors::{BorderError, Kind};
+use crate::generators::halves;
 use crate::infos::{Told, info, infos};
 use crate::shared::{Shared, Watch};
 use crate::simulation::{Origin, Simulation};
@@ -51,6 +54,19 @@ impl Inner {
         let message = self.batch.errors()[index].as_ref().map(ToString::to_string);
         Ok((self.batch.episode(index)?, message))
     }
+
+    /// Indices of rovers; as many as `expected`, where that is known.
+    fn indices(&self, given: &Bound<'_, PyAny>, expected: Option<usize>) -> PyResult<Vec<usize>> {
+        let found: Option<Vec<Bound<'_, PyAny>>> = given.extract().ok();
+        let found = found.filter(|found| expected.is_none_or(|n| n == found.len()));
+        let what = expected.map_or_else(
+            || "indices of rovers".to_owned(),
+            |n| format!("{n} indices of rovers"),
+        );
+        let found = found.ok_or_else(|| refused(given, Kind::Option, "indices", &what))?;
+        let rovers = self.batch.rovers();
+        found.iter().map(|one| index(one, rovers)).collect()
+    }
 }
 
 /// A count of at least one.
@@ -59,15 +75,6 @@ fn at_least_one(given: &Bound<'_, PyAny>, field: &str) -> PyResult<usize> {
         0 => Err(refused(given, Kind::Option, field, "at least 1").into()),
         n => Ok(n),
     }
-}
-
-/// A generator from the numbers of `bit_generator.state["state"]`.
-fn generator(given: &Bound<'_, PyAny>) -> PyResult<Pcg64> {
-    let found = given.extract::<(u128, u128)>();
-    let what = "the numbers (state, inc) of a PCG64";
-    let (state, increment) =
-        found.map_err(|_| refused(given, Kind::Option, "random_state", what))?;
-    Ok(Pcg64::from_state(Pcg64State { state, increment }))
 }
 
 #[pymethods]
@@ -218,75 +225,129 @@ impl EpisodeBatch {
         Ok(rows)
     }
 
-    /// Puts copies of a simulation and its episode in the place of a rover.
+    /// Draws episodes on the threads of this batch, as `EpisodeDistribution.draw` does; no rover changes.
     ///
     /// Args:
-    ///     index: Index of the rover.
-    ///     simulation: Its replacement.
-    ///     episode: The episode, which begins or goes on.
-    ///     random_state: The numbers `state` and `inc` of the PCG64 that its noise is drawn from;
-    ///         any by default.
+    ///     distribution: What the episodes are drawn from.
+    ///     generators: Generators, (m, 4) uint64.
+    ///     attempts: As of `EpisodeDistribution.draw`.
+    ///     difficulties: As of `EpisodeDistribution.draw`.
+    ///     fixed: As of `EpisodeDistribution.draw`.
+    ///
+    /// Returns:
+    ///     The episodes, the same for any number of threads.
     ///
     /// Raises:
-    ///     OptionError: There is no such rover, the episode has other rules, or an argument is
-    ///         invalid. Nothing has changed.
-    #[pyo3(signature = (index, simulation, episode, random_state = None))]
-    fn replace(
+    ///     RoverGymError: As of `EpisodeDistribution.draw`, for the first rover that has one.
+    #[pyo3(signature = (distribution, generators, *, attempts = Given::MISSING, difficulties = None, fixed = None),
+        text_signature = "($self, distribution, generators, *, attempts=100, difficulties=None, fixed=None)")]
+    fn draw(
         &self,
-        index: &Bound<'_, PyAny>,
-        simulation: &Bound<'_, PyAny>,
-        episode: &Bound<'_, PyAny>,
-        random_state: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<()> {
-        let one = self::simulation(simulation, "simulation")?.get();
-        let found = episode.cast::<Episode>();
-        let refuse = |_| refused(episode, Kind::Option, "episode", "an Episode");
-        let given = found.map_err(refuse)?.get().copy()?;
-        let drawn = random_state.map(generator).transpose()?;
-        let drawn = drawn.unwrap_or_else(|| Pcg64::seeded(&[0]));
-        let rover = one.open()?.clone();
+        py: Python<'_>,
+        distribution: &Bound<'_, PyAny>,
+        generators: &Bound<'_, PyAny>,
+        attempts: Given<'_>,
+        difficulties: Option<&Bound<'_, PyAny>>,
+        fixed: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<DrawnEpisodes> {
+        let found = distribution.cast::<EpisodeDistribution>();
+        let what = "an EpisodeDistribution";
+        let refuse = |_| refused(distribution, Kind::Option, "distribution", what);
+        let found = found.map_err(refuse)?;
+        let request = Request::parse(generators, attempts, difficulties, fixed)?;
         let mut held = self.0.open()?;
-        let index = self::index(index, held.batch.rovers())?;
-        let replaced = held.batch.replace(index, rover, given, drawn);
-        replaced.map_err(BorderError::from)?;
-        held.origins[index] = one.origin().clone();
+        found.get().draw_on(py, &request, Some(&mut held.batch))
+    }
+
+    /// Begins drawn episodes.
+    ///
+    /// Args:
+    ///     indices: Indices of the rovers, one for each episode.
+    ///     episodes: Drawn episodes with the rules of the batch.
+    ///
+    /// Raises:
+    ///     OptionError: There is no such rover, or the episodes do not fit. Nothing has changed.
+    fn begin(&self, indices: &Bound<'_, PyAny>, episodes: &Bound<'_, PyAny>) -> PyResult<()> {
+        let found = episodes.cast::<DrawnEpisodes>();
+        let refuse = |_| refused(episodes, Kind::Option, "episodes", "DrawnEpisodes");
+        let drawn = found.map_err(refuse)?.get();
+        let mut held = self.0.open()?;
+        let places = held.indices(indices, Some(drawn.drawn.len()))?;
+        for (&index, one) in places.iter().zip(&drawn.drawn) {
+            held.batch.check(index, one).map_err(BorderError::from)?;
+        }
+        for (&index, one) in places.iter().zip(&drawn.drawn) {
+            let begun = held.batch.begin(index, one.clone());
+            begun.map_err(BorderError::from)?;
+            held.origins[index] = drawn.origin(one);
+        }
         Ok(())
     }
 
-    /// The numbers `state` and `inc` of the PCG64 that a rover's noise is drawn from.
+    /// The generators of rovers, from which their noise is drawn.
     ///
     /// Args:
-    ///     index: Index of the rover.
+    ///     indices: Indices of the rovers.
+    ///
+    /// Returns:
+    ///     (m, 4) uint64: high and low half of each state, high and low half of each increment.
     ///
     /// Raises:
     ///     OptionError: There is no such rover, or its episode has not begun.
-    fn random_state(&self, index: &Bound<'_, PyAny>) -> PyResult<(u128, u128)> {
+    fn generators<'py>(
+        &self,
+        py: Python<'py>,
+        indices: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<u64>>> {
         let held = self.0.open()?;
-        let index = self::index(index, held.batch.rovers())?;
-        let drawn = held.batch.generator(index).map_err(BorderError::from)?;
-        let Pcg64State { state, increment } = drawn.state();
-        Ok((state, increment))
+        let places = held.indices(indices, None)?;
+        let found = places.iter().map(|&index| held.batch.generator(index));
+        let found: Vec<Pcg64> = found.collect::<Result<_, _>>().map_err(BorderError::from)?;
+        fresh_table(py, found.iter().map(halves))
     }
 
-    /// Sets the numbers that `random_state` returns.
+    /// Sets the generators of rovers.
+    ///
+    /// Args:
+    ///     indices: Indices of the rovers.
+    ///     generators: As `generators` returns them, (m, 4) uint64.
+    ///
+    /// Raises:
+    ///     OptionError: There is no such rover, its episode has not begun, or `generators` has a
+    ///         wrong shape. Nothing has changed.
+    fn set_generators(
+        &self,
+        indices: &Bound<'_, PyAny>,
+        generators: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let given = crate::generators::generators(generators)?;
+        let mut held = self.0.open()?;
+        let places = held.indices(indices, Some(given.len()))?;
+        for &index in &places {
+            held.batch.generator(index).map_err(BorderError::from)?;
+        }
+        for (index, generator) in places.into_iter().zip(given) {
+            let set = held.batch.set_generator(index, generator);
+            set.map_err(BorderError::from)?;
+        }
+        Ok(())
+    }
+
+    /// The ground of one rover.
     ///
     /// Args:
     ///     index: Index of the rover.
-    ///     random_state: `state` and `inc`.
     ///
     /// Raises:
-    ///     OptionError: There is no such rover, or its episode has not begun; or the numbers are
-    ///         none of a PCG64.
-    fn set_random_state(
+    ///     OptionError: There is no such rover.
+    fn terrain<'py>(
         &self,
+        py: Python<'py>,
         index: &Bound<'_, PyAny>,
-        random_state: &Bound<'_, PyAny>,
-    ) -> PyResult<()> {
-        let drawn = generator(random_state)?;
-        let mut held = self.0.open()?;
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let held = self.0.open()?;
         let index = self::index(index, held.batch.rovers())?;
-        let set = held.batch.set_generator(index, drawn);
-        Ok(set.map_err(BorderError::from)?)
+        held.origins[index].terrain.to_object(py)
     }
 
     /// Returns a copy of one rover.

@@ -6,12 +6,15 @@ mod arguments;
 mod arrays;
 mod batch;
 mod contacts;
+mod draw;
+mod elementary;
 mod episode;
 mod episode_batch;
 mod episode_rules;
 mod errors;
 mod files;
 mod friction_contact;
+mod generators;
 mod infos;
 mod model;
 mod motor;
@@ -46,6 +49,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<contacts::Contacts>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<batch::SimulationBatch>()?;
+    module.add_class::<draw::EpisodeDistribution>()?;
+    module.add_class::<draw::DrawnEpisodes>()?;
     module.add_class::<episode_rules::EpisodeRules>()?;
     module.add_class::<episode::Episode>()?;
     module.add_class::<episode_batch::EpisodeBatch>()?;
@@ -55,10 +60,15 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<friction_contact::SolverReport>()?;
     module.add_class::<friction_contact::FrictionContactSolution>()?;
     module.add_function(wrap_pyfunction!(accuracy::accuracy_options, module)?)?;
+    module.add_function(wrap_pyfunction!(elementary::sin_cos, module)?)?;
+    module.add_function(wrap_pyfunction!(elementary::atan2, module)?)?;
+    module.add_function(wrap_pyfunction!(elementary::exp, module)?)?;
     module.add_function(wrap_pyfunction!(
         friction_contact::solve_friction_contact,
         module
     )?)?;
+    module.add_function(wrap_pyfunction!(generators::seed_generators, module)?)?;
+    module.add_function(wrap_pyfunction!(generators::standard_normals, module)?)?;
     planar::register(module)?;
     planar_soil::register(module)?;
     Ok(())

@@ -8,7 +8,7 @@ use super::pair::{Contact, ContactKey};
 use super::part::Part;
 use crate::geometry::query::sweep::{DEEP, first_touch};
 use crate::geometry::query::{SurfacePoint, box_sphere, disc_sphere, dispatch, sphere_sphere};
-use crate::geometry::{PlacedShape, Primitive, Sphere, Terrain};
+use crate::geometry::{Disc, PlacedShape, Primitive, Sphere, Terrain};
 use crate::multibody::{Kinematics, Model};
 
 /// On a sphere: the nearest point.
@@ -204,19 +204,7 @@ fn touch(
     half_way: &Vector3<f64>,
 ) -> Option<Vector3<f64>> {
     match &placed.shape {
-        PlacedShape::Disc(disc) => {
-            // The disc keeps its midpoint axes throughout.
-            let middle = ground.centre - base - disc.centre;
-            let distance = |x: &Vector3<f64>| {
-                let ball = Sphere {
-                    centre: x + base + disc.centre,
-                    radius: 0.0,
-                };
-                let near = disc_sphere::nearest_point(disc, &ball, base);
-                (near.n, near.gap)
-            };
-            first_touch(distance, &middle, &(middle - half_way), ground.radius)
-        }
+        PlacedShape::Disc(disc) => touch_of_disc(disc, ground, base, half_way),
         PlacedShape::Box(solid) => {
             let middle = solid.R.tr_mul(&(ground.centre - base - solid.centre));
             let PlacedShape::Box(at_end) = placed.part.place(model, end) else {
@@ -247,6 +235,26 @@ fn touch(
             first_touch(distance, &middle, &(middle - half_way), ground.radius)
         }
     }
+}
+
+/// The same for a disc, which moves by `half_way` (m) in half a step and keeps its midpoint axes
+/// throughout.
+pub(crate) fn touch_of_disc(
+    disc: &Disc,
+    ground: &Sphere,
+    base: &Vector3<f64>,
+    half_way: &Vector3<f64>,
+) -> Option<Vector3<f64>> {
+    let middle = ground.centre - base - disc.centre;
+    let distance = |x: &Vector3<f64>| {
+        let ball = Sphere {
+            centre: x + base + disc.centre,
+            radius: 0.0,
+        };
+        let near = disc_sphere::nearest_point(disc, &ball, base);
+        (near.n, near.gap)
+    };
+    first_touch(distance, &middle, &(middle - half_way), ground.radius)
 }
 
 /// Gap, nearest point (relative to the trunk origin) and frame of every wheel over a terrain, as

@@ -151,11 +151,11 @@ mod tests {
     #[allow(clippy::float_cmp)] // bit for bit
     fn a_mixture_of_draws_is_that_of_numpy() {
         let mut made = Pcg64::seeded(&[7]);
-        assert_eq!(made.below(1 << 63), 5765488047046174021);
-        assert_eq!(made.below(1 << 63), 8275336682942969162);
+        assert_eq!(made.below(1 << 63), 5_765_488_047_046_174_021);
+        assert_eq!(made.below(1 << 63), 8_275_336_682_942_969_162);
         made.unit();
-        assert_eq!(made.uniform([-2.0, 3.0]), -0.8739640500470407);
-        assert_eq!(made.uniform([-2.0, 3.0]), -0.49916857544387283);
+        assert_eq!(made.uniform([-2.0, 3.0]), -0.873_964_050_047_040_7);
+        assert_eq!(made.uniform([-2.0, 3.0]), -0.499_168_575_443_872_83);
         let sum = (0..1000).fold(0_u64, |sum, _| sum.wrapping_add(made.below(3 << 61)));
         assert_eq!(sum, 0x81B9_538D_CC9D_FE6A);
         let state = Pcg64State {

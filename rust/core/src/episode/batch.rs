@@ -6,11 +6,12 @@
 use std::sync::Arc;
 
 use super::action;
+use super::beginning::{Beginning, EpisodeDistribution};
 use super::error::EpisodeError;
 use super::noise;
 use super::rules::Rules;
 use super::running::{Episode, Period};
-use crate::draw::Pcg64;
+use crate::draw::{Order, Pcg64};
 use crate::integrator::StepError;
 use crate::simulation::{Batch, BatchError, Done, ReadingScratch, RoverSimulation, Turn};
 
@@ -31,6 +32,17 @@ struct Seat {
     generator: Pcg64,
     /// Room for the commands of an action.
     commands: Vec<f64>,
+}
+
+impl Seat {
+    fn new(episode: Episode, generator: Pcg64) -> Self {
+        Self {
+            commands: vec![0.0; episode.rules().n_actions()],
+            episode,
+            steps: 0,
+            generator,
+        }
+    }
 }
 
 impl EpisodeBatch {
@@ -123,28 +135,51 @@ impl EpisodeBatch {
         seat.as_ref().ok_or(EpisodeError::NotBegun { index })
     }
 
-    /// Replaces a rover by one whose episode begins. `generator`: where its noise comes from.
+    /// Draws episodes on the threads of the batch, see [`EpisodeDistribution::draw`]. No rover
+    /// changes.
     ///
     /// # Errors
-    /// `OtherRules`, `NoSuchRover`, or as [`Rules::check_model`]; nothing is changed then.
-    pub fn replace(
+    /// As [`EpisodeDistribution::draw`]; `Threads`.
+    pub fn draw(
         &mut self,
-        index: usize,
-        rover: RoverSimulation,
-        episode: Episode,
-        generator: Pcg64,
-    ) -> Result<(), EpisodeError> {
-        if *episode.rules() != self.rules {
+        distribution: &EpisodeDistribution,
+        orders: &[Order<'_>],
+        attempts: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<Option<Vec<Beginning>>, EpisodeError> {
+        let pool = self.batch.pool()?;
+        distribution.draw(orders, attempts, pool, go_on)
+    }
+
+    /// Checks that an episode may begin with a rover.
+    ///
+    /// # Errors
+    /// `OtherRules`, `NoSuchRover`, or as [`Rules::check_model`].
+    pub fn check(&self, index: usize, beginning: &Beginning) -> Result<(), EpisodeError> {
+        let len = self.seats.len();
+        if index >= len {
+            return Err(BatchError::NoSuchRover { index, len }.into());
+        }
+        if *beginning.episode.rules() != self.rules {
             return Err(EpisodeError::OtherRules);
         }
-        self.rules.check_model(rover.model())?;
-        self.batch.replace(index, rover, episode.setting().goal)?;
-        self.seats[index] = Some(Seat {
+        self.rules
+            .check_model(&beginning.scene.placement.scene.model)
+    }
+
+    /// Begins a drawn episode with a rover, from whose generator its noise goes on.
+    ///
+    /// # Errors
+    /// As [`Self::check`]; nothing is changed then.
+    pub fn begin(&mut self, index: usize, beginning: Beginning) -> Result<(), EpisodeError> {
+        self.check(index, &beginning)?;
+        let Beginning {
+            scene,
             episode,
-            steps: 0,
-            generator,
-            commands: vec![0.0; self.rules.n_actions()],
-        });
+            random,
+        } = beginning;
+        self.batch.begin(index, scene.placement, scene.start.goal)?;
+        self.seats[index] = Some(Seat::new(episode, random));
         Ok(())
     }
 

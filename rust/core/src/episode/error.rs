@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::draw::DrawError;
 use crate::simulation::BatchError;
 
 /// What an episode or a batch of episodes refuses.
@@ -45,6 +46,12 @@ pub enum EpisodeError {
         /// Which rover.
         index: usize,
     },
+    /// A given state whose observation is not finite in float32.
+    #[error("q: must be observable in float32, with v and goal")]
+    NotObservable,
+    /// Why no scene could be drawn.
+    #[error(transparent)]
+    Draw(#[from] DrawError),
     /// What the rovers of a batch refuse.
     #[error(transparent)]
     Batch(#[from] BatchError),

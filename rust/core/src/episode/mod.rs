@@ -7,12 +7,14 @@
 //! [`noise`]), the [`progress`] of the episode, the terms of the [`reward`] and whether the episode
 //! ends ([`ending`]); together they are the period's [`outcome`].
 //!
-//! - [`rules`]: what all episodes of a task share;
+//! - [`rules`]: what all episodes of a task share; [`beginning`]: how one begins, in a scene that
+//!   is drawn ([`crate::draw`]);
 //! - [`running`]: one episode and its control period;
 //! - [`batch`]: many rovers side by side, each with its episode.
 
 pub mod action;
 pub mod batch;
+pub mod beginning;
 pub mod ending;
 pub mod error;
 pub mod noise;
@@ -24,10 +26,11 @@ pub mod rules;
 pub mod running;
 
 pub use batch::EpisodeBatch;
+pub use beginning::{Beginning, EpisodeDistribution};
 pub use ending::Ending;
 pub use error::EpisodeError;
 pub use outcome::{Outcome, Quantities};
 pub use progress::Progress;
 pub use reward::{TERMS, Weights};
 pub use rules::{Rules, Settings};
-pub use running::{Domain, Episode, Setting};
+pub use running::{Episode, Setting};

@@ -10,20 +10,8 @@ use super::outcome::{Outcome, Quantities};
 use super::progress::Progress;
 use super::reward::{Earned, squared_changes, terms};
 use super::rules::Rules;
+use crate::draw::Domain;
 use crate::simulation::{CommandError, ReadingScratch, RoverSimulation};
-
-/// Properties of rover and world that may differ from episode to episode.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Domain {
-    /// Factor on the model's masses and inertias.
-    pub mass_scale: f64,
-    /// Coulomb's friction coefficient.
-    pub friction: f64,
-    /// Torque given over torque asked, up to the motor's limit.
-    pub actuator_gain: f64,
-    /// Factor on the task's gravity.
-    pub gravity_scale: f64,
-}
 
 /// What was drawn for an episode. Only goal, gain and load limit act; the rest is reported.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -521,6 +521,8 @@ fn solve_problem<S: MechanicalSystem>(
 /// Enters a solver's report into a step's.
 pub(super) fn note(report: &mut StepReport, solved: &SolveReport) {
     report.iterations += solved.iterations;
+    report.factorisations += solved.factorisations();
+    report.pivots += solved.pivots();
     report.residual = report.residual.max(solved.residual);
     if !solved.is_converged() {
         report.status = StepStatus::NotConverged;

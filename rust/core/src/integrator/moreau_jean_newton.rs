@@ -133,7 +133,7 @@ impl<S: MechanicalSystem> Integrator<S> for MoreauJeanNewton {
         system.set_moved(start.configuration, &ws.v_mean, h, &mut ws.end);
         let turn = options.time_step * system.turning(start.v);
         let drift = if system.conserves_momenta() && turn <= MOST_TURN {
-            turn.powi(3)
+            turn * turn * turn
         } else {
             0.0
         };

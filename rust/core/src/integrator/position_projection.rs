@@ -126,4 +126,4 @@ fn size<S: MechanicalSystem>(system: &S, ws: &ScratchOf<S>) -> f64 {
 /// Friction locks a wheel that an impact left wedged between a stone and the ground. The solution
 /// of the linearised problem may then lie a metre away: without this limit a penetration of 2 cm
 /// threw a rover up by that much.
-const FARTHEST: f64 = 4.0;
+pub(crate) const FARTHEST: f64 = 4.0;

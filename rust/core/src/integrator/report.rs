@@ -20,6 +20,10 @@ pub struct StepReport {
     pub steps: usize,
     /// Iterations of the contact solver, all steps together.
     pub iterations: usize,
+    /// Matrices that the contact solver factored, all steps together.
+    pub factorisations: usize,
+    /// Its iterations that pivoted, all steps together.
+    pub pivots: usize,
     /// Newton iterations on the forces, all steps together (0 in the linearised variant).
     pub newton_iterations: usize,
     /// Largest natural-map residual, recomputed from the impulses.
@@ -52,6 +56,8 @@ impl StepReport {
         }
         self.steps += later.steps;
         self.iterations += later.iterations;
+        self.factorisations += later.factorisations;
+        self.pivots += later.pivots;
         self.newton_iterations += later.newton_iterations;
         self.residual = self.residual.max(later.residual);
         self.n_contacts = self.n_contacts.max(later.n_contacts);

@@ -120,6 +120,29 @@ impl<Q: Clone, C> Scratch<Q, C> {
         }
     }
 
+    /// Makes a step that was taken elsewhere the last one: `list` hands its contacts with their
+    /// impulses and local velocities to its argument. `q` and `mu`: free velocity and friction.
+    pub(crate) fn show<const D: usize>(
+        &mut self,
+        list: impl FnOnce(&mut dyn FnMut(C, [f64; D], [f64; D])),
+        q: &[f64],
+        mu: &[f64],
+    ) {
+        self.contacts.clear();
+        self.p.clear();
+        self.u.clear();
+        list(&mut |contact, p, u| {
+            self.contacts.push(contact);
+            self.p.extend_from_slice(&p);
+            self.u.extend_from_slice(&u);
+        });
+        let n = self.contacts.len();
+        self.q_free.clear();
+        self.q_free.extend_from_slice(&q[..D * n]);
+        self.mu.clear();
+        self.mu.extend_from_slice(&mu[..n]);
+    }
+
     /// Contacts of the last step.
     #[must_use]
     pub fn contacts(&self) -> &[C] {

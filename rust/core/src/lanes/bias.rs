@@ -1,1 +1,168 @@
-//! Bias forces of a block.
+//! Bias `N(q, v) v + G(q)` by recursive Newton–Euler: the generalized force at zero acceleration.
+//!
+//! Moments are about each body's own origin. Gravity is an acceleration of the trunk. What a body
+//! without others on it needs is passed to its carrier at once, so only carriers are swept twice.
+//!
+//! Source: Luh, Walker and Paul 1980; here in world axes.
+
+use super::inertias::{Inertia, Inertias};
+use super::machine::{Link, Machine};
+use super::poses::{Pose, Poses};
+use crate::multibody::model::BASE;
+use crate::scalar::{Lane, Vec3};
+
+/// Scratch of the bias.
+#[derive(Clone, Debug)]
+pub struct BiasScratch<T: Lane> {
+    token: T::Token,
+    bodies: Vec<Moved<T>>,
+}
+
+/// A body at zero joint accelerations.
+#[derive(Clone, Copy, Debug)]
+struct Moved<T> {
+    omega: Vec3<T>,
+    alpha: Vec3<T>,
+    /// Acceleration of its origin, relative to free fall, m/s².
+    origin: Vec3<T>,
+    /// Force (N) and moment about its origin (N m) on it and everything it carries.
+    force: Vec3<T>,
+    moment: Vec3<T>,
+}
+
+impl<T: Lane> BiasScratch<T> {
+    /// Room for a machine.
+    #[must_use]
+    pub fn new(token: T::Token, machine: &Machine) -> Self {
+        let zero = Vec3::splat(token, [0.0; 3]);
+        let moved = Moved {
+            omega: zero,
+            alpha: zero,
+            origin: zero,
+            force: zero,
+            moment: zero,
+        };
+        Self {
+            token,
+            bodies: vec![moved; machine.n_bodies()],
+        }
+    }
+}
+
+/// Bias `b` in `M v̇ + b = τ`: Coriolis, centrifugal, gyroscopic and gravity terms.
+///
+/// `v`, `out`: (nv), N along a velocity in m/s, N m about one in rad/s. `gravity`: m/s², world.
+///
+/// # Panics
+/// If an argument is of another machine.
+pub fn bias<T: Lane>(
+    machine: &Machine,
+    inertias: &Inertias<T>,
+    poses: &Poses<T>,
+    v: &[T],
+    gravity: Vec3<T>,
+    scratch: &mut BiasScratch<T>,
+    out: &mut [T],
+) {
+    T::vectorize(
+        scratch.token,
+        #[inline(always)]
+        || {
+            bias_here(machine, inertias, poses, v, gravity, scratch, out);
+        },
+    );
+}
+
+#[inline(always)]
+fn bias_here<T: Lane>(
+    machine: &Machine,
+    inertias: &Inertias<T>,
+    poses: &Poses<T>,
+    v: &[T],
+    gravity: Vec3<T>,
+    scratch: &mut BiasScratch<T>,
+    out: &mut [T],
+) {
+    let n = machine.links.len();
+    let (links, inertias) = (&machine.links[..n], &inertias.bodies[..n]);
+    let (poses, moved) = (&poses.bodies[..n], &mut scratch.bodies[..n]);
+    let (base, rates) = v.split_at(BASE);
+    let (out_base, out) = out.split_at_mut(BASE);
+    let (rates, out) = (&rates[..n - 1], &mut out[..n - 1]);
+    let zero = Vec3::splat(scratch.token, [0.0; 3]);
+    moved[0] = Moved {
+        omega: Vec3::new(base[3], base[4], base[5]),
+        alpha: zero,
+        origin: -gravity,
+        force: zero,
+        moment: zero,
+    };
+    moved[0].load(&links[0], &inertias[0], &poses[0]);
+    for b in 1..n {
+        let (before, own) = moved.split_at_mut(b);
+        let (link, pose) = (&links[b], &poses[b]);
+        let carrier = &mut before[link.parent];
+        let (omega, d) = (carrier.omega, pose.lever);
+        let spin = pose.axis * rates[b - 1];
+        let mut body = Moved {
+            omega: omega + spin,
+            alpha: carrier.alpha + omega.cross(spin),
+            origin: carrier.origin + carrier.alpha.cross(d) + omega.cross(omega.cross(d)),
+            force: zero,
+            moment: zero,
+        };
+        body.load(link, &inertias[b], pose);
+        if link.is_leaf {
+            out[b - 1] = body.rest_on(carrier, pose);
+        } else {
+            own[0] = body;
+        }
+    }
+    for b in (1..n).rev() {
+        if !links[b].is_leaf {
+            let (before, own) = moved.split_at_mut(b);
+            out[b - 1] = own[0].rest_on(&mut before[links[b].parent], &poses[b]);
+        }
+    }
+    let Moved { force, moment, .. } = moved[0];
+    out_base.copy_from_slice(&[force.x, force.y, force.z, moment.x, moment.y, moment.z]);
+}
+
+impl<T: Lane> Moved<T> {
+    /// Sets force and moment to those of the body alone.
+    #[inline(always)]
+    fn load(&mut self, link: &Link, inertia: &Inertia<T>, pose: &Pose<T>) {
+        let Self { omega, alpha, .. } = *self;
+        // A symmetric part of the inertia has no gyroscopic moment; the part k a aᵀ has
+        // a k (a · α) + (ω × a) k (a · ω).
+        let (a, b) = inertia.axes(link.symmetry, &pose.R);
+        let mut moment = alpha * inertia.rest + turning(inertia.first, a, omega, alpha);
+        if let Some(b) = b {
+            moment += turning(inertia.second, b, omega, alpha);
+        }
+        let mut acceleration = self.origin;
+        if link.is_centred {
+            self.force = acceleration * inertia.mass;
+        } else {
+            let lever = pose.c - pose.r;
+            acceleration += alpha.cross(lever) + omega.cross(omega.cross(lever));
+            self.force = acceleration * inertia.mass;
+            moment += lever.cross(self.force);
+        }
+        self.moment = moment;
+    }
+
+    /// Adds its force and moment to its carrier's. Returns its joint's share.
+    #[inline(always)]
+    fn rest_on(&self, carrier: &mut Self, pose: &Pose<T>) -> T {
+        carrier.force += self.force;
+        carrier.moment += self.moment + pose.lever.cross(self.force);
+        pose.axis.dot(self.moment)
+    }
+}
+
+/// Moment of the inertia `k a aᵀ` at the angular velocity ω and acceleration α.
+#[inline(always)]
+fn turning<T: Lane>(k: T, a: Vec3<T>, omega: Vec3<T>, alpha: Vec3<T>) -> Vec3<T> {
+    a * (k * a.dot(alpha)) + omega.cross(a) * (k * a.dot(omega))
+}

@@ -1,1 +1,604 @@
-//! Contacts of the wheels of a block.
+//! Contacts of the wheels with the ground, in slots.
+//!
+//! Each wheel has two slots: most wheels touch the plane or a sphere, some both or two spheres. A
+//! slot is filled lane by lane; rovers that share it may touch different things there. Detection
+//! at the midpoint of the step and relocation to its end follow [`crate::contact`] and
+//! [`crate::geometry::query`]. With the unit normal n, the unit axle s and the rolling direction
+//! `t = n × s / |n × s|`, a wheel's lowest point over a plane lies along `t × s` from its centre.
+//!
+//! What is rare is declined: a wheel that nearly lies flat, passes a sphere within the step or
+//! touches more than two things, a box near the ground, more than [`MAX_CONTACTS`] contacts.
+
+use nalgebra::Vector3;
+
+use super::forecast::Forecast;
+use super::ground::{Ground, GroundSphere, turning};
+use super::machine::Machine;
+use super::parts::{Parts, Twist};
+use super::poses::Poses;
+use super::problem::MAX_CONTACTS;
+use crate::contact::detection::touch_of_disc;
+use crate::contact::{Contact, ContactFrame, ContactKey, Part};
+use crate::geometry::query::NEAREST;
+use crate::geometry::query::sweep::DEEP;
+use crate::geometry::{Disc, Sphere};
+use crate::integrator::WarmStart;
+use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
+
+/// Number of the plane in every terrain that has one.
+const PLANE: u32 = 0;
+
+/// Slots of a wheel.
+pub const SLOTS: usize = 2;
+
+/// Sine of the angle between axle and normal below which a wheel has no rolling direction.
+const PARALLEL: f64 = 1e-9;
+
+/// Lengths below which a direction is not taken from a difference, m.
+const NO_DIRECTION: f64 = 1e-12;
+
+/// A contact, of the same wheel in every lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Slot<T: Lane> {
+    /// Where it is a contact. Elsewhere the other fields mean nothing.
+    pub active: T::Mask,
+    /// Point of the wheel relative to the trunk's origin, m.
+    pub point: Vec3<T>,
+    /// Normal, from the ground to the wheel.
+    pub n: Vec3<T>,
+    /// Rolling direction.
+    pub t: Vec3<T>,
+    /// `t × n`.
+    pub b: Vec3<T>,
+    /// m.
+    pub gap: T,
+    on_sphere: T::Mask,
+    sphere: GroundSphere<T>,
+}
+
+/// The contacts of one rover in the order of detection.
+#[derive(Clone, Copy, Debug)]
+pub struct Listed {
+    /// Their number, at most [`MAX_CONTACTS`].
+    pub n: usize,
+    /// Slot of each.
+    pub slots: [u8; MAX_CONTACTS],
+    /// Number of the ground's primitive of each.
+    pub primitives: [u32; MAX_CONTACTS],
+}
+
+/// The contacts of a block.
+#[derive(Clone, Debug)]
+pub struct Contacts<T: Lane> {
+    token: T::Token,
+    parts: Parts,
+    twists: Vec<Twist<T>>,
+    slots: Vec<Slot<T>>,
+    used: Vec<usize>,
+    lists: [Listed; MAX_LANES],
+    /// Whether every slot in use is active in all lanes.
+    is_full: bool,
+    /// Place of each slot among the contacts of each lane.
+    places: Vec<[u8; MAX_LANES]>,
+}
+
+/// What one detection looks at.
+struct Sight<'a, T: Lane> {
+    middle: &'a Poses<T>,
+    end: &'a Poses<T>,
+    v: &'a [T],
+    forecast: &'a Forecast<T>,
+    /// Height of the trunk's origin over the plane at the midpoint, m.
+    height: T,
+}
+
+impl<T: Lane> Contacts<T> {
+    /// Room for a machine.
+    ///
+    /// # Panics
+    /// If it has more than 128 wheels.
+    #[must_use]
+    pub fn new(token: T::Token, machine: &Machine) -> Self {
+        assert!(
+            machine.wheels.len() <= 128,
+            "invariant: slots are numbered by 8 bits"
+        );
+        let parts = Parts::of(machine);
+        let n_slots = SLOTS * parts.wheels.len();
+        let zero = T::splat(token, 0.0);
+        let nowhere = Vec3::new(zero, zero, zero);
+        let slot = Slot {
+            active: T::mask(token, 0),
+            point: nowhere,
+            n: nowhere,
+            t: nowhere,
+            b: nowhere,
+            gap: zero,
+            on_sphere: T::mask(token, 0),
+            sphere: GroundSphere {
+                centre: nowhere,
+                radius: zero,
+                number: zero,
+            },
+        };
+        let twist = Twist {
+            angular: nowhere,
+            linear: nowhere,
+        };
+        Self {
+            token,
+            twists: vec![twist; parts.n_carriers()],
+            parts,
+            slots: vec![slot; n_slots],
+            used: Vec::with_capacity(n_slots),
+            lists: [Listed::NONE; MAX_LANES],
+            is_full: false,
+            places: vec![[0; MAX_LANES]; n_slots],
+        }
+    }
+
+    /// Number of slots.
+    #[must_use]
+    pub fn n_slots(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// Slots with a contact in any lane, ascending.
+    #[inline(always)]
+    #[must_use]
+    pub fn used(&self) -> &[usize] {
+        &self.used
+    }
+
+    /// A slot.
+    #[inline(always)]
+    #[must_use]
+    pub fn slot(&self, slot: usize) -> &Slot<T> {
+        &self.slots[slot]
+    }
+
+    /// Wheel of a slot.
+    #[inline(always)]
+    #[must_use]
+    pub fn wheel(slot: usize) -> usize {
+        slot / SLOTS
+    }
+
+    /// The contacts of a rover.
+    #[inline(always)]
+    #[must_use]
+    pub fn list(&self, lane: usize) -> &Listed {
+        &self.lists[lane]
+    }
+
+    /// Whether every slot in use is active in all lanes: a contact's place is then the same in all.
+    #[inline(always)]
+    pub(super) fn is_full(&self) -> bool {
+        self.is_full
+    }
+
+    /// A contact of a rover by its place in the list, with its slot.
+    #[must_use]
+    pub fn contact(&self, machine: &Machine, lane: usize, place: usize) -> (usize, Contact) {
+        let list = &self.lists[lane];
+        let slot = usize::from(list.slots[place]);
+        let (own, wheel) = (&self.slots[slot], Self::wheel(slot));
+        let frame = ContactFrame {
+            n: own.n.get(lane).into(),
+            t: own.t.get(lane).into(),
+            b: own.b.get(lane).into(),
+        };
+        let contact = Contact {
+            key: Self::key(list, place),
+            part: Part::Wheel(wheel),
+            body: machine.wheels[wheel].body,
+            other: None,
+            point: own.point.get(lane).into(),
+            frame,
+            gap: own.gap.get(lane),
+        };
+        (slot, contact)
+    }
+
+    /// Place of a slot among the contacts of each lane in which it is active.
+    #[inline(always)]
+    pub(super) fn places(&self, slot: usize) -> &[u8; MAX_LANES] {
+        &self.places[slot]
+    }
+
+    /// Key of a rover's contact, by its place in the list.
+    #[inline(always)]
+    fn key(list: &Listed, place: usize) -> ContactKey {
+        let wheel = Part::Wheel(Self::wheel(usize::from(list.slots[place])));
+        ContactKey::on_ground(wheel, NEAREST, list.primitives[place])
+    }
+
+    /// Fills `p` (3 n_c) with the impulses that a rover remembers of its contacts, N s, zero for new
+    /// ones. Returns whether the last step had exactly these contacts.
+    #[inline(always)]
+    pub fn recall(&self, lane: usize, memory: &WarmStart, p: &mut [f64]) -> bool {
+        let list = &self.lists[lane];
+        let mut is_same = memory.impulses.len() == list.n;
+        for (place, out) in p.chunks_exact_mut(3).enumerate().take(list.n) {
+            let wanted = Self::key(list, place);
+            let same = memory.impulses.get(place);
+            let known = if let Some((_, known)) = same.filter(|(key, _)| *key == wanted) {
+                *known
+            } else {
+                is_same = false;
+                let found = memory.impulses.iter().find(|(key, _)| *key == wanted);
+                found.map_or([0.0; 3], |(_, known)| *known)
+            };
+            out.copy_from_slice(&known);
+        }
+        is_same
+    }
+
+    /// Makes a rover remember the impulses of its contacts, `p` (3 n_c), N s.
+    #[inline(always)]
+    pub fn remember(&self, lane: usize, p: &[f64], memory: &mut WarmStart) {
+        let list = &self.lists[lane];
+        memory.impulses.clear();
+        for (place, p) in p.chunks_exact(3).enumerate().take(list.n) {
+            let known = (Self::key(list, place), [p[0], p[1], p[2]]);
+            memory.impulses.push(known);
+        }
+    }
+
+    /// Finds the contacts of a step and moves them to its end.
+    ///
+    /// `middle` and `end`: poses at the midpoint of the step, where gaps are measured, and at its
+    /// predicted end. `v`: velocity (nv) before the step. Returns the lanes that are declined.
+    ///
+    /// # Panics
+    /// If an argument is of another machine.
+    pub fn detect(
+        &mut self,
+        ground: &mut Ground<T>,
+        middle: &Poses<T>,
+        end: &Poses<T>,
+        v: &[T],
+        forecast: &Forecast<T>,
+    ) -> T::Mask {
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || self.detect_here(ground, middle, end, v, forecast),
+        )
+    }
+
+    #[inline(always)]
+    fn detect_here(
+        &mut self,
+        ground: &mut Ground<T>,
+        middle: &Poses<T>,
+        end: &Poses<T>,
+        v: &[T],
+        forecast: &Forecast<T>,
+    ) -> T::Mask {
+        let sight = Sight {
+            middle,
+            end,
+            v,
+            forecast,
+            height: ground.height(middle.origin),
+        };
+        self.parts.find_twists(middle, v, &mut self.twists);
+        let mut declined = T::mask(self.token, 0);
+        for b in 0..self.parts.boxes.len() {
+            declined = declined | self.look_at_box(b, ground, &sight);
+        }
+        self.used.clear();
+        let height_at_end = ground.height(end.origin);
+        for w in 0..self.parts.wheels.len() {
+            declined = declined | self.look_at_wheel(w, ground, &sight);
+            let first = SLOTS * w;
+            if !self.slots[first].active.any() {
+                continue;
+            }
+            let pose = &end.bodies[self.parts.wheels[w].body];
+            let (s, centre) = (
+                self.parts.wheels[w].axle(pose),
+                self.parts.wheels[w].centre(pose),
+            );
+            for slot in first..first + SLOTS {
+                if self.slots[slot].active.any() {
+                    self.used.push(slot);
+                    let flat = self.relocate(slot, ground, end, height_at_end, s, centre);
+                    declined = declined | flat;
+                }
+            }
+        }
+        declined | self.list_contacts()
+    }
+
+    /// Whether a box is near the ground.
+    #[inline(always)]
+    fn look_at_box(
+        &mut self,
+        number: usize,
+        ground: &mut Ground<T>,
+        sight: &Sight<'_, T>,
+    ) -> T::Mask {
+        let solid = &self.parts.boxes[number];
+        let pose = &sight.middle.bodies[solid.body];
+        let n = ground.normal;
+        let (centre, R) = (solid.centre(pose), solid.axes(pose));
+        let reach = (sight.forecast).reach(
+            #[inline(always)]
+            || solid.speed(&self.twists[solid.carrier], centre),
+        );
+        let local = R.transpose_times(n);
+        let half = Vec3::splat(self.token, solid.half_size);
+        let drop = (local.x * half.x).abs() + (local.y * half.y).abs() + (local.z * half.z).abs();
+        let near_plane = (sight.height + n.dot(centre) - drop).le(reach);
+        if !ground.has_spheres() {
+            return near_plane;
+        }
+        let at_end = &sight.end.bodies[solid.body];
+        let shift = sight.end.origin - sight.middle.origin + (solid.centre(at_end) - centre);
+        let bound = T::splat(self.token, solid.bound);
+        let motion = shift.norm() + turning(&at_end.R, &pose.R) * bound;
+        let world = sight.middle.origin + centre;
+        near_plane | ground.is_near_box(number, world, &R, solid.half_size, reach + motion)
+    }
+
+    /// Fills the slots of a wheel with its contacts at the midpoint.
+    #[inline(always)]
+    fn look_at_wheel(&mut self, w: usize, ground: &mut Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
+        let wheel = &self.parts.wheels[w];
+        let pose = &sight.middle.bodies[wheel.body];
+        let (n, s, centre) = (ground.normal, wheel.axle(pose), wheel.centre(pose));
+        let radius = T::splat(self.token, wheel.radius);
+        let (across, along) = (n.cross(s), n.dot(s));
+        let length = across.norm();
+        let height = sight.height + n.dot(centre);
+        let gap = height - radius * length;
+        let twist = &self.twists[wheel.carrier];
+        let u_N = if sight.forecast.needs_velocity(gap) {
+            let lever = centre.cross(n) - across * (radius * along / length);
+            n.dot(twist.linear) + twist.angular.dot(lever)
+        } else {
+            radius
+        };
+        let on_plane = sight.forecast.admits(gap, u_N);
+        // The second and third point of the rim.
+        let reach = (sight.forecast).reach(
+            #[inline(always)]
+            || wheel.speed(&self.twists[wheel.carrier], centre, sight.v),
+        );
+        let half = radius.like(0.5);
+        let mut declined = (height + half * radius * length).le(reach);
+        let none = T::mask(self.token, 0);
+        let first = SLOTS * w;
+        self.slots[first].active = on_plane;
+        self.slots[first].on_sphere = none;
+        self.slots[first + 1].active = none;
+        self.slots[first + 1].on_sphere = none;
+        if ground.has_spheres() {
+            declined = declined | self.look_at_spheres(w, ground, sight, s, centre, reach);
+        }
+        declined
+    }
+
+    /// Adds the contacts of a wheel with spheres at the midpoint; it has the axle `s` and the centre
+    /// `centre` there.
+    #[inline(always)]
+    fn look_at_spheres(
+        &mut self,
+        w: usize,
+        ground: &mut Ground<T>,
+        sight: &Sight<'_, T>,
+        s: Vec3<T>,
+        centre: Vec3<T>,
+        reach: T,
+    ) -> T::Mask {
+        let wheel = &self.parts.wheels[w];
+        let origin = sight.middle.origin;
+        let at_end = wheel.centre(&sight.end.bodies[wheel.body]);
+        let half_way = sight.end.origin - origin + at_end - centre;
+        let motion = half_way.norm();
+        let need = reach + motion;
+        let mut declined = ground.look_around_wheel(w, origin + centre, wheel.radius, need);
+        let radius = T::splat(self.token, wheel.radius);
+        let zero = radius.like(0.0);
+        let twist = self.twists[wheel.carrier];
+        for sphere in ground.near_wheel(w) {
+            let offset = sphere.centre - origin - centre;
+            let along = offset.dot(s);
+            let in_plane = offset - s * along;
+            let in_plane_length = in_plane.norm();
+            let beyond = (in_plane_length - radius).max(zero);
+            let distance = (along * along + beyond * beyond).sqrt();
+            let gap = distance - sphere.radius;
+            let is_deep = (gap - motion).lt(-(radius.like(DEEP) * sphere.radius));
+            if is_deep.any() {
+                let passes = self.passing(w, is_deep, sphere, sight, half_way);
+                declined = declined | passes;
+            }
+            let u_N = if sight.forecast.needs_velocity(gap) {
+                let to_point = in_plane * (in_plane_length.min(radius) / in_plane_length);
+                let n = (to_point - offset) * (radius.like(1.0) / distance);
+                n.dot(twist.linear + twist.angular.cross(centre + to_point))
+            } else {
+                radius
+            };
+            let admitted = sight.forecast.admits(gap, u_N);
+            if admitted.any() {
+                // Normal or rolling direction are not defined by differences.
+                let least = radius.like(NO_DIRECTION);
+                declined = declined | (admitted & (in_plane_length.le(least) | distance.le(least)));
+                declined = declined | self.enter(SLOTS * w, admitted, sphere);
+            }
+        }
+        declined
+    }
+
+    /// Enters a contact with a sphere into the first free slot of a wheel. Returns where none is.
+    #[inline(always)]
+    fn enter(&mut self, first: usize, admitted: T::Mask, sphere: &GroundSphere<T>) -> T::Mask {
+        let mut rest = admitted;
+        for slot in &mut self.slots[first..first + SLOTS] {
+            let here = rest & !slot.active;
+            rest = rest & slot.active;
+            if here.any() {
+                slot.active = slot.active | here;
+                slot.on_sphere = slot.on_sphere | here;
+                let own = &mut slot.sphere;
+                own.centre = Vec3::select(here, sphere.centre, own.centre);
+                own.radius = T::select(here, sphere.radius, own.radius);
+                own.number = T::select(here, sphere.number, own.number);
+            }
+        }
+        rest
+    }
+
+    /// Where a wheel passes a sphere within the step, of the lanes asked for.
+    #[inline(always)]
+    fn passing(
+        &self,
+        w: usize,
+        asked: T::Mask,
+        sphere: &GroundSphere<T>,
+        sight: &Sight<'_, T>,
+        half_way: Vec3<T>,
+    ) -> T::Mask {
+        let wheel = &self.parts.wheels[w];
+        let pose = &sight.middle.bodies[wheel.body];
+        let (s, centre) = (wheel.axle(pose), wheel.centre(pose));
+        let spoke = pose.R.times_shared(wheel.spoke);
+        let mut lanes = asked.bits();
+        let mut passes = 0;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            let disc = Disc {
+                centre: centre.get(lane).into(),
+                axle: s.get(lane).into(),
+                spoke: spoke.get(lane).into(),
+                radius: wheel.radius,
+            };
+            let ball = Sphere {
+                centre: sphere.centre.get(lane).into(),
+                radius: sphere.radius.get(lane),
+            };
+            let base = Vector3::from(sight.middle.origin.get(lane));
+            let half_way = Vector3::from(half_way.get(lane));
+            if touch_of_disc(&disc, &ball, &base, &half_way).is_some() {
+                passes |= 1 << lane;
+            }
+        }
+        T::mask(self.token, passes)
+    }
+
+    /// Evaluates a slot at the end of the step, where the wheel has the axle `s` and the centre
+    /// `centre`. Returns where a frame is not defined.
+    #[inline(always)]
+    fn relocate(
+        &mut self,
+        slot: usize,
+        ground: &Ground<T>,
+        end: &Poses<T>,
+        height: T,
+        s: Vec3<T>,
+        centre: Vec3<T>,
+    ) -> T::Mask {
+        let wheel = &self.parts.wheels[slot / SLOTS];
+        let slot = &mut self.slots[slot];
+        let radius = T::splat(self.token, wheel.radius);
+        let parallel = radius.like(PARALLEL);
+        let mut undefined = T::mask(self.token, 0);
+        if (slot.active & !slot.on_sphere).any() {
+            let n = ground.normal;
+            let across = n.cross(s);
+            let length = across.norm();
+            let t = across * (radius.like(1.0) / length);
+            slot.n = n;
+            slot.t = t;
+            slot.point = centre + t.cross(s) * radius;
+            slot.gap = height + n.dot(centre) - radius * length;
+            undefined = slot.active & !slot.on_sphere & length.le(parallel);
+        }
+        if slot.on_sphere.any() {
+            let sphere = &slot.sphere;
+            let offset = sphere.centre - end.origin - centre;
+            let in_plane = offset - s * offset.dot(s);
+            let length = in_plane.norm();
+            let outward = in_plane * (radius.like(1.0) / length);
+            let to_point = outward * length.min(radius);
+            let from_sphere = to_point - offset;
+            let distance = from_sphere.norm();
+            let n = from_sphere * (radius.like(1.0) / distance);
+            let across = n.cross(s);
+            let across_length = across.norm();
+            let rolls = across_length.gt(parallel);
+            let mut t = across * (radius.like(1.0) / across_length);
+            if (slot.on_sphere & !rolls).any() {
+                // The face touches: along the rim.
+                let rim = s.cross(outward);
+                let rim = rim - n * n.dot(rim);
+                t = Vec3::select(rolls, t, rim * (radius.like(1.0) / rim.norm()));
+            }
+            let here = slot.on_sphere;
+            let least = radius.like(NO_DIRECTION);
+            undefined = undefined | (here & (length.le(least) | distance.le(least)));
+            slot.n = Vec3::select(here, n, slot.n);
+            slot.t = Vec3::select(here, t, slot.t);
+            slot.point = Vec3::select(here, centre + to_point, slot.point);
+            slot.gap = T::select(here, distance - sphere.radius, slot.gap);
+        }
+        slot.b = slot.t.cross(slot.n);
+        undefined
+    }
+
+    /// Lists the contacts of every lane. Returns the lanes with too many.
+    #[inline(always)]
+    fn list_contacts(&mut self) -> T::Mask {
+        for list in &mut self.lists[..T::LANES] {
+            list.n = 0;
+        }
+        let mut too_many = 0;
+        self.is_full = true;
+        for &slot in &self.used {
+            let own = &mut self.slots[slot];
+            let on_sphere = own.on_sphere.bits();
+            let mut numbers = [0.0; MAX_LANES];
+            if on_sphere != 0 {
+                own.sphere.number.store(&mut numbers[..T::LANES]);
+            }
+            let places = &mut self.places[slot];
+            self.is_full &= own.active.all();
+            let mut lanes = own.active.bits();
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize;
+                lanes &= lanes - 1;
+                let list = &mut self.lists[lane];
+                if list.n == MAX_CONTACTS {
+                    too_many |= 1 << lane;
+                    continue;
+                }
+                places[lane] = list.n as u8;
+                list.slots[list.n] = slot as u8;
+                list.primitives[list.n] = if on_sphere >> lane & 1 == 1 {
+                    numbers[lane] as u32
+                } else {
+                    PLANE
+                };
+                list.n += 1;
+            }
+            if too_many != 0 {
+                self.is_full = false;
+                own.active = own.active & !T::mask(self.token, too_many);
+            }
+        }
+        T::mask(self.token, too_many)
+    }
+}
+
+impl Listed {
+    const NONE: Self = Self {
+        n: 0,
+        slots: [0; MAX_CONTACTS],
+        primitives: [0; MAX_CONTACTS],
+    };
+}

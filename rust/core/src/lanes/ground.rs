@@ -1,1 +1,336 @@
-//! The ground under each rover of a block.
+//! The ground under the rovers of a block: a plane, spheres, or spheres on a plane.
+//!
+//! A rover over a plane alone pays for the plane alone. Spheres are searched rover by rover, and
+//! seldom: a wheel keeps those near it until it has moved further than the search looked ahead, and
+//! a box keeps its distance to the nearest. What is kept decides only what need not be examined, so
+//! a step does not depend on when a search was made.
+
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::geometry::{OrientedBox, Primitive, Sphere, Terrain};
+use crate::scalar::{Lane, LaneMask, MAX_LANES, Mat3, Vec3};
+
+/// Most spheres near a wheel. A wheel near more is declined.
+const MAX_NEAR: usize = 8;
+
+/// How far beyond its reach a search for a wheel looks, m: first, and where that finds too many.
+/// Twice as far examines twice as many spheres a step and searches half as often.
+const AHEAD: [f64; 3] = [0.1, 0.02, 0.0];
+
+/// How far beyond its reach a search for a box looks, m.
+const AHEAD_OF_BOX: f64 = 0.5;
+
+/// Covers the rounding of distances, m, for coordinates up to the size of a terrain.
+const ROUNDING: f64 = 1e-6;
+
+/// The place of a sphere that has not been found.
+const NONE: Sphere = Sphere {
+    centre: Vector3::new(0.0, 0.0, 0.0),
+    radius: f64::NEG_INFINITY,
+};
+
+/// A sphere of the ground under each rover.
+#[derive(Clone, Copy, Debug)]
+pub struct GroundSphere<T> {
+    /// World, m.
+    pub centre: Vec3<T>,
+    /// m; −∞ for a rover that has no such sphere.
+    pub radius: T,
+    /// Its number in the terrain.
+    pub number: T,
+}
+
+/// The spheres near a wheel.
+#[derive(Clone, Debug)]
+struct Near<T> {
+    /// Place of the wheel's centre when they were searched, world, m.
+    from: Vec3<T>,
+    /// They are all that come as near to the wheel as this, m.
+    within: T,
+    spheres: [GroundSphere<T>; MAX_NEAR],
+    counts: [usize; MAX_LANES],
+    /// The largest count.
+    n: usize,
+}
+
+/// The spheres around a box.
+#[derive(Clone, Debug)]
+struct Around<T> {
+    /// Place and attitude of the box when they were searched; world, m.
+    from: Vec3<T>,
+    R: Mat3<T>,
+    /// No sphere comes nearer to the box than this, m.
+    clearance: T,
+}
+
+/// The ground of a block.
+#[derive(Clone)]
+pub struct Ground<T: Lane> {
+    /// Unit normal of the plane.
+    pub(super) normal: Vec3<T>,
+    /// Offset of the plane, m; ∞ without a plane.
+    pub(super) offset: T,
+    /// Terrain of each lane, once it has one.
+    terrains: Vec<Option<Arc<dyn Terrain>>>,
+    /// Those that may have more than a plane.
+    fields: Vec<Option<Arc<dyn Terrain>>>,
+    has_spheres: bool,
+    wheels: Vec<Near<T>>,
+    boxes: Vec<Around<T>>,
+}
+
+impl<T: Lane> Ground<T> {
+    /// Flat ground at height 0 under every rover.
+    #[must_use]
+    pub fn new(token: T::Token, n_wheels: usize, n_boxes: usize) -> Self {
+        let nowhere = Vec3::splat(token, [0.0; 3]);
+        let none = GroundSphere {
+            centre: nowhere,
+            radius: T::splat(token, f64::NEG_INFINITY),
+            number: T::splat(token, 0.0),
+        };
+        let near = Near {
+            from: nowhere,
+            within: T::splat(token, f64::INFINITY),
+            spheres: [none; MAX_NEAR],
+            counts: [0; MAX_LANES],
+            n: 0,
+        };
+        let around = Around {
+            from: nowhere,
+            R: Mat3 {
+                x: nowhere,
+                y: nowhere,
+                z: nowhere,
+            },
+            clearance: T::splat(token, f64::INFINITY),
+        };
+        Self {
+            normal: Vec3::splat(token, [0.0, 1.0, 0.0]),
+            offset: T::splat(token, 0.0),
+            terrains: vec![None; T::LANES],
+            fields: vec![None; T::LANES],
+            has_spheres: false,
+            wheels: vec![near; n_wheels],
+            boxes: vec![around; n_boxes],
+        }
+    }
+
+    /// Puts a rover on a terrain.
+    pub fn set_lane(&mut self, lane: usize, terrain: &Arc<dyn Terrain>) {
+        // What is known of a terrain holds for any rover on it.
+        if (self.terrains[lane].as_ref()).is_some_and(|own| Arc::ptr_eq(own, terrain)) {
+            return;
+        }
+        self.terrains[lane] = Some(Arc::clone(terrain));
+        let plane = terrain.ground();
+        let (normal, offset) = match plane {
+            Some(plane) => ((*plane.normal()).into(), plane.offset()),
+            None => ([0.0, 1.0, 0.0], f64::INFINITY),
+        };
+        self.normal.set(lane, normal);
+        self.offset.set(lane, offset);
+        let is_plane = plane.is_some() && !terrain.can_be_passed();
+        self.fields[lane] = (!is_plane).then(|| Arc::clone(terrain));
+        self.has_spheres = self.fields.iter().any(Option::is_some);
+        // A plane alone needs no search, and the first step on spheres makes one.
+        let known = if is_plane {
+            f64::INFINITY
+        } else {
+            f64::NEG_INFINITY
+        };
+        for near in &mut self.wheels {
+            near.keep(lane, &[]);
+            near.from.set(lane, [0.0; 3]);
+            near.within.set(lane, known);
+        }
+        for around in &mut self.boxes {
+            around.from.set(lane, [0.0; 3]);
+            around.clearance.set(lane, known);
+        }
+    }
+
+    /// Whether any rover's ground may have spheres.
+    #[inline(always)]
+    pub(super) fn has_spheres(&self) -> bool {
+        self.has_spheres
+    }
+
+    /// Height of a point over the plane, m.
+    #[inline(always)]
+    pub(super) fn height(&self, x: Vec3<T>) -> T {
+        self.normal.dot(x) + self.offset
+    }
+
+    /// Spheres near a wheel, for the rover that has most; see [`Self::look_around_wheel`].
+    #[inline(always)]
+    pub(super) fn near_wheel(&self, wheel: usize) -> &[GroundSphere<T>] {
+        let near = &self.wheels[wheel];
+        &near.spheres[..near.n]
+    }
+
+    /// Makes [`Self::near_wheel`] contain all spheres that come closer than `need` (m) to a ball of
+    /// radius `radius` (m) about `centre` (world, m). True where there are too many.
+    #[inline(always)]
+    pub(super) fn look_around_wheel(
+        &mut self,
+        wheel: usize,
+        centre: Vec3<T>,
+        radius: f64,
+        need: T,
+    ) -> T::Mask {
+        let near = &mut self.wheels[wheel];
+        let moved = (centre - near.from).norm();
+        let is_known = (moved + need + need.like(ROUNDING)).le(near.within);
+        let mut too_many = 0;
+        let mut unknown = (!is_known).bits();
+        while unknown != 0 {
+            let lane = unknown.trailing_zeros() as usize;
+            unknown &= unknown - 1;
+            if let Some(field) = &self.fields[lane] {
+                let place = Vector3::from(centre.get(lane));
+                if !near.search(lane, &**field, &place, radius, need.get(lane)) {
+                    too_many |= 1 << lane;
+                }
+            }
+        }
+        T::mask(need.token(), too_many)
+    }
+
+    /// Whether a sphere comes as near as `need` (m) to a box with its centre at `centre` (world, m)
+    /// and the axes `R`.
+    #[inline(always)]
+    pub(super) fn is_near_box(
+        &mut self,
+        number: usize,
+        centre: Vec3<T>,
+        R: &Mat3<T>,
+        half_size: [f64; 3],
+        need: T,
+    ) -> T::Mask {
+        let around = &mut self.boxes[number];
+        let bound = Vector3::from(half_size).norm();
+        let moved = (centre - around.from).norm() + turning(R, &around.R) * need.like(bound);
+        let is_clear = (moved + need + need.like(ROUNDING)).lt(around.clearance);
+        let mut is_near = 0;
+        let mut unknown = (!is_clear).bits();
+        while unknown != 0 {
+            let lane = unknown.trailing_zeros() as usize;
+            unknown &= unknown - 1;
+            if let Some(field) = &self.fields[lane] {
+                let columns = [R.x, R.y, R.z].map(|column| Vector3::from(column.get(lane)));
+                let solid = OrientedBox {
+                    centre: Vector3::from(centre.get(lane)),
+                    R: Matrix3::from_columns(&columns),
+                    half_size: Vector3::from(half_size),
+                };
+                if around.search(lane, &**field, &solid, bound, need.get(lane)) {
+                    is_near |= 1 << lane;
+                }
+            }
+        }
+        T::mask(need.token(), is_near)
+    }
+}
+
+impl<T: Lane> Near<T> {
+    /// Searches the spheres of one rover. False if more than [`MAX_NEAR`] are as near as `need`.
+    #[cold]
+    fn search(
+        &mut self,
+        lane: usize,
+        field: &dyn Terrain,
+        centre: &Vector3<f64>,
+        radius: f64,
+        need: f64,
+    ) -> bool {
+        for ahead in AHEAD {
+            let within = need + ahead;
+            let mut found = [(0, NONE); MAX_NEAR];
+            let mut count = 0;
+            visit_spheres(field, centre, radius + within, |number, sphere| {
+                if let Some(place) = found.get_mut(count) {
+                    *place = (number, *sphere);
+                }
+                count += 1;
+            });
+            if let Some(found) = found.get(..count) {
+                self.keep(lane, found);
+                self.from.set(lane, (*centre).into());
+                self.within.set(lane, within);
+                return true;
+            }
+        }
+        self.keep(lane, &[]);
+        self.within.set(lane, f64::NEG_INFINITY);
+        false
+    }
+
+    /// Replaces the spheres of a rover.
+    fn keep(&mut self, lane: usize, spheres: &[(u32, Sphere)]) {
+        for (k, own) in self.spheres.iter_mut().enumerate() {
+            if let Some((number, sphere)) = spheres.get(k) {
+                own.centre.set(lane, sphere.centre.into());
+                own.radius.set(lane, sphere.radius);
+                own.number.set(lane, f64::from(*number));
+            } else {
+                own.radius.set(lane, f64::NEG_INFINITY);
+            }
+        }
+        self.counts[lane] = spheres.len();
+        self.n = self.counts.iter().fold(0, |most, &n| most.max(n));
+    }
+}
+
+impl<T: Lane> Around<T> {
+    /// Measures the clearance of one rover's box. True if it is at most `need`, m.
+    #[cold]
+    fn search(
+        &mut self,
+        lane: usize,
+        field: &dyn Terrain,
+        solid: &OrientedBox,
+        bound: f64,
+        need: f64,
+    ) -> bool {
+        let mut clearance = need + AHEAD_OF_BOX;
+        visit_spheres(field, &solid.centre, bound + clearance, |_, sphere| {
+            let local = solid.R.tr_mul(&(sphere.centre - solid.centre));
+            let outside = (local.abs() - solid.half_size).map(|x| x.max(0.0));
+            clearance = clearance.min(outside.norm() - sphere.radius);
+        });
+        self.from.set(lane, solid.centre.into());
+        self.R.x.set(lane, solid.axis(0).into());
+        self.R.y.set(lane, solid.axis(1).into());
+        self.R.z.set(lane, solid.axis(2).into());
+        self.clearance.set(lane, clearance);
+        clearance <= need
+    }
+}
+
+/// Upper bound on the motion of a point at unit distance from the centre: the Frobenius norm of the
+/// difference of two attitudes.
+#[inline(always)]
+pub(super) fn turning<T: Lane>(R: &Mat3<T>, S: &Mat3<T>) -> T {
+    let (x, y, z) = (R.x - S.x, R.y - S.y, R.z - S.z);
+    (x.dot(x) + y.dot(y) + z.dot(z)).sqrt()
+}
+
+/// Visits exactly the spheres that come as near to `centre` (world, m) as `within`, m.
+fn visit_spheres(
+    field: &dyn Terrain,
+    centre: &Vector3<f64>,
+    within: f64,
+    mut visit: impl FnMut(u32, &Sphere),
+) {
+    field.visit_near(centre, within, &mut |number, primitive| match primitive {
+        Primitive::Plane(_) => {} // the ground's own, measured by itself
+        Primitive::Sphere(sphere) => {
+            if sphere.distance(centre) <= within {
+                visit(number, sphere);
+            }
+        }
+    });
+}

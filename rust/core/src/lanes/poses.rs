@@ -1,1 +1,186 @@
-//! Forward kinematics of a block.
+//! Forward kinematics: attitude, origin, joint axis and mass centre of every body.
+//!
+//! World axes. Positions are relative to the trunk's origin, so that a rover far from the world's
+//! origin loses no precision.
+
+use super::inertias::Inertias;
+use super::machine::{Axis, Machine};
+use super::place::Place;
+use crate::scalar::elementary::sin_cos;
+use crate::scalar::{Lane, Mat3, Vec3};
+
+/// Poses of all bodies.
+#[derive(Clone, Debug)]
+pub struct Poses<T: Lane> {
+    token: T::Token,
+    /// Origin of the trunk, world, m.
+    pub origin: Vec3<T>,
+    /// One entry a body.
+    pub bodies: Vec<Pose<T>>,
+}
+
+/// Pose of a body.
+#[derive(Clone, Copy, Debug)]
+pub struct Pose<T> {
+    /// `R_WB`; of a spinner, the attitude before its own rotation.
+    pub R: Mat3<T>,
+    /// Origin of its frame, m.
+    pub r: Vec3<T>,
+    /// Mass centre, m.
+    pub c: Vec3<T>,
+    /// Unit axis of its joint; zero for the trunk.
+    pub axis: Vec3<T>,
+    /// `r × axis`, m: velocity of its material point at the trunk's origin per unit of its joint's
+    /// velocity. A force f with the moment n about the trunk's origin has on the joint the
+    /// generalized force `axis · n + swing · f`.
+    pub swing: Vec3<T>,
+    /// From its carrier's origin to its own, m.
+    pub lever: Vec3<T>,
+}
+
+impl<T: Lane> Poses<T> {
+    /// Room for a machine.
+    #[must_use]
+    pub fn new(token: T::Token, machine: &Machine) -> Self {
+        let zero = Vec3::splat(token, [0.0; 3]);
+        let pose = Pose {
+            R: Mat3 {
+                x: zero,
+                y: zero,
+                z: zero,
+            },
+            r: zero,
+            c: zero,
+            axis: zero,
+            swing: zero,
+            lever: zero,
+        };
+        Self {
+            token,
+            origin: zero,
+            bodies: vec![pose; machine.n_bodies()],
+        }
+    }
+
+    /// Recomputes all poses.
+    ///
+    /// # Panics
+    /// If an argument is of another machine.
+    pub fn update(&mut self, machine: &Machine, inertias: &Inertias<T>, place: &Place<T>) {
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || self.update_here(machine, inertias, place),
+        );
+    }
+
+    #[inline(always)]
+    fn update_here(&mut self, machine: &Machine, inertias: &Inertias<T>, place: &Place<T>) {
+        let n = machine.links.len();
+        let (links, inertias) = (&machine.links[..n], &inertias.bodies[..n]);
+        let (bodies, joints) = (&mut self.bodies[..n], &place.joints[..n - 1]);
+        self.origin = place.position;
+        let trunk = &mut bodies[0];
+        trunk.R = rotation(&place.attitude);
+        if !links[0].is_centred {
+            trunk.c = trunk.R.times(inertias[0].centre);
+        }
+        for b in 1..n {
+            let (before, own) = bodies.split_at_mut(b);
+            let (link, own) = (&links[b], &mut own[0]);
+            let carrier = &before[link.parent];
+            let lever = carrier.R.times_shared(link.position);
+            let r = carrier.r + lever;
+            let frame = match &link.rotation {
+                None => carrier.R,
+                Some(fixed) => times_columns(&carrier.R, fixed),
+            };
+            let axis = link.axis.turned(&frame);
+            own.R = if link.is_spinner {
+                frame
+            } else {
+                link.axis.rotate(&frame, axis, joints[b - 1])
+            };
+            own.c = if link.is_centred {
+                r
+            } else {
+                r + own.R.times(inertias[b].centre)
+            };
+            own.r = r;
+            own.lever = lever;
+            own.axis = axis;
+            own.swing = r.cross(axis);
+        }
+    }
+}
+
+/// Rotation matrix of a unit quaternion x, y, z, w.
+#[inline(always)]
+pub(super) fn rotation<T: Lane>(q: &[T; 4]) -> Mat3<T> {
+    let [x, y, z, w] = *q;
+    let (xx, yy, zz, ww) = (x * x, y * y, z * z, w * w);
+    let two = x.like(2.0);
+    let (xy, xz, yz) = (two * x * y, two * x * z, two * y * z);
+    let (wx, wy, wz) = (two * w * x, two * w * y, two * w * z);
+    Mat3 {
+        x: Vec3::new(ww + xx - yy - zz, xy + wz, xz - wy),
+        y: Vec3::new(xy - wz, ww - xx + yy - zz, yz + wx),
+        z: Vec3::new(xz + wy, yz - wx, ww - xx - yy + zz),
+    }
+}
+
+/// `R A` for a matrix that all lanes share, by its columns.
+#[inline(always)]
+pub(super) fn times_columns<T: Lane>(R: &Mat3<T>, A: &[[f64; 3]; 3]) -> Mat3<T> {
+    Mat3 {
+        x: R.times_shared(A[0]),
+        y: R.times_shared(A[1]),
+        z: R.times_shared(A[2]),
+    }
+}
+
+impl Axis {
+    /// The axis in the frame that `R` maps to.
+    #[inline(always)]
+    pub(super) fn turned<T: Lane>(&self, R: &Mat3<T>) -> Vec3<T> {
+        match self {
+            Self::X => R.x,
+            Self::Y => R.y,
+            Self::Z => R.z,
+            Self::General(u) => R.times_shared(*u),
+        }
+    }
+
+    /// `R · Rot(axis, angle)`; `turned` is the axis in the frame that `R` maps to.
+    #[inline(always)]
+    pub(super) fn rotate<T: Lane>(&self, R: &Mat3<T>, turned: Vec3<T>, angle: T) -> Mat3<T> {
+        let (s, c) = sin_cos(angle);
+        let Mat3 { x, y, z } = *R;
+        match self {
+            Self::X => {
+                let (y, z) = (y * c + z * s, z * c - y * s);
+                Mat3 { x, y, z }
+            }
+            Self::Y => {
+                let (z, x) = (z * c + x * s, x * c - z * s);
+                Mat3 { x, y, z }
+            }
+            Self::Z => {
+                let (x, y) = (x * c + y * s, y * c - x * s);
+                Mat3 { x, y, z }
+            }
+            Self::General(u) => {
+                // Rodrigues: e ↦ c e + s (u × e) + (1 − c) (u · e) u, with R (u × e) = R u × R e.
+                let rest = c.like(1.0) - c;
+                let column = |e: Vec3<T>, along: f64| {
+                    e * c + turned.cross(e) * s + turned * (rest * c.like(along))
+                };
+                Mat3 {
+                    x: column(x, u[0]),
+                    y: column(y, u[1]),
+                    z: column(z, u[2]),
+                }
+            }
+        }
+    }
+}

@@ -1,1 +1,477 @@
-//! Contact Jacobian, Delassus operator and impulses of a block.
+//! Contact Jacobian and Delassus operator `W = Hᵀ M̂⁻¹ H` of a block.
+//!
+//! As in [`crate::contact::delassus`]: with `M̂ = Lᵀ D L` and `Z = D^(-1/2) L^(-T) H` the operator is
+//! `W = Zᵀ Z`. A column of Z is nonzero along the path of its wheel, and a block of W is a product
+//! over the part of the path that two wheels share. Rows belong to slots ([`super::contacts`]). A
+//! slot that is active in some lanes only never changes what the others accumulate.
+
+use super::contacts::Contacts;
+use super::machine::{Machine, velocity};
+use super::mass_matrix::Factor;
+use super::poses::Poses;
+use super::problem::{ContactProblem, MAX_UNKNOWNS, block};
+use crate::multibody::model::BASE;
+use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
+
+/// Entries of a contact along n, t, b.
+pub type Triple<T> = [T; 3];
+
+/// The contacts of a block in matrix form.
+#[derive(Clone, Debug)]
+pub struct Rows<T: Lane> {
+    token: T::Token,
+    /// Bodies whose joints move a wheel, from the trunk outwards.
+    movers: Vec<Vec<usize>>,
+    /// Velocities that two wheels share: `common[a * n_wheels + b]`.
+    common: Vec<usize>,
+    /// Length of the longest path.
+    stride: usize,
+    /// Z along the path of each slot's wheel: `Z[slot * stride + k]`.
+    Z: Vec<Triple<T>>,
+    /// Blocks of W for the slots in use, row-major: [`block`] of their positions among them.
+    W: Vec<[T; 9]>,
+    /// Local velocity `Hᵀ v` before the step by slot, m/s.
+    pub u_before: Vec<Triple<T>>,
+}
+
+impl<T: Lane> Rows<T> {
+    /// Room for a machine with `n_slots` slots.
+    #[must_use]
+    pub fn new(token: T::Token, machine: &Machine, n_slots: usize) -> Self {
+        let paths: Vec<&[usize]> = (machine.wheels.iter())
+            .map(|wheel| machine.path(wheel.body))
+            .collect();
+        let mut common = Vec::with_capacity(paths.len() * paths.len());
+        for a in &paths {
+            for b in &paths {
+                common.push(a.iter().zip(*b).take_while(|(i, j)| i == j).count());
+            }
+        }
+        let movers = (machine.wheels.iter())
+            .map(|wheel| {
+                let own = (wheel.body > 0).then_some(wheel.body);
+                machine
+                    .ancestors(wheel.body)
+                    .iter()
+                    .copied()
+                    .chain(own)
+                    .collect()
+            })
+            .collect();
+        let stride = paths.iter().map(|path| path.len()).max().unwrap_or(0);
+        let zero = T::splat(token, 0.0);
+        Self {
+            token,
+            movers,
+            common,
+            stride,
+            Z: vec![[zero; 3]; n_slots * stride],
+            W: vec![[zero; 9]; n_slots * (n_slots + 1) / 2],
+            u_before: vec![[zero; 3]; n_slots],
+        }
+    }
+
+    /// Builds Z, W and `u_before = Hᵀ v` at the end of the step.
+    ///
+    /// `v`: velocity (nv) before the step.
+    ///
+    /// # Panics
+    /// If an argument is of another machine.
+    pub fn assemble(
+        &mut self,
+        machine: &Machine,
+        end: &Poses<T>,
+        factor: &Factor<T>,
+        contacts: &Contacts<T>,
+        v: &[T],
+    ) {
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || {
+                for &slot in contacts.used() {
+                    self.build(machine, end, factor, contacts, v, slot);
+                }
+                self.multiply(contacts.used());
+            },
+        );
+    }
+
+    /// Z and `Hᵀ v` of a slot.
+    #[inline(always)]
+    fn build(
+        &mut self,
+        machine: &Machine,
+        end: &Poses<T>,
+        factor: &Factor<T>,
+        contacts: &Contacts<T>,
+        v: &[T],
+        slot: usize,
+    ) {
+        let wheel = Contacts::<T>::wheel(slot);
+        let movers = &self.movers[wheel][..];
+        let rows = &mut self.Z[slot * self.stride..][..BASE + movers.len()];
+        let (base, joints) = rows.split_at_mut(BASE);
+        let own = contacts.slot(slot);
+        let (x, n, t, b) = (own.point, own.n, own.t, own.b);
+        let (xn, xt, xb) = (x.cross(n), x.cross(t), x.cross(b));
+        base[0] = [n.x, t.x, b.x];
+        base[1] = [n.y, t.y, b.y];
+        base[2] = [n.z, t.z, b.z];
+        base[3] = [xn.x, xt.x, xb.x];
+        base[4] = [xn.y, xt.y, xb.y];
+        base[5] = [xn.z, xt.z, xb.z];
+        let mut u = scaled(&base[0], v[0]);
+        for k in 1..BASE {
+            add_scaled(&mut u, &base[k], v[k]);
+        }
+        for (row, &body) in joints.iter_mut().zip(movers) {
+            let pose = &end.bodies[body];
+            let moved = pose.axis.cross(x) + pose.swing;
+            *row = [moved.dot(n), moved.dot(t), moved.dot(b)];
+            add_scaled(&mut u, row, v[velocity(body)]);
+        }
+        self.u_before[slot] = u;
+        factor.half_solve_path(machine, machine.wheels[wheel].body, rows);
+    }
+
+    /// W from Z.
+    #[inline(always)]
+    fn multiply(&mut self, used: &[usize]) {
+        let n_wheels = self.movers.len();
+        let mut at = 0;
+        for (i, &row) in used.iter().enumerate() {
+            let a = Contacts::<T>::wheel(row);
+            for &column in &used[..i] {
+                let b = Contacts::<T>::wheel(column);
+                let shared = self.common[a * n_wheels + b];
+                let x = &self.Z[row * self.stride..][..shared];
+                let y = &self.Z[column * self.stride..][..shared];
+                self.W[at] = product(x, y);
+                at += 1;
+            }
+            let x = &self.Z[row * self.stride..][..BASE + self.movers[a].len()];
+            self.W[at] = square(x);
+            at += 1;
+        }
+    }
+
+    /// `q = Zᵀ y + Hᵀ v` by slot: local velocities after a change `y` (nv, factor coordinates) of
+    /// the velocity before the step.
+    ///
+    /// # Panics
+    /// If an argument is of another machine.
+    #[inline(always)]
+    pub fn local(&self, contacts: &Contacts<T>, y: &[T], q: &mut [Triple<T>]) {
+        for &slot in contacts.used() {
+            let movers = &self.movers[Contacts::<T>::wheel(slot)][..];
+            let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
+            let (base, joints) = rows.split_at(BASE);
+            let mut sum = scaled(&base[0], y[0]);
+            for k in 1..BASE {
+                add_scaled(&mut sum, &base[k], y[k]);
+            }
+            for (row, &body) in joints.iter().zip(movers) {
+                add_scaled(&mut sum, row, y[velocity(body)]);
+            }
+            let [n, t, b] = self.u_before[slot];
+            q[slot] = [sum[0] + n, sum[1] + t, sum[2] + b];
+        }
+    }
+
+    /// `y += Z p`: change of the velocity in factor coordinates (nv) due to impulses by slot, N s,
+    /// in the lanes of a mask.
+    ///
+    /// # Panics
+    /// If an argument is of another machine.
+    #[inline(always)]
+    pub fn add_impulses(
+        &self,
+        contacts: &Contacts<T>,
+        lanes: T::Mask,
+        p: &[Triple<T>],
+        y: &mut [T],
+    ) {
+        for &slot in contacts.used() {
+            let movers = &self.movers[Contacts::<T>::wheel(slot)][..];
+            let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
+            let (base, joints) = rows.split_at(BASE);
+            let here = contacts.slot(slot).active & lanes;
+            let p = &p[slot];
+            for (y, row) in y[..BASE].iter_mut().zip(base) {
+                add(here, y, along(row, p));
+            }
+            for (row, &body) in joints.iter().zip(movers) {
+                add(here, &mut y[velocity(body)], along(row, p));
+            }
+        }
+    }
+
+    /// `out = H p` (nv): generalized impulse, N s and N m s, of impulses by slot, N s, in the lanes
+    /// of a mask; zero elsewhere.
+    ///
+    /// # Panics
+    /// If an argument is of another machine.
+    #[inline(always)]
+    pub fn generalized_impulse(
+        &self,
+        contacts: &Contacts<T>,
+        end: &Poses<T>,
+        lanes: T::Mask,
+        p: &[Triple<T>],
+        out: &mut [T],
+    ) {
+        let zero = T::splat(self.token, 0.0);
+        out.fill(zero);
+        let mut total = Vec3::new(zero, zero, zero);
+        let mut couple = total;
+        for &slot in contacts.used() {
+            let own = contacts.slot(slot);
+            let here = own.active & lanes;
+            let [p_n, p_t, p_b] = p[slot];
+            let force = own.n * p_n + own.t * p_t + own.b * p_b;
+            let moment = own.point.cross(force);
+            add_vector(here, &mut total, force);
+            add_vector(here, &mut couple, moment);
+            for &body in &self.movers[Contacts::<T>::wheel(slot)] {
+                let power = end.bodies[body].power(force, moment);
+                add(here, &mut out[velocity(body)], power);
+            }
+        }
+        out[..BASE].copy_from_slice(&[total.x, total.y, total.z, couple.x, couple.y, couple.z]);
+    }
+
+    /// Writes each lane's problem: W, q, μ. Starting impulses stay as they are.
+    ///
+    /// `q`: free velocity by slot, m/s; `mu`: friction coefficient. `problems`: one a lane.
+    ///
+    /// # Panics
+    /// If there are fewer problems than lanes.
+    pub fn to_problems(
+        &self,
+        contacts: &Contacts<T>,
+        q: &[Triple<T>],
+        mu: T,
+        problems: &mut [ContactProblem],
+    ) {
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || {
+                let problems = &mut problems[..T::LANES];
+                let mut friction = [0.0; MAX_LANES];
+                mu.store(&mut friction[..T::LANES]);
+                for (lane, problem) in problems.iter_mut().enumerate() {
+                    problem.n_contacts = contacts.list(lane).n;
+                    problem.mu[..problem.n_contacts].fill(friction[lane]);
+                }
+                let mut at = 0;
+                for (i, &row) in contacts.used().iter().enumerate() {
+                    let of_row = contacts.places(row);
+                    let values = store_all(&q[row]);
+                    each::<T>(
+                        contacts.slot(row).active,
+                        #[inline(always)]
+                        |lane| {
+                            let place = usize::from(of_row[lane]);
+                            let q = &mut problems[lane].q[3 * place..][..3];
+                            for i in 0..3 {
+                                q[i] = values[i][lane];
+                            }
+                        },
+                    );
+                    for &column in &contacts.used()[..=i] {
+                        let of_column = contacts.places(column);
+                        let [first @ .., last] = &self.W[at];
+                        let (mut rows, mut ends) = ([[0.0; 8]; MAX_LANES], [0.0; MAX_LANES]);
+                        T::transpose(first, &mut rows);
+                        last.store(&mut ends[..T::LANES]);
+                        if contacts.is_full() {
+                            for (lane, problem) in problems.iter_mut().enumerate() {
+                                let out = &mut problem.W[at];
+                                out[..8].copy_from_slice(&rows[lane]);
+                                out[8] = ends[lane];
+                            }
+                        } else {
+                            let both = contacts.slot(row).active & contacts.slot(column).active;
+                            each::<T>(
+                                both,
+                                #[inline(always)]
+                                |lane| {
+                                    let (c, d) = (of_row[lane], of_column[lane]);
+                                    let out = &mut problems[lane].W[block(c.into(), d.into())];
+                                    out[..8].copy_from_slice(&rows[lane]);
+                                    out[8] = ends[lane];
+                                },
+                            );
+                        }
+                        at += 1;
+                    }
+                }
+            },
+        );
+    }
+
+    /// Reads impulses by slot from the problems, N s. Slots that a lane does not use are left as
+    /// they are.
+    ///
+    /// # Panics
+    /// If there are fewer problems than lanes.
+    #[inline(always)]
+    pub fn impulses(
+        &self,
+        contacts: &Contacts<T>,
+        problems: &[ContactProblem],
+        p: &mut [Triple<T>],
+    ) {
+        self.read(
+            contacts,
+            problems,
+            #[inline(always)]
+            |problem| &problem.p,
+            p,
+        );
+    }
+
+    /// Reads velocities by slot from the problems, m/s, likewise.
+    ///
+    /// # Panics
+    /// If there are fewer problems than lanes.
+    #[inline(always)]
+    pub fn velocities(
+        &self,
+        contacts: &Contacts<T>,
+        problems: &[ContactProblem],
+        u: &mut [Triple<T>],
+    ) {
+        self.read(
+            contacts,
+            problems,
+            #[inline(always)]
+            |problem| &problem.u,
+            u,
+        );
+    }
+
+    #[inline(always)]
+    fn read(
+        &self,
+        contacts: &Contacts<T>,
+        problems: &[ContactProblem],
+        of: impl Fn(&ContactProblem) -> &[f64; MAX_UNKNOWNS],
+        out: &mut [Triple<T>],
+    ) {
+        let problems = &problems[..T::LANES];
+        for &slot in contacts.used() {
+            let mut values = store_all(&out[slot]);
+            let places = contacts.places(slot);
+            each::<T>(
+                contacts.slot(slot).active,
+                #[inline(always)]
+                |lane| {
+                    let own = &of(&problems[lane])[3 * usize::from(places[lane])..][..3];
+                    for i in 0..3 {
+                        values[i][lane] = own[i];
+                    }
+                },
+            );
+            for (out, values) in out[slot].iter_mut().zip(&values) {
+                *out = T::load(self.token, &values[..T::LANES]);
+            }
+        }
+    }
+}
+
+/// `x += y` where the mask is true.
+#[inline(always)]
+fn add<T: Lane>(mask: T::Mask, x: &mut T, y: T) {
+    *x = T::select(mask, *x + y, *x);
+}
+
+#[inline(always)]
+fn add_vector<T: Lane>(mask: T::Mask, x: &mut Vec3<T>, y: Vec3<T>) {
+    *x = Vec3::select(mask, *x + y, *x);
+}
+
+/// A row of Z times an impulse.
+#[inline(always)]
+fn along<T: Lane>(z: &Triple<T>, p: &Triple<T>) -> T {
+    z[0] * p[0] + z[1] * p[1] + z[2] * p[2]
+}
+
+/// `a x`.
+#[inline(always)]
+fn scaled<T: Lane>(x: &Triple<T>, a: T) -> Triple<T> {
+    [a * x[0], a * x[1], a * x[2]]
+}
+
+/// `sums += a x`.
+#[inline(always)]
+fn add_scaled<T: Lane>(sums: &mut Triple<T>, x: &Triple<T>, a: T) {
+    for i in 0..3 {
+        sums[i] += a * x[i];
+    }
+}
+
+/// `Xᵀ Y`, row-major.
+#[inline(always)]
+fn product<T: Lane>(x: &[Triple<T>], y: &[Triple<T>]) -> [T; 9] {
+    let ([a, b, c], [d, e, f]) = (x[0], y[0]);
+    let mut sums = [
+        a * d,
+        a * e,
+        a * f,
+        b * d,
+        b * e,
+        b * f,
+        c * d,
+        c * e,
+        c * f,
+    ];
+    for (x, y) in x[1..].iter().zip(&y[1..]) {
+        for i in 0..3 {
+            for j in 0..3 {
+                sums[3 * i + j] += x[i] * y[j];
+            }
+        }
+    }
+    sums
+}
+
+/// `Xᵀ X`, row-major.
+#[inline(always)]
+fn square<T: Lane>(x: &[Triple<T>]) -> [T; 9] {
+    let [a, b, c] = x[0];
+    let mut sums = [a * a, b * a, b * b, c * a, c * b, c * c];
+    for [a, b, c] in &x[1..] {
+        sums[0] += *a * *a;
+        sums[1] += *b * *a;
+        sums[2] += *b * *b;
+        sums[3] += *c * *a;
+        sums[4] += *c * *b;
+        sums[5] += *c * *c;
+    }
+    let [nn, tn, tt, bn, bt, bb] = sums;
+    [nn, tn, bn, tn, tt, bt, bn, bt, bb]
+}
+
+/// The numbers of all lanes.
+#[inline(always)]
+fn store_all<T: Lane, const N: usize>(x: &[T; N]) -> [[f64; MAX_LANES]; N] {
+    let mut out = [[0.0; MAX_LANES]; N];
+    for (out, x) in out.iter_mut().zip(x) {
+        x.store(&mut out[..T::LANES]);
+    }
+    out
+}
+
+/// Calls `act` for each lane of a mask.
+#[inline(always)]
+fn each<T: Lane>(mask: T::Mask, mut act: impl FnMut(usize)) {
+    let mut lanes = mask.bits();
+    while lanes != 0 {
+        let lane = lanes.trailing_zeros() as usize;
+        lanes &= lanes - 1;
+        act(lane);
+    }
+}

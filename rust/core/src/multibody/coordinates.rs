@@ -15,6 +15,7 @@ use super::error::StateError;
 use super::joint::{Joint, Pose, Spherical};
 use super::model::Model;
 use super::state::Configuration;
+use crate::scalar::elementary::sin_cos;
 use crate::spatial::{CardanReport, HeadingPitchRoll};
 
 fn check(field: &'static str, values: &[f64], expected: usize) -> Result<(), StateError> {
@@ -216,7 +217,7 @@ pub fn to_report(
     let mut qdot = v.to_vec();
     for (k, angles) in report_angles(model, &q).blocks {
         let E = angles.rate_matrix();
-        let inverse = (angles.y.cos().abs() > 1e-9)
+        let inverse = (sin_cos(angles.y).1.abs() > 1e-9)
             .then(|| E.try_inverse())
             .flatten();
         let Some(inverse) = inverse else {
@@ -234,8 +235,15 @@ pub fn to_report(
 /// `Bᵀ A B`: a symmetric operator on velocities, in the report's coordinates.
 #[must_use]
 pub fn congruence(A: &DMatrix<f64>, angles: &ReportAngles) -> DMatrix<f64> {
-    let B = angles.rate_operator(A.nrows());
-    B.transpose() * A * B
+    let mut out = A.clone();
+    for &(k, angles) in &angles.blocks {
+        let E = angles.rate_matrix();
+        let columns = out.fixed_columns::<3>(k) * E;
+        out.fixed_columns_mut::<3>(k).copy_from(&columns);
+        let rows = E.transpose() * out.fixed_rows::<3>(k);
+        out.fixed_rows_mut::<3>(k).copy_from(&rows);
+    }
+    out
 }
 
 /// `Bᵀ f`: a generalized force, in the report's coordinates.

@@ -160,6 +160,11 @@ impl Kinematics {
         &self.origins[self.tree_of[b]]
     }
 
+    /// Sets the reference origin of a tree, m.
+    pub(crate) fn set_origin(&mut self, tree: usize, origin: Vector3<f64>) {
+        self.origins[tree] = origin;
+    }
+
     /// A point given in the frame of body `b`, relative to its tree's origin, world axes.
     #[inline]
     #[must_use]

@@ -20,6 +20,7 @@ use super::error::PlanarError;
 use super::ground::{Facing, Ground, MAX_FACING};
 use crate::geometry::Support;
 use crate::quantity::{PLACES, QuantityError, Range, finite, within};
+use crate::scalar::elementary::{hypot, sin_cos};
 
 /// Slopes, m/m.
 const SLOPES: Range = Range {
@@ -112,7 +113,7 @@ impl Support<2> for Line {
 
 /// The point (c_x, y) of a curve with the given slope there, seen from a centre above it.
 fn tangent_facing(centre: &Vector2<f64>, y: f64, slope: f64) -> Facing {
-    let length = slope.hypot(1.0);
+    let length = hypot(slope, 1.0);
     Facing {
         foot: Vector2::new(centre.x, y),
         n: Vector2::new(-slope, 1.0) / length,
@@ -170,7 +171,7 @@ impl Sine {
 
 impl Curve for Sine {
     fn jet(&self, x: f64) -> Jet {
-        let (sin, cos) = (self.k * x + self.phase).sin_cos();
+        let (sin, cos) = sin_cos(self.k * x + self.phase);
         let (a, k) = (self.amplitude, self.k);
         [
             a * sin + self.offset,
@@ -416,7 +417,7 @@ fn facing(curve: &dyn Curve, centre: &Vector2<f64>, reach: f64, out: &mut Vec<Fa
     let limit = if is_inside { f64::INFINITY } else { reach };
     minima(curve, centre, a, b, limit, &mut |x| {
         let [y, slope, ..] = curve.jet(x);
-        let length = slope.hypot(1.0);
+        let length = hypot(slope, 1.0);
         let n = Vector2::new(-slope, 1.0) / length;
         let away = centre - Vector2::new(x, y);
         let distance = away.norm();
@@ -498,7 +499,7 @@ impl Cell {
             above,
             aside: (0.5 * (a + b) - centre.x).abs(),
             // Less than what rounding could add.
-            least: across.hypot(beside) * (1.0 - 1e-9),
+            least: hypot(across, beside) * (1.0 - 1e-9),
         }
     }
 }

@@ -21,6 +21,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
 use super::error::PlanarError;
 use super::machine::{Disc, PlanarMachine, PlanarMotor};
 use crate::multibody::{Body, Joint, JointAxis, JointProperties, Model, Motor, Passive};
+use crate::scalar::elementary::sin_cos;
 
 /// Relative difference up to which two sides count as mirror images.
 const ALIKE: f64 = 1e-9;
@@ -175,7 +176,7 @@ impl<const NV: usize> MirroredRover<NV> {
             placed.x_axis[b] = if part.is_spinner {
                 carrier
             } else {
-                let (s, c) = q[2 + b].sin_cos();
+                let (s, c) = sin_cos(q[2 + b]);
                 carrier * c + left(&carrier) * s
             };
         }

@@ -7,6 +7,7 @@ use super::error::PlanarError;
 use super::ground::{Facing, Ground, keep_few, keep_if};
 use crate::geometry::Support;
 use crate::quantity::{PLACES, QuantityError, within};
+use crate::scalar::elementary::hypot;
 
 /// Straight pieces between points, continued beyond the ends with the slope
 /// of the last pieces (level where those are vertical).
@@ -34,7 +35,7 @@ impl Polyline {
                     value: x[i],
                 });
             }
-            if dx.hypot(dy) <= 0.0 {
+            if hypot(dx, dy) <= 0.0 {
                 return Err(PlanarError::RepeatedPoint {
                     index: i,
                     value: y[i],

@@ -27,6 +27,7 @@ use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 use super::error::PlanarError;
 use super::machine::{Disc, PlanarMachine, fingerprint};
 use crate::quantity::{INERTIAS, LENGTHS, MASSES, PLACES, within};
+use crate::scalar::elementary::sin_cos;
 
 /// A wheel and where its axle sits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,7 +113,7 @@ impl TwoWheelRover {
 
     /// `r_A`, `r_B`: the axles relative to the body's mass centre, world axes, m.
     fn arms_of(&self, q: &SVector<f64, 5>) -> [Vector2<f64>; 2] {
-        let (sin, cos) = q[2].sin_cos();
+        let (sin, cos) = sin_cos(q[2]);
         let R = Matrix2::new(cos, -sin, sin, cos);
         [R * self.wheels[0].axle, R * self.wheels[1].axle]
     }

@@ -76,6 +76,9 @@ pub trait Lane:
     /// A mask whose lane k is bit k.
     fn mask(token: Self::Token, bits: u32) -> Self::Mask;
 
+    /// Writes lane k of eight numbers to `out[k]`, for [`Self::LANES`] lanes.
+    fn transpose(x: &[Self; 8], out: &mut [[f64; 8]; MAX_LANES]);
+
     /// The token that this number was made with.
     fn token(self) -> Self::Token;
 
@@ -87,6 +90,10 @@ pub trait Lane:
     #[must_use]
     fn abs(self) -> Self;
 
+    /// `2ⁿ` of a whole number `−1022 <= n <= 1023`.
+    #[must_use]
+    fn exp2_of_integer(self) -> Self;
+
     /// `self < other`.
     fn lt(self, other: Self) -> Self::Mask;
 
@@ -96,7 +103,8 @@ pub trait Lane:
     /// `yes` where the mask is true, `no` elsewhere.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
 
-    /// Runs `f` compiled for the instructions of the token; whatever `f` calls must be inlined.
+    /// Runs `f` compiled for the instructions of the token; whatever `f` calls must be inlined, and
+    /// `f` itself: write `#[inline(always)] || ...`, or a large one is compiled for the baseline.
     fn vectorize<R>(token: Self::Token, f: impl FnOnce() -> R) -> R;
 
     /// The number `x` in every lane.
@@ -139,25 +147,20 @@ pub trait Lane:
     }
 
     /// The number of a lane.
-    #[inline(always)]
-    fn get(self, lane: usize) -> f64 {
-        let mut lanes = [0.0; MAX_LANES];
-        self.store(&mut lanes[..Self::LANES]);
-        lanes[lane]
-    }
+    fn get(self, lane: usize) -> f64;
 
     /// Replaces the number of a lane.
-    #[inline(always)]
-    fn set(&mut self, lane: usize, x: f64) {
-        let mut lanes = [0.0; MAX_LANES];
-        self.store(&mut lanes[..Self::LANES]);
-        lanes[lane] = x;
-        *self = Self::load(self.token(), &lanes[..Self::LANES]);
-    }
+    fn set(&mut self, lane: usize, x: f64);
 }
 
 /// Most lanes of any scalar.
 pub const MAX_LANES: usize = 8;
+
+/// Added to a whole number n, it leaves the exponent field of 2ⁿ in the last bits of the sum.
+pub(super) const EXPONENT_IN_LAST_BITS: f64 = 6_755_399_441_056_767.0; // 1.5 · 2⁵² + 1023
+
+/// Bits of an `f64` behind its exponent field.
+pub(super) const MANTISSA_BITS: u32 = 52;
 
 impl LaneMask for bool {
     #[inline(always)]
@@ -203,6 +206,11 @@ impl Lane for f64 {
     }
 
     #[inline(always)]
+    fn transpose(x: &[Self; 8], out: &mut [[f64; 8]; MAX_LANES]) {
+        out[0] = *x;
+    }
+
+    #[inline(always)]
     fn token(self) -> Single {
         Single::Baseline
     }
@@ -215,6 +223,11 @@ impl Lane for f64 {
     #[inline(always)]
     fn abs(self) -> Self {
         f64::abs(self)
+    }
+
+    #[inline(always)]
+    fn exp2_of_integer(self) -> Self {
+        f64::from_bits((self + EXPONENT_IN_LAST_BITS).to_bits() << MANTISSA_BITS)
     }
 
     #[inline(always)]

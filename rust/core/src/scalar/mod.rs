@@ -2,9 +2,11 @@
 //!
 //! - [`lane`]: the scalar and its mask, and `f64` as one lane;
 //! - [`instructions`]: what this machine can do, found at run time, and the lane types;
+//! - [`elementary`]: sine, cosine and exponential with the same bits everywhere;
 //! - [`linear`]: vectors and matrices of three dimensions over lanes.
 #![allow(clippy::inline_always)] // a call would leave the instruction set that its caller is compiled for
 
+pub mod elementary;
 pub mod instructions;
 pub mod lane;
 pub mod linear;

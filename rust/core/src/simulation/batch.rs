@@ -3,12 +3,15 @@
 //! Rovers share models and terrains and nothing else. They never wait for each other, and their
 //! motion depends neither on the number of rovers nor on the number of threads.
 
+use rayon::ThreadPool;
+
 use super::error::BatchError;
 use super::pool::Pool;
 use super::reading::{Look, ReadingLayout, ReadingScratch};
-use super::rover::RoverSimulation;
+use super::rover::{Placement, RoverSimulation};
 use super::turns::{Done, Turn, take_turns};
 use crate::integrator::StepError;
+use crate::multibody::Model;
 
 /// Rovers with the threads that step them.
 pub struct Batch {
@@ -55,20 +58,20 @@ impl Batch {
             layout,
         };
         for (index, rover) in batch.rovers.iter().enumerate() {
-            batch.check(index, rover)?;
+            batch.fits(index, rover.model())?;
         }
         Ok(batch)
     }
 
-    fn check(&self, index: usize, rover: &RoverSimulation) -> Result<(), BatchError> {
-        let own = ReadingLayout::new(rover.model(), self.scan.len());
+    fn fits(&self, index: usize, model: &Model) -> Result<(), BatchError> {
+        let own = ReadingLayout::new(model, self.scan.len());
         if own == self.layout {
             return Ok(());
         }
         Err(BatchError::Differs {
             index,
             expected: self.rovers[0].model().nv(),
-            actual: rover.model().nv(),
+            actual: model.nv(),
         })
     }
 
@@ -105,11 +108,46 @@ impl Batch {
         if index >= len {
             return Err(BatchError::NoSuchRover { index, len });
         }
-        self.check(index, &rover)?;
+        self.fits(index, rover.model())?;
         self.rovers[index] = rover;
         self.targets[index] = target;
         self.errors[index] = None;
         Ok(())
+    }
+
+    /// Lets a rover begin anew, see [`RoverSimulation::begin`]; `target` (x, z, m) is the target of
+    /// its readings.
+    ///
+    /// # Errors
+    /// `NoSuchRover`, `Differs`, `Options`; nothing is changed then.
+    ///
+    /// # Panics
+    /// If the sizes of the state do not fit the model.
+    pub fn begin(
+        &mut self,
+        index: usize,
+        placement: Placement,
+        target: [f64; 2],
+    ) -> Result<(), BatchError> {
+        let len = self.rovers.len();
+        if index >= len {
+            return Err(BatchError::NoSuchRover { index, len });
+        }
+        self.fits(index, &placement.scene.model)?;
+        let begun = self.rovers[index].begin(placement);
+        begun.map_err(|error| BatchError::Options { index, error })?;
+        self.targets[index] = target;
+        self.errors[index] = None;
+        Ok(())
+    }
+
+    /// The threads that help the caller's, for other work on the rovers; none where that one does
+    /// all the work.
+    ///
+    /// # Errors
+    /// `Threads`, as [`Self::step`].
+    pub fn pool(&mut self) -> Result<Option<&ThreadPool>, BatchError> {
+        self.pool.as_mut().map(Pool::of_this_process).transpose()
     }
 
     /// Gives every rover its commands, takes `n` steps and writes the readings (n_rovers × size of

@@ -4,7 +4,7 @@
 //! - [`state`], [`snapshot`], [`active_contact`]: its state, the data needed to continue, its
 //!   contacts;
 //! - [`rover`]: a rover on a terrain, with its [commands](rover_command), its
-//!   [contacts](rover_contacts) and its [`reading`];
+//!   [contacts](rover_contacts), its ordinary steps and its [`reading`];
 //! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains,
 //!   perhaps with a machine on it;
 //! - [`batch`]: many rovers side by side, each with its [turn](turns); [`profile`]: time spent in each part of a step.
@@ -12,6 +12,7 @@
 pub mod active_contact;
 pub mod batch;
 pub mod error;
+pub mod fleet;
 pub mod grains;
 pub mod planar;
 mod pool;
@@ -20,6 +21,7 @@ pub mod reading;
 pub mod rover;
 pub mod rover_command;
 pub mod rover_contacts;
+mod rover_quick;
 pub mod scene;
 pub mod snapshot;
 pub mod state;
@@ -36,9 +38,9 @@ pub use planar::{
     BallSimulation, MirroredRoverSimulation, PlanarScene, PlanarSimulation, TwoWheelRoverSimulation,
 };
 pub use reading::{Look, ReadingLayout, ReadingScratch};
-pub use rover::{LastCall, RoverScene, RoverSimulation};
+pub use rover::{LastCall, Placement, RoverScene, RoverSimulation};
 pub use rover_command::RoverCommand;
-pub use scene::{DenseOperator, Scene, SceneKey, SceneScratch, StepTaken};
+pub use scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, StepTaken};
 pub use snapshot::Snapshot;
 pub use state::State;
 pub use stepping::Simulation;

@@ -9,6 +9,7 @@ use super::rover_contacts::WheelForces;
 use crate::contact::{Part, detection::wheel_gap};
 use crate::integrator::StepStatus;
 use crate::multibody::{Kinematics, Model, coordinates};
+use crate::scalar::elementary::{hypot, sin_cos};
 use crate::spatial::HeadingPitchRoll;
 
 /// Speed below which, for both rim and ground, a slip ratio is meaningless, m/s.
@@ -202,18 +203,18 @@ impl RoverSimulation {
         row.put(normal.iter().copied());
 
         let heading = if is_free { pose[4] } else { 0.0 };
-        let (sine, cosine) = heading.sin_cos();
+        let (sine, cosine) = sin_cos(heading);
         let (dx, dz) = (target[0] - x, target[1] - z);
         row.put([
             dx * cosine - dz * sine,
             dx * sine + dz * cosine,
-            dx.hypot(dz),
+            hypot(dx, dz),
         ]);
         let gravity = &self.options().gravity;
         let up = gravity.try_normalize(0.0).map_or(Vector3::y(), |g| -g);
         row.put([
             up.dot(&R_WB.matrix().column(1)),
-            base[0].hypot(base[2]),
+            hypot(base[0], base[2]),
             self.body_force(),
             self.slip_ratio(),
         ]);
@@ -270,8 +271,8 @@ impl RoverSimulation {
                 let rate = rate.map_or(0.0, |j| self.state().v[self.model().joint_velocity(j)]);
                 let rim = wheel.radius * wheel.drive_sign * rate;
                 let [_, u_t, u_b] = active.velocity;
-                let ground = (rim + u_t).hypot(u_b);
-                total += u_t.hypot(u_b) / rim.abs().max(ground).max(SLIP_SPEED);
+                let ground = hypot(rim + u_t, u_b);
+                total += hypot(u_t, u_b) / rim.abs().max(ground).max(SLIP_SPEED);
                 n += 1;
             }
         }

@@ -7,13 +7,15 @@ use nalgebra::Vector3;
 
 use super::active_contact::LocatedContact;
 use super::rover_command::RoverCommand;
-use super::scene::{DenseOperator, Scene, StepTaken};
+use super::rover_quick::Quick;
+use super::scene::{DenseOperator, QuickStep, Scene, SceneScratch, StepTaken};
 use super::snapshot::Snapshot;
 use super::state::State;
 use super::stepping::Simulation;
 use crate::contact::{Contact, Opposite, Part};
 use crate::geometry::Terrain;
-use crate::integrator::{OptionsError, StepOptions, StepReport};
+use crate::integrator::{OptionsError, Probe, StepOptions, StepReport};
+use crate::lanes::machine::Machine;
 use crate::multibody::{Configuration, Energy, Kinematics, Model, Momentum, momentum};
 use crate::system::{TreeScratch, TreeSystem};
 
@@ -24,6 +26,30 @@ pub struct RoverScene {
     pub model: Arc<Model>,
     /// The ground.
     pub terrain: Arc<dyn Terrain>,
+    /// The machine of its ordinary steps, if it has any.
+    pub(super) machine: Option<Arc<Machine>>,
+}
+
+impl RoverScene {
+    /// A machine on a terrain.
+    #[must_use]
+    pub fn new(model: Arc<Model>, terrain: Arc<dyn Terrain>) -> Self {
+        let machine = Machine::of(&model).ok().map(Arc::new);
+        Self {
+            model,
+            terrain,
+            machine,
+        }
+    }
+
+    /// The same machine on another terrain.
+    #[must_use]
+    pub fn on(&self, terrain: Arc<dyn Terrain>) -> Self {
+        Self {
+            terrain,
+            ..self.clone()
+        }
+    }
 }
 
 impl fmt::Debug for RoverScene {
@@ -37,12 +63,26 @@ impl fmt::Debug for RoverScene {
 /// A rover on a terrain, stepped through time.
 pub type RoverSimulation = Simulation<RoverScene>;
 
+/// A rover in a state on a terrain, before it is simulated.
+#[derive(Clone, Debug)]
+pub struct Placement {
+    /// The rover and the ground.
+    pub scene: RoverScene,
+    /// Options of the steps.
+    pub options: StepOptions,
+    /// Where it is.
+    pub configuration: Configuration,
+    /// Its velocity (nv).
+    pub v: Vec<f64>,
+}
+
 /// Scratch of a rover's steps.
 #[derive(Clone, Debug)]
 pub struct RoverParts {
-    tree: TreeScratch,
+    pub(super) tree: TreeScratch,
+    pub(super) quick: Quick,
     /// Work of each joint's drive in the last call, J.
-    drive_work: Vec<f64>,
+    pub(super) drive_work: Vec<f64>,
 }
 
 impl DenseOperator for RoverParts {
@@ -89,6 +129,7 @@ impl Scene for RoverScene {
     fn parts(&self) -> RoverParts {
         RoverParts {
             tree: TreeScratch::new(&self.model, self.contact_capacity()),
+            quick: Quick::default(),
             drive_work: vec![0.0; self.model.n_joints()],
         }
     }
@@ -135,6 +176,26 @@ impl Scene for RoverScene {
         for (torque, wheel) in taken.memory.iter_mut().zip(self.model.wheels()) {
             let impulse = wheel.joint.map_or(0.0, |j| drives[j].impulse);
             *torque = wheel.drive_sign * impulse / taken.options.time_step;
+        }
+    }
+
+    fn quick_step(&self, step: QuickStep<'_, Self>, probe: &mut dyn Probe) -> Option<StepReport> {
+        self.take_ordinary_step(step, probe)
+    }
+
+    fn publish(&self, parts: &mut RoverParts, scratch: &mut SceneScratch<Self>) {
+        let RoverParts { tree, quick, .. } = parts;
+        if let Some((block, problem)) = quick.last() {
+            tree.show(block.origin(0), problem.n_unknowns(), |i, j| {
+                problem.entry(i, j)
+            });
+            scratch.show(
+                |show| {
+                    block.visit_contacts(0, |contact, _, p, u| show(contact, p, u));
+                },
+                &problem.q,
+                &problem.mu,
+            );
         }
     }
 
@@ -192,7 +253,52 @@ impl RoverSimulation {
         options: StepOptions,
     ) -> Result<Self, OptionsError> {
         let configuration = Configuration::zero(&model);
-        Self::of(RoverScene { model, terrain }, configuration, options)
+        Self::of(RoverScene::new(model, terrain), configuration, options)
+    }
+
+    /// As [`Self::new`], then [`Self::begin`].
+    ///
+    /// # Errors
+    /// An option out of its range.
+    ///
+    /// # Panics
+    /// If the sizes of the state do not fit the model.
+    pub fn placed(placement: Placement) -> Result<Self, OptionsError> {
+        let Placement {
+            scene,
+            options,
+            configuration,
+            v,
+        } = placement;
+        assert!(
+            configuration.is_of(&scene.model),
+            "invariant: a configuration of this model"
+        );
+        let mut made = Self::of(scene, configuration.clone(), options)?;
+        made.place(configuration, v);
+        Ok(made)
+    }
+
+    /// Begins anew in another scene: bit for bit what [`Self::placed`] makes, but in the memory of
+    /// this simulation if the model is the same.
+    ///
+    /// # Errors
+    /// An option out of its range; nothing is changed then.
+    ///
+    /// # Panics
+    /// If the sizes of the state do not fit the model.
+    pub fn begin(&mut self, placement: Placement) -> Result<(), OptionsError> {
+        if placement.scene.model.fingerprint() != self.model().fingerprint() {
+            *self = Self::placed(placement)?;
+            return Ok(());
+        }
+        placement.options.check()?;
+        assert!(
+            placement.configuration.is_of(self.model()),
+            "invariant: a configuration of this model"
+        );
+        self.restart(placement);
+        Ok(())
     }
 
     /// The machine.
@@ -218,6 +324,13 @@ impl RoverSimulation {
             "invariant: a configuration of this model"
         );
         self.place(configuration, v);
+    }
+
+    fn restart(&mut self, placement: Placement) {
+        self.command = placement.scene.command();
+        self.scene = placement.scene;
+        self.options = placement.options;
+        self.place(placement.configuration, placement.v);
     }
 
     /// Results of the last call of [`Self::step`].

@@ -7,7 +7,9 @@
 use super::active_contact::LocatedContact;
 use super::snapshot::Snapshot;
 use super::state::State;
-use crate::integrator::{MechanicalSystem, Scratch, StepOptions, UnilateralContact, WarmStart};
+use crate::integrator::{
+    MechanicalSystem, Probe, Scratch, StepOptions, StepReport, UnilateralContact, WarmStart,
+};
 use crate::multibody::Energy;
 
 /// Key of a scene's contacts.
@@ -70,6 +72,17 @@ pub trait Scene: Clone {
     /// Called after each accepted step. By default it does nothing.
     fn after_step(&self, _taken: StepTaken<'_, Self>) {}
 
+    /// Takes a step in the scene's own, faster way, by the law of the options' variant. None if
+    /// there is no such way or the step does not suit it; nothing has changed then. By default
+    /// there is none.
+    fn quick_step(&self, _step: QuickStep<'_, Self>, _probe: &mut dyn Probe) -> Option<StepReport> {
+        None
+    }
+
+    /// Called at the end of a call: makes `parts` and `scratch` those of the last step, whichever
+    /// way it was taken. By default they are.
+    fn publish(&self, _parts: &mut Self::Parts, _scratch: &mut SceneScratch<Self>) {}
+
     /// Kinetic and potential energy of a state, J.
     fn energy(&self, options: &StepOptions, state: &State<Self::Configuration>) -> Energy;
 
@@ -79,6 +92,22 @@ pub trait Scene: Clone {
     /// Whether a snapshot's configuration, command, memory and contacts fit this scene. The caller
     /// has already checked the velocities, the warm start and the numbers of contacts.
     fn admits(&self, snapshot: &Snapshot<Self>) -> bool;
+}
+
+/// A step that a scene may take in its own way.
+pub struct QuickStep<'a, S: Scene> {
+    /// The step's options.
+    pub options: &'a StepOptions,
+    /// Configuration, velocity and time.
+    pub state: &'a mut State<S::Configuration>,
+    /// The command.
+    pub command: &'a S::Command,
+    /// The scene's memory.
+    pub memory: &'a mut S::Memory,
+    /// Its scratch.
+    pub parts: &'a mut S::Parts,
+    /// Where the solve starts.
+    pub warm_start: &'a mut WarmStart<SceneKey<S>>,
 }
 
 /// A step that was just accepted.

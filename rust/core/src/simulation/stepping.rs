@@ -3,7 +3,7 @@
 use super::active_contact::{ActiveContact, Components, LocatedContact};
 use super::error::SnapshotError;
 use super::profile::Stopwatch;
-use super::scene::{DenseOperator, Scene, SceneKey, SceneScratch, StepTaken};
+use super::scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, StepTaken};
 use super::snapshot::Snapshot;
 use super::state::State;
 use crate::integrator::{
@@ -172,7 +172,7 @@ impl<S: Scene> Simulation<S> {
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<StepReport, StepError> {
         let variant = self.options.variant;
-        self.call(&variant, n, go_on, &mut NoProbe)
+        self.call(&variant, true, n, go_on, &mut NoProbe)
     }
 
     /// Takes `n` steps of another scheme, with the same options.
@@ -183,7 +183,7 @@ impl<S: Scene> Simulation<S> {
     where
         I: for<'a> Integrator<S::System<'a>>,
     {
-        self.call(integrator, n, &mut || true, &mut NoProbe)
+        self.call(integrator, false, n, &mut || true, &mut NoProbe)
     }
 
     /// Takes `n` steps of a copy and returns the time of each part; `go_on` as for
@@ -198,17 +198,32 @@ impl<S: Scene> Simulation<S> {
     ) -> Result<Stopwatch, StepError> {
         let mut copy = self.clone();
         let variant = copy.options.variant;
-        copy.call(&variant, n.min(WARM_UP), go_on, &mut NoProbe)?;
+        copy.call(&variant, true, n.min(WARM_UP), go_on, &mut NoProbe)?;
         let mut stopwatch = Stopwatch::start();
-        let report = copy.call(&variant, n, go_on, &mut stopwatch)?;
+        let report = copy.call(&variant, true, n, go_on, &mut stopwatch)?;
         stopwatch.finish(report.steps);
         Ok(stopwatch)
     }
 
-    /// One call: its report is kept.
+    /// Takes `n` steps and tells `probe` where each part of a step ends.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_probed(
+        &mut self,
+        n: usize,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError> {
+        let variant = self.options.variant;
+        self.call(&variant, true, n, &mut || true, probe)
+    }
+
+    /// One call: its report is kept. `may_be_quick`: whether steps that the scene takes in its own
+    /// way are the integrator's.
     fn call<I>(
         &mut self,
         integrator: &I,
+        may_be_quick: bool,
         n: usize,
         go_on: &mut dyn FnMut() -> bool,
         probe: &mut dyn Probe,
@@ -216,15 +231,28 @@ impl<S: Scene> Simulation<S> {
     where
         I: for<'a> Integrator<S::System<'a>>,
     {
-        self.scene.begin_call(&mut self.parts);
-        let result = self.steps(integrator, n, go_on, probe);
-        self.last_report = result.clone().unwrap_or_default();
+        self.begin_call();
+        let result = self.steps(integrator, may_be_quick, n, go_on, probe);
+        self.end_call(result.clone().unwrap_or_default());
         result
+    }
+
+    /// Resets what counts over a call.
+    pub(super) fn begin_call(&mut self) {
+        self.scene.begin_call(&mut self.parts);
+        self.last_report = StepReport::default();
+        self.active.clear();
+    }
+
+    /// Keeps the report of a call.
+    pub(super) fn end_call(&mut self, report: StepReport) {
+        self.last_report = report;
     }
 
     fn steps<I>(
         &mut self,
         integrator: &I,
+        may_be_quick: bool,
         n: usize,
         go_on: &mut dyn FnMut() -> bool,
         probe: &mut dyn Probe,
@@ -234,36 +262,69 @@ impl<S: Scene> Simulation<S> {
     {
         let mut total = StepReport::default();
         for _ in 0..n {
-            let mut system = self
-                .scene
-                .system(&self.command, &self.memory, &mut self.parts);
-            let report = integrator.step(
-                &mut system,
-                &self.options,
-                self.state.as_mut(),
-                &mut self.warm_start,
-                &mut self.scratch,
-                probe,
-            )?;
-            drop(system);
+            let quick = may_be_quick.then(|| self.quick_step(probe)).flatten();
+            let report = match quick {
+                Some(report) => report,
+                None => self.general_step(integrator, probe)?,
+            };
             total.merge(&report);
-            self.list_active();
-            self.scene.after_step(StepTaken {
-                options: &self.options,
-                state: &mut self.state,
-                memory: &mut self.memory,
-                parts: &mut self.parts,
-                warm_start: &mut self.warm_start,
-                scratch: &self.scratch,
-            });
             if !go_on() {
                 break;
             }
         }
+        if total.steps > 0 {
+            self.scene.publish(&mut self.parts, &mut self.scratch);
+            self.list_active();
+        }
         Ok(total)
     }
 
-    fn list_active(&mut self) {
+    /// The scene's own way to take a step, if it has one.
+    fn quick_step(&mut self, probe: &mut dyn Probe) -> Option<StepReport> {
+        let step = QuickStep {
+            options: &self.options,
+            state: &mut self.state,
+            command: &self.command,
+            memory: &mut self.memory,
+            parts: &mut self.parts,
+            warm_start: &mut self.warm_start,
+        };
+        self.scene.quick_step(step, probe)
+    }
+
+    /// A step of any scene and integrator.
+    pub(super) fn general_step<I>(
+        &mut self,
+        integrator: &I,
+        probe: &mut dyn Probe,
+    ) -> Result<StepReport, StepError>
+    where
+        I: for<'a> Integrator<S::System<'a>>,
+    {
+        let mut system = self
+            .scene
+            .system(&self.command, &self.memory, &mut self.parts);
+        let report = integrator.step(
+            &mut system,
+            &self.options,
+            self.state.as_mut(),
+            &mut self.warm_start,
+            &mut self.scratch,
+            probe,
+        )?;
+        drop(system);
+        self.scene.after_step(StepTaken {
+            options: &self.options,
+            state: &mut self.state,
+            memory: &mut self.memory,
+            parts: &mut self.parts,
+            warm_start: &mut self.warm_start,
+            scratch: &self.scratch,
+        });
+        Ok(report)
+    }
+
+    pub(super) fn list_active(&mut self) {
         let d = <S::Contact as LocatedContact>::Vector::N;
         let (scene, parts) = (&self.scene, &self.parts);
         let impulses = self.scratch.impulses().chunks_exact(d);

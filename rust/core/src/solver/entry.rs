@@ -139,7 +139,7 @@ fn report_of(status: SolveStatus, method: Method) -> SolveReport {
     rungs.push(Rung {
         stage: Stage::AtRest,
         status,
-        iterations: 0,
+        ..Rung::default()
     });
     SolveReport {
         status,

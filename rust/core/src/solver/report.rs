@@ -52,9 +52,7 @@ pub enum Stage {
     BodySweeps,
     /// Islands of contacts that share no body, each solved separately.
     Islands,
-    /// Newton's steps on the modes of the warm start.
-    WarmNewton,
-    /// Pivoting from the warm start: one contact at a time changes its mode.
+    /// From the warm start: pivoting, in which one contact at a time changes its mode.
     Pivoting,
     /// From zero impulse: Newton's steps on the modes that a few sweeps find.
     GuidedNewton,
@@ -79,7 +77,6 @@ impl Stage {
             Self::Sweeps => "sweeps",
             Self::BodySweeps => "body_sweeps",
             Self::Islands => "islands",
-            Self::WarmNewton => "warm_newton",
             Self::Pivoting => "pivoting",
             Self::GuidedNewton => "guided_newton",
             Self::Newton => "newton",
@@ -95,12 +92,9 @@ impl Stage {
     pub const fn method(self) -> Method {
         match self {
             Self::Sweeps | Self::BodySweeps | Self::Islands => Method::GaussSeidel,
-            Self::AtRest
-            | Self::WarmNewton
-            | Self::Pivoting
-            | Self::GuidedNewton
-            | Self::Newton
-            | Self::Restarts => Method::Newton,
+            Self::AtRest | Self::Pivoting | Self::GuidedNewton | Self::Newton | Self::Restarts => {
+                Method::Newton
+            }
             Self::ProximalPoint => Method::ProximalPoint,
             Self::Admm => Method::Admm,
             Self::Relaxed => Method::Relaxed,
@@ -130,6 +124,8 @@ pub struct Rung {
     pub status: SolveStatus,
     /// Its sweeps and linear solves.
     pub iterations: usize,
+    /// Matrices that it factored for them; islands and sweeps over bodies count none.
+    pub factorisations: usize,
 }
 
 /// The stages that were tried, in their order.
@@ -198,6 +194,20 @@ impl SolveReport {
     pub(super) fn amend(&mut self, status: SolveStatus) {
         self.status = status;
         self.rungs.amend(status);
+    }
+
+    /// Matrices factored by all stages together.
+    #[must_use]
+    pub fn factorisations(&self) -> usize {
+        self.rungs.as_slice().iter().map(|r| r.factorisations).sum()
+    }
+
+    /// Systems solved while pivoting: one contact changes its mode between two of them.
+    #[must_use]
+    pub fn pivots(&self) -> usize {
+        let rungs = self.rungs.as_slice().iter();
+        let pivoting = rungs.filter(|rung| rung.stage == Stage::Pivoting);
+        pivoting.map(|rung| rung.iterations).sum()
     }
 
     /// Whether the answer meets the tolerances.

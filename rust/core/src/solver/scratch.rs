@@ -74,6 +74,7 @@ impl Scratch {
             stage,
             status,
             iterations,
+            factorisations: std::mem::take(&mut self.work.factorisations),
         });
         status
     }

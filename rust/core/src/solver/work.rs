@@ -19,6 +19,8 @@ pub(in crate::solver) struct Work {
     pub budget: u64,
     /// Whether some work was refused for lack of budget.
     pub is_exhausted: bool,
+    /// Factorisations since the last stage that was listed.
+    pub factorisations: usize,
 }
 
 impl Work {
@@ -28,6 +30,7 @@ impl Work {
             spent: 0,
             budget,
             is_exhausted: false,
+            factorisations: 0,
         }
     }
 

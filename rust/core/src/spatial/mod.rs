@@ -5,5 +5,7 @@ pub mod rotation;
 pub mod space;
 pub mod symmetric;
 
-pub use rotation::{CardanReport, HeadingPitchRoll, exp_rotation};
+pub use rotation::{
+    CardanReport, HeadingPitchRoll, exp_rotation, quaternion_about, rotation_about,
+};
 pub use symmetric::SymmetricMatrix3;

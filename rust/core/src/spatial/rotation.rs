@@ -6,7 +6,9 @@
 //! - public `q`: `R = Ry(heading) Rz(pitch) Rx(roll)`, singular only with the nose straight up;
 //! - report: `R = Rz(q5) Ry(q4) Rx(q3)`, singular at a heading of 90 degrees.
 
-use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector3};
+
+use crate::scalar::elementary::{atan2, hypot, sin_cos};
 
 /// Rotation by the vector `phi` (rad, world axes): the quaternion `exp(phi / 2)`.
 ///
@@ -22,9 +24,36 @@ pub fn exp_rotation(phi: &Vector3<f64>) -> UnitQuaternion<f64> {
         )
     } else {
         let half = half2.sqrt();
-        (half.cos(), 0.5 * half.sin() / half)
+        let (sin, cos) = sin_cos(half);
+        (cos, 0.5 * sin / half)
     };
     UnitQuaternion::new_unchecked(Quaternion::new(w, s * phi.x, s * phi.y, s * phi.z))
+}
+
+/// Matrix of the rotation by an angle (rad) about an axis.
+#[must_use]
+pub fn rotation_about(axis: &Unit<Vector3<f64>>, angle: f64) -> Matrix3<f64> {
+    let (sin, cos) = sin_cos(angle);
+    let [x, y, z]: [f64; 3] = axis.into_inner().into();
+    let rest = 1.0 - cos;
+    Matrix3::new(
+        cos + x * x * rest,
+        x * y * rest - z * sin,
+        x * z * rest + y * sin,
+        x * y * rest + z * sin,
+        cos + y * y * rest,
+        y * z * rest - x * sin,
+        x * z * rest - y * sin,
+        y * z * rest + x * sin,
+        cos + z * z * rest,
+    )
+}
+
+/// Quaternion of the rotation by an angle (rad) about an axis.
+#[must_use]
+pub fn quaternion_about(axis: &Unit<Vector3<f64>>, angle: f64) -> UnitQuaternion<f64> {
+    let (sin, cos) = sin_cos(0.5 * angle);
+    UnitQuaternion::new_unchecked(Quaternion::from_parts(cos, axis.into_inner() * sin))
 }
 
 /// Heading, pitch and roll (rad) of the public coordinates: `R = Ry(heading) Rz(pitch) Rx(roll)`.
@@ -42,10 +71,10 @@ impl HeadingPitchRoll {
     /// Angles of an attitude. With the nose straight up or down the heading is taken as 0.
     #[must_use]
     pub fn from_rotation(R: &Matrix3<f64>) -> Self {
-        let horizontal = R[(0, 0)].hypot(R[(2, 0)]);
-        let pitch = R[(1, 0)].atan2(horizontal);
+        let horizontal = hypot(R[(0, 0)], R[(2, 0)]);
+        let pitch = atan2(R[(1, 0)], horizontal);
         if horizontal < 1e-9 {
-            let roll = R[(2, 1)].atan2(R[(2, 2)]);
+            let roll = atan2(R[(2, 1)], R[(2, 2)]);
             return Self {
                 heading: 0.0,
                 pitch,
@@ -53,18 +82,18 @@ impl HeadingPitchRoll {
             };
         }
         Self {
-            heading: (-R[(2, 0)]).atan2(R[(0, 0)]),
+            heading: atan2(-R[(2, 0)], R[(0, 0)]),
             pitch,
-            roll: (-R[(1, 2)]).atan2(R[(1, 1)]),
+            roll: atan2(-R[(1, 2)], R[(1, 1)]),
         }
     }
 
     /// The attitude `R_WB` of these angles.
     #[must_use]
     pub fn to_quaternion(self) -> UnitQuaternion<f64> {
-        UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.heading)
-            * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.pitch)
-            * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.roll)
+        quaternion_about(&Vector3::y_axis(), self.heading)
+            * quaternion_about(&Vector3::z_axis(), self.pitch)
+            * quaternion_about(&Vector3::x_axis(), self.roll)
     }
 }
 
@@ -83,32 +112,32 @@ impl CardanReport {
     /// Angles of an attitude. At the singular heading the angle about z is taken as 0.
     #[must_use]
     pub fn from_rotation(R: &Matrix3<f64>) -> Self {
-        let across = R[(0, 0)].hypot(R[(1, 0)]);
-        let y = (-R[(2, 0)]).atan2(across);
+        let across = hypot(R[(0, 0)], R[(1, 0)]);
+        let y = atan2(-R[(2, 0)], across);
         if across < 1e-9 {
-            let x = (-R[(1, 2)]).atan2(R[(1, 1)]);
+            let x = atan2(-R[(1, 2)], R[(1, 1)]);
             return Self { x, y, z: 0.0 };
         }
         Self {
-            x: R[(2, 1)].atan2(R[(2, 2)]),
+            x: atan2(R[(2, 1)], R[(2, 2)]),
             y,
-            z: R[(1, 0)].atan2(R[(0, 0)]),
+            z: atan2(R[(1, 0)], R[(0, 0)]),
         }
     }
 
     /// The attitude `R_WB` of these angles.
     #[must_use]
     pub fn to_quaternion(self) -> UnitQuaternion<f64> {
-        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.z)
-            * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), self.y)
-            * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.x)
+        quaternion_about(&Vector3::z_axis(), self.z)
+            * quaternion_about(&Vector3::y_axis(), self.y)
+            * quaternion_about(&Vector3::x_axis(), self.x)
     }
 
     /// `E` in `ω = E (ẋ, ẏ, ż)`: Cardan rates to world angular velocity.
     #[must_use]
     pub fn rate_matrix(self) -> Matrix3<f64> {
-        let Rz = Rotation3::from_axis_angle(&Vector3::z_axis(), self.z);
-        let Ry = Rotation3::from_axis_angle(&Vector3::y_axis(), self.y);
+        let Rz = rotation_about(&Vector3::z_axis(), self.z);
+        let Ry = rotation_about(&Vector3::y_axis(), self.y);
         Matrix3::from_columns(&[Rz * (Ry * Vector3::x()), Rz * Vector3::y(), Vector3::z()])
     }
 

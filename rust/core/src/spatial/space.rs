@@ -5,6 +5,8 @@
 
 use nalgebra::SVector;
 
+use crate::scalar::elementary::hypot;
+
 /// Velocities of a body in D dimensions: 3 in the plane, 6 in space.
 #[must_use]
 pub const fn body_velocities(dimensions: usize) -> usize {
@@ -22,7 +24,9 @@ pub fn axis<const D: usize>(k: usize) -> SVector<f64, D> {
 #[inline]
 #[must_use]
 pub fn length(x: &[f64]) -> f64 {
-    x[1..].iter().fold(x[0].abs(), |length, x| length.hypot(*x))
+    x[1..]
+        .iter()
+        .fold(x[0].abs(), |length, x| hypot(length, *x))
 }
 
 /// `a · b`, from the first entry to the last.

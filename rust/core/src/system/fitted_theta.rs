@@ -7,13 +7,15 @@
 //!
 //! Source: Liniger and Willoughby 1970, *SIAM J. Numer. Anal.* 7, 47–66.
 
+use crate::scalar::elementary::exp_m1;
+
 /// θ(z) in [½, 1] for `z ≥ 0`.
 #[must_use]
 pub fn fitted_theta(z: f64) -> f64 {
     if z < 1e-2 {
         0.5 + z / 12.0 - z * z * z / 720.0
     } else {
-        1.0 / -f64::exp_m1(-z) - 1.0 / z
+        1.0 / -exp_m1(-z) - 1.0 / z
     }
 }
 

@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 
 use super::{NEAREST, PairPoint, convex, disc_plane};
 use crate::geometry::{Disc, OrientedBox, SupportMap};
+use crate::scalar::elementary::hypot;
 
 /// Sine of the angle to a face's normal, or to the axle, below which a direction counts as parallel
 /// to it.
@@ -37,7 +38,7 @@ pub fn points(disc: &Disc, solid: &OrientedBox, reach: f64, mut visit: impl FnMu
     let outward = solid.R.tr_mul(&-near.n);
     let k = outward.iamax();
     let face = 2 * k + usize::from(outward[k] < 0.0);
-    if outward.x.hypot(outward.y).hypot(outward.z) - outward[k].abs() < ALONG * ALONG {
+    if hypot(hypot(outward.x, outward.y), outward.z) - outward[k].abs() < ALONG * ALONG {
         for feature in 0..3 {
             let point = rim_point(disc, solid, face, feature);
             if is_over(solid, k, &point.point) {

@@ -21,6 +21,7 @@ use super::error::TerrainError;
 use super::plane::Plane;
 use super::sphere_field::{MAX_SIZE, check_count};
 use crate::geometry::shape::Sphere;
+use crate::scalar::elementary::{exp, hypot};
 
 /// A circle that no rock reaches into, seen from above.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,7 +92,7 @@ impl Rocks {
     #[must_use]
     pub fn covered_fraction(&self, diameter: f64) -> f64 {
         if self.abundance > 0.0 {
-            self.abundance * (-self.decay() * diameter).exp()
+            self.abundance * exp(-self.decay() * diameter)
         } else {
             0.0
         }
@@ -105,9 +106,12 @@ impl Rocks {
     /// Expected number of rocks between the smallest and the largest diameter.
     #[must_use]
     pub fn expected_count(&self) -> f64 {
-        self.table()
-            .last()
-            .map_or(0.0, |per_area| per_area * self.area[0] * self.area[1])
+        self.count_of(&self.table())
+    }
+
+    fn count_of(&self, table: &[f64]) -> f64 {
+        let per_area = table.last().copied().unwrap_or_default();
+        per_area * self.area[0] * self.area[1]
     }
 
     /// Rocks per m² from 1/max_diameter up to each node of a uniform grid in 1/D.
@@ -122,7 +126,7 @@ impl Rocks {
         }
         for i in 0..CELLS {
             let y = low + (i as f64 + 0.5) * step;
-            sum += 4.0 * k * q / PI * (-q / y).exp() * step;
+            sum += 4.0 * k * q / PI * exp(-q / y) * step;
             table.push(sum);
         }
         table
@@ -221,7 +225,7 @@ impl Rocks {
     pub fn sample(&self) -> Result<Vec<Sphere>, TerrainError> {
         self.check()?;
         let table = self.table();
-        let expected = self.expected_count();
+        let expected = self.count_of(&table);
         check_count(expected.min(1e15).ceil() as usize)?;
         let mut random = Random::new(self.seed);
         let count = (expected + random.uniform()) as usize;
@@ -235,7 +239,7 @@ impl Rocks {
                 let is_clear = self
                     .clearings
                     .iter()
-                    .all(|c| (x - c.x).hypot(z - c.z) >= c.radius + radius);
+                    .all(|c| hypot(x - c.x, z - c.z) >= c.radius + radius);
                 is_clear.then_some((x, z))
             });
             if let Some((x, z)) = place {

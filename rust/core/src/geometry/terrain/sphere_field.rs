@@ -8,6 +8,7 @@ use super::rocks::Rocks;
 use super::{Primitive, Terrain};
 use crate::geometry::broad_phase::BallTree;
 use crate::geometry::shape::Sphere;
+use crate::scalar::elementary::{hypot, sin_cos};
 
 /// Most spheres of a field: some hundred megabytes, and a second to sort them.
 pub const MAX_SPHERES: usize = 2_000_000;
@@ -76,7 +77,7 @@ impl SphereField {
             .map(|(x, z)| Sphere {
                 centre: Vector3::new(
                     x,
-                    -0.5 + 0.5 * (x / 5.0 + std::f64::consts::FRAC_PI_2).sin(),
+                    -0.5 + 0.5 * sin_cos(x / 5.0 + std::f64::consts::FRAC_PI_2).0,
                     z,
                 ),
                 radius: 0.5,
@@ -173,7 +174,7 @@ impl Terrain for SphereField {
     fn height(&self, x: f64, z: f64) -> Option<f64> {
         let mut highest = self.ground.as_ref().and_then(|plane| plane.height(x, z));
         self.tree.visit_column(x, z, |sphere| {
-            let across = (sphere.centre.x - x).hypot(sphere.centre.z - z);
+            let across = hypot(sphere.centre.x - x, sphere.centre.z - z);
             let top = sphere.centre.y + (sphere.radius.powi(2) - across.powi(2)).max(0.0).sqrt();
             highest = Some(highest.map_or(top, |y| y.max(top)));
         });

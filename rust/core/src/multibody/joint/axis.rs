@@ -1,6 +1,9 @@
 //! Direction of a joint's axis.
 
-use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
+use nalgebra::{Matrix3, Unit, Vector3};
+
+use crate::scalar::elementary::sin_cos;
+use crate::spatial::rotation_about;
 
 /// Direction of a revolute or prismatic joint. The coordinate axes are separate variants because a
 /// rotation about one of them changes only two columns.
@@ -61,7 +64,7 @@ impl JointAxis {
     #[must_use]
     pub fn rotate(&self, R: &Matrix3<f64>, angle: f64) -> (Matrix3<f64>, Vector3<f64>) {
         let columns = |fixed: usize| {
-            let (s, c) = angle.sin_cos();
+            let (s, c) = sin_cos(angle);
             let (i, j) = ((fixed + 1) % 3, (fixed + 2) % 3);
             let (a, b): (Vector3<f64>, Vector3<f64>) = (R.column(i).into(), R.column(j).into());
             let mut out = *R;
@@ -73,7 +76,7 @@ impl JointAxis {
             Self::X => columns(0),
             Self::Y => columns(1),
             Self::Z => columns(2),
-            Self::General(u) => R * Rotation3::from_axis_angle(u, angle).matrix(),
+            Self::General(u) => R * rotation_about(u, angle),
         };
         (turned, self.turned(R))
     }
@@ -82,6 +85,7 @@ impl JointAxis {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Rotation3;
 
     #[test]
     fn coordinate_axes_agree_with_the_general_one() {

@@ -361,6 +361,7 @@ where
         stage: report.stage,
         status: report.status,
         iterations: report.iterations,
+        ..Rung::default()
     });
     report
 }

@@ -4,6 +4,7 @@
 //! redundant contacts with large mass ratios. A sweep costs no more than one product with `W`.
 
 use crate::problem::{Prepared, Proximal, Residual};
+use crate::scalar::elementary::ln;
 use crate::solver::local::sweep;
 use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
@@ -53,8 +54,8 @@ pub(in crate::solver) fn sweeps<const D: usize>(
         // The residual costs as much as a sweep: compute it often at first, then every tenth sweep.
         let batch = (done / 2).clamp(1, 10).min(budget.sweeps - done);
         if budget.predict && done >= 20 {
-            let rate = (residual.relative / last).ln() / batch as f64;
-            let remaining = (options.tolerance / residual.relative).ln() / rate;
+            let rate = ln(residual.relative / last) / batch as f64;
+            let remaining = ln(options.tolerance / residual.relative) / rate;
             if rate >= 0.0 || remaining > (budget.sweeps - done) as f64 {
                 return give_best(SolveStatus::Stalled, best, p, u, scratch);
             }

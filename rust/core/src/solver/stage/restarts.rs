@@ -7,6 +7,7 @@
 
 use super::pivoting;
 use crate::problem::{Prepared, Residual};
+use crate::scalar::elementary::sin_cos;
 use crate::solver::options::SolverOptions;
 use crate::solver::report::SolveStatus;
 use crate::solver::scratch::Scratch;
@@ -37,7 +38,7 @@ fn draw<const D: usize>(mu: &[f64], size: f64, draws: &mut Draws, p: &mut [f64])
         let normal = 2.0 * size * draws.next();
         // A third of the contacts start on the cone's surface, sliding.
         let tangential = mu.min(1.0) * normal * (1.5 * draws.next()).min(1.0);
-        let (sin, cos) = (std::f64::consts::TAU * draws.next()).sin_cos();
+        let (sin, cos) = sin_cos(std::f64::consts::TAU * draws.next());
         if is_open {
             p.fill(0.0);
             continue;

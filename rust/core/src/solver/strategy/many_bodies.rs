@@ -160,6 +160,7 @@ fn search<const D: usize>(
         stage: found.stage,
         status: found.status,
         iterations: found.iterations,
+        factorisations: found.factorisations(),
     });
     found.iterations += report.iterations;
     if found.is_converged() || excess(options, &found) < excess(options, &report) {

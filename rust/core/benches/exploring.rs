@@ -1,0 +1,172 @@
+//! Microseconds a step of a rover whose policy explores, on one thread, and what the contact solver
+//! does meanwhile: `cargo bench -p rover-core --bench exploring`.
+//!
+//! It only reports. The drives are those of `tests/comparison/exploring.json`: random torques and
+//! set-points, redrawn every ten steps of 5 ms. A time is the median of eleven rounds, each of which
+//! plays all drives at both tolerances. `-- --json GROUND TORQUE` measures one scene and prints
+//! JSON, for `make bench`, which sets other figures beside these.
+
+#![allow(clippy::print_stdout, clippy::unwrap_used)] // prints; stops at an impossible scene
+
+#[path = "../../../tests/physics/exploring_scenes.rs"]
+#[allow(missing_docs)]
+mod exploring_scenes;
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use exploring_scenes::{Drive, Ground, TORQUES, drives};
+use rover_core::integrator::{StepError, StepOptions};
+use rover_core::solver::SolverOptions;
+use serde_json::{Value, json};
+
+/// The tolerances: the default, and that of a hasty user.
+const TOLERANCES: [f64; 2] = [1e-12, 1e-6];
+
+const ROUNDS: usize = 11;
+
+/// Number of steps by the size of something.
+type Histogram = BTreeMap<usize, usize>;
+
+/// The figures of a scene.
+struct Measured {
+    /// Microseconds a step at each tolerance.
+    microseconds: [f64; 2],
+    steps: usize,
+    not_converged: usize,
+    iterations: Histogram,
+    factorisations: Histogram,
+    pivots: Histogram,
+}
+
+fn options(tolerance: f64) -> StepOptions {
+    StepOptions {
+        solver: SolverOptions {
+            tolerance,
+            ..SolverOptions::default()
+        },
+        ..StepOptions::default()
+    }
+}
+
+/// Microseconds a step over all drives.
+fn time(drives: &[Drive]) -> Result<f64, StepError> {
+    let (mut seconds, mut steps) = (0.0, 0);
+    for drive in drives {
+        let mut drive = drive.clone();
+        let start = Instant::now();
+        steps += drive.play()?.steps;
+        seconds += start.elapsed().as_secs_f64();
+    }
+    Ok(1e6 * seconds / steps as f64)
+}
+
+fn measure(ground: Ground, torque: f64) -> Result<Measured, StepError> {
+    let drives = TOLERANCES.map(|tolerance| drives(ground, torque, &options(tolerance)));
+    let mut times = [Vec::new(), Vec::new()];
+    for _ in 0..ROUNDS {
+        for (times, drives) in times.iter_mut().zip(&drives) {
+            times.push(time(drives)?);
+        }
+    }
+    let mut measured = Measured {
+        microseconds: times.map(|mut times| {
+            times.sort_by(f64::total_cmp);
+            times[ROUNDS / 2]
+        }),
+        steps: 0,
+        not_converged: 0,
+        iterations: Histogram::new(),
+        factorisations: Histogram::new(),
+        pivots: Histogram::new(),
+    };
+    for drive in &drives[0] {
+        drive.clone().play_by_step(|report| {
+            measured.steps += 1;
+            measured.not_converged += usize::from(!report.is_converged());
+            *measured.iterations.entry(report.iterations).or_default() += 1;
+            let factorisations = &mut measured.factorisations;
+            *factorisations.entry(report.factorisations).or_default() += 1;
+            *measured.pivots.entry(report.pivots).or_default() += 1;
+        })?;
+    }
+    Ok(measured)
+}
+
+/// Mean, median, 99th percentile and largest, of a table's column.
+fn summary(histogram: &Histogram) -> String {
+    let n: usize = histogram.values().sum();
+    let total: usize = histogram.iter().map(|(size, count)| size * count).sum();
+    let quantile = |share: f64| {
+        let mut seen = 0;
+        let rank = (share * n as f64).ceil();
+        let reached = histogram.iter().find(|(_, count)| {
+            seen += **count;
+            seen as f64 >= rank
+        });
+        reached.map_or(0, |(size, _)| *size)
+    };
+    let mean = total as f64 / n as f64;
+    let (median, most, largest) = (quantile(0.5), quantile(0.99), quantile(1.0));
+    format!("{mean:6.2} {median:3} {most:3} {largest:4}")
+}
+
+fn as_json(measured: &Measured) -> Value {
+    let pairs = |histogram: &Histogram| histogram.iter().map(|(a, b)| json!([a, b])).collect();
+    let [iterations, factorisations, pivots]: [Value; 3] = [
+        &measured.iterations,
+        &measured.factorisations,
+        &measured.pivots,
+    ]
+    .map(pairs);
+    json!({
+        "tolerances": TOLERANCES,
+        "microseconds": measured.microseconds,
+        "steps": measured.steps,
+        "not_converged": measured.not_converged,
+        "iterations": iterations,
+        "factorisations": factorisations,
+        "pivots": pivots,
+    })
+}
+
+fn main() -> Result<(), StepError> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let Some(at) = arguments.iter().position(|a| a == "--json") {
+        let ground = arguments.get(at + 1).and_then(|name| Ground::of(name));
+        let torque = arguments.get(at + 2).and_then(|t| t.parse().ok());
+        let (ground, torque) = (
+            ground.expect("the name of a ground"),
+            torque.expect("a torque"),
+        );
+        println!("{}", as_json(&measure(ground, torque)?));
+        return Ok(());
+    }
+    println!(
+        "{:<22} {:>6} {:>9} {:>9} {:>6} {:^20} {:^20} {:^20}",
+        "exploring, 5 ms",
+        "N m",
+        "us, 1e-12",
+        "us, 1e-6",
+        "failed",
+        "iterations",
+        "factors",
+        "pivots"
+    );
+    println!("{:<56} {}", "", "  mean med 99% most  ".repeat(3));
+    for ground in Ground::ALL {
+        for torque in TORQUES {
+            let measured = measure(ground, torque)?;
+            let [fine, coarse] = measured.microseconds;
+            println!(
+                "{:<22} {torque:>6} {fine:>9.2} {coarse:>9.2} {:>6}  {}   {}   {}",
+                ground.name(),
+                measured.not_converged,
+                summary(&measured.iterations),
+                summary(&measured.factorisations),
+                summary(&measured.pivots),
+            );
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,32 @@
+//! A rover that takes a lane of a block: what the block reads of it, and writes back.
+
+use std::sync::Arc;
+
+use crate::geometry::Terrain;
+use crate::integrator::{StepOptions, WarmStart};
+use crate::multibody::{Configuration, Model};
+use crate::system::Command;
+
+/// A rover by its parts.
+pub struct Passenger<'a> {
+    /// Its model, whose machine is the block's.
+    pub model: &'a Arc<Model>,
+    /// Its ground.
+    pub terrain: &'a Arc<dyn Terrain>,
+    /// Its options, alike those of all passengers of the block.
+    pub options: &'a StepOptions,
+    /// Its command.
+    pub command: &'a Command,
+    /// Configuration.
+    pub configuration: &'a mut Configuration,
+    /// Velocity (nv).
+    pub v: &'a mut [f64],
+    /// s.
+    pub time: &'a mut f64,
+    /// Impulses of the last step.
+    pub warm_start: &'a mut WarmStart,
+    /// Work of each joint's drive since the call began (n_joints), J.
+    pub drive_work: &'a mut [f64],
+    /// Mean torque of each wheel's drive in the last step, positive forward, N m.
+    pub wheel_torque: &'a mut [f64],
+}

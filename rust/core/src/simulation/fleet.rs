@@ -1,0 +1,265 @@
+//! Rovers that one thread steps together, several to a register.
+//!
+//! Rovers of one machine with alike options fill the lanes of blocks ([`crate::lanes`]); in each
+//! step the contact problems of all blocks are solved together. A lane whose step is not ordinary
+//! is taken by the general step, alone, and comes back. Every rover moves as it would alone, to the
+//! last bit.
+
+use std::sync::Arc;
+
+use super::rover::RoverSimulation;
+use crate::integrator::{NoProbe, StepError, StepReport};
+use crate::lanes::machine::Machine;
+use crate::lanes::newton;
+use crate::lanes::problem::ContactProblem;
+use crate::lanes::step::{Block, are_alike};
+use crate::scalar::{Instructions, Lane};
+
+/// Rovers that together cost less alone than as a block, as a fraction of its lanes.
+const FEW: f64 = 0.4;
+
+/// A rover of a fleet, and the place for the error that ended its last call.
+#[derive(Debug)]
+pub struct Rider<'a> {
+    /// The rover.
+    pub rover: &'a mut RoverSimulation,
+    /// Why its call ended early, if it did.
+    pub error: &'a mut Option<StepError>,
+}
+
+/// The blocks that a thread steps rovers with. Holds no state between calls.
+pub struct Fleet {
+    crew: Crew,
+}
+
+/// Blocks of this machine's widest lanes.
+enum Crew {
+    Singles,
+    #[cfg(target_arch = "x86_64")]
+    Fours(Box<Lanes<fearless_simd::f64x4<fearless_simd::Avx2>>>),
+    #[cfg(target_arch = "x86_64")]
+    Eights(Box<Lanes<fearless_simd::f64x8<fearless_simd::Avx512>>>),
+}
+
+impl Fleet {
+    /// For a set of instructions; mostly [`Instructions::of_this_machine`].
+    #[must_use]
+    pub fn new(instructions: Instructions) -> Self {
+        let crew = match instructions {
+            Instructions::Baseline => Crew::Singles,
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2(token) => Crew::Fours(Box::new(Lanes::new(token))),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx512(token) => Crew::Eights(Box::new(Lanes::new(token))),
+        };
+        Self { crew }
+    }
+
+    /// Takes `n` steps with each rover, but stops after a whole one once `go_on`, asked after each
+    /// step, returns false. A failed step ends the call of its own rover only.
+    pub fn advance(&mut self, riders: &mut [Rider<'_>], n: usize, go_on: &mut dyn FnMut() -> bool) {
+        match &mut self.crew {
+            Crew::Singles => {
+                for rider in riders {
+                    rider.go_alone(n, go_on);
+                }
+            }
+            #[cfg(target_arch = "x86_64")]
+            Crew::Fours(lanes) => lanes.advance(riders, n, go_on),
+            #[cfg(target_arch = "x86_64")]
+            Crew::Eights(lanes) => lanes.advance(riders, n, go_on),
+        }
+    }
+}
+
+impl Rider<'_> {
+    fn go_alone(&mut self, n: usize, go_on: &mut dyn FnMut() -> bool) {
+        *self.error = self.rover.step_while(n, go_on).err();
+    }
+}
+
+/// A lane's rover in a call.
+#[derive(Clone, Copy, Debug)]
+struct Seat {
+    /// Index of the rider.
+    rider: usize,
+    report: StepReport,
+    has_failed: bool,
+    /// Whether its last step was a general one.
+    is_general: bool,
+}
+
+struct Lanes<T: Lane> {
+    token: T::Token,
+    machine: Option<Arc<Machine>>,
+    blocks: Vec<Block<T>>,
+    problems: Vec<ContactProblem>,
+    seats: Vec<Option<Seat>>,
+}
+
+impl<T: Lane> Lanes<T> {
+    fn new(token: T::Token) -> Self {
+        Self {
+            token,
+            machine: None,
+            blocks: Vec::new(),
+            problems: Vec::new(),
+            seats: Vec::new(),
+        }
+    }
+
+    fn advance(&mut self, riders: &mut [Rider<'_>], n: usize, go_on: &mut dyn FnMut() -> bool) {
+        let n_seats = self.seat(riders);
+        for (k, rider) in riders.iter_mut().enumerate() {
+            if !self.seats[..n_seats]
+                .iter()
+                .flatten()
+                .any(|seat| seat.rider == k)
+            {
+                rider.go_alone(n, go_on);
+            }
+        }
+        if n_seats == 0 {
+            return;
+        }
+        let n_blocks = n_seats / T::LANES;
+        for (b, block) in self.blocks[..n_blocks].iter_mut().enumerate() {
+            for lane in 0..T::LANES {
+                match &mut self.seats[b * T::LANES + lane] {
+                    Some(seat) => {
+                        let rover = &mut *riders[seat.rider].rover;
+                        rover.begin_call();
+                        rover.board(block, lane);
+                    }
+                    None => block.clear(lane),
+                }
+            }
+        }
+        for _ in 0..n {
+            self.step(n_blocks, riders);
+            if !go_on() {
+                break;
+            }
+        }
+        for (b, block) in self.blocks[..n_blocks].iter_mut().enumerate() {
+            for (lane, seat) in self.seats[b * T::LANES..][..T::LANES].iter().enumerate() {
+                if let Some(seat) = seat.filter(|seat| !seat.has_failed) {
+                    let rover = &mut *riders[seat.rider].rover;
+                    if seat.is_general {
+                        rover.list_active();
+                    } else {
+                        rover.alight(block, lane);
+                        rover.list_from(block, lane);
+                    }
+                    rover.end_call(seat.report);
+                }
+            }
+        }
+    }
+
+    /// Gives the rovers that can share blocks their seats; returns how many seats the blocks have.
+    fn seat(&mut self, riders: &[Rider<'_>]) -> usize {
+        self.seats.clear();
+        let Some(first) = riders
+            .iter()
+            .position(|rider| rider.rover.machine().is_some())
+        else {
+            return 0;
+        };
+        let leader = &*riders[first].rover;
+        for (k, rider) in riders.iter().enumerate() {
+            let is_like = match (rider.rover.machine(), leader.machine()) {
+                (Some(own), Some(other)) => Arc::ptr_eq(own, other) || own == other,
+                _ => false,
+            };
+            if is_like && are_alike(rider.rover.options(), leader.options()) {
+                self.seats.push(Some(Seat {
+                    rider: k,
+                    report: StepReport::default(),
+                    has_failed: false,
+                    is_general: false,
+                }));
+            }
+        }
+        let rest = self.seats.len() % T::LANES;
+        if (rest as f64) < FEW * T::LANES as f64 {
+            self.seats.truncate(self.seats.len() - rest);
+        }
+        let n_seats = self.seats.len().next_multiple_of(T::LANES);
+        self.seats.resize(n_seats, None);
+        let Some(machine) = leader.machine() else {
+            return 0;
+        };
+        if !self
+            .machine
+            .as_ref()
+            .is_some_and(|own| Arc::ptr_eq(own, machine))
+        {
+            self.machine = Some(Arc::clone(machine));
+            self.blocks.clear();
+        }
+        while self.blocks.len() < n_seats / T::LANES {
+            self.blocks.push(Block::new(self.token, machine));
+        }
+        if self.problems.len() < n_seats {
+            self.problems.resize_with(n_seats, ContactProblem::default);
+        }
+        n_seats
+    }
+
+    /// One step of every block.
+    fn step(&mut self, n_blocks: usize, riders: &mut [Rider<'_>]) {
+        let (blocks, probe) = (&mut self.blocks[..n_blocks], &mut NoProbe);
+        let problems = &mut self.problems[..n_blocks * T::LANES];
+        for (block, problems) in blocks.iter_mut().zip(problems.chunks_exact_mut(T::LANES)) {
+            block.prepare(problems, probe);
+        }
+        let solver = blocks[0].options().solver;
+        newton::solve_all::<T>(self.token, problems, &solver);
+        let mut is_deep = false;
+        for (block, problems) in blocks.iter_mut().zip(problems.chunks_exact(T::LANES)) {
+            is_deep |= block.conclude(problems, probe);
+        }
+        if is_deep {
+            for (block, problems) in blocks.iter_mut().zip(problems.chunks_exact_mut(T::LANES)) {
+                block.set_gaps(problems);
+            }
+            newton::solve_all::<T>(self.token, problems, &solver);
+        }
+        for (block, problems) in blocks.iter_mut().zip(problems.chunks_exact(T::LANES)) {
+            block.finish(is_deep.then_some(problems), probe);
+        }
+        for (b, block) in blocks.iter_mut().enumerate() {
+            let seats = &mut self.seats[b * T::LANES..][..T::LANES];
+            let mut is_changed = false;
+            for (lane, seat) in seats.iter_mut().enumerate() {
+                let Some(seat) = seat.as_mut().filter(|seat| !seat.has_failed) else {
+                    continue;
+                };
+                if block.declined(lane).is_none() {
+                    seat.report.merge(block.report(lane));
+                    seat.is_general = false;
+                    continue;
+                }
+                let Rider { rover, error } = &mut riders[seat.rider];
+                rover.alight(block, lane);
+                match rover.step_generally() {
+                    Ok(report) => {
+                        seat.report.merge(&report);
+                        seat.is_general = true;
+                        rover.board(block, lane);
+                    }
+                    Err(why) => {
+                        **error = Some(why);
+                        seat.has_failed = true;
+                        block.clear(lane);
+                    }
+                }
+                is_changed = true;
+            }
+            if is_changed {
+                block.begin();
+            }
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! The ordinary steps of a rover, alone and as a passenger of a block.
+
+use std::sync::Arc;
+
+use super::active_contact::ActiveContact;
+use super::rover::{RoverScene, RoverSimulation};
+use super::scene::QuickStep;
+use crate::integrator::{NoProbe, Phase, Probe, StepError, StepReport};
+use crate::lanes::machine::Machine;
+use crate::lanes::newton;
+use crate::lanes::passenger::Passenger;
+use crate::lanes::problem::ContactProblem;
+use crate::lanes::step::{Block, admits};
+use crate::scalar::{Lane, Single};
+
+/// A block of one lane, made when first needed. It holds no state: a copy has none.
+#[derive(Default)]
+pub(super) struct Quick {
+    block: Option<Box<Block<f64>>>,
+    problem: Box<[ContactProblem; 1]>,
+    gap_problem: Box<[ContactProblem; 1]>,
+    /// Whether the last step was taken here.
+    is_last: bool,
+}
+
+impl Clone for Quick {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl std::fmt::Debug for Quick {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Quick").finish_non_exhaustive()
+    }
+}
+
+impl RoverScene {
+    /// Takes an ordinary step; None if it is not ordinary, and nothing has changed.
+    pub(super) fn take_ordinary_step(
+        &self,
+        step: QuickStep<'_, Self>,
+        probe: &mut dyn Probe,
+    ) -> Option<StepReport> {
+        let quick = &mut step.parts.quick;
+        quick.is_last = false;
+        let machine = self.machine.as_ref().filter(|_| admits(step.options))?;
+        let token = Single::best();
+        let block = quick
+            .block
+            .get_or_insert_with(|| Box::new(Block::new(token, machine)));
+        let mut passenger = Passenger {
+            model: &self.model,
+            terrain: &self.terrain,
+            options: step.options,
+            command: &step.command.actuators,
+            configuration: &mut step.state.configuration,
+            v: &mut step.state.v,
+            time: &mut step.state.time,
+            warm_start: step.warm_start,
+            drive_work: &mut step.parts.drive_work,
+            wheel_torque: step.memory,
+        };
+        block.board(0, &passenger);
+        block.begin();
+        let problems = &mut quick.problem[..];
+        block.prepare(problems, probe);
+        let solver = &step.options.solver;
+        newton::solve_all::<f64>(token, problems, solver);
+        probe.end(Phase::Solve);
+        let is_deep = block.conclude(problems, probe);
+        let gap_problems = &mut quick.gap_problem[..];
+        if is_deep {
+            gap_problems.clone_from_slice(problems);
+            block.set_gaps(gap_problems);
+            newton::solve_all::<f64>(token, gap_problems, solver);
+        }
+        block.finish(is_deep.then_some(&*gap_problems), probe);
+        if block.declined(0).is_some() {
+            return None;
+        }
+        block.alight(0, &mut passenger);
+        quick.is_last = true;
+        Some(*block.report(0))
+    }
+}
+
+impl Quick {
+    /// The problem of the last step taken here, and its block.
+    pub(super) fn last(&self) -> Option<(&Block<f64>, &ContactProblem)> {
+        let block = self.block.as_deref().filter(|_| self.is_last)?;
+        Some((block, &self.problem[0]))
+    }
+}
+
+impl RoverSimulation {
+    /// The machine of its ordinary steps; none if its steps are never ordinary.
+    pub(super) fn machine(&self) -> Option<&Arc<Machine>> {
+        self.scene
+            .machine
+            .as_ref()
+            .filter(|_| admits(&self.options))
+    }
+
+    /// Takes a lane of a block. [`Block::begin`] follows.
+    pub(super) fn board<T: Lane>(&mut self, block: &mut Block<T>, lane: usize) {
+        block.board(lane, &self.passenger());
+    }
+
+    /// Takes back what the block has made of it.
+    pub(super) fn alight<T: Lane>(&mut self, block: &Block<T>, lane: usize) {
+        block.alight(lane, &mut self.passenger());
+    }
+
+    /// Lists the contacts of its last step in a block.
+    pub(super) fn list_from<T: Lane>(&mut self, block: &Block<T>, lane: usize) {
+        self.active.clear();
+        let active = &mut self.active;
+        block.visit_contacts(lane, |contact, position, impulse, velocity| {
+            active.push(ActiveContact {
+                contact,
+                position,
+                impulse,
+                velocity,
+            });
+        });
+    }
+
+    /// A step that is not ordinary.
+    pub(super) fn step_generally(&mut self) -> Result<StepReport, StepError> {
+        let variant = self.options.variant;
+        self.general_step(&variant, &mut NoProbe)
+    }
+
+    fn passenger(&mut self) -> Passenger<'_> {
+        Passenger {
+            model: &self.scene.model,
+            terrain: &self.scene.terrain,
+            options: &self.options,
+            command: &self.command.actuators,
+            configuration: &mut self.state.configuration,
+            v: &mut self.state.v,
+            time: &mut self.state.time,
+            warm_start: &mut self.warm_start,
+            drive_work: &mut self.parts.drive_work,
+            wheel_torque: &mut self.memory,
+        }
+    }
+}
