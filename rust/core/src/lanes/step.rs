@@ -63,7 +63,8 @@ pub enum Decline {
 /// Number of reasons.
 pub const REASONS: usize = 8;
 /// LAB
-pub static DECLINED: [std::sync::atomic::AtomicUsize; 8] = [const { std::sync::atomic::AtomicUsize::new(0) }; 8];
+pub static DECLINED: [std::sync::atomic::AtomicUsize; 8] =
+    [const { std::sync::atomic::AtomicUsize::new(0) }; 8];
 
 /// Whether steps with these options can be ordinary.
 #[must_use]
