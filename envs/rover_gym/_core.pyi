@@ -13,13 +13,16 @@ import numpy.typing as npt
 from typing_extensions import disjoint_base
 
 _Array: TypeAlias = npt.NDArray[np.float64]
+_Rows: TypeAlias = npt.NDArray[np.uint64]
 _Coordinates: TypeAlias = Literal["report", "state"]
+_Range: TypeAlias = tuple[float, float]
 
 __all__ = [
     "BallSimulation",
     "BusyError",
     "CommandError",
     "Contacts",
+    "DrawnScenes",
     "Energy",
     "FrictionContactSolution",
     "Line",
@@ -35,6 +38,7 @@ __all__ = [
     "ProblemError",
     "RoverGymError",
     "RoverModel",
+    "SceneDistribution",
     "Simulation",
     "SimulationBatch",
     "Sine",
@@ -55,8 +59,10 @@ __all__ = [
     "atan2",
     "exp",
     "sin_cos",
+    "seed_generators",
     "soil_packing",
     "solve_friction_contact",
+    "standard_normals",
 ]
 
 __version__: str
@@ -282,6 +288,13 @@ class RoverModel:
     def wheel_radii(self) -> _Array:
         """Radius at which each wheel touches the ground, (n_wheels,), m."""
     @property
+    def clear_radius(self) -> float:
+        """Radius of the place that the rover needs to turn on the spot, m.
+
+        It is the largest distance from the trunk's origin to a wheel's contact, joints at zero, plus
+        the wheel's radius and 0.1 m.
+        """
+    @property
     def wheel_torque_limits(self) -> _Array:
         """Largest torque of each wheel, (n_wheels,), N m."""
     @property
@@ -404,6 +417,24 @@ class RoverModel:
             TerrainError: `terrain` is not a terrain.
             OptionError: `coordinates` is neither of the two.
         """
+    def resting_pose(self, plane: Plane, position: Sequence[float], heading: float) -> _Array:
+        """The coordinates of the rover at rest on a plane.
+
+        The joints are at zero, the trunk is upright along the normal with its origin above the
+        position, and the lowest wheel has gap zero.
+
+        Args:
+            plane: The plane, which must not be vertical.
+            position: x and z, (2,), m.
+            heading: Heading, rad.
+
+        Returns:
+            Coordinates of the state, (nq,).
+
+        Raises:
+            TerrainError: `plane` is no plane.
+            StateError: A number is not finite, or the plane is vertical.
+        """
     def wheel_contact_points(
         self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
     ) -> _Array:
@@ -494,6 +525,20 @@ class Plane:
     @property
     def offset(self) -> float:
         """Gap between the world's origin and the plane, m; flat ground at height y has the offset -y."""
+    @staticmethod
+    def tilted(slope: float, uphill: float) -> Plane:
+        """The plane through the origin that rises by a slope in a direction.
+
+        Args:
+            slope: Slope, rad.
+            uphill: Direction of steepest ascent, rad: an angle about +y from +x.
+
+        Returns:
+            The plane.
+
+        Raises:
+            TerrainError: An angle is no finite number.
+        """
     def height(self, x: float, z: float) -> float:
         """The height of the plane at a place.
 
@@ -1494,6 +1539,141 @@ class MirroredRoverSimulation(PlanarSimulation):
         """Names of the wheels of each disc."""
 
 @final
+class SceneDistribution:
+    """What the scenes of a task's episodes are drawn from.
+
+    Draws come from generators that are number for number NumPy's `PCG64`; a generator is given and
+    returned as four unsigned 64-bit numbers: high and low half of its state, high and low half of
+    its increment.
+
+    Args:
+        simulation: The rover, before its masses are scaled, and the options of its steps.
+        start: Ranges (low, high) of `slope`, `uphill`, `heading`, `goal_distance` and
+            `goal_bearing`, by name, rad and m.
+        domain: Ranges of `mass_scale`, `friction`, `actuator_gain` and `gravity_scale`, by name.
+        goal_tolerance: Distance from the goal within which no rock lies, m.
+        rocks: Range of `difficulty`, and `abundance` and `max_radius` or None, by name; None for no
+            rocks.
+        slope_by_difficulty: Whether the slope follows from the difficulty of the rocks.
+        field: The ground of every episode, a field on a plane; None for a tilted plane.
+        scan: Points of the height scan ahead and to the right of the trunk's origin in the heading
+            frame, (n, 2), m; none by default.
+        noise: Standard deviation of each entry of an observation, (size,); none by default.
+
+    Raises:
+        OptionError: An argument is missing, no number, or out of its range.
+    """
+
+    def __new__(
+        cls,
+        simulation: Simulation,
+        *,
+        start: Mapping[str, _Range],
+        domain: Mapping[str, _Range],
+        goal_tolerance: float,
+        rocks: Mapping[str, Any] | None = None,
+        slope_by_difficulty: bool = False,
+        field: SphereField | None = None,
+        scan: npt.ArrayLike | None = None,
+        noise: npt.ArrayLike | None = None,
+    ) -> SceneDistribution: ...
+    def draw(
+        self,
+        generators: _Rows,
+        *,
+        attempts: int = 100,
+        difficulties: Sequence[_Range | None] | None = None,
+        fixed: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
+    ) -> DrawnScenes:
+        """Draws one scene from each generator; `SimulationBatch.draw` does it on several threads.
+
+        A scene in which the rover would stand deeper than 1 cm in the ground or in a sphere is
+        drawn again. The given generators do not change: see `DrawnScenes.generators`.
+
+        Args:
+            generators: Generators, (m, 4) uint64.
+            attempts: Most scenes drawn for a rover until it has room.
+            difficulties: For each generator a range (low, high) that replaces that of the rocks'
+                difficulty, or None; by default none.
+            fixed: Values that replace draws, which are made all the same, by name: `slope`,
+                `uphill`, `position` (x, z), `heading`, `goal` (x, z), `difficulty`, `q` and `v`; one
+                mapping for all or a list of one for each generator; none by default.
+
+        Returns:
+            The scenes.
+
+        Raises:
+            TerrainError: A rover has no room in `attempts` scenes, or the ground refuses a number.
+            StateError: `q` or `v` has a wrong length or an entry that is not finite.
+            ModelError: A scaled mass is out of its range.
+            OptionError: Any other argument is invalid.
+        """
+    def __getnewargs_ex__(self) -> tuple[tuple[Simulation], dict[str, Any]]: ...
+
+@final
+class DrawnScenes:
+    """Drawn scenes with their first readings, in the order of the generators."""
+
+    @property
+    def generators(self) -> _Rows:
+        """The generators after the draws, (m, 4) uint64."""
+    @property
+    def readings(self) -> _Array:
+        """First readings, (m, size), with the goal as their target."""
+    @property
+    def noise(self) -> _Array | None:
+        """Noise of the first observations, (m, size); None without noise."""
+    @property
+    def starts(self) -> _Array:
+        """Starts, (m, 7), rad and m.
+
+        Slope, direction of steepest ascent, x and z of the start, heading, x and z of the goal.
+        """
+    @property
+    def domains(self) -> _Array:
+        """Properties of rover and world, (m, 4).
+
+        Factor of the masses, friction, gain of the motors, factor of gravity.
+        """
+    @property
+    def rocks(self) -> _Array:
+        """Rocks, (m, 3); zeros where there are none.
+
+        Difficulty, abundance, radius of the largest in wheel radii.
+        """
+    @property
+    def rock_seeds(self) -> _Rows:
+        """Seeds of the rocks, (m,) uint64; zeros where there are none."""
+    def terrain(self, index: int) -> Plane | SphereField:
+        """The ground of a scene.
+
+        Args:
+            index: Number of the scene.
+
+        Raises:
+            OptionError: There is no such scene.
+        """
+    def plane(self, index: int) -> Plane:
+        """The plane of a scene, under rocks too.
+
+        Args:
+            index: Number of the scene.
+
+        Raises:
+            OptionError: There is no such scene.
+        """
+    def simulation(self, index: int) -> Simulation:
+        """A new simulation of the rover at its start in a scene.
+
+        Args:
+            index: Number of the scene.
+
+        Raises:
+            OptionError: There is no such scene.
+        """
+    def __len__(self) -> int: ...
+
+@final
 class SimulationBatch:
     """Many rovers stepped side by side on several threads, each bit for bit as it would be alone.
 
@@ -1560,6 +1740,49 @@ class SimulationBatch:
 
         Raises:
             OptionError: There is no such rover, or an argument is invalid. Nothing has changed.
+        """
+    def draw(
+        self,
+        distribution: SceneDistribution,
+        generators: _Rows,
+        *,
+        attempts: int = 100,
+        difficulties: Sequence[_Range | None] | None = None,
+        fixed: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
+    ) -> DrawnScenes:
+        """Draws scenes on the threads of this batch, as `SceneDistribution.draw` does; no rover changes.
+
+        Args:
+            distribution: What the scenes are drawn from.
+            generators: Generators, (m, 4) uint64.
+            attempts: As of `SceneDistribution.draw`.
+            difficulties: As of `SceneDistribution.draw`.
+            fixed: As of `SceneDistribution.draw`.
+
+        Returns:
+            The scenes, the same for any number of threads.
+
+        Raises:
+            RoverGymError: As of `SceneDistribution.draw`, for the first rover that has one.
+        """
+    def begin(self, indices: Sequence[int], scenes: DrawnScenes) -> None:
+        """Puts rovers into drawn scenes, with the goals as the targets of their readings.
+
+        Args:
+            indices: Indices of the rovers, one for each scene.
+            scenes: Drawn scenes of models with equally many coordinates.
+
+        Raises:
+            OptionError: There is no such rover, or the scenes do not fit. Nothing has changed.
+        """
+    def terrain(self, index: int) -> Plane | SphereField:
+        """The ground of one rover.
+
+        Args:
+            index: Index of the rover.
+
+        Raises:
+            OptionError: There is no such rover.
         """
     def simulation(self, index: int) -> Simulation:
         """Returns a copy of one rover.
@@ -1838,6 +2061,33 @@ class SoilSimulation:
         Raises:
             StateError: The snapshot belongs to another soil or is damaged. Nothing has changed.
         """
+
+def seed_generators(seeds: Sequence[int]) -> _Rows:
+    """Seeds generators as `numpy.random.PCG64` does.
+
+    Args:
+        seeds: Whole numbers from 0, of any size.
+
+    Returns:
+        (m, 4) uint64: high and low half of each state, high and low half of each increment.
+
+    Raises:
+        OptionError: A seed is no whole number from 0.
+    """
+
+def standard_normals(generators: _Rows, size: int) -> tuple[_Array, _Rows]:
+    """Draws standard normal numbers as `numpy.random.Generator.standard_normal` does.
+
+    Args:
+        generators: Generators, (m, 4) uint64.
+        size: Numbers for each.
+
+    Returns:
+        The numbers, (m, size), and the generators after the draws, (m, 4) uint64.
+
+    Raises:
+        OptionError: An argument has a wrong shape or type.
+    """
 
 def soil_packing(
     count: int = 222,

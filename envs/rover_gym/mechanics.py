@@ -10,6 +10,7 @@ from rover_gym._core import (
     BusyError,
     CommandError,
     Contacts,
+    DrawnScenes,
     Energy,
     FrictionContactSolution,
     Line,
@@ -25,6 +26,7 @@ from rover_gym._core import (
     ProblemError,
     RoverGymError,
     RoverModel,
+    SceneDistribution,
     Simulation,
     SimulationBatch,
     Sine,
@@ -45,8 +47,10 @@ from rover_gym._core import (
     atan2,
     exp,
     sin_cos,
+    seed_generators,
     soil_packing,
     solve_friction_contact,
+    standard_normals,
 )
 
 __all__ = [
@@ -54,6 +58,7 @@ __all__ = [
     "BusyError",
     "CommandError",
     "Contacts",
+    "DrawnScenes",
     "Energy",
     "FrictionContactSolution",
     "Line",
@@ -69,6 +74,7 @@ __all__ = [
     "ProblemError",
     "RoverGymError",
     "RoverModel",
+    "SceneDistribution",
     "Simulation",
     "SimulationBatch",
     "Sine",
@@ -89,6 +95,8 @@ __all__ = [
     "atan2",
     "exp",
     "sin_cos",
+    "seed_generators",
     "soil_packing",
     "solve_friction_contact",
+    "standard_normals",
 ]

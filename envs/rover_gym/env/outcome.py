@@ -117,13 +117,14 @@ def _masked(values: dict[str, Any], n: int) -> dict[str, Any]:
     return {name: value for i, key in enumerate(values) for name, value in ((key, values[key]), (f"_{key}", masks[i]))}
 
 
-def reset_outcome(task: Task, progress: Progress, reading: Array) -> Outcome:
-    """The outcome of one rover's reset, with zero reward."""
+def reset_outcome(task: Task, progress: Progress, readings: Array) -> Outcome:
+    """The outcome of the reset of m rovers, with zero rewards."""
+    m = len(readings)
     return Outcome(
         observation=progress.observation.copy(),
-        reward=0.0,
-        termination=0,
+        reward=np.zeros(m),
+        termination=np.zeros(m, np.int64),
         progress=progress,
-        scalars=ReadingScalars.of(task, reading),
-        terms=dict.fromkeys(task.reward_weights, 0.0),
+        scalars=ReadingScalars.of(task, readings),
+        terms={name: np.zeros(m) for name in task.reward_weights},
     )

@@ -1,12 +1,13 @@
 """The state of an episode outside the simulation, for one rover or for n."""
 
 import copy
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
-from rover_gym.env.episode_scene import EpisodeScene
-from rover_gym.env.quantities import Array, Observations, Quantity
+from rover_gym.env.quantities import Array, Mask, Observations, Quantity
 from rover_gym.env.randomisation import Domain
 from rover_gym.env.readings import ReadingScalars, observe
 from rover_gym.env.task import Task
@@ -58,29 +59,37 @@ class Progress:
         )
 
     @classmethod
-    def begin(cls, task: Task, scene: EpisodeScene, reading: Array, noise: Array | None) -> "Progress | None":
-        """The progress of one rover at the start of an episode; None if its observation is not finite in float32."""
-        previous_action = np.zeros(N_ACTIONS)
+    def begin(
+        cls, task: Task, domains: Array, difficulties: Array, readings: Array, noise: Array | None
+    ) -> tuple["Progress", Mask]:
+        """The progress of m rovers at the start of an episode, and a mask of those with a finite observation."""
+        m = len(readings)
+        previous_action = np.zeros((m, N_ACTIONS))
+        energy, energy_positive, stuck_time = np.zeros((3, m))
         with np.errstate(over="ignore", invalid="ignore"):
-            observation, finite = observe(task, reading, previous_action, 0.0, noise)
-        if not finite:
-            return None
-        return cls(
-            distance=ReadingScalars.of(task, reading).distance,
+            observation, finite = observe(task, readings, previous_action, stuck_time, noise)
+        begun = cls(
+            distance=ReadingScalars.of(task, readings).distance,
             previous_action=previous_action,
-            energy=0.0,
-            energy_positive=0.0,
-            stuck_time=0.0,
-            domain=np.array(list(scene.domain.as_info().values())),
-            trunk_load_limit=task.trunk_load_limit(scene.domain),
-            difficulty=scene.difficulty,
+            energy=energy,
+            energy_positive=energy_positive,
+            stuck_time=stuck_time,
+            domain=domains,
+            trunk_load_limit=task.trunk_load_limit(domains),
+            difficulty=difficulties,
             observation=observation,
         )
+        return begun, finite
 
-    def put(self, i: int, one: "Progress") -> None:
-        """Sets the row of rover i."""
+    def row(self, i: int) -> "Progress":
+        """A copy of the progress of rover i."""
+        own: dict[str, Any] = {k: v[i].copy() if v.ndim > 1 else float(v[i]) for k, v in vars(self).items()}
+        return Progress(**own)
+
+    def put(self, chosen: Sequence[int], begun: "Progress") -> None:
+        """Sets the rows of some rovers."""
         for name, value in vars(self).items():
-            value[i] = getattr(one, name)
+            value[chosen] = getattr(begun, name)
 
     def is_of(self, task: Task) -> bool:
         """Whether the shapes fit one rover with this task and all values are finite."""

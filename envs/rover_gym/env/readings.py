@@ -1,13 +1,14 @@
 """Splits the core's readings into scalars and observations, for one rover or for n."""
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from rover_gym.env.generators import Rows
 from rover_gym.env.quantities import Array, Observations, Quantity
 from rover_gym.env.task import Task
 from rover_gym.env.wheels import N_ACTIONS
+from rover_gym.mechanics import standard_normals
 
 
 class ReadingScalars(NamedTuple):
@@ -55,15 +56,16 @@ def observe(
     return observation, finite
 
 
-def draw_noise(task: Task, generators: Sequence[np.random.Generator | None]) -> Array | None:
-    """Draws observation noise `(n, size)`, each row from that rover's own generator; None without noise."""
+def draw_noise(task: Task, generators: Rows) -> tuple[Array | None, Rows]:
+    """Draws observation noise `(m, size)`, each row from its own generator; None without noise.
+
+    Returns:
+        The noise, and the generators `(m, 4)` after the draw.
+    """
     if task.noisy is None:
-        return None
-    noise = np.zeros((len(generators), task.layout.size))
-    for row, generator in zip(noise, generators, strict=True):
-        if generator is not None:
-            row[:] = generator.standard_normal(task.layout.size) * task.noisy
-    return noise
+        return None, generators
+    normals, after = standard_normals(generators, task.layout.size)
+    return normals * task.noisy, after
 
 
 def tilt_of(cos_tilt: Quantity) -> Quantity:

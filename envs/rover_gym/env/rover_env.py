@@ -10,10 +10,11 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from rover_gym.env.arguments import RoverArguments, check_arguments, takes_arguments, with_argument_table
-from rover_gym.env.beginning import check_seed, draw_beginning, put_back, seeded
+from rover_gym.env.beginning import draw_beginnings
 from rover_gym.env.control_period import advance, motor_commands
 from rover_gym.env.env_snapshot import EnvSnapshot, check_random_state, check_snapshot
-from rover_gym.env.episode_scene import EpisodeScene, check_difficulty, check_reset_options
+from rover_gym.env.episode_scene import EpisodeScene, check_difficulty, check_reset_options, scene_of
+from rover_gym.env.generators import check_seed, row_of, seeded, set_row
 from rover_gym.env.observation import ObservationLayout
 from rover_gym.env.progress import Progress
 from rover_gym.env.randomisation import Domain
@@ -270,12 +271,15 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         checked = check_reset_options(self.task, options)
         chosen = check_seed(seed)
         generator, used = (self.np_random, self._np_random_seed) if chosen is None else seeded(chosen)
-        with put_back((generator,)):
-            beginning = draw_beginning(self.task, generator, self._difficulty, checked)
+        begun = draw_beginnings(self.task, row_of(generator)[None], [self._difficulty], checked)
+        scenes = begun.scenes
+        set_row(generator, scenes.generators[0])
         self._np_random, self._np_random_seed = generator, used
-        self._simulation, self._scene, self._progress = beginning.simulation, beginning.scene, beginning.progress
-        outcome = beginning.report(self.task)
-        return outcome.observation, outcome.info()
+        self._simulation, self._progress = scenes.simulation(0), begun.progress.row(0)
+        self._scene = scene_of(
+            self.task, scenes.starts[0], scenes.rocks[0], scenes.rock_seeds[0], scenes.domains[0], scenes.terrain(0)
+        )
+        return self._progress.observation.copy(), begun.report(self.task).info(0)
 
     def step(
         self, action: npt.NDArray[np.float32]
@@ -298,8 +302,12 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         except StepError as error:
             messages[0] = str(error)
         reading = simulation.reading(goal, self.task.scan)
-        noise = draw_noise(self.task, (self.np_random,))
-        outcome = advance(self.task, self._progress, command, reading, messages, None if noise is None else noise[0])
+        noise = None
+        if self.task.noisy is not None:
+            drawn, after = draw_noise(self.task, row_of(self.np_random)[None])
+            set_row(self.np_random, after[0])
+            noise = None if drawn is None else drawn[0]
+        outcome = advance(self.task, self._progress, command, reading, messages, noise)
         return outcome.observation, float(outcome.reward), bool(outcome.termination), False, outcome.info()
 
     def set_difficulty(self, difficulty: float | Range) -> None:

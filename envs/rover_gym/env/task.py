@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from rover_gym.env import rewards
 from rover_gym.env.observation import ObservationLayout, build_layout
+from rover_gym.env.quantities import Array
 from rover_gym.env.randomisation import Domain, DomainDistribution
 from rover_gym.env.rocks import MAX_GOAL_DISTANCE, RockDistribution, rock_distribution
 from rover_gym.env.start import StartDistribution, slope_of
@@ -18,6 +19,7 @@ from rover_gym.mechanics import (
     OptionError,
     Plane,
     RoverModel,
+    SceneDistribution,
     Simulation,
     SphereField,
 )
@@ -61,6 +63,7 @@ class Task:
         places: Slices of a reading, by name.
         n_shared: Number of leading entries that a reading and an observation share, in the same order.
         scalars: Slice of a reading that holds the scalars, from the distance to the goal on.
+        scenes: What the core draws episodes from.
     """
 
     model: RoverModel
@@ -86,6 +89,7 @@ class Task:
     places: Mapping[str, slice]
     n_shared: int
     scalars: slice
+    scenes: SceneDistribution
 
     def simulate(self, terrain: Plane | SphereField, domain: Domain) -> Simulation:
         """Creates a simulation of the rover on a terrain, at rest in the zero configuration."""
@@ -95,10 +99,10 @@ class Task:
             options["gravity"] = tuple(domain.gravity_scale * g for g in self.gravity)
         return Simulation(model, terrain, **options)
 
-    def trunk_load_limit(self, domain: Domain) -> float:
-        """Force on the trunk beyond which it is high-centred, N."""
+    def trunk_load_limit(self, domains: Array) -> Array:
+        """Forces on the trunk beyond which rovers with these fields of `Domain`, `(m, 4)`, are high-centred, N."""
         weight = self.model.mass * math.hypot(*self.gravity)
-        return TRUNK_LOAD * weight * domain.mass_scale * domain.gravity_scale
+        return TRUNK_LOAD * weight * domains[:, 0] * domains[:, 3]
 
 
 def make_task(given: Mapping[str, Any]) -> Task:
@@ -154,14 +158,29 @@ def make_task(given: Mapping[str, Any]) -> Task:
     }
     n_scan = 0 if scan is None else len(scan.offsets)
     # The core validates the simulation options.
-    places = Simulation(rover, Plane(), **options).reading_layout(n_scan)
+    simulation = Simulation(rover, Plane(), **options)
+    places = simulation.reading_layout(n_scan)
     layout = build_layout(rover, math.hypot(*gravity), n_scan)
+    points = None if scan is None else scan.offsets
+    noisy = None if domain.observation_noise == 0.0 else domain.observation_noise * layout.unbounded
+    slope_by_difficulty = slope_deg is None and rocks is not None
+    scenes = SceneDistribution(
+        simulation,
+        start=asdict(start),
+        domain=asdict(domain),
+        goal_tolerance=given["goal_tolerance"],
+        rocks=None if rocks is None else asdict(rocks),
+        slope_by_difficulty=slope_by_difficulty,
+        field=field,
+        scan=points,
+        noise=noisy,
+    )
     return Task(
         model=rover,
         field=field,
         rocks=rocks,
-        slope_by_difficulty=slope_deg is None and rocks is not None,
-        scan=None if scan is None else scan.offsets,
+        slope_by_difficulty=slope_by_difficulty,
+        scan=points,
         start=start,
         domain=domain,
         goal_tolerance=given["goal_tolerance"],
@@ -176,10 +195,11 @@ def make_task(given: Mapping[str, Any]) -> Task:
         torque_limits=rover.wheel_torque_limits,
         layout=layout,
         inverse_scale=1.0 / layout.scale,
-        noisy=None if domain.observation_noise == 0.0 else domain.observation_noise * layout.unbounded,
+        noisy=noisy,
         places=places,
         n_shared=places["target"].stop,
         scalars=slice(places["target"].stop - 1, places["solver"].stop),
+        scenes=scenes,
     )
 
 

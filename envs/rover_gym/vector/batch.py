@@ -5,8 +5,7 @@ rovers and threads. Each control period calls the compiled core once. Observatio
 functions that `RoverEnv` uses, applied to arrays.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
@@ -14,9 +13,10 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.beginning import Beginning, check_seed, draw_beginning, put_back, seeded
+from rover_gym.env.beginning import Beginnings, draw_beginnings
 from rover_gym.env.control_period import advance, motor_commands
-from rover_gym.env.episode_scene import EpisodeScene, ResetOptions, check_difficulty, check_reset_options
+from rover_gym.env.episode_scene import EpisodeScene, ResetOptions, check_difficulty, check_reset_options, scene_of
+from rover_gym.env.generators import Rows, check_seed, fresh_seed, generator_at, row_of, seeded_rows, set_row
 from rover_gym.env.observation import ObservationLayout
 from rover_gym.env.outcome import Outcome
 from rover_gym.env.progress import Progress
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from rover_gym.rendering import FrameRenderer
 
 
-#: Limits of a batch; each rover takes about 100 kB.
+#: Limits of a batch; `docs/vector.md` states the memory of a rover.
 MAX_ROVERS = 100_000
 MAX_THREADS = 4096
 
@@ -75,11 +75,15 @@ class RoverBatch:
         self.simulations = SimulationBatch([simulation] * self.n, scan=self.task.scan, threads=threads)
         self.rovers = tuple(BatchRover(self, i) for i in range(self.n))
         self._progress = Progress.of(self.task, self.n)
-        self._scenes: list[EpisodeScene | None] = [None] * self.n
-        self._generators: list[np.random.Generator | None] = [None] * self.n
+        self._starts, self._rocks = np.zeros((self.n, 7)), np.zeros((self.n, 3))
+        self._rock_seeds = np.zeros(self.n, np.uint64)
+        self._generators: Rows = np.zeros((self.n, 4), np.uint64)
+        #: Generators that were handed out; they hold their rovers' states.
+        self._lent: dict[int, np.random.Generator] = {}
         self._seeds: list[int] = [-1] * self.n
-        self._difficulties: list[Range | None] = [None] * self.n
+        self._difficulties: dict[int, Range] = {}
         self._steps = np.zeros(self.n, np.int64)
+        self._begun = np.zeros(self.n, np.bool_)
         self._started = False
 
     @property
@@ -98,49 +102,53 @@ class RoverBatch:
             OptionError: The seed is no whole number from 0; nothing has changed.
             TerrainError: As `RoverEnv.reset`; nothing has changed.
         """
-        with self.beginnings([i], [check_seed(seed)], options) as drawn:
-            return self.begin(i, drawn[0])
+        return self.begin(self.draw([i], [check_seed(seed)], options)).info(0)
 
-    @contextmanager
-    def beginnings(
+    def draw(
         self,
         chosen: Sequence[int],
         seeds: Sequence[int | None] | None = None,
-        options: ResetOptions | None = None,
-    ) -> Iterator[list["Drawn"]]:
-        """Draws the next episodes of some rovers, which `begin` starts.
-
-        If drawing or the `with` block raises, every random generator keeps its state.
+        options: ResetOptions | Sequence[ResetOptions] | None = None,
+    ) -> "Drawn":
+        """Draws the next episodes of some rovers on the batch's threads. Nothing changes until `begin` starts them.
 
         Args:
             chosen: Indices of the rovers.
             seeds: One checked seed per chosen rover; None to continue with the present generators.
-            options: The values that reset options fix.
+            options: The values that reset options fix, for all chosen rovers or one per rover.
 
         Raises:
-            TerrainError: As `RoverEnv.reset`; nothing has changed.
+            TerrainError: As `RoverEnv.reset`.
         """
         given = [None] * len(chosen) if seeds is None else seeds
-        made = [
-            (self.generator(i), self._seeds[i]) if seed is None else seeded(seed)
-            for i, seed in zip(chosen, given, strict=True)
-        ]
+        self._seed_at_random([i for i, seed in zip(chosen, given, strict=True) if seed is None])
+        self._collect()
+        rows = self._generators[chosen]
+        anew = [k for k, seed in enumerate(given) if seed is not None]
+        if anew:
+            rows[anew] = seeded_rows([seed for seed in given if seed is not None])
+        used = [self._seeds[i] if seed is None else seed for i, seed in zip(chosen, given, strict=True)]
+        difficulties = [self._difficulties.get(i) for i in chosen]
         fixed = ResetOptions() if options is None else options
-        with put_back([generator for generator, _ in made]):
-            yield [
-                Drawn(draw_beginning(self.task, generator, self._difficulties[i], fixed), generator, seed)
-                for i, (generator, seed) in zip(chosen, made, strict=True)
-            ]
+        begun = draw_beginnings(self.task, rows, difficulties, fixed, self.simulations)
+        return Drawn(begun, chosen, used, {chosen[k] for k in anew})
 
-    def begin(self, i: int, drawn: "Drawn") -> dict[str, Any]:
-        """Starts a drawn episode of rover i and returns its info."""
-        beginning = drawn.beginning
-        self.simulations.replace(i, beginning.simulation, beginning.scene.start.goal)
-        self._progress.put(i, beginning.progress)
-        self._scenes[i] = beginning.scene
-        self._steps[i] = 0
-        self._generators[i], self._seeds[i] = drawn.generator, drawn.seed
-        return beginning.report(self.task).info()
+    def begin(self, drawn: "Drawn") -> Outcome:
+        """Starts drawn episodes and returns what their reset reports, one row per rover."""
+        chosen, begun = drawn.chosen, drawn.begun
+        scenes = begun.scenes
+        self.simulations.begin(chosen, scenes)
+        self._progress.put(chosen, begun.progress)
+        self._starts[chosen], self._rocks[chosen] = scenes.starts, scenes.rocks
+        self._rock_seeds[chosen] = scenes.rock_seeds
+        self._steps[chosen], self._begun[chosen] = 0, True
+        self._generators[chosen] = scenes.generators
+        for i, seed in zip(chosen, drawn.seeds, strict=True):
+            self._seeds[i] = seed
+        for i in drawn.seeded & self._lent.keys():
+            del self._lent[i]
+        self._hand_back()
+        return begun.report(self.task)
 
     def step(self, actions: object, active: Mask | None = None) -> tuple[Outcome, Mask, Mask]:
         """Applies actions `(n, 12)` for one control period.
@@ -159,14 +167,13 @@ class RoverBatch:
         """
         commands = check_actions(actions, (self.n, N_ACTIONS))
         if not self._started:
-            if None in self._scenes:
+            if not self._begun.all():
                 raise ResetNeeded("a batch of rovers: call reset() first")
             self._started = True
         task = self.task
         torques, set_points = motor_commands(task, self._progress, commands)
         readings, messages = self.simulations.step(torques, set_points, task.substeps, active=active)
-        noise = self._draw_noise(active)
-        outcome = advance(task, self._progress, commands, readings, messages, noise)
+        outcome = advance(task, self._progress, commands, readings, messages, self._draw_noise(active))
         self._steps += 1
         terminated = outcome.termination != 0
         if self.max_episode_steps is None:
@@ -174,28 +181,71 @@ class RoverBatch:
         return outcome, terminated, self._steps >= self.max_episode_steps
 
     def generator(self, i: int) -> np.random.Generator:
-        """Rover i's random generator; before the first reset it is seeded at random, as in `gymnasium.Env`."""
-        made = self._generators[i]
-        if made is None:
-            made, self._seeds[i] = seeded(None)
-            self._generators[i] = made
-        return made
+        """Rover i's random generator; before the first reset it is seeded at random, as in `gymnasium.Env`.
+
+        The rover continues to draw from it: numbers that the caller draws are not drawn again.
+        """
+        if i not in self._lent:
+            self._seed_at_random([i])
+            self._lent[i] = generator_at(self._generators[i])
+        return self._lent[i]
+
+    def seed_of(self, i: int) -> int:
+        """The seed of rover i's random generator."""
+        self._seed_at_random([i])
+        return self._seeds[i]
+
+    def scene(self, i: int) -> EpisodeScene:
+        """The scene of rover i's episode.
+
+        Raises:
+            ResetNeeded: The rover has not been reset.
+        """
+        if not self._begun[i]:
+            raise ResetNeeded("a batch of rovers: call reset() first")
+        domain, terrain = self._progress.domain[i], self.simulations.terrain(i)
+        return scene_of(self.task, self._starts[i], self._rocks[i], int(self._rock_seeds[i]), domain, terrain)
+
+    def _seed_at_random(self, chosen: Sequence[int]) -> None:
+        """Seeds those of the chosen generators that have no seed yet."""
+        unseeded = [i for i in chosen if self._seeds[i] < 0]
+        if unseeded:
+            seeds = [fresh_seed() for _ in unseeded]
+            self._generators[unseeded] = seeded_rows(seeds)
+            for i, seed in zip(unseeded, seeds, strict=True):
+                self._seeds[i] = seed
+
+    def _collect(self) -> None:
+        """Takes over the states of the generators that were handed out."""
+        for i, generator in self._lent.items():
+            self._generators[i] = row_of(generator)
+
+    def _hand_back(self) -> None:
+        """Sets the generators that were handed out to the present states."""
+        for i, generator in self._lent.items():
+            set_row(generator, self._generators[i])
 
     def _draw_noise(self, active: Mask | None) -> Array | None:
         if self.task.noisy is None:
             return None
-        if active is None:
-            return draw_noise(self.task, self._generators)
-        chosen = zip(self._generators, active.tolist(), strict=True)
-        return draw_noise(self.task, [generator if moves else None for generator, moves in chosen])
+        self._collect()
+        moving = slice(None) if active is None else active
+        drawn, self._generators[moving] = draw_noise(self.task, self._generators[moving])
+        self._hand_back()
+        if active is None or drawn is None:
+            return drawn
+        noise = np.zeros((self.n, drawn.shape[1]))
+        noise[active] = drawn
+        return noise
 
 
 class Drawn(NamedTuple):
-    """A rover's next episode, the generator it was drawn from, and that generator's seed."""
+    """The next episodes of chosen rovers, their generators' seeds, and the rovers whose generators are new."""
 
-    beginning: Beginning
-    generator: np.random.Generator
-    seed: int
+    begun: Beginnings
+    chosen: Sequence[int]
+    seeds: Sequence[int]
+    seeded: set[int]
 
 
 class BatchRover:
@@ -286,8 +336,7 @@ class BatchRover:
     @property
     def np_random_seed(self) -> int:
         """The seed of the rover's random generator."""
-        self._batch.generator(self._i)
-        return self._batch._seeds[self._i]
+        return self._batch.seed_of(self._i)
 
     def set_difficulty(self, difficulty: float | Range) -> None:
         """Sets the rocks' difficulty, or the range it is drawn from, from the next reset on.
@@ -299,7 +348,4 @@ class BatchRover:
 
     @property
     def _scene(self) -> EpisodeScene:
-        scene = self._batch._scenes[self._i]
-        if scene is None:
-            raise ResetNeeded("a batch of rovers: call reset() first")
-        return scene
+        return self._batch.scene(self._i)

@@ -8,14 +8,13 @@ model = stable_baselines3.PPO("MlpPolicy", VecMonitor(venv))
 
 import copy
 from collections.abc import Sequence
-from contextlib import ExitStack
 from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.beginning import check_seed
+from rover_gym.env.generators import check_seed
 from rover_gym.env.observation import LARGEST
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
@@ -23,7 +22,7 @@ from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import OptionError, RoverGymError
 from rover_gym.validation import refuse
-from rover_gym.vector.batch import BatchRover, RoverBatch
+from rover_gym.vector.batch import BatchRover, Drawn, RoverBatch
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
@@ -80,13 +79,7 @@ class RoverVecEnv(VecEnv):
             TerrainError: As `RoverEnv.reset`; nothing has changed.
         """
         options = [self.batch.check_options(given) for given in self._options]
-        with ExitStack() as stack:
-            drawn = [
-                stack.enter_context(self.batch.beginnings([i], [seed], fixed))[0]
-                for i, (seed, fixed) in enumerate(zip(self._seeds, options, strict=True))
-            ]
-            for i, one in enumerate(drawn):
-                self.reset_infos[i] = self.batch.begin(i, one)
+        self._begin(self.batch.draw(range(self.num_envs), self._seeds, options))
         self._waiting = []
         self._reset_seeds()
         self._reset_options()
@@ -132,7 +125,7 @@ class RoverVecEnv(VecEnv):
                 another seed or other options.
         """
         if self._waiting:
-            self._restart(self._waiting)
+            self._begin(self.batch.draw(self._waiting))
             self._waiting = []
         outcome, terminated, timed_out = self.batch.step(self._actions)
         observation = outcome.observation
@@ -146,7 +139,7 @@ class RoverVecEnv(VecEnv):
                 last["terminal_observation"] = observation[i].copy()
                 infos[i] = last
             try:
-                self._restart(ended)
+                self._begin(self.batch.draw(ended))
             except RoverGymError:
                 self._waiting = ended
             else:
@@ -155,10 +148,10 @@ class RoverVecEnv(VecEnv):
         reward = np.clip(outcome.reward, -LARGEST, LARGEST).astype(np.float32)
         return observation, reward, dones, infos
 
-    def _restart(self, chosen: list[int]) -> None:
-        with self.batch.beginnings(chosen) as drawn:
-            for i, one in zip(chosen, drawn, strict=True):
-                self.reset_infos[i] = self.batch.begin(i, one)
+    def _begin(self, drawn: Drawn) -> None:
+        begun = self.batch.begin(drawn)
+        for k, i in enumerate(drawn.chosen):
+            self.reset_infos[i] = begun.info(k)
 
     def close(self) -> None:
         """Frees the renderers, if there are any."""

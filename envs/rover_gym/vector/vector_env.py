@@ -11,13 +11,13 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.beginning import spread_seeds
+from rover_gym.env.generators import spread_seeds
 from rover_gym.env.quantities import Array, Mask, Observations
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.mechanics import OptionError, RoverGymError
 from rover_gym.validation import mapping, refuse
-from rover_gym.vector.batch import RoverBatch
+from rover_gym.vector.batch import Drawn, RoverBatch
 
 _Info = dict[str, Any]
 
@@ -95,10 +95,9 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         chosen = self._check_mask(given.pop("reset_mask")) if "reset_mask" in given else list(range(self.num_envs))
         fixed = self.batch.check_options(given)
         infos: _Info = {}
-        with self.batch.beginnings(chosen, [seeds[i] for i in chosen], fixed) as drawn:
-            for i, one in zip(chosen, drawn, strict=True):
-                infos = self._add_info(infos, self.batch.begin(i, one), i)
-                self._ended[i] = False
+        if chosen:
+            self._begin(self.batch.draw(chosen, [seeds[i] for i in chosen], fixed), infos)
+            self._ended[chosen] = False
         return self.batch.observation, infos
 
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observations, Array, Mask, Mask, _Info]:
@@ -119,12 +118,12 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         starting: list[int] = np.flatnonzero(self._ended).tolist()
         if starting and self.autoreset_mode == AutoresetMode.DISABLED:
             raise ResetNeeded(f"rovers {starting}: call reset() with reset_mask first")
-        with self.batch.beginnings(starting) as drawn:
-            outcome, terminated, truncated = self.batch.step(commands, ~self._ended if starting else None)
-            observation, reward, infos = outcome.observation, outcome.reward, outcome.vector_info()
-            for i, one in zip(starting, drawn, strict=True):
-                reward[i], terminated[i], truncated[i] = 0.0, False, False
-                self._add_info(infos, self.batch.begin(i, one), i)
+        drawn = self.batch.draw(starting) if starting else None
+        outcome, terminated, truncated = self.batch.step(commands, ~self._ended if starting else None)
+        observation, reward, infos = outcome.observation, outcome.reward, outcome.vector_info()
+        if drawn is not None:
+            reward[starting], terminated[starting], truncated[starting] = 0.0, False, False
+            self._begin(drawn, infos)
         self._ended = terminated | truncated
         if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
             ended: list[int] = np.flatnonzero(self._ended).tolist()
@@ -132,9 +131,8 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
             for i, info in zip(ended, last, strict=True):
                 self._add_info(infos, {"final_obs": observation[i].copy(), "final_info": info}, i)
             # If an episode is refused here, its rover stays ended and the next step raises the error.
-            with suppress(RoverGymError), self.batch.beginnings(ended) as drawn:
-                for i, one in zip(ended, drawn, strict=True):
-                    self._add_info(infos, self.batch.begin(i, one), i)
+            with suppress(RoverGymError):
+                self._begin(self.batch.draw(ended), infos)
                 self._ended = np.zeros(self.num_envs, np.bool_)
                 starting += ended
         if starting:
@@ -160,10 +158,25 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         """Reads an attribute of every rover, by its name in `RoverEnv`."""
         return tuple(getattr(rover, name) for rover in self.batch.rovers)
 
+    def _begin(self, drawn: Drawn, infos: _Info) -> None:
+        """Begins drawn episodes and writes their infos into those of all rovers."""
+        _write_infos(infos, self.batch.begin(drawn).vector_info(), drawn.chosen, self.num_envs)
+
     def _check_mask(self, mask: object) -> list[int]:
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
             refuse(OptionError, "options.reset_mask", mask, f"must be an array of {self.num_envs} bool")
         return [int(i) for i in np.flatnonzero(mask)]
+
+
+def _write_infos(infos: _Info, begun: _Info, chosen: Sequence[int], n: int) -> None:
+    """Writes the infos of chosen rovers into those of n rovers, as `VectorEnv._add_info` does for one rover."""
+    for name, values in begun.items():
+        if isinstance(values, dict):
+            _write_infos(infos.setdefault(name, {}), values, chosen, n)
+            continue
+        if name not in infos:
+            infos[name] = np.full(n, None, object) if values.dtype == object else np.zeros(n, values.dtype)
+        infos[name][chosen] = values
 
 
 def _check_mode(mode: object) -> AutoresetMode:

@@ -22,7 +22,8 @@
 //! - [`planar`]: grounds and machines in the plane; [`system`]: the mechanical systems that a step
 //!   moves, such as the multibody tree;
 //! - [`lanes`]: the ordinary step of one rover or several to a register;
-//! - [`simulation`]: many steps of any scene.
+//! - [`simulation`]: many steps of any scene;
+//! - [`draw`]: random numbers, for scenes that are drawn.
 #![forbid(unsafe_code)]
 // Same bits on every machine: sines and their like come from `scalar::elementary`.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
@@ -31,6 +32,7 @@ pub use nalgebra;
 
 pub mod cone;
 pub mod contact;
+pub mod draw;
 pub mod geometry;
 pub mod integrator;
 pub mod lanes;

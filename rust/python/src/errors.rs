@@ -5,6 +5,7 @@ use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple, PyType};
+use rover_core::draw::DrawError;
 use rover_core::geometry::TerrainError;
 use rover_core::integrator::{OptionsError, StepError};
 use rover_core::multibody::{ModelError, StateError};
@@ -336,6 +337,15 @@ impl From<BatchError> for BorderError {
                     ..inner
                 };
             }
+            BatchError::Options { index, error } => {
+                let inner = Self::from(error);
+                let field = inner.field.map(|field| format!("{field}[{index}]"));
+                return Self {
+                    message,
+                    field,
+                    ..inner
+                };
+            }
             BatchError::Empty => ("simulations".to_owned(), Value::Count(0)),
             BatchError::Differs { index, actual, .. } => {
                 (format!("simulations[{index}]"), Value::Count(actual))
@@ -344,6 +354,23 @@ impl From<BatchError> for BorderError {
             BatchError::Threads { count, .. } => ("threads".to_owned(), Value::Count(count)),
         };
         Self::option(&field, message, value)
+    }
+}
+
+impl From<DrawError> for BorderError {
+    fn from(e: DrawError) -> Self {
+        match e {
+            DrawError::NoRoom { overlap, .. } => Self {
+                kind: Kind::Terrain,
+                message: e.to_string(),
+                field: Some("terrain".to_owned()),
+                value: Value::Number(overlap),
+            },
+            DrawError::Terrain(e) => e.into(),
+            DrawError::Model(e) => e.into(),
+            DrawError::State(e) => e.into(),
+            DrawError::Options(e) => e.into(),
+        }
     }
 }
 

@@ -68,8 +68,8 @@ pub struct Simulation {
 /// What a simulation was made with and the core does not keep, for pickling.
 #[derive(Clone)]
 pub struct Origin {
-    terrain: Ground,
-    words: SolverWords,
+    pub terrain: Ground,
+    pub words: SolverWords,
 }
 
 fn names(joints: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {

@@ -7,14 +7,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
+use rayon::ThreadPool;
 use rayon::iter::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 use rayon::slice::ParallelSliceMut;
 
 use super::error::BatchError;
 use super::pool::Pool;
 use super::reading::{Look, ReadingLayout};
-use super::rover::RoverSimulation;
+use super::rover::{Placement, RoverSimulation};
 use crate::integrator::StepError;
+use crate::multibody::Model;
 
 /// Interval at which the calling thread asks whether to continue while others step.
 const ASKING: Duration = Duration::from_millis(20);
@@ -70,20 +72,24 @@ impl Batch {
             threads,
         };
         for (index, rover) in batch.rovers.iter().enumerate() {
-            batch.check(index, rover)?;
+            batch.fits(index, rover.model())?;
         }
         Ok(batch)
     }
 
-    fn check(&self, index: usize, rover: &RoverSimulation) -> Result<(), BatchError> {
-        let own = ReadingLayout::new(rover.model(), self.scan.len());
+    /// Whether a model has the coordinates of this batch's.
+    ///
+    /// # Errors
+    /// `Differs`, with this index.
+    pub fn fits(&self, index: usize, model: &Model) -> Result<(), BatchError> {
+        let own = ReadingLayout::new(model, self.scan.len());
         if own == self.layout {
             return Ok(());
         }
         Err(BatchError::Differs {
             index,
             expected: self.rovers[0].model().nv(),
-            actual: rover.model().nv(),
+            actual: model.nv(),
         })
     }
 
@@ -120,10 +126,44 @@ impl Batch {
         if index >= len {
             return Err(BatchError::NoSuchRover { index, len });
         }
-        self.check(index, &rover)?;
+        self.fits(index, rover.model())?;
         self.rovers[index] = rover;
         self.targets[index] = target;
         Ok(())
+    }
+
+    /// Lets a rover begin anew, see [`RoverSimulation::begin`]; `target` (x, z, m) is the target of
+    /// its readings.
+    ///
+    /// # Errors
+    /// `NoSuchRover`, `Differs`, `Options`; nothing is changed then.
+    ///
+    /// # Panics
+    /// If the sizes of the state do not fit the model.
+    pub fn begin(
+        &mut self,
+        index: usize,
+        placement: Placement,
+        target: [f64; 2],
+    ) -> Result<(), BatchError> {
+        let len = self.rovers.len();
+        if index >= len {
+            return Err(BatchError::NoSuchRover { index, len });
+        }
+        self.fits(index, &placement.scene.model)?;
+        let begun = self.rovers[index].begin(placement);
+        begun.map_err(|error| BatchError::Options { index, error })?;
+        self.targets[index] = target;
+        Ok(())
+    }
+
+    /// The threads that help the caller's, for other work on the rovers; none where that one does
+    /// all the work.
+    ///
+    /// # Errors
+    /// `Threads`, as [`Self::step`].
+    pub fn pool(&mut self) -> Result<Option<&ThreadPool>, BatchError> {
+        self.pool.as_mut().map(Pool::of_this_process).transpose()
     }
 
     /// Gives every rover its commands, takes `n` steps and writes the readings (n_rovers × size of

@@ -37,7 +37,7 @@ pub use planar::{
     BallSimulation, MirroredRoverSimulation, PlanarScene, PlanarSimulation, TwoWheelRoverSimulation,
 };
 pub use reading::{Look, ReadingLayout};
-pub use rover::{LastCall, RoverScene, RoverSimulation};
+pub use rover::{LastCall, Placement, RoverScene, RoverSimulation};
 pub use rover_command::RoverCommand;
 pub use scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, StepTaken};
 pub use snapshot::Snapshot;
