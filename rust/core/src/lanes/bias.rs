@@ -64,9 +64,13 @@ pub fn bias<T: Lane>(
     scratch: &mut BiasScratch<T>,
     out: &mut [T],
 ) {
-    T::vectorize(scratch.token, || {
-        bias_here(machine, inertias, poses, v, gravity, scratch, out);
-    });
+    T::vectorize(
+        scratch.token,
+        #[inline(always)]
+        || {
+            bias_here(machine, inertias, poses, v, gravity, scratch, out);
+        },
+    );
 }
 
 #[inline(always)]

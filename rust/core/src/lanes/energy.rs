@@ -78,9 +78,11 @@ pub fn energy<T: Lane>(
     gravity: Vec3<T>,
     scratch: &mut EnergyScratch<T>,
 ) -> Energy<T> {
-    T::vectorize(scratch.token, || {
-        energy_here(machine, inertias, place, v, gravity, scratch)
-    })
+    T::vectorize(
+        scratch.token,
+        #[inline(always)]
+        || energy_here(machine, inertias, place, v, gravity, scratch),
+    )
 }
 
 #[inline(always)]

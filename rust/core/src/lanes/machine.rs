@@ -55,9 +55,8 @@ pub struct Machine {
     pub boxes: Vec<BodyBox>,
     /// Largest distance of a joint from the trunk's origin.
     pub reach: f64,
-    ancestors: Vec<usize>,
+    entries: Vec<usize>,
     paths: Vec<usize>,
-    n_entries: usize,
 }
 
 /// A body and its joint.
@@ -82,9 +81,8 @@ pub struct Link {
     pub is_centred: bool,
     /// What is known of its principal axes.
     pub symmetry: Symmetry,
-    /// Where its row of joint entries begins: those of its ancestors, then its own.
-    pub(super) row: usize,
-    ancestors: Range<usize>,
+    /// Its row in [`Machine::entries`].
+    row: Range<usize>,
     path: Range<usize>,
 }
 
@@ -173,9 +171,8 @@ impl Machine {
                 })
                 .collect(),
             reach: model.trees()[0].reach,
-            ancestors: Vec::new(),
+            entries: Vec::new(),
             paths: Vec::new(),
-            n_entries: 0,
         };
         for (b, body) in bodies.iter().enumerate() {
             machine.add(b, body, bodies);
@@ -184,18 +181,14 @@ impl Machine {
     }
 
     fn add(&mut self, b: usize, body: &Body, bodies: &[Body]) {
-        let (first, path) = (self.ancestors.len(), self.paths.len());
-        let mut carrier = body.parent.filter(|&parent| parent > 0);
-        while let Some(parent) = carrier {
-            self.ancestors.insert(first, parent);
-            carrier = bodies[parent].parent.filter(|&parent| parent > 0);
+        let (first, path) = (self.entries.len(), self.paths.len());
+        let mut mover = Some(b).filter(|&b| b > 0);
+        while let Some(body) = mover {
+            self.entries.insert(first, body);
+            mover = bodies[body].parent.filter(|&parent| parent > 0);
         }
-        let n = self.ancestors.len();
         self.paths.extend(0..BASE);
-        (self.paths).extend(self.ancestors[first..].iter().map(|&a| velocity(a)));
-        if b > 0 {
-            self.paths.push(velocity(b));
-        }
+        (self.paths).extend(self.entries[first..].iter().map(|&body| velocity(body)));
         let mut others = bodies[b + 1..].iter();
         self.links.push(Link {
             parent: body.parent.unwrap_or(0),
@@ -207,13 +200,9 @@ impl Machine {
             is_last: !others.any(|other| other.parent == body.parent),
             is_centred: body.is_centred(),
             symmetry: Symmetry::of(body),
-            row: self.n_entries,
-            ancestors: first..n,
+            row: first..self.entries.len(),
             path: path..self.paths.len(),
         });
-        if b > 0 {
-            self.n_entries += n - first + 1;
-        }
     }
 
     /// Whether a model differs from this machine in its inertias alone, so that it can be a lane of
@@ -246,10 +235,15 @@ impl Machine {
     }
 
     /// Bodies between the trunk and body `b`, from the trunk outwards, without either.
-    #[inline(always)]
     #[must_use]
     pub fn ancestors(&self, b: usize) -> &[usize] {
-        &self.ancestors[self.links[b].ancestors.clone()]
+        (self.row(b).split_last()).map_or(&[], |(_, ancestors)| ancestors)
+    }
+
+    /// The row of body `b` in [`Self::entries`]; empty for the trunk.
+    #[inline(always)]
+    pub(super) fn row(&self, b: usize) -> &[usize] {
+        &self.entries[self.links[b].row.clone()]
     }
 
     /// Velocities that move body `b`: those of the base, then of its ancestors, then its own.
@@ -259,9 +253,25 @@ impl Machine {
         &self.paths[self.links[b].path.clone()]
     }
 
-    /// Number of entries in the rows of all joints, beyond the base.
-    pub(super) fn n_entries(&self) -> usize {
-        self.n_entries
+    /// The bodies between the trunk and each body, from the trunk outwards, and the body itself:
+    /// the columns of each joint's row in the mass matrix, row after row.
+    #[inline(always)]
+    pub(super) fn entries(&self) -> &[usize] {
+        &self.entries
+    }
+}
+
+impl Link {
+    /// Where its row in [`Machine::entries`] begins.
+    #[inline(always)]
+    pub(super) fn row(&self) -> usize {
+        self.row.start
+    }
+
+    /// Where its own entry is.
+    #[inline(always)]
+    pub(super) fn diagonal(&self) -> usize {
+        self.row.end - 1
     }
 }
 

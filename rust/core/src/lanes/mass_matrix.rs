@@ -137,7 +137,7 @@ impl<T: Lane> MassMatrix<T> {
             token,
             block: [zero; BLOCK],
             base: vec![[zero; BASE]; machine.n_joints()],
-            joints: vec![zero; machine.n_entries()],
+            joints: vec![zero; machine.entries().len()],
             composites: vec![composite; machine.n_bodies()],
         }
     }
@@ -147,7 +147,11 @@ impl<T: Lane> MassMatrix<T> {
     /// # Panics
     /// If an argument is of another machine.
     pub fn update(&mut self, machine: &Machine, inertias: &Inertias<T>, poses: &Poses<T>) {
-        T::vectorize(self.token, || self.update_here(machine, inertias, poses));
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || self.update_here(machine, inertias, poses),
+        );
     }
 
     #[inline(always)]
@@ -157,6 +161,9 @@ impl<T: Lane> MassMatrix<T> {
         let (bodies, inertias) = (&poses.bodies[..n], &inertias.bodies[..n]);
         let carried = &mut self.composites[..n];
         let base = &mut self.base[..n - 1];
+        let columns = machine.entries();
+        let entries = &mut self.joints[..columns.len()];
+        let mut end = columns.len();
         for b in (1..n).rev() {
             let (link, pose) = (&links[b], &bodies[b]);
             let mut composite = Composite::of(link, &inertias[b], pose);
@@ -172,12 +179,12 @@ impl<T: Lane> MassMatrix<T> {
             let f = pose.swing * mass + pose.axis.cross(moment);
             let l = inertia.times(pose.axis) + moment.cross(pose.swing);
             base[b - 1] = [f.x, f.y, f.z, l.x, l.y, l.z];
-            let ancestors = machine.ancestors(b);
-            let row = &mut self.joints[link.row..][..=ancestors.len()];
-            for (entry, &a) in row.iter_mut().zip(ancestors) {
-                *entry = bodies[a].power(f, l);
+            let start = link.row();
+            let (columns, row) = (&columns[start..end], &mut entries[start..end]);
+            end = start;
+            for p in 0..columns.len() {
+                row[p] = bodies[columns[p]].power(f, l);
             }
-            row[ancestors.len()] = pose.power(f, l);
             carried[link.parent] = if link.is_last {
                 composite
             } else {
@@ -203,13 +210,13 @@ impl<T: Lane> MassMatrix<T> {
     /// Diagonal entry of the joint of body `b`.
     #[inline(always)]
     pub fn diagonal(&self, machine: &Machine, b: usize) -> T {
-        self.joints[machine.links[b].row + machine.ancestors(b).len()]
+        self.joints[machine.links[b].diagonal()]
     }
 
     /// Adds the implicit terms of a held joint to the diagonal entry of the joint of body `b`.
     #[inline(always)]
     pub fn add_to_diagonal(&mut self, machine: &Machine, b: usize, value: T) {
-        self.joints[machine.links[b].row + machine.ancestors(b).len()] += value;
+        self.joints[machine.links[b].diagonal()] += value;
     }
 
     /// Lane `lane` as a full symmetric matrix (nv, nv).
@@ -229,7 +236,7 @@ impl<T: Lane> MassMatrix<T> {
         for b in 1..machine.n_bodies() {
             let row = self.base[b - 1]
                 .iter()
-                .chain(&self.joints[machine.links[b].row..]);
+                .chain(&self.joints[machine.links[b].row()..]);
             for (&j, &x) in machine.path(b).iter().zip(row) {
                 set(velocity(b), j, x);
             }
@@ -237,13 +244,20 @@ impl<T: Lane> MassMatrix<T> {
         dense
     }
 
-    /// Computes `M = Lᵀ D L`. Returns where M is positive definite; the factor of any other lane is
-    /// not a number.
+    /// Computes `M = Lᵀ D L`, and leaves M undefined until [`Self::update`]. Returns where M is
+    /// positive definite; the factor of any other lane has no meaning.
     ///
     /// # Panics
     /// If an argument is of another machine.
-    pub fn factorise(&self, machine: &Machine, factor: &mut Factor<T>) -> T::Mask {
-        T::vectorize(self.token, || factor.update_here(machine, self))
+    pub fn factorise(&mut self, machine: &Machine, factor: &mut Factor<T>) -> T::Mask {
+        factor.block = self.block;
+        std::mem::swap(&mut factor.base, &mut self.base);
+        std::mem::swap(&mut factor.joints, &mut self.joints);
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || factor.factorise_here(machine),
+        )
     }
 }
 
@@ -274,70 +288,57 @@ impl<T: Lane> Factor<T> {
         Self {
             block: [zero; BLOCK],
             base: vec![[zero; BASE]; machine.n_joints()],
-            joints: vec![zero; machine.n_entries()],
+            joints: vec![zero; machine.entries().len()],
             block_root: [zero; BASE],
             root: vec![zero; machine.n_joints()],
         }
     }
 
+    /// Turns the entries of M into those of its factor.
     #[inline(always)]
-    fn update_here(&mut self, machine: &Machine, M: &MassMatrix<T>) -> T::Mask {
+    fn factorise_here(&mut self, machine: &Machine) -> T::Mask {
         let n = machine.n_joints();
+        let (links, columns) = (&machine.links[1..=n], machine.entries());
         let (base_rows, roots) = (&mut self.base[..n], &mut self.root[..n]);
-        base_rows.copy_from_slice(&M.base);
-        self.joints.copy_from_slice(&M.joints);
-        let mut block = M.block;
-        let one = block[0].like(1.0);
-        let zero = block[0].like(0.0);
-        let mut is_positive = block[0].gt(zero);
+        let entries = &mut self.joints[..columns.len()];
+        let mut block = self.block;
+        let (zero, one) = (block[0].like(0.0), block[0].like(1.0));
+        let mut is_positive = zero.lt(one);
+        let mut end = columns.len();
         for j in (0..n).rev() {
-            let ancestors = machine.ancestors(j + 1);
-            let p_own = ancestors.len();
-            let (above, own) = self.joints.split_at_mut(machine.links[j + 1].row);
-            let (base_above, base) = base_rows.split_at_mut(j);
-            let (own, base) = (&mut own[..=p_own], &mut base[0]);
-            let pivot = own[p_own];
+            let start = links[j].row();
+            let columns = &columns[start..end];
+            let (above, own) = entries[..end].split_at_mut(start);
+            let (base_above, base_row) = base_rows.split_at_mut(j);
+            end = start;
+            let last = columns.len() - 1;
+            let own = &mut own[..=last];
+            let base = base_row[0];
+            let pivot = own[last];
             is_positive = is_positive & pivot.gt(zero);
-            let root = one / pivot.sqrt();
-            let inverse = root * root;
-            roots[j] = root;
-            for p in (0..p_own).rev() {
+            let inverse = one / pivot;
+            roots[j] = inverse.sqrt();
+            for p in (0..last).rev() {
                 let a = own[p] * inverse;
-                let ancestor = ancestors[p];
-                subtract(&mut base_above[ancestor - 1], a, base);
-                let row = &mut above[machine.links[ancestor].row..][..=p];
-                for (x, y) in row.iter_mut().zip(&*own) {
-                    *x -= a * *y;
+                let ancestor = columns[p] - 1;
+                subtract(&mut base_above[ancestor], a, &base);
+                let row = &mut above[links[ancestor].row()..][..=p];
+                for i in 0..=p {
+                    row[i] -= a * own[i];
                 }
                 own[p] = a;
             }
-            let mut at = 0;
-            for i in 0..BASE {
-                let a = base[i] * inverse;
-                for k in 0..=i {
-                    block[at] -= a * base[k];
-                    at += 1;
-                }
-            }
-            for x in base {
-                *x *= inverse;
-            }
+            let factors = scaled(&base, inverse);
+            subtract_product(&mut block, &factors, &base);
+            base_row[0] = factors;
         }
-        for k in (0..BASE).rev() {
-            let start = k * (k + 1) / 2;
-            let pivot = block[start + k];
-            is_positive = is_positive & pivot.gt(zero);
-            let root = one / pivot.sqrt();
-            let inverse = root * root;
-            self.block_root[k] = root;
-            for p in (0..k).rev() {
-                let a = block[start + p] * inverse;
-                for i in 0..=p {
-                    block[p * (p + 1) / 2 + i] -= a * block[start + i];
-                }
-                block[start + p] = a;
-            }
-        }
+        let roots = &mut self.block_root;
+        is_positive = is_positive & eliminate::<T, 5>(&mut block, roots);
+        is_positive = is_positive & eliminate::<T, 4>(&mut block, roots);
+        is_positive = is_positive & eliminate::<T, 3>(&mut block, roots);
+        is_positive = is_positive & eliminate::<T, 2>(&mut block, roots);
+        is_positive = is_positive & eliminate::<T, 1>(&mut block, roots);
+        is_positive = is_positive & eliminate::<T, 0>(&mut block, roots);
         self.block = block;
         is_positive
     }
@@ -346,18 +347,21 @@ impl<T: Lane> Factor<T> {
     #[inline(always)]
     pub fn half_solve(&self, machine: &Machine, y: &mut [T]) {
         let n = machine.n_joints();
+        let (links, columns) = (&machine.links[1..=n], machine.entries());
         let (rows, roots) = (&self.base[..n], &self.root[..n]);
+        let entries = &self.joints[..columns.len()];
         let (base, joints) = y.split_at_mut(BASE);
         let joints = &mut joints[..n];
-        let mut sum = [base[0]; BASE];
-        sum.copy_from_slice(base);
+        let mut sum = [base[0], base[1], base[2], base[3], base[4], base[5]];
+        let mut end = columns.len();
         for j in (0..n).rev() {
+            let start = links[j].row();
+            let (columns, entries) = (&columns[start..end], &entries[start..end]);
+            end = start;
             let value = joints[j];
             subtract(&mut sum, value, &rows[j]);
-            let ancestors = machine.ancestors(j + 1);
-            let entries = &self.joints[machine.links[j + 1].row..][..ancestors.len()];
-            for (entry, &a) in entries.iter().zip(ancestors) {
-                joints[a - 1] -= *entry * value;
+            for p in 0..columns.len() - 1 {
+                joints[columns[p] - 1] -= entries[p] * value;
             }
             joints[j] = value * roots[j];
         }
@@ -375,7 +379,9 @@ impl<T: Lane> Factor<T> {
     #[inline(always)]
     pub fn half_solve_back(&self, machine: &Machine, x: &mut [T]) {
         let n = machine.n_joints();
+        let (links, columns) = (&machine.links[1..=n], machine.entries());
         let (rows, roots) = (&self.base[..n], &self.root[..n]);
+        let entries = &self.joints[..columns.len()];
         let (base, joints) = x.split_at_mut(BASE);
         let joints = &mut joints[..n];
         let mut known = [base[0]; BASE];
@@ -385,17 +391,17 @@ impl<T: Lane> Factor<T> {
                 value -= self.block[k * (k + 1) / 2 + i] * known[i];
             }
             known[k] = value;
+            base[k] = value;
         }
-        base.copy_from_slice(&known);
         for j in 0..n {
             let mut value = joints[j] * roots[j];
             for i in 0..BASE {
                 value -= rows[j][i] * known[i];
             }
-            let ancestors = machine.ancestors(j + 1);
-            let entries = &self.joints[machine.links[j + 1].row..][..ancestors.len()];
-            for (entry, &a) in entries.iter().zip(ancestors) {
-                value -= *entry * joints[a - 1];
+            let (start, end) = (links[j].row(), links[j].diagonal());
+            let (columns, entries) = (&columns[start..end], &entries[start..end]);
+            for p in 0..columns.len() {
+                value -= entries[p] * joints[columns[p] - 1];
             }
             joints[j] = value;
         }
@@ -406,36 +412,27 @@ impl<T: Lane> Factor<T> {
     #[inline(always)]
     pub fn half_solve_path(&self, machine: &Machine, b: usize, y: &mut [[T; 3]]) {
         let (base, joints) = y.split_at_mut(BASE);
-        let mut sum = [base[0]; BASE];
-        sum.copy_from_slice(base);
-        if b > 0 {
-            let ancestors = machine.ancestors(b);
-            for p in (0..=ancestors.len()).rev() {
-                let body = if p < ancestors.len() { ancestors[p] } else { b };
-                let value = joints[p];
-                let row = &self.base[body - 1];
-                for i in 0..BASE {
-                    for c in 0..3 {
-                        sum[i][c] -= row[i] * value[c];
-                    }
-                }
-                let entries = &self.joints[machine.links[body].row..][..p];
-                for (x, entry) in joints.iter_mut().zip(entries) {
-                    for c in 0..3 {
-                        x[c] -= *entry * value[c];
-                    }
-                }
-                let root = self.root[body - 1];
-                joints[p] = [value[0] * root, value[1] * root, value[2] * root];
+        let mut sum = [base[0], base[1], base[2], base[3], base[4], base[5]];
+        let columns = machine.row(b);
+        let joints = &mut joints[..columns.len()];
+        for p in (0..columns.len()).rev() {
+            let j = columns[p] - 1;
+            let value = joints[p];
+            let row = &self.base[j];
+            for i in 0..BASE {
+                subtract_columns(&mut sum[i], row[i], &value);
             }
+            let entries = &self.joints[machine.links[j + 1].row()..][..p];
+            for i in 0..p {
+                subtract_columns(&mut joints[i], entries[i], &value);
+            }
+            let root = self.root[j];
+            joints[p] = [value[0] * root, value[1] * root, value[2] * root];
         }
         for k in (0..BASE).rev() {
             let value = sum[k];
             for i in 0..k {
-                let entry = self.block[k * (k + 1) / 2 + i];
-                for c in 0..3 {
-                    sum[i][c] -= entry * value[c];
-                }
+                subtract_columns(&mut sum[i], self.block[k * (k + 1) / 2 + i], &value);
             }
             let root = self.block_root[k];
             base[k] = [value[0] * root, value[1] * root, value[2] * root];
@@ -448,5 +445,47 @@ impl<T: Lane> Factor<T> {
 fn subtract<T: Lane>(x: &mut [T; BASE], a: T, y: &[T; BASE]) {
     for i in 0..BASE {
         x[i] -= a * y[i];
+    }
+}
+
+/// `x −= a y` for three columns.
+#[inline(always)]
+fn subtract_columns<T: Lane>(x: &mut [T; 3], a: T, y: &[T; 3]) {
+    for c in 0..3 {
+        x[c] -= a * y[c];
+    }
+}
+
+/// `a y`.
+#[inline(always)]
+fn scaled<T: Lane>(y: &[T; BASE], a: T) -> [T; BASE] {
+    [y[0] * a, y[1] * a, y[2] * a, y[3] * a, y[4] * a, y[5] * a]
+}
+
+/// Eliminates velocity K of the base, when all after it are. Returns where its pivot is positive. K is
+/// a constant so that the block stays in registers.
+#[inline(always)]
+fn eliminate<T: Lane, const K: usize>(block: &mut [T; BLOCK], roots: &mut [T; BASE]) -> T::Mask {
+    let start = K * (K + 1) / 2;
+    let pivot = block[start + K];
+    let inverse = pivot.like(1.0) / pivot;
+    roots[K] = inverse.sqrt();
+    for p in (0..K).rev() {
+        let a = block[start + p] * inverse;
+        for i in 0..=p {
+            block[p * (p + 1) / 2 + i] -= a * block[start + i];
+        }
+        block[start + p] = a;
+    }
+    pivot.gt(pivot.like(0.0))
+}
+
+/// `A −= a yᵀ`, where the product is symmetric; the lower triangle by its rows.
+#[inline(always)]
+fn subtract_product<T: Lane>(A: &mut [T; BLOCK], a: &[T; BASE], y: &[T; BASE]) {
+    for i in 0..BASE {
+        for k in 0..=i {
+            A[i * (i + 1) / 2 + k] -= a[i] * y[k];
+        }
     }
 }

@@ -67,7 +67,11 @@ impl<T: Lane> Poses<T> {
     /// # Panics
     /// If an argument is of another machine.
     pub fn update(&mut self, machine: &Machine, inertias: &Inertias<T>, place: &Place<T>) {
-        T::vectorize(self.token, || self.update_here(machine, inertias, place));
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || self.update_here(machine, inertias, place),
+        );
     }
 
     #[inline(always)]

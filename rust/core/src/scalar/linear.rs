@@ -25,8 +25,11 @@ impl<T: Lane> Vec3<T> {
     /// The same vector in every lane.
     #[inline(always)]
     pub fn splat(token: T::Token, v: [f64; 3]) -> Self {
-        let [x, y, z] = v.map(|x| T::splat(token, x));
-        Self { x, y, z }
+        Self {
+            x: T::splat(token, v[0]),
+            y: T::splat(token, v[1]),
+            z: T::splat(token, v[2]),
+        }
     }
 
     /// Scalar product.

@@ -1,0 +1,400 @@
+//! Poses, mass matrix, factor, bias and energy: within rounding of the sources for any machine, and
+//! every lane with the bits of the same source run as `f64`.
+
+use nalgebra::{DVector, Matrix3, Rotation3, Vector3};
+use proptest::prelude::*;
+use rover_core::lanes::bias::{BiasScratch, bias};
+use rover_core::lanes::energy::{EnergyScratch, energy};
+use rover_core::lanes::inertias::Inertias;
+use rover_core::lanes::machine::{Machine, NotOrdinary};
+use rover_core::lanes::mass_matrix::{Factor, MassMatrix};
+use rover_core::lanes::place::Place;
+use rover_core::lanes::poses::Poses;
+use rover_core::multibody;
+use rover_core::multibody::description::{JointKind, Limits, SolidDescription};
+use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription};
+use rover_core::scalar::{Lane, LaneMask, Single, Vec3};
+
+/// Time over which the configurations of a test move.
+const H: f64 = 0.3;
+
+/// A rover in a state, under its own gravity.
+struct Rover {
+    model: Model,
+    q: Configuration,
+    v: Vec<f64>,
+    gravity: [f64; 3],
+}
+
+/// What the sources of the tree compute.
+#[derive(Default)]
+struct Found {
+    /// Name, and the numbers of one quantity.
+    parts: Vec<(&'static str, Vec<f64>)>,
+}
+
+impl Found {
+    fn add(&mut self, name: &'static str, numbers: impl IntoIterator<Item = f64>) {
+        self.parts.push((name, numbers.into_iter().collect()));
+    }
+}
+
+fn filled<T: Lane>(token: T::Token, rovers: &[Rover], of: impl Fn(&Rover) -> Vec<f64>) -> Vec<T> {
+    let n = of(&rovers[0]).len();
+    let mut out = vec![T::splat(token, 0.0); n];
+    for (lane, rover) in rovers.iter().enumerate() {
+        for (out, x) in out.iter_mut().zip(of(rover)) {
+            out.set(lane, x);
+        }
+    }
+    out
+}
+
+/// The lane sources on as many rovers as lanes.
+fn found<T: Lane>(token: T::Token, rovers: &[Rover]) -> Vec<Found> {
+    let machine = Machine::of(&rovers[0].model).unwrap();
+    let mut inertias = Inertias::<T>::new(token, &machine);
+    let mut start = Place::new(token, &machine);
+    for (lane, rover) in rovers.iter().enumerate() {
+        assert!(machine.fits(&rover.model));
+        inertias.set_lane(lane, &machine, &rover.model);
+        start.set_lane(lane, &rover.q);
+    }
+    let v: Vec<T> = filled(token, rovers, |rover| rover.v.clone());
+    let gravity: Vec<T> = filled(token, rovers, |rover| rover.gravity.to_vec());
+    let gravity = Vec3::new(gravity[0], gravity[1], gravity[2]);
+
+    let mut place = start.clone();
+    T::vectorize(token, || {
+        place.set_moved(&start, &v, H);
+        place.normalise();
+    });
+    assert!(place.is_finite().all());
+    let mut poses = Poses::new(token, &machine);
+    poses.update(&machine, &inertias, &place);
+    let mut M = MassMatrix::new(token, &machine);
+    M.update(&machine, &inertias, &poses);
+    let dense: Vec<_> = (0..T::LANES).map(|k| M.to_dense(&machine, k)).collect();
+    let mut factor = Factor::new(token, &machine);
+    assert!(M.factorise(&machine, &mut factor).all());
+    let mut half = v.clone();
+    T::vectorize(token, || factor.half_solve(&machine, &mut half));
+    let mut solved = half.clone();
+    T::vectorize(token, || factor.half_solve_back(&machine, &mut solved));
+    let last = machine.n_bodies() - 1;
+    let path = machine.path(last);
+    let mut columns: Vec<[T; 3]> = path.iter().map(|&k| [v[k], v[0], v[k]]).collect();
+    T::vectorize(token, || {
+        factor.half_solve_path(&machine, last, &mut columns)
+    });
+    let mut load = v.clone();
+    let mut scratch = BiasScratch::new(token, &machine);
+    bias(
+        &machine,
+        &inertias,
+        &poses,
+        &v,
+        gravity,
+        &mut scratch,
+        &mut load,
+    );
+    let mut scratch = EnergyScratch::new(token, &machine);
+    let energy = energy(&machine, &inertias, &place, &v, gravity, &mut scratch);
+
+    let of_lane = |(lane, rover): (usize, &Rover)| {
+        let mut found = Found::default();
+        let mut q = rover.q.clone();
+        place.to_lane(lane, &mut q);
+        found.add("configuration", numbers(&q));
+        for pose in &poses.bodies {
+            let columns = [pose.R.x, pose.R.y, pose.R.z];
+            found.add(
+                "attitude",
+                columns.iter().flat_map(|column| column.get(lane)),
+            );
+            found.add("places", [pose.r, pose.c].iter().flat_map(|x| x.get(lane)));
+        }
+        for pose in &poses.bodies[1..] {
+            found.add("axis", pose.axis.get(lane));
+        }
+        found.add("mass matrix", dense[lane].iter().copied());
+        found.add("half-solution", half.iter().map(|x| x.get(lane)));
+        found.add("solution", solved.iter().map(|x| x.get(lane)));
+        found.add("columns", columns.iter().flatten().map(|x| x.get(lane)));
+        found.add("bias", load.iter().map(|x| x.get(lane)));
+        found.add("kinetic energy", [energy.kinetic.get(lane)]);
+        found.add("potential energy", [energy.potential.get(lane)]);
+        found.add("momentum", energy.momentum.get(lane));
+        found
+    };
+    rovers.iter().enumerate().map(of_lane).collect()
+}
+
+fn numbers(q: &Configuration) -> Vec<f64> {
+    let free = q.position.iter().chain(q.attitude.coords.iter());
+    free.chain(&q.joints).copied().collect()
+}
+
+/// The same quantities by the sources for any machine.
+fn expected(rover: &Rover) -> Found {
+    let Rover { model, v, .. } = rover;
+    let gravity = Vector3::from(rover.gravity);
+    let mut q = rover.q.clone();
+    q.set_moved(model, &rover.q, v, H);
+    q.normalise();
+    let mut kinematics = Kinematics::new(model);
+    kinematics.update_for_step(model, &q);
+    let mut M = multibody::MassMatrix::new(model);
+    M.update(model, &kinematics);
+    let mut factor = multibody::FactoredMassMatrix::new(model);
+    assert!(M.factorise(model, &mut factor));
+    let mut half = v.clone();
+    factor.half_solve(model, &mut half);
+    let mut solved = half.clone();
+    factor.half_solve_back(model, &mut solved);
+    let last = model.bodies().len() - 1;
+    let path = model.path(last);
+    let mut columns: Vec<[f64; 3]> = path.iter().map(|&k| [v[k], v[0], v[k]]).collect();
+    factor.half_solve_path(path, &mut columns);
+    let mut load = v.clone();
+    let mut scratch = multibody::bias::BiasScratch::new(model);
+    multibody::bias::bias(model, &kinematics, v, &gravity, &mut scratch, &mut load);
+    let mut scratch = multibody::EnergyScratch::new(model);
+    let (energy, momentum) =
+        multibody::momentum::energy_and_momentum(model, &q, v, &gravity, &mut scratch);
+
+    let mut found = Found::default();
+    found.add("configuration", numbers(&q));
+    for b in 0..model.bodies().len() {
+        found.add("attitude", kinematics.R[b].iter().copied());
+        let places = kinematics.r[b].iter().chain(&kinematics.c[b]);
+        found.add("places", places.copied());
+    }
+    for motion in &kinematics.motions {
+        found.add("axis", motion.axis().iter().copied());
+    }
+    found.add("mass matrix", M.to_dense(model).iter().copied());
+    found.add("half-solution", half);
+    found.add("solution", solved);
+    found.add("columns", columns.iter().flatten().copied());
+    found.add("bias", load);
+    found.add("kinetic energy", [energy.kinetic]);
+    found.add("potential energy", [energy.potential]);
+    found.add("momentum", momentum.iter().copied());
+    found
+}
+
+/// The condition number of M enters what is solved with it.
+fn tolerance(name: &str) -> f64 {
+    match name {
+        "solution" | "half-solution" | "columns" => 1e-11,
+        _ => 1e-13,
+    }
+}
+
+fn same_bits<T: Lane>(token: T::Token, rovers: &[Rover], alone: &[Found]) {
+    // Also with the rovers in other lanes.
+    for shift in [0, 3] {
+        for start in (0..rovers.len()).step_by(T::LANES) {
+            let mut order: Vec<usize> = (start..start + T::LANES).collect();
+            order.rotate_left(shift % T::LANES);
+            let block: Vec<Rover> = order.iter().map(|&i| rovers[i].copy()).collect();
+            for (found, &i) in found::<T>(token, &block).iter().zip(&order) {
+                for ((name, found), (_, alone)) in found.parts.iter().zip(&alone[i].parts) {
+                    for (x, y) in found.iter().zip(alone) {
+                        assert_eq!(x.to_bits(), y.to_bits(), "{name}: {x} {y}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Rover {
+    fn copy(&self) -> Self {
+        Self {
+            model: self.model.clone(),
+            q: self.q.clone(),
+            v: self.v.clone(),
+            gravity: self.gravity,
+        }
+    }
+}
+
+/// Eight rovers alone and in lanes, against the sources for any machine.
+fn check(rovers: &[Rover]) {
+    let mut alone = Vec::new();
+    for rover in rovers {
+        let found = found::<f64>(Single::best(), std::slice::from_ref(rover)).remove(0);
+        for ((name, found), (_, expected)) in found.parts.iter().zip(&expected(rover).parts) {
+            let (x, y) = (
+                DVector::from_column_slice(found),
+                DVector::from_column_slice(expected),
+            );
+            let error = (&x - &y).amax() / y.amax().max(1.0);
+            assert!(error < tolerance(name), "{name}: {error:e}");
+        }
+        let baseline = found_at_baseline(rover);
+        for ((name, x), (_, y)) in found.parts.iter().zip(&baseline.parts) {
+            assert!(
+                x.iter().zip(y).all(|(x, y)| x.to_bits() == y.to_bits()),
+                "{name}"
+            );
+        }
+        alone.push(found);
+    }
+    let level = fearless_simd::Level::new();
+    fearless_simd::dispatch!(level, token => {
+        same_bits::<fearless_simd::f64x4<_>>(token, rovers, &alone);
+        same_bits::<fearless_simd::f64x8<_>>(token, rovers, &alone);
+    });
+}
+
+fn found_at_baseline(rover: &Rover) -> Found {
+    found::<f64>(Single::Baseline, std::slice::from_ref(rover)).remove(0)
+}
+
+/// A number between −1 and 1 that depends on the seed and k.
+fn random(seed: u64, k: usize) -> f64 {
+    let mut x = seed ^ (k as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ (x >> 31)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 29)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((x ^ (x >> 32)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}
+
+/// Eight rovers of a description with masses of their own, in random states.
+fn rovers(description: &ModelDescription, seed: u64, speed: f64) -> Vec<Rover> {
+    let rover = |lane: usize| {
+        let number = |k: usize| random(seed, 1000 * lane + k);
+        let mut own = description.clone();
+        for (i, solid) in own.solids.iter_mut().enumerate() {
+            let factor = 1.0 + 0.3 * number(i);
+            solid.mass *= factor;
+            for entry in solid.inertia.iter_mut().flatten() {
+                *entry *= factor;
+            }
+        }
+        let model = Model::from_description(own).unwrap();
+        let mut q = Configuration::zero(&model);
+        let turns: Vec<f64> = (0..model.nv()).map(|k| 3.0 * number(100 + k)).collect();
+        q.advance(&model, &turns, 1.0);
+        Rover {
+            q,
+            v: (0..model.nv()).map(|k| speed * number(200 + k)).collect(),
+            gravity: [number(300), -9.81, number(301)],
+            model,
+        }
+    };
+    (0..8).map(rover).collect()
+}
+
+/// A random tree on a free base: fixed rotations, axes along and across the frame, mass centres off
+/// the axes and principal axes of their own, some of them symmetric bodies.
+fn tree(seed: u64, n: usize) -> ModelDescription {
+    let mut description = ModelDescription::rover();
+    let template = description.solids[1].clone();
+    description.wheels.clear();
+    description.tags.clear();
+    description.solids.clear();
+    for i in 0..n {
+        let number = |k: usize| random(seed, 10_000 + 100 * i + k);
+        let choice = |k: usize, n: usize| ((number(k) + 1.0) * 0.5 * n as f64) as usize % n;
+        let three = |k: usize| [number(k), number(k + 1), number(k + 2)];
+        let unit = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let [a, b, c] = three(0).map(|x| 0.1 + x.abs());
+        let moments = match choice(3, 5) {
+            0 => [a, a, b],
+            1 => [b, a, a],
+            2 => [a, b, a],
+            _ => [b + c, a + c, a + b],
+        };
+        let moments = moments.map(|x| x + 1.0);
+        let turn = match choice(4, 2) {
+            0 => Matrix3::identity(),
+            _ => *Rotation3::new(Vector3::from(three(5))).matrix(),
+        };
+        let I = turn * Matrix3::from_diagonal(&moments.into()) * turn.transpose();
+        description.solids.push(SolidDescription {
+            name: format!("solid {i}"),
+            parent: (i > 0).then(|| format!("solid {}", choice(8, i.max(1)))),
+            joint: Some(if i == 0 {
+                JointKind::Free
+            } else {
+                JointKind::Revolute
+            }),
+            position: (i > 0).then(|| three(10)),
+            rotation: (i > 0 && choice(13, 2) == 0).then(|| three(14)),
+            axis: (i > 0).then(|| match choice(17, 4) {
+                3 => three(18),
+                k => unit[k],
+            }),
+            mass: 1.0 + a,
+            centre_of_mass: (choice(21, 2) == 0).then(|| three(22)),
+            inertia: Some([
+                I[(0, 0)],
+                I[(1, 1)],
+                I[(2, 2)],
+                I[(0, 1)],
+                I[(0, 2)],
+                I[(1, 2)],
+            ]),
+            shape: None,
+            shapes: Vec::new(),
+            collides: false,
+            hold: None,
+            ..template.clone()
+        });
+    }
+    description
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(40) })]
+
+    #[test]
+    fn rovers_agree(seed: u64, speed in prop::sample::select(vec![0.01, 1.0, 20.0])) {
+        check(&rovers(&ModelDescription::rover(), seed, speed));
+    }
+
+    #[test]
+    fn random_trees_agree(seed: u64, n in 1_usize..12, speed in prop::sample::select(vec![0.01, 1.0, 20.0])) {
+        check(&rovers(&tree(seed, n), seed, speed));
+    }
+}
+
+#[test]
+fn a_machine_that_is_not_ordinary_is_refused_with_its_reason() {
+    let reason = |change: fn(&mut ModelDescription)| {
+        let mut description = ModelDescription::rover();
+        change(&mut description);
+        Machine::of(&Model::from_description(description).unwrap())
+    };
+    let body = || "front_axle".to_owned();
+    assert!(reason(|_| {}).is_ok());
+    assert_eq!(
+        reason(|rover| rover.solids[1].damping = Some(1.0)),
+        Err(NotOrdinary::PassiveJoint { body: body() })
+    );
+    assert_eq!(
+        reason(|rover| rover.solids[1].armature = Some(1.0)),
+        Err(NotOrdinary::PassiveJoint { body: body() })
+    );
+    let stops = |rover: &mut ModelDescription| {
+        rover.solids[1].limits = Some(Limits {
+            lower: -1.0,
+            upper: 1.0,
+        });
+    };
+    assert_eq!(
+        reason(stops),
+        Err(NotOrdinary::LimitedJoint { body: body() })
+    );
+    assert_eq!(
+        reason(|rover| rover.solids[1].joint = Some(JointKind::Prismatic)),
+        Err(NotOrdinary::NotRevolute { body: body() })
+    );
+    assert_eq!(
+        reason(|rover| rover.self_contact = true),
+        Err(NotOrdinary::SelfContact)
+    );
+}
