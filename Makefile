@@ -88,6 +88,7 @@ chart: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CP
 	$(COMPARE).chart $(CHART)
 	$(COMPARE).presets $(filter --quick,$(CHART))
 	$(COMPARE).sphere_scenes $(filter --quick,$(CHART))
+	$(COMPARE).exploring_chart $(filter --quick,$(CHART))
 
 stability: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes where methods fail, ours and other engines': docs/stability.md (5 minutes)
 	$(COMPARE).stability

@@ -1567,6 +1567,9 @@ class SimulationBatch:
     def threads(self) -> int:
         """Number of threads."""
     @property
+    def instruction_set(self) -> Literal["AVX-512", "AVX2", "baseline"]:
+        """Either "AVX-512", "AVX2" or "baseline", as the processor has it."""
+    @property
     def reading_layout(self) -> dict[str, slice]:
         """Place of each quantity in a row of readings; `Simulation.reading_layout` lists them."""
     def step(

@@ -3,6 +3,7 @@
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use rover_core::scalar::instructions::Instructions;
 use rover_core::simulation::{Batch, RoverSimulation as CoreSimulation};
 
 use crate::arguments::{Given, count, flags, refused};
@@ -119,6 +120,13 @@ impl SimulationBatch {
     #[getter]
     fn threads(&self) -> PyResult<usize> {
         Ok(self.0.open()?.inner.threads())
+    }
+
+    /// Either "AVX-512", "AVX2" or "baseline", as the processor has it.
+    #[getter]
+    #[allow(clippy::unused_self)] // a property in Python
+    fn instruction_set(&self) -> &'static str {
+        Instructions::of_this_machine().name()
     }
 
     /// Place of each quantity in a row of readings; `Simulation.reading_layout` lists them.

@@ -74,8 +74,7 @@ impl StartDistribution {
         .map(|range| random.uniform(range));
         let heading = fixed.heading.unwrap_or(heading);
         let position = fixed.position.unwrap_or_default();
-        let direction = heading + bearing;
-        let (sine, cosine) = sin_cos(direction);
+        let (sine, cosine) = sin_cos(heading + bearing);
         let goal = [
             position[0] + distance * cosine,
             position[1] - distance * sine,
@@ -95,7 +94,8 @@ impl StartDistribution {
 /// # Errors
 /// `NotFinite` for an angle that is not finite.
 pub fn tilted_plane(slope: f64, uphill: f64) -> Result<Plane, TerrainError> {
-    let ((across, up), (sine, cosine)) = (sin_cos(slope), sin_cos(uphill));
+    let (across, up) = sin_cos(slope);
+    let (sine, cosine) = sin_cos(uphill);
     Plane::new([-across * cosine, up, across * sine], 0.0)
 }
 

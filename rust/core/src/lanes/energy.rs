@@ -3,7 +3,7 @@
 use super::inertias::{Inertia, Inertias};
 use super::machine::{Link, Machine};
 use super::place::Place;
-use super::poses::{rotation, times_columns};
+use super::poses::{Turns, rotation, times_columns};
 use crate::multibody::model::BASE;
 use crate::scalar::{Lane, Mat3, Vec3};
 
@@ -23,6 +23,7 @@ pub struct Energy<T> {
 pub struct EnergyScratch<T: Lane> {
     token: T::Token,
     bodies: Vec<Moving<T>>,
+    turns: Turns<T>,
 }
 
 /// Pose and velocity of a body's frame.
@@ -60,6 +61,7 @@ impl<T: Lane> EnergyScratch<T> {
         Self {
             token,
             bodies: vec![moving; machine.n_bodies()],
+            turns: Turns::new(token, machine),
         }
     }
 }
@@ -98,7 +100,8 @@ fn energy_here<T: Lane>(
     let (links, own_inertias) = (&machine.links[..n], &inertias.bodies[..n]);
     let bodies = &mut scratch.bodies[..n];
     let (base, rates) = v.split_at(BASE);
-    let (rates, joints) = (&rates[..n - 1], &place.joints[..n - 1]);
+    let rates = &rates[..n - 1];
+    let mut turns = scratch.turns.of(machine, place);
     let zero = T::splat(scratch.token, 0.0);
     let mut sums = Sums {
         twice_kinetic: zero,
@@ -116,7 +119,7 @@ fn energy_here<T: Lane>(
         let (before, own) = bodies.split_at_mut(b);
         let link = &links[b];
         let carrier = &before[link.parent];
-        let lever = carrier.R.times_shared(link.position);
+        let lever = link.lever(&carrier.R);
         let frame = match &link.rotation {
             None => carrier.R,
             Some(fixed) => times_columns(&carrier.R, fixed),
@@ -126,7 +129,7 @@ fn energy_here<T: Lane>(
             R: if link.is_spinner {
                 frame
             } else {
-                link.axis.rotate(&frame, axis, joints[b - 1])
+                link.axis.rotate(&frame, axis, turns.next())
             },
             velocity: carrier.velocity + carrier.omega.cross(lever),
             omega: carrier.omega + axis * rates[b - 1],

@@ -9,7 +9,7 @@ use super::error::BatchError;
 use super::pool::Pool;
 use super::reading::{Look, ReadingLayout, ReadingScratch};
 use super::rover::{Placement, RoverSimulation};
-use super::turns::{Done, Turn, take_turns};
+use super::turns::{Bench, Done, Turn, take_turns};
 use crate::integrator::StepError;
 use crate::multibody::Model;
 
@@ -23,7 +23,7 @@ pub struct Batch {
     /// The threads besides the caller's; None if it does all the work.
     pool: Option<Pool>,
     /// One for each thread.
-    scratch: Vec<ReadingScratch>,
+    benches: Vec<Bench>,
 }
 
 impl Batch {
@@ -52,7 +52,7 @@ impl Batch {
             pool: (threads > 1)
                 .then(|| Pool::start(threads - 1))
                 .transpose()?,
-            scratch: (0..threads).map(|_| ReadingScratch::default()).collect(),
+            benches: (0..threads).map(|_| Bench::default()).collect(),
             rovers,
             scan,
             layout,
@@ -84,7 +84,7 @@ impl Batch {
     /// Threads that step them.
     #[must_use]
     pub fn threads(&self) -> usize {
-        self.scratch.len()
+        self.benches.len()
     }
 
     /// Layout of the rows of readings.
@@ -211,7 +211,7 @@ impl Batch {
         let turn = ReadingTurn { scan: &self.scan };
         let rovers = self.rovers.iter_mut().zip(&mut self.errors);
         let seats = rovers.zip(&mut places);
-        take_turns(seats, n, &turn, &mut self.scratch, pool, go_on);
+        take_turns(seats, n, &turn, &mut self.benches, pool, go_on);
         Ok(())
     }
 
@@ -234,7 +234,7 @@ impl Batch {
         let pool = self.pool.as_mut().map(Pool::of_this_process).transpose()?;
         let rovers = self.rovers.iter_mut().zip(&mut self.errors);
         let seats = rovers.zip(places);
-        take_turns(seats, n, turn, &mut self.scratch, pool, go_on);
+        take_turns(seats, n, turn, &mut self.benches, pool, go_on);
         Ok(())
     }
 

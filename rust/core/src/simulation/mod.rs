@@ -12,7 +12,7 @@
 pub mod active_contact;
 pub mod batch;
 pub mod error;
-mod fleet;
+pub mod fleet;
 pub mod grains;
 pub mod planar;
 mod pool;
