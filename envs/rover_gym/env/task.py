@@ -22,6 +22,7 @@ from rover_gym.mechanics import (
     RoverModel,
     Simulation,
     SphereField,
+    sin_cos,
 )
 from rover_gym.validation import Range, array, number, refuse, span
 
@@ -152,7 +153,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
         torque_limits=rover.wheel_torque_limits,
         max_steering=max_steering,
         goal_tolerance=given["goal_tolerance"],
-        cos_max_tilt=math.cos(math.radians(given["max_tilt_deg"])),
+        cos_max_tilt=sin_cos(math.radians(given["max_tilt_deg"]))[1],
         stuck_time=given["stuck_time"],
         weights=weights,
         scale=layout.scale,

@@ -3,6 +3,7 @@
 use super::ending::Ending;
 use super::reward::N_TERMS;
 use super::rules::Places;
+use crate::scalar::elementary::acos;
 
 /// Quantities of a reading that rewards, ends and reports are made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -74,7 +75,7 @@ impl Quantities {
     /// Tilt of the trunk from the vertical, rad.
     #[must_use]
     pub fn tilt(&self) -> f64 {
-        self.cos_tilt.clamp(-1.0, 1.0).acos()
+        acos(self.cos_tilt.clamp(-1.0, 1.0))
     }
 }
 
