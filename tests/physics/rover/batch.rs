@@ -235,6 +235,7 @@ fn a_reading_says_what_the_simulation_says() {
             target: TARGET,
             scan: &SCAN,
         },
+        &mut ReadingScratch::default(),
         &mut row,
     );
     let of = |name: &str| {

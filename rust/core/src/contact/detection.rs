@@ -297,7 +297,7 @@ pub fn wheel_contact(
 pub fn wheel_gap(model: &Model, kinematics: &Kinematics, terrain: &dyn Terrain, i: usize) -> f64 {
     let mut gap = f64::INFINITY;
     visit_nearer(model, kinematics, terrain, i, &mut |_, point| {
-        gap = point.gap
+        gap = point.gap;
     });
     gap
 }

@@ -156,6 +156,7 @@ mod tests {
     #[test]
     fn after_a_failed_step_only_failure_counts() {
         let terms = reward(&Quantities::default(), 0.05, Ending::StepFailed);
-        assert_eq!(terms, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -10.0]);
+        assert!(terms[..FAILURE].iter().all(|&term| term == 0.0));
+        assert!(terms[FAILURE] < -9.0);
     }
 }
