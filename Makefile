@@ -14,7 +14,7 @@ UV     := $(BIN)/uv pip install --quiet --python $(BIN)/python
 export PYO3_PYTHON := $(abspath $(BIN)/python)# one interpreter for every cargo call, so that nothing is built twice
 export VIRTUAL_ENV := $(abspath $(VENV))# where maturin installs
 
-.PHONY: help demo test check lint types deny format stub test-rust test-python docs bench chart stability torture validate orders profiles train train-rllib pins clean
+.PHONY: help demo test check lint types deny format stub test-rust test-python docs bench chart stability torture validate orders bits profiles train train-rllib pins clean
 
 help: ## list the targets (this list)
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -64,8 +64,9 @@ docs: $(STAMPS)/test $(STAMPS)/train $(STAMPS)/core ## build the documentation, 
 	@echo "docs/_build/html/index.html"
 	@echo "target/doc/rover_core/index.html"
 
-bench: ## time a step and tell where the time goes (informs, does not gate)
-	cargo bench --locked
+bench: $(STAMPS)/core ## time a step and tell where the time goes, MuJoCo's beside it where it is installed (informs, does not gate)
+	$(COMPARE).exploring_bench
+	cargo bench --locked $(addprefix --bench ,step accuracy spheres solver soil)
 	@if command -v valgrind > /dev/null; then cargo build --release --locked --quiet --example drive_steps; \
 	  count() { valgrind --tool=callgrind --callgrind-out-file=/dev/null target/release/examples/drive_steps $$1 2>&1 \
 	    | awk '/Collected/ { print $$NF }'; }; \
@@ -87,12 +88,16 @@ chart: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CP
 	$(COMPARE).chart $(CHART)
 	$(COMPARE).presets $(filter --quick,$(CHART))
 	$(COMPARE).sphere_scenes $(filter --quick,$(CHART))
+	$(COMPARE).exploring_chart $(filter --quick,$(CHART))
 
 stability: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes where methods fail, ours and other engines': docs/stability.md (5 minutes)
 	$(COMPARE).stability
 
 torture: $(STAMPS)/test $(STAMPS)/core ## tries to break everything: docs/stability.md's table (5 minutes on two cores; TORTURE="--hours 2", or --regime NAME --case K)
 	PYTHONPATH=tests $(BIN)/python -m torture $(TORTURE)
+
+bits: $(STAMPS)/test $(STAMPS)/core ## hash trajectories bit by bit (BITS="--save runs/bits.json" before a change, BITS="--against runs/bits.json" after it)
+	$(COMPARE).bits $(BITS)
 
 profiles: $(STAMPS)/test $(STAMPS)/core ## performance profiles of the contact solvers, with Siconos' where it is installed
 	$(COMPARE).solver_profiles

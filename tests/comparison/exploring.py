@@ -1,9 +1,9 @@
 """Drives of random policies, recorded: what a policy does before it has learned anything.
 
-Torques and set-points of the steering are redrawn every 50 ms. A drive is recorded as numbers in [-1, 1], which a torque
-(N m) and the steering's limit scale, so that one record serves all torques. Its rocks are those of `Rover-v0` with
-`terrain="sphere_field"` at difficulty 0.5, slope included; the rover starts halfway to the goal, since the clearing at
-the environment's start has no rocks. Rust plays the same file (`tests/physics/exploring_scenes.rs`).
+Torques and set-points of the steering are redrawn every 50 ms. A drive is recorded as numbers in [-1, 1], which a
+torque (N m) and the steering's limit scale, so that one record serves all torques. Its rocks are those of `Rover-v0`
+with `terrain="sphere_field"` at difficulty 0.5, slope included; the rover starts at rest halfway to the goal, since
+the clearing at the environment's start has no rocks. Rust plays the same file (`tests/physics/exploring_scenes.rs`).
 
 `python -m comparison.exploring` records `exploring.json` anew.
 """
@@ -66,9 +66,7 @@ def drives() -> tuple[Drive, ...]:
     """All records."""
     data = json.loads(FILE.read_text(encoding="utf-8"))
     return tuple(
-        Drive(
-            d["seed"], np.array(d["actions"]), tuple(d["normal"]), np.array(d["q"]), np.array(d["spheres"])
-        )
+        Drive(d["seed"], np.array(d["actions"]), tuple(d["normal"]), np.array(d["q"]), np.array(d["spheres"]))
         for d in data["drives"]
     )
 
@@ -107,16 +105,18 @@ def _record(seed: int) -> dict[str, Any]:
     spheres = np.round(np.column_stack([terrain.centres, terrain.radii]), 4)
     halfway = tuple(float(x) for x in 0.5 * (np.array(start.position) + np.array(env.goal)))
     q = resting_pose(env.model, ground, halfway, start.heading)
-    simulation = Simulation(env.model, SphereField(spheres[:, :3], spheres[:, 3], ground))
+    simulation = Simulation(env.model, SphereField(spheres[:, :3], spheres[:, 3], ground), time_step=0.001)
     simulation.set_state(q)
     while simulation.deepest_overlap < 0.0:
         q[1] += 0.005
         simulation.set_state(q)
+    simulation.brake()
+    simulation.step(2000)  # it lands, and comes to rest on the rocks
     return {
         "seed": seed,
         "actions": np.round(rng.uniform(-1.0, 1.0, (PERIODS, 12)), 3).tolist(),
         "normal": normal,
-        "q": np.round(q, 6).tolist(),
+        "q": np.round(simulation.q, 7).tolist(),
         "spheres": spheres.tolist(),
     }
 

@@ -119,22 +119,34 @@ def test_a_scene_without_room_is_drawn_again() -> None:
 
 
 def test_a_scene_without_room_is_refused_after_a_stated_number_of_draws(monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn = 0
-    draw = beginning.draw_scene
-
-    def counted(*arguments: Any) -> Any:
-        nonlocal drawn
-        drawn += 1
-        return draw(*arguments)
-
-    monkeypatch.setattr(beginning, "draw_scene", counted)
     with pytest.raises(TerrainError) as caught:
         RoverEnv(terrain=BLOCKED).reset(seed=0)
-    assert drawn == beginning.PLACING_ATTEMPTS == 100
+    assert beginning.PLACING_ATTEMPTS == 100
     assert "100 scenes" in str(caught.value)
     assert caught.value.field == "terrain"
     assert caught.value.value < -0.01
     assert "100 scenes" in " ".join((RoverEnv.__doc__ or "").split())
+    # A scene takes five numbers of the generator; the third one turns it to where there is room.
+    env = RoverEnv(terrain=NARROW)
+    seed = next(seed for seed in range(60) if draws_of(env, seed) == 15)
+    for attempts in (3, 2):
+        monkeypatch.setattr(beginning, "PLACING_ATTEMPTS", attempts)
+        if attempts == 3:
+            env.reset(seed=seed)
+        else:
+            with pytest.raises(TerrainError, match="2 scenes"):
+                env.reset(seed=seed)
+
+
+def draws_of(env: RoverEnv, seed: int) -> int:
+    """How many numbers a reset takes from the generator."""
+    env.reset(seed=seed)
+    generator = np.random.Generator(np.random.PCG64(seed))
+    for n in range(500):
+        if random_state(generator) == random_state(env.np_random):
+            return n
+        generator.random()
+    raise AssertionError("the state was never that of NumPy's generator")
 
 
 def vector(mode: str = "NextStep", n: int = 3, **arguments: Any) -> RoverVectorEnv:
@@ -145,13 +157,12 @@ def state_of(env: RoverVectorEnv) -> list[Any]:
     """All that a refused call must leave as it was."""
     batch = env.batch
     return [
-        [batch.simulations.simulation(i).snapshot() for i in range(batch.n)],
+        [batch.episodes.simulation(i).snapshot() for i in range(batch.n)],
         [random_state(batch.generator(i)) for i in range(batch.n)],
         list(batch._seeds),
-        batch._progress.observation.tobytes(),
-        batch._steps.tolist(),
+        batch.observation.tobytes(),
         [rover.start for rover in batch.rovers],
-        env._ended.tolist(),
+        list(env._over),
     ]
 
 
@@ -240,10 +251,10 @@ def test_stable_baselines_environments_are_refused_whole_too() -> None:
     observation, _, dones, infos = venv.step(actions)
     assert dones.tolist() == [False, True]
     assert infos[1]["terminal_observation"].tobytes() == observation[1].tobytes()
-    before = [venv.batch.simulations.simulation(i).snapshot() for i in range(2)]
+    before = [venv.batch.episodes.simulation(i).snapshot() for i in range(2)]
     with pytest.raises(TerrainError):
         venv.step(actions)
-    assert [venv.batch.simulations.simulation(i).snapshot() for i in range(2)] == before
+    assert [venv.batch.episodes.simulation(i).snapshot() for i in range(2)] == before
     assert [random_state(venv.batch.generator(i)) for i in range(2)] == generators
     venv.set_options({**ELSEWHERE, "goal": (9.0, 0.0)})
     venv.reset()

@@ -16,7 +16,7 @@ from gymnasium.utils.env_checker import check_env
 
 from rover_gym import OptionError, PDPolicy, Plane, RoverEnv, RoverGymError, SphereField, TerrainError
 from rover_gym.env import HeightScan
-from rover_gym.env.rocks import HARDEST_SLOPE_DEG, MARGIN, RockDistribution, clear_radius, heights, scan_points
+from rover_gym.env.rocks import clear_radius, heights, scan_points
 from rover_gym.policy import measure_baseline, wilson_interval
 from rover_gym.policy.baseline import ENDS
 
@@ -120,7 +120,7 @@ def test_difficulty_is_an_option_of_the_reset(rocks: RoverEnv, difficulty: float
     assert rocks.difficulty == drawn.difficulty == difficulty
     assert drawn.abundance == pytest.approx(0.2 * difficulty)
     assert drawn.max_radius == pytest.approx(0.5 + 1.1 * difficulty)
-    assert 0.0 <= rocks.start.slope <= math.radians(HARDEST_SLOPE_DEG) * difficulty
+    assert 0.0 <= rocks.start.slope <= math.radians(10.0) * difficulty
     field = field_of(rocks)
     assert (len(field) > 0) == (difficulty > 0.0)
     assert (field.radii <= drawn.max_radius * rocks.model.wheel_radii[0] * (1.0 + 1e-12)).all()
@@ -167,13 +167,24 @@ def test_difficulty_table_of_the_card_is_the_map() -> None:
     low, slope = (float(word) for word in said["slope_deg"].removeprefix("uniform, ").removesuffix(" d").split(" to "))
     factor = float(abundance.removesuffix(" d"))
     constant, rate = (ast.literal_eval(word.removesuffix(" d")) for word in radius.split(" + "))
-    rng = np.random.default_rng(0)
+    env = RoverEnv(terrain="sphere_field")
     for d in (0.0, 0.25, 1.0):
-        drawn = RockDistribution().sample(rng, d)
+        env.reset(seed=0, options={"difficulty": d, "position": (0.0, 0.0), "goal": (6.0, 0.0)})
+        drawn = env.rocks
+        assert drawn is not None
         assert drawn.abundance == pytest.approx(factor * d)
         assert drawn.max_radius == pytest.approx(constant + rate * d)
-        assert drawn.slope == pytest.approx((math.radians(low), math.radians(slope) * d))
-    assert f"up to {MARGIN:g} m beyond" in section
+        # The first number sets the difficulty, the second is the rocks' seed, the third the slope.
+        generator = np.random.Generator(np.random.PCG64(0))
+        generator.uniform(0.5, 0.5), generator.integers(2**63)
+        expected = generator.uniform(math.radians(low), math.radians(slope) * d)
+        assert env.start.slope == pytest.approx(expected)
+    margin = float(section.split("up to ")[1].split(" m beyond")[0])
+    assert margin == 4.0
+    places = field_of(env).centres[:, [0, 2]]
+    assert (places.min(axis=0) >= (-margin, -margin)).all()
+    assert (places.max(axis=0) <= (6.0 + margin, margin)).all()
+    assert (places.max(axis=0) >= (5.0 + margin, margin - 1.0)).all()
 
 
 @pytest.mark.parametrize("seed", range(10))

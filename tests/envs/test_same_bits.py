@@ -91,15 +91,7 @@ def here() -> dict[str, list[str]]:
     return drives()
 
 
-@pytest.mark.parametrize(
-    "other",
-    [
-        pytest.param("blas", marks=pytest.mark.xfail(strict=False, reason="starts on slopes are drawn with NumPy")),
-        "blas_haswell",
-        "numpy",
-        "libc",
-    ],
-)
+@pytest.mark.parametrize("other", OTHER_MACHINES)
 def test_other_instructions_same_bits(other: str, here: dict[str, list[str]]) -> None:
     there = drives_elsewhere(OTHER_MACHINES[other])
     parted = {

@@ -1,6 +1,8 @@
 //! Whole behaviour of the rover: against references, closed forms and conservation laws.
 #![allow(clippy::unwrap_used)]
 
+#[path = "exploring_scenes.rs"]
+mod exploring_scenes;
 #[path = "rover/scenes.rs"]
 mod scenes;
 
@@ -8,6 +10,10 @@ mod scenes;
 mod batch;
 #[path = "rover/driving.rs"]
 mod driving;
+#[path = "rover/episodes.rs"]
+mod episodes;
+#[path = "rover/exploring.rs"]
+mod exploring;
 #[path = "rover/free_flight.rs"]
 mod free_flight;
 #[path = "rover/inclined_plane.rs"]

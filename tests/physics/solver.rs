@@ -827,7 +827,7 @@ fn the_report_names_the_stage_that_answered_and_those_before_it() {
     );
     assert_eq!(cold.stage, Stage::Newton);
     let (_, warm) = solve_with(&problem, &SolverOptions::default(), &mut p);
-    assert_eq!(stages(&warm), [(Stage::WarmNewton, SolveStatus::Converged)]);
+    assert_eq!(stages(&warm), [(Stage::Pivoting, SolveStatus::Converged)]);
     let column = pile(&[1.0; 12], 0.9).problem(&falling(12, 9.81e-3));
     let (_, _, many) = solved(&column);
     assert_eq!(many.rungs.as_slice()[0].stage, Stage::Sweeps);

@@ -1,14 +1,21 @@
-"""`rover speed`: how fast a batch of rovers is here, and where its time goes."""
+"""`rover speed`: how fast a batch of rovers is here, beside MuJoCo, and where the time of its environment goes."""
 
+import datetime
 import json
+import os
 from dataclasses import asdict
 from enum import StrEnum
+from importlib import metadata
 from typing import Annotated, Any
 
 import typer
 
 from rover_gym.cli.console import plain_errors, progress_bar
-from rover_gym.vector.throughput import measure_speed
+from rover_gym.vector.exploring import ExploringSpeed, measure_exploring, processor
+from rover_gym.vector.throughput import VectorSpeed, measure_speed
+
+#: Steps of an environment for each round of the physics alone, which is as much work as ten.
+_STEPS_A_ROUND = 20
 
 
 class SpeedTerrain(StrEnum):
@@ -25,27 +32,84 @@ def speed(
         int | None, typer.Option(min=1, max=1024, help="Threads that step them. Default: one per core.")
     ] = None,
     terrain: Annotated[
-        SpeedTerrain, typer.Option(help="Flat ground, or rocks with a height scan.")
-    ] = SpeedTerrain.plane,
-    rounds: Annotated[int, typer.Option(min=1, max=1_000_000, help="Measurements of each; the fastest counts.")] = 200,
+        SpeedTerrain | None, typer.Option(help="Only flat ground, or only rocks (with a height scan). Default: both.")
+    ] = None,
+    torque: Annotated[float, typer.Option(min=0.0, max=1e3, help="Largest torque of exploring rovers, N m.")] = 60.0,
+    rounds: Annotated[int, typer.Option(min=1, max=1_000_000, help="Steps of each environment that are timed.")] = 200,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Step a batch of rovers with one thread and with several, and a SyncVectorEnv, and print how fast they are."""
-    arguments: dict[str, Any] = {"terrain": terrain.value, "height_scan": terrain is SpeedTerrain.sphere_field}
+    """Step a batch of exploring rovers, and MuJoCo's rollout of the same where it is installed, and print how fast."""
+    grounds = list(SpeedTerrain) if terrain is None else [terrain]
+    exploring_rounds = -(-rounds // _STEPS_A_ROUND)
+    told: dict[str, tuple[ExploringSpeed, VectorSpeed]] = {}
     with progress_bar() as bar:
-        task = bar.add_task("speed", total=rounds + 1, state=f"{num_envs} rovers")
-        result = measure_speed(
-            num_envs, threads, rounds=rounds, progress=lambda: bar.update(task, advance=1), **arguments
-        )
+        task = bar.add_task("speed", total=len(grounds) * (rounds + exploring_rounds + 2), state=f"{num_envs} rovers")
+
+        def advance() -> None:
+            bar.update(task, advance=1)
+
+        for ground in grounds:
+            exploring = measure_exploring(
+                num_envs, threads, ground=ground.value, torque=torque, rounds=exploring_rounds, progress=advance
+            )
+            arguments: dict[str, Any] = {"terrain": ground.value, "height_scan": ground is SpeedTerrain.sphere_field}
+            told[ground.value] = (
+                exploring,
+                measure_speed(num_envs, threads, rounds=rounds, progress=advance, **arguments),
+            )
+    first = next(iter(told.values()))[0]
+    machine = {
+        "processor": processor(),
+        "cores": os.cpu_count(),
+        "instruction_set": first.instruction_set,
+        "date": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
+        "packages": _versions(),
+    }
     if as_json:
-        derived = ("physics_share", "speed_up", "gain", "steps_per_second")
-        typer.echo(json.dumps(asdict(result) | {name: getattr(result, name) for name in derived}, indent=2))
+        typer.echo(json.dumps({"machine": machine, "grounds": {name: _fields(*two) for name, two in told.items()}}))
         return
+    packages = ", ".join(f"{name} {version}" for name, version in _versions().items())
+    typer.echo(f"{machine['processor']}, {machine['cores']} cores, {machine['instruction_set']}; {machine['date']}")
+    typer.echo(f"{packages}; {num_envs} rovers, {first.threads} threads")
+    for name, (exploring, environment) in told.items():
+        _print_exploring(name, exploring)
+        _print_environment(environment)
+
+
+def _fields(exploring: ExploringSpeed, environment: VectorSpeed) -> dict[str, Any]:
+    derived = ("physics_share", "speed_up", "gain", "steps_per_second")
+    return {
+        "exploring": asdict(exploring) | {"simulated": exploring.simulated},
+        "environment": asdict(environment) | {name: getattr(environment, name) for name in derived},
+    }
+
+
+def _print_exploring(name: str, result: ExploringSpeed) -> None:
     typer.echo(
-        f"{result.num_envs} rovers, {result.threads} threads: {result.step * 1e6:.0f} us a step of the batch, "
-        f"{result.steps_per_second:.0f} environment steps a second\n"
-        f"  inside the physics    {result.physics_share:.1%}\n"
-        f"  over one thread       {result.speed_up:.2f} times (physics)\n"
-        f"  over SyncVectorEnv    {result.gain:.1f} times\n"
-        f"  reset of one rover    {result.reset * 1e6:.0f} us"
+        f"\n{name}: torques of up to {result.torque:g} N m and set-points redrawn every 10 steps of 5 ms\n"
+        f"  {'':<38}{'rover-steps/s':>14}{'simulated s/s':>16}"
     )
+    for engine, rate in result.rover_steps.items():
+        typer.echo(f"  {engine:<38}{rate:>14.0f}{result.simulated[engine]:>16.0f}")
+
+
+def _print_environment(result: VectorSpeed) -> None:
+    typer.echo(
+        f"  environment: {result.step * 1e6:.0f} us a step of the batch, "
+        f"{result.steps_per_second:.0f} environment steps a second\n"
+        f"    inside the physics    {result.physics_share:.1%}\n"
+        f"    over one thread       {result.speed_up:.2f} times (physics)\n"
+        f"    over SyncVectorEnv    {result.gain:.1f} times\n"
+        f"    reset of one rover    {result.reset * 1e6:.0f} us"
+    )
+
+
+def _versions() -> dict[str, str]:
+    """Versions of the engines that are installed."""
+    found = {}
+    for name in ("rover-gym", "mujoco"):
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found

@@ -1,102 +1,39 @@
-"""Starts episodes: draws and checks everything first, so that the caller adopts a complete episode or none."""
+"""Begins episodes: draws and checks everything first, so that the caller adopts complete episodes or none."""
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Sequence
 
-import numpy as np
-from gymnasium.utils import seeding
-
-from rover_gym.env.episode_scene import START_OVERLAP, EpisodeScene, ResetOptions, draw_scene
-from rover_gym.env.outcome import Outcome, reset_outcome
-from rover_gym.env.progress import Progress
-from rover_gym.env.quantities import Array
-from rover_gym.env.readings import draw_noise
+from rover_gym.env.episode_scene import ResetOptions
+from rover_gym.env.generators import Rows
 from rover_gym.env.task import Task
-from rover_gym.mechanics import OptionError, Simulation, StateError, TerrainError
-from rover_gym.validation import Range, refuse, whole
+from rover_gym.mechanics import DrawnEpisodes, EpisodeBatch
+from rover_gym.validation import Range
 
 #: Most scenes drawn for one reset until the rover penetrates neither the ground nor a sphere.
 PLACING_ATTEMPTS = 100
 
 
-@dataclass(frozen=True)
-class Beginning:
-    """A drawn and checked episode: its scene, simulation, progress and first reading."""
-
-    scene: EpisodeScene
-    simulation: Simulation
-    progress: Progress
-    reading: Array
-
-    def report(self, task: Task) -> Outcome:
-        """The outcome that a reset reports."""
-        return reset_outcome(task, self.progress, self.reading)
-
-
-def draw_beginning(task: Task, rng: np.random.Generator, difficulty: Range | None, options: ResetOptions) -> Beginning:
-    """Draws an episode and repeats the draw until the rover can be placed.
+def draw_episodes(
+    task: Task,
+    generators: Rows,
+    difficulties: Sequence[Range | None],
+    options: ResetOptions | Sequence[ResetOptions],
+    batch: EpisodeBatch | None = None,
+) -> DrawnEpisodes:
+    """Draws the next episode of each generator, which keeps its state, and repeats each draw until the rover has room.
 
     Args:
         task: The task.
-        rng: The random generator.
-        difficulty: Range of the rocks' difficulty; None for the task's own.
-        options: The values that reset options fix.
+        generators: `(m, 4)` random generators; the result's `generators` holds their states after the draws.
+        difficulties: Range of each rover's rocks' difficulty; None for the task's own.
+        options: The values that reset options fix, for all rovers or one per rover.
+        batch: The batch whose threads draw; None for the caller's alone.
 
     Raises:
-        TerrainError: The rover would penetrate the ground or a sphere in each of `PLACING_ATTEMPTS` scenes.
-        StateError: The observation of the given state overflows float32.
+        TerrainError: A rover would penetrate the ground or a sphere in each of `PLACING_ATTEMPTS` scenes.
+        StateError: The observation of a given state overflows float32.
     """
-    for _ in range(PLACING_ATTEMPTS):
-        scene, simulation = draw_scene(task, rng, difficulty, options)
-        overlap = simulation.deepest_overlap
-        if overlap >= -START_OVERLAP:
-            break
-    else:
-        reason = (
-            f"is how deep (m) the rover stands in the ground or in a sphere at its start, in the last of "
-            f"{PLACING_ATTEMPTS} scenes"
-        )
-        refuse(TerrainError, "terrain", overlap, reason)
-    reading = simulation.reading(scene.start.goal, task.scan)
-    noise = draw_noise(task, (rng,))
-    progress = Progress.begin(task, scene, reading, None if noise is None else noise[0])
-    if progress is None:
-        refuse(StateError, "options.q", options.q, "must be observable in float32, with v and goal")
-    return Beginning(scene, simulation, progress, reading)
-
-
-def check_seed(seed: object, field: str = "seed") -> int | None:
-    """Checks the seed of a random generator; None stays None."""
-    return None if seed is None else whole(field, seed)
-
-
-def spread_seeds(seed: object, n: int) -> list[int | None]:
-    """One seed per rover: a single number seeds the first rover and increases by one per rover.
-
-    Raises:
-        OptionError: The seed is neither None, a whole number from 0, nor a sequence of n of these.
-    """
-    if isinstance(seed, (list, tuple, range)) or (isinstance(seed, np.ndarray) and seed.ndim == 1):
-        if len(seed) != n:
-            refuse(OptionError, "seed", seed, f"must be one seed, or {n}")
-        return [check_seed(one, f"seed[{i}]") for i, one in enumerate(seed)]
-    first = check_seed(seed)
-    return [None if first is None else first + i for i in range(n)]
-
-
-def seeded(seed: int | None) -> tuple[np.random.Generator, int]:
-    """A random generator made from a checked seed as `gymnasium.Env.reset` makes it, and the seed used."""
-    return seeding.np_random(seed)
-
-
-@contextmanager
-def put_back(generators: Iterable[np.random.Generator]) -> Iterator[None]:
-    """Restores the states of random generators if the `with` block raises."""
-    before = [(generator, generator.bit_generator.state) for generator in generators]
-    try:
-        yield
-    except BaseException:
-        for generator, state in before:
-            generator.bit_generator.state = state
-        raise
+    fixed = options.fixed if isinstance(options, ResetOptions) else [one.fixed for one in options]
+    given = list(difficulties) if any(difficulties) else None
+    if batch is None:
+        return task.episodes.draw(generators, attempts=PLACING_ATTEMPTS, difficulties=given, fixed=fixed)
+    return batch.draw(task.episodes, generators, attempts=PLACING_ATTEMPTS, difficulties=given, fixed=fixed)

@@ -2,27 +2,22 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from rover_gym.env.argument_checks import MAX_SLOPE_DEG
+from rover_gym.env.quantities import Array
 from rover_gym.env.randomisation import Domain
 from rover_gym.env.rocks import MAX_GOAL_DISTANCE, Rocks
-from rover_gym.env.start import Start, resting_pose, sample_start, tilted_plane
+from rover_gym.env.start import Start
 from rover_gym.env.task import Task
-from rover_gym.mechanics import OptionError, Plane, Simulation, SphereField, StateError
+from rover_gym.mechanics import OptionError, Plane, SphereField, StateError, TerrainError
 from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector
 
 RESET_OPTIONS = ("difficulty", "slope_deg", "uphill_deg", "position", "heading_deg", "goal", "q", "v")
 
 #: Largest magnitude of a map coordinate x or z, m.
 MAX_PLACE = 1e6
-
-# Largest penetration of ground and spheres at the start, m; a deeper start is drawn again.
-START_OVERLAP = 0.01
 
 
 @dataclass(frozen=True)
@@ -43,45 +38,32 @@ class EpisodeScene:
 
 @dataclass(frozen=True)
 class ResetOptions:
-    """Checked reset options: arguments of `sample_start`, the difficulty, and the whole state."""
+    """Checked reset options, by the names and in the units that `EpisodeDistribution.draw` takes them in."""
 
-    start: Mapping[str, Any] = field(default_factory=dict)
-    difficulty: float | None = None
-    q: npt.NDArray[np.float64] | None = None
-    v: npt.NDArray[np.float64] | None = None
+    fixed: Mapping[str, Any] = field(default_factory=dict)
 
 
-def draw_scene(
-    task: Task, rng: np.random.Generator, difficulty: Range | None, options: ResetOptions
-) -> tuple[EpisodeScene, Simulation]:
-    """Draws a scene and puts the rover into it, without checking for penetration.
+def scene_of(
+    task: Task, start: Array, rocks: Array, rock_seed: int, domain: Array, terrain: Plane | SphereField
+) -> EpisodeScene:
+    """The scene of one episode from rows of `DrawnEpisodes`: `starts`, `rocks`, `rock_seeds`, `domains`."""
+    slope, uphill, x, z, heading, goal_x, goal_z = start.tolist()
+    difficulty, abundance, max_radius = rocks.tolist()
+    return EpisodeScene(
+        start=Start(slope, uphill, (x, z), heading, (goal_x, goal_z)),
+        plane=terrain if isinstance(terrain, Plane) else _ground_of(terrain),
+        terrain=terrain,
+        rocks=None if task.rocks is None else Rocks(difficulty, abundance, max_radius, int(rock_seed)),
+        domain=Domain(*domain.tolist()),
+    )
 
-    Args:
-        task: The task.
-        rng: The random generator; every draw is made, whatever the options fix.
-        difficulty: Range of the rocks' difficulty; None for the task's own.
-        options: The values that reset options fix.
-    """
-    distribution, rocks = task.start, None
-    if task.rocks is not None:
-        of_rocks = task.rocks if difficulty is None else replace(task.rocks, difficulty=difficulty)
-        rocks = of_rocks.sample(rng, options.difficulty)
-        if task.slope_by_difficulty:
-            distribution = replace(distribution, slope=rocks.slope)
-    start = sample_start(rng, distribution, **options.start)
-    domain = task.domain.sample(rng)
-    plane = tilted_plane(start.slope, start.uphill)
-    terrain: Plane | SphereField = plane
-    if task.field is not None and task.field.ground is not None:
-        plane, terrain = task.field.ground, task.field
-    elif rocks is not None:
-        terrain = rocks.lay_out(task.model, start, plane, task.goal_tolerance)
-    simulation = task.simulate(terrain, domain)
-    q = options.q
-    if q is None:
-        q = resting_pose(task.model, plane, start.position, start.heading)
-    simulation.set_state(q, options.v)
-    return EpisodeScene(start=start, plane=plane, terrain=terrain, rocks=rocks, domain=domain), simulation
+
+def _ground_of(terrain: SphereField) -> Plane:
+    """The plane under a field, which the fields of episodes have."""
+    ground = terrain.ground
+    if ground is None:
+        refuse(TerrainError, "terrain", terrain, "needs a ground plane to stand on")
+    return ground
 
 
 def check_difficulty(task: Task, difficulty: object) -> Range:
@@ -97,9 +79,8 @@ def check_reset_options(task: Task, options: Mapping[str, Any] | None) -> ResetO
     given = mapping("options", options)
     known_keys("options", given, RESET_OPTIONS)
     fixed: dict[str, Any] = {}
-    difficulty = None
     if "difficulty" in given:
-        difficulty = number("options.difficulty", given["difficulty"], at_least=0.0, at_most=1.0)
+        difficulty = fixed["difficulty"] = number("options.difficulty", given["difficulty"], at_least=0.0, at_most=1.0)
         if task.rocks is None:
             refuse(OptionError, "options.difficulty", difficulty, "needs terrain 'sphere_field'")
     if "slope_deg" in given:
@@ -116,20 +97,19 @@ def check_reset_options(task: Task, options: Mapping[str, Any] | None) -> ResetO
             for i, value in enumerate(fixed[name]):
                 number(f"options.{name}[{i}]", value, at_least=-MAX_PLACE, at_most=MAX_PLACE)
 
-    q = v = None
     if "v" in given and "q" not in given:
         refuse(OptionError, "options.v", given["v"], "must come with q")
     if "q" in given:
         for name in ("position", "heading_deg"):
             if name in given:
                 refuse(OptionError, f"options.{name}", given[name], "must not come with q, which holds it")
-        q = np.array(vector("options.q", given["q"], task.model.nq, error=StateError))
-        fixed["position"], fixed["heading"] = (float(q[0]), float(q[2])), float(q[4])
+        q = fixed["q"] = vector("options.q", given["q"], task.model.nq, error=StateError)
+        fixed["position"], fixed["heading"] = (q[0], q[2]), q[4]
         if "v" in given:
-            v = np.array(vector("options.v", given["v"], task.model.nv, error=StateError))
+            fixed["v"] = vector("options.v", given["v"], task.model.nv, error=StateError)
     if task.rocks is not None and "goal" in fixed:
         distance = math.dist(fixed["goal"], fixed.get("position", (0.0, 0.0)))
         if not distance <= MAX_GOAL_DISTANCE:
             reason = f"must be within {MAX_GOAL_DISTANCE:g} m of the start"
             refuse(OptionError, "options.goal", given["goal"], reason)
-    return ResetOptions(start=fixed, difficulty=difficulty, q=q, v=v)
+    return ResetOptions(fixed)

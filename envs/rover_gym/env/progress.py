@@ -1,97 +1,50 @@
-"""The state of an episode outside the simulation, for one rover or for n."""
+"""The state of an episode outside the simulation, as snapshots hold it."""
 
-import copy
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
-
-from rover_gym.env.episode_scene import EpisodeScene
-from rover_gym.env.quantities import Array, Observations, Quantity
-from rover_gym.env.randomisation import Domain
-from rover_gym.env.readings import ReadingScalars, observe
-from rover_gym.env.task import Task
-from rover_gym.env.wheels import N_ACTIONS
-
-DOMAIN = tuple(entry.name for entry in fields(Domain))
+from rover_gym.env.quantities import Array, Observations
+from rover_gym.mechanics import Episode, EpisodeRules
 
 
-@dataclass
+@dataclass(frozen=True)
 class Progress:
-    """The state of an episode outside the simulation, for one rover or with one row per rover.
+    """The state of an episode outside the simulation.
 
     Attributes:
+        goal: The goal (x, z), m.
+        domain: `(4,)` fields of `Domain`, in its order.
+        trunk_load_limit: Trunk force beyond which the rover is high-centred, N.
+        difficulty: Difficulty of the rocks.
         distance: Horizontal distance to the goal, m.
-        previous_action: `(..., 12)` last action.
+        previous_action: `(12,)` last action.
         energy: Motor work since reset, braking counted, J.
         energy_positive: Motor work since reset, driving only, J.
         stuck_time: How long the rover has been high-centred, s.
-        domain: `(..., 4)` fields of `Domain`, in its order.
-        trunk_load_limit: Trunk force beyond which the rover is high-centred, N.
-        difficulty: Difficulty of the rocks.
-        observation: `(..., size) float32`, the last observation.
+        observation: `(size,) float32`, the last observation.
     """
 
-    distance: Quantity
-    previous_action: Array
-    energy: Quantity
-    energy_positive: Quantity
-    stuck_time: Quantity
+    goal: tuple[float, float]
     domain: Array
-    trunk_load_limit: Quantity
-    difficulty: Quantity
+    trunk_load_limit: float
+    difficulty: float
+    distance: float
+    previous_action: Array
+    energy: float
+    energy_positive: float
+    stuck_time: float
     observation: Observations
 
     @classmethod
-    def of(cls, task: Task, n: int) -> "Progress":
-        """The progress of n rovers before their first reset."""
-        distance, energy, energy_positive, stuck_time, trunk_load_limit, difficulty = np.zeros((6, n))
-        return cls(
-            distance=distance,
-            previous_action=np.zeros((n, N_ACTIONS)),
-            energy=energy,
-            energy_positive=energy_positive,
-            stuck_time=stuck_time,
-            domain=np.ones((n, len(DOMAIN))),
-            trunk_load_limit=trunk_load_limit,
-            difficulty=difficulty,
-            observation=np.zeros((n, task.layout.size), np.float32),
-        )
+    def of(cls, episode: Episode) -> "Progress":
+        """The progress of an episode."""
+        return cls(**episode.state())
 
-    @classmethod
-    def begin(cls, task: Task, scene: EpisodeScene, reading: Array, noise: Array | None) -> "Progress | None":
-        """The progress of one rover at the start of an episode; None if its observation is not finite in float32."""
-        previous_action = np.zeros(N_ACTIONS)
-        with np.errstate(over="ignore", invalid="ignore"):
-            observation, finite = observe(task, reading, previous_action, 0.0, noise)
-        if not finite:
-            return None
-        return cls(
-            distance=ReadingScalars.of(task, reading).distance,
-            previous_action=previous_action,
-            energy=0.0,
-            energy_positive=0.0,
-            stuck_time=0.0,
-            domain=np.array(list(scene.domain.as_info().values())),
-            trunk_load_limit=task.trunk_load_limit(scene.domain),
-            difficulty=scene.difficulty,
-            observation=observation,
-        )
+    def episode(self, rules: EpisodeRules) -> Episode:
+        """The episode that continues from here.
 
-    def put(self, i: int, one: "Progress") -> None:
-        """Sets the row of rover i."""
-        for name, value in vars(self).items():
-            value[i] = getattr(one, name)
-
-    def is_of(self, task: Task) -> bool:
-        """Whether the shapes fit one rover with this task and all values are finite."""
-        shapes = {"previous_action": (N_ACTIONS,), "domain": (len(DOMAIN),), "observation": (task.layout.size,)}
-        return all(
-            isinstance(value, np.ndarray if name in shapes else (float, int))
-            and np.shape(value) == shapes.get(name, ())
-            and bool(np.isfinite(value).all())
-            for name, value in vars(self).items()
-        )
-
-    def copy(self) -> "Progress":
-        """A deep copy."""
-        return copy.deepcopy(self)
+        Raises:
+            OptionError: A value does not fit the rules, or is not finite.
+        """
+        state: dict[str, Any] = vars(self)
+        return Episode(rules, **state)

@@ -6,8 +6,6 @@ random number, so it does not shift the other draws.
 
 from dataclasses import asdict, dataclass
 
-import numpy as np
-
 from rover_gym.validation import Range
 
 
@@ -34,24 +32,10 @@ class Domain:
 
 @dataclass(frozen=True)
 class DomainDistribution:
-    """Ranges that `sample` draws from uniformly, and the standard deviation of the observation noise."""
+    """Ranges that episodes draw from uniformly, and the standard deviation of the observation noise."""
 
     mass_scale: Range
     friction: Range
     actuator_gain: Range
     gravity_scale: Range
     observation_noise: float
-
-    def sample(self, rng: np.random.Generator) -> Domain:
-        """Draws the properties of one episode."""
-
-        def draw(span: Range) -> float:
-            low, high = span
-            return low if low == high else float(rng.uniform(low, high))
-
-        return Domain(
-            mass_scale=draw(self.mass_scale),
-            friction=draw(self.friction),
-            actuator_gain=draw(self.actuator_gain),
-            gravity_scale=draw(self.gravity_scale),
-        )

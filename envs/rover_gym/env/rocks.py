@@ -15,52 +15,29 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.start import Point, Start
-from rover_gym.env.wheels import wheel_centres
+from rover_gym.env.start import Point
 from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField
 from rover_gym.validation import Range, number, refuse, vector
 
-#: Rock abundance at difficulty 1; landing sites on Mars have 0.03 to 0.2 (Golombek and Rapp 1997).
-HARDEST_ABUNDANCE = 0.2
-#: Radius of the largest rock at difficulty 0 and at difficulty 1, in wheel radii.
-LARGEST_ROCK = (0.5, 1.6)
-#: Steepest slope at difficulty 1, degrees.
-HARDEST_SLOPE_DEG = 10.0
 DEFAULT_DIFFICULTY = 0.5
 
 #: Largest abundance; the size distribution does not hold beyond it.
 MAX_ABUNDANCE = 0.5
 #: Range of the largest rock's radius, in wheel radii; smaller rocks are gravel, larger ones hills.
 ROCK_RADII = (0.3, 10.0)
-#: Rocks lie up to this far beyond the rectangle that start and goal span, m.
-MARGIN = 4.0
 #: Largest distance from start to goal, m, which limits the size of the field.
 MAX_GOAL_DISTANCE = 100.0
 #: Range of a height scan's spacing, m.
 SPACINGS = (1e-3, 10.0)
-#: Free room that a clearing leaves around the rover, m.
-CLEARANCE = 0.1
 
 
 @dataclass(frozen=True)
 class RockDistribution:
-    """What `sample` draws from: a range of difficulties, and the values that override the difficulty."""
+    """What rocks are drawn from: a range of difficulties, and the values that override the difficulty."""
 
     difficulty: Range = (DEFAULT_DIFFICULTY, DEFAULT_DIFFICULTY)
     abundance: float | None = None
     max_radius: float | None = None
-
-    def sample(self, rng: np.random.Generator, difficulty: float | None = None) -> "Rocks":
-        """Draws the rocks of one episode; a given difficulty replaces its draw without shifting the others."""
-        drawn = float(rng.uniform(*self.difficulty))
-        d = drawn if difficulty is None else difficulty
-        smallest, largest = LARGEST_ROCK
-        return Rocks(
-            difficulty=d,
-            abundance=HARDEST_ABUNDANCE * d if self.abundance is None else self.abundance,
-            max_radius=smallest + (largest - smallest) * d if self.max_radius is None else self.max_radius,
-            seed=int(rng.integers(2**63)),
-        )
 
 
 @dataclass(frozen=True)
@@ -79,29 +56,10 @@ class Rocks:
     max_radius: float
     seed: int
 
-    @property
-    def slope(self) -> Range:
-        """Range of the ground's slope, rad."""
-        return (0.0, math.radians(HARDEST_SLOPE_DEG) * self.difficulty)
-
-    def lay_out(self, model: RoverModel, start: Start, ground: Plane, goal_tolerance: float) -> SphereField:
-        """The rock field around start and goal, with a clearing at each in which the rover has room to turn."""
-        (x, z), (goal_x, goal_z) = start.position, start.goal
-        radius = clear_radius(model)
-        return SphereField.rocks(
-            self.abundance,
-            (min(x, goal_x) - MARGIN, min(z, goal_z) - MARGIN, max(x, goal_x) + MARGIN, max(z, goal_z) + MARGIN),
-            self.seed,
-            max_diameter=2.0 * self.max_radius * float(model.wheel_radii.max()),
-            ground=ground,
-            clear=((x, z, radius), (goal_x, goal_z, max(radius, goal_tolerance))),
-        )
-
 
 def clear_radius(model: RoverModel) -> float:
-    """Radius of the clearings, m: the wheels' largest reach from the trunk's origin plus `CLEARANCE`."""
-    reach = np.linalg.norm(wheel_centres(model), axis=1) + model.wheel_radii
-    return float(reach.max()) + CLEARANCE
+    """Radius of the clearings, m: the wheels' largest reach from the trunk's origin plus 0.1 m."""
+    return model.clear_radius
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ Point: TypeAlias = tuple[float, float]
 
 @dataclass(frozen=True)
 class StartDistribution:
-    """Ranges that `sample_start` draws from uniformly; angles in rad, distances in m."""
+    """Ranges that starts are drawn from uniformly; angles in rad, distances in m."""
 
     slope: Range
     uphill: Range
@@ -39,52 +39,9 @@ class Start:
     goal: Point
 
 
-def sample_start(
-    rng: np.random.Generator,
-    distribution: StartDistribution,
-    *,
-    slope: float | None = None,
-    uphill: float | None = None,
-    position: Point = (0.0, 0.0),
-    heading: float | None = None,
-    goal: Point | None = None,
-) -> Start:
-    """Draws a start; given values replace their draws, which are still made, so that the other draws do not shift."""
-    draws = [
-        rng.uniform(*span)
-        for span in (
-            distribution.slope,
-            distribution.uphill,
-            distribution.heading,
-            distribution.goal_distance,
-            distribution.goal_bearing,
-        )
-    ]
-    heading = draws[2] if heading is None else heading
-    if goal is None:
-        direction = heading + draws[4]
-        goal = (
-            position[0] + draws[3] * math.cos(direction),
-            position[1] - draws[3] * math.sin(direction),
-        )
-    return Start(
-        slope=draws[0] if slope is None else slope,
-        uphill=draws[1] if uphill is None else uphill,
-        position=position,
-        heading=heading,
-        goal=goal,
-    )
-
-
 def tilted_plane(slope: float, uphill: float) -> Plane:
     """The plane through the origin that rises by `slope` in the direction `uphill`, both rad."""
-    return Plane(
-        (
-            -math.sin(slope) * math.cos(uphill),
-            math.cos(slope),
-            math.sin(slope) * math.sin(uphill),
-        )
-    )
+    return Plane.tilted(slope, uphill)
 
 
 def slope_of(field: SphereField) -> tuple[float, float]:
@@ -105,22 +62,4 @@ def resting_pose(model: RoverModel, plane: Plane, position: Point, heading: floa
 
     The trunk's origin is above `position`, and the lowest wheel has gap zero.
     """
-    n = plane.normal
-    # The trunk's x axis lies in the plane, its horizontal part along the heading.
-    forward = np.array(
-        [math.cos(heading), -(n[0] * math.cos(heading) - n[2] * math.sin(heading)) / n[1], -math.sin(heading)]
-    )
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, n)
-
-    # The middle row of R = Ry(heading) Rz(pitch) Rx(roll) is (sin p, cos p cos r, -cos p sin r).
-    q = np.zeros(model.nq)
-    q[3] = math.atan2(-right[1], n[1])
-    q[4] = math.remainder(heading, math.tau)
-    q[5] = math.asin(forward[1])
-
-    q[0], q[2] = position
-    q[1] = plane.height(*position)
-    # Raising the trunk by dy opens every gap by dy n_y.
-    q[1] -= model.wheel_gaps(q, plane, coordinates="state").min() / n[1]
-    return q
+    return model.resting_pose(plane, position, heading)

@@ -1,12 +1,11 @@
 """A batch of rovers, the base of the vector environments for Gymnasium and stable-baselines3.
 
 Rover i of a batch behaves, bit for bit, like a `RoverEnv` with the same arguments and seed, whatever the numbers of
-rovers and threads. Each control period calls the compiled core once. Observation, reward and termination come from the
-functions that `RoverEnv` uses, applied to arrays.
+rovers and threads. Each control period is one call of the compiled core: the thread that steps a rover also computes
+its observation, reward and termination, as it does for `RoverEnv`.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
@@ -14,28 +13,25 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.beginning import Beginning, check_seed, draw_beginning, put_back, seeded
-from rover_gym.env.control_period import advance, motor_commands
-from rover_gym.env.episode_scene import EpisodeScene, ResetOptions, check_difficulty, check_reset_options
+from rover_gym.env.beginning import draw_episodes
+from rover_gym.env.episode_scene import EpisodeScene, ResetOptions, check_difficulty, check_reset_options, scene_of
+from rover_gym.env.generators import Rows, check_seed, fresh_seed, generator_at, row_of, seeded_rows, set_row
 from rover_gym.env.observation import ObservationLayout
-from rover_gym.env.outcome import Outcome
-from rover_gym.env.progress import Progress
 from rover_gym.env.quantities import Array, Mask, Observations
 from rover_gym.env.randomisation import Domain
-from rover_gym.env.readings import draw_noise
 from rover_gym.env.rocks import Rocks
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import Start
 from rover_gym.env.task import Task, check_actions
 from rover_gym.env.wheels import N_ACTIONS
-from rover_gym.mechanics import Plane, RoverModel, Simulation, SimulationBatch
+from rover_gym.mechanics import DrawnEpisodes, EpisodeBatch, Plane, RoverModel, Simulation
 from rover_gym.validation import Range, whole
 
 if TYPE_CHECKING:
     from rover_gym.rendering import FrameRenderer
 
 
-#: Limits of a batch; each rover takes about 100 kB.
+#: Limits of a batch; `docs/vector.md` states the memory of a rover.
 MAX_ROVERS = 100_000
 MAX_THREADS = 4096
 
@@ -51,6 +47,7 @@ class RoverBatch:
 
     Attributes:
         prototype: An environment with the same arguments, never stepped, that gives spaces, layout and model.
+        episodes: The rovers' simulations and episodes in the core.
         rovers: One view per rover.
     """
 
@@ -72,20 +69,25 @@ class RoverBatch:
         self.prototype = RoverEnv(**arguments)
         self.task: Task = self.prototype.task
         simulation = Simulation(self.task.model, Plane(), **self.task.simulation_options)
-        self.simulations = SimulationBatch([simulation] * self.n, scan=self.task.scan, threads=threads)
+        self.episodes = EpisodeBatch(
+            self.task.rules, simulation, self.n, max_steps=self.max_episode_steps, threads=threads
+        )
         self.rovers = tuple(BatchRover(self, i) for i in range(self.n))
-        self._progress = Progress.of(self.task, self.n)
-        self._scenes: list[EpisodeScene | None] = [None] * self.n
-        self._generators: list[np.random.Generator | None] = [None] * self.n
+        self._starts, self._rocks = np.zeros((self.n, 7)), np.zeros((self.n, 3))
+        self._rock_seeds, self._domains = np.zeros(self.n, np.uint64), np.zeros((self.n, 4))
+        #: Generators of the rovers before their first episodes; afterwards the core has them.
+        self._generators: Rows = np.zeros((self.n, 4), np.uint64)
+        #: Generators that were handed out; they hold their rovers' states.
+        self._lent: dict[int, np.random.Generator] = {}
         self._seeds: list[int] = [-1] * self.n
-        self._difficulties: list[Range | None] = [None] * self.n
-        self._steps = np.zeros(self.n, np.int64)
+        self._difficulties: dict[int, Range] = {}
+        self._begun = np.zeros(self.n, np.bool_)
         self._started = False
 
     @property
     def observation(self) -> Observations:
         """`(n, size) float32` copy of the last observations."""
-        return self._progress.observation.copy()
+        return self.episodes.observations()
 
     def check_options(self, options: Mapping[str, Any] | None) -> ResetOptions:
         """Checks reset options and refuses the first bad one."""
@@ -98,104 +100,148 @@ class RoverBatch:
             OptionError: The seed is no whole number from 0; nothing has changed.
             TerrainError: As `RoverEnv.reset`; nothing has changed.
         """
-        with self.beginnings([i], [check_seed(seed)], options) as drawn:
-            return self.begin(i, drawn[0])
+        self.begin(self.draw([i], [check_seed(seed)], options))
+        return self.info(i)
 
-    @contextmanager
-    def beginnings(
+    def draw(
         self,
         chosen: Sequence[int],
         seeds: Sequence[int | None] | None = None,
-        options: ResetOptions | None = None,
-    ) -> Iterator[list["Drawn"]]:
-        """Draws the next episodes of some rovers, which `begin` starts.
-
-        If drawing or the `with` block raises, every random generator keeps its state.
+        options: ResetOptions | Sequence[ResetOptions] | None = None,
+    ) -> "Drawn":
+        """Draws the next episodes of some rovers on the batch's threads. Nothing changes until `begin` starts them.
 
         Args:
             chosen: Indices of the rovers.
             seeds: One checked seed per chosen rover; None to continue with the present generators.
-            options: The values that reset options fix.
+            options: The values that reset options fix, for all chosen rovers or one per rover.
 
         Raises:
-            TerrainError: As `RoverEnv.reset`; nothing has changed.
+            TerrainError: As `RoverEnv.reset`.
         """
         given = [None] * len(chosen) if seeds is None else seeds
-        made = [
-            (self.generator(i), self._seeds[i]) if seed is None else seeded(seed)
-            for i, seed in zip(chosen, given, strict=True)
-        ]
+        rows = np.zeros((len(chosen), 4), np.uint64)
+        kept = [k for k, seed in enumerate(given) if seed is None]
+        rows[kept] = self._rows([chosen[k] for k in kept])
+        anew = [k for k, seed in enumerate(given) if seed is not None]
+        rows[anew] = seeded_rows([seed for seed in given if seed is not None])
+        used = [self._seeds[i] if seed is None else seed for i, seed in zip(chosen, given, strict=True)]
+        difficulties = [self._difficulties.get(i) for i in chosen]
         fixed = ResetOptions() if options is None else options
-        with put_back([generator for generator, _ in made]):
-            yield [
-                Drawn(draw_beginning(self.task, generator, self._difficulties[i], fixed), generator, seed)
-                for i, (generator, seed) in zip(chosen, made, strict=True)
-            ]
+        episodes = draw_episodes(self.task, rows, difficulties, fixed, self.episodes)
+        return Drawn(episodes, chosen, used, {chosen[k] for k in anew})
 
-    def begin(self, i: int, drawn: "Drawn") -> dict[str, Any]:
-        """Starts a drawn episode of rover i and returns its info."""
-        beginning = drawn.beginning
-        self.simulations.replace(i, beginning.simulation, beginning.scene.start.goal)
-        self._progress.put(i, beginning.progress)
-        self._scenes[i] = beginning.scene
-        self._steps[i] = 0
-        self._generators[i], self._seeds[i] = drawn.generator, drawn.seed
-        return beginning.report(self.task).info()
+    def begin(self, drawn: "Drawn") -> None:
+        """Starts drawn episodes."""
+        chosen, episodes = drawn.chosen, drawn.episodes
+        self.episodes.begin(chosen, episodes)
+        self._starts[chosen], self._domains[chosen] = episodes.starts, episodes.domains
+        self._rocks[chosen], self._rock_seeds[chosen] = episodes.rocks, episodes.rock_seeds
+        self._begun[chosen] = True
+        for i, seed in zip(chosen, drawn.seeds, strict=True):
+            self._seeds[i] = seed
+        for i in drawn.seeded & self._lent.keys():
+            del self._lent[i]
+        self._hand_back(self._lent.keys() & set(chosen))
 
-    def step(self, actions: object, active: Mask | None = None) -> tuple[Outcome, Mask, Mask]:
+    def step(
+        self, actions: object, active: Mask | None = None, *, has_scan: bool = True
+    ) -> tuple[Observations, Array, Mask, Mask, list[int]]:
         """Applies actions `(n, 12)` for one control period.
 
         Args:
             actions: Within [-1, 1].
-            active: `(n,)` mask of the rovers to move; the results of the others are meaningless. None for all.
+            active: `(n,)` mask of the rovers to move; the others keep the values of their last period. None for all.
+            has_scan: Whether the height scan is taken. Without, only observations of episodes that end here have new
+                heights; the others keep the last ones.
 
         Returns:
-            The outcome, a mask of terminated episodes, and a mask of episodes that have reached the time limit.
+            Observations `(n, size) float32`, rewards `(n,)`, a mask of terminated episodes, a mask of episodes that
+            have reached the time limit, and the indices of those that are over, one way or the other.
 
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite or outside [-1, 1]; nothing
                 has changed.
             ResetNeeded: A rover has not been reset.
         """
-        commands = check_actions(actions, (self.n, N_ACTIONS))
         if not self._started:
-            if None in self._scenes:
+            check_actions(actions, (self.n, N_ACTIONS))
+            if not self._begun.all():
                 raise ResetNeeded("a batch of rovers: call reset() first")
             self._started = True
-        task = self.task
-        torques, set_points = motor_commands(task, self._progress, commands)
-        readings, messages = self.simulations.step(torques, set_points, task.substeps, active=active)
-        noise = self._draw_noise(active)
-        outcome = advance(task, self._progress, commands, readings, messages, noise)
-        self._steps += 1
-        terminated = outcome.termination != 0
-        if self.max_episode_steps is None:
-            return outcome, terminated, np.zeros(self.n, np.bool_)
-        return outcome, terminated, self._steps >= self.max_episode_steps
+        if not self.task.is_noisy or not self._lent:
+            return self.episodes.step(actions, active, has_scan=has_scan)
+        lent = list(self._lent)
+        self.episodes.set_generators(lent, np.stack([row_of(self._lent[i]) for i in lent]))
+        result = self.episodes.step(actions, active, has_scan=has_scan)
+        self._hand_back(lent)
+        return result
+
+    def info(self, i: int) -> dict[str, Any]:
+        """The info of rover i's last period or reset, as `RoverEnv` returns it."""
+        return self.episodes.info(i)
+
+    def infos(self) -> dict[str, Any]:
+        """The infos of all n rovers, as one array per key with Gymnasium's masks."""
+        return self.episodes.infos()
 
     def generator(self, i: int) -> np.random.Generator:
-        """Rover i's random generator; before the first reset it is seeded at random, as in `gymnasium.Env`."""
-        made = self._generators[i]
-        if made is None:
-            made, self._seeds[i] = seeded(None)
-            self._generators[i] = made
-        return made
+        """Rover i's random generator; before the first reset it is seeded at random, as in `gymnasium.Env`.
 
-    def _draw_noise(self, active: Mask | None) -> Array | None:
-        if self.task.noisy is None:
-            return None
-        if active is None:
-            return draw_noise(self.task, self._generators)
-        chosen = zip(self._generators, active.tolist(), strict=True)
-        return draw_noise(self.task, [generator if moves else None for generator, moves in chosen])
+        The rover continues to draw from it: numbers that the caller draws are not drawn again.
+        """
+        if i not in self._lent:
+            self._lent[i] = generator_at(self._rows([i])[0])
+        return self._lent[i]
+
+    def seed_of(self, i: int) -> int:
+        """The seed of rover i's random generator."""
+        self._seed_at_random([i])
+        return self._seeds[i]
+
+    def scene(self, i: int) -> EpisodeScene:
+        """The scene of rover i's episode.
+
+        Raises:
+            ResetNeeded: The rover has not been reset.
+        """
+        if not self._begun[i]:
+            raise ResetNeeded("a batch of rovers: call reset() first")
+        terrain = self.episodes.terrain(i)
+        return scene_of(self.task, self._starts[i], self._rocks[i], int(self._rock_seeds[i]), self._domains[i], terrain)
+
+    def _rows(self, chosen: Sequence[int]) -> Rows:
+        """The present generators of some rovers, `(m, 4)`."""
+        self._seed_at_random(chosen)
+        rows = self._generators[chosen]
+        begun = [k for k, i in enumerate(chosen) if self._begun[i]]
+        rows[begun] = self.episodes.generators([chosen[k] for k in begun])
+        for k, i in enumerate(chosen):
+            if i in self._lent:
+                rows[k] = row_of(self._lent[i])
+        return rows
+
+    def _seed_at_random(self, chosen: Sequence[int]) -> None:
+        """Seeds those of the chosen generators that have no seed yet."""
+        unseeded = [i for i in chosen if self._seeds[i] < 0]
+        seeds = [fresh_seed() for _ in unseeded]
+        self._generators[unseeded] = seeded_rows(seeds)
+        for i, seed in zip(unseeded, seeds, strict=True):
+            self._seeds[i] = seed
+
+    def _hand_back(self, lent: Iterable[int]) -> None:
+        """Sets generators that were handed out to the states in the core."""
+        for i in lent:
+            set_row(self._lent[i], self.episodes.generators([i])[0])
 
 
 class Drawn(NamedTuple):
-    """A rover's next episode, the generator it was drawn from, and that generator's seed."""
+    """The next episodes of chosen rovers, their generators' seeds, and the rovers whose generators are new."""
 
-    beginning: Beginning
-    generator: np.random.Generator
-    seed: int
+    episodes: DrawnEpisodes
+    chosen: Sequence[int]
+    seeds: Sequence[int]
+    seeded: set[int]
 
 
 class BatchRover:
@@ -231,7 +277,7 @@ class BatchRover:
     @property
     def simulation(self) -> Simulation:
         """A copy of the rover's simulation."""
-        return self._batch.simulations.simulation(self._i)
+        return self._batch.episodes.simulation(self._i)
 
     @property
     def start(self) -> Start:
@@ -286,8 +332,7 @@ class BatchRover:
     @property
     def np_random_seed(self) -> int:
         """The seed of the rover's random generator."""
-        self._batch.generator(self._i)
-        return self._batch._seeds[self._i]
+        return self._batch.seed_of(self._i)
 
     def set_difficulty(self, difficulty: float | Range) -> None:
         """Sets the rocks' difficulty, or the range it is drawn from, from the next reset on.
@@ -299,7 +344,4 @@ class BatchRover:
 
     @property
     def _scene(self) -> EpisodeScene:
-        scene = self._batch._scenes[self._i]
-        if scene is None:
-            raise ResetNeeded("a batch of rovers: call reset() first")
-        return scene
+        return self._batch.scene(self._i)

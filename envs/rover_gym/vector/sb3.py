@@ -8,14 +8,13 @@ model = stable_baselines3.PPO("MlpPolicy", VecMonitor(venv))
 
 import copy
 from collections.abc import Sequence
-from contextlib import ExitStack
 from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.beginning import check_seed
+from rover_gym.env.generators import check_seed
 from rover_gym.env.observation import LARGEST
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
@@ -23,7 +22,7 @@ from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import OptionError, RoverGymError
 from rover_gym.validation import refuse
-from rover_gym.vector.batch import BatchRover, RoverBatch
+from rover_gym.vector.batch import BatchRover, Drawn, RoverBatch
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
@@ -61,7 +60,9 @@ class RoverVecEnv(VecEnv):
         **arguments: Unpack[RoverArguments],
     ) -> None:
         self.batch = RoverBatch(n_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments)
-        self._actions: npt.NDArray[np.float64] | None = None
+        #: Whether a step takes the height scan, see `RoverBatch.step`.
+        self.has_scan = True
+        self._actions: object = None
         #: Rovers whose next episode was refused when the last one ended.
         self._waiting: list[int] = []
         prototype = self.prototype
@@ -80,13 +81,7 @@ class RoverVecEnv(VecEnv):
             TerrainError: As `RoverEnv.reset`; nothing has changed.
         """
         options = [self.batch.check_options(given) for given in self._options]
-        with ExitStack() as stack:
-            drawn = [
-                stack.enter_context(self.batch.beginnings([i], [seed], fixed))[0]
-                for i, (seed, fixed) in enumerate(zip(self._seeds, options, strict=True))
-            ]
-            for i, one in enumerate(drawn):
-                self.reset_infos[i] = self.batch.begin(i, one)
+        self._begin(self.batch.draw(range(self.num_envs), self._seeds, options))
         self._waiting = []
         self._reset_seeds()
         self._reset_options()
@@ -115,12 +110,8 @@ class RoverVecEnv(VecEnv):
         self._options = [copy.deepcopy(dict(one or {})) for one in given]
 
     def step_async(self, actions: npt.NDArray[np.float32]) -> None:
-        """Stores the actions `(n_envs, 12)` for `step_wait`.
-
-        Raises:
-            CommandError: The actions have a wrong shape or an entry outside [-1, 1]; nothing has changed.
-        """
-        self._actions = check_actions(actions, (self.num_envs, N_ACTIONS))
+        """Stores the actions `(n_envs, 12)` for `step_wait`."""
+        self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
         """Applies the stored actions for one control period; rovers whose episode ends start the next.
@@ -128,37 +119,37 @@ class RoverVecEnv(VecEnv):
         If a next episode cannot begin, the following step refuses it before any rover moves.
 
         Raises:
+            CommandError: The actions have a wrong shape or an entry outside [-1, 1]; nothing has changed.
             TerrainError: A rover's next episode cannot begin (see `RoverEnv.reset`); nothing has changed. Reset with
                 another seed or other options.
         """
         if self._waiting:
-            self._restart(self._waiting)
+            check_actions(self._actions, (self.num_envs, N_ACTIONS))
+            self._begin(self.batch.draw(self._waiting))
             self._waiting = []
-        outcome, terminated, timed_out = self.batch.step(self._actions)
-        observation = outcome.observation
+        observation, earned, terminated, timed_out, ended = self.batch.step(self._actions, has_scan=self.has_scan)
         dones = terminated | timed_out
         infos: list[dict[str, Any]] = [{"TimeLimit.truncated": False} for _ in range(self.num_envs)]
-        if dones.any():
-            ended = np.flatnonzero(dones).tolist()
+        if ended:
             for i in ended:
-                last = outcome.info(i)
+                last = self.batch.info(i)
                 last["TimeLimit.truncated"] = bool(timed_out[i] and not terminated[i])
                 last["terminal_observation"] = observation[i].copy()
                 infos[i] = last
             try:
-                self._restart(ended)
+                self._begin(self.batch.draw(ended))
             except RoverGymError:
                 self._waiting = ended
             else:
                 observation[ended] = self.batch.observation[ended]
         # Only a rover that flies off at 1e37 m/s earns a reward out of float32's range.
-        reward = np.clip(outcome.reward, -LARGEST, LARGEST).astype(np.float32)
+        reward = np.clip(earned, -LARGEST, LARGEST).astype(np.float32)
         return observation, reward, dones, infos
 
-    def _restart(self, chosen: list[int]) -> None:
-        with self.batch.beginnings(chosen) as drawn:
-            for i, one in zip(chosen, drawn, strict=True):
-                self.reset_infos[i] = self.batch.begin(i, one)
+    def _begin(self, drawn: Drawn) -> None:
+        self.batch.begin(drawn)
+        for i in drawn.chosen:
+            self.reset_infos[i] = self.batch.info(i)
 
     def close(self) -> None:
         """Frees the renderers, if there are any."""

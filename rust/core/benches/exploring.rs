@@ -2,9 +2,9 @@
 //! does meanwhile: `cargo bench -p rover-core --bench exploring`.
 //!
 //! It only reports. The drives are those of `tests/comparison/exploring.json`: random torques and
-//! set-points, redrawn every ten steps of 5 ms. A time is the median of eleven rounds, each of which
-//! plays all drives at both tolerances. `-- --json GROUND TORQUE` measures one scene and prints
-//! JSON, for `make bench`, which sets other figures beside these.
+//! set-points, redrawn every ten steps of 5 ms. A time is the median of eleven rounds; each plays
+//! all drives at both tolerances. `-- --json GROUND TORQUE` measures one scene and prints JSON, for
+//! `make bench`, which sets other figures beside these.
 
 #![allow(clippy::print_stdout, clippy::unwrap_used)] // prints; stops at an impossible scene
 

@@ -1,13 +1,13 @@
 //! Steps of a rover whose policy explores, for counting the instructions of each part of a step:
-//! `explore_steps GROUND TORQUE EVERY` under
+//! `explore_steps GROUND TORQUE DRIVES` under
 //! `valgrind --tool=callgrind --collect-atstart=no --toggle-collect='*counted_step*'
 //! --dump-before='*part_ends*'`.
 //!
-//! It plays the drives of `tests/comparison/exploring.json` (GROUND: `plane`, `rocks`,
-//! `plane, wheels 0.20 m`) with torques of up to TORQUE N m, and counts every EVERY-th step. Each
+//! It plays the first DRIVES drives of `tests/comparison/exploring.json` (GROUND: `plane`, `rocks`,
+//! `plane, wheels 0.20 m`) with torques of up to TORQUE N m, and counts every seventh step. Each
 //! part of a counted step ends with a call of `part_ends`, at which callgrind writes what the part
-//! took; the names of the parts are printed in the same order, one a line. `make bench` adds them
-//! up.
+//! took. The number of counted steps is printed, and the names of the parts in the same order, one
+//! a line. `make bench` adds them up.
 
 #![allow(clippy::print_stdout)] // its purpose
 
@@ -18,6 +18,10 @@ mod exploring_scenes;
 use exploring_scenes::{Ground, STEPS_A_COMMAND, drives};
 use rover_core::integrator::{Phase, Probe, StepError, StepOptions};
 use rover_core::simulation::RoverSimulation;
+
+/// Every how many-th step is counted: prime to the steps of a command, so that each of them comes
+/// up.
+const EVERY: usize = 7;
 
 /// The parts of the counted steps, in their order.
 struct Parts(Vec<Phase>);
@@ -46,19 +50,20 @@ fn main() -> Result<(), StepError> {
     let arguments: Vec<String> = std::env::args().collect();
     let ground = arguments.get(1).and_then(|name| Ground::of(name));
     let torque = arguments.get(2).and_then(|t| t.parse().ok());
-    let every: Option<usize> = arguments.get(3).and_then(|n| n.parse().ok());
-    let (Some(ground), Some(torque), Some(every)) = (ground, torque, every) else {
-        println!("usage: explore_steps GROUND TORQUE EVERY");
+    let n_drives = arguments.get(3).and_then(|n| n.parse().ok());
+    let (Some(ground), Some(torque), Some(n_drives)) = (ground, torque, n_drives) else {
+        println!("usage: explore_steps GROUND TORQUE DRIVES");
         std::process::exit(2);
     };
     let mut parts = Parts(Vec::with_capacity(1 << 17));
     let mut step = 0;
-    for mut drive in drives(ground, torque, &StepOptions::default()) {
+    let drives = drives(ground, torque, &StepOptions::default());
+    for mut drive in drives.into_iter().take(n_drives) {
         for command in 0..drive.n_commands() {
             drive.give(command);
             for _ in 0..STEPS_A_COMMAND {
                 step += 1;
-                if step % every == 0 {
+                if step % EVERY == 0 {
                     counted_step(&mut drive.simulation, &mut parts)?;
                 } else {
                     drive.simulation.step(1)?;
@@ -66,6 +71,7 @@ fn main() -> Result<(), StepError> {
             }
         }
     }
+    println!("{}", step / EVERY);
     for phase in parts.0 {
         println!("{phase:?}");
     }

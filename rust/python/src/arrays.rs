@@ -113,3 +113,12 @@ pub fn fresh_matrix<'py>(
     let transposed = m.transpose();
     PyArray1::from_slice(py, transposed.as_slice()).reshape([rows, columns])
 }
+
+/// Fresh (m, M) array of any type.
+pub fn fresh_table<'py, T: numpy::Element, const M: usize>(
+    py: Python<'py>,
+    rows: impl ExactSizeIterator<Item = [T; M]>,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let m = rows.len();
+    PyArray1::from_iter(py, rows.flatten()).reshape([m, M])
+}

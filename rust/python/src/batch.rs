@@ -3,10 +3,12 @@
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use rover_core::scalar::instructions::Instructions;
 use rover_core::simulation::{Batch, RoverSimulation as CoreSimulation};
 
 use crate::arguments::{Given, count, flags, refused};
 use crate::arrays::array;
+use crate::episode::simulation;
 use crate::errors::{BorderError, Kind, Value};
 use crate::reading::{place, scan_points, slices};
 use crate::shared::{Shared, Watch};
@@ -35,7 +37,7 @@ struct Inner {
 }
 
 /// (n,) truth values: which rovers move.
-fn mask(value: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<bool>> {
+pub fn mask(value: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<bool>> {
     let active = match value.extract::<PyReadonlyArray1<'_, bool>>() {
         Ok(ready) => ready.as_array().to_vec(),
         Err(_) => flags(value, Kind::Option, "active")?,
@@ -73,24 +75,14 @@ fn commands(
     Ok(view.iter().copied().collect())
 }
 
-impl SimulationBatch {
-    fn index(index: &Bound<'_, PyAny>, rovers: &[CoreSimulation]) -> PyResult<usize> {
-        let i = count(index, Kind::Option, "index")?;
-        if i < rovers.len() {
-            return Ok(i);
-        }
-        let len = rovers.len();
-        Err(refused(index, Kind::Option, "index", &format!("below {len}")).into())
+/// The index of one of these rovers.
+pub fn index(index: &Bound<'_, PyAny>, rovers: &[CoreSimulation]) -> PyResult<usize> {
+    let i = count(index, Kind::Option, "index")?;
+    if i < rovers.len() {
+        return Ok(i);
     }
-}
-
-/// A simulation of the border.
-fn simulation<'a, 'py>(
-    value: &'a Bound<'py, PyAny>,
-    field: &str,
-) -> PyResult<&'a Bound<'py, Simulation>> {
-    let cast = value.cast();
-    cast.map_err(|_| refused(value, Kind::Option, field, "a Simulation").into())
+    let len = rovers.len();
+    Err(refused(index, Kind::Option, "index", &format!("below {len}")).into())
 }
 
 #[pymethods]
@@ -128,6 +120,13 @@ impl SimulationBatch {
     #[getter]
     fn threads(&self) -> PyResult<usize> {
         Ok(self.0.open()?.inner.threads())
+    }
+
+    /// Either "AVX-512", "AVX2" or "baseline", as the processor has it.
+    #[getter]
+    #[allow(clippy::unused_self)] // a property in Python
+    fn instruction_set(&self) -> &'static str {
+        Instructions::of_this_machine().name()
     }
 
     /// Place of each quantity in a row of readings; `Simulation.reading_layout` lists them.
@@ -219,11 +218,11 @@ impl SimulationBatch {
         simulation: &Bound<'_, PyAny>,
         target: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let one = self::simulation(simulation, "simulation")?.get();
+        let one = crate::episode::simulation(simulation, "simulation")?.get();
         let target = place(target)?;
         let rover = one.open()?.clone();
         let mut held = self.0.open()?;
-        let index = Self::index(index, held.inner.rovers())?;
+        let index = self::index(index, held.inner.rovers())?;
         let replaced = held.inner.replace(index, rover, target);
         replaced.map_err(BorderError::from)?;
         held.origins[index] = one.origin().clone();
@@ -243,7 +242,7 @@ impl SimulationBatch {
     fn simulation(&self, index: &Bound<'_, PyAny>) -> PyResult<Simulation> {
         let held = self.0.open()?;
         let rovers = held.inner.rovers();
-        let index = Self::index(index, rovers)?;
+        let index = self::index(index, rovers)?;
         Ok(Simulation::of(
             rovers[index].clone(),
             held.origins[index].clone(),

@@ -5,6 +5,8 @@ use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple, PyType};
+use rover_core::draw::DrawError;
+use rover_core::episode::EpisodeError;
 use rover_core::geometry::TerrainError;
 use rover_core::integrator::{OptionsError, StepError};
 use rover_core::multibody::{ModelError, StateError};
@@ -336,6 +338,15 @@ impl From<BatchError> for BorderError {
                     ..inner
                 };
             }
+            BatchError::Options { index, error } => {
+                let inner = Self::from(error);
+                let field = inner.field.map(|field| format!("{field}[{index}]"));
+                return Self {
+                    message,
+                    field,
+                    ..inner
+                };
+            }
             BatchError::Empty => ("simulations".to_owned(), Value::Count(0)),
             BatchError::Differs { index, actual, .. } => {
                 (format!("simulations[{index}]"), Value::Count(actual))
@@ -344,6 +355,53 @@ impl From<BatchError> for BorderError {
             BatchError::Threads { count, .. } => ("threads".to_owned(), Value::Count(count)),
         };
         Self::option(&field, message, value)
+    }
+}
+
+impl From<DrawError> for BorderError {
+    fn from(e: DrawError) -> Self {
+        match e {
+            DrawError::NoRoom { overlap, .. } => Self {
+                kind: Kind::Terrain,
+                message: e.to_string(),
+                field: Some("terrain".to_owned()),
+                value: Value::Number(overlap),
+            },
+            DrawError::Terrain(e) => e.into(),
+            DrawError::Model(e) => e.into(),
+            DrawError::State(e) => e.into(),
+            DrawError::Options(e) => e.into(),
+        }
+    }
+}
+
+impl From<EpisodeError> for BorderError {
+    fn from(e: EpisodeError) -> Self {
+        let message = e.to_string();
+        match e {
+            EpisodeError::Action { place, value } => Self {
+                kind: Kind::Command,
+                message,
+                field: Some(format!("action{place}")),
+                value: Value::Number(value),
+            },
+            EpisodeError::Length { field, actual, .. } => {
+                Self::option(field, message, Value::Count(actual))
+            }
+            EpisodeError::OutOfRange { field, value, .. } => {
+                Self::option(field, message, Value::Number(value))
+            }
+            EpisodeError::OtherRules => Self::option("episode", message, Value::Nothing),
+            EpisodeError::NotBegun { index } => Self::option("index", message, Value::Count(index)),
+            EpisodeError::NotObservable => Self {
+                kind: Kind::State,
+                message,
+                field: Some("q".to_owned()),
+                value: Value::Nothing,
+            },
+            EpisodeError::Draw(error) => Self::from(error),
+            EpisodeError::Batch(error) => Self::from(error),
+        }
     }
 }
 

@@ -6,10 +6,16 @@ mod arguments;
 mod arrays;
 mod batch;
 mod contacts;
+mod draw;
 mod elementary;
+mod episode;
+mod episode_batch;
+mod episode_rules;
 mod errors;
 mod files;
 mod friction_contact;
+mod generators;
+mod infos;
 mod model;
 mod motor;
 mod options;
@@ -43,6 +49,11 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<contacts::Contacts>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<batch::SimulationBatch>()?;
+    module.add_class::<draw::EpisodeDistribution>()?;
+    module.add_class::<draw::DrawnEpisodes>()?;
+    module.add_class::<episode_rules::EpisodeRules>()?;
+    module.add_class::<episode::Episode>()?;
+    module.add_class::<episode_batch::EpisodeBatch>()?;
     module.add_class::<report::StepReport>()?;
     module.add_class::<report::Energy>()?;
     module.add_class::<snapshot::Snapshot>()?;
@@ -56,6 +67,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
         friction_contact::solve_friction_contact,
         module
     )?)?;
+    module.add_function(wrap_pyfunction!(generators::seed_generators, module)?)?;
+    module.add_function(wrap_pyfunction!(generators::standard_normals, module)?)?;
     planar::register(module)?;
     planar_soil::register(module)?;
     Ok(())

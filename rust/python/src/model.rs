@@ -7,6 +7,7 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::contact::{Contact, detection::wheel_contacts};
+use rover_core::draw::{resting_pose, rocks::clear_radius};
 use rover_core::multibody::bias::BiasScratch;
 use rover_core::multibody::{
     Configuration, Joint, Kinematics, MassMatrix, Model, ModelDescription, ModelError, bias,
@@ -473,6 +474,15 @@ impl RoverModel {
         PyArray1::from_iter(py, self.inner.wheels().iter().map(|w| w.radius))
     }
 
+    /// Radius of the place that the rover needs to turn on the spot, m.
+    ///
+    /// It is the largest distance from the trunk's origin to a wheel's contact, joints at zero, plus
+    /// the wheel's radius and 0.1 m.
+    #[getter]
+    fn clear_radius(&self) -> f64 {
+        clear_radius(&self.inner)
+    }
+
     /// Largest torque of each wheel, (n_wheels,), N m.
     #[getter]
     fn wheel_torque_limits<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
@@ -710,6 +720,41 @@ impl RoverModel {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let contacts = self.contacts(q, terrain, coordinates)?.3;
         Ok(PyArray1::from_iter(py, contacts.iter().map(|c| c.gap)))
+    }
+
+    /// The coordinates of the rover at rest on a plane.
+    ///
+    /// The joints are at zero, the trunk is upright along the normal with its origin above the
+    /// position, and the lowest wheel has gap zero.
+    ///
+    /// Args:
+    ///     plane: The plane, which must not be vertical.
+    ///     position: x and z, (2,), m.
+    ///     heading: Heading, rad.
+    ///
+    /// Returns:
+    ///     Coordinates of the state, (nq,).
+    ///
+    /// Raises:
+    ///     TerrainError: `plane` is no plane.
+    ///     StateError: A number is not finite, or the plane is vertical.
+    fn resting_pose<'py>(
+        &self,
+        py: Python<'py>,
+        plane: &Bound<'_, PyAny>,
+        position: &Bound<'_, PyAny>,
+        heading: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let Ground::Plane(plane) = Ground::parse(plane)? else {
+            return Err(arguments::refused(plane, Kind::Terrain, "plane", "a Plane").into());
+        };
+        let place = <[f64; 2]>::try_from(vector(position, Kind::State, "position")?);
+        let what = "two numbers";
+        let place =
+            place.map_err(|_| arguments::refused(position, Kind::State, "position", what))?;
+        let heading = number(heading, Kind::State, "heading")?;
+        let q = resting_pose(&self.inner, &plane.inner, place, heading);
+        Ok(fresh(py, &q.map_err(BorderError::from)?))
     }
 
     /// The point of each wheel's rim that is nearest to the terrain.

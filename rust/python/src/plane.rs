@@ -2,6 +2,7 @@
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
+use rover_core::draw::tilted_plane;
 use rover_core::geometry::Plane as CorePlane;
 
 use crate::arguments::{Given, number};
@@ -38,6 +39,26 @@ impl Plane {
         let normal = normal.map_or(Ok([0.0, 1.0, 0.0]), |n| triple(n, Kind::Terrain, "normal"))?;
         Ok(Self {
             inner: CorePlane::new(normal, offset).map_err(BorderError::from)?,
+        })
+    }
+
+    /// The plane through the origin that rises by a slope in a direction.
+    ///
+    /// Args:
+    ///     slope: Slope, rad.
+    ///     uphill: Direction of steepest ascent, rad: an angle about +y from +x.
+    ///
+    /// Returns:
+    ///     The plane.
+    ///
+    /// Raises:
+    ///     TerrainError: An angle is no finite number.
+    #[staticmethod]
+    fn tilted(slope: &Bound<'_, PyAny>, uphill: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let slope = number(slope, Kind::Terrain, "slope")?;
+        let uphill = number(uphill, Kind::Terrain, "uphill")?;
+        Ok(Self {
+            inner: tilted_plane(slope, uphill).map_err(BorderError::from)?,
         })
     }
 

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from comparison.scene import Array, Phase, RoverScene
+from rover_gym.vector.mujoco_rover import contact_radius, principal_inertia
 
 
 class LeftOut(Exception):  # noqa: N818 - no error: the chart has a gap there
@@ -77,29 +78,6 @@ class Body:
     radius: float
     drive_sign: float
     steers: int  # index of the wheel that its joint steers, or -1
-
-
-def principal_inertia(solid: dict[str, Any]) -> Array:
-    """About the mass centre along the frame's axes, kg m²."""
-    if solid.get("inertia") is not None:
-        inertia = np.array(solid["inertia"], dtype=float)
-        if np.any(inertia[3:] != 0.0):
-            raise ValueError(f"{solid['name']}: products of inertia are not supported here")
-        return inertia[:3]
-    m, shape = solid["mass"], solid["shape"]
-    if shape["kind"] == "box":
-        a, b, c = shape["size"]
-        return m / 12.0 * np.array([b * b + c * c, a * a + c * c, a * a + b * b])
-    r = shape["radius"]
-    if shape["kind"] == "disc":
-        return m * r * r * np.array([0.25, 0.25, 0.5])
-    across = m / 12.0 * (3.0 * r * r + shape["height"] ** 2)
-    return np.array([across, m * r * r / 2.0, across])
-
-
-def contact_radius(wheel: dict[str, Any]) -> float:
-    """Radius at which a wheel of a description touches the ground, m."""
-    return wheel.get("contact_radius", wheel["radius"])
 
 
 def bodies(machine: dict[str, Any]) -> list[Body]:

@@ -46,13 +46,13 @@ pub struct MechanicalEnergy {
 pub const GAIN: f64 = 5e-10;
 
 /// Excess, as a fraction of the kinetic energy, above which the step is repeated.
-const COARSE: f64 = 1e-3;
+pub(crate) const COARSE: f64 = 1e-3;
 
 /// Rounding errors allowed in the difference of two energies.
 pub(crate) const ROUNDINGS: f64 = 64.0;
 
 /// Largest relative increase of the energy of free motion in a step.
-const RAISE: f64 = 1.0;
+pub(crate) const RAISE: f64 = 1.0;
 
 /// Fraction of the kinetic energy after a step that may be removed by scaling the velocity alone.
 const SHORT: f64 = 0.5;

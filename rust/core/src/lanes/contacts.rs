@@ -5,17 +5,17 @@
 //! at the midpoint of the step and relocation to its end follow [`crate::contact`] and
 //! [`crate::geometry::query`]. With the unit normal n, the unit axle s and the rolling direction
 //! `t = n × s / |n × s|`, a wheel's lowest point over a plane lies along `t × s` from its centre.
-//! The spin of a wheel moves that point along the ground alone, so the normal velocity comes from
-//! the carrier.
 //!
 //! What is rare is declined: a wheel that nearly lies flat, passes a sphere within the step or
 //! touches more than two things, a box near the ground, more than [`MAX_CONTACTS`] contacts.
 
 use nalgebra::Vector3;
 
+use super::forecast::Forecast;
 use super::ground::{Ground, GroundSphere, turning};
-use super::machine::{Axis, Machine, velocity};
-use super::poses::{Pose, Poses};
+use super::machine::Machine;
+use super::parts::{Parts, Twist};
+use super::poses::Poses;
 use super::problem::MAX_CONTACTS;
 use crate::contact::detection::touch_of_disc;
 use crate::contact::{Contact, ContactFrame, ContactKey, Part};
@@ -23,7 +23,7 @@ use crate::geometry::query::NEAREST;
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::{Disc, Sphere};
 use crate::integrator::WarmStart;
-use crate::scalar::{Lane, LaneMask, MAX_LANES, Mat3, Vec3};
+use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 
 /// Number of the plane in every terrain that has one.
 const PLANE: u32 = 0;
@@ -36,63 +36,6 @@ const PARALLEL: f64 = 1e-9;
 
 /// Lengths below which a direction is not taken from a difference, m.
 const NO_DIRECTION: f64 = 1e-12;
-
-/// Which candidates are contacts: [`crate::contact::Activation`] of each rover.
-#[derive(Clone, Copy, Debug)]
-pub struct Forecast<T> {
-    /// The part of γ h that remains after the configuration in which gaps are measured, s.
-    pub lead: f64,
-    /// m.
-    pub hover: T,
-    /// m/s.
-    pub slow: T,
-}
-
-impl<T: Lane> Forecast<T> {
-    /// The forecast of a step of h seconds under gravity (m/s²), for gaps that are measured
-    /// `measured` seconds after its start.
-    #[inline(always)]
-    pub fn new(gravity: Vec3<T>, h: f64, forecast: f64, measured: f64) -> Self {
-        let g = gravity.norm();
-        let least = g.like(1e-9);
-        Self {
-            lead: forecast * h - measured,
-            hover: (g.like(0.5) * g * g.like(h) * g.like(h)).max(least),
-            slow: (g.like(2.0) * g * g.like(h)).max(least),
-        }
-    }
-
-    /// Whether the normal velocity decides for any rover with this gap, m.
-    #[inline(always)]
-    fn needs_velocity(&self, gap: T) -> bool {
-        self.lead.abs() > 0.0 || (gap.gt(gap.like(0.0)) & gap.le(self.hover)).any()
-    }
-
-    /// Whether candidates with this gap (m) are contacts; `u_N`: normal velocity, m/s, which may be
-    /// anything unless [`Self::needs_velocity`].
-    #[inline(always)]
-    fn admits(&self, gap: T, u_N: T) -> T::Mask {
-        let zero = gap.like(0.0);
-        let hovers = gap.le(self.hover) & u_N.abs().le(self.slow);
-        if self.lead.abs() > 0.0 {
-            !(gap + gap.like(self.lead) * u_N).gt(zero) | hovers
-        } else {
-            !gap.gt(zero) | hovers
-        }
-    }
-
-    /// Distance from the surface within which a part no point of which is faster than `speed` (m/s)
-    /// can be in contact, m.
-    #[inline(always)]
-    fn reach(&self, speed: impl FnOnce() -> T) -> T {
-        if self.lead.abs() > 0.0 {
-            let margin = speed();
-            (margin * margin.like(self.lead.abs())).max(self.hover)
-        } else {
-            self.hover
-        }
-    }
-}
 
 /// A contact, of the same wheel in every lane.
 #[derive(Clone, Copy, Debug)]
@@ -124,68 +67,17 @@ pub struct Listed {
     pub primitives: [u32; MAX_CONTACTS],
 }
 
-/// A wheel, as contacts need it.
-#[derive(Clone, Debug)]
-struct Wheel {
-    body: usize,
-    centre: Option<[f64; 3]>,
-    axle: Axle,
-    spoke: [f64; 3],
-    radius: f64,
-    /// Twist of the body that moves its centre.
-    carrier: usize,
-    /// Velocity of the spin about its own axle that the carrier's twist lacks.
-    spin: Option<usize>,
-}
-
-/// Where a wheel's axle comes from.
-#[derive(Clone, Copy, Debug)]
-enum Axle {
-    /// Along the joint's axis, or against it.
-    Joint(bool),
-    /// A direction in the body's frame.
-    Fixed([f64; 3]),
-}
-
-/// A box, as contacts need it.
-#[derive(Clone, Debug)]
-struct Solid {
-    body: usize,
-    centre: Option<[f64; 3]>,
-    rotation: Option<[[f64; 3]; 3]>,
-    half_size: [f64; 3],
-    bound: f64,
-    /// Twist of its body.
-    carrier: usize,
-}
-
-/// A body whose twist is needed.
-#[derive(Clone, Copy, Debug)]
-struct Carrier {
-    body: usize,
-    /// Twist of the body that carries it.
-    parent: usize,
-}
-
-/// Velocity of a body: angular, and of its material point at the trunk's origin.
-#[derive(Clone, Copy, Debug)]
-struct Twist<T> {
-    angular: Vec3<T>,
-    linear: Vec3<T>,
-}
-
 /// The contacts of a block.
 #[derive(Clone, Debug)]
 pub struct Contacts<T: Lane> {
     token: T::Token,
-    wheels: Vec<Wheel>,
-    boxes: Vec<Solid>,
-    /// The trunk, then those that it carries.
-    carriers: Vec<Carrier>,
+    parts: Parts,
     twists: Vec<Twist<T>>,
     slots: Vec<Slot<T>>,
     used: Vec<usize>,
     lists: [Listed; MAX_LANES],
+    /// Whether every slot in use is active in all lanes.
+    is_full: bool,
     /// Place of each slot among the contacts of each lane.
     places: Vec<[u8; MAX_LANES]>,
 }
@@ -211,43 +103,8 @@ impl<T: Lane> Contacts<T> {
             machine.wheels.len() <= 128,
             "invariant: slots are numbered by 8 bits"
         );
-        let mut carriers = vec![Carrier { body: 0, parent: 0 }];
-        let some = |x: [f64; 3]| (x != [0.0; 3]).then_some(x);
-        let wheels: Vec<Wheel> = (machine.wheels.iter())
-            .map(|wheel| {
-                let link = &machine.links[wheel.body];
-                let axle = if wheel.body > 0 {
-                    axle_of(&link.axis, wheel.axle)
-                } else {
-                    Axle::Fixed(wheel.axle)
-                };
-                let spins = link.is_spinner && matches!(axle, Axle::Joint(_));
-                let mover = if spins { link.parent } else { wheel.body };
-                Wheel {
-                    body: wheel.body,
-                    centre: some(wheel.centre),
-                    axle,
-                    spoke: wheel.spoke,
-                    radius: wheel.radius,
-                    carrier: carrier_of(machine, mover, &mut carriers),
-                    spin: spins.then(|| velocity(wheel.body)),
-                }
-            })
-            .collect();
-        let boxes = (machine.boxes.iter())
-            .map(|solid| {
-                let is_plain =
-                    solid.rotation == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-                Solid {
-                    body: solid.body,
-                    centre: some(solid.centre),
-                    rotation: (!is_plain).then_some(solid.rotation),
-                    half_size: solid.half_size,
-                    bound: Vector3::from(solid.half_size).norm(),
-                    carrier: carrier_of(machine, solid.body, &mut carriers),
-                }
-            })
-            .collect();
+        let parts = Parts::of(machine);
+        let n_slots = SLOTS * parts.wheels.len();
         let zero = T::splat(token, 0.0);
         let nowhere = Vec3::new(zero, zero, zero);
         let slot = Slot {
@@ -270,14 +127,13 @@ impl<T: Lane> Contacts<T> {
         };
         Self {
             token,
-            twists: vec![twist; carriers.len()],
-            carriers,
-            slots: vec![slot; SLOTS * wheels.len()],
-            used: Vec::with_capacity(SLOTS * wheels.len()),
-            wheels,
-            boxes,
+            twists: vec![twist; parts.n_carriers()],
+            parts,
+            slots: vec![slot; n_slots],
+            used: Vec::with_capacity(n_slots),
             lists: [Listed::NONE; MAX_LANES],
-            places: vec![[0; MAX_LANES]; SLOTS * machine.wheels.len()],
+            is_full: false,
+            places: vec![[0; MAX_LANES]; n_slots],
         }
     }
 
@@ -313,6 +169,12 @@ impl<T: Lane> Contacts<T> {
     #[must_use]
     pub fn list(&self, lane: usize) -> &Listed {
         &self.lists[lane]
+    }
+
+    /// Whether every slot in use is active in all lanes: a contact's place is then the same in all.
+    #[inline(always)]
+    pub(super) fn is_full(&self) -> bool {
+        self.is_full
     }
 
     /// A contact of a rover by its place in the list, with its slot.
@@ -398,9 +260,11 @@ impl<T: Lane> Contacts<T> {
         v: &[T],
         forecast: &Forecast<T>,
     ) -> T::Mask {
-        T::vectorize(self.token, || {
-            self.detect_here(ground, middle, end, v, forecast)
-        })
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || self.detect_here(ground, middle, end, v, forecast),
+        )
     }
 
     #[inline(always)]
@@ -419,21 +283,24 @@ impl<T: Lane> Contacts<T> {
             forecast,
             height: ground.height(middle.origin),
         };
-        self.find_twists(middle, v);
+        self.parts.find_twists(middle, v, &mut self.twists);
         let mut declined = T::mask(self.token, 0);
-        for b in 0..self.boxes.len() {
+        for b in 0..self.parts.boxes.len() {
             declined = declined | self.look_at_box(b, ground, &sight);
         }
         self.used.clear();
         let height_at_end = ground.height(end.origin);
-        for w in 0..self.wheels.len() {
+        for w in 0..self.parts.wheels.len() {
             declined = declined | self.look_at_wheel(w, ground, &sight);
             let first = SLOTS * w;
             if !self.slots[first].active.any() {
                 continue;
             }
-            let pose = &end.bodies[self.wheels[w].body];
-            let (s, centre) = (self.wheels[w].axle(pose), self.wheels[w].centre(pose));
+            let pose = &end.bodies[self.parts.wheels[w].body];
+            let (s, centre) = (
+                self.parts.wheels[w].axle(pose),
+                self.parts.wheels[w].centre(pose),
+            );
             for slot in first..first + SLOTS {
                 if self.slots[slot].active.any() {
                     self.used.push(slot);
@@ -453,38 +320,25 @@ impl<T: Lane> Contacts<T> {
         ground: &mut Ground<T>,
         sight: &Sight<'_, T>,
     ) -> T::Mask {
-        let solid = &self.boxes[number];
+        let solid = &self.parts.boxes[number];
         let pose = &sight.middle.bodies[solid.body];
         let n = ground.normal;
-        let centre = place(pose, solid.centre.as_ref());
-        let reach = (sight.forecast).reach(|| self.speed_of_box(solid, centre));
-        let local = pose.R.transpose_times(n);
-        let local = match &solid.rotation {
-            None => local,
-            Some([x, y, z]) => {
-                let along = |e: &[f64; 3]| local.dot(Vec3::splat(self.token, *e));
-                Vec3::new(along(x), along(y), along(z))
-            }
-        };
-        let [x, y, z] = solid.half_size.map(|x| T::splat(self.token, x));
-        let drop = (local.x * x).abs() + (local.y * y).abs() + (local.z * z).abs();
+        let (centre, R) = (solid.centre(pose), solid.axes(pose));
+        let reach = (sight.forecast).reach(
+            #[inline(always)]
+            || solid.speed(&self.twists[solid.carrier], centre),
+        );
+        let local = R.transpose_times(n);
+        let half = Vec3::splat(self.token, solid.half_size);
+        let drop = (local.x * half.x).abs() + (local.y * half.y).abs() + (local.z * half.z).abs();
         let near_plane = (sight.height + n.dot(centre) - drop).le(reach);
         if !ground.has_spheres() {
             return near_plane;
         }
         let at_end = &sight.end.bodies[solid.body];
-        let shift = sight.end.origin - sight.middle.origin
-            + (place(at_end, solid.centre.as_ref()) - centre);
+        let shift = sight.end.origin - sight.middle.origin + (solid.centre(at_end) - centre);
         let bound = T::splat(self.token, solid.bound);
         let motion = shift.norm() + turning(&at_end.R, &pose.R) * bound;
-        let R = match &solid.rotation {
-            None => pose.R,
-            Some([x, y, z]) => Mat3 {
-                x: pose.R.times_shared(*x),
-                y: pose.R.times_shared(*y),
-                z: pose.R.times_shared(*z),
-            },
-        };
         let world = sight.middle.origin + centre;
         near_plane | ground.is_near_box(number, world, &R, solid.half_size, reach + motion)
     }
@@ -492,7 +346,7 @@ impl<T: Lane> Contacts<T> {
     /// Fills the slots of a wheel with its contacts at the midpoint.
     #[inline(always)]
     fn look_at_wheel(&mut self, w: usize, ground: &mut Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
-        let wheel = &self.wheels[w];
+        let wheel = &self.parts.wheels[w];
         let pose = &sight.middle.bodies[wheel.body];
         let (n, s, centre) = (ground.normal, wheel.axle(pose), wheel.centre(pose));
         let radius = T::splat(self.token, wheel.radius);
@@ -509,7 +363,10 @@ impl<T: Lane> Contacts<T> {
         };
         let on_plane = sight.forecast.admits(gap, u_N);
         // The second and third point of the rim.
-        let reach = (sight.forecast).reach(|| self.speed_of_wheel(wheel, sight, centre));
+        let reach = (sight.forecast).reach(
+            #[inline(always)]
+            || wheel.speed(&self.twists[wheel.carrier], centre, sight.v),
+        );
         let half = radius.like(0.5);
         let mut declined = (height + half * radius * length).le(reach);
         let none = T::mask(self.token, 0);
@@ -536,7 +393,7 @@ impl<T: Lane> Contacts<T> {
         centre: Vec3<T>,
         reach: T,
     ) -> T::Mask {
-        let wheel = &self.wheels[w];
+        let wheel = &self.parts.wheels[w];
         let origin = sight.middle.origin;
         let at_end = wheel.centre(&sight.end.bodies[wheel.body]);
         let half_way = sight.end.origin - origin + at_end - centre;
@@ -606,7 +463,7 @@ impl<T: Lane> Contacts<T> {
         sight: &Sight<'_, T>,
         half_way: Vec3<T>,
     ) -> T::Mask {
-        let wheel = &self.wheels[w];
+        let wheel = &self.parts.wheels[w];
         let pose = &sight.middle.bodies[wheel.body];
         let (s, centre) = (wheel.axle(pose), wheel.centre(pose));
         let spoke = pose.R.times_shared(wheel.spoke);
@@ -646,7 +503,7 @@ impl<T: Lane> Contacts<T> {
         s: Vec3<T>,
         centre: Vec3<T>,
     ) -> T::Mask {
-        let wheel = &self.wheels[slot / SLOTS];
+        let wheel = &self.parts.wheels[slot / SLOTS];
         let slot = &mut self.slots[slot];
         let radius = T::splat(self.token, wheel.radius);
         let parallel = radius.like(PARALLEL);
@@ -701,6 +558,7 @@ impl<T: Lane> Contacts<T> {
             list.n = 0;
         }
         let mut too_many = 0;
+        self.is_full = true;
         for &slot in &self.used {
             let own = &mut self.slots[slot];
             let on_sphere = own.on_sphere.bits();
@@ -709,6 +567,7 @@ impl<T: Lane> Contacts<T> {
                 own.sphere.number.store(&mut numbers[..T::LANES]);
             }
             let places = &mut self.places[slot];
+            self.is_full &= own.active.all();
             let mut lanes = own.active.bits();
             while lanes != 0 {
                 let lane = lanes.trailing_zeros() as usize;
@@ -728,57 +587,11 @@ impl<T: Lane> Contacts<T> {
                 list.n += 1;
             }
             if too_many != 0 {
+                self.is_full = false;
                 own.active = own.active & !T::mask(self.token, too_many);
             }
         }
         T::mask(self.token, too_many)
-    }
-
-    /// Twists of the carriers at the poses of the midpoint.
-    #[inline(always)]
-    fn find_twists(&mut self, middle: &Poses<T>, v: &[T]) {
-        let n = self.carriers.len();
-        let twists = &mut self.twists[..n];
-        twists[0] = Twist {
-            linear: Vec3::new(v[0], v[1], v[2]),
-            angular: Vec3::new(v[3], v[4], v[5]),
-        };
-        for i in 1..n {
-            let Carrier { body, parent } = self.carriers[i];
-            let (pose, rate, before) = (&middle.bodies[body], v[velocity(body)], twists[parent]);
-            twists[i] = Twist {
-                angular: before.angular + pose.axis * rate,
-                linear: before.linear + pose.swing * rate,
-            };
-        }
-    }
-
-    /// Upper bound on the normal velocity of all points of a wheel, m/s.
-    #[inline(always)]
-    fn speed_of_wheel(&self, wheel: &Wheel, sight: &Sight<'_, T>, centre: Vec3<T>) -> T {
-        let twist = &self.twists[wheel.carrier];
-        let spin = match wheel.spin {
-            Some(k) => sight.v[k].abs(),
-            None => sight.height.like(0.0),
-        };
-        let radius = spin.like(wheel.radius);
-        twist.velocity(centre).norm() + (twist.angular.norm() + spin) * radius
-    }
-
-    /// Upper bound on the velocity of all points of a box, m/s.
-    #[inline(always)]
-    fn speed_of_box(&self, solid: &Solid, centre: Vec3<T>) -> T {
-        let twist = &self.twists[solid.carrier];
-        let bound = centre.x.like(solid.bound);
-        twist.velocity(centre).norm() + twist.angular.norm() * bound
-    }
-}
-
-impl<T: Lane> Twist<T> {
-    /// Velocity of a material point, m/s.
-    #[inline(always)]
-    fn velocity(&self, x: Vec3<T>) -> Vec3<T> {
-        self.linear + self.angular.cross(x)
     }
 }
 
@@ -788,63 +601,4 @@ impl Listed {
         slots: [0; MAX_CONTACTS],
         primitives: [0; MAX_CONTACTS],
     };
-}
-
-impl Wheel {
-    /// Centre relative to the trunk's origin, m.
-    #[inline(always)]
-    fn centre<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
-        place(pose, self.centre.as_ref())
-    }
-
-    /// Unit axle.
-    #[inline(always)]
-    fn axle<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
-        match self.axle {
-            Axle::Joint(is_reversed) => {
-                if is_reversed {
-                    -pose.axis
-                } else {
-                    pose.axis
-                }
-            }
-            Axle::Fixed(s) => pose.R.times_shared(s),
-        }
-    }
-}
-
-/// A point of a body, `None` for its origin, relative to the trunk's origin, m.
-#[inline(always)]
-fn place<T: Lane>(pose: &Pose<T>, x: Option<&[f64; 3]>) -> Vec3<T> {
-    match x {
-        None => pose.r,
-        Some(x) => pose.r + pose.R.times_shared(*x),
-    }
-}
-
-/// The axle of a wheel whose body has a joint with this axis.
-fn axle_of(axis: &Axis, axle: [f64; 3]) -> Axle {
-    let axis = match axis {
-        Axis::X => [1.0, 0.0, 0.0],
-        Axis::Y => [0.0, 1.0, 0.0],
-        Axis::Z => [0.0, 0.0, 1.0],
-        Axis::General(u) => *u,
-    };
-    if axle == axis {
-        Axle::Joint(false)
-    } else if axle == axis.map(|x| -x) {
-        Axle::Joint(true)
-    } else {
-        Axle::Fixed(axle)
-    }
-}
-
-/// Index of a body among the carriers; adds it with all that carry it.
-fn carrier_of(machine: &Machine, body: usize, carriers: &mut Vec<Carrier>) -> usize {
-    if let Some(i) = carriers.iter().position(|carrier| carrier.body == body) {
-        return i;
-    }
-    let parent = carrier_of(machine, machine.links[body].parent, carriers);
-    carriers.push(Carrier { body, parent });
-    carriers.len() - 1
 }

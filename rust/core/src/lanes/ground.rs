@@ -72,7 +72,9 @@ pub struct Ground<T: Lane> {
     pub(super) normal: Vec3<T>,
     /// Offset of the plane, m; ∞ without a plane.
     pub(super) offset: T,
-    /// Terrains that may have more than a plane, by lane.
+    /// Terrain of each lane, once it has one.
+    terrains: Vec<Option<Arc<dyn Terrain>>>,
+    /// Those that may have more than a plane.
     fields: Vec<Option<Arc<dyn Terrain>>>,
     has_spheres: bool,
     wheels: Vec<Near<T>>,
@@ -108,6 +110,7 @@ impl<T: Lane> Ground<T> {
         Self {
             normal: Vec3::splat(token, [0.0, 1.0, 0.0]),
             offset: T::splat(token, 0.0),
+            terrains: vec![None; T::LANES],
             fields: vec![None; T::LANES],
             has_spheres: false,
             wheels: vec![near; n_wheels],
@@ -117,6 +120,11 @@ impl<T: Lane> Ground<T> {
 
     /// Puts a rover on a terrain.
     pub fn set_lane(&mut self, lane: usize, terrain: &Arc<dyn Terrain>) {
+        // What is known of a terrain holds for any rover on it.
+        if (self.terrains[lane].as_ref()).is_some_and(|own| Arc::ptr_eq(own, terrain)) {
+            return;
+        }
+        self.terrains[lane] = Some(Arc::clone(terrain));
         let plane = terrain.ground();
         let (normal, offset) = match plane {
             Some(plane) => ((*plane.normal()).into(), plane.offset()),

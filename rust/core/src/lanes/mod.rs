@@ -7,8 +7,9 @@
 //!
 //! - [`machine`]: what the rovers share; [`inertias`]: what they need not; [`place`]: configurations;
 //! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
-//! - [`ground`], [`contacts`], [`rows`]: contacts, Jacobian and Delassus operator;
-//! - [`problem`], [`newton`]: the friction-contact problems;
+//! - `parts`, [`ground`], [`forecast`], [`contacts`]: what touches what; [`rows`]: Jacobian and
+//!   Delassus operator;
+//! - [`problem`], [`modes`], [`equations`], [`newton`]: the friction-contact problems;
 //! - [`step`]: the step.
 #![allow(clippy::inline_always)] // a call would leave the instruction set that its caller is compiled for
 
@@ -16,11 +17,15 @@ pub mod bias;
 pub mod contacts;
 pub mod drives;
 pub mod energy;
+pub mod equations;
+pub mod forecast;
 pub mod ground;
 pub mod inertias;
 pub mod machine;
 pub mod mass_matrix;
+pub mod modes;
 pub mod newton;
+mod parts;
 pub mod passenger;
 pub mod place;
 pub mod poses;

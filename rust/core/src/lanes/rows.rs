@@ -85,12 +85,16 @@ impl<T: Lane> Rows<T> {
         contacts: &Contacts<T>,
         v: &[T],
     ) {
-        T::vectorize(self.token, || {
-            for &slot in contacts.used() {
-                self.build(machine, end, factor, contacts, v, slot);
-            }
-            self.multiply(contacts.used());
-        });
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || {
+                for &slot in contacts.used() {
+                    self.build(machine, end, factor, contacts, v, slot);
+                }
+                self.multiply(contacts.used());
+            },
+        );
     }
 
     /// Z and `Hᵀ v` of a slot.
@@ -117,20 +121,15 @@ impl<T: Lane> Rows<T> {
         base[3] = [xn.x, xt.x, xb.x];
         base[4] = [xn.y, xt.y, xb.y];
         base[5] = [xn.z, xt.z, xb.z];
-        let mut u = [0, 1, 2].map(|i| v[0] * base[0][i]);
+        let mut u = scaled(&base[0], v[0]);
         for k in 1..BASE {
-            for i in 0..3 {
-                u[i] += v[k] * base[k][i];
-            }
+            add_scaled(&mut u, &base[k], v[k]);
         }
         for (row, &body) in joints.iter_mut().zip(movers) {
             let pose = &end.bodies[body];
             let moved = pose.axis.cross(x) + pose.swing;
             *row = [moved.dot(n), moved.dot(t), moved.dot(b)];
-            let rate = v[velocity(body)];
-            for i in 0..3 {
-                u[i] += rate * row[i];
-            }
+            add_scaled(&mut u, row, v[velocity(body)]);
         }
         self.u_before[slot] = u;
         factor.half_solve_path(machine, machine.wheels[wheel].body, rows);
@@ -168,20 +167,15 @@ impl<T: Lane> Rows<T> {
             let movers = &self.movers[Contacts::<T>::wheel(slot)][..];
             let rows = &self.Z[slot * self.stride..][..BASE + movers.len()];
             let (base, joints) = rows.split_at(BASE);
-            let mut sum = [0, 1, 2].map(|i| y[0] * base[0][i]);
+            let mut sum = scaled(&base[0], y[0]);
             for k in 1..BASE {
-                for i in 0..3 {
-                    sum[i] += y[k] * base[k][i];
-                }
+                add_scaled(&mut sum, &base[k], y[k]);
             }
             for (row, &body) in joints.iter().zip(movers) {
-                let y = y[velocity(body)];
-                for i in 0..3 {
-                    sum[i] += y * row[i];
-                }
+                add_scaled(&mut sum, row, y[velocity(body)]);
             }
-            let before = &self.u_before[slot];
-            q[slot] = [0, 1, 2].map(|i| sum[i] + before[i]);
+            let [n, t, b] = self.u_before[slot];
+            q[slot] = [sum[0] + n, sum[1] + t, sum[2] + b];
         }
     }
 
@@ -260,40 +254,62 @@ impl<T: Lane> Rows<T> {
         mu: T,
         problems: &mut [ContactProblem],
     ) {
-        T::vectorize(self.token, || {
-            let problems = &mut problems[..T::LANES];
-            let mut friction = [0.0; MAX_LANES];
-            mu.store(&mut friction[..T::LANES]);
-            for (lane, problem) in problems.iter_mut().enumerate() {
-                problem.n_contacts = contacts.list(lane).n;
-                problem.mu[..problem.n_contacts].fill(friction[lane]);
-            }
-            let mut at = 0;
-            for (i, &row) in contacts.used().iter().enumerate() {
-                let of_row = contacts.places(row);
-                let values = store_all(&q[row]);
-                each::<T>(contacts.slot(row).active, |lane| {
-                    let place = usize::from(of_row[lane]);
-                    let q = &mut problems[lane].q[3 * place..][..3];
-                    for i in 0..3 {
-                        q[i] = values[i][lane];
-                    }
-                });
-                for &column in &contacts.used()[..=i] {
-                    let of_column = contacts.places(column);
-                    let values = store_all(&self.W[at]);
-                    at += 1;
-                    let both = contacts.slot(row).active & contacts.slot(column).active;
-                    each::<T>(both, |lane| {
-                        let (c, d) = (of_row[lane], of_column[lane]);
-                        let out = &mut problems[lane].W[block(c.into(), d.into())];
-                        for i in 0..9 {
-                            out[i] = values[i][lane];
-                        }
-                    });
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || {
+                let problems = &mut problems[..T::LANES];
+                let mut friction = [0.0; MAX_LANES];
+                mu.store(&mut friction[..T::LANES]);
+                for (lane, problem) in problems.iter_mut().enumerate() {
+                    problem.n_contacts = contacts.list(lane).n;
+                    problem.mu[..problem.n_contacts].fill(friction[lane]);
                 }
-            }
-        });
+                let mut at = 0;
+                for (i, &row) in contacts.used().iter().enumerate() {
+                    let of_row = contacts.places(row);
+                    let values = store_all(&q[row]);
+                    each::<T>(
+                        contacts.slot(row).active,
+                        #[inline(always)]
+                        |lane| {
+                            let place = usize::from(of_row[lane]);
+                            let q = &mut problems[lane].q[3 * place..][..3];
+                            for i in 0..3 {
+                                q[i] = values[i][lane];
+                            }
+                        },
+                    );
+                    for &column in &contacts.used()[..=i] {
+                        let of_column = contacts.places(column);
+                        let [first @ .., last] = &self.W[at];
+                        let (mut rows, mut ends) = ([[0.0; 8]; MAX_LANES], [0.0; MAX_LANES]);
+                        T::transpose(first, &mut rows);
+                        last.store(&mut ends[..T::LANES]);
+                        if contacts.is_full() {
+                            for (lane, problem) in problems.iter_mut().enumerate() {
+                                let out = &mut problem.W[at];
+                                out[..8].copy_from_slice(&rows[lane]);
+                                out[8] = ends[lane];
+                            }
+                        } else {
+                            let both = contacts.slot(row).active & contacts.slot(column).active;
+                            each::<T>(
+                                both,
+                                #[inline(always)]
+                                |lane| {
+                                    let (c, d) = (of_row[lane], of_column[lane]);
+                                    let out = &mut problems[lane].W[block(c.into(), d.into())];
+                                    out[..8].copy_from_slice(&rows[lane]);
+                                    out[8] = ends[lane];
+                                },
+                            );
+                        }
+                        at += 1;
+                    }
+                }
+            },
+        );
     }
 
     /// Reads impulses by slot from the problems, N s. Slots that a lane does not use are left as
@@ -308,7 +324,13 @@ impl<T: Lane> Rows<T> {
         problems: &[ContactProblem],
         p: &mut [Triple<T>],
     ) {
-        self.read(contacts, problems, |problem| &problem.p, p);
+        self.read(
+            contacts,
+            problems,
+            #[inline(always)]
+            |problem| &problem.p,
+            p,
+        );
     }
 
     /// Reads velocities by slot from the problems, m/s, likewise.
@@ -322,7 +344,13 @@ impl<T: Lane> Rows<T> {
         problems: &[ContactProblem],
         u: &mut [Triple<T>],
     ) {
-        self.read(contacts, problems, |problem| &problem.u, u);
+        self.read(
+            contacts,
+            problems,
+            #[inline(always)]
+            |problem| &problem.u,
+            u,
+        );
     }
 
     #[inline(always)]
@@ -337,13 +365,19 @@ impl<T: Lane> Rows<T> {
         for &slot in contacts.used() {
             let mut values = store_all(&out[slot]);
             let places = contacts.places(slot);
-            each::<T>(contacts.slot(slot).active, |lane| {
-                let own = &of(&problems[lane])[3 * usize::from(places[lane])..][..3];
-                for i in 0..3 {
-                    values[i][lane] = own[i];
-                }
-            });
-            out[slot] = [0, 1, 2].map(|i| T::load(self.token, &values[i][..T::LANES]));
+            each::<T>(
+                contacts.slot(slot).active,
+                #[inline(always)]
+                |lane| {
+                    let own = &of(&problems[lane])[3 * usize::from(places[lane])..][..3];
+                    for i in 0..3 {
+                        values[i][lane] = own[i];
+                    }
+                },
+            );
+            for (out, values) in out[slot].iter_mut().zip(&values) {
+                *out = T::load(self.token, &values[..T::LANES]);
+            }
         }
     }
 }
@@ -365,10 +399,35 @@ fn along<T: Lane>(z: &Triple<T>, p: &Triple<T>) -> T {
     z[0] * p[0] + z[1] * p[1] + z[2] * p[2]
 }
 
+/// `a x`.
+#[inline(always)]
+fn scaled<T: Lane>(x: &Triple<T>, a: T) -> Triple<T> {
+    [a * x[0], a * x[1], a * x[2]]
+}
+
+/// `sums += a x`.
+#[inline(always)]
+fn add_scaled<T: Lane>(sums: &mut Triple<T>, x: &Triple<T>, a: T) {
+    for i in 0..3 {
+        sums[i] += a * x[i];
+    }
+}
+
 /// `Xᵀ Y`, row-major.
 #[inline(always)]
 fn product<T: Lane>(x: &[Triple<T>], y: &[Triple<T>]) -> [T; 9] {
-    let mut sums = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|e| x[0][e / 3] * y[0][e % 3]);
+    let ([a, b, c], [d, e, f]) = (x[0], y[0]);
+    let mut sums = [
+        a * d,
+        a * e,
+        a * f,
+        b * d,
+        b * e,
+        b * f,
+        c * d,
+        c * e,
+        c * f,
+    ];
     for (x, y) in x[1..].iter().zip(&y[1..]) {
         for i in 0..3 {
             for j in 0..3 {

@@ -16,9 +16,10 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::bias::{BiasScratch, bias};
-use super::contacts::{Contacts, Forecast};
+use super::contacts::Contacts;
 use super::drives::Drives;
 use super::energy::{EnergyScratch, energy};
+use super::forecast::Forecast;
 use super::ground::Ground;
 use super::inertias::Inertias;
 use super::machine::{Machine, velocity};
@@ -29,14 +30,14 @@ use super::poses::Poses;
 use super::problem::{ContactProblem, MAX_CONTACTS};
 use super::rows::{Rows, Triple};
 use crate::contact::Contact;
-use crate::integrator::energy_audit::{GAIN, ROUNDINGS};
+use crate::integrator::energy_audit::{COARSE, GAIN, RAISE, ROUNDINGS};
 use crate::integrator::position_projection::FARTHEST;
 use crate::integrator::{Phase, Probe, Stabilisation, StepOptions, StepReport, Variant, WarmStart};
 use crate::multibody::Model;
 use crate::multibody::model::BASE;
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 use crate::solver::Method;
-use crate::system::tree::{JOINT_ARM, MOST_SPIN, MOST_TURN};
+use crate::system::tree::{JOINT_ARM, MOST_JOINT_TURN, MOST_SPIN, MOST_TURN};
 
 /// Why a lane was declined in its last step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,12 +60,6 @@ pub enum Decline {
     /// Something is not finite.
     NotFinite,
 }
-
-/// Number of reasons.
-pub const REASONS: usize = 8;
-/// LAB
-pub static DECLINED: [std::sync::atomic::AtomicUsize; 8] =
-    [const { std::sync::atomic::AtomicUsize::new(0) }; 8];
 
 /// Whether steps with these options can be ordinary.
 #[must_use]
@@ -136,6 +131,10 @@ pub struct Block<T: Lane> {
     /// Kinetic and potential energy at the start and at the end of the step, J.
     before: [T; 2],
     after: [T; 2],
+    /// Linear momentum at the end of the step, kg m/s.
+    momentum: Vec3<T>,
+    /// Lanes whose velocity the energy audit corrected in this step.
+    is_corrected: T::Mask,
     /// Lanes whose energy at the start is not known yet.
     is_new: T::Mask,
     /// Lanes whose position must be projected, and their deepest gap, m.
@@ -197,6 +196,8 @@ impl<T: Lane> Block<T> {
             pushed: vector(),
             before: [zero; 2],
             after: [zero; 2],
+            momentum: Vec3::splat(token, [0.0; 3]),
+            is_corrected: nobody,
             is_new: nobody,
             is_deep: nobody,
             deepest: zero,
@@ -344,7 +345,6 @@ impl<T: Lane> Block<T> {
         self.going = self.going & !lanes;
         while lost != 0 {
             self.reasons[lost.trailing_zeros() as usize] = Some(reason);
-            DECLINED[reason as usize].fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             lost &= lost - 1;
         }
     }
@@ -357,7 +357,11 @@ impl<T: Lane> Block<T> {
         let token = self.token;
         self.going = self.occupied;
         self.reasons = [None; MAX_LANES];
-        T::vectorize(token, || self.predict());
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.predict(),
+        );
         self.poses_middle
             .update(&self.machine, &self.inertias, &self.middle);
         self.poses_end
@@ -367,7 +371,11 @@ impl<T: Lane> Block<T> {
         probe.end(Phase::Detection);
         self.mass_matrix
             .update(&self.machine, &self.inertias, &self.poses_middle);
-        T::vectorize(token, || self.add_implicit());
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.add_implicit(),
+        );
         probe.end(Phase::MassMatrix);
         let is_definite = self.mass_matrix.factorise(&self.machine, &mut self.factor);
         self.decline(Decline::MassMatrix, !is_definite);
@@ -386,10 +394,11 @@ impl<T: Lane> Block<T> {
     #[inline(always)]
     fn predict(&mut self) {
         let (h, theta) = (self.options.time_step, self.options.theta);
-        let (turning, spin) = fastest(&self.machine, &self.v);
+        let (base, joints, spin) = fastest(&self.machine, &self.v);
         let step = self.number(h);
-        let is_fast =
-            self.number(MOST_TURN).lt(step * turning) | self.number(MOST_SPIN).lt(step * spin);
+        let is_fast = self.number(MOST_TURN).lt(step * base)
+            | self.number(MOST_JOINT_TURN).lt(step * (base + joints))
+            | self.number(MOST_SPIN).lt(step * spin);
         self.decline(Decline::Turning, is_fast);
         self.middle
             .set_moved(&self.start, &self.v, (1.0 - theta) * h);
@@ -444,11 +453,23 @@ impl<T: Lane> Block<T> {
     fn load(&mut self, problems: &[ContactProblem]) {
         let token = self.token;
         let is_any = (self.persists & self.going).any();
-        T::vectorize(token, || self.push_and_drive(is_any, problems));
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.push_and_drive(is_any, problems),
+        );
         self.weigh(true);
-        T::vectorize(token, || self.add_torque_and_pushed(is_any));
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.add_torque_and_pushed(is_any),
+        );
         self.weigh(false);
-        T::vectorize(token, || self.add_torque_and_correction(is_any));
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.add_torque_and_correction(is_any),
+        );
     }
 
     #[inline(always)]
@@ -546,7 +567,11 @@ impl<T: Lane> Block<T> {
             }
         }
         self.decline(Decline::Solver, !T::mask(token, solved));
-        T::vectorize(token, || self.move_on(problems));
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.move_on(problems),
+        );
         let after = energy(
             &self.machine,
             &self.inertias,
@@ -556,12 +581,24 @@ impl<T: Lane> Block<T> {
             &mut self.energy_scratch,
         );
         self.after = [after.kinetic, after.potential];
-        T::vectorize(token, || self.audit());
+        self.momentum = after.momentum;
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.audit(),
+        );
+        if self.is_corrected.any() {
+            self.weigh_again();
+        }
         probe.end(Phase::Update);
         let Some(tolerated) = self.tolerated() else {
             return false;
         };
-        T::vectorize(token, || self.measure(tolerated))
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.measure(tolerated),
+        )
     }
 
     #[inline(always)]
@@ -608,14 +645,81 @@ impl<T: Lane> Block<T> {
         let zero = h.like(0.0);
         let allowed = rounding + T::select(is_free, zero, h.like(GAIN) * size);
         let measured = T::select(is_free, excess.abs(), excess);
-        // What is not finite is not within the bound either.
-        self.decline(Decline::Energy, !measured.le(allowed));
+        let is_balanced = measured.le(allowed);
+        let left = excess - end_kinetic;
+        let is_left = !left.le(rounding + h.like(GAIN) * size);
+        // What is not finite is not within the bounds either.
+        let is_coarse = !measured.le(h.like(COARSE) * size) | is_left;
+        self.decline(Decline::Energy, is_coarse & !is_balanced);
+        self.is_corrected = !is_balanced & self.going;
+        if self.is_corrected.any() {
+            self.correct(excess, is_free);
+        }
         let gain = (excess - rounding).max(zero) / size.max(h.like(f64::MIN_POSITIVE));
+        let gain = T::select(self.is_corrected, zero, gain);
+        let removed = T::select(self.is_corrected, excess.max(zero), zero);
+        let mut energies = [0.0; MAX_LANES];
+        removed.store(&mut energies[..T::LANES]);
+        for (report, removed) in self.reports.iter_mut().zip(energies) {
+            report.energy_removed = removed;
+        }
         let mut gains = [0.0; MAX_LANES];
         gain.store(&mut gains[..T::LANES]);
         for (report, gain) in self.reports.iter_mut().zip(gains) {
             report.energy_gain = gain;
         }
+    }
+
+    /// Removes an excess of energy from the velocity at the end of the step, as
+    /// [`crate::integrator::energy_audit`] does.
+    #[inline(always)]
+    fn correct(&mut self, excess: T, is_free: T::Mask) {
+        let zero = excess.like(0.0);
+        let one = excess.like(1.0);
+        let [kinetic, _] = self.after;
+        let (lanes, mass) = (self.is_corrected, self.inertias.mass);
+        let momentum = self.momentum;
+        let whole = momentum.dot(momentum) / (mass.like(2.0) * mass);
+        let relative = kinetic - whole;
+        let is_relative = is_free & excess.lt(relative);
+        let all = (one - excess / kinetic).max(zero).sqrt();
+        let of_relative = (one - excess / relative).min(one.like(1.0 + RAISE)).sqrt();
+        let share = T::select(is_relative, of_relative, all);
+        // Free flight that loses more than its relative energy is left as it is.
+        let lanes = lanes & (is_relative | zero.lt(excess));
+        let translation = momentum * (one / mass);
+        let common = [translation.x, translation.y, translation.z];
+        for (k, v) in self.v_end.iter_mut().enumerate() {
+            let common = if k < 3 {
+                T::select(is_relative, common[k], zero)
+            } else {
+                zero
+            };
+            *v = T::select(lanes, common + share * (*v - common), *v);
+        }
+        let shortened = lanes & !is_relative;
+        for &slot in self.contacts.used() {
+            for u in &mut self.u[slot] {
+                *u = T::select(shortened, *u * share, *u);
+            }
+        }
+    }
+
+    /// Energy of the lanes whose velocity was corrected.
+    fn weigh_again(&mut self) {
+        let after = energy(
+            &self.machine,
+            &self.inertias,
+            &self.end,
+            &self.v_end,
+            self.gravity,
+            &mut self.energy_scratch,
+        );
+        let [kinetic, potential] = self.after;
+        self.after = [
+            T::select(self.is_corrected, after.kinetic, kinetic),
+            T::select(self.is_corrected, after.potential, potential),
+        ];
     }
 
     /// Penetration that is tolerated, m, if positions are projected.
@@ -655,27 +759,31 @@ impl<T: Lane> Block<T> {
     /// # Panics
     /// If there are fewer problems than lanes.
     pub fn set_gaps(&mut self, problems: &mut [ContactProblem]) {
-        T::vectorize(self.token, || {
-            let (h, theta) = self.time_step();
-            for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
-                if !self.is_deep.get(lane) {
-                    problem.n_contacts = 0;
-                }
-                let n = problem.n_unknowns();
-                problem.q[..n].fill(0.0);
-                problem.p[..n].fill(0.0);
-            }
-            for &slot in self.contacts.used() {
-                let gap = self.gap_at_end(slot, h, theta);
-                let places = self.contacts.places(slot);
-                let active = self.contacts.slot(slot).active & self.is_deep;
+        T::vectorize(
+            self.token,
+            #[inline(always)]
+            || {
+                let (h, theta) = self.time_step();
                 for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
-                    if active.get(lane) {
-                        problem.q[3 * usize::from(places[lane])] = gap.get(lane);
+                    if !self.is_deep.get(lane) {
+                        problem.n_contacts = 0;
+                    }
+                    let n = problem.n_unknowns();
+                    problem.q[..n].fill(0.0);
+                    problem.p[..n].fill(0.0);
+                }
+                for &slot in self.contacts.used() {
+                    let gap = self.gap_at_end(slot, h, theta);
+                    let places = self.contacts.places(slot);
+                    let active = self.contacts.slot(slot).active & self.is_deep;
+                    for (lane, problem) in problems[..T::LANES].iter_mut().enumerate() {
+                        if active.get(lane) {
+                            problem.q[3 * usize::from(places[lane])] = gap.get(lane);
+                        }
                     }
                 }
-            }
-        });
+            },
+        );
     }
 
     /// Last part of a step. `problems`: those of [`Self::set_gaps`], solved, if a lane's position
@@ -689,7 +797,11 @@ impl<T: Lane> Block<T> {
             self.project(&problems[..T::LANES]);
         }
         probe.end(Phase::Projection);
-        T::vectorize(token, || self.accept());
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.accept(),
+        );
         let going = self.going.bits();
         for lane in 0..T::LANES {
             if going >> lane & 1 == 1 {
@@ -711,7 +823,11 @@ impl<T: Lane> Block<T> {
             }
         }
         self.decline(Decline::Projection, T::mask(token, unsolved));
-        T::vectorize(token, || self.displace(problems));
+        T::vectorize(
+            token,
+            #[inline(always)]
+            || self.displace(problems),
+        );
         let lifted = energy(
             &self.machine,
             &self.inertias,
@@ -799,9 +915,10 @@ impl<T: Lane> Block<T> {
     }
 }
 
-/// Angular speed of the fastest frame, at most, and of the fastest spinner about its axle, rad/s.
+/// Angular speeds of the trunk, of the fastest joint that turns a frame, and of the fastest spinner
+/// about its axle, rad/s.
 #[inline(always)]
-fn fastest<T: Lane>(machine: &Machine, v: &[T]) -> (T, T) {
+fn fastest<T: Lane>(machine: &Machine, v: &[T]) -> (T, T, T) {
     let [x, y, z] = [v[3], v[4], v[5]];
     let zero = x.like(0.0);
     let (mut joints, mut spin) = (zero, zero);
@@ -813,7 +930,7 @@ fn fastest<T: Lane>(machine: &Machine, v: &[T]) -> (T, T) {
             joints = rate.max(joints);
         }
     }
-    ((x * x + y * y + z * z).sqrt() + joints, spin)
+    ((x * x + y * y + z * z).sqrt(), joints, spin)
 }
 
 /// Largest displacement: of the base, and of the joints at their arm, m.

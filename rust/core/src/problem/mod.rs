@@ -30,4 +30,4 @@ pub(crate) use passivity::passive_share;
 pub(crate) use prepared::{Prepared, Proximal};
 pub(crate) use residual::{Magnitudes, Violations, evaluate_contact};
 pub use residual::{Residual, evaluate, evaluate_into};
-pub(crate) use scales::{Scales, power_of_two};
+pub(crate) use scales::{ContactScales, Scales, power_of_two};

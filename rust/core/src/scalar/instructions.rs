@@ -9,7 +9,7 @@ use fearless_simd::{
     u64x4, u64x8,
 };
 
-use super::lane::{EXPONENT_IN_LAST_BITS, Lane, LaneMask, MANTISSA_BITS};
+use super::lane::{EXPONENT_IN_LAST_BITS, Lane, LaneMask, MANTISSA_BITS, MAX_LANES};
 
 /// Instructions that a single rover's step is compiled for. Its bits do not depend on them.
 #[derive(Clone, Copy, Debug)]
@@ -81,6 +81,21 @@ impl Instructions {
             let _ = level;
             Self::Baseline
         })
+    }
+
+    /// This machine's best, and all that it could do with less.
+    #[must_use]
+    pub fn all_of_this_machine() -> Vec<Self> {
+        let best = Self::of_this_machine();
+        let mut all = vec![best];
+        #[cfg(target_arch = "x86_64")]
+        if let (Self::Avx512(_), Some(token)) = (best, Level::new().as_avx2()) {
+            all.push(Self::Avx2(token));
+        }
+        if best.lanes() > 1 {
+            all.push(Self::Baseline);
+        }
+        all
     }
 
     /// Rovers to a register.
@@ -155,6 +170,27 @@ macro_rules! lanes {
             }
 
             #[inline(always)]
+            fn transpose(x: &[Self; 8], out: &mut [[f64; 8]; MAX_LANES]) {
+                for (part, x) in x.chunks_exact($n).enumerate() {
+                    let mut rows = [x[0]; $n];
+                    rows.copy_from_slice(x);
+                    let mut stage = 1;
+                    while stage < $n {
+                        let before = rows;
+                        for i in 0..$n / 2 {
+                            let (low, high) = (before[i], before[i + $n / 2]);
+                            rows[2 * i] = low.zip_low(high);
+                            rows[2 * i + 1] = low.zip_high(high);
+                        }
+                        stage *= 2;
+                    }
+                    for (out, row) in out.iter_mut().zip(&rows) {
+                        row.store_slice(&mut out[$n * part..][..$n]);
+                    }
+                }
+            }
+
+            #[inline(always)]
             fn token(self) -> S {
                 self.simd
             }
@@ -194,6 +230,16 @@ macro_rules! lanes {
             fn vectorize<R>(token: S, f: impl FnOnce() -> R) -> R {
                 token.vectorize(f)
             }
+
+            #[inline(always)]
+            fn get(self, lane: usize) -> f64 {
+                self.as_slice()[lane]
+            }
+
+            #[inline(always)]
+            fn set(&mut self, lane: usize, x: f64) {
+                self.as_mut_slice()[lane] = x;
+            }
         }
     };
 }
@@ -203,7 +249,6 @@ lanes!(f64x8, mask64x8, u64x8, 8);
 
 #[cfg(test)]
 mod tests {
-    use super::super::lane::MAX_LANES;
     use super::*;
 
     /// A formula with every operation, over any scalar.
@@ -228,6 +273,17 @@ mod tests {
             let alone = formula(a[k], b[k]);
             assert_eq!(found.get(k).to_bits(), alone.to_bits(), "lane {k}");
             assert_eq!(x.lt(y).get(k), a[k] < b[k]);
+        }
+        let mut columns = [x; 8];
+        for (k, column) in columns.iter_mut().enumerate() {
+            *column = x + x.like(10.0 * k as f64);
+        }
+        let mut rows = [[0.0; 8]; MAX_LANES];
+        T::transpose(&columns, &mut rows);
+        for lane in 0..T::LANES {
+            for k in 0..8 {
+                assert_eq!(rows[lane][k].to_bits(), columns[k].get(lane).to_bits());
+            }
         }
         assert_eq!(T::mask(token, 0b10).bits(), 0b10 & ((1 << T::LANES) - 1));
     }

@@ -76,6 +76,9 @@ pub trait Lane:
     /// A mask whose lane k is bit k.
     fn mask(token: Self::Token, bits: u32) -> Self::Mask;
 
+    /// Writes lane k of eight numbers to `out[k]`, for [`Self::LANES`] lanes.
+    fn transpose(x: &[Self; 8], out: &mut [[f64; 8]; MAX_LANES]);
+
     /// The token that this number was made with.
     fn token(self) -> Self::Token;
 
@@ -101,7 +104,7 @@ pub trait Lane:
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
 
     /// Runs `f` compiled for the instructions of the token; whatever `f` calls must be inlined, and
-    /// `f` itself, so write the closure as `#[inline(always)] || ...`.
+    /// `f` itself: write `#[inline(always)] || ...`, or a large one is compiled for the baseline.
     fn vectorize<R>(token: Self::Token, f: impl FnOnce() -> R) -> R;
 
     /// The number `x` in every lane.
@@ -144,21 +147,10 @@ pub trait Lane:
     }
 
     /// The number of a lane.
-    #[inline(always)]
-    fn get(self, lane: usize) -> f64 {
-        let mut lanes = [0.0; MAX_LANES];
-        self.store(&mut lanes[..Self::LANES]);
-        lanes[lane]
-    }
+    fn get(self, lane: usize) -> f64;
 
     /// Replaces the number of a lane.
-    #[inline(always)]
-    fn set(&mut self, lane: usize, x: f64) {
-        let mut lanes = [0.0; MAX_LANES];
-        self.store(&mut lanes[..Self::LANES]);
-        lanes[lane] = x;
-        *self = Self::load(self.token(), &lanes[..Self::LANES]);
-    }
+    fn set(&mut self, lane: usize, x: f64);
 }
 
 /// Most lanes of any scalar.
@@ -211,6 +203,11 @@ impl Lane for f64 {
     #[inline(always)]
     fn mask(_: Single, bits: u32) -> bool {
         bits & 1 == 1
+    }
+
+    #[inline(always)]
+    fn transpose(x: &[Self; 8], out: &mut [[f64; 8]; MAX_LANES]) {
+        out[0] = *x;
     }
 
     #[inline(always)]

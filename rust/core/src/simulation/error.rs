@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::integrator::OptionsError;
+
 /// A torque or set-point that is refused.
 #[derive(Debug, Error, Clone, PartialEq)]
 pub enum CommandError {
@@ -94,6 +96,14 @@ pub enum BatchError {
         index: usize,
         /// What is wrong with it.
         error: CommandError,
+    },
+    /// An option of one rover out of its range.
+    #[error("rover {index}: {error}")]
+    Options {
+        /// Which rover.
+        index: usize,
+        /// What is wrong with it.
+        error: OptionsError,
     },
 }
 

@@ -41,6 +41,15 @@ impl RoverScene {
             machine,
         }
     }
+
+    /// The same machine on another terrain.
+    #[must_use]
+    pub fn on(&self, terrain: Arc<dyn Terrain>) -> Self {
+        Self {
+            terrain,
+            ..self.clone()
+        }
+    }
 }
 
 impl fmt::Debug for RoverScene {
@@ -53,6 +62,19 @@ impl fmt::Debug for RoverScene {
 
 /// A rover on a terrain, stepped through time.
 pub type RoverSimulation = Simulation<RoverScene>;
+
+/// A rover in a state on a terrain, before it is simulated.
+#[derive(Clone, Debug)]
+pub struct Placement {
+    /// The rover and the ground.
+    pub scene: RoverScene,
+    /// Options of the steps.
+    pub options: StepOptions,
+    /// Where it is.
+    pub configuration: Configuration,
+    /// Its velocity (nv).
+    pub v: Vec<f64>,
+}
 
 /// Scratch of a rover's steps.
 #[derive(Clone, Debug)]
@@ -234,6 +256,51 @@ impl RoverSimulation {
         Self::of(RoverScene::new(model, terrain), configuration, options)
     }
 
+    /// As [`Self::new`], then [`Self::begin`].
+    ///
+    /// # Errors
+    /// An option out of its range.
+    ///
+    /// # Panics
+    /// If the sizes of the state do not fit the model.
+    pub fn placed(placement: Placement) -> Result<Self, OptionsError> {
+        let Placement {
+            scene,
+            options,
+            configuration,
+            v,
+        } = placement;
+        assert!(
+            configuration.is_of(&scene.model),
+            "invariant: a configuration of this model"
+        );
+        let mut made = Self::of(scene, configuration.clone(), options)?;
+        made.place(configuration, v);
+        Ok(made)
+    }
+
+    /// Begins anew in another scene: bit for bit what [`Self::placed`] makes, but in the memory of
+    /// this simulation if the model is the same.
+    ///
+    /// # Errors
+    /// An option out of its range; nothing is changed then.
+    ///
+    /// # Panics
+    /// If the sizes of the state do not fit the model.
+    pub fn begin(&mut self, placement: Placement) -> Result<(), OptionsError> {
+        if placement.scene.model.fingerprint() != self.model().fingerprint() {
+            *self = Self::placed(placement)?;
+            return Ok(());
+        }
+        placement.options.check()?;
+        assert!(
+            placement.configuration.is_of(self.model()),
+            "invariant: a configuration of this model"
+        );
+        self.restart(placement);
+        Ok(())
+    }
+
     /// The machine.
     #[must_use]
     pub fn model(&self) -> &Arc<Model> {
@@ -257,6 +324,13 @@ impl RoverSimulation {
             "invariant: a configuration of this model"
         );
         self.place(configuration, v);
+    }
+
+    fn restart(&mut self, placement: Placement) {
+        self.command = placement.scene.command();
+        self.scene = placement.scene;
+        self.options = placement.options;
+        self.place(placement.configuration, placement.v);
     }
 
     /// Results of the last call of [`Self::step`].

@@ -52,9 +52,7 @@ pub enum Stage {
     BodySweeps,
     /// Islands of contacts that share no body, each solved separately.
     Islands,
-    /// Newton's steps on the modes of the warm start.
-    WarmNewton,
-    /// Pivoting from the warm start: one contact at a time changes its mode.
+    /// From the warm start: pivoting, in which one contact at a time changes its mode.
     Pivoting,
     /// From zero impulse: Newton's steps on the modes that a few sweeps find.
     GuidedNewton,
@@ -79,7 +77,6 @@ impl Stage {
             Self::Sweeps => "sweeps",
             Self::BodySweeps => "body_sweeps",
             Self::Islands => "islands",
-            Self::WarmNewton => "warm_newton",
             Self::Pivoting => "pivoting",
             Self::GuidedNewton => "guided_newton",
             Self::Newton => "newton",
@@ -95,12 +92,9 @@ impl Stage {
     pub const fn method(self) -> Method {
         match self {
             Self::Sweeps | Self::BodySweeps | Self::Islands => Method::GaussSeidel,
-            Self::AtRest
-            | Self::WarmNewton
-            | Self::Pivoting
-            | Self::GuidedNewton
-            | Self::Newton
-            | Self::Restarts => Method::Newton,
+            Self::AtRest | Self::Pivoting | Self::GuidedNewton | Self::Newton | Self::Restarts => {
+                Method::Newton
+            }
             Self::ProximalPoint => Method::ProximalPoint,
             Self::Admm => Method::Admm,
             Self::Relaxed => Method::Relaxed,

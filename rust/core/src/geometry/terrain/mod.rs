@@ -45,6 +45,6 @@ pub trait Terrain: Send + Sync {
     /// Height y (m) of the visible surface at (x, z); `None` where there is none.
     fn height(&self, x: f64, z: f64) -> Option<f64>;
 
-    /// The base plane, if there is one.
+    /// The base plane, if there is one; its number is 0.
     fn ground(&self) -> Option<&Plane>;
 }

@@ -106,9 +106,12 @@ impl Rocks {
     /// Expected number of rocks between the smallest and the largest diameter.
     #[must_use]
     pub fn expected_count(&self) -> f64 {
-        self.table()
-            .last()
-            .map_or(0.0, |per_area| per_area * self.area[0] * self.area[1])
+        self.count_of(&self.table())
+    }
+
+    fn count_of(&self, table: &[f64]) -> f64 {
+        let per_area = table.last().copied().unwrap_or_default();
+        per_area * self.area[0] * self.area[1]
     }
 
     /// Rocks per m² from 1/max_diameter up to each node of a uniform grid in 1/D.
@@ -222,7 +225,7 @@ impl Rocks {
     pub fn sample(&self) -> Result<Vec<Sphere>, TerrainError> {
         self.check()?;
         let table = self.table();
-        let expected = self.expected_count();
+        let expected = self.count_of(&table);
         check_count(expected.min(1e15).ceil() as usize)?;
         let mut random = Random::new(self.seed);
         let count = (expected + random.uniform()) as usize;

@@ -75,6 +75,18 @@ impl Model {
         Self::from_description(description)
     }
 
+    /// A copy with all masses and inertias multiplied by a factor.
+    ///
+    /// # Errors
+    /// A mass or an inertia that leaves its range.
+    pub fn with_masses_scaled(&self, factor: f64) -> Result<Self, ModelError> {
+        let mut description = self.description.clone();
+        for solid in &mut description.solids {
+            solid.set_mass(solid.mass * factor);
+        }
+        Self::from_description(description)
+    }
+
     /// A copy with another torque–speed line, or none, on all wheels.
     ///
     /// # Errors

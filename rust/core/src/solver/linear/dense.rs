@@ -9,6 +9,11 @@
 /// Entries of a chunk, and columns that are eliminated together.
 pub(super) const LANES: usize = 4;
 
+/// Least pivot relative to the entries below it that is accepted without an exchange of rows.
+/// `W` with modes is near a positive definite matrix, which needs hardly any: the iterations of an
+/// exploring rover are those with the largest pivots.
+const THRESHOLD: f64 = 0.01;
+
 /// Entries that the loops process together.
 pub(super) type Chunk = [f64; LANES];
 
@@ -171,8 +176,9 @@ fn cholesky_solve_of(L: &[Chunk], size: usize, b: &mut [Chunk]) {
     }
 }
 
-/// LU factors with row exchanges of a matrix of `size` chunks a side, in
-/// place; the diagonal of `U` is stored reciprocal.
+/// LU factors of a matrix of `size` chunks a side, in place; the diagonal of `U` is stored
+/// reciprocal. Rows are exchanged where the diagonal is [much smaller](THRESHOLD) than what is
+/// below it.
 ///
 /// Returns `false` at a zero or non-finite pivot.
 #[must_use]
@@ -245,8 +251,8 @@ fn eliminate(x: &mut Chunk, panel: [&[Chunk]; LANES], block: usize) -> Chunk {
     *x
 }
 
-/// Brings the largest entry of a column at or below the diagonal onto it; `false` if it is zero or
-/// not finite. The column is named by its diagonal's chunk and the place there.
+/// Puts an acceptable pivot onto the diagonal of a column; `false` if all below it is zero or not
+/// finite. The column is named by its diagonal's chunk and the place there.
 #[inline(always)]
 fn exchange(
     A: &mut [Chunk],
@@ -256,31 +262,43 @@ fn exchange(
 ) -> bool {
     let k = LANES * block + lane;
     let column = &A[k * size..(k + 1) * size];
-    let mut best = k;
-    let mut largest = column[block][lane].abs();
-    let mut offer = |row: usize, x: f64| {
-        if x.abs() > largest {
-            largest = x.abs();
-            best = row;
-        }
-    };
+    let mut below = [0.0; LANES];
     for l in lane + 1..LANES {
-        offer(LANES * block + l, column[block][l]);
+        below[l] = column[block][l].abs();
     }
-    for (c, chunk) in column.iter().enumerate().skip(block + 1) {
-        for (l, &x) in chunk.iter().enumerate() {
-            offer(LANES * c + l, x);
+    for chunk in &column[block + 1..] {
+        below = std::array::from_fn(|l| larger(chunk[l].abs(), below[l]));
+    }
+    let largest = larger(larger(below[0], below[1]), larger(below[2], below[3]));
+    let own = column[block][lane].abs();
+    if own >= THRESHOLD * largest && own > 0.0 {
+        pivots[k] = k;
+        return own.is_finite();
+    }
+    exchange_largest(A, size, k, pivots);
+    largest > 0.0 && largest.is_finite()
+}
+
+/// The larger of two numbers that are not NaN, in one instruction.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// Brings the largest entry of column `k` at or below the diagonal onto it.
+#[cold]
+fn exchange_largest(A: &mut [Chunk], size: usize, k: usize, pivots: &mut [usize]) {
+    let column = A[k * size..(k + 1) * size].as_flattened();
+    let mut best = k;
+    for (row, x) in column.iter().enumerate().skip(k + 1) {
+        if x.abs() > column[best].abs() {
+            best = row;
         }
     }
     pivots[k] = best;
-    if best != k {
-        for column in A.chunks_exact_mut(size) {
-            let x = column[block][lane];
-            column[block][lane] = column[best / LANES][best % LANES];
-            column[best / LANES][best % LANES] = x;
-        }
+    for column in A.chunks_exact_mut(size) {
+        column.as_flattened_mut().swap(k, best);
     }
-    largest > 0.0 && largest.is_finite()
 }
 
 /// Solves `A x = b` in place of `b`, with the factors of [`lu`].

@@ -147,56 +147,71 @@ fn assemble<const D: usize>(
     for ((contact, &mu_i), rows) in contacts.iter().zip(mu).zip(W.chunks_exact(D * n)) {
         let rows: [&[[f64; D]]; D] =
             std::array::from_fn(|r| rows[r * n..(r + 1) * n].as_chunks::<D>().0);
-        for k in 0..n_unknowns::<D>(contact.mode, mu_i) {
-            let column = &mut A[contact.start + k..];
-            let diagonal = (contact.start + k) * height;
-            if contact.mode == ContactMode::Slide && k == 1 {
-                let [e0, e1] = contact.e;
-                let turned = rows[1].iter().zip(rows[D - 1]);
-                let across = turned.map(|(x, y)| std::array::from_fn(|c| e0 * y[c] - e1 * x[c]));
-                combine_columns::<D>(across, mu, contacts, height, column);
-                column[diagonal] += contact.gamma;
-            } else {
-                combine_columns::<D>(rows[k].iter().copied(), mu, contacts, height, column);
+        let own = &mut A[contact.start..];
+        let [e0, e1] = contact.e;
+        let size = n_unknowns::<D>(contact.mode, mu_i);
+        match (contact.mode, size) {
+            (ContactMode::Open, _) => continue,
+            (ContactMode::Stick, _) => assemble_rows(rows, mu, contacts, height, own, |w| w),
+            (ContactMode::Slide, 2) => {
+                let across = |w: [[f64; D]; D]| {
+                    let turned = std::array::from_fn(|c| e0 * w[D - 1][c] - e1 * w[1][c]);
+                    [w[0], turned]
+                };
+                assemble_rows(rows, mu, contacts, height, own, across);
+                own[(contact.start + 1) * height + 1] += contact.gamma;
             }
-            column[diagonal] += alpha;
+            (ContactMode::Slide, _) => {
+                assemble_rows(rows, mu, contacts, height, own, |w| [w[0]]);
+            }
+        }
+        for k in 0..size {
+            own[(contact.start + k) * height + k] += alpha;
         }
     }
 }
 
-/// One row of `W C`, the columns that the unknowns of every contact act
-/// through, into every `height`-th entry of `target`.
+/// The equations of one contact: its blocks of `Bᵀ W C`. `reduce` takes the rows that the contact
+/// keeps from a block of `W`; here follow the columns, which the unknowns of every contact act
+/// through. `target` begins at the contact's first row; columns have `height` entries.
 #[inline]
-fn combine_columns<const D: usize>(
-    row: impl Iterator<Item = [f64; D]>,
+fn assemble_rows<const D: usize, const R: usize>(
+    rows: [&[[f64; D]]; D],
     mu: &[f64],
     contacts: &[Linearised],
     height: usize,
     target: &mut [f64],
+    reduce: impl Fn([[f64; D]; D]) -> [[f64; D]; R],
 ) {
+    let n = contacts.len();
+    let (rows, mu) = (rows.map(|row| &row[..n]), &mu[..n]);
     let mut at = 0;
-    let mut push = |x: f64| {
-        target[at] = x;
+    let mut push = |entries: [f64; R]| {
+        target[at..at + R].copy_from_slice(&entries);
         at += height;
     };
-    for ((w, contact), &mu) in row.zip(contacts).zip(mu) {
+    for (j, contact) in contacts.iter().enumerate() {
+        let [e0, e1] = contact.e;
         match contact.mode {
             ContactMode::Open => {}
             ContactMode::Stick => {
-                for x in w {
-                    push(x);
+                let w = reduce(rows.map(|row| row[j]));
+                for c in 0..D {
+                    push(w.map(|row| row[c]));
                 }
             }
             ContactMode::Slide => {
-                let [e0, e1] = contact.e;
-                let along = if D == 2 {
-                    w[1] * e0
-                } else {
-                    w[1] * e0 + w[2] * e1
+                let w = reduce(rows.map(|row| row[j]));
+                let along = |row: [f64; D]| {
+                    if D == 2 {
+                        row[1] * e0
+                    } else {
+                        row[1] * e0 + row[D - 1] * e1
+                    }
                 };
-                push(w[0] + mu * along);
-                if D == 3 && mu > 0.0 {
-                    push(e0 * w[2] - e1 * w[1]);
+                push(w.map(|row| row[0] + mu[j] * along(row)));
+                if D == 3 && mu[j] > 0.0 {
+                    push(w.map(|row| e0 * row[D - 1] - e1 * row[1]));
                 }
             }
         }

@@ -21,6 +21,8 @@ pub(in crate::solver) struct Linearised {
     pub gamma: f64,
     /// First unknown of this contact in the reduced system.
     pub start: usize,
+    /// Whether pivoting keeps the mode, which it left and returned to at once.
+    pub is_barred: bool,
 }
 
 /// Result of a prediction of the modes.
@@ -210,6 +212,6 @@ fn by_solving<const D: usize>(
         mode: solved.mode,
         e: direction(&solved.impulse, norm),
         gamma: solved.kappa,
-        start: 0,
+        ..Linearised::default()
     }
 }

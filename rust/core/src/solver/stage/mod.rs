@@ -10,6 +10,7 @@ pub(super) mod body_sweeps;
 pub(super) mod gauss_seidel;
 pub(super) mod guided;
 pub(super) mod newton;
+mod pivot_rules;
 pub(super) mod pivoting;
 pub(super) mod proximal;
 pub(super) mod restarts;

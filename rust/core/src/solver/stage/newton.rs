@@ -19,10 +19,6 @@ use crate::solver::work;
 /// full steps find the modes within about ten steps or not at all.
 pub(in crate::solver) const FULL_STEPS: usize = 24;
 
-/// Most full steps from a warm start before pivoting takes over. Measured on a steering rover: 3 to
-/// 6 cost the same.
-pub(in crate::solver) const WARM_STEPS: usize = 3;
-
 /// Steps with changing modes after which a few sweeps break the cycle.
 const CYCLE: usize = 8;
 const CYCLE_SWEEPS: usize = 3;

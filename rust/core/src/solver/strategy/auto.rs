@@ -160,15 +160,16 @@ pub(in crate::solver) fn escalate<const D: usize>(
         }
         scratch.start.copy_from_slice(p);
     } else if is_warm {
-        // If the modes of the last step are right, this ends the solve; if not, more full steps
-        // seldom help.
-        let few = newton::WARM_STEPS.min(steps);
-        let found = newton::full_steps::<D>(data, options, few, p, u, scratch, iterations);
-        if let Some(outcome) = ladder.enter(Stage::WarmNewton, found, p, scratch, *iterations) {
+        let found = pivoting::pivots::<D>(data, options, None, p, u, scratch, iterations);
+        if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
             return outcome;
         }
-        p.copy_from_slice(&scratch.start);
-        let found = pivoting::pivots::<D>(data, options, p, u, scratch, iterations);
+        // Friction may point to modes that lead nowhere: the next path starts from the loads alone.
+        for (p, start) in p.chunks_exact_mut(D).zip(scratch.start.chunks_exact(D)) {
+            p.fill(0.0);
+            p[0] = start[0];
+        }
+        let found = pivoting::pivots::<D>(data, options, None, p, u, scratch, iterations);
         if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
             return outcome;
         }

@@ -1,0 +1,133 @@
+"""The rover in MuJoCo, for speed and accuracy beside another engine. MuJoCo itself is not needed to describe it."""
+
+from collections.abc import Collection, Mapping
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+#: Half the width of a wheel that must not be a sphere, m.
+HALF_WIDTH = 0.002
+
+
+def rover_xml(
+    machine: Mapping[str, Any],
+    *,
+    time_step: float,
+    normal: Collection[float] | None = (0.0, 1.0, 0.0),
+    spheres: npt.ArrayLike = (),
+    friction: float = 0.7,
+    gravity: Collection[float] = (0.0, -9.81, 0.0),
+    thin_wheels: bool = False,
+    brake: bool = False,
+    integrator: str = "implicitfast",
+    cone: str = "pyramidal",
+    impratio: float = 1.0,
+) -> str:
+    """A rover on fixed ground in MuJoCo's XML.
+
+    Only the wheels touch the ground. An actuator `drive{i}` has the torque of wheel i about its joint, and
+    `hold_{solid}` the set-point of each held joint. The default integrator is not MuJoCo's, `Euler`, which is
+    unstable with the gains of the steering.
+
+    Args:
+        machine: `RoverModel.to_dict()`.
+        time_step: s.
+        normal: Of the plane through the origin; None for no plane.
+        spheres: Centres and radii, (n, 4), m.
+        friction: Coulomb's coefficient.
+        gravity: m/s².
+        thin_wheels: Whether wheels are cylinders 4 mm wide. Otherwise they are spheres, which touch flat ground at the
+            same point as discs on axles parallel to it.
+        brake: Whether the wheels are held, too.
+        integrator: MuJoCo's.
+        cone: Of friction.
+        impratio: Of friction over normal impedance.
+
+    Raises:
+        ValueError: A solid has products of inertia.
+    """
+    root = ElementTree.Element("mujoco")
+    ElementTree.SubElement(root, "compiler", angle="radian", autolimits="true")
+    ElementTree.SubElement(
+        root,
+        "option",
+        timestep=repr(time_step),
+        gravity=_text(gravity),
+        integrator=integrator,
+        cone=cone,
+        impratio=repr(impratio),
+    )
+    default = ElementTree.SubElement(root, "default")
+    ElementTree.SubElement(default, "geom", friction=f"{friction} 0 0", condim="3")
+    world = ElementTree.SubElement(root, "worldbody")
+    ground = {"contype": "1", "conaffinity": "2"}  # the links do not touch each other
+    if normal is not None:
+        ElementTree.SubElement(world, "geom", ground, type="plane", size="0 0 1", zaxis=_text(normal))
+    for x, y, z, r in np.reshape(np.asarray(spheres, dtype=float), (-1, 4)):
+        ElementTree.SubElement(world, "geom", ground, type="sphere", size=repr(float(r)), pos=_text((x, y, z)))
+    actuator = ElementTree.SubElement(root, "actuator")
+    wheels = {wheel["solid"]: i for i, wheel in enumerate(machine["wheels"])}
+    steered = {wheel.get("steering") for wheel in machine["wheels"]}
+    nodes: dict[str, ElementTree.Element] = {}
+    for solid in machine["solids"]:
+        name, parent = solid["name"], solid.get("parent")
+        node = ElementTree.SubElement(
+            nodes[parent] if parent else world, "body", name=name, pos=_text(solid.get("position") or (0.0, 0.0, 0.0))
+        )
+        nodes[name] = node
+        ElementTree.SubElement(
+            node,
+            "inertial",
+            pos=_text(solid.get("centre_of_mass") or (0.0, 0.0, 0.0)),
+            mass=repr(solid["mass"]),
+            diaginertia=_text(principal_inertia(solid)),
+        )
+        if parent:
+            ElementTree.SubElement(node, "joint", name=name, type="hinge", axis=_text(solid.get("axis") or (0, 0, 1)))
+        else:
+            ElementTree.SubElement(node, "freejoint")
+        if name in wheels:
+            radius = contact_radius(machine["wheels"][wheels[name]])
+            rim = ("cylinder", f"{radius} {HALF_WIDTH}") if thin_wheels else ("sphere", repr(radius))
+            masks = {"contype": "2", "conaffinity": "1"}
+            ElementTree.SubElement(node, "geom", masks, type=rim[0], size=rim[1], mass="0")
+            ElementTree.SubElement(actuator, "motor", name=f"drive{wheels[name]}", joint=name)
+        if name in steered or (brake and name in wheels):
+            kp, kv = (repr(solid["hold"][gain]) for gain in ("stiffness", "damping"))
+            ElementTree.SubElement(actuator, "position", name=f"hold_{name}", joint=name, kp=kp, kv=kv)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def contact_radius(wheel: Mapping[str, Any]) -> float:
+    """Radius at which a wheel of a description touches the ground, m."""
+    return float(wheel.get("contact_radius", wheel["radius"]))
+
+
+def principal_inertia(solid: Mapping[str, Any]) -> Array:
+    """Inertia of a solid of a description about its mass centre along the frame's axes, (3,), kg m².
+
+    Raises:
+        ValueError: It has products of inertia.
+    """
+    if solid.get("inertia") is not None:
+        inertia = np.array(solid["inertia"], dtype=float)
+        if np.any(inertia[3:] != 0.0):
+            raise ValueError(f"{solid['name']}: products of inertia are not supported here")
+        return inertia[:3]
+    m, shape = float(solid["mass"]), solid["shape"]
+    if shape["kind"] == "box":
+        a, b, c = (float(length) for length in shape["size"])
+        return m / 12.0 * np.array([b * b + c * c, a * a + c * c, a * a + b * b])
+    r = float(shape["radius"])
+    if shape["kind"] == "disc":
+        return m * r * r * np.array([0.25, 0.25, 0.5])
+    across = m / 12.0 * (3.0 * r * r + float(shape["height"]) ** 2)
+    return np.array([across, m * r * r / 2.0, across])
+
+
+def _text(values: Collection[float] | Array) -> str:
+    return " ".join(repr(float(v)) for v in values)

@@ -1,0 +1,121 @@
+//! Rocks of an episode: a number d in [0, 1], the difficulty, sets how hard it is.
+//!
+//! ```text
+//! abundance    k = 0.2 d            fraction of the ground that rocks cover
+//! largest rock r = (0.5 + 1.1 d) R  radius, with R the wheel radius; half of a rock is below ground
+//! slope        0 to 10 d            degrees
+//! ```
+
+use super::pcg64::Pcg64;
+use super::start::{Range, Start};
+use crate::contact::detection::wheel_contacts;
+use crate::geometry::{Clearing, Plane, Rocks, SphereField, TerrainError};
+use crate::multibody::{Configuration, Kinematics, Model};
+
+/// Abundance at difficulty 1; landing sites on Mars have 0.03 to 0.2 (Golombek and Rapp 1997).
+const HARDEST_ABUNDANCE: f64 = 0.2;
+/// Radius of the largest rock at difficulty 0 and at difficulty 1, in wheel radii.
+const LARGEST_ROCK: Range = [0.5, 1.6];
+/// Steepest slope at difficulty 1, degrees.
+const HARDEST_SLOPE_DEG: f64 = 10.0;
+/// Rocks lie up to this far beyond the rectangle that start and goal span, m.
+const MARGIN: f64 = 4.0;
+/// Free room that a clearing leaves around the rover, m.
+const CLEARANCE: f64 = 0.1;
+
+/// What the rocks are drawn from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RockDistribution {
+    /// Of the difficulty.
+    pub difficulty: Range,
+    /// Overrides that of the difficulty.
+    pub abundance: Option<f64>,
+    /// Overrides that of the difficulty; in wheel radii.
+    pub max_radius: Option<f64>,
+}
+
+/// The rocks of an episode.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RockDraw {
+    /// In [0, 1].
+    pub difficulty: f64,
+    /// Fraction of the ground that rocks cover.
+    pub abundance: f64,
+    /// Radius of the largest rocks, in wheel radii.
+    pub max_radius: f64,
+    /// Of the sizes and places, below 2⁶³.
+    pub seed: u64,
+}
+
+impl RockDistribution {
+    /// Draws the rocks of an episode. `range` replaces the range of the difficulty, `fixed` its
+    /// draw, which is made all the same.
+    pub fn draw(&self, random: &mut Pcg64, range: Option<Range>, fixed: Option<f64>) -> RockDraw {
+        let drawn = random.uniform(range.unwrap_or(self.difficulty));
+        let d = fixed.unwrap_or(drawn);
+        let [smallest, largest] = LARGEST_ROCK;
+        RockDraw {
+            difficulty: d,
+            abundance: self.abundance.unwrap_or(HARDEST_ABUNDANCE * d),
+            max_radius: (self.max_radius).unwrap_or(smallest + (largest - smallest) * d),
+            seed: random.below(1 << 63),
+        }
+    }
+}
+
+impl RockDraw {
+    /// Range of the ground's slope, rad.
+    #[must_use]
+    pub fn slope(&self) -> Range {
+        [
+            0.0,
+            HARDEST_SLOPE_DEG * (std::f64::consts::PI / 180.0) * self.difficulty,
+        ]
+    }
+
+    /// The rocks around start and goal, with a clearing at each. `radius`: of the clearing at the
+    /// start, see [`clear_radius`]; the other one has at least `goal_tolerance` (m).
+    ///
+    /// # Errors
+    /// As [`SphereField::rocks`].
+    pub fn lay_out(
+        &self,
+        model: &Model,
+        start: &Start,
+        ground: &Plane,
+        radius: f64,
+        goal_tolerance: f64,
+    ) -> Result<SphereField, TerrainError> {
+        let ([x, z], [goal_x, goal_z]) = (start.position, start.goal);
+        let along = [x.min(goal_x) - MARGIN, x.max(goal_x) + MARGIN];
+        let across = [z.min(goal_z) - MARGIN, z.max(goal_z) + MARGIN];
+        let wheels = model.wheels().iter().map(|wheel| wheel.radius);
+        let clearing = |[x, z]: [f64; 2], radius| Clearing { x, z, radius };
+        SphereField::rocks(&Rocks {
+            abundance: self.abundance,
+            area: [along[1] - along[0], across[1] - across[0]],
+            middle: [0.5 * (along[0] + along[1]), 0.5 * (across[0] + across[1])],
+            seed: self.seed,
+            max_diameter: 2.0 * self.max_radius * wheels.fold(0.0, f64::max),
+            clearings: vec![
+                clearing(start.position, radius),
+                clearing(start.goal, radius.max(goal_tolerance)),
+            ],
+            ground: *ground,
+            ..Rocks::default()
+        })
+    }
+}
+
+/// Radius of a clearing in which a rover has room to turn, m: the wheels' largest reach from the
+/// trunk's origin and a margin.
+#[must_use]
+pub fn clear_radius(model: &Model) -> f64 {
+    let kinematics = Kinematics::of(model, &Configuration::zero(model));
+    let wheels = wheel_contacts(model, &kinematics, &Plane::ground());
+    let reach = wheels.iter().zip(model.wheels()).map(|(contact, wheel)| {
+        let point = kinematics.origin(contact.body) + contact.point;
+        (point.x * point.x + point.z * point.z).sqrt() + wheel.radius
+    });
+    reach.fold(0.0, f64::max) + CLEARANCE
+}

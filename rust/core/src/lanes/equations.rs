@@ -1,0 +1,249 @@
+//! The linear system of a Newton step on `C` contacts: product with `W`, assembly, LU.
+//!
+//! Each contact has three unknowns whatever its mode; those that a mode eliminates have a row of
+//! the unit matrix and the answer zero. With the columns `C_i` and rows `B_i` of the
+//! [modes](super::modes) the system is
+//!
+//! ```text
+//! Bᵀ (W + α I) C y + γ y = −Bᵀ (q − α c),    p = C y
+//! ```
+//!
+//! It gives the impulses themselves, not a change of them: the error of an LU is small in the
+//! equations, whatever the condition of `W + α I`. Rows are not exchanged; that leaves the number
+//! of steps as it is.
+
+use super::modes::Mode;
+use super::problem::{MAX_BLOCKS, block};
+use crate::scalar::Lane;
+
+/// A 3 x 3 block, row-major.
+pub type Block<T> = [T; 9];
+
+/// A contact's three numbers.
+pub type Triple<T> = [T; 3];
+
+/// Block (i, j) of a symmetric `W`.
+#[inline(always)]
+fn block_of<T: Lane>(W: &[Block<T>; MAX_BLOCKS], i: usize, j: usize) -> Block<T> {
+    if j <= i {
+        W[block(i, j)]
+    } else {
+        let [a, b, c, d, e, f, g, h, k] = W[block(j, i)];
+        [a, d, g, b, e, h, c, f, k]
+    }
+}
+
+/// `u = W p + q`.
+#[inline(always)]
+pub fn velocities<T: Lane, const C: usize>(
+    W: &[Block<T>; MAX_BLOCKS],
+    q: &[Triple<T>; C],
+    p: &[Triple<T>; C],
+    u: &mut [Triple<T>; C],
+) {
+    *u = *q;
+    for i in 0..C {
+        let [p0, p1, p2] = p[i];
+        let mut own = u[i];
+        for j in 0..i {
+            let w = &W[block(i, j)];
+            let other = p[j];
+            for k in 0..3 {
+                let row = &w[3 * k..3 * k + 3];
+                own[k] += row[0] * other[0] + row[1] * other[1] + row[2] * other[2];
+                u[j][k] += w[k] * p0 + w[3 + k] * p1 + w[6 + k] * p2;
+            }
+        }
+        let w = &W[block(i, i)];
+        for k in 0..3 {
+            let row = &w[3 * k..3 * k + 3];
+            own[k] += row[0] * p0 + row[1] * p1 + row[2] * p2;
+        }
+        u[i] = own;
+    }
+}
+
+/// Block (i, j) of `Bᵀ (W + α I) C + γ`.
+#[inline(always)]
+fn assemble<T: Lane>(
+    w: Block<T>,
+    alpha: Option<T>,
+    row_mode: &Mode<T>,
+    column_mode: &Mode<T>,
+) -> Block<T> {
+    let mut w = w;
+    if let Some(alpha) = alpha {
+        for k in 0..3 {
+            w[4 * k] += alpha;
+        }
+    }
+    let Mode { a, b, .. } = column_mode;
+    let mut x = w;
+    for k in 0..3 {
+        let (w1, w2) = (w[3 * k + 1], w[3 * k + 2]);
+        x[3 * k] = w[3 * k] + (a[0] * w1 + a[1] * w2);
+        x[3 * k + 1] = b[0] * w1 + b[1] * w2;
+    }
+    let Mode {
+        closed,
+        b,
+        stick,
+        gamma,
+        ..
+    } = row_mode;
+    let mut out = x;
+    for k in 0..3 {
+        out[k] = *closed * x[k];
+        out[3 + k] = b[0] * x[3 + k] + b[1] * x[6 + k];
+        out[6 + k] = *stick * x[6 + k];
+    }
+    if alpha.is_some() {
+        let one = gamma.like(1.0);
+        out[0] += one - *closed;
+        out[4] += *gamma;
+        out[8] += one - *stick;
+    }
+    out
+}
+
+/// Factors of the system, `L` with ones on its diagonal and `U` with the inverse of its own.
+pub type Factors<T, const C: usize> = [[Block<T>; C]; C];
+
+/// `x − L U`.
+#[inline(always)]
+fn minus_product<T: Lane>(x: &mut Block<T>, l: &Block<T>, u: &Block<T>) {
+    for r in 0..3 {
+        let row = [l[3 * r], l[3 * r + 1], l[3 * r + 2]];
+        for c in 0..3 {
+            let mut sum = x[3 * r + c];
+            sum -= row[0] * u[c];
+            sum -= row[1] * u[3 + c];
+            sum -= row[2] * u[6 + c];
+            x[3 * r + c] = sum;
+        }
+    }
+}
+
+/// Factors a diagonal block; the diagonal of `U` is inverted.
+#[inline(always)]
+fn factor_diagonal<T: Lane>(x: &Block<T>) -> Block<T> {
+    let one = x[0].like(1.0);
+    let [x00, x01, x02, x10, x11, x12, x20, x21, x22] = *x;
+    let d0 = one / x00;
+    let (l1, l2) = (x10 * d0, x20 * d0);
+    let (u11, u12) = (x11 - l1 * x01, x12 - l1 * x02);
+    let d1 = one / u11;
+    let l21 = (x21 - l2 * x01) * d1;
+    let d2 = one / (x22 - l2 * x02 - l21 * u12);
+    [d0, x01, x02, l1, d1, u12, l2, l21, d2]
+}
+
+/// `X U⁻¹` for a factored diagonal block.
+#[inline(always)]
+fn over_upper<T: Lane>(x: &Block<T>, f: &Block<T>) -> Block<T> {
+    let mut out = *x;
+    for r in 0..3 {
+        let l0 = x[3 * r] * f[0];
+        let l1 = (x[3 * r + 1] - l0 * f[1]) * f[4];
+        let l2 = (x[3 * r + 2] - l0 * f[2] - l1 * f[5]) * f[8];
+        out[3 * r] = l0;
+        out[3 * r + 1] = l1;
+        out[3 * r + 2] = l2;
+    }
+    out
+}
+
+/// `L⁻¹ X` for a factored diagonal block.
+#[inline(always)]
+fn under_lower<T: Lane>(x: &Block<T>, f: &Block<T>) -> Block<T> {
+    let mut out = *x;
+    for c in 0..3 {
+        let y1 = x[3 + c] - f[3] * x[c];
+        out[3 + c] = y1;
+        out[6 + c] = x[6 + c] - f[6] * x[c] - f[7] * y1;
+    }
+    out
+}
+
+/// The impulses `C y` of the Newton step, into `y`; `factors` is scratch.
+#[inline(always)]
+pub fn newton_point<T: Lane, const C: usize>(
+    W: &[Block<T>; MAX_BLOCKS],
+    q: &[Triple<T>; C],
+    centre: &[Triple<T>; C],
+    alpha: T,
+    modes: &[Mode<T>; C],
+    factors: &mut Factors<T, C>,
+    y: &mut [Triple<T>; C],
+) {
+    for k in 0..C {
+        let mut diagonal = assemble(W[block(k, k)], Some(alpha), &modes[k], &modes[k]);
+        for m in 0..k {
+            let (l, u) = (factors[k][m], factors[m][k]);
+            minus_product(&mut diagonal, &l, &u);
+        }
+        let pivot = factor_diagonal(&diagonal);
+        factors[k][k] = pivot;
+        for i in k + 1..C {
+            let mut x = assemble(block_of(W, i, k), None, &modes[i], &modes[k]);
+            for m in 0..k {
+                let (l, u) = (factors[i][m], factors[m][k]);
+                minus_product(&mut x, &l, &u);
+            }
+            factors[i][k] = over_upper(&x, &pivot);
+            let mut x = assemble(block_of(W, k, i), None, &modes[k], &modes[i]);
+            for m in 0..k {
+                let (l, u) = (factors[k][m], factors[m][i]);
+                minus_product(&mut x, &l, &u);
+            }
+            factors[k][i] = under_lower(&x, &pivot);
+        }
+        // The right-hand side is one more column.
+        let Mode {
+            closed, b, stick, ..
+        } = &modes[k];
+        let (c, q) = (&centre[k], &q[k]);
+        let rhs = [
+            alpha * c[0] - q[0],
+            alpha * c[1] - q[1],
+            alpha * c[2] - q[2],
+        ];
+        let mut own = [
+            *closed * rhs[0],
+            b[0] * rhs[1] + b[1] * rhs[2],
+            *stick * rhs[2],
+        ];
+        for m in 0..k {
+            let l = &factors[k][m];
+            for r in 0..3 {
+                own[r] -= l[3 * r] * y[m][0];
+                own[r] -= l[3 * r + 1] * y[m][1];
+                own[r] -= l[3 * r + 2] * y[m][2];
+            }
+        }
+        own[1] -= pivot[3] * own[0];
+        own[2] = own[2] - pivot[6] * own[0] - pivot[7] * own[1];
+        y[k] = own;
+    }
+    for k in (0..C).rev() {
+        let mut own = y[k];
+        for m in k + 1..C {
+            let u = &factors[k][m];
+            for r in 0..3 {
+                own[r] -= u[3 * r] * y[m][0];
+                own[r] -= u[3 * r + 1] * y[m][1];
+                own[r] -= u[3 * r + 2] * y[m][2];
+            }
+        }
+        let f = &factors[k][k];
+        own[2] *= f[8];
+        own[1] = (own[1] - f[5] * own[2]) * f[4];
+        own[0] = (own[0] - f[1] * own[1] - f[2] * own[2]) * f[0];
+        y[k] = own;
+    }
+    for k in 0..C {
+        let Mode { a, b, .. } = &modes[k];
+        let [y0, y1, y2] = y[k];
+        y[k] = [y0, a[0] * y0 + b[0] * y1, a[1] * y0 + b[1] * y1 + y2];
+    }
+}

@@ -1,0 +1,320 @@
+//! Modes of the contacts side by side, and their violation of the law.
+//!
+//! The modes are predicted by the projection of `z = p − ρ u` (Alart and Curnier 1991), or read
+//! from the impulses of the last step.
+
+use super::equations::Triple;
+use crate::scalar::Lane;
+
+/// The linearised equations of one contact.
+///
+/// Its impulse is `p = C y` and its equations are the rows `Bᵀ` of `u + γ y = 0`:
+///
+/// ```text
+///          C                      B                  γ
+/// open     -                      0 0 0              1 1 1
+/// stick    1 0 0                  1 0 0              0 0 0
+///          0 1 0                  0 1 0
+///          0 0 1                  0 0 1
+/// slide    1    0    -            1 0    0           0 γ 1
+///          μ e1 −e2  -            0 −e2  0
+///          μ e2 e1   -            0 e1   0
+/// ```
+///
+/// A column marked `-` may be anything, since its unknown is zero.
+#[derive(Clone, Copy, Debug)]
+pub struct Mode<T> {
+    /// `μ e`, zero unless sliding.
+    pub a: [T; 2],
+    /// `(−e2, e1)`; (1, 0) if sticking, zero if open or without friction.
+    pub b: [T; 2],
+    /// 1 if closed, 0 if open.
+    pub closed: T,
+    /// 1 if sticking, 0 otherwise.
+    pub stick: T,
+    /// Turning stiffness of the second equation, 1/kg; 1 where `b` is zero.
+    pub gamma: T,
+}
+
+/// What a contact's law needs to know of its problem.
+#[derive(Clone, Copy, Debug)]
+pub struct Law<T> {
+    /// Friction coefficient.
+    pub mu: T,
+    /// `ρ_N` and `ρ_T`, kg.
+    pub rho: [T; 2],
+    /// `1/ρ_N` and `1/ρ_T`, 1/kg.
+    pub inverse: [T; 2],
+    /// Square of the contact's mass, kg².
+    pub mass_squared: T,
+}
+
+/// `z_T = p_T − ρ_T u_T` and its length.
+#[derive(Clone, Copy, Debug)]
+pub struct Projected<T> {
+    z: [T; 2],
+    norm: T,
+}
+
+/// Sums over the contacts' violations.
+#[derive(Clone, Copy, Debug)]
+pub struct Violations<T> {
+    /// `Σ |v_i|²`, (m/s)².
+    pub squares: T,
+    /// `Σ |ρ_i v_i|²`, (N s)².
+    pub weighted: T,
+    /// `max |v_i|²`, (m/s)².
+    pub largest: T,
+}
+
+/// Impulses below the limit of friction by less than this share slide.
+const AT_THE_LIMIT: f64 = 1e-9;
+
+/// Largest turning stiffness relative to `1/ρ_T`; a contact about to open would have infinitely
+/// much.
+const STIFFEST: f64 = 1e12;
+
+impl<T: Lane> Mode<T> {
+    /// Open.
+    #[inline(always)]
+    pub fn open(like: T) -> Self {
+        let (zero, one) = (like.like(0.0), like.like(1.0));
+        Self {
+            a: [zero; 2],
+            b: [zero; 2],
+            closed: zero,
+            stick: zero,
+            gamma: one,
+        }
+    }
+
+    /// Of masks and of the slide along `e` with stiffness `gamma`; `has_friction` where the
+    /// contact can resist a slide.
+    #[inline(always)]
+    fn of(
+        mu: T,
+        closed: T::Mask,
+        stick: T::Mask,
+        has_friction: T::Mask,
+        e: [T; 2],
+        gamma: T,
+    ) -> Self {
+        let (zero, one) = (mu.like(0.0), mu.like(1.0));
+        let slides = closed & !stick & has_friction;
+        let sticks = closed & stick;
+        let e = [T::select(slides, e[0], zero), T::select(slides, e[1], zero)];
+        Self {
+            a: [mu * e[0], mu * e[1]],
+            b: [T::select(sticks, one, -e[1]), e[0]],
+            closed: T::select(closed, one, zero),
+            stick: T::select(sticks, one, zero),
+            gamma: T::select(slides, gamma, T::select(sticks, zero, one)),
+        }
+    }
+
+    /// `yes` where the mask is true, `no` elsewhere.
+    #[inline(always)]
+    pub fn select(mask: T::Mask, yes: &Self, no: &Self) -> Self {
+        Self {
+            a: [
+                T::select(mask, yes.a[0], no.a[0]),
+                T::select(mask, yes.a[1], no.a[1]),
+            ],
+            b: [
+                T::select(mask, yes.b[0], no.b[0]),
+                T::select(mask, yes.b[1], no.b[1]),
+            ],
+            closed: T::select(mask, yes.closed, no.closed),
+            stick: T::select(mask, yes.stick, no.stick),
+            gamma: T::select(mask, yes.gamma, no.gamma),
+        }
+    }
+
+    /// Predicted at an impulse `p_N` and velocity `u_N`.
+    #[inline(always)]
+    pub fn predict(law: &Law<T>, seen: &Projected<T>, p_N: T, u_N: T) -> Self {
+        let zero = p_N.like(0.0);
+        let [rho_N, rho_T] = law.rho;
+        let z_N = p_N - rho_N * u_N;
+        let Projected { z, norm } = *seen;
+        let radius = law.mu * z_N;
+        let one = zero.like(1.0);
+        let inverse = one / (rho_T * radius * norm);
+        let shared = rho_T * radius * inverse;
+        let e = [z[0] * shared, z[1] * shared];
+        let stiffest = zero.like(STIFFEST) * law.inverse[1];
+        let gamma = ((norm - radius) * norm * inverse).min(stiffest);
+        let closed = zero.lt(z_N);
+        Self::of(
+            law.mu,
+            closed,
+            norm.le(radius) & zero.lt(radius),
+            zero.lt(radius),
+            e,
+            gamma,
+        )
+    }
+
+    /// Read from the impulse itself, the answer of the last step.
+    ///
+    /// A contact without impulse counts as sticking if it approaches, else as open.
+    #[inline(always)]
+    pub fn recall(mu: T, p: &Triple<T>, u: &Triple<T>) -> Self {
+        let zero = mu.like(0.0);
+        let (e, gamma, norm) = slide_along(p, u);
+        let radius = mu * p[0];
+        let pressed = zero.lt(p[0]);
+        let below = norm.lt(radius * zero.like(1.0 - AT_THE_LIMIT));
+        let approaches = u[0].lt(zero);
+        let stick = (pressed & below) | (!pressed & approaches);
+        Self::of(mu, pressed | approaches, stick, zero.lt(radius), e, gamma)
+    }
+
+    /// A slide along the present impulse.
+    #[inline(always)]
+    pub fn slide(mu: T, p: &Triple<T>, u: &Triple<T>) -> Self {
+        let zero = mu.like(0.0);
+        let (e, gamma, norm) = slide_along(p, u);
+        let yes = zero.le(zero);
+        Self::of(mu, yes, !yes, zero.lt(mu) & zero.lt(norm), e, gamma)
+    }
+
+    /// Whether it is open, sticks or slides where another does not.
+    #[inline(always)]
+    pub fn differs(&self, other: &Self) -> T::Mask {
+        let (own, other) = (self.closed + self.stick, other.closed + other.stick);
+        own.lt(other) | other.lt(own)
+    }
+
+    /// Whether it sticks.
+    #[inline(always)]
+    pub fn sticks(&self) -> T::Mask {
+        self.stick.like(0.5).lt(self.stick)
+    }
+}
+
+/// Direction of the tangential impulse, the turning stiffness of a slide along it, and its size.
+#[inline(always)]
+fn slide_along<T: Lane>(p: &Triple<T>, u: &Triple<T>) -> ([T; 2], T, T) {
+    let zero = p[0].like(0.0);
+    let square = p[1] * p[1] + p[2] * p[2];
+    let norm = square.sqrt();
+    let inverse = zero.like(1.0) / norm;
+    let along = p[1] * u[1] + p[2] * u[2];
+    let gamma = (-(along * inverse) * inverse).max(zero);
+    ([p[1] * inverse, p[2] * inverse], gamma, norm)
+}
+
+/// Violations of the law at impulses `p` and velocities `u`, and the projected impulses.
+#[inline(always)]
+pub fn judge<T: Lane, const C: usize>(
+    laws: &[Law<T>; C],
+    p: &[Triple<T>; C],
+    u: &[Triple<T>; C],
+    seen: &mut [Projected<T>; C],
+) -> Violations<T> {
+    let zero = p[0][0].like(0.0);
+    let one = zero.like(1.0);
+    let mut sums = Violations::none(zero);
+    for i in 0..C {
+        let (law, p, u) = (&laws[i], &p[i], &u[i]);
+        // The normal part: min(u_N, p_N/ρ_N).
+        let pressed = p[0] * law.inverse[0];
+        let normal = T::select(pressed.le(u[0]), pressed, u[0]);
+        // The tangential part: (p_T − Π(z_T))/ρ_T with the disc of radius μ p_N.
+        let rho_T = law.rho[1];
+        let z = [p[1] - rho_T * u[1], p[2] - rho_T * u[2]];
+        let norm = (z[0] * z[0] + z[1] * z[1]).sqrt();
+        let radius = (law.mu * p[0]).max(zero);
+        let scale = T::select(radius.lt(norm), radius / norm, one);
+        let slip = [
+            (p[1] - z[0] * scale) * law.inverse[1],
+            (p[2] - z[1] * scale) * law.inverse[1],
+        ];
+        let square = normal * normal + (slip[0] * slip[0] + slip[1] * slip[1]);
+        sums.squares += square;
+        sums.weighted += law.mass_squared * square;
+        sums.largest = square.max(sums.largest);
+        seen[i] = Projected { z, norm };
+    }
+    sums
+}
+
+impl<T: Lane> Violations<T> {
+    /// No violation.
+    #[inline(always)]
+    pub fn none(like: T) -> Self {
+        let zero = like.like(0.0);
+        Self {
+            squares: zero,
+            weighted: zero,
+            largest: zero,
+        }
+    }
+
+    /// Whether the sums are finite, and with them all impulses and velocities.
+    #[inline(always)]
+    pub fn is_finite(&self) -> T::Mask {
+        self.squares.is_finite() & self.weighted.is_finite()
+    }
+}
+
+impl<T: Lane> Projected<T> {
+    /// Nothing projected.
+    #[inline(always)]
+    pub fn none(like: T) -> Self {
+        let zero = like.like(0.0);
+        Self {
+            z: [zero; 2],
+            norm: zero,
+        }
+    }
+}
+
+/// Where a contact limits a step, as a fraction of it: 1 where it does not.
+#[derive(Clone, Copy, Debug)]
+pub struct Limit<T: Lane> {
+    /// Fraction of the step.
+    pub t: T,
+    /// Whether the contact slides from there on; else it opens.
+    pub slides: T::Mask,
+}
+
+/// `x_T y_T − μ² x_N y_N`; for x = y positive outside the cone of friction.
+#[inline(always)]
+fn outside<T: Lane>(mu: T, x: &Triple<T>, y: &Triple<T>) -> T {
+    x[1] * y[1] + x[2] * y[2] - mu * mu * (x[0] * y[0])
+}
+
+/// Smallest fraction of the step from `p` to `trial` at which a sticking contact reaches the limit
+/// of friction, or a sliding one opens.
+#[inline(always)]
+pub fn limit<T: Lane>(mode: &Mode<T>, mu: T, p: &Triple<T>, trial: &Triple<T>) -> Limit<T> {
+    let (zero, one) = (mu.like(0.0), mu.like(1.0));
+    let d = [trial[0] - p[0], trial[1] - p[1], trial[2] - p[2]];
+    // |p_T + t d_T|² = μ² (p_N + t d_N)²
+    let a = outside(mu, &d, &d);
+    let b = outside(mu, p, &d);
+    let c = outside(mu, p, p);
+    let root = (b * b - a * c).max(zero).sqrt();
+    // In the form without cancellation.
+    let ahead = zero.le(b);
+    let first = T::select(ahead, -c / (b + root), (root - b) / a);
+    let second = T::select(ahead, (-b - root) / a, -c / (b + root));
+    let first = T::select(zero.le(first), first, one);
+    let second = T::select(zero.le(second), second, one);
+    let inside = first.min(second).min(one);
+    let at_the_limit = T::select(ahead, zero, one);
+    let sticks = mode.sticks();
+    let pressed = zero.lt(p[0]);
+    let stays = outside(mu, trial, trial).le(zero) & zero.lt(trial[0]);
+    let leaves = T::select(zero.le(c), at_the_limit, inside);
+    let opens = T::select(trial[0].lt(zero), p[0] / -d[0], one);
+    let closed = zero.lt(mode.closed);
+    let t = T::select(
+        sticks & pressed & !stays,
+        leaves,
+        T::select(closed & !sticks & pressed, opens, one),
+    );
+    Limit { t, slides: sticks }
+}

@@ -1,0 +1,243 @@
+//! The parts of a machine that meet the ground, and the motion of what carries them.
+//!
+//! The spin of a wheel moves its nearest point to the ground along the ground alone, so its
+//! normal velocity comes from the carrier.
+
+use nalgebra::Vector3;
+
+use super::machine::{Axis, Machine, velocity};
+use super::poses::{Pose, Poses, times_columns};
+use crate::scalar::{Lane, Mat3, Vec3};
+
+/// Wheels and boxes.
+#[derive(Clone, Debug)]
+pub(super) struct Parts {
+    pub wheels: Vec<Wheel>,
+    pub boxes: Vec<Solid>,
+    /// The trunk, then bodies after what carries them.
+    carriers: Vec<Carrier>,
+}
+
+/// A wheel, as contacts need it.
+#[derive(Clone, Debug)]
+pub(super) struct Wheel {
+    pub body: usize,
+    centre: Option<[f64; 3]>,
+    axle: Axle,
+    pub spoke: [f64; 3],
+    /// m.
+    pub radius: f64,
+    /// Twist of the body that moves its centre.
+    pub carrier: usize,
+    /// Velocity of the spin about its own axle that the carrier's twist lacks.
+    spin: Option<usize>,
+}
+
+/// Where a wheel's axle comes from.
+#[derive(Clone, Copy, Debug)]
+enum Axle {
+    /// Along the joint's axis, or against it.
+    Joint(bool),
+    /// A direction in the body's frame.
+    Fixed([f64; 3]),
+}
+
+/// A box, as contacts need it.
+#[derive(Clone, Debug)]
+pub(super) struct Solid {
+    pub body: usize,
+    centre: Option<[f64; 3]>,
+    rotation: Option<[[f64; 3]; 3]>,
+    pub half_size: [f64; 3],
+    /// Radius of a bounding ball, m.
+    pub bound: f64,
+    /// Twist of its body.
+    pub carrier: usize,
+}
+
+/// A body whose twist is needed.
+#[derive(Clone, Copy, Debug)]
+struct Carrier {
+    body: usize,
+    /// Twist of the body that carries it.
+    parent: usize,
+}
+
+/// Velocity of a body: angular, and of its material point at the trunk's origin.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Twist<T> {
+    pub angular: Vec3<T>,
+    pub linear: Vec3<T>,
+}
+
+impl Parts {
+    /// The parts of a machine.
+    pub(super) fn of(machine: &Machine) -> Self {
+        let mut carriers = vec![Carrier { body: 0, parent: 0 }];
+        let some = |x: [f64; 3]| (x != [0.0; 3]).then_some(x);
+        let wheels = (machine.wheels.iter())
+            .map(|wheel| {
+                let link = &machine.links[wheel.body];
+                let axle = if wheel.body > 0 {
+                    axle_of(&link.axis, wheel.axle)
+                } else {
+                    Axle::Fixed(wheel.axle)
+                };
+                let spins = link.is_spinner && matches!(axle, Axle::Joint(_));
+                let mover = if spins { link.parent } else { wheel.body };
+                Wheel {
+                    body: wheel.body,
+                    centre: some(wheel.centre),
+                    axle,
+                    spoke: wheel.spoke,
+                    radius: wheel.radius,
+                    carrier: carrier_of(machine, mover, &mut carriers),
+                    spin: spins.then(|| velocity(wheel.body)),
+                }
+            })
+            .collect();
+        let boxes = (machine.boxes.iter())
+            .map(|solid| {
+                let is_plain =
+                    solid.rotation == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+                Solid {
+                    body: solid.body,
+                    centre: some(solid.centre),
+                    rotation: (!is_plain).then_some(solid.rotation),
+                    half_size: solid.half_size,
+                    bound: Vector3::from(solid.half_size).norm(),
+                    carrier: carrier_of(machine, solid.body, &mut carriers),
+                }
+            })
+            .collect();
+        Self {
+            wheels,
+            boxes,
+            carriers,
+        }
+    }
+
+    /// Number of twists.
+    pub(super) fn n_carriers(&self) -> usize {
+        self.carriers.len()
+    }
+
+    /// Twists of all carriers.
+    #[inline(always)]
+    pub(super) fn find_twists<T: Lane>(&self, poses: &Poses<T>, v: &[T], twists: &mut [Twist<T>]) {
+        let n = self.carriers.len();
+        let twists = &mut twists[..n];
+        twists[0] = Twist {
+            linear: Vec3::new(v[0], v[1], v[2]),
+            angular: Vec3::new(v[3], v[4], v[5]),
+        };
+        for i in 1..n {
+            let Carrier { body, parent } = self.carriers[i];
+            let (pose, rate, before) = (&poses.bodies[body], v[velocity(body)], twists[parent]);
+            twists[i] = Twist {
+                angular: before.angular + pose.axis * rate,
+                linear: before.linear + pose.swing * rate,
+            };
+        }
+    }
+}
+
+impl<T: Lane> Twist<T> {
+    /// Velocity of a material point, m/s.
+    #[inline(always)]
+    pub(super) fn velocity(&self, x: Vec3<T>) -> Vec3<T> {
+        self.linear + self.angular.cross(x)
+    }
+}
+
+impl Wheel {
+    /// Centre relative to the trunk's origin, m.
+    #[inline(always)]
+    pub(super) fn centre<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
+        place(pose, self.centre.as_ref())
+    }
+
+    /// Unit axle.
+    #[inline(always)]
+    pub(super) fn axle<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
+        match self.axle {
+            Axle::Joint(is_reversed) => {
+                if is_reversed {
+                    -pose.axis
+                } else {
+                    pose.axis
+                }
+            }
+            Axle::Fixed(s) => pose.R.times_shared(s),
+        }
+    }
+
+    /// Upper bound on the speed of all its points, m/s, with its centre at `centre`.
+    #[inline(always)]
+    pub(super) fn speed<T: Lane>(&self, twist: &Twist<T>, centre: Vec3<T>, v: &[T]) -> T {
+        let spin = match self.spin {
+            Some(k) => v[k].abs(),
+            None => v[0].like(0.0),
+        };
+        twist.velocity(centre).norm() + (twist.angular.norm() + spin) * spin.like(self.radius)
+    }
+}
+
+impl Solid {
+    /// Centre relative to the trunk's origin, m.
+    #[inline(always)]
+    pub(super) fn centre<T: Lane>(&self, pose: &Pose<T>) -> Vec3<T> {
+        place(pose, self.centre.as_ref())
+    }
+
+    /// Its axes.
+    #[inline(always)]
+    pub(super) fn axes<T: Lane>(&self, pose: &Pose<T>) -> Mat3<T> {
+        match &self.rotation {
+            None => pose.R,
+            Some(rotation) => times_columns(&pose.R, rotation),
+        }
+    }
+
+    /// Upper bound on the speed of all its points, m/s, with its centre at `centre`.
+    #[inline(always)]
+    pub(super) fn speed<T: Lane>(&self, twist: &Twist<T>, centre: Vec3<T>) -> T {
+        twist.velocity(centre).norm() + twist.angular.norm() * centre.x.like(self.bound)
+    }
+}
+
+/// A point of a body, `None` for its origin, relative to the trunk's origin, m.
+#[inline(always)]
+fn place<T: Lane>(pose: &Pose<T>, x: Option<&[f64; 3]>) -> Vec3<T> {
+    match x {
+        None => pose.r,
+        Some(x) => pose.r + pose.R.times_shared(*x),
+    }
+}
+
+/// The axle of a wheel whose body has a joint with this axis.
+fn axle_of(axis: &Axis, axle: [f64; 3]) -> Axle {
+    let axis = match axis {
+        Axis::X => [1.0, 0.0, 0.0],
+        Axis::Y => [0.0, 1.0, 0.0],
+        Axis::Z => [0.0, 0.0, 1.0],
+        Axis::General(u) => *u,
+    };
+    if axle == axis {
+        Axle::Joint(false)
+    } else if axle == axis.map(|x| -x) {
+        Axle::Joint(true)
+    } else {
+        Axle::Fixed(axle)
+    }
+}
+
+/// Index of a body among the carriers; adds it with all that carry it.
+fn carrier_of(machine: &Machine, body: usize, carriers: &mut Vec<Carrier>) -> usize {
+    if let Some(i) = carriers.iter().position(|carrier| carrier.body == body) {
+        return i;
+    }
+    let parent = carrier_of(machine, machine.links[body].parent, carriers);
+    carriers.push(Carrier { body, parent });
+    carriers.len() - 1
+}

@@ -1,0 +1,105 @@
+//! Random generators as arrays: four unsigned 64-bit numbers each, high and low half of the state,
+//! high and low half of the increment.
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyInt;
+use rover_core::draw::{Pcg64, Pcg64State};
+
+use crate::arguments::{count, refused};
+use crate::arrays::fresh_table;
+use crate::errors::Kind;
+
+/// (m, 4) halves of states and increments.
+pub fn generators(value: &Bound<'_, PyAny>) -> PyResult<Vec<Pcg64>> {
+    let found = value.extract::<PyReadonlyArray2<'_, u64>>();
+    let what = "an array (m, 4) of uint64";
+    let found = found.map_err(|_| refused(value, Kind::Option, "generators", what))?;
+    let view = found.as_array();
+    if view.shape()[1] != 4 {
+        return Err(refused(value, Kind::Option, "generators", what).into());
+    }
+    let join = |high: u64, low: u64| (u128::from(high) << 64) | u128::from(low);
+    let generator = |row: numpy::ndarray::ArrayView1<'_, u64>| {
+        Pcg64::from_state(Pcg64State {
+            state: join(row[0], row[1]),
+            increment: join(row[2], row[3]),
+        })
+    };
+    Ok(view.rows().into_iter().map(generator).collect())
+}
+
+#[allow(clippy::cast_possible_truncation)] // the halves are meant
+pub fn halves(random: &Pcg64) -> [u64; 4] {
+    let Pcg64State { state, increment } = random.state();
+    [
+        (state >> 64) as u64,
+        state as u64,
+        (increment >> 64) as u64,
+        increment as u64,
+    ]
+}
+
+/// Seeds generators as `numpy.random.PCG64` does.
+///
+/// Args:
+///     seeds: Whole numbers from 0, of any size.
+///
+/// Returns:
+///     (m, 4) uint64: high and low half of each state, high and low half of each increment.
+///
+/// Raises:
+///     OptionError: A seed is no whole number from 0.
+#[pyfunction]
+pub fn seed_generators<'py>(
+    py: Python<'py>,
+    seeds: &Bound<'_, PyAny>,
+) -> PyResult<Bound<'py, PyArray2<u64>>> {
+    let what = "whole numbers from 0";
+    let entries = seeds.try_iter();
+    let entries = entries.map_err(|_| refused(seeds, Kind::Option, "seeds", what))?;
+    let seeded = |(i, entry): (usize, PyResult<Bound<'_, PyAny>>)| -> PyResult<[u64; 4]> {
+        let entry = entry?;
+        let field = format!("seeds[{i}]");
+        let refuse = || refused(&entry, Kind::Option, &field, "a whole number from 0");
+        if !entry.is_instance_of::<PyInt>() || entry.lt(0)? {
+            return Err(refuse().into());
+        }
+        let n_bits: usize = entry.call_method0("bit_length")?.extract()?;
+        let n_words = n_bits.div_ceil(32).max(1);
+        let bytes = entry.call_method1("to_bytes", (4 * n_words, "little"))?;
+        let bytes: Vec<u8> = bytes.extract()?;
+        let words = bytes.chunks_exact(4);
+        let words: Vec<u32> = words
+            .map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]]))
+            .collect();
+        Ok(halves(&Pcg64::seeded(&words)))
+    };
+    let rows: Vec<[u64; 4]> = entries.enumerate().map(seeded).collect::<PyResult<_>>()?;
+    fresh_table(py, rows.into_iter())
+}
+
+/// Draws standard normal numbers as `numpy.random.Generator.standard_normal` does.
+///
+/// Args:
+///     generators: Generators, (m, 4) uint64.
+///     size: Numbers for each.
+///
+/// Returns:
+///     The numbers, (m, size), and the generators after the draws, (m, 4) uint64.
+///
+/// Raises:
+///     OptionError: An argument has a wrong shape or type.
+#[pyfunction]
+pub fn standard_normals<'py>(
+    py: Python<'py>,
+    generators: &Bound<'_, PyAny>,
+    size: &Bound<'_, PyAny>,
+) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u64>>)> {
+    let mut randoms = self::generators(generators)?;
+    let size = count(size, Kind::Option, "size")?;
+    let numbers = (randoms.iter_mut()).flat_map(|random| (0..size).map(|_| random.normal()));
+    let numbers: Vec<f64> = numbers.collect();
+    let numbers = PyArray1::from_vec(py, numbers).reshape([randoms.len(), size])?;
+    Ok((numbers, fresh_table(py, randoms.iter().map(halves))?))
+}

@@ -1,0 +1,226 @@
+"""Episodes are drawn in the compiled core: from NumPy's numbers, and the same on any threads and any processor."""
+
+import hashlib
+import math
+import os
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rover_gym import OptionError, RoverEnv
+from rover_gym.env.generators import fresh_seed, generator_at, row_of, seeded_rows
+from rover_gym.mechanics import EpisodeBatch, EpisodeDistribution, Simulation, seed_generators, standard_normals
+from rover_gym.vector import RoverVectorEnv
+
+#: Everything that can be drawn is drawn.
+ALL_DRAWN: dict[str, Any] = {
+    "terrain": "sphere_field",
+    "difficulty": (0.0, 0.6),
+    "friction": (0.5, 0.9),
+    "mass_scale": (0.8, 1.2),
+    "actuator_gain": (0.9, 1.1),
+    "gravity_scale": (0.4, 1.0),
+    "observation_noise": 0.02,
+}
+
+
+def numpys(seed: int) -> np.random.Generator:
+    return np.random.Generator(np.random.PCG64(seed))
+
+
+@pytest.mark.parametrize("seed", [0, 1, 12345, 2**32, 2**63, 2**64 - 1, 2**128 + 3, 2**400 - 1])
+def test_seeds_give_the_states_and_normal_numbers_of_numpy(seed: int) -> None:
+    generator = numpys(seed)
+    rows = seed_generators([seed])
+    np.testing.assert_array_equal(rows, row_of(generator)[None])
+    for size in (1, 91, 5000):
+        numbers, rows = standard_normals(rows, size)
+        assert numbers.tobytes() == generator.standard_normal((1, size)).tobytes()
+        np.testing.assert_array_equal(rows[0], row_of(generator))
+    assert generator_at(rows[0]).random() == generator.random()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_reset_draws_what_numpy_would_draw(seed: int) -> None:
+    env = RoverEnv(**ALL_DRAWN)
+    observation, info = env.reset(seed=seed)
+    generator = numpys(seed)
+    difficulty, rock_seed = generator.uniform(0.0, 0.6), int(generator.integers(2**63))
+    slope = generator.uniform(0.0, math.radians(10.0) * difficulty)
+    uphill, heading = (generator.uniform(-math.pi, math.pi) for _ in range(2))
+    distance, bearing = generator.uniform(5.0, 10.0), generator.uniform(-math.pi / 2.0, math.pi / 2.0)
+    assert env.rocks is not None
+    assert (env.rocks.difficulty, env.rocks.seed) == (difficulty, rock_seed)
+    assert (env.start.slope, env.start.uphill, env.start.heading) == (slope, uphill, heading)
+    assert env.goal == pytest.approx(
+        (distance * math.cos(heading + bearing), -distance * math.sin(heading + bearing)), abs=1e-14
+    )
+    ranges = {name: ALL_DRAWN[name] for name in ("mass_scale", "friction", "actuator_gain", "gravity_scale")}
+    assert info["domain"] == {name: generator.uniform(*span) for name, span in ranges.items()}
+    noise = 0.02 * generator.standard_normal(91) * env.observation_layout.unbounded
+    exact = RoverEnv(**{**ALL_DRAWN, "observation_noise": 0.0}).reset(seed=seed)[0]
+    np.testing.assert_allclose(observation, exact + noise, atol=1e-6)
+    assert env.np_random.bit_generator.state == generator.bit_generator.state
+
+
+def test_numbers_that_a_user_draws_are_not_drawn_again() -> None:
+    env, vector = RoverEnv(**ALL_DRAWN), RoverVectorEnv(3, threads=2, **ALL_DRAWN)
+    generator = numpys(4)
+    env.reset(seed=4)
+    vector.reset(seed=[3, 4, 5])
+    action = np.full(12, 0.1, np.float32)
+    for _ in range(2):
+        user, other = env.np_random, vector.np_random[1]
+        assert user.normal() == other.normal()
+        assert user.integers(100) == other.integers(100)  # leaves half of a number for the next such draw
+        alone, together = env.step(action)[0], vector.step(np.tile(action, (3, 1)))[0]
+        assert alone.tobytes() == together[1].tobytes()
+        assert (
+            env.reset()[0].tobytes()
+            == vector.reset(options={"reset_mask": np.array([False, True, False])})[0][1].tobytes()
+        )
+        assert user is env.np_random
+        assert other is vector.np_random[1]
+        assert user.bit_generator.state == other.bit_generator.state
+    assert user.random() != generator.random()
+    vector.reset(seed=8)
+    assert vector.np_random[1] is not other
+
+
+def test_another_kind_of_generator_is_refused_before_anything_changes() -> None:
+    env = RoverEnv()
+    env.reset(seed=0)
+    before = env.start
+    env.np_random = np.random.Generator(np.random.MT19937(0))
+    with pytest.raises(OptionError, match="np_random: must be a generator over PCG64"):
+        env.reset()
+    assert env.start == before
+    env.reset(seed=1)
+    assert env.start != before
+
+
+def test_an_unseeded_rover_has_a_seed_that_repeats_its_episode() -> None:
+    vector = RoverVectorEnv(2, threads=1)
+    first, _ = vector.reset()
+    seeds = vector.np_random_seed
+    assert seeds[0] != seeds[1]
+    assert vector.reset(seed=list(seeds))[0].tobytes() == first.tobytes()
+    assert fresh_seed() != fresh_seed()
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_scenes_do_not_hang_on_the_number_of_threads(mode: str) -> None:
+    runs = []
+    for threads in (1, 2, 5):
+        env = RoverVectorEnv(7, threads=threads, autoreset_mode=mode, max_episode_steps=2, **ALL_DRAWN)
+        seen = [env.reset(seed=0)[0]]
+        seen += [env.step(np.full((7, 12), 0.2, np.float32))[0] for _ in range(5)]
+        fields = [rover.simulation.terrain.centres for rover in env.batch.rovers]
+        runs.append(b"".join(one.tobytes() for one in [*seen, *fields]))
+    assert runs[0] == runs[1] == runs[2]
+
+
+def test_episodes_can_be_drawn_without_an_environment() -> None:
+    task = RoverEnv(terrain="sphere_field").task
+    rows = seeded_rows([1, 2, 3])
+    alone = task.episodes.draw(rows, fixed={"difficulty": 0.2, "position": (1.0, 2.0)})
+    batch = EpisodeBatch(task.rules, Simulation(), 4, threads=2)
+    together = batch.draw(task.episodes, rows, fixed=[{"difficulty": 0.2, "position": (1.0, 2.0)}] * 3)
+    assert len(alone) == len(together) == 3
+    for name in ("generators", "observations", "starts", "domains", "rocks", "rock_seeds"):
+        np.testing.assert_array_equal(getattr(alone, name), getattr(together, name))
+    assert alone.rocks[:, 0].tolist() == [0.2] * 3
+    np.testing.assert_array_equal(alone.starts[:, 2:4], [[1.0, 2.0]] * 3)
+    batch.begin([3, 0, 1], alone)
+    assert batch.simulation(3).snapshot() == alone.simulation(0).snapshot()
+    np.testing.assert_array_equal(batch.terrain(0).centres, alone.terrain(1).centres)
+    np.testing.assert_array_equal(batch.terrain(0).ground.normal, alone.plane(1).normal)
+    np.testing.assert_array_equal(batch.generators([3, 1]), alone.generators[[0, 2]])
+    batch.set_generators([1], rows[:1])
+    np.testing.assert_array_equal(batch.generators([3, 1]), [alone.generators[0], rows[0]])
+    assert batch.info(1) == alone.episode(2).info()
+    assert batch.simulation(2).snapshot() == Simulation().snapshot()
+    before = batch.generators([0])
+    for call, given in ((batch.begin, alone), (batch.set_generators, rows)):
+        for indices in ([0, 1], [0, 1, 4], [0, 1, -1], 3):
+            with pytest.raises(OptionError, match=r"indices|index"):
+                call(indices, given)  # type: ignore[operator]
+    other = EpisodeBatch(RoverEnv(goal_tolerance=0.7).task.rules, Simulation(), 3)
+    with pytest.raises(OptionError, match="rules"):
+        other.begin([0, 1, 2], alone)
+    with pytest.raises(OptionError, match="not begun"):
+        batch.set_generators([0, 2, 3], rows)
+    np.testing.assert_array_equal(batch.generators([0]), before)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field"),
+    [
+        ({"generators": [[1, 2, 3, 4]]}, "generators"),
+        ({"generators": np.zeros((2, 3), np.uint64)}, "generators"),
+        ({"difficulties": [None]}, "difficulties"),
+        ({"difficulties": [None, (0.4, 0.2)]}, "difficulties[1]"),
+        ({"fixed": [{}]}, "fixed"),
+        ({"fixed": {"slope": "steep"}}, "fixed.slope"),
+        ({"fixed": {"goal": (1.0, 2.0, 3.0)}}, "fixed.goal"),
+        ({"fixed": {"q": [0.0]}}, "q"),
+        ({"attempts": -1}, "attempts"),
+    ],
+)
+def test_a_bad_request_for_episodes_is_refused_by_name(arguments: dict[str, Any], field: str) -> None:
+    episodes = RoverEnv().task.episodes
+    request = {"generators": seeded_rows([1, 2]), **arguments}
+    with pytest.raises(ValueError, match=r"must|needs") as caught:
+        episodes.draw(**request)
+    assert getattr(caught.value, "field") == field  # noqa: B009 - an attribute of the package's errors
+
+
+def test_a_bad_distribution_is_refused_by_name() -> None:
+    rules = RoverEnv().task.rules
+    good: dict[str, Any] = {
+        "start": dict.fromkeys(("slope", "uphill", "heading", "goal_distance", "goal_bearing"), (0.0, 1.0)),
+        "domain": dict.fromkeys(("mass_scale", "friction", "actuator_gain", "gravity_scale"), (1.0, 1.0)),
+        "trunk_load_limit": 50.0,
+    }
+    assert len(EpisodeDistribution(rules, Simulation(), **good).draw(seed_generators([0]))) == 1
+    for change, field in (
+        ({"start": {"slope": (0.0, 1.0)}}, "start"),
+        ({"domain": 3}, "domain"),
+        ({"start": {**good["start"], "slope": (1.0, 0.0)}}, "start.slope"),
+        ({"trunk_load_limit": "much"}, "trunk_load_limit"),
+        ({"rocks": {"abundance": 0.1}}, "rocks"),
+        ({"field": 3}, "field"),
+    ):
+        with pytest.raises(ValueError, match="must") as caught:
+            EpisodeDistribution(rules, Simulation(), **{**good, **change})
+        assert getattr(caught.value, "field") == field  # noqa: B009 - an attribute of the package's errors
+    for seeds in ([-1], [1.5], ["x"]):
+        with pytest.raises(OptionError, match=r"seeds\[0\]"):
+            seed_generators(seeds)  # type: ignore[arg-type]
+
+
+#: Prints the hash of first observations, poses and rocks.
+RESETS = """
+import hashlib, numpy as np
+from rover_gym import RoverEnv
+seen = hashlib.sha256()
+rocks = {"terrain": "sphere_field", "height_scan": True, "observation_noise": 0.1}
+for arguments in ({"slope_deg": (0.0, 20.0)}, rocks):
+    env = RoverEnv(**arguments)
+    for seed in range(40):
+        seen.update(env.reset(seed=seed)[0].tobytes() + env.simulation.q.tobytes())
+print(seen.hexdigest())
+"""
+
+
+def test_first_observations_hung_on_the_matrix_products_of_the_processor() -> None:
+    def run(**settings: str) -> str:
+        environment = {**os.environ, **settings}
+        return subprocess.check_output([sys.executable, "-c", RESETS], env=environment, text=True).strip()
+
+    old = {"OPENBLAS_CORETYPE": "Prescott", "NPY_DISABLE_CPU_FEATURES": "AVX512F AVX512_SKX AVX2 FMA3"}
+    assert run() == run(**old)
+    assert len(run()) == len(hashlib.sha256().hexdigest())

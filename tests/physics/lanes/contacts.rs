@@ -1,0 +1,602 @@
+//! Contacts of the wheels, their Jacobian and operator: within rounding of the sources for any
+//! machine, every lane with the bits of the same source run as `f64`, and what is rare declined.
+
+use std::sync::Arc;
+
+use nalgebra::{UnitQuaternion, Vector3};
+use rover_core::contact::{
+    self, Activation, Contact, ContactSystem, Part, generalized_impulse, relocate,
+};
+use rover_core::geometry::{Plane, Rocks, SphereField, Terrain};
+use rover_core::integrator::WarmStart;
+use rover_core::lanes::contacts::Contacts;
+use rover_core::lanes::forecast::Forecast;
+use rover_core::lanes::ground::Ground;
+use rover_core::lanes::inertias::Inertias;
+use rover_core::lanes::machine::Machine;
+use rover_core::lanes::mass_matrix::{Factor, MassMatrix};
+use rover_core::lanes::place::Place;
+use rover_core::lanes::poses::Poses;
+use rover_core::lanes::problem::{ContactProblem, block};
+use rover_core::lanes::rows::Rows;
+use rover_core::multibody::{self, Configuration, Kinematics, Model};
+use rover_core::scalar::{Instructions, Lane, LaneMask, Single, Vec3};
+
+const G: f64 = 9.81;
+const THETA: f64 = 0.5;
+const MU: f64 = 0.7;
+
+/// A rover on its ground.
+#[derive(Clone)]
+struct Rover {
+    q: Configuration,
+    v: Vec<f64>,
+    terrain: Arc<dyn Terrain>,
+}
+
+/// Step and forecast.
+#[derive(Clone, Copy)]
+struct Step {
+    h: f64,
+    gamma: f64,
+}
+
+impl Step {
+    fn lead(self) -> f64 {
+        self.gamma * self.h - (1.0 - THETA) * self.h
+    }
+}
+
+/// Repeatable numbers in [−1, 1).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 * 2.0_f64.powi(-52) - 1.0
+    }
+}
+
+/// What a step finds of a rover: the declined have no numbers.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Found {
+    is_declined: bool,
+    keys: Vec<(usize, u32)>,
+    geometry: Vec<f64>,
+    u_before: Vec<f64>,
+    operator: Vec<f64>,
+    local: Vec<f64>,
+    y: Vec<f64>,
+    impulse: Vec<f64>,
+}
+
+/// The lane sources, with the memory that lasts from step to step.
+struct Block<T: Lane> {
+    token: T::Token,
+    machine: Machine,
+    inertias: Inertias<T>,
+    ground: Ground<T>,
+    contacts: Contacts<T>,
+    rows: Rows<T>,
+    problems: Vec<ContactProblem>,
+}
+
+impl<T: Lane> Block<T> {
+    fn new(token: T::Token, model: &Model, rovers: &[Rover]) -> Self {
+        assert_eq!(rovers.len(), T::LANES);
+        let machine = Machine::of(model).unwrap();
+        let mut inertias = Inertias::new(token, &machine);
+        let mut ground = Ground::new(token, machine.wheels.len(), machine.boxes.len());
+        for (lane, rover) in rovers.iter().enumerate() {
+            inertias.set_lane(lane, &machine, model);
+            ground.set_lane(lane, &rover.terrain);
+        }
+        let contacts = Contacts::new(token, &machine);
+        Self {
+            token,
+            rows: Rows::new(token, &machine, contacts.n_slots()),
+            machine,
+            inertias,
+            ground,
+            contacts,
+            problems: vec![ContactProblem::default(); T::LANES],
+        }
+    }
+
+    fn spread(&self, rovers: &[Rover], of: impl Fn(&Rover) -> Vec<f64>) -> Vec<T> {
+        let mut out = vec![T::splat(self.token, 0.0); of(&rovers[0]).len()];
+        for (lane, rover) in rovers.iter().enumerate() {
+            for (out, x) in out.iter_mut().zip(of(rover)) {
+                out.set(lane, x);
+            }
+        }
+        out
+    }
+
+    fn step(&mut self, rovers: &[Rover], step: Step) -> Vec<Found> {
+        let Self {
+            token,
+            machine,
+            inertias,
+            ..
+        } = self;
+        let token = *token;
+        let mut start = Place::new(token, machine);
+        for (lane, rover) in rovers.iter().enumerate() {
+            start.set_lane(lane, &rover.q);
+        }
+        let v = self.spread(rovers, |rover| rover.v.clone());
+        let machine = &self.machine;
+        let inertias = &self.inertias;
+        let mut poses = Vec::new();
+        for h in [(1.0 - THETA) * step.h, step.h] {
+            let mut place = start.clone();
+            T::vectorize(token, || place.set_moved(&start, &v, h));
+            let mut of_place = Poses::new(token, machine);
+            of_place.update(machine, inertias, &place);
+            poses.push(of_place);
+        }
+        let (middle, end) = (&poses[0], &poses[1]);
+        let gravity = Vec3::splat(token, [0.0, -G, 0.0]);
+        let forecast = Forecast::new(gravity, step.h, step.gamma, (1.0 - THETA) * step.h);
+        let declined = self
+            .contacts
+            .detect(&mut self.ground, middle, end, &v, &forecast);
+        let mut M = MassMatrix::new(token, machine);
+        M.update(machine, inertias, middle);
+        let mut factor = Factor::new(token, machine);
+        assert!(M.factorise(machine, &mut factor).all());
+        self.rows
+            .assemble(machine, end, &factor, &self.contacts, &v);
+        let zero = T::splat(token, 0.0);
+        let mut q = vec![[zero; 3]; self.contacts.n_slots()];
+        let change = self.spread(rovers, |_| (0..v.len()).map(number).collect());
+        T::vectorize(token, || self.rows.local(&self.contacts, &change, &mut q));
+        let mu = T::splat(token, MU);
+        self.rows
+            .to_problems(&self.contacts, &q, mu, &mut self.problems);
+        for problem in &mut self.problems {
+            for (k, p) in problem.p.iter_mut().enumerate() {
+                *p = number(k);
+            }
+        }
+        let mut p = vec![[zero; 3]; self.contacts.n_slots()];
+        let mut y = change;
+        let mut impulse = vec![zero; v.len()];
+        let all = T::mask(token, u32::MAX);
+        T::vectorize(token, || {
+            self.rows.impulses(&self.contacts, &self.problems, &mut p);
+            self.rows.add_impulses(&self.contacts, all, &p, &mut y);
+            self.rows
+                .generalized_impulse(&self.contacts, end, all, &p, &mut impulse);
+        });
+        (0..T::LANES)
+            .map(|lane| {
+                if declined.get(lane) {
+                    return Found {
+                        is_declined: true,
+                        ..Found::default()
+                    };
+                }
+                let mut found = Found {
+                    y: y.iter().map(|y| y.get(lane)).collect(),
+                    impulse: impulse.iter().map(|x| x.get(lane)).collect(),
+                    ..Found::default()
+                };
+                let list = self.contacts.list(lane);
+                let problem = &self.problems[lane];
+                assert_eq!(problem.n_contacts, list.n);
+                let n = list.n;
+                found.local = problem.q[..3 * n].to_vec();
+                assert!(
+                    problem.mu[..n]
+                        .iter()
+                        .all(|&mu| mu.to_bits() == MU.to_bits())
+                );
+                for c in 0..n {
+                    let slot = usize::from(list.slots[c]);
+                    found
+                        .keys
+                        .push((Contacts::<T>::wheel(slot), list.primitives[c]));
+                    let own = self.contacts.slot(slot);
+                    assert!(own.active.get(lane));
+                    for x in [own.point, own.n, own.t, own.b] {
+                        found.geometry.extend(x.get(lane));
+                    }
+                    found.geometry.push(own.gap.get(lane));
+                    found
+                        .u_before
+                        .extend(self.rows.u_before[slot].map(|u| u.get(lane)));
+                }
+                found.operator = vec![0.0; 9 * n * n];
+                for c in 0..n {
+                    for d in 0..=c {
+                        let block = &problem.W[block(c, d)];
+                        for i in 0..3 {
+                            for j in 0..3 {
+                                let (row, column) = (3 * c + i, 3 * d + j);
+                                found.operator[row * 3 * n + column] = block[3 * i + j];
+                                found.operator[column * 3 * n + row] = block[3 * i + j];
+                            }
+                        }
+                    }
+                }
+                found
+            })
+            .collect()
+    }
+}
+
+fn number(k: usize) -> f64 {
+    (1.3 * k as f64 + 0.4).sin()
+}
+
+/// The same by the sources for any machine, and whether a step of it must be declined.
+fn expected(model: &Model, rover: &Rover, step: Step) -> (Found, bool) {
+    let moved = |h: f64| {
+        let mut q = rover.q.clone();
+        q.set_moved(model, &rover.q, &rover.v, h);
+        let mut kinematics = Kinematics::new(model);
+        kinematics.update_for_step(model, &q);
+        kinematics
+    };
+    let (middle, end) = (moved((1.0 - THETA) * step.h), moved(step.h));
+    let activation = Activation {
+        lead: step.lead(),
+        hover: 0.5 * G * step.h * step.h,
+        slow: 2.0 * G * step.h,
+        margin: 50.0 * step.lead().abs(),
+    };
+    let mut contacts = Vec::new();
+    contact::detect(
+        model,
+        &middle,
+        &end,
+        &*rover.terrain,
+        &rover.v,
+        &activation,
+        &mut contacts,
+    );
+    let is_rare = is_rare(&contacts);
+    for contact in &mut contacts {
+        relocate(model, &end, &*rover.terrain, contact);
+    }
+    let mut M = multibody::MassMatrix::new(model);
+    M.update(model, &middle);
+    let mut factor = multibody::FactoredMassMatrix::new(model);
+    assert!(M.factorise(model, &mut factor));
+    let mut system = ContactSystem::with_capacity(model, contacts.len());
+    system.assemble(model, &end, &factor, &contacts, &rover.v);
+    let change: Vec<f64> = (0..model.nv()).map(number).collect();
+    let n = contacts.len();
+    let mut local = vec![0.0; 3 * n];
+    system.local(model, &change, &mut local);
+    for (q, u) in local.iter_mut().zip(&system.u) {
+        *q += u;
+    }
+    let p: Vec<f64> = (0..3 * n).map(number).collect();
+    let mut y = change;
+    system.add_impulses(model, &p, &mut y);
+    let mut impulse = vec![0.0; model.nv()];
+    generalized_impulse(model, &end, &contacts, &p, &mut impulse);
+    let mut found = Found {
+        is_declined: false,
+        u_before: system.u.clone(),
+        operator: system.W.clone(),
+        local,
+        y,
+        impulse,
+        ..Found::default()
+    };
+    for contact in &contacts {
+        let contact::Opposite::Ground(primitive) = contact.key.opposite else {
+            panic!("only the ground")
+        };
+        if let Part::Wheel(wheel) = contact.part {
+            found.keys.push((wheel, primitive));
+        }
+        for x in [
+            contact.point,
+            contact.frame.n,
+            contact.frame.t,
+            contact.frame.b,
+        ] {
+            found.geometry.extend(x.iter());
+        }
+        found.geometry.push(contact.gap);
+    }
+    (found, is_rare)
+}
+
+/// Whether lanes have no place for these contacts.
+fn is_rare(contacts: &[Contact]) -> bool {
+    let of = |i: usize| contacts.iter().filter(|c| c.part == Part::Wheel(i)).count();
+    let is_common = |c: &Contact| matches!(c.part, Part::Wheel(_)) && c.key.feature == 0;
+    contacts.len() > 8 || !contacts.iter().all(is_common) || (0..16).any(|i| of(i) > 2)
+}
+
+/// Whether a step is rare if parts are in contact from somewhat further off.
+fn is_nearly_rare(model: &Model, rover: &Rover, step: Step) -> bool {
+    let fastest = rover.v.iter().map(|v| v.abs()).sum::<f64>() * 2.0;
+    let near = |h: f64| {
+        let mut q = rover.q.clone();
+        q.set_moved(model, &rover.q, &rover.v, h);
+        let mut kinematics = Kinematics::new(model);
+        kinematics.update_for_step(model, &q);
+        let activation = Activation {
+            lead: 0.0,
+            hover: 0.01 + step.h * fastest,
+            slow: f64::INFINITY,
+            margin: 0.0,
+        };
+        let mut contacts = Vec::new();
+        contact::detect(
+            model,
+            &kinematics,
+            &kinematics,
+            &*rover.terrain,
+            &rover.v,
+            &activation,
+            &mut contacts,
+        );
+        is_rare(&contacts)
+    };
+    near(0.5 * step.h)
+}
+
+fn assert_close(name: &str, a: &[f64], b: &[f64], tolerance: f64) {
+    assert_eq!(a.len(), b.len(), "{name}");
+    let scale = b.iter().fold(1.0, |most: f64, x| most.max(x.abs()));
+    for (k, (a, b)) in a.iter().zip(b).enumerate() {
+        assert!(
+            (a - b).abs() <= tolerance * scale,
+            "{name}[{k}]: {a} and {b}"
+        );
+    }
+}
+
+/// A rover whose lowest wheel is about as deep as `depth`, m, over its plane or a random place.
+fn rover(
+    model: &Model,
+    terrain: &Arc<dyn Terrain>,
+    random: &mut Random,
+    depth: f64,
+    tilt: f64,
+) -> Rover {
+    let mut q = Configuration::zero(model);
+    // Over every ground of these tests: the rug of spheres begins at the origin.
+    q.position = Vector3::new(5.5 + 3.0 * random.next(), 0.0, 5.5 + 3.0 * random.next());
+    let about = Vector3::new(
+        random.next(),
+        3.0 * random.next() / tilt.max(1e-3),
+        random.next(),
+    );
+    q.attitude = UnitQuaternion::from_scaled_axis(about * tilt);
+    for angle in &mut q.joints {
+        *angle = 0.2 * random.next();
+    }
+    let lowest = |q: &Configuration| {
+        let kinematics = Kinematics::of(model, q);
+        let contacts = contact::detection::wheel_contacts(model, &kinematics, &**terrain);
+        contacts.iter().fold(f64::INFINITY, |low, c| low.min(c.gap))
+    };
+    q.position.y = 1.5;
+    for _ in 0..30 {
+        q.position.y -= 0.9 * lowest(&q);
+    }
+    q.position.y -= depth * (0.6 + 0.4 * random.next());
+    let mut v: Vec<f64> = (0..model.nv()).map(|_| random.next()).collect();
+    for v in &mut v[9..] {
+        *v *= 4.0;
+    }
+    Rover {
+        q,
+        v,
+        terrain: Arc::clone(terrain),
+    }
+}
+
+fn rocks(seed: u64, abundance: f64) -> Arc<dyn Terrain> {
+    let rocks = Rocks {
+        abundance,
+        seed,
+        max_diameter: 0.25,
+        ground: Plane::new([0.1, 1.0, -0.05], 0.2).unwrap(),
+        ..Rocks::default()
+    };
+    Arc::new(SphereField::rocks(&rocks).unwrap())
+}
+
+/// Grounds of every kind: planes, rocks on a plane, and spheres alone.
+fn grounds() -> Vec<Arc<dyn Terrain>> {
+    vec![
+        Arc::new(Plane::ground()),
+        Arc::new(Plane::new([-0.2, 1.0, 0.1], 0.4).unwrap()),
+        rocks(1, 0.05),
+        rocks(2, 0.2),
+        Arc::new(SphereField::rug()),
+        Arc::new(SphereField::new(&[], &[], Some(Plane::ground())).unwrap()),
+    ]
+}
+
+fn check(model: &Model, rover: &Rover, step: Step, found: &Found) -> bool {
+    let (right, is_rare) = expected(model, rover, step);
+    if is_rare {
+        assert!(found.is_declined, "{right:?}");
+    }
+    if found.is_declined {
+        assert!(is_nearly_rare(model, rover, step), "declined: {right:?}");
+        return false;
+    }
+    assert_eq!(found.keys, right.keys);
+    assert_close("geometry", &found.geometry, &right.geometry, 1e-13);
+    assert_close("velocity before", &found.u_before, &right.u_before, 1e-12);
+    assert_close("operator", &found.operator, &right.operator, 1e-12);
+    assert_close("local velocity", &found.local, &right.local, 1e-12);
+    assert_close("factor coordinates", &found.y, &right.y, 1e-12);
+    assert_close("impulse", &found.impulse, &right.impulse, 1e-12);
+    true
+}
+
+fn bits(found: &[Found]) -> Vec<Vec<u64>> {
+    let all = |f: &Found| {
+        [
+            &f.geometry,
+            &f.u_before,
+            &f.operator,
+            &f.local,
+            &f.y,
+            &f.impulse,
+        ]
+        .iter()
+        .flat_map(|part| part.iter().map(|x| x.to_bits()))
+        .collect()
+    };
+    found.iter().map(all).collect()
+}
+
+const STEPS: [Step; 3] = [
+    Step {
+        h: 0.005,
+        gamma: 0.5,
+    },
+    Step {
+        h: 0.005,
+        gamma: 1.0,
+    },
+    Step {
+        h: 0.02,
+        gamma: 0.4,
+    },
+];
+
+#[test]
+fn contacts_agree_with_those_of_any_machine() {
+    let model = Model::rover();
+    let mut random = Random(1);
+    let (mut ordinary, mut declined, mut n_contacts, mut on_spheres) = (0, 0, 0, 0);
+    for terrain in grounds() {
+        for k in 0..240 {
+            let depth = [1e-4, 0.01, 0.05][k % 3];
+            let tilt = [0.0, 0.1, 0.3, 1.5][k / 60];
+            let rover = rover(&model, &terrain, &mut random, depth, tilt);
+            let step = STEPS[k % 2 + usize::from(k % 7 == 0)];
+            let mut block = Block::<f64>::new(Single::best(), &model, std::slice::from_ref(&rover));
+            let found = &block.step(std::slice::from_ref(&rover), step)[0];
+            if check(&model, &rover, step, found) {
+                ordinary += 1;
+                n_contacts += found.keys.len();
+                on_spheres += found
+                    .keys
+                    .iter()
+                    .filter(|(_, primitive)| *primitive > 0)
+                    .count();
+            } else {
+                declined += 1;
+            }
+        }
+    }
+    assert!(
+        ordinary > 1000 && declined > 40 && n_contacts > 1000 && on_spheres > 200,
+        "{ordinary} ordinary, {declined} declined, {n_contacts} contacts, {on_spheres} on spheres"
+    );
+}
+
+fn lanes_agree<T: Lane>(token: T::Token) {
+    let model = Model::rover();
+    let mut random = Random(2);
+    let grounds = grounds();
+    for k in 0..40 {
+        let rovers: Vec<Rover> = (0..T::LANES)
+            .map(|lane| {
+                let terrain = &grounds[if k < 10 {
+                    k % 2
+                } else {
+                    (k + lane * lane) % grounds.len()
+                }];
+                rover(&model, terrain, &mut random, 0.02, [0.0, 0.2][k % 2])
+            })
+            .collect();
+        let step = STEPS[k % 3];
+        let found = Block::<T>::new(token, &model, &rovers).step(&rovers, step);
+        for (lane, rover) in rovers.iter().enumerate() {
+            let rover = std::slice::from_ref(rover);
+            let alone = Block::<f64>::new(Single::best(), &model, rover).step(rover, step);
+            assert_eq!(found[lane].is_declined, alone[0].is_declined);
+            assert_eq!(found[lane].keys, alone[0].keys);
+            assert_eq!(bits(&found[lane..=lane]), bits(&alone), "lane {lane}");
+        }
+    }
+}
+
+#[test]
+fn every_lane_has_the_bits_of_a_rover_alone() {
+    match Instructions::of_this_machine() {
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx512(token) => {
+            lanes_agree::<fearless_simd::f64x4<_>>(token);
+            lanes_agree::<fearless_simd::f64x8<_>>(token);
+        }
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx2(token) => lanes_agree::<fearless_simd::f64x4<_>>(token),
+        Instructions::Baseline => {}
+    }
+}
+
+/// Spheres are kept from step to step. A rover that comes from elsewhere finds what one finds that
+/// has just been put there.
+#[test]
+fn what_a_search_keeps_does_not_show() {
+    let model = Model::rover();
+    let mut random = Random(3);
+    for terrain in [
+        rocks(3, 0.2),
+        Arc::new(SphereField::rug()) as Arc<dyn Terrain>,
+    ] {
+        let mut rover = rover(&model, &terrain, &mut random, 0.01, 0.05);
+        let mut block = Block::<f64>::new(Single::best(), &model, std::slice::from_ref(&rover));
+        for k in 0..300 {
+            let stride = [0.002, 0.02, 0.3][k / 100];
+            rover.q.position +=
+                Vector3::new(random.next(), 0.05 * random.next(), random.next()) * stride;
+            let here = std::slice::from_ref(&rover);
+            let fresh = Block::<f64>::new(Single::best(), &model, here).step(here, STEPS[0]);
+            let found = block.step(here, STEPS[0]);
+            assert_eq!(
+                (found[0].is_declined, &found[0].keys),
+                (fresh[0].is_declined, &fresh[0].keys)
+            );
+            assert_eq!(bits(&found), bits(&fresh));
+        }
+    }
+}
+
+#[test]
+fn impulses_are_remembered_by_contact() {
+    let model = Model::rover();
+    let terrain: Arc<dyn Terrain> = Arc::new(Plane::ground());
+    let mut rover = rover(&model, &terrain, &mut Random(4), 0.0, 0.0);
+    rover.q = Configuration::zero(&model);
+    rover.q.position.y = 0.3499;
+    rover.v.fill(0.0);
+    let here = std::slice::from_ref(&rover);
+    let mut block = Block::<f64>::new(Single::best(), &model, here);
+    let found = block.step(here, STEPS[0]);
+    assert_eq!(found[0].keys.len(), 6);
+    let p: Vec<f64> = (0..18).map(number).collect();
+    let mut memory = WarmStart::default();
+    block.contacts.remember(0, &p, &mut memory);
+    let mut recalled = [f64::NAN; 18];
+    assert!(block.contacts.recall(0, &memory, &mut recalled));
+    assert_eq!(recalled[..], p[..]);
+    // The third was not there, the first two were in another order.
+    memory.impulses.remove(2);
+    memory.impulses.swap(0, 1);
+    assert!(!block.contacts.recall(0, &memory, &mut recalled));
+    assert_eq!(recalled[..6], p[..6]);
+    assert_eq!(recalled[6..9], [0.0; 3]);
+    assert_eq!(recalled[9..], p[9..]);
+}

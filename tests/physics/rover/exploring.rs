@@ -1,0 +1,74 @@
+//! Rovers whose policy explores: every step is solved, and a probe sees all parts of it.
+
+use rover_core::integrator::{Phase, Probe, StepOptions};
+
+use crate::exploring_scenes::{Drive, Ground, TORQUES, drives};
+
+const PHASES: [Phase; 9] = [
+    Phase::Kinematics,
+    Phase::Detection,
+    Phase::MassMatrix,
+    Phase::Factor,
+    Phase::Delassus,
+    Phase::Bias,
+    Phase::Solve,
+    Phase::Update,
+    Phase::Projection,
+];
+
+struct Recorder(Vec<Phase>);
+
+impl Probe for Recorder {
+    fn end(&mut self, phase: Phase) {
+        self.0.push(phase);
+    }
+}
+
+fn first_drive(ground: Ground, torque: f64) -> Drive {
+    drives(ground, torque, &StepOptions::default()).swap_remove(0)
+}
+
+#[test]
+fn an_exploring_rover_is_solved_to_the_tolerance_in_every_step() {
+    for ground in Ground::ALL {
+        for torque in TORQUES {
+            let report = first_drive(ground, torque).play().unwrap();
+            assert!(report.is_converged(), "{ground:?}, {torque} N m");
+            assert_eq!(report.steps, 1000);
+        }
+    }
+}
+
+#[test]
+fn factorisations_and_pivots_of_a_drive_are_those_of_its_steps() {
+    let drive = first_drive(Ground::Plane, 60.0);
+    let whole = drive.clone().play().unwrap();
+    let (mut factorisations, mut pivots, mut iterations) = (0, 0, 0);
+    let note = |report: &rover_core::integrator::StepReport| {
+        factorisations += report.factorisations;
+        pivots += report.pivots;
+        iterations += report.iterations;
+        assert!(report.pivots <= report.iterations);
+    };
+    drive.clone().play_by_step(note).unwrap();
+    assert_eq!(
+        (factorisations, pivots, iterations),
+        (whole.factorisations, whole.pivots, whole.iterations)
+    );
+    assert!(factorisations > 1000 && pivots > 100);
+}
+
+#[test]
+fn a_probe_sees_the_parts_of_a_step_in_their_order_and_changes_no_bit() {
+    let mut plain = first_drive(Ground::Rocks, 60.0);
+    let mut probed = plain.clone();
+    plain.give(0);
+    probed.give(0);
+    let mut parts = Recorder(Vec::new());
+    let report = probed.simulation.step_probed(10, &mut parts).unwrap();
+    assert_eq!(plain.simulation.step(10).unwrap(), report);
+    assert_eq!(plain.simulation.snapshot(), probed.simulation.snapshot());
+    // A step that is taken once more begins anew.
+    assert!(parts.0.len() >= 10 * PHASES.len());
+    assert_eq!(parts.0, PHASES.repeat(parts.0.len() / PHASES.len()));
+}
