@@ -6,7 +6,7 @@ listed FL, FR, ML, BL, MR, BR. Every array returned is new.
 
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from typing import Any, Literal, TypeAlias, final, overload
+from typing import Any, ClassVar, Literal, TypeAlias, final, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from typing_extensions import disjoint_base
 
 _Array: TypeAlias = npt.NDArray[np.float64]
 _Rows: TypeAlias = npt.NDArray[np.uint64]
+_Observation: TypeAlias = npt.NDArray[np.float32]
 _Coordinates: TypeAlias = Literal["report", "state"]
 _Range: TypeAlias = tuple[float, float]
 
@@ -22,8 +23,12 @@ __all__ = [
     "BusyError",
     "CommandError",
     "Contacts",
-    "DrawnScenes",
+    "DrawnEpisodes",
     "Energy",
+    "Episode",
+    "EpisodeBatch",
+    "EpisodeDistribution",
+    "EpisodeRules",
     "FrictionContactSolution",
     "Line",
     "MirroredRoverSimulation",
@@ -38,7 +43,6 @@ __all__ = [
     "ProblemError",
     "RoverGymError",
     "RoverModel",
-    "SceneDistribution",
     "Simulation",
     "SimulationBatch",
     "Sine",
@@ -1539,141 +1543,6 @@ class MirroredRoverSimulation(PlanarSimulation):
         """Names of the wheels of each disc."""
 
 @final
-class SceneDistribution:
-    """What the scenes of a task's episodes are drawn from.
-
-    Draws come from generators that are number for number NumPy's `PCG64`; a generator is given and
-    returned as four unsigned 64-bit numbers: high and low half of its state, high and low half of
-    its increment.
-
-    Args:
-        simulation: The rover, before its masses are scaled, and the options of its steps.
-        start: Ranges (low, high) of `slope`, `uphill`, `heading`, `goal_distance` and
-            `goal_bearing`, by name, rad and m.
-        domain: Ranges of `mass_scale`, `friction`, `actuator_gain` and `gravity_scale`, by name.
-        goal_tolerance: Distance from the goal within which no rock lies, m.
-        rocks: Range of `difficulty`, and `abundance` and `max_radius` or None, by name; None for no
-            rocks.
-        slope_by_difficulty: Whether the slope follows from the difficulty of the rocks.
-        field: The ground of every episode, a field on a plane; None for a tilted plane.
-        scan: Points of the height scan ahead and to the right of the trunk's origin in the heading
-            frame, (n, 2), m; none by default.
-        noise: Standard deviation of each entry of an observation, (size,); none by default.
-
-    Raises:
-        OptionError: An argument is missing, no number, or out of its range.
-    """
-
-    def __new__(
-        cls,
-        simulation: Simulation,
-        *,
-        start: Mapping[str, _Range],
-        domain: Mapping[str, _Range],
-        goal_tolerance: float,
-        rocks: Mapping[str, Any] | None = None,
-        slope_by_difficulty: bool = False,
-        field: SphereField | None = None,
-        scan: npt.ArrayLike | None = None,
-        noise: npt.ArrayLike | None = None,
-    ) -> SceneDistribution: ...
-    def draw(
-        self,
-        generators: _Rows,
-        *,
-        attempts: int = 100,
-        difficulties: Sequence[_Range | None] | None = None,
-        fixed: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
-    ) -> DrawnScenes:
-        """Draws one scene from each generator; `SimulationBatch.draw` does it on several threads.
-
-        A scene in which the rover would stand deeper than 1 cm in the ground or in a sphere is
-        drawn again. The given generators do not change: see `DrawnScenes.generators`.
-
-        Args:
-            generators: Generators, (m, 4) uint64.
-            attempts: Most scenes drawn for a rover until it has room.
-            difficulties: For each generator a range (low, high) that replaces that of the rocks'
-                difficulty, or None; by default none.
-            fixed: Values that replace draws, which are made all the same, by name: `slope`,
-                `uphill`, `position` (x, z), `heading`, `goal` (x, z), `difficulty`, `q` and `v`; one
-                mapping for all or a list of one for each generator; none by default.
-
-        Returns:
-            The scenes.
-
-        Raises:
-            TerrainError: A rover has no room in `attempts` scenes, or the ground refuses a number.
-            StateError: `q` or `v` has a wrong length or an entry that is not finite.
-            ModelError: A scaled mass is out of its range.
-            OptionError: Any other argument is invalid.
-        """
-    def __getnewargs_ex__(self) -> tuple[tuple[Simulation], dict[str, Any]]: ...
-
-@final
-class DrawnScenes:
-    """Drawn scenes with their first readings, in the order of the generators."""
-
-    @property
-    def generators(self) -> _Rows:
-        """The generators after the draws, (m, 4) uint64."""
-    @property
-    def readings(self) -> _Array:
-        """First readings, (m, size), with the goal as their target."""
-    @property
-    def noise(self) -> _Array | None:
-        """Noise of the first observations, (m, size); None without noise."""
-    @property
-    def starts(self) -> _Array:
-        """Starts, (m, 7), rad and m.
-
-        Slope, direction of steepest ascent, x and z of the start, heading, x and z of the goal.
-        """
-    @property
-    def domains(self) -> _Array:
-        """Properties of rover and world, (m, 4).
-
-        Factor of the masses, friction, gain of the motors, factor of gravity.
-        """
-    @property
-    def rocks(self) -> _Array:
-        """Rocks, (m, 3); zeros where there are none.
-
-        Difficulty, abundance, radius of the largest in wheel radii.
-        """
-    @property
-    def rock_seeds(self) -> _Rows:
-        """Seeds of the rocks, (m,) uint64; zeros where there are none."""
-    def terrain(self, index: int) -> Plane | SphereField:
-        """The ground of a scene.
-
-        Args:
-            index: Number of the scene.
-
-        Raises:
-            OptionError: There is no such scene.
-        """
-    def plane(self, index: int) -> Plane:
-        """The plane of a scene, under rocks too.
-
-        Args:
-            index: Number of the scene.
-
-        Raises:
-            OptionError: There is no such scene.
-        """
-    def simulation(self, index: int) -> Simulation:
-        """A new simulation of the rover at its start in a scene.
-
-        Args:
-            index: Number of the scene.
-
-        Raises:
-            OptionError: There is no such scene.
-        """
-    def __len__(self) -> int: ...
-
-@final
 class SimulationBatch:
     """Many rovers stepped side by side on several threads, each bit for bit as it would be alone.
 
@@ -1744,39 +1613,471 @@ class SimulationBatch:
         Raises:
             OptionError: There is no such rover, or an argument is invalid. Nothing has changed.
         """
+    def simulation(self, index: int) -> Simulation:
+        """Returns a copy of one rover.
+
+        Args:
+            index: Index of the rover.
+
+        Returns:
+            The copy; stepping it does not move the rover.
+
+        Raises:
+            OptionError: There is no such rover.
+        """
+    def __len__(self) -> int: ...
+
+@final
+class EpisodeRules:
+    """What all episodes of a driving task share.
+
+    Args:
+        model: The machine.
+        substeps: Physics steps of a control period.
+        dt: Control period, s.
+        torque_limits: Torque of a torque action of 1, (n_wheels,), N m.
+        max_steering: Set-point of a steering action of 1, rad.
+        goal_tolerance: Distance within which the goal is reached, m.
+        cos_max_tilt: Cosine of the tilt beyond which the rover has rolled over.
+        stuck_time: Time until a high-centred rover ends the episode, s.
+        weights: Weights of the reward, one for each of its terms.
+        scale: Value of an entry of 1 of the observation, (size,).
+        noise: Standard deviation of each entry's noise, (size,); no noise by default.
+        scan: Points of the height scan ahead and to the right of the trunk's origin in the heading
+            frame, (n, 2), m; none by default.
+
+    Raises:
+        ModelError: `model` is not a RoverModel.
+        OptionError: A number is out of its range, a list has a wrong length, or the weights are not
+            those of the terms.
+    """
+
+    terms: ClassVar[tuple[str, ...]]
+    def __new__(
+        cls,
+        model: RoverModel,
+        *,
+        substeps: int,
+        dt: float,
+        torque_limits: npt.ArrayLike,
+        max_steering: float,
+        goal_tolerance: float,
+        cos_max_tilt: float,
+        stuck_time: float,
+        weights: Mapping[str, float],
+        scale: npt.ArrayLike,
+        noise: npt.ArrayLike | None = None,
+        scan: npt.ArrayLike | None = None,
+    ) -> EpisodeRules: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[RoverModel], dict[str, Any]]: ...
+
+@final
+class Episode:
+    """One episode of a driving task: what its simulation does not hold.
+
+    Args:
+        rules: What all episodes of the task share.
+        goal: The goal (x, z), m.
+        domain: Properties of rover and world: mass_scale, friction, actuator_gain, gravity_scale.
+        trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
+        difficulty: Difficulty of the rocks.
+        distance: Horizontal distance to the goal, m.
+        previous_action: The last action, (2 n_wheels,).
+        energy: Work of the motors since the beginning, driving or braking, J.
+        energy_positive: Its driving part, J.
+        stuck_time: How long the rover has been high-centred, s.
+        observation: The last observation, (size,).
+
+    Raises:
+        OptionError: An argument has a wrong shape or a number that is not finite.
+    """
+
+    def __new__(
+        cls,
+        rules: EpisodeRules,
+        *,
+        goal: Sequence[float],
+        domain: npt.ArrayLike,
+        trunk_load_limit: float,
+        difficulty: float,
+        distance: float,
+        previous_action: npt.ArrayLike,
+        energy: float,
+        energy_positive: float,
+        stuck_time: float,
+        observation: npt.ArrayLike,
+    ) -> Episode: ...
+    @staticmethod
+    def begin(
+        rules: EpisodeRules,
+        simulation: Simulation,
+        *,
+        goal: Sequence[float],
+        domain: npt.ArrayLike,
+        trunk_load_limit: float,
+        difficulty: float,
+        normals: npt.ArrayLike | None = None,
+    ) -> Episode | None:
+        """The beginning of an episode.
+
+        Args:
+            rules: What all episodes of the task share.
+            simulation: The rover at its start.
+            goal: The goal (x, z), m.
+            domain: As of the class.
+            trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
+            difficulty: Difficulty of the rocks.
+            normals: A standard normal number for each entry of the observation, (size,), where the
+                rules have noise.
+
+        Returns:
+            The episode; None if its observation is not finite in float32.
+
+        Raises:
+            OptionError: An argument has a wrong shape or a number that is not finite, or the
+                rover's model does not fit the rules.
+        """
+    def step(
+        self,
+        simulation: Simulation,
+        action: npt.ArrayLike,
+        normals: npt.ArrayLike | None = None,
+        *,
+        has_scan: bool = True,
+    ) -> tuple[_Observation, float, bool, dict[str, Any]]:
+        """Gives the simulation an action for one control period.
+
+        Other threads run meanwhile. Ctrl-C, or whatever else a signal handler raises, ends the call
+        after a whole physics step, whose state stays; the episode then stays as before the call.
+
+        Args:
+            simulation: The rover of this episode.
+            action: Torques, then steering, within [-1, 1], (2 n_wheels,).
+            normals: A standard normal number for each entry of the observation, (size,), where the
+                rules have noise.
+            has_scan: Whether the heights are taken. Without, only a period that ends the episode
+                takes them; otherwise the last ones stay until `complete`.
+
+        Returns:
+            Observation (size,) float32, reward, whether the episode has ended, and info.
+
+        Raises:
+            CommandError: The action has a wrong shape or an entry that is not finite or outside
+                [-1, 1]. Nothing has changed.
+            OptionError: `normals` has a wrong length. Nothing has changed.
+        """
+    def advance(
+        self,
+        reading: npt.ArrayLike,
+        action: npt.ArrayLike,
+        normals: npt.ArrayLike | None = None,
+        *,
+        message: str | None = None,
+    ) -> tuple[_Observation, float, bool, dict[str, Any]]:
+        """Goes on by a control period that ended with a reading, without a simulation.
+
+        Args:
+            reading: As of `Simulation.reading` with the goal as its target and the rules' scan.
+            action: As of `step`.
+            normals: As of `step`.
+            message: The message of the physics step that failed, if one did.
+
+        Returns:
+            As `step`.
+
+        Raises:
+            CommandError: As `step`.
+            OptionError: `reading` or `normals` has a wrong length.
+        """
+    def complete(self, simulation: Simulation) -> _Observation:
+        """Takes the heights that the last observation lacks, if it lacks any.
+
+        Args:
+            simulation: The rover of this episode, which has not moved since.
+
+        Returns:
+            The last observation, (size,) float32.
+        """
+    @property
+    def observation(self) -> _Observation:
+        """The last observation, (size,) float32."""
+    def info(self) -> dict[str, Any]:
+        """The info of the last period, or of the beginning."""
+    def state(self) -> dict[str, Any]:
+        """The keyword arguments that make an episode which continues as this one."""
+    def __getnewargs_ex__(self) -> tuple[tuple[EpisodeRules], dict[str, Any]]: ...
+
+@final
+class EpisodeDistribution:
+    """What the episodes of a task are drawn from.
+
+    Draws come from generators that are number for number NumPy's `PCG64`; a generator is given and
+    returned as four unsigned 64-bit numbers: high and low half of its state, high and low half of
+    its increment.
+
+    Args:
+        rules: What all episodes share; rocks leave the goal clear within its tolerance.
+        simulation: The rover, before its masses are scaled, and the options of its steps.
+        start: Ranges (low, high) of `slope`, `uphill`, `heading`, `goal_distance` and
+            `goal_bearing`, by name, rad and m.
+        domain: Ranges of `mass_scale`, `friction`, `actuator_gain` and `gravity_scale`, by name.
+        trunk_load_limit: Force on the trunk beyond which the rover is high-centred, before masses
+            and gravity are scaled, N.
+        rocks: Range of `difficulty`, and `abundance` and `max_radius` or None, by name; None for no
+            rocks.
+        slope_by_difficulty: Whether the slope follows from the difficulty of the rocks.
+        field: The ground of every episode, a field on a plane; None for a tilted plane.
+
+    Raises:
+        OptionError: An argument is missing, no number, or out of its range.
+        TerrainError: `field` is no SphereField on a plane.
+    """
+
+    def __new__(
+        cls,
+        rules: EpisodeRules,
+        simulation: Simulation,
+        *,
+        start: Mapping[str, _Range],
+        domain: Mapping[str, _Range],
+        trunk_load_limit: float,
+        rocks: Mapping[str, Any] | None = None,
+        slope_by_difficulty: bool = False,
+        field: SphereField | None = None,
+    ) -> EpisodeDistribution: ...
     def draw(
         self,
-        distribution: SceneDistribution,
         generators: _Rows,
         *,
         attempts: int = 100,
         difficulties: Sequence[_Range | None] | None = None,
         fixed: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
-    ) -> DrawnScenes:
-        """Draws scenes on the threads of this batch, as `SceneDistribution.draw` does; no rover changes.
+    ) -> DrawnEpisodes:
+        """Draws one episode from each generator; `EpisodeBatch.draw` does it on several threads.
+
+        A scene in which the rover would stand deeper than 1 cm in the ground or in a sphere is
+        drawn again. The given generators do not change: see `DrawnEpisodes.generators`.
 
         Args:
-            distribution: What the scenes are drawn from.
             generators: Generators, (m, 4) uint64.
-            attempts: As of `SceneDistribution.draw`.
-            difficulties: As of `SceneDistribution.draw`.
-            fixed: As of `SceneDistribution.draw`.
+            attempts: Most scenes drawn for a rover until it has room.
+            difficulties: For each generator a range (low, high) that replaces that of the rocks'
+                difficulty, or None; by default none.
+            fixed: Values that replace draws, which are made all the same, by name: `slope`,
+                `uphill`, `position` (x, z), `heading`, `goal` (x, z), `difficulty`, `q` and `v`; one
+                mapping for all or a list of one for each generator; none by default.
 
         Returns:
-            The scenes, the same for any number of threads.
+            The episodes.
 
         Raises:
-            RoverGymError: As of `SceneDistribution.draw`, for the first rover that has one.
+            TerrainError: A rover has no room in `attempts` scenes, or the ground refuses a number.
+            StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
+                cannot hold the observation.
+            ModelError: A scaled mass is out of its range.
+            OptionError: Any other argument is invalid.
         """
-    def begin(self, indices: Sequence[int], scenes: DrawnScenes) -> None:
-        """Puts rovers into drawn scenes, with the goals as the targets of their readings.
+    def __getnewargs_ex__(self) -> tuple[tuple[EpisodeRules, Simulation], dict[str, Any]]: ...
+
+@final
+class DrawnEpisodes:
+    """Drawn episodes, in the order of the generators."""
+
+    @property
+    def generators(self) -> _Rows:
+        """The generators after the draws, (m, 4) uint64."""
+    @property
+    def observations(self) -> _Observation:
+        """First observations, (m, size) float32."""
+    @property
+    def starts(self) -> _Array:
+        """Starts, (m, 7), rad and m.
+
+        Slope, direction of steepest ascent, x and z of the start, heading, x and z of the goal.
+        """
+    @property
+    def domains(self) -> _Array:
+        """Properties of rover and world, (m, 4).
+
+        Factor of the masses, friction, gain of the motors, factor of gravity.
+        """
+    @property
+    def rocks(self) -> _Array:
+        """Rocks, (m, 3); zeros where there are none.
+
+        Difficulty, abundance, radius of the largest in wheel radii.
+        """
+    @property
+    def rock_seeds(self) -> _Rows:
+        """Seeds of the rocks, (m,) uint64; zeros where there are none."""
+    def episode(self, index: int) -> Episode:
+        """An episode, which has begun.
 
         Args:
-            indices: Indices of the rovers, one for each scene.
-            scenes: Drawn scenes of models with equally many coordinates.
+            index: Number of the episode.
 
         Raises:
-            OptionError: There is no such rover, or the scenes do not fit. Nothing has changed.
+            OptionError: There is no such episode.
+        """
+    def terrain(self, index: int) -> Plane | SphereField:
+        """The ground of an episode.
+
+        Args:
+            index: Number of the episode.
+
+        Raises:
+            OptionError: There is no such episode.
+        """
+    def plane(self, index: int) -> Plane:
+        """The plane of an episode, under rocks too.
+
+        Args:
+            index: Number of the episode.
+
+        Raises:
+            OptionError: There is no such episode.
+        """
+    def simulation(self, index: int) -> Simulation:
+        """A new simulation of the rover at the start of an episode.
+
+        Args:
+            index: Number of the episode.
+
+        Raises:
+            OptionError: There is no such episode.
+        """
+    def __len__(self) -> int: ...
+
+@final
+class EpisodeBatch:
+    """Many rovers with their episodes, each bit for bit as it would be alone.
+
+    One call at a time: a call during another one raises BusyError.
+
+    Args:
+        rules: What all episodes share.
+        simulation: A rover of the task; the batch begins with copies of it, without episodes.
+        n: Number of rovers.
+        max_steps: Control periods until an episode is truncated; no limit by default.
+        threads: Number of threads; one a core by default.
+
+    Raises:
+        OptionError: An argument is out of its range, or the model does not fit the rules.
+    """
+
+    def __new__(
+        cls,
+        rules: EpisodeRules,
+        simulation: Simulation,
+        n: int,
+        *,
+        max_steps: int | None = None,
+        threads: int | None = None,
+    ) -> EpisodeBatch: ...
+    @property
+    def threads(self) -> int:
+        """Number of threads."""
+    def step(
+        self, actions: object, active: npt.NDArray[np.bool_] | None = None, *, has_scan: bool = True
+    ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_], list[int]]:
+        """Gives all rovers their actions for one control period.
+
+        Ctrl-C ends the call after a whole physics step of each rover, which need not be the same
+        one.
+
+        Args:
+            actions: As of `Episode.step`, (n_rovers, 2 n_wheels).
+            active: Which rovers move, (n_rovers,); all by default. The others stay as they are.
+            has_scan: Whether the heights are taken. Without, only episodes that end or reach the
+                time limit take them; the others keep the last ones.
+
+        Returns:
+            Observations (n_rovers, size) float32, rewards (n_rovers,), which episodes have ended,
+            which have reached the time limit, (n_rovers,), and the indices of all that have done
+            either. A rover that stays has the values of its last period.
+
+        Raises:
+            CommandError: The actions have a wrong shape or an entry that is not finite or outside
+                [-1, 1]. No rover has moved.
+            OptionError: `active` is invalid, or an episode has not begun. No rover has moved.
+        """
+    def infos(self) -> dict[str, Any]:
+        """The infos of all rovers, of their last periods or beginnings.
+
+        Returns:
+            For each entry an array (n_rovers,), and under its name after an underscore the mask of
+            the rovers that have it: all.
+
+        Raises:
+            OptionError: An episode has not begun.
+        """
+    def info(self, index: int) -> dict[str, Any]:
+        """The info of one rover, of its last period or beginning.
+
+        Args:
+            index: Index of the rover.
+
+        Raises:
+            OptionError: There is no such rover, or its episode has not begun.
+        """
+    def observations(self) -> _Observation:
+        """The last observations of all rovers, (n_rovers, size) float32; zeros before an episode."""
+    def draw(
+        self,
+        distribution: EpisodeDistribution,
+        generators: _Rows,
+        *,
+        attempts: int = 100,
+        difficulties: Sequence[_Range | None] | None = None,
+        fixed: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
+    ) -> DrawnEpisodes:
+        """Draws episodes on the threads of this batch, as `EpisodeDistribution.draw` does; no rover changes.
+
+        Args:
+            distribution: What the episodes are drawn from.
+            generators: Generators, (m, 4) uint64.
+            attempts: As of `EpisodeDistribution.draw`.
+            difficulties: As of `EpisodeDistribution.draw`.
+            fixed: As of `EpisodeDistribution.draw`.
+
+        Returns:
+            The episodes, the same for any number of threads.
+
+        Raises:
+            RoverGymError: As of `EpisodeDistribution.draw`, for the first rover that has one.
+        """
+    def begin(self, indices: Sequence[int], episodes: DrawnEpisodes) -> None:
+        """Begins drawn episodes.
+
+        Args:
+            indices: Indices of the rovers, one for each episode.
+            episodes: Drawn episodes with the rules of the batch.
+
+        Raises:
+            OptionError: There is no such rover, or the episodes do not fit. Nothing has changed.
+        """
+    def generators(self, indices: Sequence[int]) -> _Rows:
+        """The generators of rovers, from which their noise is drawn.
+
+        Args:
+            indices: Indices of the rovers.
+
+        Returns:
+            (m, 4) uint64: high and low half of each state, high and low half of each increment.
+
+        Raises:
+            OptionError: There is no such rover, or its episode has not begun.
+        """
+    def set_generators(self, indices: Sequence[int], generators: _Rows) -> None:
+        """Sets the generators of rovers.
+
+        Args:
+            indices: Indices of the rovers.
+            generators: As `generators` returns them, (m, 4) uint64.
+
+        Raises:
+            OptionError: There is no such rover, its episode has not begun, or `generators` has a
+                wrong shape. Nothing has changed.
         """
     def terrain(self, index: int) -> Plane | SphereField:
         """The ground of one rover.

@@ -157,13 +157,12 @@ def state_of(env: RoverVectorEnv) -> list[Any]:
     """All that a refused call must leave as it was."""
     batch = env.batch
     return [
-        [batch.simulations.simulation(i).snapshot() for i in range(batch.n)],
+        [batch.episodes.simulation(i).snapshot() for i in range(batch.n)],
         [random_state(batch.generator(i)) for i in range(batch.n)],
         list(batch._seeds),
-        batch._progress.observation.tobytes(),
-        batch._steps.tolist(),
+        batch.observation.tobytes(),
         [rover.start for rover in batch.rovers],
-        env._ended.tolist(),
+        list(env._over),
     ]
 
 
@@ -252,10 +251,10 @@ def test_stable_baselines_environments_are_refused_whole_too() -> None:
     observation, _, dones, infos = venv.step(actions)
     assert dones.tolist() == [False, True]
     assert infos[1]["terminal_observation"].tobytes() == observation[1].tobytes()
-    before = [venv.batch.simulations.simulation(i).snapshot() for i in range(2)]
+    before = [venv.batch.episodes.simulation(i).snapshot() for i in range(2)]
     with pytest.raises(TerrainError):
         venv.step(actions)
-    assert [venv.batch.simulations.simulation(i).snapshot() for i in range(2)] == before
+    assert [venv.batch.episodes.simulation(i).snapshot() for i in range(2)] == before
     assert [random_state(venv.batch.generator(i)) for i in range(2)] == generators
     venv.set_options({**ELSEWHERE, "goal": (9.0, 0.0)})
     venv.reset()

@@ -12,7 +12,7 @@ import pytest
 
 from rover_gym import OptionError, RoverEnv
 from rover_gym.env.generators import fresh_seed, generator_at, row_of, seeded_rows
-from rover_gym.mechanics import SceneDistribution, Simulation, SimulationBatch, seed_generators, standard_normals
+from rover_gym.mechanics import EpisodeBatch, EpisodeDistribution, Simulation, seed_generators, standard_normals
 from rover_gym.vector import RoverVectorEnv
 
 #: Everything that can be drawn is drawn.
@@ -60,7 +60,7 @@ def test_a_reset_draws_what_numpy_would_draw(seed: int) -> None:
     )
     ranges = {name: ALL_DRAWN[name] for name in ("mass_scale", "friction", "actuator_gain", "gravity_scale")}
     assert info["domain"] == {name: generator.uniform(*span) for name, span in ranges.items()}
-    noise = generator.standard_normal(91) * env.task.noisy
+    noise = 0.02 * generator.standard_normal(91) * env.observation_layout.unbounded
     exact = RoverEnv(**{**ALL_DRAWN, "observation_noise": 0.0}).reset(seed=seed)[0]
     np.testing.assert_allclose(observation, exact + noise, atol=1e-6)
     assert env.np_random.bit_generator.state == generator.bit_generator.state
@@ -123,23 +123,37 @@ def test_scenes_do_not_hang_on_the_number_of_threads(mode: str) -> None:
     assert runs[0] == runs[1] == runs[2]
 
 
-def test_scenes_can_be_drawn_without_an_environment() -> None:
+def test_episodes_can_be_drawn_without_an_environment() -> None:
     task = RoverEnv(terrain="sphere_field").task
     rows = seeded_rows([1, 2, 3])
-    alone = task.scenes.draw(rows, fixed={"difficulty": 0.2, "position": (1.0, 2.0)})
-    batch = SimulationBatch([Simulation()] * 4, threads=2)
-    together = batch.draw(task.scenes, rows, fixed=[{"difficulty": 0.2, "position": (1.0, 2.0)}] * 3)
+    alone = task.episodes.draw(rows, fixed={"difficulty": 0.2, "position": (1.0, 2.0)})
+    batch = EpisodeBatch(task.rules, Simulation(), 4, threads=2)
+    together = batch.draw(task.episodes, rows, fixed=[{"difficulty": 0.2, "position": (1.0, 2.0)}] * 3)
     assert len(alone) == len(together) == 3
-    for name in ("generators", "readings", "starts", "domains", "rocks", "rock_seeds"):
+    for name in ("generators", "observations", "starts", "domains", "rocks", "rock_seeds"):
         np.testing.assert_array_equal(getattr(alone, name), getattr(together, name))
-    assert alone.noise is None
     assert alone.rocks[:, 0].tolist() == [0.2] * 3
     np.testing.assert_array_equal(alone.starts[:, 2:4], [[1.0, 2.0]] * 3)
     batch.begin([3, 0, 1], alone)
     assert batch.simulation(3).snapshot() == alone.simulation(0).snapshot()
     np.testing.assert_array_equal(batch.terrain(0).centres, alone.terrain(1).centres)
     np.testing.assert_array_equal(batch.terrain(0).ground.normal, alone.plane(1).normal)
+    np.testing.assert_array_equal(batch.generators([3, 1]), alone.generators[[0, 2]])
+    batch.set_generators([1], rows[:1])
+    np.testing.assert_array_equal(batch.generators([3, 1]), [alone.generators[0], rows[0]])
+    assert batch.info(1) == alone.episode(2).info()
     assert batch.simulation(2).snapshot() == Simulation().snapshot()
+    before = batch.generators([0])
+    for call, given in ((batch.begin, alone), (batch.set_generators, rows)):
+        for indices in ([0, 1], [0, 1, 4], [0, 1, -1], 3):
+            with pytest.raises(OptionError, match=r"indices|index"):
+                call(indices, given)  # type: ignore[operator]
+    other = EpisodeBatch(RoverEnv(goal_tolerance=0.7).task.rules, Simulation(), 3)
+    with pytest.raises(OptionError, match="rules"):
+        other.begin([0, 1, 2], alone)
+    with pytest.raises(OptionError, match="not begun"):
+        batch.set_generators([0, 2, 3], rows)
+    np.testing.assert_array_equal(batch.generators([0]), before)
 
 
 @pytest.mark.parametrize(
@@ -156,31 +170,32 @@ def test_scenes_can_be_drawn_without_an_environment() -> None:
         ({"attempts": -1}, "attempts"),
     ],
 )
-def test_a_bad_request_for_scenes_is_refused_by_name(arguments: dict[str, Any], field: str) -> None:
-    scenes = RoverEnv().task.scenes
+def test_a_bad_request_for_episodes_is_refused_by_name(arguments: dict[str, Any], field: str) -> None:
+    episodes = RoverEnv().task.episodes
     request = {"generators": seeded_rows([1, 2]), **arguments}
     with pytest.raises(ValueError, match=r"must|needs") as caught:
-        scenes.draw(**request)
+        episodes.draw(**request)
     assert getattr(caught.value, "field") == field  # noqa: B009 - an attribute of the package's errors
 
 
 def test_a_bad_distribution_is_refused_by_name() -> None:
+    rules = RoverEnv().task.rules
     good: dict[str, Any] = {
         "start": dict.fromkeys(("slope", "uphill", "heading", "goal_distance", "goal_bearing"), (0.0, 1.0)),
         "domain": dict.fromkeys(("mass_scale", "friction", "actuator_gain", "gravity_scale"), (1.0, 1.0)),
-        "goal_tolerance": 0.5,
+        "trunk_load_limit": 50.0,
     }
-    assert len(SceneDistribution(Simulation(), **good).draw(seed_generators([0]))) == 1
+    assert len(EpisodeDistribution(rules, Simulation(), **good).draw(seed_generators([0]))) == 1
     for change, field in (
         ({"start": {"slope": (0.0, 1.0)}}, "start"),
         ({"domain": 3}, "domain"),
         ({"start": {**good["start"], "slope": (1.0, 0.0)}}, "start.slope"),
-        ({"goal_tolerance": "near"}, "goal_tolerance"),
+        ({"trunk_load_limit": "much"}, "trunk_load_limit"),
         ({"rocks": {"abundance": 0.1}}, "rocks"),
         ({"field": 3}, "field"),
     ):
         with pytest.raises(ValueError, match="must") as caught:
-            SceneDistribution(Simulation(), **{**good, **change})
+            EpisodeDistribution(rules, Simulation(), **{**good, **change})
         assert getattr(caught.value, "field") == field  # noqa: B009 - an attribute of the package's errors
     for seeds in ([-1], [1.5], ["x"]):
         with pytest.raises(OptionError, match=r"seeds\[0\]"):

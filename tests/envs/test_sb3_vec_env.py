@@ -9,9 +9,11 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize
+from stable_baselines3.common.vec_env import DummyVecEnv, VecEnvWrapper, VecMonitor, VecNormalize
 
 from rover_gym import CommandError, OptionError, PDPolicy, RoverEnv
+from rover_gym.learning.command_vec_env import CommandVecEnv
+from rover_gym.policy import CommandController, Features
 from rover_gym.vector.sb3 import RoverVecEnv
 
 LIMIT = 12
@@ -192,3 +194,45 @@ def test_ppo_learns_from_it_without_complaint() -> None:
     assert len(model.ep_info_buffer) == 8
     assert all(np.isfinite(episode["r"]) and episode["l"] == 8 for episode in model.ep_info_buffer)
     assert all("is_success" in episode for episode in model.ep_info_buffer)
+
+
+SCANNED: dict[str, Any] = {"terrain": "sphere_field", "height_scan": (6, 4, 0.3), "difficulty": 1.0}
+
+
+class Opaque(VecEnvWrapper):
+    """Hides what it wraps, so that every step takes its scan."""
+
+    def __init__(self, venv: RoverVecEnv) -> None:
+        super().__init__(venv)
+
+    @property
+    def unwrapped(self) -> Any:
+        """Nothing that a command would know."""
+        return self
+
+    def reset(self) -> Any:
+        """As the wrapped."""
+        return self.venv.reset()
+
+    def step_wait(self) -> Any:
+        """As the wrapped."""
+        return self.venv.step_wait()
+
+
+def test_training_takes_a_scan_once_a_command() -> None:
+    rovers = [RoverVecEnv(2, threads=1, max_episode_steps=10, **SCANNED) for _ in range(2)]
+    prototype = rovers[0].prototype
+    features, controller = Features(prototype), CommandController(prototype, guided=False)
+    commands = np.array([[1.0, 0.2, 0.0], [0.8, -0.2, 0.0]], np.float32)
+    rare = CommandVecEnv(VecMonitor(rovers[0]), features, controller, 3)
+    often = CommandVecEnv(Opaque(rovers[1]), features, controller, 3)
+    for venv in (rare, often):
+        venv.seed(1)
+    assert rare.reset().tobytes() == often.reset().tobytes()
+    for _ in range(6):
+        ours, theirs = rare.step(commands), often.step(commands)
+        for one, other in zip(ours[:3], theirs[:3], strict=True):
+            assert one.tobytes() == other.tobytes()
+        for info, expected in zip(ours[3], theirs[3], strict=True):
+            if "terminal_observation" in expected:
+                assert info["terminal_observation"].tobytes() == expected["terminal_observation"].tobytes()

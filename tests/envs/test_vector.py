@@ -90,7 +90,7 @@ def test_neither_threads_nor_neighbours_show(n: int, threads: int) -> None:
         assert (result[1][-1], result[2][-1], result[3][-1]) == (reward, terminated, truncated)
         assert result[4]["distance_to_goal"][-1] == info["distance_to_goal"]
         over = terminated or truncated
-    assert batch.batch.simulations.threads == min(threads, n)
+    assert batch.batch.episodes.threads == min(threads, n)
 
 
 def test_the_time_limit_is_the_registered_one() -> None:

@@ -22,6 +22,8 @@ CHAPTERS = [
     "system",
     "lanes",
     "simulation",
+    "draw",
+    "episode",
 ]
 
 # A path from the crate's root, and what it may name: `crate::law::coulomb`, `crate::{cone, law::coulomb}`.

@@ -5,3 +5,6 @@
 mod contacts;
 #[path = "lanes/tree.rs"]
 mod tree;
+
+#[path = "lanes/fleet.rs"]
+mod fleet;

@@ -10,6 +10,8 @@ mod scenes;
 mod batch;
 #[path = "rover/driving.rs"]
 mod driving;
+#[path = "rover/episodes.rs"]
+mod episodes;
 #[path = "rover/exploring.rs"]
 mod exploring;
 #[path = "rover/free_flight.rs"]

@@ -187,3 +187,24 @@ def test_the_wrapper_sums_the_rewards_of_the_steps_it_holds() -> None:
         seen, reward, *_ = plain.step(controller.act(seen[None], command[None])[0])
         expected += reward
     assert total == pytest.approx(expected, rel=1e-12)
+
+
+SCANNED: dict[str, Any] = {"terrain": "sphere_field", "height_scan": (6, 4, 0.3), "difficulty": 1.0}
+
+
+@pytest.mark.parametrize("limit", [9, 10])
+def test_a_scan_once_a_command_is_the_scan_where_it_counts(limit: int) -> None:
+    # The limit of 10 steps cuts the fourth command short: its features, too, have the heights of their place.
+    wrapped = DriveByCommand(gym.wrappers.TimeLimit(RoverEnv(**SCANNED), limit), repeat=3)
+    plain = RoverEnv(**SCANNED)
+    features, controller = Features(plain), CommandController(plain, guided=False)
+    command = np.array([1.0, 0.2, 0.0], np.float32)
+    wrapped.reset(seed=5)
+    seen, _ = plain.reset(seed=5)
+    for step in range(limit):
+        if step % 3 == 0:
+            ours, *_, truncated, _ = wrapped.step(command)
+        seen, *_ = plain.step(controller.act(seen[None], command[None])[0])
+        if step % 3 == 2 or step == limit - 1:
+            assert ours.tobytes() == features(seen[None])[0].tobytes()
+    assert truncated

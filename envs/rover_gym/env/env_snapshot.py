@@ -10,7 +10,7 @@ import numpy as np
 from rover_gym.env.episode_scene import EpisodeScene
 from rover_gym.env.progress import Progress
 from rover_gym.env.task import Task
-from rover_gym.mechanics import Snapshot, StateError
+from rover_gym.mechanics import Episode, RoverGymError, Snapshot, StateError
 from rover_gym.validation import Range, refuse
 
 
@@ -28,8 +28,8 @@ class EnvSnapshot:
     random_state: Mapping[str, Any]
 
 
-def check_snapshot(task: Task, snapshot: object) -> None:
-    """Checks that a snapshot comes from an environment with this task.
+def check_snapshot(task: Task, snapshot: object) -> Episode:
+    """Checks that a snapshot comes from an environment with this task, and returns its episode.
 
     Raises:
         StateError: The value is no snapshot, is damaged, or comes from an environment with other arguments.
@@ -40,8 +40,11 @@ def check_snapshot(task: Task, snapshot: object) -> None:
         part = getattr(snapshot, name)
         if not isinstance(part, kind):
             refuse(StateError, f"snapshot.{name}", part, f"must be of the class {kind.__name__}")
-    if not snapshot.progress.is_of(task):
-        refuse(StateError, "snapshot.progress", snapshot.progress, "must be of an environment with these arguments")
+    try:
+        return snapshot.progress.episode(task.rules)
+    except RoverGymError as error:
+        reason = f"must be of an environment with these arguments ({error})"
+        refuse(StateError, "snapshot.progress", snapshot.progress, reason)
 
 
 def check_random_state(generator: np.random.Generator, given: Mapping[str, Any]) -> dict[str, Any]:

@@ -38,7 +38,7 @@ class EpisodeScene:
 
 @dataclass(frozen=True)
 class ResetOptions:
-    """Checked reset options, by the names and in the units that `SceneDistribution.draw` takes them in."""
+    """Checked reset options, by the names and in the units that `EpisodeDistribution.draw` takes them in."""
 
     fixed: Mapping[str, Any] = field(default_factory=dict)
 
@@ -46,7 +46,7 @@ class ResetOptions:
 def scene_of(
     task: Task, start: Array, rocks: Array, rock_seed: int, domain: Array, terrain: Plane | SphereField
 ) -> EpisodeScene:
-    """The scene of one episode from rows of `DrawnScenes`: `starts`, `rocks`, `rock_seeds`, `domains`."""
+    """The scene of one episode from rows of `DrawnEpisodes`: `starts`, `rocks`, `rock_seeds`, `domains`."""
     slope, uphill, x, z, heading, goal_x, goal_z = start.tolist()
     difficulty, abundance, max_radius = rocks.tolist()
     return EpisodeScene(

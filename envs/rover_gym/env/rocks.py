@@ -9,14 +9,13 @@ One number d in [0, 1], the difficulty, sets how hard an episode is:
 An argument that is given overrides the difficulty.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.start import Point
-from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField
+from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField, sin_cos
 from rover_gym.validation import Range, number, refuse, vector
 
 DEFAULT_DIFFICULTY = 0.5
@@ -86,7 +85,7 @@ class HeightScan:
 
 def scan_points(offsets: npt.NDArray[np.float64], position: Point, heading: float) -> npt.NDArray[np.float64]:
     """`(n, 2)` x and z of the scan's points on the map, m."""
-    c, s = math.cos(heading), math.sin(heading)
+    s, c = sin_cos(heading)
     points: npt.NDArray[np.float64] = offsets @ np.array([[c, -s], [s, c]]) + position
     return points
 

@@ -10,25 +10,26 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from rover_gym.env.arguments import RoverArguments, check_arguments, takes_arguments, with_argument_table
-from rover_gym.env.beginning import draw_beginnings
-from rover_gym.env.control_period import advance, motor_commands
+from rover_gym.env.beginning import draw_episodes
 from rover_gym.env.env_snapshot import EnvSnapshot, check_random_state, check_snapshot
 from rover_gym.env.episode_scene import EpisodeScene, check_difficulty, check_reset_options, scene_of
 from rover_gym.env.generators import check_seed, row_of, seeded, set_row
 from rover_gym.env.observation import ObservationLayout
 from rover_gym.env.progress import Progress
 from rover_gym.env.randomisation import Domain
-from rover_gym.env.readings import draw_noise
 from rover_gym.env.rocks import Rocks
 from rover_gym.env.start import Start
-from rover_gym.env.task import Task, check_actions, make_task
+from rover_gym.env.task import Task, make_task
 from rover_gym.env.wheels import N_ACTIONS
-from rover_gym.mechanics import Plane, Simulation, StepError
+from rover_gym.mechanics import Episode, Plane, Simulation, standard_normals
 from rover_gym.rendering.render_options import RENDER_MODES, RenderOptions
 from rover_gym.validation import Range
 
 if TYPE_CHECKING:
     from rover_gym.rendering import FrameRenderer
+
+
+NOT_RUNNING = "RoverEnv: call reset() first"
 
 
 @with_argument_table
@@ -216,8 +217,11 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         self.action_space = gym.spaces.Box(-1.0, 1.0, (N_ACTIONS,), np.float32)
         self._simulation = Simulation(self.model, Plane(), **self.task.simulation_options)
         self._scene: EpisodeScene | None = None
-        self._progress: Progress
+        self._episode: Episode
         self._difficulty: Range | None = None
+        #: Whether a step takes the height scan. Without, observations keep the last heights until
+        #: `complete_observation`, or until the episode ends by itself.
+        self.has_scan = True
 
         self.render_mode: str | None = given["render_mode"]
         self.render_options: RenderOptions = given["render_options"] or RenderOptions()
@@ -271,15 +275,14 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         checked = check_reset_options(self.task, options)
         chosen = check_seed(seed)
         generator, used = (self.np_random, self._np_random_seed) if chosen is None else seeded(chosen)
-        begun = draw_beginnings(self.task, row_of(generator)[None], [self._difficulty], checked)
-        scenes = begun.scenes
-        set_row(generator, scenes.generators[0])
+        drawn = draw_episodes(self.task, row_of(generator)[None], [self._difficulty], checked)
+        set_row(generator, drawn.generators[0])
         self._np_random, self._np_random_seed = generator, used
-        self._simulation, self._progress = scenes.simulation(0), begun.progress.row(0)
+        self._simulation, self._episode = drawn.simulation(0), drawn.episode(0)
         self._scene = scene_of(
-            self.task, scenes.starts[0], scenes.rocks[0], scenes.rock_seeds[0], scenes.domains[0], scenes.terrain(0)
+            self.task, drawn.starts[0], drawn.rocks[0], drawn.rock_seeds[0], drawn.domains[0], drawn.terrain(0)
         )
-        return self._progress.observation.copy(), begun.report(self.task).info(0)
+        return self._episode.observation, self._episode.info()
 
     def step(
         self, action: npt.NDArray[np.float32]
@@ -291,24 +294,25 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
                 [-1, 1]; nothing has changed.
             ResetNeeded: The environment has not been reset.
         """
-        goal = self._running().start.goal
-        simulation = self._simulation
-        command = check_actions(action, (N_ACTIONS,))
-        torques, set_points = motor_commands(self.task, self._progress, command)
-        simulation.set_commands(torques, set_points)
-        messages: dict[int, str] = {}
-        try:
-            simulation.step(self.task.substeps)
-        except StepError as error:
-            messages[0] = str(error)
-        reading = simulation.reading(goal, self.task.scan)
-        noise = None
-        if self.task.noisy is not None:
-            drawn, after = draw_noise(self.task, row_of(self.np_random)[None])
+        if self._scene is None:
+            raise ResetNeeded(NOT_RUNNING)
+        if self.task.is_noisy:
+            normals, after = standard_normals(row_of(self.np_random)[None], self.task.layout.size)
+            result = self._episode.step(self._simulation, action, normals[0], has_scan=self.has_scan)
             set_row(self.np_random, after[0])
-            noise = None if drawn is None else drawn[0]
-        outcome = advance(self.task, self._progress, command, reading, messages, noise)
-        return outcome.observation, float(outcome.reward), bool(outcome.termination), False, outcome.info()
+        else:
+            result = self._episode.step(self._simulation, action, has_scan=self.has_scan)
+        observation, reward, terminated, info = result
+        return observation, reward, terminated, False, info
+
+    def complete_observation(self) -> npt.NDArray[np.float32]:
+        """The last observation, with the heights that it lacks where `has_scan` was off; takes the scan if it must.
+
+        Raises:
+            ResetNeeded: The environment has not been reset.
+        """
+        self._running()
+        return self._episode.complete(self._simulation)
 
     def set_difficulty(self, difficulty: float | Range) -> None:
         """Sets the rocks' difficulty, or the range it is drawn from, from the next reset on.
@@ -351,7 +355,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         return EnvSnapshot(
             scene=self._running(),
             simulation=self._simulation.snapshot(),
-            progress=self._progress.copy(),
+            progress=Progress.of(self._episode),
             difficulty=self._difficulty,
             random_state=copy.deepcopy(self.np_random.bit_generator.state),
         )
@@ -363,16 +367,16 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
             StateError: The value is no snapshot, is damaged, or comes from an environment with other arguments; nothing
                 has changed.
         """
-        check_snapshot(self.task, snapshot)
+        episode = check_snapshot(self.task, snapshot)
         state = check_random_state(self.np_random, snapshot.random_state)
         difficulty = None if snapshot.difficulty is None else check_difficulty(self.task, snapshot.difficulty)
         simulation = self.task.simulate(snapshot.scene.terrain, snapshot.scene.domain)
         simulation.restore(snapshot.simulation)
         self.np_random.bit_generator.state = state
         self._simulation, self._scene = simulation, snapshot.scene
-        self._progress, self._difficulty = snapshot.progress.copy(), difficulty
+        self._episode, self._difficulty = episode, difficulty
 
     def _running(self) -> EpisodeScene:
         if self._scene is None:
-            raise ResetNeeded("RoverEnv: call reset() first")
+            raise ResetNeeded(NOT_RUNNING)
         return self._scene

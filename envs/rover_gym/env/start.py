@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import Plane, RoverModel, SphereField, TerrainError
+from rover_gym.mechanics import Plane, RoverModel, SphereField, TerrainError, atan2
 from rover_gym.validation import Range, refuse
 
 Point: TypeAlias = tuple[float, float]
@@ -54,7 +54,7 @@ def slope_of(field: SphereField) -> tuple[float, float]:
     if ground is None or ground.normal[1] <= 0.0:
         refuse(TerrainError, "terrain", field, "needs a ground plane to stand on, facing up")
     x, y, z = ground.normal
-    return math.acos(min(y, 1.0)), math.atan2(z, -x)
+    return float(atan2(math.sqrt(x * x + z * z), y)), float(atan2(z, -x))
 
 
 def resting_pose(model: RoverModel, plane: Plane, position: Point, heading: float) -> npt.NDArray[np.float64]:

@@ -10,18 +10,19 @@ import numpy.typing as npt
 
 from rover_gym.env import rewards
 from rover_gym.env.observation import ObservationLayout, build_layout
-from rover_gym.env.quantities import Array
 from rover_gym.env.randomisation import Domain, DomainDistribution
 from rover_gym.env.rocks import MAX_GOAL_DISTANCE, RockDistribution, rock_distribution
 from rover_gym.env.start import StartDistribution, slope_of
 from rover_gym.mechanics import (
     CommandError,
+    EpisodeDistribution,
+    EpisodeRules,
     OptionError,
     Plane,
     RoverModel,
-    SceneDistribution,
     Simulation,
     SphereField,
+    sin_cos,
 )
 from rover_gym.validation import Range, array, number, refuse, span
 
@@ -48,22 +49,14 @@ class Task:
         start: Distribution of the starts.
         domain: Distribution of the randomised properties.
         goal_tolerance: Distance within which the goal is reached, m.
-        cos_max_tilt: Cosine of the tilt below which the rover has rolled over.
-        stuck_time: Time until a high-centred rover ends the episode, s.
         gravity: Gravity before it is scaled, m/s2.
         substeps: Physics steps per control period.
         dt: Control period, s.
-        reward_weights: Weights of the reward, by term.
         simulation_options: Keyword arguments of `Simulation`.
         max_steering: Set-point of a steering action of 1, rad.
-        torque_limits: `(6,)` torque of a torque action of 1, N m.
         layout: Layout of the observation.
-        inverse_scale: `(size,)` inverse of the observation's scale.
-        noisy: `(size,)` standard deviation of each entry's noise; None without noise.
-        places: Slices of a reading, by name.
-        n_shared: Number of leading entries that a reading and an observation share, in the same order.
-        scalars: Slice of a reading that holds the scalars, from the distance to the goal on.
-        scenes: What the core draws episodes from.
+        rules: What the core needs to run an episode.
+        episodes: What the core draws episodes from.
     """
 
     model: RoverModel
@@ -74,22 +67,14 @@ class Task:
     start: StartDistribution
     domain: DomainDistribution
     goal_tolerance: float
-    cos_max_tilt: float
-    stuck_time: float
     gravity: tuple[float, ...]
     substeps: int
     dt: float
-    reward_weights: Mapping[str, float]
     simulation_options: Mapping[str, Any]
     max_steering: float
-    torque_limits: npt.NDArray[np.float64]
     layout: ObservationLayout
-    inverse_scale: npt.NDArray[np.float64]
-    noisy: npt.NDArray[np.float64] | None
-    places: Mapping[str, slice]
-    n_shared: int
-    scalars: slice
-    scenes: SceneDistribution
+    rules: EpisodeRules
+    episodes: EpisodeDistribution
 
     def simulate(self, terrain: Plane | SphereField, domain: Domain) -> Simulation:
         """Creates a simulation of the rover on a terrain, at rest in the zero configuration."""
@@ -99,10 +84,10 @@ class Task:
             options["gravity"] = tuple(domain.gravity_scale * g for g in self.gravity)
         return Simulation(model, terrain, **options)
 
-    def trunk_load_limit(self, domains: Array) -> Array:
-        """Forces on the trunk beyond which rovers with these fields of `Domain`, `(m, 4)`, are high-centred, N."""
-        weight = self.model.mass * math.hypot(*self.gravity)
-        return TRUNK_LOAD * weight * domains[:, 0] * domains[:, 3]
+    @property
+    def is_noisy(self) -> bool:
+        """Whether observations have noise."""
+        return self.domain.observation_noise > 0.0
 
 
 def make_task(given: Mapping[str, Any]) -> Task:
@@ -156,24 +141,35 @@ def make_task(given: Mapping[str, Any]) -> Task:
         "time_step": step,
         **(given["solver_options"] or {}),
     }
-    n_scan = 0 if scan is None else len(scan.offsets)
-    # The core validates the simulation options.
-    simulation = Simulation(rover, Plane(), **options)
-    places = simulation.reading_layout(n_scan)
-    layout = build_layout(rover, math.hypot(*gravity), n_scan)
+    simulation = Simulation(rover, Plane(), **options)  # the core validates the simulation options
     points = None if scan is None else scan.offsets
-    noisy = None if domain.observation_noise == 0.0 else domain.observation_noise * layout.unbounded
+    layout = build_layout(rover, math.hypot(*gravity), 0 if points is None else len(points))
+    max_steering = _steering_limit(rover, given["max_steering_deg"])
+    weights = dict(rewards.WEIGHTS) if given["reward_weights"] is None else given["reward_weights"]
+    rules = EpisodeRules(
+        rover,
+        substeps=substeps,
+        dt=substeps * step,
+        torque_limits=rover.wheel_torque_limits,
+        max_steering=max_steering,
+        goal_tolerance=given["goal_tolerance"],
+        cos_max_tilt=float(sin_cos(math.radians(given["max_tilt_deg"]))[1]),
+        stuck_time=given["stuck_time"],
+        weights=weights,
+        scale=layout.scale,
+        noise=domain.observation_noise * layout.unbounded if domain.observation_noise > 0.0 else None,
+        scan=points,
+    )
     slope_by_difficulty = slope_deg is None and rocks is not None
-    scenes = SceneDistribution(
+    episodes = EpisodeDistribution(
+        rules,
         simulation,
         start=asdict(start),
         domain=asdict(domain),
-        goal_tolerance=given["goal_tolerance"],
+        trunk_load_limit=TRUNK_LOAD * (rover.mass * math.hypot(*gravity)),
         rocks=None if rocks is None else asdict(rocks),
         slope_by_difficulty=slope_by_difficulty,
         field=field,
-        scan=points,
-        noise=noisy,
     )
     return Task(
         model=rover,
@@ -184,22 +180,14 @@ def make_task(given: Mapping[str, Any]) -> Task:
         start=start,
         domain=domain,
         goal_tolerance=given["goal_tolerance"],
-        cos_max_tilt=math.cos(math.radians(given["max_tilt_deg"])),
-        stuck_time=given["stuck_time"],
         gravity=gravity,
         substeps=substeps,
         dt=substeps * step,
-        reward_weights=dict(rewards.WEIGHTS) if given["reward_weights"] is None else given["reward_weights"],
         simulation_options=options,
-        max_steering=_steering_limit(rover, given["max_steering_deg"]),
-        torque_limits=rover.wheel_torque_limits,
+        max_steering=max_steering,
         layout=layout,
-        inverse_scale=1.0 / layout.scale,
-        noisy=noisy,
-        places=places,
-        n_shared=places["target"].stop,
-        scalars=slice(places["target"].stop - 1, places["solver"].stop),
-        scenes=scenes,
+        rules=rules,
+        episodes=episodes,
     )
 
 

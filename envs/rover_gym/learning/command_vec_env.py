@@ -10,10 +10,13 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepR
 
 from rover_gym.policy.command import N_COMMANDS, CommandController
 from rover_gym.policy.features import LARGEST_FEATURE, Features
+from rover_gym.vector.sb3 import RoverVecEnv
 
 
 class CommandVecEnv(VecEnvWrapper):
     """Holds each command for several steps of the wrapped rover environments and returns features.
+
+    Over a `RoverVecEnv` the height scan is taken once a command, in the last of its steps, and where an episode ends.
 
     If an episode ends while a command is held, its rover starts the next episode and waits without torque for the
     remaining steps, at most `repeat - 1`, whose rewards are discarded.
@@ -34,6 +37,8 @@ class CommandVecEnv(VecEnvWrapper):
         self.features = features
         self.controller = controller
         self.repeat = repeat
+        rovers = venv.unwrapped
+        self._rovers = rovers if isinstance(rovers, RoverVecEnv) else None
         self._seen: npt.NDArray[Any] = np.zeros((self.num_envs, features.size), np.float32)
         self._commands = np.zeros((self.num_envs, N_COMMANDS), np.float32)
 
@@ -52,7 +57,9 @@ class CommandVecEnv(VecEnvWrapper):
         ended = np.zeros(self.num_envs, bool)
         final: dict[int, dict[str, Any]] = {}
         infos: list[dict[str, Any]] = []
-        for _ in range(self.repeat):
+        for left in reversed(range(self.repeat)):
+            if self._rovers is not None:
+                self._rovers.has_scan = left == 0
             actions = self.controller.act(self._seen, self._commands)
             actions[ended] = 0.0
             seen, step_rewards, dones, infos = self.venv.step(actions)

@@ -23,7 +23,7 @@ class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
     """Holds each command for several steps of the rover and sums the rewards.
 
     Actions and observations are those that `rover_gym.learning` trains with, for libraries that take single
-    environments.
+    environments. The height scan is taken once a command, in the last of its steps, and where an episode ends.
 
     Args:
         env: A `Rover-v0`, wrapped or not.
@@ -46,6 +46,8 @@ class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
         self._features = Features(rover, pool)
         self._controller = CommandController(rover, CommandLimits(**limits), guided=guided)
         self._repeat = repeat
+        self._rover = rover
+        self._heights = rover.observation_layout.get("height_scan")
         self._seen = np.zeros((1, rover.observation_layout.size), np.float32)
         self.observation_space = gym.spaces.Box(-LARGEST_FEATURE, LARGEST_FEATURE, (self._features.size,), np.float32)
         self.action_space = gym.spaces.Box(-1.0, 1.0, (N_COMMANDS,), np.float32)
@@ -67,12 +69,17 @@ class DriveByCommand(gym.Wrapper[Array, Array, Array, Array]):
         command = np.array(vector("action", action, N_COMMANDS, error=CommandError))[None]
         terminated = truncated = False
         info: dict[str, Any] = {}
-        for _ in range(self._repeat):
-            observation, reward, terminated, truncated, info = self.env.step(
-                self._controller.act(self._seen, command)[0]
-            )
+        for left in reversed(range(self._repeat)):
+            action = self._controller.act(self._seen, command)[0]
+            self._rover.has_scan = left == 0
+            try:
+                observation, reward, terminated, truncated, info = self.env.step(action)
+            finally:
+                self._rover.has_scan = True
             self._seen = observation[None]
             total += float(reward)
             if terminated or truncated:
+                if self._heights is not None:
+                    observation[self._heights] = self._rover.complete_observation()[self._heights]
                 break
         return self._features(self._seen)[0], total, terminated, truncated, info

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.readings import tilt_of
 from rover_gym.env.task import MAX_EPISODE_STEPS
 from rover_gym.mechanics import OptionError
 from rover_gym.policy.baseline import ENDS, wilson_interval
@@ -102,18 +101,18 @@ def drive_all(
     state = None
     while active.any():
         actions, state = policy.predict(observation, state, steps == 0)
-        outcome, terminated, _ = batch.step(actions, active)
-        observation = outcome.observation
+        observation, _, terminated, _, _ = batch.step(actions, active)
+        infos = batch.infos()
         now = _places(batch, observation)
         sums[:, 0] += np.linalg.norm(now - places, axis=1)
-        tilt = tilt_of(outcome.scalars.cos_tilt)
-        sums[:, 1] += outcome.scalars.slip_ratio
+        tilt = infos["tilt"]
+        sums[:, 1] += infos["slip_ratio"]
         sums[:, 2] += tilt
         np.maximum(sums[:, 3], tilt, out=sums[:, 3])
         places = now
         steps += 1
         for i in np.flatnonzero(active & (terminated | (steps >= limit))).tolist():
-            info = outcome.info(i)
+            info = batch.info(i)
             way, slip, lean, largest = sums[i].tolist()
             done[running[i]] = EvaluatedEpisode(
                 seed=running[i],

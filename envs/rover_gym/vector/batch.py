@@ -1,11 +1,11 @@
 """A batch of rovers, the base of the vector environments for Gymnasium and stable-baselines3.
 
 Rover i of a batch behaves, bit for bit, like a `RoverEnv` with the same arguments and seed, whatever the numbers of
-rovers and threads. Each control period calls the compiled core once. Observation, reward and termination come from the
-functions that `RoverEnv` uses, applied to arrays.
+rovers and threads. Each control period is one call of the compiled core: the thread that steps a rover also computes
+its observation, reward and termination, as it does for `RoverEnv`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
@@ -13,22 +13,18 @@ import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.beginning import Beginnings, draw_beginnings
-from rover_gym.env.control_period import advance, motor_commands
+from rover_gym.env.beginning import draw_episodes
 from rover_gym.env.episode_scene import EpisodeScene, ResetOptions, check_difficulty, check_reset_options, scene_of
 from rover_gym.env.generators import Rows, check_seed, fresh_seed, generator_at, row_of, seeded_rows, set_row
 from rover_gym.env.observation import ObservationLayout
-from rover_gym.env.outcome import Outcome
-from rover_gym.env.progress import Progress
 from rover_gym.env.quantities import Array, Mask, Observations
 from rover_gym.env.randomisation import Domain
-from rover_gym.env.readings import draw_noise
 from rover_gym.env.rocks import Rocks
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import Start
 from rover_gym.env.task import Task, check_actions
 from rover_gym.env.wheels import N_ACTIONS
-from rover_gym.mechanics import Plane, RoverModel, Simulation, SimulationBatch
+from rover_gym.mechanics import DrawnEpisodes, EpisodeBatch, Plane, RoverModel, Simulation
 from rover_gym.validation import Range, whole
 
 if TYPE_CHECKING:
@@ -51,6 +47,7 @@ class RoverBatch:
 
     Attributes:
         prototype: An environment with the same arguments, never stepped, that gives spaces, layout and model.
+        episodes: The rovers' simulations and episodes in the core.
         rovers: One view per rover.
     """
 
@@ -72,24 +69,25 @@ class RoverBatch:
         self.prototype = RoverEnv(**arguments)
         self.task: Task = self.prototype.task
         simulation = Simulation(self.task.model, Plane(), **self.task.simulation_options)
-        self.simulations = SimulationBatch([simulation] * self.n, scan=self.task.scan, threads=threads)
+        self.episodes = EpisodeBatch(
+            self.task.rules, simulation, self.n, max_steps=self.max_episode_steps, threads=threads
+        )
         self.rovers = tuple(BatchRover(self, i) for i in range(self.n))
-        self._progress = Progress.of(self.task, self.n)
         self._starts, self._rocks = np.zeros((self.n, 7)), np.zeros((self.n, 3))
-        self._rock_seeds = np.zeros(self.n, np.uint64)
+        self._rock_seeds, self._domains = np.zeros(self.n, np.uint64), np.zeros((self.n, 4))
+        #: Generators of the rovers before their first episodes; afterwards the core has them.
         self._generators: Rows = np.zeros((self.n, 4), np.uint64)
         #: Generators that were handed out; they hold their rovers' states.
         self._lent: dict[int, np.random.Generator] = {}
         self._seeds: list[int] = [-1] * self.n
         self._difficulties: dict[int, Range] = {}
-        self._steps = np.zeros(self.n, np.int64)
         self._begun = np.zeros(self.n, np.bool_)
         self._started = False
 
     @property
     def observation(self) -> Observations:
         """`(n, size) float32` copy of the last observations."""
-        return self._progress.observation.copy()
+        return self.episodes.observations()
 
     def check_options(self, options: Mapping[str, Any] | None) -> ResetOptions:
         """Checks reset options and refuses the first bad one."""
@@ -102,7 +100,8 @@ class RoverBatch:
             OptionError: The seed is no whole number from 0; nothing has changed.
             TerrainError: As `RoverEnv.reset`; nothing has changed.
         """
-        return self.begin(self.draw([i], [check_seed(seed)], options)).info(0)
+        self.begin(self.draw([i], [check_seed(seed)], options))
+        return self.info(i)
 
     def draw(
         self,
@@ -121,64 +120,70 @@ class RoverBatch:
             TerrainError: As `RoverEnv.reset`.
         """
         given = [None] * len(chosen) if seeds is None else seeds
-        self._seed_at_random([i for i, seed in zip(chosen, given, strict=True) if seed is None])
-        self._collect()
-        rows = self._generators[chosen]
+        rows = np.zeros((len(chosen), 4), np.uint64)
+        kept = [k for k, seed in enumerate(given) if seed is None]
+        rows[kept] = self._rows([chosen[k] for k in kept])
         anew = [k for k, seed in enumerate(given) if seed is not None]
-        if anew:
-            rows[anew] = seeded_rows([seed for seed in given if seed is not None])
+        rows[anew] = seeded_rows([seed for seed in given if seed is not None])
         used = [self._seeds[i] if seed is None else seed for i, seed in zip(chosen, given, strict=True)]
         difficulties = [self._difficulties.get(i) for i in chosen]
         fixed = ResetOptions() if options is None else options
-        begun = draw_beginnings(self.task, rows, difficulties, fixed, self.simulations)
-        return Drawn(begun, chosen, used, {chosen[k] for k in anew})
+        episodes = draw_episodes(self.task, rows, difficulties, fixed, self.episodes)
+        return Drawn(episodes, chosen, used, {chosen[k] for k in anew})
 
-    def begin(self, drawn: "Drawn") -> Outcome:
-        """Starts drawn episodes and returns what their reset reports, one row per rover."""
-        chosen, begun = drawn.chosen, drawn.begun
-        scenes = begun.scenes
-        self.simulations.begin(chosen, scenes)
-        self._progress.put(chosen, begun.progress)
-        self._starts[chosen], self._rocks[chosen] = scenes.starts, scenes.rocks
-        self._rock_seeds[chosen] = scenes.rock_seeds
-        self._steps[chosen], self._begun[chosen] = 0, True
-        self._generators[chosen] = scenes.generators
+    def begin(self, drawn: "Drawn") -> None:
+        """Starts drawn episodes."""
+        chosen, episodes = drawn.chosen, drawn.episodes
+        self.episodes.begin(chosen, episodes)
+        self._starts[chosen], self._domains[chosen] = episodes.starts, episodes.domains
+        self._rocks[chosen], self._rock_seeds[chosen] = episodes.rocks, episodes.rock_seeds
+        self._begun[chosen] = True
         for i, seed in zip(chosen, drawn.seeds, strict=True):
             self._seeds[i] = seed
         for i in drawn.seeded & self._lent.keys():
             del self._lent[i]
-        self._hand_back()
-        return begun.report(self.task)
+        self._hand_back(self._lent.keys() & set(chosen))
 
-    def step(self, actions: object, active: Mask | None = None) -> tuple[Outcome, Mask, Mask]:
+    def step(
+        self, actions: object, active: Mask | None = None, *, has_scan: bool = True
+    ) -> tuple[Observations, Array, Mask, Mask, list[int]]:
         """Applies actions `(n, 12)` for one control period.
 
         Args:
             actions: Within [-1, 1].
-            active: `(n,)` mask of the rovers to move; the results of the others are meaningless. None for all.
+            active: `(n,)` mask of the rovers to move; the others keep the values of their last period. None for all.
+            has_scan: Whether the height scan is taken. Without, only observations of episodes that end here have new
+                heights; the others keep the last ones.
 
         Returns:
-            The outcome, a mask of terminated episodes, and a mask of episodes that have reached the time limit.
+            Observations `(n, size) float32`, rewards `(n,)`, a mask of terminated episodes, a mask of episodes that
+            have reached the time limit, and the indices of those that are over, one way or the other.
 
         Raises:
             CommandError: The actions have a wrong shape or an entry that is not finite or outside [-1, 1]; nothing
                 has changed.
             ResetNeeded: A rover has not been reset.
         """
-        commands = check_actions(actions, (self.n, N_ACTIONS))
         if not self._started:
+            check_actions(actions, (self.n, N_ACTIONS))
             if not self._begun.all():
                 raise ResetNeeded("a batch of rovers: call reset() first")
             self._started = True
-        task = self.task
-        torques, set_points = motor_commands(task, self._progress, commands)
-        readings, messages = self.simulations.step(torques, set_points, task.substeps, active=active)
-        outcome = advance(task, self._progress, commands, readings, messages, self._draw_noise(active))
-        self._steps += 1
-        terminated = outcome.termination != 0
-        if self.max_episode_steps is None:
-            return outcome, terminated, np.zeros(self.n, np.bool_)
-        return outcome, terminated, self._steps >= self.max_episode_steps
+        if not self.task.is_noisy or not self._lent:
+            return self.episodes.step(actions, active, has_scan=has_scan)
+        lent = list(self._lent)
+        self.episodes.set_generators(lent, np.stack([row_of(self._lent[i]) for i in lent]))
+        result = self.episodes.step(actions, active, has_scan=has_scan)
+        self._hand_back(lent)
+        return result
+
+    def info(self, i: int) -> dict[str, Any]:
+        """The info of rover i's last period or reset, as `RoverEnv` returns it."""
+        return self.episodes.info(i)
+
+    def infos(self) -> dict[str, Any]:
+        """The infos of all n rovers, as one array per key with Gymnasium's masks."""
+        return self.episodes.infos()
 
     def generator(self, i: int) -> np.random.Generator:
         """Rover i's random generator; before the first reset it is seeded at random, as in `gymnasium.Env`.
@@ -186,8 +191,7 @@ class RoverBatch:
         The rover continues to draw from it: numbers that the caller draws are not drawn again.
         """
         if i not in self._lent:
-            self._seed_at_random([i])
-            self._lent[i] = generator_at(self._generators[i])
+            self._lent[i] = generator_at(self._rows([i])[0])
         return self._lent[i]
 
     def seed_of(self, i: int) -> int:
@@ -203,46 +207,38 @@ class RoverBatch:
         """
         if not self._begun[i]:
             raise ResetNeeded("a batch of rovers: call reset() first")
-        domain, terrain = self._progress.domain[i], self.simulations.terrain(i)
-        return scene_of(self.task, self._starts[i], self._rocks[i], int(self._rock_seeds[i]), domain, terrain)
+        terrain = self.episodes.terrain(i)
+        return scene_of(self.task, self._starts[i], self._rocks[i], int(self._rock_seeds[i]), self._domains[i], terrain)
+
+    def _rows(self, chosen: Sequence[int]) -> Rows:
+        """The present generators of some rovers, `(m, 4)`."""
+        self._seed_at_random(chosen)
+        rows = self._generators[chosen]
+        begun = [k for k, i in enumerate(chosen) if self._begun[i]]
+        rows[begun] = self.episodes.generators([chosen[k] for k in begun])
+        for k, i in enumerate(chosen):
+            if i in self._lent:
+                rows[k] = row_of(self._lent[i])
+        return rows
 
     def _seed_at_random(self, chosen: Sequence[int]) -> None:
         """Seeds those of the chosen generators that have no seed yet."""
         unseeded = [i for i in chosen if self._seeds[i] < 0]
-        if unseeded:
-            seeds = [fresh_seed() for _ in unseeded]
-            self._generators[unseeded] = seeded_rows(seeds)
-            for i, seed in zip(unseeded, seeds, strict=True):
-                self._seeds[i] = seed
+        seeds = [fresh_seed() for _ in unseeded]
+        self._generators[unseeded] = seeded_rows(seeds)
+        for i, seed in zip(unseeded, seeds, strict=True):
+            self._seeds[i] = seed
 
-    def _collect(self) -> None:
-        """Takes over the states of the generators that were handed out."""
-        for i, generator in self._lent.items():
-            self._generators[i] = row_of(generator)
-
-    def _hand_back(self) -> None:
-        """Sets the generators that were handed out to the present states."""
-        for i, generator in self._lent.items():
-            set_row(generator, self._generators[i])
-
-    def _draw_noise(self, active: Mask | None) -> Array | None:
-        if self.task.noisy is None:
-            return None
-        self._collect()
-        moving = slice(None) if active is None else active
-        drawn, self._generators[moving] = draw_noise(self.task, self._generators[moving])
-        self._hand_back()
-        if active is None or drawn is None:
-            return drawn
-        noise = np.zeros((self.n, drawn.shape[1]))
-        noise[active] = drawn
-        return noise
+    def _hand_back(self, lent: Iterable[int]) -> None:
+        """Sets generators that were handed out to the states in the core."""
+        for i in lent:
+            set_row(self._lent[i], self.episodes.generators([i])[0])
 
 
 class Drawn(NamedTuple):
     """The next episodes of chosen rovers, their generators' seeds, and the rovers whose generators are new."""
 
-    begun: Beginnings
+    episodes: DrawnEpisodes
     chosen: Sequence[int]
     seeds: Sequence[int]
     seeded: set[int]
@@ -281,7 +277,7 @@ class BatchRover:
     @property
     def simulation(self) -> Simulation:
         """A copy of the rover's simulation."""
-        return self._batch.simulations.simulation(self._i)
+        return self._batch.episodes.simulation(self._i)
 
     @property
     def start(self) -> Start:

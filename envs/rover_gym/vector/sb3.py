@@ -60,7 +60,9 @@ class RoverVecEnv(VecEnv):
         **arguments: Unpack[RoverArguments],
     ) -> None:
         self.batch = RoverBatch(n_envs, threads=threads, max_episode_steps=max_episode_steps, **arguments)
-        self._actions: npt.NDArray[np.float64] | None = None
+        #: Whether a step takes the height scan, see `RoverBatch.step`.
+        self.has_scan = True
+        self._actions: object = None
         #: Rovers whose next episode was refused when the last one ended.
         self._waiting: list[int] = []
         prototype = self.prototype
@@ -108,12 +110,8 @@ class RoverVecEnv(VecEnv):
         self._options = [copy.deepcopy(dict(one or {})) for one in given]
 
     def step_async(self, actions: npt.NDArray[np.float32]) -> None:
-        """Stores the actions `(n_envs, 12)` for `step_wait`.
-
-        Raises:
-            CommandError: The actions have a wrong shape or an entry outside [-1, 1]; nothing has changed.
-        """
-        self._actions = check_actions(actions, (self.num_envs, N_ACTIONS))
+        """Stores the actions `(n_envs, 12)` for `step_wait`."""
+        self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
         """Applies the stored actions for one control period; rovers whose episode ends start the next.
@@ -121,20 +119,20 @@ class RoverVecEnv(VecEnv):
         If a next episode cannot begin, the following step refuses it before any rover moves.
 
         Raises:
+            CommandError: The actions have a wrong shape or an entry outside [-1, 1]; nothing has changed.
             TerrainError: A rover's next episode cannot begin (see `RoverEnv.reset`); nothing has changed. Reset with
                 another seed or other options.
         """
         if self._waiting:
+            check_actions(self._actions, (self.num_envs, N_ACTIONS))
             self._begin(self.batch.draw(self._waiting))
             self._waiting = []
-        outcome, terminated, timed_out = self.batch.step(self._actions)
-        observation = outcome.observation
+        observation, earned, terminated, timed_out, ended = self.batch.step(self._actions, has_scan=self.has_scan)
         dones = terminated | timed_out
         infos: list[dict[str, Any]] = [{"TimeLimit.truncated": False} for _ in range(self.num_envs)]
-        if dones.any():
-            ended = np.flatnonzero(dones).tolist()
+        if ended:
             for i in ended:
-                last = outcome.info(i)
+                last = self.batch.info(i)
                 last["TimeLimit.truncated"] = bool(timed_out[i] and not terminated[i])
                 last["terminal_observation"] = observation[i].copy()
                 infos[i] = last
@@ -145,13 +143,13 @@ class RoverVecEnv(VecEnv):
             else:
                 observation[ended] = self.batch.observation[ended]
         # Only a rover that flies off at 1e37 m/s earns a reward out of float32's range.
-        reward = np.clip(outcome.reward, -LARGEST, LARGEST).astype(np.float32)
+        reward = np.clip(earned, -LARGEST, LARGEST).astype(np.float32)
         return observation, reward, dones, infos
 
     def _begin(self, drawn: Drawn) -> None:
-        begun = self.batch.begin(drawn)
-        for k, i in enumerate(drawn.chosen):
-            self.reset_infos[i] = begun.info(k)
+        self.batch.begin(drawn)
+        for i in drawn.chosen:
+            self.reset_infos[i] = self.batch.info(i)
 
     def close(self) -> None:
         """Frees the renderers, if there are any."""

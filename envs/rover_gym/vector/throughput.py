@@ -70,7 +70,7 @@ class _TimedSimulations:
     """Wraps a batch's simulations and sums the time of their steps."""
 
     def __init__(self, batch: RoverBatch) -> None:
-        self._inner = batch.simulations
+        self._inner = batch.episodes
         self.elapsed = 0.0
 
     def step(self, *args: Any, **kwargs: Any) -> Any:
@@ -109,7 +109,7 @@ def measure_speed(
     watches = []
     for env in (several, single):
         watch: Any = _TimedSimulations(env.batch)
-        env.batch.simulations = watch
+        env.batch.episodes = watch
         watches.append(watch)
     start = time.perf_counter()
     several.reset(seed=0)
@@ -130,7 +130,7 @@ def measure_speed(
     step, physics, _, _ = min(measured)
     return VectorSpeed(
         num_envs=num_envs,
-        threads=several.batch.simulations.threads,
+        threads=several.batch.episodes.threads,
         step=step,
         physics=physics,
         one_thread=min(row[2] for row in measured),

@@ -17,7 +17,7 @@ from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.mechanics import OptionError, RoverGymError
 from rover_gym.validation import mapping, refuse
-from rover_gym.vector.batch import Drawn, RoverBatch
+from rover_gym.vector.batch import RoverBatch
 
 _Info = dict[str, Any]
 
@@ -57,7 +57,8 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         self.single_action_space = self.prototype.action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._ended: Mask = np.zeros(self.num_envs, np.bool_)
+        #: Rovers whose episode is over and whose next has not begun, in order.
+        self._over: list[int] = []
 
     @property  # type: ignore[override] # as SyncVectorEnv's
     def np_random(self) -> tuple[np.random.Generator, ...]:
@@ -94,10 +95,14 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         given = dict(mapping("options", options))
         chosen = self._check_mask(given.pop("reset_mask")) if "reset_mask" in given else list(range(self.num_envs))
         fixed = self.batch.check_options(given)
+        self.batch.begin(self.batch.draw(chosen, [seeds[i] for i in chosen], fixed))
+        begun = set(chosen)
+        self._over = [i for i in self._over if i not in begun]
+        if len(chosen) == self.num_envs:
+            return self.batch.observation, self.batch.infos()
         infos: _Info = {}
-        if chosen:
-            self._begin(self.batch.draw(chosen, [seeds[i] for i in chosen], fixed), infos)
-            self._ended[chosen] = False
+        for i in chosen:
+            infos = self._add_info(infos, self.batch.info(i), i)
         return self.batch.observation, infos
 
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observations, Array, Mask, Mask, _Info]:
@@ -113,31 +118,40 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
                 another seed or other options.
             ResetNeeded: A rover has not been reset, or autoreset is disabled and its episode has ended.
         """
-        commands = check_actions(actions, (self.num_envs, N_ACTIONS))
-        # These rovers do not move: their episodes start in this step.
-        starting: list[int] = np.flatnonzero(self._ended).tolist()
-        if starting and self.autoreset_mode == AutoresetMode.DISABLED:
-            raise ResetNeeded(f"rovers {starting}: call reset() with reset_mask first")
-        drawn = self.batch.draw(starting) if starting else None
-        outcome, terminated, truncated = self.batch.step(commands, ~self._ended if starting else None)
-        observation, reward, infos = outcome.observation, outcome.reward, outcome.vector_info()
-        if drawn is not None:
-            reward[starting], terminated[starting], truncated[starting] = 0.0, False, False
-            self._begin(drawn, infos)
-        self._ended = terminated | truncated
-        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
-            ended: list[int] = np.flatnonzero(self._ended).tolist()
-            last = [outcome.info(i) for i in ended]
-            for i, info in zip(ended, last, strict=True):
-                self._add_info(infos, {"final_obs": observation[i].copy(), "final_info": info}, i)
-            # If an episode is refused here, its rover stays ended and the next step raises the error.
+        starting = self._over
+        if starting:
+            observation, reward, terminated, truncated, over = self._start_and_step(actions)
+        else:
+            observation, reward, terminated, truncated, over = self.batch.step(actions)
+        self._over = over
+        finals: dict[int, _Info] = {}
+        if over and self.autoreset_mode == AutoresetMode.SAME_STEP:
+            finals = {i: {"final_obs": observation[i].copy(), "final_info": self.batch.info(i)} for i in over}
+            # If an episode is refused here, its rover stays over and the next step raises the error.
             with suppress(RoverGymError):
-                self._begin(self.batch.draw(ended), infos)
-                self._ended = np.zeros(self.num_envs, np.bool_)
-                starting += ended
+                self.batch.begin(self.batch.draw(over))
+                self._over = []
+                starting = starting + over
+        infos = self.batch.infos()
+        for i, final in finals.items():
+            infos = self._add_info(infos, final, i)
         if starting:
             observation[starting] = self.batch.observation[starting]
         return observation, reward, terminated, truncated, infos
+
+    def _start_and_step(self, actions: object) -> tuple[Observations, Array, Mask, Mask, list[int]]:
+        """Steps all rovers but those whose episode is over, and starts theirs."""
+        check_actions(actions, (self.num_envs, N_ACTIONS))
+        starting = self._over
+        if self.autoreset_mode == AutoresetMode.DISABLED:
+            raise ResetNeeded(f"rovers {starting}: call reset() with reset_mask first")
+        active = np.ones(self.num_envs, np.bool_)
+        active[starting] = False
+        drawn = self.batch.draw(starting)
+        observation, reward, terminated, truncated, over = self.batch.step(actions, active)
+        self.batch.begin(drawn)
+        reward[starting], terminated[starting], truncated[starting] = 0.0, False, False
+        return observation, reward, terminated, truncated, [i for i in over if active[i]]
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
         """One frame per rover with `render_mode="rgb_array"`; None without a render mode."""
@@ -158,25 +172,10 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         """Reads an attribute of every rover, by its name in `RoverEnv`."""
         return tuple(getattr(rover, name) for rover in self.batch.rovers)
 
-    def _begin(self, drawn: Drawn, infos: _Info) -> None:
-        """Begins drawn episodes and writes their infos into those of all rovers."""
-        _write_infos(infos, self.batch.begin(drawn).vector_info(), drawn.chosen, self.num_envs)
-
     def _check_mask(self, mask: object) -> list[int]:
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
             refuse(OptionError, "options.reset_mask", mask, f"must be an array of {self.num_envs} bool")
         return [int(i) for i in np.flatnonzero(mask)]
-
-
-def _write_infos(infos: _Info, begun: _Info, chosen: Sequence[int], n: int) -> None:
-    """Writes the infos of chosen rovers into those of n rovers, as `VectorEnv._add_info` does for one rover."""
-    for name, values in begun.items():
-        if isinstance(values, dict):
-            _write_infos(infos.setdefault(name, {}), values, chosen, n)
-            continue
-        if name not in infos:
-            infos[name] = np.full(n, None, object) if values.dtype == object else np.zeros(n, values.dtype)
-        infos[name][chosen] = values
 
 
 def _check_mode(mode: object) -> AutoresetMode:

@@ -23,7 +23,8 @@
 //!   moves, such as the multibody tree;
 //! - [`lanes`]: the ordinary step of one rover or several to a register;
 //! - [`simulation`]: many steps of any scene;
-//! - [`draw`]: random numbers, for scenes that are drawn.
+//! - [`draw`]: random numbers, for scenes that are drawn;
+//! - [`episode`]: the episodes of a driving task: actions, observations, rewards, ends.
 #![forbid(unsafe_code)]
 // Same bits on every machine: sines and their like come from `scalar::elementary`.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
@@ -33,6 +34,7 @@ pub use nalgebra;
 pub mod cone;
 pub mod contact;
 pub mod draw;
+pub mod episode;
 pub mod geometry;
 pub mod integrator;
 pub mod lanes;

@@ -8,7 +8,7 @@ use rover_core::simulation::{Batch, RoverSimulation as CoreSimulation};
 
 use crate::arguments::{Given, count, flags, refused};
 use crate::arrays::array;
-use crate::draw::{DrawnScenes, Request, SceneDistribution};
+use crate::episode::simulation;
 use crate::errors::{BorderError, Kind, Value};
 use crate::reading::{place, scan_points, slices};
 use crate::shared::{Shared, Watch};
@@ -37,7 +37,7 @@ struct Inner {
 }
 
 /// (n,) truth values: which rovers move.
-fn mask(value: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<bool>> {
+pub fn mask(value: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<bool>> {
     let active = match value.extract::<PyReadonlyArray1<'_, bool>>() {
         Ok(ready) => ready.as_array().to_vec(),
         Err(_) => flags(value, Kind::Option, "active")?,
@@ -75,24 +75,14 @@ fn commands(
     Ok(view.iter().copied().collect())
 }
 
-impl SimulationBatch {
-    fn index(index: &Bound<'_, PyAny>, rovers: &[CoreSimulation]) -> PyResult<usize> {
-        let i = count(index, Kind::Option, "index")?;
-        if i < rovers.len() {
-            return Ok(i);
-        }
-        let len = rovers.len();
-        Err(refused(index, Kind::Option, "index", &format!("below {len}")).into())
+/// The index of one of these rovers.
+pub fn index(index: &Bound<'_, PyAny>, rovers: &[CoreSimulation]) -> PyResult<usize> {
+    let i = count(index, Kind::Option, "index")?;
+    if i < rovers.len() {
+        return Ok(i);
     }
-}
-
-/// A simulation of the border.
-fn simulation<'a, 'py>(
-    value: &'a Bound<'py, PyAny>,
-    field: &str,
-) -> PyResult<&'a Bound<'py, Simulation>> {
-    let cast = value.cast();
-    cast.map_err(|_| refused(value, Kind::Option, field, "a Simulation").into())
+    let len = rovers.len();
+    Err(refused(index, Kind::Option, "index", &format!("below {len}")).into())
 }
 
 #[pymethods]
@@ -228,101 +218,15 @@ impl SimulationBatch {
         simulation: &Bound<'_, PyAny>,
         target: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let one = self::simulation(simulation, "simulation")?.get();
+        let one = crate::episode::simulation(simulation, "simulation")?.get();
         let target = place(target)?;
         let rover = one.open()?.clone();
         let mut held = self.0.open()?;
-        let index = Self::index(index, held.inner.rovers())?;
+        let index = self::index(index, held.inner.rovers())?;
         let replaced = held.inner.replace(index, rover, target);
         replaced.map_err(BorderError::from)?;
         held.origins[index] = one.origin().clone();
         Ok(())
-    }
-
-    /// Draws scenes on the threads of this batch, as `SceneDistribution.draw` does; no rover changes.
-    ///
-    /// Args:
-    ///     distribution: What the scenes are drawn from.
-    ///     generators: Generators, (m, 4) uint64.
-    ///     attempts: As of `SceneDistribution.draw`.
-    ///     difficulties: As of `SceneDistribution.draw`.
-    ///     fixed: As of `SceneDistribution.draw`.
-    ///
-    /// Returns:
-    ///     The scenes, the same for any number of threads.
-    ///
-    /// Raises:
-    ///     RoverGymError: As of `SceneDistribution.draw`, for the first rover that has one.
-    #[pyo3(signature = (distribution, generators, *, attempts = Given::MISSING, difficulties = None, fixed = None),
-        text_signature = "($self, distribution, generators, *, attempts=100, difficulties=None, fixed=None)")]
-    fn draw(
-        &self,
-        py: Python<'_>,
-        distribution: &Bound<'_, PyAny>,
-        generators: &Bound<'_, PyAny>,
-        attempts: Given<'_>,
-        difficulties: Option<&Bound<'_, PyAny>>,
-        fixed: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<DrawnScenes> {
-        let found = distribution.cast::<SceneDistribution>();
-        let what = "a SceneDistribution";
-        let found = found.map_err(|_| refused(distribution, Kind::Option, "distribution", what))?;
-        let request = Request::parse(generators, attempts, difficulties, fixed)?;
-        let mut held = self.0.open()?;
-        found.get().draw_on(py, &request, Some(&mut held.inner))
-    }
-
-    /// Puts rovers into drawn scenes, with the goals as the targets of their readings.
-    ///
-    /// Args:
-    ///     indices: Indices of the rovers, one for each scene.
-    ///     scenes: Drawn scenes of models with equally many coordinates.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such rover, or the scenes do not fit. Nothing has changed.
-    fn begin(&self, indices: &Bound<'_, PyAny>, scenes: &Bound<'_, PyAny>) -> PyResult<()> {
-        let found = scenes.cast::<DrawnScenes>();
-        let found = found.map_err(|_| refused(scenes, Kind::Option, "scenes", "DrawnScenes"))?;
-        let drawn = found.get();
-        let n = drawn.scenes().len();
-        let mut held = self.0.open()?;
-        let what = format!("{n} indices of rovers");
-        let given: Option<Vec<Bound<'_, PyAny>>> = indices.extract().ok();
-        let given = given.filter(|given| given.len() == n);
-        let given = given.ok_or_else(|| refused(indices, Kind::Option, "indices", &what))?;
-        let places = given
-            .iter()
-            .map(|one| Self::index(one, held.inner.rovers()));
-        let places: Vec<usize> = places.collect::<PyResult<_>>()?;
-        for (&index, one) in places.iter().zip(drawn.scenes()) {
-            let placed = &one.scene.placement;
-            let fits = held.inner.fits(index, &placed.scene.model);
-            fits.map_err(BorderError::from)?;
-        }
-        for (&index, one) in places.iter().zip(drawn.scenes()) {
-            let placement = one.scene.placement.clone();
-            let begun = held.inner.begin(index, placement, one.scene.start.goal);
-            begun.map_err(BorderError::from)?;
-            held.origins[index] = drawn.origin(one);
-        }
-        Ok(())
-    }
-
-    /// The ground of one rover.
-    ///
-    /// Args:
-    ///     index: Index of the rover.
-    ///
-    /// Raises:
-    ///     OptionError: There is no such rover.
-    fn terrain<'py>(
-        &self,
-        py: Python<'py>,
-        index: &Bound<'_, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let held = self.0.open()?;
-        let index = Self::index(index, held.inner.rovers())?;
-        held.origins[index].terrain.to_object(py)
     }
 
     /// Returns a copy of one rover.
@@ -338,7 +242,7 @@ impl SimulationBatch {
     fn simulation(&self, index: &Bound<'_, PyAny>) -> PyResult<Simulation> {
         let held = self.0.open()?;
         let rovers = held.inner.rovers();
-        let index = Self::index(index, rovers)?;
+        let index = self::index(index, rovers)?;
         Ok(Simulation::of(
             rovers[index].clone(),
             held.origins[index].clone(),

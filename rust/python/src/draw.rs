@@ -1,65 +1,64 @@
-//! `SceneDistribution` and `DrawnScenes`: the scenes of episodes, drawn at random.
-
-use std::sync::Arc;
+//! `EpisodeDistribution` and `DrawnEpisodes`: the next episodes of rovers, drawn at random.
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
-use rover_core::draw::many::Draw;
 use rover_core::draw::{
-    Beginning, DomainDistribution, DrawnGround, Fixed, FixedStart, Order, Pcg64, Range,
-    RockDistribution, SceneDistribution as CoreDistribution, StartDistribution, draw_many,
+    DomainDistribution, DrawnGround, Fixed, FixedStart, Order, Pcg64, Range, RockDistribution,
+    SceneDistribution, StartDistribution,
 };
+use rover_core::episode::{Beginning, EpisodeBatch, EpisodeDistribution as CoreDistribution};
 use rover_core::geometry::Terrain;
-use rover_core::simulation::{Batch, RoverSimulation};
+use rover_core::simulation::RoverSimulation;
 
 use crate::arguments::{Given, count, number, refused};
 use crate::arrays::{fresh_table, vector};
+use crate::episode::{self, Episode};
 use crate::errors::{BorderError, Kind};
 use crate::generators::{generators, halves};
 use crate::options::SolverWords;
 use crate::plane::Plane;
-use crate::reading::scan_points;
 use crate::shared::Watch;
 use crate::simulation::{Origin, Simulation};
 use crate::sphere_field::{Ground, SphereField};
 
-/// What the scenes of a task's episodes are drawn from.
+/// Positional and keyword arguments.
+type NewArguments<'py> = ((Bound<'py, PyAny>, Bound<'py, PyAny>), Bound<'py, PyDict>);
+
+/// What the episodes of a task are drawn from.
 ///
 /// Draws come from generators that are number for number NumPy's `PCG64`; a generator is given and
 /// returned as four unsigned 64-bit numbers: high and low half of its state, high and low half of
 /// its increment.
 ///
 /// Args:
+///     rules: What all episodes share; rocks leave the goal clear within its tolerance.
 ///     simulation: The rover, before its masses are scaled, and the options of its steps.
 ///     start: Ranges (low, high) of `slope`, `uphill`, `heading`, `goal_distance` and
 ///         `goal_bearing`, by name, rad and m.
 ///     domain: Ranges of `mass_scale`, `friction`, `actuator_gain` and `gravity_scale`, by name.
-///     goal_tolerance: Distance from the goal within which no rock lies, m.
+///     trunk_load_limit: Force on the trunk beyond which the rover is high-centred, before masses
+///         and gravity are scaled, N.
 ///     rocks: Range of `difficulty`, and `abundance` and `max_radius` or None, by name; None for no
 ///         rocks.
 ///     slope_by_difficulty: Whether the slope follows from the difficulty of the rocks.
 ///     field: The ground of every episode, a field on a plane; None for a tilted plane.
-///     scan: Points of the height scan ahead and to the right of the trunk's origin in the heading
-///         frame, (n, 2), m; none by default.
-///     noise: Standard deviation of each entry of an observation, (size,); none by default.
 ///
 /// Raises:
 ///     OptionError: An argument is missing, no number, or out of its range.
+///     TerrainError: `field` is no SphereField on a plane.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
-pub struct SceneDistribution {
-    inner: CoreDistribution,
-    words: SolverWords,
-    scan: Vec<[f64; 2]>,
-    deviations: Vec<f64>,
+pub struct EpisodeDistribution {
+    pub inner: CoreDistribution,
+    pub words: SolverWords,
     /// What it was made with, for pickling.
-    given: (Py<PyAny>, Py<PyDict>),
+    given: (Py<PyAny>, Py<PyAny>, Py<PyDict>),
 }
 
-/// Drawn scenes with their first readings, in the order of the generators.
+/// Drawn episodes, in the order of the generators.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
-pub struct DrawnScenes {
-    drawn: Vec<Beginning>,
+pub struct DrawnEpisodes {
+    pub drawn: Vec<Beginning>,
     words: SolverWords,
 }
 
@@ -208,16 +207,14 @@ impl Request {
     }
 }
 
-impl SceneDistribution {
+impl EpisodeDistribution {
     /// Draws with the interpreter free for others, on the threads of a batch where one is given.
     pub fn draw_on(
         &self,
         py: Python<'_>,
         request: &Request,
-        batch: Option<&mut Batch>,
-    ) -> PyResult<DrawnScenes> {
-        let pool = batch.map(Batch::pool).transpose();
-        let pool = pool.map_err(BorderError::from)?.flatten();
+        batch: Option<&mut EpisodeBatch>,
+    ) -> PyResult<DrawnEpisodes> {
         let places = request.randoms.iter().zip(&request.difficulties);
         let orders: Vec<Order<'_>> = places
             .enumerate()
@@ -228,118 +225,98 @@ impl SceneDistribution {
                 fixed: request.fixed.get(i).unwrap_or(&request.fixed[0]),
             })
             .collect();
-        let draw = Draw {
-            distribution: &self.inner,
-            attempts: request.attempts,
-            scan: &self.scan,
-            deviations: &self.deviations,
-        };
         let mut watch = Watch::new();
-        let drawn = py.detach(|| draw_many(&draw, &orders, pool, &mut || watch.go_on()));
-        let drawn = watch.result(drawn)?;
-        Ok(DrawnScenes {
-            drawn: drawn.unwrap_or_default(),
+        let drawn = py.detach(|| {
+            let go_on = &mut || watch.go_on();
+            match batch {
+                Some(batch) => batch.draw(&self.inner, &orders, request.attempts, go_on),
+                None => self.inner.draw(&orders, request.attempts, None, go_on),
+            }
+        });
+        Ok(DrawnEpisodes {
+            drawn: watch.result(drawn)?.unwrap_or_default(),
             words: self.words.clone(),
         })
     }
 }
 
 #[pymethods]
-impl SceneDistribution {
+impl EpisodeDistribution {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (simulation, *, start, domain, goal_tolerance, rocks = None, slope_by_difficulty = Given::MISSING, field = None,
-        scan = None, noise = None),
-        text_signature = "(simulation, *, start, domain, goal_tolerance, rocks=None, slope_by_difficulty=False, field=None, scan=None, noise=None)")]
+    #[pyo3(signature = (rules, simulation, *, start, domain, trunk_load_limit, rocks = None, slope_by_difficulty = Given::MISSING,
+        field = None),
+        text_signature = "(rules, simulation, *, start, domain, trunk_load_limit, rocks=None, slope_by_difficulty=False, field=None)")]
     fn new(
+        rules: &Bound<'_, PyAny>,
         simulation: &Bound<'_, PyAny>,
         start: &Bound<'_, PyAny>,
         domain: &Bound<'_, PyAny>,
-        goal_tolerance: &Bound<'_, PyAny>,
+        trunk_load_limit: &Bound<'_, PyAny>,
         rocks: Option<&Bound<'_, PyAny>>,
         slope_by_difficulty: Given<'_>,
         field: Option<&Bound<'_, PyAny>>,
-        scan: Option<&Bound<'_, PyAny>>,
-        noise: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let py = simulation.py();
-        let given = PyDict::new(py);
+        let slope_by_difficulty =
+            slope_by_difficulty.flag(false, Kind::Option, "slope_by_difficulty")?;
+        let given = PyDict::new(simulation.py());
         for (name, value) in [
             ("start", Some(start)),
             ("domain", Some(domain)),
-            ("goal_tolerance", Some(goal_tolerance)),
+            ("trunk_load_limit", Some(trunk_load_limit)),
             ("rocks", rocks),
             ("field", field),
-            ("scan", scan),
-            ("noise", noise),
         ] {
             given.set_item(name, value)?;
         }
-        let slope_by_difficulty =
-            slope_by_difficulty.flag(false, Kind::Option, "slope_by_difficulty")?;
         given.set_item("slope_by_difficulty", slope_by_difficulty)?;
-        let found = simulation.cast::<Simulation>();
-        let what = "a Simulation";
-        let found = found.map_err(|_| refused(simulation, Kind::Option, "simulation", what))?;
+        let given = (
+            rules.clone().unbind(),
+            simulation.clone().unbind(),
+            given.unbind(),
+        );
+
+        let rules = episode::rules(rules)?;
+        let made = episode::simulation(simulation, "simulation")?.get();
+        let rover = made.open()?;
+        let field = field.map(on_a_plane).transpose()?;
         let (start, domain) = (Named::of(start, "start")?, Named::of(domain, "domain")?);
-        let rocks = match rocks {
-            None => None,
-            Some(given) => {
-                let named = Named::of(given, "rocks")?;
-                Some(RockDistribution {
-                    difficulty: named.range("difficulty")?,
-                    abundance: named.number("abundance")?,
-                    max_radius: named.number("max_radius")?,
-                })
-            }
+        let scenes = SceneDistribution {
+            rover: rover.scene().clone(),
+            options: rover.options().clone(),
+            field: field.map(|field| field.inner),
+            rocks: rocks.map(rock_distribution).transpose()?,
+            slope_by_difficulty,
+            start: StartDistribution {
+                slope: start.range("slope")?,
+                uphill: start.range("uphill")?,
+                heading: start.range("heading")?,
+                goal_distance: start.range("goal_distance")?,
+                goal_bearing: start.range("goal_bearing")?,
+            },
+            domain: DomainDistribution {
+                mass_scale: domain.range("mass_scale")?,
+                friction: domain.range("friction")?,
+                actuator_gain: domain.range("actuator_gain")?,
+                gravity_scale: domain.range("gravity_scale")?,
+            },
+            goal_tolerance: rules.settings().goal_tolerance,
         };
-        let field = match field {
-            None => None,
-            Some(given) => {
-                let found = given.extract::<SphereField>();
-                let what = "a SphereField on a plane";
-                let found = found.ok().filter(|field| field.inner.ground().is_some());
-                Some(found.ok_or_else(|| refused(given, Kind::Terrain, "field", what))?)
-            }
-        };
-        let made = found.get();
-        let open = made.open()?;
         Ok(Self {
             inner: CoreDistribution {
-                model: open.model().clone(),
-                options: open.options().clone(),
-                field: field.map(|field| field.inner),
-                rocks,
-                slope_by_difficulty,
-                start: StartDistribution {
-                    slope: start.range("slope")?,
-                    uphill: start.range("uphill")?,
-                    heading: start.range("heading")?,
-                    goal_distance: start.range("goal_distance")?,
-                    goal_bearing: start.range("goal_bearing")?,
-                },
-                domain: DomainDistribution {
-                    mass_scale: domain.range("mass_scale")?,
-                    friction: domain.range("friction")?,
-                    actuator_gain: domain.range("actuator_gain")?,
-                    gravity_scale: domain.range("gravity_scale")?,
-                },
-                goal_tolerance: number(goal_tolerance, Kind::Option, "goal_tolerance")?,
+                scenes,
+                rules,
+                trunk_load_limit: number(trunk_load_limit, Kind::Option, "trunk_load_limit")?,
             },
             words: made.origin().words.clone(),
-            scan: scan_points(scan)?,
-            deviations: noise.map_or_else(
-                || Ok(Vec::new()),
-                |noise| vector(noise, Kind::Option, "noise"),
-            )?,
-            given: (simulation.clone().unbind(), given.unbind()),
+            given,
         })
     }
 
-    /// Draws one scene from each generator; `SimulationBatch.draw` does it on several threads.
+    /// Draws one episode from each generator; `EpisodeBatch.draw` does it on several threads.
     ///
     /// A scene in which the rover would stand deeper than 1 cm in the ground or in a sphere is
-    /// drawn again. The given generators do not change: see `DrawnScenes.generators`.
+    /// drawn again. The given generators do not change: see `DrawnEpisodes.generators`.
     ///
     /// Args:
     ///     generators: Generators, (m, 4) uint64.
@@ -351,11 +328,12 @@ impl SceneDistribution {
     ///         mapping for all or a list of one for each generator; none by default.
     ///
     /// Returns:
-    ///     The scenes.
+    ///     The episodes.
     ///
     /// Raises:
     ///     TerrainError: A rover has no room in `attempts` scenes, or the ground refuses a number.
-    ///     StateError: `q` or `v` has a wrong length or an entry that is not finite.
+    ///     StateError: `q` or `v` has a wrong length or an entry that is not finite, or float32
+    ///         cannot hold the observation.
     ///     ModelError: A scaled mass is out of its range.
     ///     OptionError: Any other argument is invalid.
     #[pyo3(signature = (generators, *, attempts = Given::MISSING, difficulties = None, fixed = None),
@@ -367,26 +345,36 @@ impl SceneDistribution {
         attempts: Given<'_>,
         difficulties: Option<&Bound<'_, PyAny>>,
         fixed: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<DrawnScenes> {
+    ) -> PyResult<DrawnEpisodes> {
         let request = Request::parse(generators, attempts, difficulties, fixed)?;
         self.draw_on(py, &request, None)
     }
 
-    fn __getnewargs_ex__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> ((Bound<'py, PyAny>,), Bound<'py, PyDict>) {
-        let (simulation, given) = &self.given;
-        ((simulation.bind(py).clone(),), given.bind(py).clone())
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> NewArguments<'py> {
+        let (rules, simulation, given) = &self.given;
+        let first = (rules.bind(py).clone(), simulation.bind(py).clone());
+        (first, given.bind(py).clone())
     }
 }
 
-impl DrawnScenes {
-    /// The scenes.
-    pub fn scenes(&self) -> &[Beginning] {
-        &self.drawn
-    }
+/// A field on a plane.
+fn on_a_plane(given: &Bound<'_, PyAny>) -> PyResult<SphereField> {
+    let found = given.extract::<SphereField>();
+    let found = found.ok().filter(|field| field.inner.ground().is_some());
+    let what = "a SphereField on a plane";
+    found.ok_or_else(|| refused(given, Kind::Terrain, "field", what).into())
+}
 
+fn rock_distribution(given: &Bound<'_, PyAny>) -> PyResult<RockDistribution> {
+    let named = Named::of(given, "rocks")?;
+    Ok(RockDistribution {
+        difficulty: named.range("difficulty")?,
+        abundance: named.number("abundance")?,
+        max_radius: named.number("max_radius")?,
+    })
+}
+
+impl DrawnEpisodes {
     /// What the border keeps beside the simulation of a scene.
     pub fn origin(&self, scene: &Beginning) -> Origin {
         Origin {
@@ -408,34 +396,25 @@ fn ground(drawn: &DrawnGround) -> Ground {
     match drawn {
         DrawnGround::Plane(plane) => Ground::Plane(Plane { inner: *plane }),
         DrawnGround::Field(field) => Ground::Field(SphereField {
-            inner: Arc::clone(field),
+            inner: field.clone(),
         }),
     }
 }
 
 #[pymethods]
-impl DrawnScenes {
+impl DrawnEpisodes {
     /// The generators after the draws, (m, 4) uint64.
     #[getter]
     fn generators<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u64>>> {
         fresh_table(py, self.drawn.iter().map(|one| halves(&one.random)))
     }
 
-    /// First readings, (m, size), with the goal as their target.
+    /// First observations, (m, size) float32.
     #[getter]
-    fn readings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let size = self.drawn.first().map_or(0, |one| one.reading.len());
-        let numbers = self.drawn.iter().flat_map(|one| &one.reading);
-        PyArray1::from_iter(py, numbers.copied()).reshape([self.drawn.len(), size])
-    }
-
-    /// Noise of the first observations, (m, size); None without noise.
-    #[getter]
-    fn noise<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        let size = self.drawn.first().map_or(0, |one| one.noise.len());
-        let numbers = self.drawn.iter().flat_map(|one| &one.noise);
-        let noise = PyArray1::from_iter(py, numbers.copied()).reshape([self.drawn.len(), size])?;
-        Ok((size > 0).then_some(noise))
+    fn observations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let size = (self.drawn.first()).map_or(0, |one| one.episode.observation().len());
+        let entries = self.drawn.iter().flat_map(|one| one.episode.observation());
+        PyArray1::from_iter(py, entries.copied()).reshape([self.drawn.len(), size])
     }
 
     /// Starts, (m, 7), rad and m.
@@ -491,13 +470,24 @@ impl DrawnScenes {
         PyArray1::from_iter(py, self.drawn.iter().map(seed))
     }
 
-    /// The ground of a scene.
+    /// An episode, which has begun.
     ///
     /// Args:
-    ///     index: Number of the scene.
+    ///     index: Number of the episode.
     ///
     /// Raises:
-    ///     OptionError: There is no such scene.
+    ///     OptionError: There is no such episode.
+    fn episode(&self, index: &Bound<'_, PyAny>) -> PyResult<Episode> {
+        Ok(Episode::of(self.at(index)?.episode.clone()))
+    }
+
+    /// The ground of an episode.
+    ///
+    /// Args:
+    ///     index: Number of the episode.
+    ///
+    /// Raises:
+    ///     OptionError: There is no such episode.
     fn terrain<'py>(
         &self,
         py: Python<'py>,
@@ -506,25 +496,25 @@ impl DrawnScenes {
         ground(&self.at(index)?.scene.ground).to_object(py)
     }
 
-    /// The plane of a scene, under rocks too.
+    /// The plane of an episode, under rocks too.
     ///
     /// Args:
-    ///     index: Number of the scene.
+    ///     index: Number of the episode.
     ///
     /// Raises:
-    ///     OptionError: There is no such scene.
+    ///     OptionError: There is no such episode.
     fn plane(&self, index: &Bound<'_, PyAny>) -> PyResult<Plane> {
         let inner = self.at(index)?.scene.plane;
         Ok(Plane { inner })
     }
 
-    /// A new simulation of the rover at its start in a scene.
+    /// A new simulation of the rover at the start of an episode.
     ///
     /// Args:
-    ///     index: Number of the scene.
+    ///     index: Number of the episode.
     ///
     /// Raises:
-    ///     OptionError: There is no such scene.
+    ///     OptionError: There is no such episode.
     fn simulation(&self, index: &Bound<'_, PyAny>) -> PyResult<Simulation> {
         let one = self.at(index)?;
         let made = RoverSimulation::placed(one.scene.placement.clone());

@@ -6,6 +6,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple, PyType};
 use rover_core::draw::DrawError;
+use rover_core::episode::EpisodeError;
 use rover_core::geometry::TerrainError;
 use rover_core::integrator::{OptionsError, StepError};
 use rover_core::multibody::{ModelError, StateError};
@@ -370,6 +371,36 @@ impl From<DrawError> for BorderError {
             DrawError::Model(e) => e.into(),
             DrawError::State(e) => e.into(),
             DrawError::Options(e) => e.into(),
+        }
+    }
+}
+
+impl From<EpisodeError> for BorderError {
+    fn from(e: EpisodeError) -> Self {
+        let message = e.to_string();
+        match e {
+            EpisodeError::Action { place, value } => Self {
+                kind: Kind::Command,
+                message,
+                field: Some(format!("action{place}")),
+                value: Value::Number(value),
+            },
+            EpisodeError::Length { field, actual, .. } => {
+                Self::option(field, message, Value::Count(actual))
+            }
+            EpisodeError::OutOfRange { field, value, .. } => {
+                Self::option(field, message, Value::Number(value))
+            }
+            EpisodeError::OtherRules => Self::option("episode", message, Value::Nothing),
+            EpisodeError::NotBegun { index } => Self::option("index", message, Value::Count(index)),
+            EpisodeError::NotObservable => Self {
+                kind: Kind::State,
+                message,
+                field: Some("q".to_owned()),
+                value: Value::Nothing,
+            },
+            EpisodeError::Draw(error) => Self::from(error),
+            EpisodeError::Batch(error) => Self::from(error),
         }
     }
 }

@@ -64,11 +64,14 @@ impl Watch {
         self.raised.is_none()
     }
 
+    /// What a handler raised.
+    pub fn raised(self) -> PyResult<()> {
+        self.raised.map_or(Ok(()), Err)
+    }
+
     /// The call's result, or what a handler raised.
     pub fn result<T>(self, result: Result<T, impl Into<BorderError>>) -> PyResult<T> {
-        match self.raised {
-            Some(raised) => Err(raised),
-            None => Ok(result.map_err(Into::into)?),
-        }
+        self.raised()?;
+        Ok(result.map_err(Into::into)?)
     }
 }

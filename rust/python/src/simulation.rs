@@ -6,7 +6,9 @@ use pyo3::types::{PyDict, PyTuple};
 use rover_core::integrator::{Accuracy, StepOptions};
 use rover_core::multibody::{Model, coordinates};
 use rover_core::nalgebra::DMatrix;
-use rover_core::simulation::{Look, ReadingLayout, RoverSimulation as CoreSimulation};
+use rover_core::simulation::{
+    Look, ReadingLayout, ReadingScratch, RoverSimulation as CoreSimulation,
+};
 use rover_core::solver::SolverOptions;
 use std::sync::{Arc, MutexGuard};
 
@@ -537,7 +539,8 @@ impl Simulation {
             scan: &scan,
         };
         let mut row = vec![0.0; ReadingLayout::new(&self.model, scan.len()).size()];
-        self.open()?.read(&look, &mut row);
+        let mut scratch = ReadingScratch::default();
+        self.open()?.read(&look, &mut scratch, &mut row);
         Ok(PyArray1::from_vec(py, row))
     }
 

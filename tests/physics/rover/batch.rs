@@ -6,7 +6,7 @@ use rover_core::geometry::{Plane, Rocks, SphereField, Terrain};
 use rover_core::integrator::StepOptions;
 use rover_core::multibody::{Configuration, Model};
 use rover_core::simulation::{
-    Batch, BatchError, CommandError, Look, ReadingLayout, RoverSimulation,
+    Batch, BatchError, CommandError, Look, ReadingLayout, ReadingScratch, RoverSimulation,
 };
 
 const SCAN: [[f64; 2]; 3] = [[1.0, -0.5], [0.0, 0.0], [-0.3, 0.8]];
@@ -87,7 +87,7 @@ fn a_batch_is_its_rovers_alone_for_any_number_of_threads() {
             scan: &SCAN,
         };
         let mut row = vec![0.0; ReadingLayout::new(rover.model(), SCAN.len()).size()];
-        rover.read(&look, &mut row);
+        rover.read(&look, &mut ReadingScratch::default(), &mut row);
         alone.extend(row);
     }
     assert!(alone.iter().all(|x| x.is_finite()));
@@ -235,6 +235,7 @@ fn a_reading_says_what_the_simulation_says() {
             target: TARGET,
             scan: &SCAN,
         },
+        &mut ReadingScratch::default(),
         &mut row,
     );
     let of = |name: &str| {

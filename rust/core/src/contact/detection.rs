@@ -257,52 +257,93 @@ pub(crate) fn touch_of_disc(
     first_touch(distance, &middle, &(middle - half_way), ground.radius)
 }
 
-/// Gap, nearest point (relative to the trunk origin) and frame of every wheel over a terrain, with
-/// respect to the nearest primitive.
-///
-/// A wheel with no primitive within 10 km (impossible over a plane) keeps a gap of +∞.
+/// Gap, nearest point (relative to the trunk origin) and frame of every wheel over a terrain, as
+/// [`wheel_contact`] gives them.
 #[must_use]
 pub fn wheel_contacts(
     model: &Model,
     kinematics: &Kinematics,
     terrain: &dyn Terrain,
 ) -> Vec<Contact> {
-    let nearest = |i: usize| {
-        let part = Part::Wheel(i);
-        let placed = Placed {
-            part,
-            body: part.body(model),
-            shape: part.place(model, kinematics),
-        };
-        let centre = kinematics.point(placed.body, &part.centre(model));
-        let radius = part.bound(model);
-        let mut best = placed.contact(
-            &SurfacePoint::of_normal(NEAREST, centre, &Vector3::y(), f64::INFINITY),
-            0,
-        );
-        // A primitive that is not visited is further from the centre than `reach`, hence further
-        // from the wheel than reach − R.
-        let mut reach = 2.0 * radius;
-        while reach < FAR && best.gap + radius > reach {
-            let base = kinematics.origin(placed.body);
-            terrain.visit_near(&(base + centre), reach, &mut |id, primitive| {
-                let point = match primitive {
-                    Primitive::Plane(plane) => {
-                        dispatch::point_on_plane(&placed.shape, plane, base, NEAREST)
-                    }
-                    Primitive::Sphere(sphere) => {
-                        dispatch::point_on_sphere(&placed.shape, sphere, base)
-                    }
-                };
-                if point.gap < best.gap {
-                    best = placed.contact(&point, id);
+    let wheels = 0..model.wheels().len();
+    wheels
+        .map(|i| wheel_contact(model, kinematics, terrain, i))
+        .collect()
+}
+
+/// Gap, nearest point (relative to the trunk origin) and frame of wheel `i` with respect to the
+/// nearest primitive.
+///
+/// A wheel with no primitive within 10 km (impossible over a plane) keeps a gap of +∞.
+#[must_use]
+pub fn wheel_contact(
+    model: &Model,
+    kinematics: &Kinematics,
+    terrain: &dyn Terrain,
+    i: usize,
+) -> Contact {
+    let placed = placed_wheel(model, kinematics, i);
+    let centre = kinematics.point(placed.body, &Part::Wheel(i).centre(model));
+    let mut best = SurfacePoint::of_normal(NEAREST, centre, &Vector3::y(), f64::INFINITY);
+    let mut primitive = 0;
+    visit_nearer(model, kinematics, terrain, i, &mut |id, point| {
+        (best, primitive) = (*point, id);
+    });
+    placed.contact(&best, primitive)
+}
+
+/// The gap of [`wheel_contact`], m.
+#[must_use]
+pub fn wheel_gap(model: &Model, kinematics: &Kinematics, terrain: &dyn Terrain, i: usize) -> f64 {
+    let mut gap = f64::INFINITY;
+    visit_nearer(model, kinematics, terrain, i, &mut |_, point| {
+        gap = point.gap;
+    });
+    gap
+}
+
+fn placed_wheel(model: &Model, kinematics: &Kinematics, i: usize) -> Placed {
+    let part = Part::Wheel(i);
+    Placed {
+        part,
+        body: part.body(model),
+        shape: part.place(model, kinematics),
+    }
+}
+
+/// Visits points of the ground near wheel `i`, each nearer than those before; the last one is the
+/// nearest.
+#[inline]
+fn visit_nearer(
+    model: &Model,
+    kinematics: &Kinematics,
+    terrain: &dyn Terrain,
+    i: usize,
+    visit: &mut impl FnMut(u32, &SurfacePoint),
+) {
+    let placed = placed_wheel(model, kinematics, i);
+    let centre = kinematics.point(placed.body, &placed.part.centre(model));
+    let radius = placed.part.bound(model);
+    let mut gap = f64::INFINITY;
+    // A primitive that is not visited is further from the centre than `reach`, hence further
+    // from the wheel than reach − R.
+    let mut reach = 2.0 * radius;
+    while reach < FAR && gap + radius > reach {
+        let base = kinematics.origin(placed.body);
+        terrain.visit_near(&(base + centre), reach, &mut |id, primitive| {
+            let point = match primitive {
+                Primitive::Plane(plane) => {
+                    dispatch::point_on_plane(&placed.shape, plane, base, NEAREST)
                 }
-            });
-            reach *= 2.0;
-        }
-        best
-    };
-    (0..model.wheels().len()).map(nearest).collect()
+                Primitive::Sphere(sphere) => dispatch::point_on_sphere(&placed.shape, sphere, base),
+            };
+            if point.gap < gap {
+                gap = point.gap;
+                visit(id, &point);
+            }
+        });
+        reach *= 2.0;
+    }
 }
 
 /// Search distance of a wheel for the nearest ground, m.

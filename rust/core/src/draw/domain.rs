@@ -1,6 +1,6 @@
 //! Domain randomisation: properties of rover and world that change from episode to episode.
 
-use std::sync::Arc;
+use serde::{Deserialize, Serialize};
 
 use super::pcg64::Pcg64;
 use super::start::Range;
@@ -22,7 +22,7 @@ pub struct DomainDistribution {
 }
 
 /// The properties of one episode.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Domain {
     /// Factor of the model's masses and inertias.
     pub mass_scale: f64,
@@ -55,16 +55,16 @@ impl DomainDistribution {
 }
 
 impl Domain {
-    /// The model with its masses scaled; the same one where the factor is 1.
+    /// The model with its masses scaled; None where the factor is 1.
     ///
     /// # Errors
     /// A mass or inertia that the factor takes out of its range.
-    pub fn model(&self, model: &Arc<Model>) -> Result<Arc<Model>, ModelError> {
+    pub fn scaled(&self, model: &Model) -> Result<Option<Model>, ModelError> {
         #[allow(clippy::float_cmp)] // exactly one
-        if self.mass_scale == 1.0 {
-            return Ok(model.clone());
-        }
-        Ok(Arc::new(model.with_masses_scaled(self.mass_scale)?))
+        let is_same = self.mass_scale == 1.0;
+        (!is_same)
+            .then(|| model.with_masses_scaled(self.mass_scale))
+            .transpose()
     }
 
     /// The options with friction and gravity of this episode.

@@ -12,7 +12,7 @@ use super::error::DrawError;
 use super::pcg64::Pcg64;
 use super::scene::{DrawnScene, Fixed, SceneDistribution};
 use super::start::Range;
-use crate::simulation::{Look, ReadingLayout, RoverSimulation};
+use crate::simulation::RoverSimulation;
 
 /// The request of one rover's next scene.
 #[derive(Clone, Copy, Debug)]
@@ -25,85 +25,55 @@ pub struct Order<'a> {
     pub fixed: &'a Fixed,
 }
 
-/// What all rovers share.
-#[derive(Clone, Copy, Debug)]
-pub struct Draw<'a> {
-    /// What the scenes are drawn from.
-    pub distribution: &'a SceneDistribution,
-    /// Most scenes drawn for one rover until it has room.
-    pub attempts: usize,
-    /// Points of the height scan, see [`RoverSimulation::read`].
-    pub scan: &'a [[f64; 2]],
-    /// Standard deviation of each entry's noise in an observation; empty without noise.
-    pub deviations: &'a [f64],
-}
-
-/// A drawn scene with its first reading.
-#[derive(Clone, Debug)]
-pub struct Beginning {
+/// A drawn scene.
+#[derive(Debug)]
+pub struct Drawn<'a> {
     /// The scene.
     pub scene: DrawnScene,
-    /// The first reading, with the goal as its target.
-    pub reading: Vec<f64>,
-    /// Noise of the first observation; empty without noise.
-    pub noise: Vec<f64>,
+    /// The rover in it; another scene takes its place afterwards.
+    pub rover: &'a RoverSimulation,
     /// The generator after the draws.
     pub random: Pcg64,
 }
 
-impl Draw<'_> {
-    /// Draws the scene of one rover. `stage`: a simulation to reuse, left in the drawn scene.
-    ///
-    /// # Errors
-    /// As [`SceneDistribution::draw`].
-    pub fn one(
-        &self,
-        order: &Order<'_>,
-        stage: &mut Option<RoverSimulation>,
-    ) -> Result<Beginning, DrawError> {
-        let mut random = order.random;
-        let scene =
-            (self.distribution).draw(&mut random, order.difficulty, order.fixed, self.attempts)?;
-        let simulation = match stage {
-            Some(simulation) => {
-                simulation.begin(scene.placement.clone())?;
-                simulation
-            }
-            None => stage.insert(RoverSimulation::placed(scene.placement.clone())?),
-        };
-        let layout = ReadingLayout::new(simulation.model(), self.scan.len());
-        let mut reading = vec![0.0; layout.size()];
-        let look = Look {
-            target: scene.start.goal,
-            scan: self.scan,
-        };
-        simulation.read(&look, &mut reading);
-        let noise = self.deviations.iter();
-        let noise = noise.map(|deviation| random.normal() * deviation).collect();
-        Ok(Beginning {
-            scene,
-            reading,
-            noise,
-            random,
-        })
-    }
-}
-
-/// Draws the next scenes of many rovers; `pool`: threads that help the caller's.
+/// Draws the next scenes of many rovers and makes something of each.
 ///
-/// `go_on` is asked by the caller's thread from time to time; once it returns false the draw ends
-/// with `None`.
+/// `attempts`: most scenes drawn for one rover until it has room. `pool`: threads that help the
+/// caller's. `go_on` is asked by the caller's thread from time to time; once it returns false the
+/// draw ends with `None`.
 ///
 /// # Errors
 /// The error of the first rover that has one.
-pub fn draw_many(
-    draw: &Draw<'_>,
+pub fn draw_many<T, E>(
+    distribution: &SceneDistribution,
     orders: &[Order<'_>],
+    attempts: usize,
+    make: &(impl Fn(Drawn<'_>) -> Result<T, E> + Sync),
     pool: Option<&ThreadPool>,
     go_on: &mut dyn FnMut() -> bool,
-) -> Result<Option<Vec<Beginning>>, DrawError> {
-    let places: Vec<OnceLock<Result<Beginning, DrawError>>> =
-        orders.iter().map(|_| OnceLock::new()).collect();
+) -> Result<Option<Vec<T>>, E>
+where
+    T: Send + Sync,
+    E: From<DrawError> + Send + Sync,
+{
+    let draw = |order: &Order<'_>, stage: &mut Option<RoverSimulation>| {
+        let mut random = order.random;
+        let scene = distribution.draw(&mut random, order.difficulty, order.fixed, attempts)?;
+        let placement = scene.placement.clone();
+        let rover = match stage {
+            Some(rover) => {
+                rover.begin(placement).map_err(DrawError::from)?;
+                rover
+            }
+            None => stage.insert(RoverSimulation::placed(placement).map_err(DrawError::from)?),
+        };
+        make(Drawn {
+            scene,
+            rover,
+            random,
+        })
+    };
+    let places: Vec<OnceLock<Result<T, E>>> = orders.iter().map(|_| OnceLock::new()).collect();
     let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
     let work = |go_on: &mut dyn FnMut() -> bool| {
         let mut stage = None;
@@ -112,8 +82,7 @@ pub fn draw_many(
             if i >= orders.len() || stop.load(Ordering::Relaxed) {
                 break;
             }
-            let drawn = draw.one(&orders[i], &mut stage);
-            let is_first = places[i].set(drawn).is_ok();
+            let is_first = places[i].set(draw(&orders[i], &mut stage)).is_ok();
             assert!(is_first, "invariant: each rover is drawn once");
             if !go_on() {
                 stop.store(true, Ordering::Relaxed);

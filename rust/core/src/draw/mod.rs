@@ -20,7 +20,7 @@ pub mod start;
 
 pub use domain::{Domain, DomainDistribution};
 pub use error::DrawError;
-pub use many::{Beginning, Order, draw_many};
+pub use many::{Drawn, Order, draw_many};
 pub use pcg64::{Pcg64, Pcg64State};
 pub use rocks::{RockDistribution, RockDraw};
 pub use scene::{DrawnGround, DrawnScene, Fixed, SceneDistribution};

@@ -12,6 +12,7 @@ use std::sync::LazyLock;
 
 use super::normal_layers::EDGES;
 use super::pcg64::Pcg64;
+use crate::scalar::elementary::{exp, ln_1p};
 
 /// Where the tail begins: the edge of the lowest layer above it.
 const TAIL: f64 = EDGES[255];
@@ -35,7 +36,7 @@ fn height(layer: usize) -> f64 {
     if layer == 0 {
         1.0
     } else {
-        (-0.5 * EDGES[layer] * EDGES[layer]).exp()
+        exp(-0.5 * EDGES[layer] * EDGES[layer])
     }
 }
 
@@ -62,7 +63,7 @@ impl Pcg64 {
                 return if is_negative { -beyond } else { beyond };
             }
             let (low, high) = (height(layer), height(layer - 1));
-            if (high - low) * self.unit() + low < (-0.5 * x * x).exp() {
+            if (high - low) * self.unit() + low < exp(-0.5 * x * x) {
                 return x;
             }
         }
@@ -71,8 +72,8 @@ impl Pcg64 {
     /// How far beyond [`TAIL`] a number of the tail lies.
     fn tail(&mut self) -> f64 {
         loop {
-            let x = -(1.0 / TAIL) * (-self.unit()).ln_1p();
-            let y = -(-self.unit()).ln_1p();
+            let x = -(1.0 / TAIL) * ln_1p(-self.unit());
+            let y = -ln_1p(-self.unit());
             if y + y > x * x {
                 return x;
             }

@@ -10,7 +10,7 @@ use super::start::{FixedStart, Range, Start, StartDistribution, resting_pose, ti
 use crate::contact::{Activation, detect};
 use crate::geometry::{Plane, SphereField, Terrain};
 use crate::integrator::StepOptions;
-use crate::multibody::{Kinematics, Model, coordinates};
+use crate::multibody::{Kinematics, coordinates};
 use crate::simulation::{Placement, RoverScene};
 
 /// Deepest overlap of rover and ground at a start, m; a deeper one is drawn again.
@@ -19,8 +19,8 @@ pub const START_OVERLAP: f64 = 0.01;
 /// What the scenes of a task are drawn from.
 #[derive(Clone, Debug)]
 pub struct SceneDistribution {
-    /// The rover before its masses are scaled.
-    pub model: Arc<Model>,
+    /// The rover before its masses are scaled, on any ground.
+    pub rover: RoverScene,
     /// Options of its steps, before friction and gravity are drawn.
     pub options: StepOptions,
     /// Given ground of every episode, which has a plane; none where the plane is tilted.
@@ -137,10 +137,10 @@ impl SceneDistribution {
                 let plane = tilted_plane(start.slope, start.uphill)?;
                 let ground = match rocks {
                     Some(rocks) => DrawnGround::Field(Arc::new(rocks.lay_out(
-                        &self.model,
+                        &self.rover.model,
                         &start,
                         &plane,
-                        clear_radius(&self.model),
+                        clear_radius(&self.rover.model),
                         self.goal_tolerance,
                     )?)),
                     None => DrawnGround::Plane(plane),
@@ -148,20 +148,24 @@ impl SceneDistribution {
                 (plane, ground)
             }
         };
-        let model = domain.model(&self.model)?;
+        let scene = match domain.scaled(&self.rover.model)? {
+            Some(scaled) => RoverScene::new(Arc::new(scaled), ground.terrain()),
+            None => self.rover.on(ground.terrain()),
+        };
         let options = domain.options(&self.options);
         options.check()?;
+        let model = &*scene.model;
         let (configuration, v) = match &fixed.state {
             Some((q, v)) => (
-                coordinates::from_public(&model, q)?,
+                coordinates::from_public(model, q)?,
                 (v.as_ref()).map_or_else(
                     || Ok(vec![0.0; model.nv()]),
-                    |v| coordinates::checked_velocity(&model, v),
+                    |v| coordinates::checked_velocity(model, v),
                 )?,
             ),
             None => {
-                let q = resting_pose(&self.model, &plane, start.position, start.heading)?;
-                let configuration = coordinates::from_public(&model, &q)?;
+                let q = resting_pose(model, &plane, start.position, start.heading)?;
+                let configuration = coordinates::from_public(model, &q)?;
                 (configuration, vec![0.0; model.nv()])
             }
         };
@@ -171,7 +175,7 @@ impl SceneDistribution {
             rocks,
             domain,
             placement: Placement {
-                scene: RoverScene::new(model, ground.terrain()),
+                scene,
                 options,
                 configuration,
                 v,

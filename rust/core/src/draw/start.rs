@@ -9,6 +9,7 @@ use super::pcg64::Pcg64;
 use crate::contact::detection::wheel_contacts;
 use crate::geometry::{Plane, Terrain, TerrainError};
 use crate::multibody::{Kinematics, Model, StateError, coordinates};
+use crate::scalar::elementary::{asin, atan2, sin_cos};
 use nalgebra::Vector3;
 
 /// Bounds of a uniform draw, low and high.
@@ -73,10 +74,10 @@ impl StartDistribution {
         .map(|range| random.uniform(range));
         let heading = fixed.heading.unwrap_or(heading);
         let position = fixed.position.unwrap_or_default();
-        let direction = heading + bearing;
+        let (sine, cosine) = sin_cos(heading + bearing);
         let goal = [
-            position[0] + distance * direction.cos(),
-            position[1] - distance * direction.sin(),
+            position[0] + distance * cosine,
+            position[1] - distance * sine,
         ];
         Start {
             slope: fixed.slope.unwrap_or(slope),
@@ -93,11 +94,9 @@ impl StartDistribution {
 /// # Errors
 /// `NotFinite` for an angle that is not finite.
 pub fn tilted_plane(slope: f64, uphill: f64) -> Result<Plane, TerrainError> {
-    let across = slope.sin();
-    Plane::new(
-        [-across * uphill.cos(), slope.cos(), across * uphill.sin()],
-        0.0,
-    )
+    let (across, up) = sin_cos(slope);
+    let (sine, cosine) = sin_cos(uphill);
+    Plane::new([-across * cosine, up, across * sine], 0.0)
 }
 
 /// Public coordinates (nv) of a rover that rests on a plane: joints at zero, the trunk upright along
@@ -115,7 +114,7 @@ pub fn resting_pose(
     heading: f64,
 ) -> Result<Vec<f64>, StateError> {
     let n = plane.normal();
-    let (sine, cosine) = (heading.sin(), heading.cos());
+    let (sine, cosine) = sin_cos(heading);
     // The trunk's x axis lies in the plane, its horizontal part along the heading.
     let forward = Vector3::new(cosine, -(n.x * cosine - n.z * sine) / n.y, -sine);
     let length = (forward.x * forward.x + forward.y * forward.y + forward.z * forward.z).sqrt();
@@ -128,9 +127,9 @@ pub fn resting_pose(
     q[0] = x;
     q[1] = plane.height(x, z).unwrap_or(f64::NAN);
     q[2] = z;
-    q[3] = (-right.y).atan2(n.y);
+    q[3] = atan2(-right.y, n.y);
     q[4] = wrapped(heading);
-    q[5] = forward.y.asin();
+    q[5] = asin(forward.y);
     // Raising the trunk by dy opens every gap by dy n_y.
     let configuration = coordinates::from_public(model, &q)?;
     let wheels = wheel_contacts(model, &Kinematics::of(model, &configuration), plane);

@@ -11,6 +11,7 @@ use thiserror::Error;
 use crate::multibody::joint::{Joint, JointAxis};
 use crate::multibody::model::BASE;
 use crate::multibody::{Body, Model};
+use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Why a machine has no ordinary step.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -56,16 +57,20 @@ pub struct Machine {
     /// Largest distance of a joint from the trunk's origin.
     pub reach: f64,
     entries: Vec<usize>,
+    turning: Vec<usize>,
     paths: Vec<usize>,
 }
 
 /// A body and its joint.
+#[allow(clippy::struct_excessive_bools)] // facts that do not depend on each other
 #[derive(Clone, Debug, PartialEq)]
 pub struct Link {
     /// The body that carries it; 0 for the trunk itself.
     pub parent: usize,
     /// Origin of the joint in the carrier's frame.
     pub position: [f64; 3],
+    /// The axis of the carrier's frame that it lies on.
+    pub(super) along: Option<usize>,
     /// Columns of the fixed rotation from the joint's frame to the carrier's; `None` for the
     /// identity.
     pub rotation: Option<[[f64; 3]; 3]>,
@@ -172,6 +177,9 @@ impl Machine {
                 .collect(),
             reach: model.trees()[0].reach,
             entries: Vec::new(),
+            turning: (0..bodies.len() - 1)
+                .filter(|&joint| !bodies[joint + 1].is_spinner)
+                .collect(),
             paths: Vec::new(),
         };
         for (b, body) in bodies.iter().enumerate() {
@@ -193,6 +201,7 @@ impl Machine {
         self.links.push(Link {
             parent: body.parent.unwrap_or(0),
             position: body.position.into(),
+            along: (0..3).find(|&k| (0..3).all(|i| i == k || body.position[i] == 0.0)),
             rotation: body.rotation.as_ref().map(columns),
             axis: Axis::of(body),
             is_spinner: body.is_spinner,
@@ -259,9 +268,27 @@ impl Machine {
     pub(super) fn entries(&self) -> &[usize] {
         &self.entries
     }
+
+    /// Joints that a step turns: all but those of the spinners.
+    #[inline(always)]
+    pub(super) fn turning(&self) -> &[usize] {
+        &self.turning
+    }
 }
 
 impl Link {
+    /// `R p` for its joint's origin p.
+    #[inline(always)]
+    pub(super) fn lever<T: Lane>(&self, R: &Mat3<T>) -> Vec3<T> {
+        let one = |column: Vec3<T>, k: usize| column * column.x.like(self.position[k]);
+        match self.along {
+            Some(0) => one(R.x, 0),
+            Some(1) => one(R.y, 1),
+            Some(2) => one(R.z, 2),
+            _ => R.times_shared(self.position),
+        }
+    }
+
     /// Where its row in [`Machine::entries`] begins.
     #[inline(always)]
     pub(super) fn row(&self) -> usize {

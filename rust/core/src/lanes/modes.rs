@@ -179,6 +179,13 @@ impl<T: Lane> Mode<T> {
         Self::of(mu, yes, !yes, zero.lt(mu) & zero.lt(norm), e, gamma)
     }
 
+    /// Whether it is open, sticks or slides where another does not.
+    #[inline(always)]
+    pub fn differs(&self, other: &Self) -> T::Mask {
+        let (own, other) = (self.closed + self.stick, other.closed + other.stick);
+        own.lt(other) | other.lt(own)
+    }
+
     /// Whether it sticks.
     #[inline(always)]
     pub fn sticks(&self) -> T::Mask {

@@ -53,6 +53,11 @@ const RISE: f64 = 100.0;
 const FALL: f64 = 0.2;
 const LARGEST: f64 = 0.1;
 
+/// With settled modes a step should reduce the squared residual at least to this share; otherwise
+/// `α` dominates what remains and is smaller by the second factor for one step.
+const SLOW: f64 = 0.01;
+const RELIEF: f64 = 0.01;
+
 /// Every so many refused steps the shortest length is taken instead of a change of modes.
 const PERSIST: u32 = 4;
 
@@ -142,6 +147,9 @@ struct Bench<T: Lane, const C: usize> {
     modes: [Mode<T>; C],
     forced: [[T::Mask; 2]; C],
     is_forced: bool,
+    /// Steps since a mode last changed, and the squared residual before the last step.
+    settled: T,
+    last: T,
     /// Steps done, how many of them were refused, and the lanes that have done all.
     steps: [usize; MAX_LANES],
     refused: [u32; MAX_LANES],
@@ -179,6 +187,8 @@ impl<T: Lane, const C: usize> Bench<T, C> {
             modes: [Mode::open(zero); C],
             forced: [[T::mask(token, 0); 2]; C],
             is_forced: false,
+            settled: zero,
+            last: zero,
             steps: [0; MAX_LANES],
             refused: [0; MAX_LANES],
             late: 0,
@@ -239,6 +249,8 @@ impl<T: Lane, const C: usize> Bench<T, C> {
         self.floor.set(lane, alpha);
         self.inverses[0].set(lane, speed * speed);
         self.inverses[1].set(lane, impulse * impulse);
+        self.settled.set(lane, 0.0);
+        self.last.set(lane, f64::INFINITY);
         self.steps[lane] = 0;
         self.refused[lane] = 0;
         self.late &= !(1 << lane);
@@ -293,6 +305,8 @@ impl<T: Lane, const C: usize> Bench<T, C> {
     fn predict(&mut self, is_fresh: T::Mask, relative: T) {
         let recalls = is_fresh & relative.lt(relative.like(FAMILIAR));
         let recalls_any = recalls.any();
+        let (zero, one) = (relative.like(0.0), relative.like(1.0));
+        let mut changes = is_fresh;
         for i in 0..C {
             let (law, p, u) = (&self.laws[i], &self.p[i], &self.u[i]);
             let mut mode = Mode::predict(law, &self.seen[i], p[0], u[0]);
@@ -305,9 +319,14 @@ impl<T: Lane, const C: usize> Bench<T, C> {
                 mode = Mode::select(slides, &Mode::slide(law.mu, p, u), &mode);
                 mode = Mode::select(opens, &Mode::open(law.mu), &mode);
             }
+            changes = changes | mode.differs(&self.modes[i]);
             self.modes[i] = mode;
         }
         self.is_forced = false;
+        self.settled = T::select(changes, zero, self.settled + one);
+        let is_slow = one.lt(self.settled) & (relative.like(SLOW) * self.last).lt(relative);
+        self.alpha = T::select(is_slow, relative.like(RELIEF) * self.alpha, self.alpha);
+        self.last = relative;
     }
 
     /// Takes a step with the predicted modes.

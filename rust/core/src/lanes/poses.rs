@@ -6,7 +6,7 @@
 use super::inertias::Inertias;
 use super::machine::{Axis, Machine};
 use super::place::Place;
-use crate::scalar::elementary::sin_cos;
+use crate::scalar::elementary::sines_cosines;
 use crate::scalar::{Lane, Mat3, Vec3};
 
 /// Poses of all bodies.
@@ -17,6 +17,7 @@ pub struct Poses<T: Lane> {
     pub origin: Vec3<T>,
     /// One entry a body.
     pub bodies: Vec<Pose<T>>,
+    turns: Turns<T>,
 }
 
 /// Pose of a body.
@@ -59,6 +60,7 @@ impl<T: Lane> Poses<T> {
             token,
             origin: zero,
             bodies: vec![pose; machine.n_bodies()],
+            turns: Turns::new(token, machine),
         }
     }
 
@@ -78,7 +80,8 @@ impl<T: Lane> Poses<T> {
     fn update_here(&mut self, machine: &Machine, inertias: &Inertias<T>, place: &Place<T>) {
         let n = machine.links.len();
         let (links, inertias) = (&machine.links[..n], &inertias.bodies[..n]);
-        let (bodies, joints) = (&mut self.bodies[..n], &place.joints[..n - 1]);
+        let bodies = &mut self.bodies[..n];
+        let mut turns = self.turns.of(machine, place);
         self.origin = place.position;
         let trunk = &mut bodies[0];
         trunk.R = rotation(&place.attitude);
@@ -89,7 +92,7 @@ impl<T: Lane> Poses<T> {
             let (before, own) = bodies.split_at_mut(b);
             let (link, own) = (&links[b], &mut own[0]);
             let carrier = &before[link.parent];
-            let lever = carrier.R.times_shared(link.position);
+            let lever = link.lever(&carrier.R);
             let r = carrier.r + lever;
             let frame = match &link.rotation {
                 None => carrier.R,
@@ -99,7 +102,7 @@ impl<T: Lane> Poses<T> {
             own.R = if link.is_spinner {
                 frame
             } else {
-                link.axis.rotate(&frame, axis, joints[b - 1])
+                link.axis.rotate(&frame, axis, turns.next())
             };
             own.c = if link.is_centred {
                 r
@@ -111,6 +114,60 @@ impl<T: Lane> Poses<T> {
             own.axis = axis;
             own.swing = r.cross(axis);
         }
+    }
+}
+
+/// Sines and cosines of the joints that a step turns.
+#[derive(Clone, Debug)]
+pub(super) struct Turns<T> {
+    /// Angles, sines and cosines; those of a single rover fill up whole registers.
+    numbers: [Vec<T>; 3],
+}
+
+/// The same, one after the other.
+pub(super) struct NextTurn<'a, T> {
+    sines: &'a [T],
+    cosines: &'a [T],
+    at: usize,
+}
+
+impl<T: Lane> Turns<T> {
+    pub(super) fn new(token: T::Token, machine: &Machine) -> Self {
+        let n = machine.turning().len();
+        let n = if T::LANES == 1 {
+            n.next_multiple_of(8)
+        } else {
+            n
+        };
+        let zeros = || vec![T::splat(token, 0.0); n];
+        Self {
+            numbers: [zeros(), zeros(), zeros()],
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn of(&mut self, machine: &Machine, place: &Place<T>) -> NextTurn<'_, T> {
+        let turning = machine.turning();
+        let [angles, sines, cosines] = &mut self.numbers;
+        let angles = &mut angles[..];
+        for k in 0..turning.len() {
+            angles[k] = place.joints[turning[k]];
+        }
+        sines_cosines(angles, sines, cosines);
+        NextTurn {
+            sines,
+            cosines,
+            at: 0,
+        }
+    }
+}
+
+impl<T: Lane> NextTurn<'_, T> {
+    #[inline(always)]
+    pub(super) fn next(&mut self) -> (T, T) {
+        let k = self.at;
+        self.at += 1;
+        (self.sines[k], self.cosines[k])
     }
 }
 
@@ -151,10 +208,10 @@ impl Axis {
         }
     }
 
-    /// `R · Rot(axis, angle)`; `turned` is the axis in the frame that `R` maps to.
+    /// `R · Rot(axis, angle)` for the sine and cosine of the angle; `turned` is the axis in the frame that `R` maps to.
     #[inline(always)]
-    pub(super) fn rotate<T: Lane>(&self, R: &Mat3<T>, turned: Vec3<T>, angle: T) -> Mat3<T> {
-        let (s, c) = sin_cos(angle);
+    pub(super) fn rotate<T: Lane>(&self, R: &Mat3<T>, turned: Vec3<T>, sin_cos: (T, T)) -> Mat3<T> {
+        let (s, c) = sin_cos;
         let Mat3 { x, y, z } = *R;
         match self {
             Self::X => {

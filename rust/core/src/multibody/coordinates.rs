@@ -66,13 +66,13 @@ fn from_angles(
     Ok(configuration)
 }
 
-/// Coordinates (nv) of a configuration, where `angles` maps a rotation to three angles.
-fn to_angles(
+/// Writes the coordinates (nv) of a configuration, where `angles` maps a rotation to three angles.
+fn write_angles(
     model: &Model,
     configuration: &Configuration,
     angles: impl Fn(&Matrix3<f64>) -> [f64; 3],
-) -> Vec<f64> {
-    let mut q = vec![0.0; model.nv()];
+    q: &mut [f64],
+) {
     for (own, &k) in configuration.joints.iter().zip(model.joint_velocities()) {
         q[k] = *own;
     }
@@ -90,6 +90,16 @@ fn to_angles(
         };
         q[..3].copy_from_slice(&angles(rotation.to_rotation_matrix().matrix()));
     }
+}
+
+/// Coordinates (nv) of a configuration, where `angles` maps a rotation to three angles.
+fn to_angles(
+    model: &Model,
+    configuration: &Configuration,
+    angles: impl Fn(&Matrix3<f64>) -> [f64; 3],
+) -> Vec<f64> {
+    let mut q = vec![0.0; model.nv()];
+    write_angles(model, configuration, angles, &mut q);
     q
 }
 
@@ -111,10 +121,20 @@ pub fn from_public(model: &Model, q: &[f64]) -> Result<Configuration, StateError
 /// Public coordinates (nv) of a configuration.
 #[must_use]
 pub fn to_public(model: &Model, configuration: &Configuration) -> Vec<f64> {
-    to_angles(model, configuration, |R| {
-        let angles = HeadingPitchRoll::from_rotation(R);
-        [angles.roll, angles.heading, angles.pitch]
-    })
+    to_angles(model, configuration, public_angles)
+}
+
+/// Writes the public coordinates (nv) of a configuration.
+///
+/// # Panics
+/// If `q` is shorter than nv.
+pub fn write_public(model: &Model, configuration: &Configuration, q: &mut [f64]) {
+    write_angles(model, configuration, public_angles, q);
+}
+
+fn public_angles(R: &Matrix3<f64>) -> [f64; 3] {
+    let angles = HeadingPitchRoll::from_rotation(R);
+    [angles.roll, angles.heading, angles.pitch]
 }
 
 /// Configuration of the report's coordinates (nv).

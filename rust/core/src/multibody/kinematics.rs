@@ -48,6 +48,15 @@ impl Kinematics {
         kinematics
     }
 
+    /// Whether it is scratch of a model with these bodies.
+    #[must_use]
+    pub fn is_of(&self, model: &Model) -> bool {
+        let trees = model.bodies().iter().map(|body| body.tree);
+        self.motions.len() == model.n_motions()
+            && self.origins.len() == model.trees().len()
+            && trees.eq(self.tree_of.iter().copied())
+    }
+
     /// Recomputes all poses.
     pub fn update(&mut self, model: &Model, configuration: &Configuration) {
         if model.only_turns() {

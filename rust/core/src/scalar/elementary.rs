@@ -69,6 +69,49 @@ const NOTHING_LEFT: f64 = -56.0 * std::f64::consts::LN_2;
 #[inline(always)]
 #[must_use]
 pub fn sin_cos<T: Lane>(x: T) -> (T, T) {
+    let (sin, cos) = near_sin_cos(x);
+    let far = is_far(x);
+    if far.any() {
+        return far_lanes(x, far, sin, cos);
+    }
+    (sin, cos)
+}
+
+/// Sines and cosines of several angles (rad), each as by [`sin_cos`]. A loop over `f64` is one over
+/// registers, too.
+///
+/// # Panics
+/// If the slices differ in length.
+#[inline(always)]
+pub fn sines_cosines<T: Lane>(x: &[T], sin: &mut [T], cos: &mut [T]) {
+    let n = x.len();
+    assert!(sin.len() == n && cos.len() == n, "as many sines as angles");
+    for k in 0..n {
+        (sin[k], cos[k]) = near_sin_cos(x[k]);
+    }
+    let Some(first) = x.first() else {
+        return;
+    };
+    let mut any = is_far(*first);
+    for k in 1..n {
+        any = any | is_far(x[k]);
+    }
+    if any.any() {
+        for k in 0..n {
+            (sin[k], cos[k]) = far_lanes(x[k], is_far(x[k]), sin[k], cos[k]);
+        }
+    }
+}
+
+/// Where the reduction in lanes does not suffice.
+#[inline(always)]
+fn is_far<T: Lane>(x: T) -> T::Mask {
+    x.like(FAR).lt(x.abs())
+}
+
+/// Sine and cosine of x up to [`FAR`].
+#[inline(always)]
+fn near_sin_cos<T: Lane>(x: T) -> (T, T) {
     let number = |value: f64| x.like(value);
     // x = n π/2 + r + low, with n whole and |r| ≤ π/4 (three parts)
     let magic = number(MAGIC);
@@ -103,10 +146,6 @@ pub fn sin_cos<T: Lane>(x: T) -> (T, T) {
     let sin = T::select(quarter.lt(-half) | more.lt(quarter), -sin, sin);
     let cos = T::select(half.lt(quarter) | quarter.lt(-more), -cos, cos);
 
-    let far = number(FAR).lt(x.abs());
-    if far.any() {
-        return far_lanes(x, far, sin, cos);
-    }
     (sin, cos)
 }
 

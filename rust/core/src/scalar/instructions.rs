@@ -83,6 +83,21 @@ impl Instructions {
         })
     }
 
+    /// This machine's best, and all that it could do with less.
+    #[must_use]
+    pub fn all_of_this_machine() -> Vec<Self> {
+        let best = Self::of_this_machine();
+        let mut all = vec![best];
+        #[cfg(target_arch = "x86_64")]
+        if let (Self::Avx512(_), Some(token)) = (best, Level::new().as_avx2()) {
+            all.push(Self::Avx2(token));
+        }
+        if best.lanes() > 1 {
+            all.push(Self::Baseline);
+        }
+        all
+    }
+
     /// Rovers to a register.
     #[must_use]
     pub fn lanes(self) -> usize {

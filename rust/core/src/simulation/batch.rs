@@ -3,32 +3,15 @@
 //! Rovers share models and terrains and nothing else. They never wait for each other, and their
 //! motion depends neither on the number of rovers nor on the number of threads.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::Duration;
-
 use rayon::ThreadPool;
-use rayon::iter::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
-use rayon::slice::ParallelSliceMut;
 
 use super::error::BatchError;
 use super::pool::Pool;
-use super::reading::{Look, ReadingLayout};
+use super::reading::{Look, ReadingLayout, ReadingScratch};
 use super::rover::{Placement, RoverSimulation};
+use super::turns::{Bench, Done, Turn, take_turns};
 use crate::integrator::StepError;
 use crate::multibody::Model;
-
-/// Interval at which the calling thread asks whether to continue while others step.
-const ASKING: Duration = Duration::from_millis(20);
-
-/// One rover with the places for its error and its reading.
-type Place<'a> = (
-    (
-        (&'a mut RoverSimulation, &'a mut Option<StepError>),
-        &'a [f64; 2],
-    ),
-    &'a mut [f64],
-);
 
 /// Rovers with the threads that step them.
 pub struct Batch {
@@ -37,9 +20,10 @@ pub struct Batch {
     scan: Vec<[f64; 2]>,
     layout: ReadingLayout,
     errors: Vec<Option<StepError>>,
-    /// None: the caller's thread does all the work.
+    /// The threads besides the caller's; None if it does all the work.
     pool: Option<Pool>,
-    threads: usize,
+    /// One for each thread.
+    benches: Vec<Bench>,
 }
 
 impl Batch {
@@ -65,11 +49,13 @@ impl Batch {
         let batch = Self {
             errors: vec![None; rovers.len()],
             targets: vec![[0.0; 2]; rovers.len()],
-            pool: (threads > 1).then(|| Pool::start(threads)).transpose()?,
+            pool: (threads > 1)
+                .then(|| Pool::start(threads - 1))
+                .transpose()?,
+            benches: (0..threads).map(|_| Bench::default()).collect(),
             rovers,
             scan,
             layout,
-            threads,
         };
         for (index, rover) in batch.rovers.iter().enumerate() {
             batch.fits(index, rover.model())?;
@@ -77,11 +63,7 @@ impl Batch {
         Ok(batch)
     }
 
-    /// Whether a model has the coordinates of this batch's.
-    ///
-    /// # Errors
-    /// `Differs`, with this index.
-    pub fn fits(&self, index: usize, model: &Model) -> Result<(), BatchError> {
+    fn fits(&self, index: usize, model: &Model) -> Result<(), BatchError> {
         let own = ReadingLayout::new(model, self.scan.len());
         if own == self.layout {
             return Ok(());
@@ -102,7 +84,7 @@ impl Batch {
     /// Threads that step them.
     #[must_use]
     pub fn threads(&self) -> usize {
-        self.threads
+        self.benches.len()
     }
 
     /// Layout of the rows of readings.
@@ -129,6 +111,7 @@ impl Batch {
         self.fits(index, rover.model())?;
         self.rovers[index] = rover;
         self.targets[index] = target;
+        self.errors[index] = None;
         Ok(())
     }
 
@@ -154,6 +137,7 @@ impl Batch {
         let begun = self.rovers[index].begin(placement);
         begun.map_err(|error| BatchError::Options { index, error })?;
         self.targets[index] = target;
+        self.errors[index] = None;
         Ok(())
     }
 
@@ -208,58 +192,49 @@ impl Batch {
         rows: &mut [f64],
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<(), BatchError> {
-        let n_rovers = self.rovers.len();
         let width = self.layout.size();
-        assert_eq!(rows.len(), n_rovers * width, "one row a rover");
+        assert_eq!(rows.len(), self.rovers.len() * width, "one row a rover");
+        if let Some(active) = active {
+            assert_eq!(active.len(), self.rovers.len(), "one flag a rover");
+        }
         let is_active = |index: usize| active.is_none_or(|active| active[index]);
         let pool = self.pool.as_mut().map(Pool::of_this_process).transpose()?;
         give_commands(&mut self.rovers, torques, set_points, is_active)?;
-
-        let scan = &self.scan;
-        let move_one = |(index, (((rover, error), target), row)): (usize, Place<'_>),
-                        go_on: &mut dyn FnMut() -> bool| {
-            *error = if is_active(index) && go_on() {
-                rover.step_while(n, go_on).err()
-            } else {
-                None
-            };
-            let look = Look {
+        let places = rows.chunks_exact_mut(width).zip(&self.targets).enumerate();
+        let mut places: Vec<_> = places
+            .map(|(index, (row, target))| ReadingPlace {
+                is_active: is_active(index),
                 target: *target,
-                scan,
-            };
-            rover.read(&look, row);
-        };
-        let (rovers, errors, targets) = (&mut self.rovers, &mut self.errors, &self.targets);
-        let Some(pool) = pool else {
-            let rovers = rovers.iter_mut().zip(errors).zip(targets);
-            for place in rovers.zip(rows.chunks_exact_mut(width)).enumerate() {
-                move_one(place, go_on);
-            }
-            return Ok(());
-        };
-        // The pool's threads step, this one asks.
-        let stop = AtomicBool::new(false);
-        pool.in_place_scope(|scope| {
-            let (done, is_done) = channel::<()>();
-            let stop = &stop;
-            scope.spawn(move |_| {
-                rovers
-                    .par_iter_mut()
-                    .zip(errors)
-                    .zip(targets)
-                    .zip(rows.par_chunks_exact_mut(width))
-                    .enumerate()
-                    .with_max_len(1) // rovers differ in cost, and a task costs little beside one
-                    .for_each(|place| move_one(place, &mut || !stop.load(Ordering::Relaxed)));
-                drop(done); // tells the asking thread, also where a rover panics
-            });
-            while is_done.recv_timeout(ASKING) == Err(RecvTimeoutError::Timeout) {
-                if !go_on() {
-                    stop.store(true, Ordering::Relaxed);
-                    break;
-                }
-            }
-        });
+                row,
+            })
+            .collect();
+        let turn = ReadingTurn { scan: &self.scan };
+        let rovers = self.rovers.iter_mut().zip(&mut self.errors);
+        let seats = rovers.zip(&mut places);
+        take_turns(seats, n, &turn, &mut self.benches, pool, go_on);
+        Ok(())
+    }
+
+    /// Gives every rover its turn of `n` steps with its place in `places`; `go_on` as for
+    /// [`Self::step_while`].
+    ///
+    /// # Errors
+    /// `Threads`, as [`Self::step`]. No rover has moved then.
+    ///
+    /// # Panics
+    /// If there are not as many places as rovers.
+    pub fn take_turns<P: Send>(
+        &mut self,
+        places: &mut [P],
+        n: usize,
+        turn: &impl Turn<P>,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<(), BatchError> {
+        assert_eq!(places.len(), self.rovers.len(), "one place a rover");
+        let pool = self.pool.as_mut().map(Pool::of_this_process).transpose()?;
+        let rovers = self.rovers.iter_mut().zip(&mut self.errors);
+        let seats = rovers.zip(places);
+        take_turns(seats, n, turn, &mut self.benches, pool, go_on);
         Ok(())
     }
 
@@ -270,13 +245,14 @@ impl Batch {
     pub fn read(&self, rows: &mut [f64]) {
         let width = self.layout.size();
         assert_eq!(rows.len(), self.rovers.len() * width, "one row a rover");
+        let mut scratch = ReadingScratch::default();
         let rovers = self.rovers.iter().zip(&self.targets);
         for ((rover, target), row) in rovers.zip(rows.chunks_exact_mut(width)) {
             let look = Look {
                 target: *target,
                 scan: &self.scan,
             };
-            rover.read(&look, row);
+            rover.read(&look, &mut scratch, row);
         }
     }
 
@@ -284,6 +260,40 @@ impl Batch {
     #[must_use]
     pub fn errors(&self) -> &[Option<StepError>] {
         &self.errors
+    }
+}
+
+/// Where a rover's reading goes.
+struct ReadingPlace<'a> {
+    is_active: bool,
+    target: [f64; 2],
+    row: &'a mut [f64],
+}
+
+/// Steps and a reading; the commands have been given.
+struct ReadingTurn<'a> {
+    scan: &'a [[f64; 2]],
+}
+
+impl Turn<ReadingPlace<'_>> for ReadingTurn<'_> {
+    fn is_moving(&self, place: &ReadingPlace<'_>) -> bool {
+        place.is_active
+    }
+
+    fn begin(&self, _: &mut RoverSimulation, _: &mut ReadingPlace<'_>) {}
+
+    fn end(
+        &self,
+        rover: &RoverSimulation,
+        _: Done<'_>,
+        place: &mut ReadingPlace<'_>,
+        scratch: &mut ReadingScratch,
+    ) {
+        let look = Look {
+            target: place.target,
+            scan: self.scan,
+        };
+        rover.read(&look, scratch, place.row);
     }
 }
 

@@ -7,12 +7,12 @@
 //!   [contacts](rover_contacts), its ordinary steps and its [`reading`];
 //! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains,
 //!   perhaps with a machine on it;
-//! - [`batch`]: many rovers side by side, each thread's in a fleet; [`profile`]: time spent in each part of a step.
+//! - [`batch`]: many rovers side by side, each with its [turn](turns); [`profile`]: time spent in each part of a step.
 
 pub mod active_contact;
 pub mod batch;
 pub mod error;
-mod fleet;
+pub mod fleet;
 pub mod grains;
 pub mod planar;
 mod pool;
@@ -26,6 +26,7 @@ pub mod scene;
 pub mod snapshot;
 pub mod state;
 pub mod stepping;
+pub mod turns;
 
 pub use active_contact::{ActiveContact, Components, LocatedContact};
 pub use batch::Batch;
@@ -36,10 +37,11 @@ pub use grains::{
 pub use planar::{
     BallSimulation, MirroredRoverSimulation, PlanarScene, PlanarSimulation, TwoWheelRoverSimulation,
 };
-pub use reading::{Look, ReadingLayout};
+pub use reading::{Look, ReadingLayout, ReadingScratch};
 pub use rover::{LastCall, Placement, RoverScene, RoverSimulation};
 pub use rover_command::RoverCommand;
 pub use scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, StepTaken};
 pub use snapshot::Snapshot;
 pub use state::State;
 pub use stepping::Simulation;
+pub use turns::{Done, Turn};

@@ -5,10 +5,12 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use super::rover::RoverSimulation;
-use crate::contact::Part;
+use super::rover_contacts::WheelForces;
+use crate::contact::{Part, detection::wheel_gap};
 use crate::integrator::StepStatus;
-use crate::multibody::{Model, coordinates};
+use crate::multibody::{Kinematics, Model, coordinates};
 use crate::scalar::elementary::{hypot, sin_cos};
+use crate::spatial::HeadingPitchRoll;
 
 /// Speed below which, for both rim and ground, a slip ratio is meaningless, m/s.
 pub const SLIP_SPEED: f64 = 0.05;
@@ -116,27 +118,60 @@ impl Row<'_> {
     }
 }
 
+/// Scratch of readings: kept between them, so that a reading allocates nothing.
+#[derive(Debug, Default)]
+pub struct ReadingScratch {
+    kinematics: Option<Kinematics>,
+    forces: WheelForces,
+    /// Room for the numbers of a reader.
+    pub numbers: Vec<f64>,
+}
+
+impl ReadingScratch {
+    /// Poses for a model.
+    fn kinematics(&mut self, model: &Model) -> &mut Kinematics {
+        if !(self.kinematics.as_ref()).is_some_and(|own| own.is_of(model)) {
+            self.kinematics = None;
+        }
+        self.kinematics
+            .get_or_insert_with(|| Kinematics::new(model))
+    }
+}
+
 impl RoverSimulation {
     /// Writes a reading in the order of [`ReadingLayout`].
     ///
     /// # Panics
     /// If the size of `out` is not that of the layout of this model and scan.
-    pub fn read(&self, look: &Look<'_>, out: &mut [f64]) {
+    pub fn read(&self, look: &Look<'_>, scratch: &mut ReadingScratch, out: &mut [f64]) {
+        let heights = out.len().saturating_sub(look.scan.len());
+        let (state, heights) = out.split_at_mut(heights);
+        self.read_state(look.target, scratch, state);
+        self.read_heights(look.scan, heights);
+    }
+
+    /// Writes a reading without heights.
+    ///
+    /// # Panics
+    /// If the size of `out` is not that of the layout of this model without a scan.
+    pub fn read_state(&self, target: [f64; 2], scratch: &mut ReadingScratch, out: &mut [f64]) {
         let model = self.model();
-        let mut row = Row { out, filled: 0 };
+        let (pose, rest) = out.split_at_mut(model.nv());
+        let mut row = Row {
+            out: rest,
+            filled: 0,
+        };
         let state = self.state();
         let R_WB = state.configuration.attitude.to_rotation_matrix();
 
-        let mut pose = coordinates::to_public(model, &state.configuration);
+        coordinates::write_public(model, &state.configuration, pose);
         for j in model.wheels().iter().filter_map(|wheel| wheel.joint) {
             let k = model.joint_velocity(j);
             let turn = std::f64::consts::TAU;
             pose[k] -= turn * (pose[k] / turn).round_ties_even();
         }
-        let [x, y, z]: [f64; 3] = state.configuration.position.into();
+        let [x, _, z]: [f64; 3] = state.configuration.position.into();
         let is_free = model.trees()[0].is_free;
-        let heading = if is_free { pose[4] } else { 0.0 };
-        row.put(pose);
 
         // A first body that is not free moves with the world.
         let v = &state.v;
@@ -150,19 +185,26 @@ impl RoverSimulation {
         row.put(angular.iter().copied());
         row.put(model.joint_velocities().iter().map(|&k| v[k]));
 
-        let wheels = self.wheel_contacts();
-        row.put(wheels.iter().map(|wheel| wheel.gap));
-        let touches = |gap: f64| f64::from(u8::from(gap <= CONTACT_GAP));
-        row.put(wheels.iter().map(|wheel| touches(wheel.gap)));
-        let forces = self.wheel_forces();
+        let n_wheels = model.wheels().len();
+        let kinematics = scratch.kinematics(model);
+        kinematics.update_for_step(model, &state.configuration);
+        let gap = |i| wheel_gap(model, kinematics, &**self.terrain(), i);
+        let first = row.filled;
+        row.put((0..n_wheels).map(gap));
+        for i in first..row.filled {
+            row.put([f64::from(u8::from(row.out[i] <= CONTACT_GAP))]);
+        }
+        scratch.forces.sum(self);
+        let forces = &scratch.forces.along;
         row.put(forces.iter().map(|force| force[0]));
         row.put(forces.iter().flat_map(|force| [force[1], force[2]]));
         let normal = self.terrain().ground().map(|plane| *plane.normal());
         let normal = R_WB.inverse() * normal.unwrap_or_default();
         row.put(normal.iter().copied());
 
+        let heading = if is_free { pose[4] } else { 0.0 };
         let (sine, cosine) = sin_cos(heading);
-        let (dx, dz) = (look.target[0] - x, look.target[1] - z);
+        let (dx, dz) = (target[0] - x, target[1] - z);
         row.put([
             dx * cosine - dz * sine,
             dx * sine + dz * cosine,
@@ -188,14 +230,33 @@ impl RoverSimulation {
             report.residual,
             report.n_contacts as f64,
         ]);
+        assert_eq!(row.filled, row.out.len(), "a row as long as its layout");
+    }
 
-        for [ahead, right] in look.scan {
+    /// Writes the heights of a reading at the points of a scan.
+    ///
+    /// # Panics
+    /// If there are not as many heights as points.
+    pub fn read_heights(&self, scan: &[[f64; 2]], heights: &mut [f64]) {
+        assert_eq!(heights.len(), scan.len(), "one height a point");
+        if scan.is_empty() {
+            return;
+        }
+        let configuration = &self.state().configuration;
+        let [x, y, z]: [f64; 3] = configuration.position.into();
+        let heading = if self.model().trees()[0].is_free {
+            let attitude = configuration.attitude.to_rotation_matrix();
+            HeadingPitchRoll::from_rotation(attitude.matrix()).heading
+        } else {
+            0.0
+        };
+        let (sine, cosine) = sin_cos(heading);
+        for (own, [ahead, right]) in heights.iter_mut().zip(scan) {
             let at_x = x + (ahead * cosine + right * sine);
             let at_z = z + (right * cosine - ahead * sine);
             let height = self.terrain().height(at_x, at_z);
-            row.put([height.map_or(f64::NAN, |height| height - y)]);
+            *own = height.map_or(f64::NAN, |height| height - y);
         }
-        assert_eq!(row.filled, row.out.len(), "a row as long as its layout");
     }
 
     /// Mean over the wheels' contacts of the last step of |u_T| / max(|rim

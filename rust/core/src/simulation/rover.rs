@@ -41,6 +41,15 @@ impl RoverScene {
             machine,
         }
     }
+
+    /// The same machine on another terrain.
+    #[must_use]
+    pub fn on(&self, terrain: Arc<dyn Terrain>) -> Self {
+        Self {
+            terrain,
+            ..self.clone()
+        }
+    }
 }
 
 impl fmt::Debug for RoverScene {
@@ -261,8 +270,12 @@ impl RoverSimulation {
             configuration,
             v,
         } = placement;
-        let mut made = Self::new(scene.model, scene.terrain, options)?;
-        made.set_state(configuration, v);
+        assert!(
+            configuration.is_of(&scene.model),
+            "invariant: a configuration of this model"
+        );
+        let mut made = Self::of(scene, configuration.clone(), options)?;
+        made.place(configuration, v);
         Ok(made)
     }
 

@@ -94,17 +94,17 @@ impl RoverSimulation {
     /// Wrong length or an entry that is not finite; nothing is changed then.
     pub fn set_wheel_torques(&mut self, torques: &[f64]) -> Result<(), CommandError> {
         check("torques", torques, self.scene.model.wheels().len())?;
-        for ((own, torque), wheel) in self
-            .command
-            .wheel_torque
-            .iter_mut()
-            .zip(torques)
-            .zip(self.scene.model.wheels())
-        {
+        self.take_wheel_torques(torques);
+        Ok(())
+    }
+
+    fn take_wheel_torques(&mut self, torques: &[f64]) {
+        let wheels = self.scene.model.wheels().iter();
+        let own = self.command.wheel_torque.iter_mut();
+        for ((own, torque), wheel) in own.zip(torques).zip(wheels) {
             *own = torque.clamp(-wheel.torque_limit, wheel.torque_limit);
         }
         self.combine_torques();
-        Ok(())
     }
 
     /// Sets torques about the joint axes (n_joints, N m).
@@ -176,6 +176,11 @@ impl RoverSimulation {
     /// there is no free steering joint.
     pub fn set_steering(&mut self, set_points: &[f64]) -> Result<(), CommandError> {
         self.check_steering(set_points)?;
+        self.take_steering(set_points);
+        Ok(())
+    }
+
+    fn take_steering(&mut self, set_points: &[f64]) {
         for (&set_point, wheel) in set_points.iter().zip(self.scene.model.wheels()) {
             if let Some(j) = wheel.steering {
                 let hold = self.scene.model.hold(j);
@@ -189,7 +194,6 @@ impl RoverSimulation {
                 });
             }
         }
-        Ok(())
     }
 
     fn check_steering(&self, set_points: &[f64]) -> Result<(), CommandError> {
@@ -223,8 +227,9 @@ impl RoverSimulation {
         set_points: &[f64],
     ) -> Result<(), CommandError> {
         self.check_commands(torques, set_points)?;
-        self.set_wheel_torques(torques)?;
-        self.set_steering(set_points)
+        self.take_wheel_torques(torques);
+        self.take_steering(set_points);
+        Ok(())
     }
 
     /// Checks whether [`Self::set_wheel_torques`] and [`Self::set_steering`] would accept these.

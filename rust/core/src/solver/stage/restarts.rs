@@ -70,7 +70,8 @@ pub(in crate::solver) fn solve<const D: usize>(
     let mut draws = Draws(0);
     let mut best = Residual::UNSOLVED;
     for _ in 0..STARTS {
-        let found = pivoting::pivots::<D>(data, options, p, u, scratch, iterations);
+        let alpha = Some(pivoting::SMALL_ALPHA);
+        let found = pivoting::pivots::<D>(data, options, alpha, p, u, scratch, iterations);
         if found.0 == SolveStatus::Converged {
             return found;
         }

@@ -160,7 +160,16 @@ pub(in crate::solver) fn escalate<const D: usize>(
         }
         scratch.start.copy_from_slice(p);
     } else if is_warm {
-        let found = pivoting::pivots::<D>(data, options, p, u, scratch, iterations);
+        let found = pivoting::pivots::<D>(data, options, None, p, u, scratch, iterations);
+        if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
+            return outcome;
+        }
+        // Friction may point to modes that lead nowhere: the next path starts from the loads alone.
+        for (p, start) in p.chunks_exact_mut(D).zip(scratch.start.chunks_exact(D)) {
+            p.fill(0.0);
+            p[0] = start[0];
+        }
+        let found = pivoting::pivots::<D>(data, options, None, p, u, scratch, iterations);
         if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
             return outcome;
         }

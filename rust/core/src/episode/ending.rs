@@ -1,0 +1,77 @@
+//! Whether and why an episode ends.
+
+use super::outcome::Quantities;
+use super::progress::Progress;
+use super::rules::Rules;
+
+/// A rover is high-centred while its trunk carries too much of the weight and it is no faster than
+/// this, m/s.
+pub const STUCK_SPEED: f64 = 0.05;
+
+/// Why an episode has ended, in the order of the codes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Ending {
+    /// It has not.
+    #[default]
+    None,
+    /// The trunk's origin is within the tolerance of the goal.
+    Goal,
+    /// The trunk leans too far.
+    RollOver,
+    /// The trunk has carried the weight for too long.
+    HighCentred,
+    /// The physics could not take a step, or gave numbers that float32 cannot hold.
+    StepFailed,
+}
+
+impl Ending {
+    /// All, by their code.
+    pub const ALL: [Self; 5] = [
+        Self::None,
+        Self::Goal,
+        Self::RollOver,
+        Self::HighCentred,
+        Self::StepFailed,
+    ];
+
+    /// Its name; empty while the episode runs.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "",
+            Self::Goal => "goal",
+            Self::RollOver => "roll_over",
+            Self::HighCentred => "high_centred",
+            Self::StepFailed => "step_failed",
+        }
+    }
+
+    /// Whether the episode has ended.
+    #[must_use]
+    pub fn is_end(self) -> bool {
+        self != Self::None
+    }
+
+    /// Whether it has ended in any other way than at the goal.
+    #[must_use]
+    pub fn is_failure(self) -> bool {
+        !matches!(self, Self::None | Self::Goal)
+    }
+
+    /// The ending after a control period: a failed step takes precedence, then the goal, then
+    /// rolling over.
+    #[must_use]
+    pub fn of(rules: &Rules, now: &Quantities, progress: &Progress, has_failed: bool) -> Self {
+        if has_failed {
+            Self::StepFailed
+        } else if now.distance <= rules.settings().goal_tolerance {
+            Self::Goal
+        } else if now.cos_tilt < rules.settings().cos_max_tilt {
+            Self::RollOver
+        } else if progress.stuck_time >= rules.settings().stuck_time {
+            Self::HighCentred
+        } else {
+            Self::None
+        }
+    }
+}

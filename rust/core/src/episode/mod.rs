@@ -1,0 +1,36 @@
+//! Episodes of a driving task: what an action commands, what is observed, rewarded, and when it
+//! ends.
+//!
+//! An agent chooses an action once a control period, which lasts several physics steps. The rover
+//! is given the action's commands ([`action`]), takes its steps and is read
+//! ([`crate::simulation::reading`]). From the reading follow the observation ([`observation`], with
+//! [`noise`]), the [`progress`] of the episode, the terms of the [`reward`] and whether the episode
+//! ends ([`ending`]); together they are the period's [`outcome`].
+//!
+//! - [`rules`]: what all episodes of a task share; [`beginning`]: how one begins, in a scene that
+//!   is drawn ([`crate::draw`]);
+//! - [`running`]: one episode and its control period;
+//! - [`batch`]: many rovers side by side, each with its episode.
+
+pub mod action;
+pub mod batch;
+pub mod beginning;
+pub mod ending;
+pub mod error;
+pub mod noise;
+pub mod observation;
+pub mod outcome;
+pub mod progress;
+pub mod reward;
+pub mod rules;
+pub mod running;
+
+pub use batch::EpisodeBatch;
+pub use beginning::{Beginning, EpisodeDistribution};
+pub use ending::Ending;
+pub use error::EpisodeError;
+pub use outcome::{Outcome, Quantities};
+pub use progress::Progress;
+pub use reward::{TERMS, Weights};
+pub use rules::{Rules, Settings};
+pub use running::{Episode, Setting};

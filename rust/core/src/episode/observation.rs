@@ -1,0 +1,79 @@
+//! The observation: a row of float32 numbers,
+//!
+//! ```text
+//! entry = (float32) (value / scale + σ z)
+//! ```
+//!
+//! | values | size |
+//! |---|---|
+//! | a reading from `pose` to `target` ([`crate::simulation::ReadingLayout`]) | nq + nv + 5 n + 6 |
+//! | the previous action | 2 n |
+//! | fraction of the time to high-centring | 1 |
+//! | heights of the scan | points |
+//!
+//! with n wheels. Entries are never clipped.
+
+use super::progress::Progress;
+use super::rules::Rules;
+
+/// Writes the entries before the heights and says whether all of them are finite.
+///
+/// `reading`: one without heights; `normals`: a standard normal number for each entry, where there
+/// is noise.
+///
+/// # Panics
+/// If a slice is too short.
+pub fn write_state(
+    rules: &Rules,
+    reading: &[f64],
+    progress: &Progress,
+    normals: Option<&[f64]>,
+    out: &mut [f32],
+) -> bool {
+    let stuck = (progress.stuck_time / rules.settings().stuck_time).min(1.0);
+    let (shared, actions) = (rules.n_shared(), rules.n_actions());
+    write(rules, 0, &reading[..shared], normals, out)
+        & write(rules, shared, &progress.previous_action, normals, out)
+        & write(rules, shared + actions, &[stuck], normals, out)
+}
+
+/// Writes the entries of the heights and says whether all of them are finite; slices as for
+/// [`write_state`].
+///
+/// # Panics
+/// If a slice is too short.
+pub fn write_heights(
+    rules: &Rules,
+    heights: &[f64],
+    normals: Option<&[f64]>,
+    out: &mut [f32],
+) -> bool {
+    write(rules, rules.n_state(), heights, normals, out)
+}
+
+/// Writes values from entry `start` on.
+#[allow(clippy::cast_possible_truncation)] // float32 is what an agent gets
+fn write(
+    rules: &Rules,
+    start: usize,
+    values: &[f64],
+    normals: Option<&[f64]>,
+    out: &mut [f32],
+) -> bool {
+    let place = start..start + values.len();
+    let out = &mut out[place.clone()];
+    let entries = out.iter_mut().zip(&rules.inverse_scale()[place.clone()]);
+    let entries = entries.zip(values);
+    if let Some(normals) = normals {
+        let noise = normals[place.clone()].iter().zip(&rules.noise()[place]);
+        for (((entry, inverse), value), (z, deviation)) in entries.zip(noise) {
+            *entry = (value * inverse + z * deviation) as f32;
+        }
+    } else {
+        for ((entry, inverse), value) in entries {
+            *entry = (value * inverse) as f32;
+        }
+    }
+    // A fold without a branch, since all entries but few are finite.
+    out.iter().fold(true, |all, entry| all & entry.is_finite())
+}

@@ -1,0 +1,97 @@
+//! The outcome of a control period.
+
+use super::ending::Ending;
+use super::reward::N_TERMS;
+use super::rules::Places;
+use crate::scalar::elementary::acos;
+
+/// Quantities of a reading that rewards, ends and reports are made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Quantities {
+    /// Horizontal distance to the goal, m.
+    pub distance: f64,
+    /// Cosine of the trunk's tilt from the vertical.
+    pub cos_tilt: f64,
+    /// Horizontal speed of the trunk's origin, m/s.
+    pub speed: f64,
+    /// Mean normal force of the last step on all that is no wheel, N.
+    pub trunk_force: f64,
+    /// Mean slip ratio of the wheels in contact.
+    pub slip_ratio: f64,
+    /// Work of the motors in the period, driving or braking, J.
+    pub work: f64,
+    /// Its driving part, J.
+    pub positive_work: f64,
+    /// s.
+    pub time: f64,
+    /// 1 if the contact solver did not converge in one of the steps, else 0.
+    pub not_converged: f64,
+    /// Its iterations, all steps together.
+    pub iterations: f64,
+    /// Its largest residual.
+    pub residual: f64,
+    /// Most contacts in a step.
+    pub n_contacts: f64,
+}
+
+impl Quantities {
+    /// From a reading without heights.
+    #[must_use]
+    pub fn of(places: &Places, reading: &[f64]) -> Self {
+        let scalars = &reading[places.scalars.clone()];
+        let &[
+            distance,
+            cos_tilt,
+            speed,
+            trunk_force,
+            slip_ratio,
+            work,
+            positive_work,
+            time,
+            not_converged,
+            iterations,
+            residual,
+            n_contacts,
+        ] = scalars
+        else {
+            unreachable!("invariant: the scalars of a reading are twelve")
+        };
+        Self {
+            distance,
+            cos_tilt,
+            speed,
+            trunk_force,
+            slip_ratio,
+            work,
+            positive_work,
+            time,
+            not_converged,
+            iterations,
+            residual,
+            n_contacts,
+        }
+    }
+
+    /// Tilt of the trunk from the vertical, rad.
+    #[must_use]
+    pub fn tilt(&self) -> f64 {
+        acos(self.cos_tilt.clamp(-1.0, 1.0))
+    }
+}
+
+/// The outcome of a control period, or the beginning of an episode, which earns nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Outcome {
+    /// Quantities at the end of the period.
+    pub now: Quantities,
+    /// Work of the motors since the episode began, J.
+    pub energy: f64,
+    /// Its driving part, J.
+    pub energy_positive: f64,
+    /// Terms of the reward, in the order of [`super::TERMS`].
+    pub terms: [f64; N_TERMS],
+    /// Their sum.
+    pub reward: f64,
+    /// Whether and how the episode has ended.
+    pub ending: Ending,
+}

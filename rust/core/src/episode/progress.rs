@@ -1,0 +1,57 @@
+//! The state of an episode outside the simulation.
+
+use super::ending::STUCK_SPEED;
+use super::outcome::Quantities;
+
+/// What an episode remembers from period to period.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Progress {
+    /// Horizontal distance to the goal, m.
+    pub distance: f64,
+    /// The last action (2 n_wheels); zeros at the beginning.
+    pub previous_action: Vec<f64>,
+    /// Work of the motors since the beginning, driving or braking, J.
+    pub energy: f64,
+    /// Its driving part, J.
+    pub energy_positive: f64,
+    /// How long the rover has been high-centred, s.
+    pub stuck_time: f64,
+}
+
+impl Progress {
+    /// At the beginning, at a distance (m) from the goal.
+    #[must_use]
+    pub fn begin(distance: f64, n_actions: usize) -> Self {
+        Self {
+            distance,
+            previous_action: vec![0.0; n_actions],
+            energy: 0.0,
+            energy_positive: 0.0,
+            stuck_time: 0.0,
+        }
+    }
+
+    /// Goes on by a control period of `dt` (s). `trunk_load_limit`: force on the trunk beyond which
+    /// it is high-centred, N.
+    pub fn advance(&mut self, action: &[f64], now: &Quantities, dt: f64, trunk_load_limit: f64) {
+        self.distance = now.distance;
+        self.previous_action.copy_from_slice(action);
+        self.energy += now.work;
+        self.energy_positive += now.positive_work;
+        let is_stuck = now.trunk_force > trunk_load_limit && now.speed <= STUCK_SPEED;
+        self.stuck_time = if is_stuck { self.stuck_time + dt } else { 0.0 };
+    }
+
+    /// Whether all of its numbers are finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        let numbers = [
+            self.distance,
+            self.energy,
+            self.energy_positive,
+            self.stuck_time,
+        ];
+        let mut numbers = numbers.iter().chain(&self.previous_action);
+        numbers.all(|x| x.is_finite())
+    }
+}

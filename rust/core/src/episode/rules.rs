@@ -1,0 +1,240 @@
+//! What all episodes of a task share.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::error::EpisodeError;
+use super::reward::Weights;
+use crate::multibody::Model;
+use crate::simulation::ReadingLayout;
+
+/// The settings of a task. SI units, radians.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Physics steps of a control period.
+    pub substeps: usize,
+    /// Control period, s.
+    pub dt: f64,
+    /// Torque of a torque action of 1, (n_wheels), N m.
+    pub torque_limits: Vec<f64>,
+    /// Set-point of a steering action of 1, rad.
+    pub max_steering: f64,
+    /// Distance within which the goal is reached, m.
+    pub goal_tolerance: f64,
+    /// Cosine of the tilt beyond which the rover has rolled over.
+    pub cos_max_tilt: f64,
+    /// Time until a high-centred rover ends the episode, s.
+    pub stuck_time: f64,
+    /// Weights of the reward's terms, in the order of [`super::TERMS`].
+    pub weights: Weights,
+    /// Value of an entry of 1 of the observation (size).
+    pub scale: Vec<f64>,
+    /// Standard deviation of each entry's noise (size); empty without noise.
+    pub noise: Vec<f64>,
+    /// Points of the height scan, as of [`crate::simulation::Look`].
+    pub scan: Vec<[f64; 2]>,
+}
+
+/// Places of what an episode needs in a reading without heights.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Places {
+    /// Leading entries that an observation shares with it.
+    pub shared: usize,
+    /// Those of [`super::Quantities`], in order.
+    pub scalars: Range<usize>,
+    /// Its size.
+    pub size: usize,
+}
+
+/// Checked settings for the models of one size.
+#[derive(Clone, Debug)]
+pub struct Rules {
+    model: Arc<Model>,
+    settings: Settings,
+    inverse_scale: Vec<f64>,
+    places: Places,
+    sizes: [usize; 3],
+}
+
+/// What a reading's size depends on.
+const SIZES: [&str; 3] = ["simulation.v", "simulation.joints", "simulation.wheels"];
+
+/// The numbers of a model in the order of [`SIZES`].
+fn sizes(model: &Model) -> [usize; 3] {
+    [model.nv(), model.n_joints(), model.wheels().len()]
+}
+
+/// Rules are equal if episodes under them are.
+impl PartialEq for Rules {
+    fn eq(&self, other: &Self) -> bool {
+        self.settings == other.settings && self.sizes == other.sizes
+    }
+}
+
+impl Rules {
+    /// Rules for a model.
+    ///
+    /// # Errors
+    /// `Length`, `OutOfRange`.
+    pub fn new(model: Arc<Model>, settings: Settings) -> Result<Self, EpisodeError> {
+        let layout = ReadingLayout::new(&model, 0);
+        let place = |name: &str| {
+            let found = layout.fields().iter().find(|(own, _)| *own == name);
+            found.map_or(0..0, |(_, place)| place.clone())
+        };
+        let shared = place("target").end;
+        let places = Places {
+            shared,
+            // The last entry of the target is the distance to the goal.
+            scalars: shared - 1..place("solver").end,
+            size: layout.size(),
+        };
+        let n_wheels = model.wheels().len();
+        let size = shared + 2 * n_wheels + 1 + settings.scan.len();
+        let noise = settings.noise.len();
+        let lengths = [
+            ("torque_limits", settings.torque_limits.len(), n_wheels),
+            ("scale", settings.scale.len(), size),
+            ("noise", noise, if noise == 0 { 0 } else { size }),
+        ];
+        for (field, actual, expected) in lengths {
+            if actual != expected {
+                return Err(EpisodeError::Length {
+                    field,
+                    expected,
+                    actual,
+                });
+            }
+        }
+        let positive = |field, value: f64| (field, value, value > 0.0, "a finite number above 0");
+        let not_negative =
+            |field, value: f64| (field, value, value >= 0.0, "a finite number from 0");
+        let any = |field, value: f64| (field, value, true, "a finite number");
+        let numbers = [
+            positive("dt", settings.dt),
+            not_negative("max_steering", settings.max_steering),
+            not_negative("goal_tolerance", settings.goal_tolerance),
+            any("cos_max_tilt", settings.cos_max_tilt),
+            positive("stuck_time", settings.stuck_time),
+        ];
+        let lists = (settings.torque_limits.iter())
+            .map(|&x| not_negative("torque_limits", x))
+            .chain(settings.weights.iter().map(|&x| any("weights", x)))
+            .chain(settings.scale.iter().map(|&x| positive("scale", x)))
+            .chain(settings.noise.iter().map(|&x| not_negative("noise", x)))
+            .chain(settings.scan.iter().flatten().map(|&x| any("scan", x)));
+        for (field, value, is_within, range) in numbers.into_iter().chain(lists) {
+            if !(is_within && value.is_finite()) {
+                return Err(EpisodeError::OutOfRange {
+                    field,
+                    range,
+                    value,
+                });
+            }
+        }
+        Ok(Self {
+            inverse_scale: settings.scale.iter().map(|scale| 1.0 / scale).collect(),
+            sizes: sizes(&model),
+            model,
+            settings,
+            places,
+        })
+    }
+
+    /// The model that they were made for.
+    #[must_use]
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    /// Checks that a model has readings of this size, and wheels that can be steered as far as an
+    /// action asks.
+    ///
+    /// # Errors
+    /// `Length`, `OutOfRange`.
+    pub fn check_model(&self, model: &Model) -> Result<(), EpisodeError> {
+        for ((field, expected), actual) in SIZES.iter().zip(self.sizes).zip(sizes(model)) {
+            if actual != expected {
+                return Err(EpisodeError::Length {
+                    field,
+                    expected,
+                    actual,
+                });
+            }
+        }
+        let steered = model.wheels().iter().filter(|w| w.steering.is_some());
+        let limit = steered
+            .map(|w| w.steering_limit)
+            .fold(f64::INFINITY, f64::min);
+        let has_fixed = model.wheels().iter().any(|w| w.steering.is_none());
+        let limit = if has_fixed { 0.0 } else { limit };
+        if self.settings.max_steering > limit * (1.0 + 1e-12) {
+            return Err(EpisodeError::OutOfRange {
+                field: "max_steering",
+                range: "within the steering limit of every wheel",
+                value: self.settings.max_steering,
+            });
+        }
+        Ok(())
+    }
+
+    /// The settings.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Wheels of a rover.
+    #[must_use]
+    pub fn n_wheels(&self) -> usize {
+        self.settings.torque_limits.len()
+    }
+
+    /// Entries of an action.
+    #[must_use]
+    pub fn n_actions(&self) -> usize {
+        2 * self.n_wheels()
+    }
+
+    /// Entries of an observation.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.settings.scale.len()
+    }
+
+    /// Entries of an observation before the heights.
+    #[must_use]
+    pub fn n_state(&self) -> usize {
+        self.size() - self.settings.scan.len()
+    }
+
+    /// Leading entries that a reading and an observation share.
+    #[must_use]
+    pub fn n_shared(&self) -> usize {
+        self.places.shared
+    }
+
+    /// Places in a reading.
+    #[must_use]
+    pub fn places(&self) -> &Places {
+        &self.places
+    }
+
+    /// Inverse of the observation's scale (size).
+    #[must_use]
+    pub fn inverse_scale(&self) -> &[f64] {
+        &self.inverse_scale
+    }
+
+    /// Standard deviation of each entry's noise (size); empty without noise.
+    #[must_use]
+    pub fn noise(&self) -> &[f64] {
+        &self.settings.noise
+    }
+
+    /// Whether observations have noise.
+    #[must_use]
+    pub fn is_noisy(&self) -> bool {
+        !self.settings.noise.is_empty()
+    }
+}

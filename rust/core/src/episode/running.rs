@@ -1,0 +1,348 @@
+//! One episode: its setting, its progress and its last outcome.
+
+use std::sync::Arc;
+
+use super::action;
+use super::ending::Ending;
+use super::error::EpisodeError;
+use super::observation::{write_heights, write_state};
+use super::outcome::{Outcome, Quantities};
+use super::progress::Progress;
+use super::reward::{Earned, squared_changes, terms};
+use super::rules::Rules;
+use crate::draw::Domain;
+use crate::simulation::{CommandError, ReadingScratch, RoverSimulation};
+
+/// What was drawn for an episode. Only goal, gain and load limit act; the rest is reported.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    /// The goal (x, z), m.
+    pub goal: [f64; 2],
+    /// Properties of rover and world.
+    pub domain: Domain,
+    /// Force on the trunk beyond which the rover is high-centred, N.
+    pub trunk_load_limit: f64,
+    /// Difficulty of the rocks; 0 where there are none.
+    pub difficulty: f64,
+}
+
+impl Setting {
+    fn check(&self) -> Result<(), EpisodeError> {
+        let Domain {
+            mass_scale,
+            friction,
+            actuator_gain,
+            gravity_scale,
+        } = self.domain;
+        let numbers = [
+            ("goal", self.goal[0]),
+            ("goal", self.goal[1]),
+            ("domain.mass_scale", mass_scale),
+            ("domain.friction", friction),
+            ("domain.actuator_gain", actuator_gain),
+            ("domain.gravity_scale", gravity_scale),
+            ("trunk_load_limit", self.trunk_load_limit),
+            ("difficulty", self.difficulty),
+        ];
+        match numbers.into_iter().find(|(_, value)| !value.is_finite()) {
+            None => Ok(()),
+            Some((field, value)) => Err(EpisodeError::OutOfRange {
+                field,
+                range: "a finite number",
+                value,
+            }),
+        }
+    }
+}
+
+/// A control period seen from its end.
+#[derive(Clone, Copy, Debug)]
+pub struct Period<'a> {
+    /// Its action (2 n_wheels).
+    pub action: &'a [f64],
+    /// Heights of the scan; None where it was not taken.
+    pub heights: Option<&'a [f64]>,
+    /// A standard normal number for each entry of the observation; None without noise.
+    pub normals: Option<&'a [f64]>,
+    /// Whether a physics step could not be taken.
+    pub has_failed: bool,
+}
+
+/// An episode outside its simulation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Episode {
+    rules: Arc<Rules>,
+    setting: Setting,
+    progress: Progress,
+    observation: Vec<f32>,
+    outcome: Outcome,
+    lacks_heights: bool,
+    /// Normal numbers of the heights that the last observation lacks.
+    owed: Vec<f64>,
+}
+
+impl Episode {
+    /// The beginning of an episode of a rover, or None if its observation is not finite in float32.
+    ///
+    /// `normals`: see [`Period`].
+    ///
+    /// # Errors
+    /// `Length`, `OutOfRange`: the setting or the normal numbers do not fit, or the rover's model
+    /// does not fit the rules.
+    pub fn begin(
+        rules: Arc<Rules>,
+        setting: Setting,
+        rover: &RoverSimulation,
+        normals: Option<&[f64]>,
+    ) -> Result<Option<Self>, EpisodeError> {
+        setting.check()?;
+        rules.check_model(rover.model())?;
+        check_normals(&rules, normals)?;
+        let mut scratch = ReadingScratch::default();
+        let mut reading = vec![0.0; rules.places().size];
+        let mut heights = vec![0.0; rules.settings().scan.len()];
+        rover.read_state(setting.goal, &mut scratch, &mut reading);
+        rover.read_heights(&rules.settings().scan, &mut heights);
+        let now = Quantities::of(rules.places(), &reading);
+        let progress = Progress::begin(now.distance, rules.n_actions());
+        let mut observation = vec![0.0; rules.size()];
+        let is_finite = write_state(&rules, &reading, &progress, normals, &mut observation)
+            & write_heights(&rules, &heights, normals, &mut observation);
+        Ok(is_finite.then(|| Self {
+            rules,
+            setting,
+            progress,
+            observation,
+            outcome: Outcome {
+                now,
+                ..Outcome::default()
+            },
+            owed: Vec::new(),
+            lacks_heights: false,
+        }))
+    }
+
+    /// An episode that goes on from its progress and its last observation.
+    ///
+    /// # Errors
+    /// `Length`, `OutOfRange`: they do not fit the rules, or are not finite.
+    pub fn resume(
+        rules: Arc<Rules>,
+        setting: Setting,
+        progress: Progress,
+        observation: Vec<f32>,
+    ) -> Result<Self, EpisodeError> {
+        setting.check()?;
+        let lengths = [
+            (
+                "previous_action",
+                progress.previous_action.len(),
+                rules.n_actions(),
+            ),
+            ("observation", observation.len(), rules.size()),
+        ];
+        for (field, actual, expected) in lengths {
+            if actual != expected {
+                return Err(EpisodeError::Length {
+                    field,
+                    expected,
+                    actual,
+                });
+            }
+        }
+        let numbers = [
+            ("distance", progress.distance),
+            ("energy", progress.energy),
+            ("energy_positive", progress.energy_positive),
+            ("stuck_time", progress.stuck_time),
+        ];
+        let entries = (progress.previous_action.iter()).map(|&a| ("previous_action", a));
+        let seen = observation.iter().map(|&x| ("observation", f64::from(x)));
+        for (field, value) in numbers.into_iter().chain(entries).chain(seen) {
+            if !value.is_finite() {
+                return Err(EpisodeError::OutOfRange {
+                    field,
+                    range: "finite",
+                    value,
+                });
+            }
+        }
+        let now = Quantities {
+            distance: progress.distance,
+            ..Quantities::default()
+        };
+        Ok(Self {
+            outcome: Outcome {
+                now,
+                energy: progress.energy,
+                energy_positive: progress.energy_positive,
+                ..Outcome::default()
+            },
+            rules,
+            setting,
+            progress,
+            observation,
+            owed: Vec::new(),
+            lacks_heights: false,
+        })
+    }
+
+    /// The rules.
+    #[must_use]
+    pub fn rules(&self) -> &Arc<Rules> {
+        &self.rules
+    }
+
+    /// What was drawn for it.
+    #[must_use]
+    pub fn setting(&self) -> &Setting {
+        &self.setting
+    }
+
+    /// Its progress.
+    #[must_use]
+    pub fn progress(&self) -> &Progress {
+        &self.progress
+    }
+
+    /// The last observation (size).
+    #[must_use]
+    pub fn observation(&self) -> &[f32] {
+        &self.observation
+    }
+
+    /// The outcome of the last period; that of the beginning earns nothing, that of a resumed
+    /// episode knows only its progress.
+    #[must_use]
+    pub fn outcome(&self) -> &Outcome {
+        &self.outcome
+    }
+
+    /// Gives a rover the commands of an action (2 n_wheels) that has been checked.
+    ///
+    /// `commands`: room for as many numbers.
+    ///
+    /// # Errors
+    /// A command that the rover's model refuses, see [`Rules::check_model`].
+    pub fn command(
+        &self,
+        rover: &mut RoverSimulation,
+        action: &[f64],
+        commands: &mut [f64],
+    ) -> Result<(), CommandError> {
+        let (torques, set_points) = commands.split_at_mut(self.rules.n_wheels());
+        let gain = self.setting.domain.actuator_gain;
+        action::commands(&self.rules, action, gain, torques, set_points);
+        rover.set_commands(torques, set_points)
+    }
+
+    /// Goes on by a control period and writes its observation (size).
+    ///
+    /// `reading`: the rover's after the period, without heights; numbers in it that are not finite
+    /// are set to zero. A period whose observation float32 cannot hold, or in which a physics step
+    /// failed, ends the episode, and the observation is the last one. Without heights the last ones
+    /// stay, until [`Self::complete`].
+    ///
+    /// # Panics
+    /// If a slice does not fit the rules.
+    pub fn advance(&mut self, reading: &mut [f64], period: &Period<'_>, observation: &mut [f32]) {
+        let rules = &*self.rules;
+        let heights = period.heights.unwrap_or_default();
+        let is_finite = |numbers: &[f64]| numbers.iter().fold(true, |all, x| all & x.is_finite());
+        let is_readable = is_finite(reading) & is_finite(heights);
+        if !is_readable {
+            for x in reading.iter_mut().filter(|x| !x.is_finite()) {
+                *x = 0.0;
+            }
+        }
+        let mut now = Quantities::of(rules.places(), reading);
+        if !is_readable {
+            now.distance = self.progress.distance;
+        }
+        let distance_before = self.progress.distance;
+        let changes = squared_changes(period.action, &self.progress.previous_action);
+        let dt = rules.settings().dt;
+        (self.progress).advance(period.action, &now, dt, self.setting.trunk_load_limit);
+
+        let normals = period.normals;
+        let mut is_sound = write_state(rules, reading, &self.progress, normals, observation);
+        let n_state = rules.n_state();
+        if period.heights.is_some() {
+            is_sound &= write_heights(rules, heights, normals, observation);
+        } else {
+            observation[n_state..].copy_from_slice(&self.observation[n_state..]);
+        }
+        let has_failed = period.has_failed || !is_readable || !is_sound;
+        if has_failed {
+            observation.copy_from_slice(&self.observation);
+        } else {
+            self.observation.copy_from_slice(observation);
+            self.lacks_heights = period.heights.is_none();
+            if let (true, Some(normals)) = (self.lacks_heights, normals) {
+                self.owed.clear();
+                self.owed.extend_from_slice(&normals[n_state..]);
+            }
+        }
+
+        let ending = Ending::of(rules, &now, &self.progress, has_failed);
+        let earned = Earned {
+            now: &now,
+            distance_before,
+            changes,
+            n_wheels: rules.n_wheels(),
+            dt,
+            ending,
+        };
+        let terms = terms(&rules.settings().weights, &earned);
+        self.outcome = Outcome {
+            now,
+            energy: self.progress.energy,
+            energy_positive: self.progress.energy_positive,
+            terms,
+            reward: terms.iter().fold(0.0, |sum, term| sum + term),
+            ending,
+        };
+    }
+
+    /// Whether the last observation lacks the heights of its place.
+    #[must_use]
+    pub fn lacks_heights(&self) -> bool {
+        self.lacks_heights
+    }
+
+    /// Takes the scan that the last observation lacks. The rover must not have moved since.
+    ///
+    /// Heights that are not finite leave the last ones.
+    pub fn complete(&mut self, rover: &RoverSimulation) {
+        if !std::mem::take(&mut self.lacks_heights) {
+            return;
+        }
+        let rules = &*self.rules;
+        let mut heights = vec![0.0; rules.settings().scan.len()];
+        rover.read_heights(&rules.settings().scan, &mut heights);
+        let mut entries = vec![0.0; rules.size()];
+        let mut normals = vec![0.0; rules.n_state()];
+        normals.extend_from_slice(&self.owed);
+        let normals = rules.is_noisy().then_some(&normals[..]);
+        if write_heights(rules, &heights, normals, &mut entries) {
+            let n_state = rules.n_state();
+            self.observation[n_state..].copy_from_slice(&entries[n_state..]);
+        }
+    }
+}
+
+/// Checks the number of the normal numbers, which must be there if and only if there is noise.
+///
+/// # Errors
+/// `Length`.
+pub fn check_normals(rules: &Rules, normals: Option<&[f64]>) -> Result<(), EpisodeError> {
+    let (actual, expected) = (normals.map_or(0, <[f64]>::len), rules.noise().len());
+    if actual == expected {
+        return Ok(());
+    }
+    Err(EpisodeError::Length {
+        field: "normals",
+        expected,
+        actual,
+    })
+}

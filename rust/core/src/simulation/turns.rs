@@ -1,0 +1,152 @@
+//! The turns of many rovers, distributed over threads.
+//!
+//! In its turn a rover is given its commands, takes its steps and is read, all on one thread. The
+//! threads take the rovers in groups from a queue, and each thread steps its group as a fleet
+//! ([`super::fleet`]). The calling thread is one of them; it also asks whether to continue.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use rayon::ThreadPool;
+
+use super::fleet::{Fleet, Rider};
+use super::reading::ReadingScratch;
+use super::rover::RoverSimulation;
+use crate::integrator::StepError;
+use crate::scalar::{Instructions, MAX_LANES};
+
+/// Interval at which the calling thread asks whether to continue while others still step.
+const ASKING: Duration = Duration::from_millis(20);
+
+/// What is done with a rover before and after its steps. `P`: the rover's own data.
+pub trait Turn<P>: Sync {
+    /// Whether the rover moves.
+    fn is_moving(&self, place: &P) -> bool;
+
+    /// Gives a rover that moves its commands.
+    fn begin(&self, rover: &mut RoverSimulation, place: &mut P);
+
+    /// Reads the rover, whether it has moved or not. `error`: the step that it could not take.
+    fn end(
+        &self,
+        rover: &RoverSimulation,
+        done: Done<'_>,
+        place: &mut P,
+        scratch: &mut ReadingScratch,
+    );
+}
+
+/// How a rover's steps went.
+#[derive(Clone, Copy, Debug)]
+pub struct Done<'a> {
+    /// Whether it took any steps.
+    pub has_moved: bool,
+    /// The step that it could not take.
+    pub error: Option<&'a StepError>,
+}
+
+/// A rover with its data.
+pub(super) type Seat<'a, P> = (
+    (&'a mut RoverSimulation, &'a mut Option<StepError>),
+    &'a mut P,
+);
+
+/// Most rovers of a group: enough that solved lanes find new problems, few enough that their data
+/// stay in the cache.
+const GROUP: usize = 32;
+
+/// What a thread needs for the turns of its rovers. Holds no state between calls.
+pub(super) struct Bench {
+    fleet: Fleet,
+    reading: ReadingScratch,
+}
+
+impl Default for Bench {
+    fn default() -> Self {
+        Self {
+            fleet: Fleet::new(Instructions::of_this_machine()),
+            reading: ReadingScratch::default(),
+        }
+    }
+}
+
+/// Gives every rover its turn of `n` steps.
+///
+/// `benches`: one for each thread, at least one; `pool`: the threads besides the calling one. Once
+/// `go_on` returns false, each rover stops after a whole step.
+pub(super) fn take_turns<'a, P: Send + 'a>(
+    seats: impl ExactSizeIterator<Item = Seat<'a, P>> + Send,
+    n: usize,
+    turn: &impl Turn<P>,
+    benches: &mut [Bench],
+    pool: Option<&ThreadPool>,
+    go_on: &mut dyn FnMut() -> bool,
+) {
+    let n_rovers = seats.len();
+    // All threads get work, in whole blocks where there are enough rovers.
+    let group = n_rovers.div_ceil(benches.len().max(1));
+    let group = group.next_multiple_of(MAX_LANES).clamp(1, GROUP);
+    let queue = Mutex::new(seats);
+    let work = |bench: &mut Bench, go_on: &mut dyn FnMut() -> bool| {
+        let mut own = Vec::with_capacity(group);
+        loop {
+            own.extend({
+                let mut queue = queue.lock().unwrap_or_else(PoisonError::into_inner);
+                (0..group).map_while(|_| queue.next()).collect::<Vec<_>>()
+            });
+            if own.is_empty() {
+                return;
+            }
+            let may_move = go_on();
+            let mut riders = Vec::with_capacity(group);
+            for ((rover, error), place) in &mut own {
+                **error = None;
+                if may_move && turn.is_moving(place) {
+                    turn.begin(rover, place);
+                    riders.push(Rider { rover, error });
+                }
+            }
+            bench.fleet.advance(&mut riders, n, go_on);
+            drop(riders);
+            for ((rover, error), place) in own.drain(..) {
+                let done = Done {
+                    has_moved: may_move && turn.is_moving(place),
+                    error: error.as_ref(),
+                };
+                turn.end(rover, done, place, &mut bench.reading);
+            }
+        }
+    };
+    let [own, others @ ..] = benches else {
+        return;
+    };
+    let Some(pool) = pool else {
+        work(own, go_on);
+        return;
+    };
+    let stop = AtomicBool::new(false);
+    pool.in_place_scope(|scope| {
+        let (done, is_done) = channel::<()>();
+        let (stop, work) = (&stop, &work);
+        for bench in others {
+            let done = done.clone();
+            scope.spawn(move |_| {
+                work(bench, &mut || !stop.load(Ordering::Relaxed));
+                drop(done); // tells the calling thread, also where a rover panics
+            });
+        }
+        drop(done);
+        let mut ask = || {
+            if !go_on() {
+                stop.store(true, Ordering::Relaxed);
+            }
+            !stop.load(Ordering::Relaxed)
+        };
+        work(own, &mut ask);
+        while is_done.recv_timeout(ASKING) == Err(RecvTimeoutError::Timeout) {
+            ask();
+        }
+    });
+}

@@ -1,0 +1,153 @@
+//! Rovers of a fleet move as they would alone, to the last bit.
+
+use std::sync::Arc;
+
+use proptest::prelude::*;
+use rover_core::geometry::{Plane, SphereField, Terrain};
+use rover_core::integrator::{StepError, StepOptions, moreau_jean::MoreauJean};
+use rover_core::multibody::{Configuration, Model};
+use rover_core::scalar::Instructions;
+use rover_core::simulation::RoverSimulation;
+use rover_core::simulation::fleet::{Fleet, Rider};
+
+/// Repeatable numbers in [-1, 1].
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}
+
+fn rocks(numbers: &mut Numbers) -> Arc<dyn Terrain> {
+    let mut centres = Vec::new();
+    let mut radii = Vec::new();
+    for _ in 0..60 {
+        let radius = 0.09 + 0.04 * numbers.next();
+        centres.push([
+            3.0 * numbers.next(),
+            0.3 * radius * numbers.next() - 0.7 * radius,
+            2.0 * numbers.next(),
+        ]);
+        radii.push(radius);
+    }
+    Arc::new(SphereField::new(&centres, &radii, Some(Plane::ground())).unwrap())
+}
+
+/// A rover on its ground; every third among rocks.
+fn rover(i: usize, model: &Arc<Model>, numbers: &mut Numbers) -> RoverSimulation {
+    let terrain: Arc<dyn Terrain> = if i % 3 == 2 {
+        rocks(numbers)
+    } else {
+        Arc::new(Plane::ground())
+    };
+    let options = StepOptions {
+        friction_coefficient: 0.6 + 0.2 * numbers.next(),
+        ..StepOptions::default()
+    };
+    let mut rover = RoverSimulation::new(Arc::clone(model), terrain, options).unwrap();
+    let mut start = Configuration::zero(model);
+    start.position.y = 0.45 + 0.1 * numbers.next();
+    let v = (0..model.nv()).map(|_| 0.3 * numbers.next()).collect();
+    rover.set_state(start, v);
+    rover
+}
+
+fn command(rover: &mut RoverSimulation, torque: f64, numbers: &mut Numbers) {
+    let torques: Vec<f64> = (0..6).map(|_| torque * numbers.next()).collect();
+    let limit = rover.model().wheels()[0].steering_limit;
+    let steering: Vec<f64> = (0..6).map(|_| limit * numbers.next()).collect();
+    rover.set_commands(&torques, &steering).unwrap();
+}
+
+fn assert_alike(a: &RoverSimulation, b: &RoverSimulation) {
+    let bits = |x: &[f64]| x.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(a.v()), bits(b.v()));
+    assert_eq!(bits(&a.q().joints), bits(&b.q().joints));
+    assert_eq!(
+        bits(a.q().position.as_slice()),
+        bits(b.q().position.as_slice())
+    );
+    assert_eq!(
+        bits(a.q().attitude.coords.as_slice()),
+        bits(b.q().attitude.coords.as_slice())
+    );
+    assert_eq!(a.contacts(), b.contacts());
+    assert_eq!(a.last_call(), b.last_call());
+    assert_eq!(a.motor_torques(), b.motor_torques());
+    assert!(a.snapshot() == b.snapshot());
+}
+
+/// Drives rovers in a fleet and alone.
+fn drive(instructions: Instructions, n: usize, torque: f64, seed: u64) {
+    let mut numbers = Numbers(seed);
+    let model = Arc::new(Model::rover());
+    let mut together: Vec<RoverSimulation> =
+        (0..n).map(|i| rover(i, &model, &mut numbers)).collect();
+    let mut alone = together.clone();
+    let mut fleet = Fleet::new(instructions);
+    for _ in 0..8 {
+        for (a, b) in together.iter_mut().zip(&mut alone) {
+            let mut same = Numbers(numbers.0);
+            command(a, torque, &mut numbers);
+            command(b, torque, &mut same);
+        }
+        let mut errors: Vec<Option<StepError>> = vec![None; n];
+        let mut riders: Vec<Rider<'_>> = (together.iter_mut().zip(&mut errors))
+            .map(|(rover, error)| Rider { rover, error })
+            .collect();
+        fleet.advance(&mut riders, 10, &mut || true);
+        for (k, (a, b)) in together.iter().zip(&mut alone).enumerate() {
+            let error = b.step(10).err();
+            assert_eq!(error.is_some(), errors[k].is_some());
+            assert_alike(a, b);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 6, ..ProptestConfig::default() })]
+    #[test]
+    fn a_rover_moves_as_it_would_alone(n in 1usize..20, torque in 0.0..200.0, seed: u64) {
+        drive(Instructions::of_this_machine(), n, torque, seed);
+    }
+}
+
+#[test]
+fn narrower_lanes_give_the_same_bits() {
+    for instructions in Instructions::all_of_this_machine() {
+        drive(instructions, 9, 60.0, 7);
+    }
+}
+
+#[test]
+fn the_quick_step_obeys_the_law_of_the_general_one() {
+    let mut numbers = Numbers(11);
+    let model = Arc::new(Model::rover());
+    let mut worst = Vec::new();
+    for i in 0..6 {
+        let mut own = rover(i, &model, &mut numbers);
+        own.step(100).unwrap();
+        for _ in 0..10 {
+            command(&mut own, 30.0, &mut numbers);
+            for _ in 0..10 {
+                let mut general = own.clone();
+                general.step_with(&MoreauJean, 1).unwrap();
+                own.step(1).unwrap();
+                let difference = own.v().iter().zip(general.v()).map(|(a, b)| (a - b).abs());
+                worst.push(difference.fold(0.0, f64::max));
+            }
+        }
+    }
+    worst.sort_by(f64::total_cmp);
+    // A few friction problems have several answers.
+    assert!(
+        worst[worst.len() * 97 / 100] < 1e-9,
+        "{:?}",
+        &worst[worst.len() - 20..]
+    );
+}

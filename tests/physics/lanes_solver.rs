@@ -1,0 +1,312 @@
+//! The solver over lanes: its answers obey the law, and no lane's bits depend on its neighbours.
+
+use std::sync::Arc;
+
+use fearless_simd::{Level, f64x4, f64x8};
+use proptest::prelude::*;
+use rover_core::geometry::Plane;
+use rover_core::integrator::{StepOptions, UnilateralContact};
+use rover_core::lanes::newton::{MAX_STEPS, solve_all};
+use rover_core::lanes::problem::{ContactProblem, MAX_CONTACTS, block};
+use rover_core::multibody::{Configuration, Model};
+use rover_core::problem::{Dimension, FrictionContactProblem, evaluate};
+use rover_core::scalar::Single;
+use rover_core::simulation::RoverSimulation;
+use rover_core::solver::SolverOptions;
+
+/// `W` as a whole, row-major.
+fn operator(problem: &ContactProblem) -> Vec<f64> {
+    let n = problem.n_unknowns();
+    let mut W = vec![0.0; n * n];
+    for i in 0..problem.n_contacts {
+        for j in 0..=i {
+            for (k, w) in problem.W[block(i, j)].iter().enumerate() {
+                let (r, c) = (3 * i + k / 3, 3 * j + k % 3);
+                W[r * n + c] = *w;
+                W[c * n + r] = *w;
+            }
+        }
+    }
+    W
+}
+
+/// The problem of an operator (row-major), free velocities, friction and a starting impulse.
+fn problem(W: &[f64], q: &[f64], mu: &[f64], p: &[f64]) -> ContactProblem {
+    let n = q.len();
+    let mut problem = ContactProblem {
+        n_contacts: mu.len(),
+        ..ContactProblem::default()
+    };
+    for i in 0..mu.len() {
+        for j in 0..=i {
+            for (k, w) in problem.W[block(i, j)].iter_mut().enumerate() {
+                *w = W[(3 * i + k / 3) * n + 3 * j + k % 3];
+            }
+        }
+    }
+    problem.q[..n].copy_from_slice(q);
+    problem.mu[..mu.len()].copy_from_slice(mu);
+    problem.p[..n].copy_from_slice(p);
+    problem
+}
+
+/// Panics unless a solved answer obeys the law and an unsolved problem has kept its start.
+fn assert_sound(problem: &ContactProblem, start: &ContactProblem) {
+    let n = problem.n_unknowns();
+    assert!(problem.p.iter().chain(&problem.u).all(|x| x.is_finite()));
+    assert!(problem.iterations <= MAX_STEPS);
+    if !problem.is_solved {
+        assert_eq!(problem.p, start.p);
+        return;
+    }
+    let (W, mu) = (operator(problem), &problem.mu[..problem.n_contacts]);
+    let data = FrictionContactProblem::from_assembled(Dimension::Three, &W, &problem.q[..n], mu);
+    let residual = evaluate(&data, &problem.p[..n]);
+    let options = SolverOptions::default();
+    // Two orders of the same sums.
+    assert!(
+        residual.relative <= 1.01 * options.tolerance,
+        "{residual:?}"
+    );
+    assert!(
+        residual.velocity <= options.velocity_tolerance,
+        "{residual:?}"
+    );
+    assert!((residual.relative - problem.residual.relative).abs() < 1e-14);
+}
+
+/// Each problem solved alone.
+fn solve_alone(problems: &[ContactProblem]) -> Vec<ContactProblem> {
+    let mut alone = problems.to_vec();
+    for problem in &mut alone {
+        let one = std::slice::from_mut(problem);
+        solve_all::<f64>(Single::best(), one, &SolverOptions::default());
+    }
+    alone
+}
+
+fn assert_same(found: &ContactProblem, alone: &ContactProblem) {
+    let bits = |p: &ContactProblem| {
+        let numbers = [p.residual.relative, p.residual.velocity];
+        let n = p.n_unknowns();
+        let numbers = numbers.iter().chain(&p.p[..n]).chain(&p.u[..n]);
+        numbers.map(|x| x.to_bits()).collect::<Vec<_>>()
+    };
+    assert_eq!(found.is_solved, alone.is_solved);
+    assert_eq!(found.iterations, alone.iterations);
+    assert_eq!(bits(found), bits(alone));
+}
+
+/// Solves the list with every width and compares each answer with that of the problem alone.
+fn assert_alike(problems: &[ContactProblem], alone: &[ContactProblem]) {
+    let options = SolverOptions::default();
+    let mut found = vec![problems.to_vec(); 3];
+    solve_all::<f64>(Single::Baseline, &mut found[0], &options);
+    fearless_simd::dispatch!(Level::new(), token => {
+        solve_all::<f64x4<_>>(token, &mut found[1], &options);
+        solve_all::<f64x8<_>>(token, &mut found[2], &options);
+    });
+    for found in found {
+        for (found, alone) in found.iter().zip(alone) {
+            assert_same(found, alone);
+        }
+    }
+}
+
+/// Numbers in [-1, 1] that look random.
+struct Draw(u64);
+
+impl Draw {
+    fn next(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+}
+
+/// The solves of a rover on the plane whose torques and set-points change every ten steps, each
+/// from the impulses of the step before.
+fn drive(largest: f64, steps: usize) -> Vec<ContactProblem> {
+    let mut draw = Draw(0x9e37_79b9_7f4a_7c15);
+    let model = Arc::new(Model::rover());
+    let mut start = Configuration::zero(&model);
+    start.position.y = 0.35;
+    let ground = Arc::new(Plane::ground());
+    let mut simulation = RoverSimulation::new(model.clone(), ground, StepOptions::default())
+        .expect("the default options are sound");
+    simulation.set_state(start, vec![0.0; model.nv()]);
+    let mut problems = Vec::new();
+    for step in 0..steps {
+        if step % 10 == 0 {
+            let torques: Vec<f64> = (0..6).map(|_| largest * draw.next()).collect();
+            let steering: Vec<f64> = (0..6).map(|_| 0.7 * draw.next()).collect();
+            simulation.set_wheel_torques(&torques).expect("six torques");
+            simulation.set_steering(&steering).expect("six set-points");
+        }
+        let before = simulation.contacts().to_vec();
+        simulation.step(1).expect("a step");
+        let contacts = simulation.contacts();
+        let (W, q, mu) = simulation.last_problem();
+        if q.len() != 3 * contacts.len() || mu.len() > MAX_CONTACTS {
+            continue;
+        }
+        let recalled = contacts.iter().flat_map(|contact| {
+            let key = contact.contact.key();
+            let same = before.iter().find(|b| b.contact.key() == key);
+            same.map_or([0.0; 3], |same| same.impulse)
+        });
+        problems.push(problem(W, q, mu, &recalled.collect::<Vec<_>>()));
+    }
+    problems
+}
+
+#[test]
+fn an_exploring_rover_is_solved_in_few_steps() {
+    for (torque, mean, unsolved) in [(0.0, 3.0, 0), (60.0, 5.0, 4), (150.0, 5.2, 6)] {
+        let problems = drive(torque, 600);
+        assert!(problems.len() > 500);
+        let mut found = problems.clone();
+        fearless_simd::dispatch!(Level::new(), token => {
+            solve_all::<f64x8<_>>(token, &mut found, &SolverOptions::default());
+        });
+        for (found, start) in found.iter().zip(&problems) {
+            assert_sound(found, start);
+        }
+        let steps: usize = found.iter().map(|p| p.iterations).sum();
+        let steps = steps as f64 / found.len() as f64;
+        let left = found.iter().filter(|p| !p.is_solved).count();
+        assert!(steps < mean, "{torque} N m: {steps} steps");
+        assert!(left <= unsolved, "{torque} N m: {left} unsolved");
+        assert_alike(&problems, &solve_alone(&problems));
+    }
+}
+
+#[test]
+fn positions_are_solved_from_zero() {
+    let mut draw = Draw(1);
+    let mut problems = drive(60.0, 300);
+    for problem in &mut problems {
+        problem.p.fill(0.0);
+        problem.q.fill(0.0);
+        for i in 0..problem.n_contacts {
+            problem.q[3 * i] = 1.5e-4 * draw.next() - 0.5e-4;
+        }
+    }
+    let mut found = problems.clone();
+    solve_all::<f64>(Single::best(), &mut found, &SolverOptions::default());
+    for (found, start) in found.iter().zip(&problems) {
+        assert_sound(found, start);
+    }
+    let left = found.iter().filter(|p| !p.is_solved).count();
+    assert!(100 * left <= 2 * found.len(), "{left} unsolved");
+}
+
+#[test]
+fn what_is_not_finite_is_unsolved_and_harms_no_neighbour() {
+    let sound = drive(20.0, 40);
+    let alone = solve_alone(&sound);
+    for bad in [f64::NAN, f64::INFINITY] {
+        let mut problems = sound.clone();
+        problems[3].q[4] = bad;
+        problems[9].W[block(2, 1)][5] = bad;
+        problems[10].mu[0] = bad;
+        let mut found = problems.clone();
+        solve_all::<f64>(Single::best(), &mut found, &SolverOptions::default());
+        fearless_simd::dispatch!(Level::new(), token => {
+            solve_all::<f64x8<_>>(token, &mut problems, &SolverOptions::default());
+        });
+        for problems in [found, problems] {
+            for (k, (found, alone)) in problems.iter().zip(&alone).enumerate() {
+                if [3, 9, 10].contains(&k) {
+                    assert!(!found.is_solved);
+                    assert!(found.p.iter().chain(&found.u).all(|x| x.is_finite()));
+                } else {
+                    assert_same(found, alone);
+                }
+            }
+        }
+    }
+    // A start that is not finite counts as none.
+    let mut problems = sound.clone();
+    problems[5].p[2] = f64::NAN;
+    let mut zero = sound[5].clone();
+    zero.p.fill(0.0);
+    solve_all::<f64>(Single::best(), &mut problems, &SolverOptions::default());
+    assert_same(&problems[5], &solve_alone(&[zero])[0]);
+}
+
+#[test]
+fn without_free_velocity_or_contacts_the_answer_is_zero() {
+    let mut problems = drive(20.0, 20);
+    problems[1].q.fill(0.0);
+    problems[2].n_contacts = 0;
+    solve_all::<f64>(Single::best(), &mut problems, &SolverOptions::default());
+    for problem in &problems[1..3] {
+        assert!(problem.is_solved && problem.iterations == 0);
+        let n = problem.n_unknowns();
+        assert!(
+            problem.p[..n]
+                .iter()
+                .chain(&problem.u[..n])
+                .all(|x| *x == 0.0)
+        );
+    }
+}
+
+/// `W = G Gᵀ` of `rank` columns, `q` in its range.
+fn random_problem(draw: &mut Draw, n_contacts: usize, rank: usize, cold: bool) -> ContactProblem {
+    let n = 3 * n_contacts;
+    let columns: Vec<Vec<f64>> = (0..rank)
+        .map(|_| (0..n).map(|_| draw.next()).collect())
+        .collect();
+    let (mut W, mut q) = (vec![0.0; n * n], vec![0.0; n]);
+    for column in &columns {
+        let share = draw.next();
+        for r in 0..n {
+            q[r] += share * column[r];
+            for c in 0..n {
+                W[r * n + c] += column[r] * column[c];
+            }
+        }
+    }
+    let mu: Vec<f64> = (0..n_contacts)
+        .map(|i| if i == 4 { 0.0 } else { draw.next().abs() })
+        .collect();
+    let p: Vec<f64> = (0..n)
+        .map(|k| {
+            if cold {
+                0.0
+            } else {
+                draw.next() + f64::from(k % 3 == 0)
+            }
+        })
+        .collect();
+    problem(&W, &q, &mu, &p)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(24) })]
+
+    #[test]
+    fn every_answer_has_the_bits_of_the_problem_alone(
+        seed in 1..u64::MAX,
+        sizes in prop::collection::vec((0..=MAX_CONTACTS, 3..20_usize, any::<bool>()), 0..40),
+    ) {
+        let mut draw = Draw(seed);
+        let mut problems: Vec<ContactProblem> = sizes
+            .iter()
+            .map(|&(n, rank, cold)| random_problem(&mut draw, n, rank, cold))
+            .collect();
+        let mut alone = solve_alone(&problems);
+        for (found, start) in alone.iter().zip(&problems) {
+            assert_sound(found, start);
+        }
+        assert_alike(&problems, &alone);
+        problems.reverse();
+        alone.reverse();
+        assert_alike(&problems, &alone);
+        let third = problems.len() / 3;
+        assert_alike(&problems[third..], &alone[third..]);
+    }
+}
