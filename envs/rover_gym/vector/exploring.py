@@ -26,8 +26,8 @@ Ground = Literal["plane", "sphere_field"]
 TIME_STEP = 0.005  # s
 #: Steps from one command to the next, commands of a round, and rounds that are not measured.
 STEPS_A_COMMAND, COMMANDS, WARM_UP = 10, 10, 1
-#: Names of MuJoCo's settings, with integrator, cone and impratio. The second has the friction of rigid contacts, nearly;
-#: with it the integrator `discrete` is both the most accurate and the fastest.
+#: Names of MuJoCo's settings, with integrator, cone and impratio. The second has the friction of rigid contacts,
+#: nearly; with it the integrator `discrete` is both the most accurate and the fastest.
 MUJOCO = {
     "MuJoCo, defaults": ("mjINT_IMPLICITFAST", "mjCONE_PYRAMIDAL", 1.0),
     "MuJoCo, elliptic cone, impratio 100": ("mjINT_DISCRETE", "mjCONE_ELLIPTIC", 100.0),
