@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use rover_core::draw::Pcg64;
+use rover_core::draw::{Domain, Pcg64};
 use rover_core::episode::running::Period;
 use rover_core::episode::{
-    Domain, Ending, Episode, EpisodeBatch, EpisodeError, Rules, Setting, Settings, noise,
+    Ending, Episode, EpisodeBatch, EpisodeError, Rules, Setting, Settings, noise,
 };
 use rover_core::geometry::{Plane, Rocks, SphereField, Terrain};
 use rover_core::integrator::StepOptions;
