@@ -324,7 +324,7 @@ impl EpisodeDistribution {
     ///     difficulties: For each generator a range (low, high) that replaces that of the rocks'
     ///         difficulty, or None; by default none.
     ///     fixed: Values that replace draws, which are made all the same, by name: `slope`,
-    ///         `uphill`, `position` (x, z), `heading`, `goal` (x, z), `difficulty`, `q` and `v`; one
+    ///         `uphill`, `position` (x, z), `heading`, `goal` (x, z), `difficulty`, `q`, `v`; one
     ///         mapping for all or a list of one for each generator; none by default.
     ///
     /// Returns:
