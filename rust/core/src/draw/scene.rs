@@ -155,12 +155,11 @@ impl SceneDistribution {
         let options = domain.options(&self.options);
         options.check()?;
         let model = &*scene.model;
-        let (q, v) = match &fixed.state {
-            Some((q, v)) => (q.clone(), v.clone()),
-            None => {
-                let pose = resting_pose(model, &plane, start.position, start.heading)?;
-                (pose, None)
-            }
+        let (q, v) = if let Some((q, v)) = &fixed.state {
+            (q.clone(), v.clone())
+        } else {
+            let pose = resting_pose(model, &plane, start.position, start.heading)?;
+            (pose, None)
         };
         let configuration = coordinates::from_public(model, &q)?;
         let v = v.unwrap_or_else(|| vec![0.0; model.nv()]);

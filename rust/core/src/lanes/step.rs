@@ -435,7 +435,7 @@ impl<T: Lane> Block<T> {
             mass_matrix.diagonal(machine, b)
         });
         self.drives.add_implicit(machine, (h, theta), |b, a| {
-            mass_matrix.add_to_diagonal(machine, b, a)
+            mass_matrix.add_to_diagonal(machine, b, a);
         });
     }
 
