@@ -22,6 +22,7 @@ from comparison.output import CHART, QUICK, between
 from comparison.peers import LeftOut, Variant, load
 from comparison.run import run
 from comparison.scene import Array, RoverScene, steps_in
+from comparison.tables import number
 
 REFERENCES = Path(__file__).parent / "references" / "exploring.json"
 BEGIN, END = "<!-- exploring: made by `make chart`, not by hand -->", "<!-- end of exploring -->"
@@ -34,7 +35,7 @@ QUICK_STEPS, QUICK_SIZE = (1e-2, 5e-3), 3
 #: First step of the references, the change of the path at which halving ends, and the last step.
 COARSE, SETTLED, FINEST = 1e-4, 2e-6, 1.25e-5  # s, m, s
 #: CPU time that a drive may take, s.
-CAP = 2.0
+CAP = 0.4
 
 
 def members(ground: str, torque: float) -> list[RoverScene]:
@@ -86,7 +87,7 @@ def point(variant: Variant, played: list[RoverScene], paths: list[Array], step: 
     for one, path in zip(played, paths, strict=True):
         try:
             traces = [run(variant, one, step, CAP)]
-            if traces[0].cpu < 0.5:
+            if traces[0].cpu < 0.1:
                 traces.append(run(variant, one, step, CAP))
         except LeftOut as left_out:
             return {"failure": f"left out: {left_out.reason}"}
@@ -157,7 +158,7 @@ def table(data: dict[str, Any], name: str) -> str:
     for engine in data["engines"]:
         rows = [found.get((engine["engine"], engine["variant"], step), {}) for step in steps]
         if any("error" in row for row in rows):
-            cells = (f"{1e3 * r['error']:.2g}, {r['cpu_ms_per_s']:.2g} ms/s" if "error" in r else "-" for r in rows)
+            cells = (f"{1e3 * r['error']:.2g}, {number(r['cpu_ms_per_s'])} ms/s" if "error" in r else "-" for r in rows)
             lines.append(f"| {engine['engine']}, {engine['variant']} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
@@ -183,7 +184,9 @@ def main() -> None:
 
     data = json.loads(path.read_text(encoding="utf-8"))
     console.print(str(others(data, output / "exploring.png")))
-    between(output, BEGIN, END, "\n\n".join(table(data, name) for name in data["scenes"]))
+    meta = data["meta"]
+    made = f"{meta['drives']} drives a scene. Measured with `make chart` on {meta['processor']}, shared with other work."
+    between(output, BEGIN, END, "\n\n".join([*(table(data, name) for name in data["scenes"]), made]))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,8 @@ def cost_of(points: list[tuple[float, float]], target: float) -> float | None:
     return min(best) if best else None
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
+    """Two digits, or a whole number."""
     return f"{value:.2g}" if value < 100.0 else f"{value:.0f}"
 
 
@@ -46,7 +47,7 @@ def reach(data: dict[str, Any], scene: str) -> str:
         least = min(rows, key=lambda p: p["error"])
         lines.append(
             f"| {engine['engine']}, {engine['variant']} | "
-            + " | ".join("-" if c is None else _number(c) for c in costs)
+            + " | ".join("-" if c is None else number(c) for c in costs)
             + f" | {100 * least['error']:.2g} cm, {least['step'] * 1e3:g} ms |"
         )
     return "\n".join(lines)

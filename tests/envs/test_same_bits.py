@@ -17,11 +17,13 @@ import numpy as np
 import numpy._core._multiarray_umath as numpy_core
 import pytest
 
+from rover_gym.env.start import tilted_plane
+from rover_gym.mechanics import SphereField
 from rover_gym.policy.drive_by_command import DriveByCommand
 from rover_gym.policy.pd_policy import PDPolicy, find_rover_env
 
 SEEDS = (3, 4)
-N_STEPS = 40
+N_STEPS = 30
 
 #: Instruction sets of this machine that NumPy can do without.
 EXTRAS = [name for name in numpy_core.__cpu_dispatch__ if numpy_core.__cpu_features__[name]]
@@ -55,10 +57,15 @@ def drive(env: gym.Env[Any, Any], seed: int, act: Callable[[Any], Any]) -> list[
 
 
 def drives() -> dict[str, list[str]]:
-    """Digests of drives on the plane and among rocks, at random, by the PD policy and by random commands."""
+    """Digests of drives on three grounds, at random, by the PD policy and by random commands."""
     found = {}
-    for name in ("Rover-v0", "RoverRocks-v0"):
-        env = gym.make(name, slope_deg=(2.0, 10.0))
+    field = SphereField([[2.0, 0.1, 0.5], [-1.5, 0.0, -0.6]], [0.2, 0.3], tilted_plane(0.1, 2.0))
+    environments = {
+        "plane": gym.make("Rover-v0", slope_deg=(2.0, 10.0), observation_noise=0.01),
+        "rocks": gym.make("RoverRocks-v0", slope_deg=(2.0, 10.0)),
+        "given field": gym.make("Rover-v0", terrain=field),
+    }
+    for name, env in environments.items():
         policy = PDPolicy(env)
         commanded = DriveByCommand(env, guided=True)
         for seed in SEEDS:

@@ -2,15 +2,19 @@
 
 use std::sync::Arc;
 
-use rover_core::draw::{Domain, Pcg64};
+use rover_core::draw::domain::DomainDistribution;
+use rover_core::draw::rocks::RockDistribution;
+use rover_core::draw::scene::{Fixed, SceneDistribution};
+use rover_core::draw::start::StartDistribution;
+use rover_core::draw::{Order, Pcg64};
 use rover_core::episode::running::Period;
 use rover_core::episode::{
-    Ending, Episode, EpisodeBatch, EpisodeError, Rules, Setting, Settings, noise,
+    Beginning, Ending, EpisodeBatch, EpisodeDistribution, EpisodeError, Rules, Settings, noise,
 };
-use rover_core::geometry::{Plane, Rocks, SphereField, Terrain};
+use rover_core::geometry::Plane;
 use rover_core::integrator::StepOptions;
-use rover_core::multibody::{Configuration, Model};
-use rover_core::simulation::{ReadingScratch, RoverSimulation};
+use rover_core::multibody::Model;
+use rover_core::simulation::{ReadingScratch, RoverScene, RoverSimulation};
 
 const SCAN: [[f64; 2]; 3] = [[1.0, -0.5], [0.0, 0.0], [-0.3, 0.8]];
 const SIZE: usize = 91 + SCAN.len();
@@ -39,41 +43,57 @@ fn rules(model: &Arc<Model>) -> Arc<Rules> {
     Arc::new(Rules::new(model.clone(), settings()).unwrap())
 }
 
-fn rover(model: &Arc<Model>, i: usize) -> RoverSimulation {
-    let field = Rocks {
-        abundance: 0.1,
-        area: [20.0, 20.0],
-        seed: i as u64,
-        ..Rocks::default()
+/// Rocks for odd numbers, a plane for even ones.
+fn distribution(model: &Arc<Model>, i: usize) -> EpisodeDistribution {
+    let rocks = RockDistribution {
+        difficulty: [0.2, 0.9],
+        abundance: None,
+        max_radius: None,
     };
-    let terrain: Arc<dyn Terrain> = if i % 2 == 1 {
-        Arc::new(SphereField::rocks(&field).unwrap())
-    } else {
-        Arc::new(Plane::ground())
-    };
-    let mut rover = RoverSimulation::new(model.clone(), terrain, StepOptions::default()).unwrap();
-    let mut start = Configuration::zero(model);
-    start.position.y = 0.6;
-    rover.set_state(start, vec![0.0; model.nv()]);
-    rover
+    EpisodeDistribution {
+        scenes: SceneDistribution {
+            rover: RoverScene::new(model.clone(), Arc::new(Plane::ground())),
+            options: StepOptions::default(),
+            field: None,
+            rocks: (i % 2 == 1).then_some(rocks),
+            slope_by_difficulty: false,
+            start: StartDistribution {
+                slope: [0.0, 0.1],
+                uphill: [-3.0, 3.0],
+                heading: [-3.0, 3.0],
+                goal_distance: [3.0, 5.0],
+                goal_bearing: [-1.0, 1.0],
+            },
+            domain: DomainDistribution {
+                mass_scale: [1.0, 1.0],
+                friction: [0.5, 0.8],
+                actuator_gain: [0.8, 1.2],
+                gravity_scale: [1.0, 1.0],
+            },
+            goal_tolerance: 0.5,
+        },
+        rules: rules(model),
+        trunk_load_limit: 900.0,
+    }
 }
 
-fn begin(rules: &Arc<Rules>, rover: &RoverSimulation, generator: &mut Pcg64) -> Episode {
-    let setting = Setting {
-        goal: [3.0, -1.0],
-        domain: Domain {
-            mass_scale: 1.0,
-            friction: 0.7,
-            actuator_gain: 0.9,
-            gravity_scale: 1.0,
-        },
-        trunk_load_limit: 900.0,
-        difficulty: 0.0,
+fn begin(model: &Arc<Model>, i: usize) -> Beginning {
+    let order = Order {
+        random: Pcg64::seeded(&[u32::try_from(i).unwrap()]),
+        difficulty: None,
+        fixed: &Fixed::default(),
     };
-    let mut normals = vec![0.0; SIZE];
-    noise::draw(generator, &mut normals);
-    let begun = Episode::begin(rules.clone(), setting, rover, Some(&normals));
-    begun.unwrap().unwrap()
+    let drawn = distribution(model, i).draw(&[order], 100, None, &mut || true);
+    drawn.unwrap().unwrap().remove(0)
+}
+
+/// A rover as the beginning of an episode places it.
+fn rover(beginning: &Beginning) -> RoverSimulation {
+    let placement = beginning.scene.placement.clone();
+    let scene = placement.scene;
+    let mut rover = RoverSimulation::new(scene.model, scene.terrain, placement.options).unwrap();
+    rover.set_state(placement.configuration, placement.v);
+    rover
 }
 
 fn action(i: usize, period: usize) -> [f64; 12] {
@@ -87,9 +107,9 @@ fn bits(observations: &[f32]) -> Vec<u32> {
 /// Rover `i` for some periods, alone: its observations one after another, and its reward at last.
 fn alone(model: &Arc<Model>, i: usize, periods: usize) -> (Vec<u32>, u64) {
     let rules = rules(model);
-    let mut rover = rover(model, i);
-    let mut generator = Pcg64::seeded(&[i as u32]);
-    let mut episode = begin(&rules, &rover, &mut generator);
+    let begun = begin(model, i);
+    let mut rover = rover(&begun);
+    let (mut episode, mut generator) = (begun.episode, begun.random);
     let mut scratch = ReadingScratch::default();
     let mut reading = vec![0.0; rules.places().size];
     let (mut heights, mut normals) = ([0.0; SCAN.len()], [0.0; SIZE]);
@@ -117,14 +137,10 @@ fn alone(model: &Arc<Model>, i: usize, periods: usize) -> (Vec<u32>, u64) {
 }
 
 fn batch(model: &Arc<Model>, n: usize, threads: usize) -> EpisodeBatch {
-    let rules = rules(model);
-    let first = rover(model, 0);
-    let mut batch = EpisodeBatch::new(rules.clone(), &first, n, Some(8), Some(threads)).unwrap();
+    let first = rover(&begin(model, 0));
+    let mut batch = EpisodeBatch::new(rules(model), &first, n, Some(8), Some(threads)).unwrap();
     for i in 0..n {
-        let rover = rover(model, i);
-        let mut generator = Pcg64::seeded(&[i as u32]);
-        let episode = begin(&rules, &rover, &mut generator);
-        batch.replace(i, rover, episode, generator).unwrap();
+        batch.begin(i, begin(model, i)).unwrap();
     }
     batch
 }
@@ -190,7 +206,7 @@ fn what_is_refused_moves_no_rover() {
         }
     ));
     assert!(batch.rovers().iter().all(|rover| rover.time() == 0.0));
-    let (rules, first) = (rules(&model), rover(&model, 0));
+    let (rules, first) = (rules(&model), rover(&begin(&model, 0)));
     let mut unbegun = EpisodeBatch::new(rules, &first, n, None, Some(1)).unwrap();
     let refused = unbegun.step_while(&good, None, true, &mut rows, &mut || true);
     assert_eq!(refused, Err(EpisodeError::NotBegun { index: 0 }));

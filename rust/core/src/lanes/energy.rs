@@ -114,31 +114,44 @@ fn energy_here<T: Lane>(
         omega: Vec3::new(base[3], base[4], base[5]),
         fall: zero,
     };
-    sums.add(&links[0], &own_inertias[0], &bodies[0], gravity);
+    let Moving {
+        R,
+        velocity,
+        omega,
+        fall,
+    } = &bodies[0];
+    sums.add(
+        &links[0],
+        &own_inertias[0],
+        (R, *velocity, *omega, *fall),
+        gravity,
+    );
     for b in 1..n {
         let (before, own) = bodies.split_at_mut(b);
         let link = &links[b];
         let carrier = &before[link.parent];
         let lever = link.lever(&carrier.R);
+        let velocity = carrier.velocity + carrier.omega.cross(lever);
+        let fall = carrier.fall + gravity.dot(lever);
         let frame = match &link.rotation {
             None => carrier.R,
             Some(fixed) => times_columns(&carrier.R, fixed),
         };
         let axis = link.axis.turned(&frame);
-        let body = Moving {
-            R: if link.is_spinner {
-                frame
-            } else {
-                link.axis.rotate(&frame, axis, turns.next())
-            },
-            velocity: carrier.velocity + carrier.omega.cross(lever),
-            omega: carrier.omega + axis * rates[b - 1],
-            fall: carrier.fall + gravity.dot(lever),
-        };
-        sums.add(link, &own_inertias[b], &body, gravity);
-        if !link.is_leaf {
-            own[0] = body;
+        let omega = carrier.omega + axis * rates[b - 1];
+        let inertia = &own_inertias[b];
+        if link.is_spinner {
+            sums.add(link, inertia, (&frame, velocity, omega, fall), gravity);
+            continue;
         }
+        let R = link.axis.rotate(&frame, axis, turns.next());
+        sums.add(link, inertia, (&R, velocity, omega, fall), gravity);
+        own[0] = Moving {
+            R,
+            velocity,
+            omega,
+            fall,
+        };
     }
     Energy {
         kinetic: sums.twice_kinetic * zero.like(0.5),
@@ -148,16 +161,21 @@ fn energy_here<T: Lane>(
 }
 
 impl<T: Lane> Sums<T> {
+    /// Adds a body with the entries of a [`Moving`].
     #[inline(always)]
-    fn add(&mut self, link: &Link, inertia: &Inertia<T>, body: &Moving<T>, gravity: Vec3<T>) {
-        let (mut velocity, mut fall) = (body.velocity, body.fall);
+    fn add(
+        &mut self,
+        link: &Link,
+        inertia: &Inertia<T>,
+        (R, mut velocity, omega, mut fall): (&Mat3<T>, Vec3<T>, Vec3<T>, T),
+        gravity: Vec3<T>,
+    ) {
         if !link.is_centred {
-            let lever = body.R.times(inertia.centre);
-            velocity += body.omega.cross(lever);
+            let lever = R.times(inertia.centre);
+            velocity += omega.cross(lever);
             fall += gravity.dot(lever);
         }
-        let omega = body.omega;
-        let (a, b) = inertia.axes(link.symmetry, &body.R);
+        let (a, b) = inertia.axes(link.symmetry, R);
         let along = a.dot(omega);
         let mut turning = inertia.rest * omega.dot(omega) + inertia.first * (along * along);
         if let Some(b) = b {

@@ -62,6 +62,7 @@ pub struct Machine {
 }
 
 /// A body and its joint.
+#[allow(clippy::struct_excessive_bools)] // facts that do not depend on each other
 #[derive(Clone, Debug, PartialEq)]
 pub struct Link {
     /// The body that carries it; 0 for the trunk itself.

@@ -250,7 +250,7 @@ impl RoverSimulation {
         } else {
             0.0
         };
-        let (sine, cosine) = heading.sin_cos();
+        let (sine, cosine) = sin_cos(heading);
         for (own, [ahead, right]) in heights.iter_mut().zip(scan) {
             let at_x = x + (ahead * cosine + right * sine);
             let at_z = z + (right * cosine - ahead * sine);
