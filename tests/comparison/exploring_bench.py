@@ -58,14 +58,14 @@ def ours(ground: str, torque: float) -> dict[str, Any]:
 
 
 def peers(console: Console) -> list[Variant]:
-    """MuJoCo at its defaults, with its accurate friction, and at its best; none where it is not installed."""
+    """MuJoCo at its defaults and at its best; none where it is not installed."""
     try:
         from comparison.peers import mujoco_engine  # noqa: PLC0415 - the peer may be missing
     except ImportError as error:
         console.print(f"left out, not installed: MuJoCo ({error})")
         return []
     best, defaults = mujoco_engine.VARIANTS
-    return [defaults, mujoco_engine.ELLIPTIC, best]
+    return [defaults, best]
 
 
 def peer_microseconds(variant: Variant, ground: str, torque: float) -> float | None:

@@ -185,7 +185,7 @@ def main() -> None:
     data = json.loads(path.read_text(encoding="utf-8"))
     console.print(str(others(data, output / "exploring.png")))
     meta = data["meta"]
-    made = f"{meta['drives']} drives a scene. Measured with `make chart` on {meta['processor']}, shared with other work."
+    made = f"{meta['drives']} drives a scene. Measured with `make chart` on {meta['processor']}, shared with others."
     between(output, BEGIN, END, "\n\n".join([*(table(data, name) for name in data["scenes"]), made]))
 
 

@@ -87,13 +87,3 @@ VARIANTS = (
         SOFT + "; the friction cone is a pyramid",
     ),
 )
-
-#: Between the two: the integrator of the defaults with the friction of the best. It is cheaper than the best, and as
-#: soft in its steering as the defaults, so the chart does without it.
-ELLIPTIC = Variant(
-    "MuJoCo",
-    "elliptic",
-    partial(MuJoCoRunner, integrator="implicitfast", cone="elliptic", impratio=100.0),
-    "integrator implicitfast, elliptic cone, impratio 100",
-    SOFT,
-)
