@@ -135,26 +135,6 @@ impl EpisodeBatch {
         seat.as_ref().ok_or(EpisodeError::NotBegun { index })
     }
 
-    /// Replaces a rover by one whose episode begins. `generator`: where its noise comes from.
-    ///
-    /// # Errors
-    /// `OtherRules`, `NoSuchRover`, or as [`Rules::check_model`]; nothing is changed then.
-    pub fn replace(
-        &mut self,
-        index: usize,
-        rover: RoverSimulation,
-        episode: Episode,
-        generator: Pcg64,
-    ) -> Result<(), EpisodeError> {
-        if *episode.rules() != self.rules {
-            return Err(EpisodeError::OtherRules);
-        }
-        self.rules.check_model(rover.model())?;
-        self.batch.replace(index, rover, episode.setting().goal)?;
-        self.seats[index] = Some(Seat::new(episode, generator));
-        Ok(())
-    }
-
     /// Draws episodes on the threads of the batch, see [`EpisodeDistribution::draw`]. No rover
     /// changes.
     ///
