@@ -6,7 +6,7 @@ listed FL, FR, ML, BL, MR, BR. Every array returned is new.
 
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from typing import Any, ClassVar, Literal, TypeAlias, final, overload
+from typing import Any, Literal, TypeAlias, final, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -25,10 +25,10 @@ __all__ = [
     "Contacts",
     "DrawnEpisodes",
     "Energy",
-    "Episode",
     "EpisodeBatch",
     "EpisodeDistribution",
     "EpisodeRules",
+    "EpisodeRun",
     "FrictionContactSolution",
     "Line",
     "MirroredRoverSimulation",
@@ -1652,7 +1652,9 @@ class EpisodeRules:
             those of the terms.
     """
 
-    terms: ClassVar[tuple[str, ...]]
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the reward's terms, in the order of their sum."""
     def __new__(
         cls,
         model: RoverModel,
@@ -1672,7 +1674,7 @@ class EpisodeRules:
     def __getnewargs_ex__(self) -> tuple[tuple[RoverModel], dict[str, Any]]: ...
 
 @final
-class Episode:
+class EpisodeRun:
     """One episode of a driving task: what its simulation does not hold.
 
     Args:
@@ -1706,7 +1708,7 @@ class Episode:
         energy_positive: float,
         stuck_time: float,
         observation: npt.ArrayLike,
-    ) -> Episode: ...
+    ) -> EpisodeRun: ...
     @staticmethod
     def begin(
         rules: EpisodeRules,
@@ -1717,7 +1719,7 @@ class Episode:
         trunk_load_limit: float,
         difficulty: float,
         normals: npt.ArrayLike | None = None,
-    ) -> Episode | None:
+    ) -> EpisodeRun | None:
         """The beginning of an episode.
 
         Args:
@@ -1910,7 +1912,7 @@ class DrawnEpisodes:
     @property
     def rock_seeds(self) -> _Rows:
         """Seeds of the rocks, (m,) uint64; zeros where there are none."""
-    def episode(self, index: int) -> Episode:
+    def episode(self, index: int) -> EpisodeRun:
         """An episode, which has begun.
 
         Args:
@@ -1986,7 +1988,7 @@ class EpisodeBatch:
         one.
 
         Args:
-            actions: As of `Episode.step`, (n_rovers, 2 n_wheels).
+            actions: As of `EpisodeRun.step`, (n_rovers, 2 n_wheels).
             active: Which rovers move, (n_rovers,); all by default. The others stay as they are.
             has_scan: Whether the heights are taken. Without, only episodes that end or reach the
                 time limit take them; the others keep the last ones.

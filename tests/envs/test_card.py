@@ -13,7 +13,6 @@ from rover_gym.env import ARGUMENTS, rewards
 from rover_gym.env.argument_checks import shortest
 from rover_gym.env.episode_scene import RESET_OPTIONS
 from rover_gym.env.observation import build_layout
-from rover_gym.mechanics import EpisodeRules
 from rover_gym.vector import RoverBatch, RoverVectorEnv
 from rover_gym.vector.sb3 import RoverVecEnv
 
@@ -81,7 +80,7 @@ def test_reward_table_is_the_reward(env: RoverEnv) -> None:
     _, _, _, _, info = env.step(np.zeros(12, np.float32))
     rows = {name: float(weight) for name, _, weight in table("Reward")}
     assert rows == dict(rewards.WEIGHTS)
-    assert list(rows) == list(info["reward_terms"]) == list(EpisodeRules.terms)
+    assert list(rows) == list(info["reward_terms"]) == list(env.task.rules.terms)
 
 
 def test_argument_table_is_the_signature() -> None:

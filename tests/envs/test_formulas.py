@@ -10,7 +10,7 @@ import pytest
 
 from rover_gym import CommandError, OptionError, RoverEnv
 from rover_gym.env.rewards import WEIGHTS
-from rover_gym.mechanics import Episode, EpisodeBatch, EpisodeRules, seed_generators
+from rover_gym.mechanics import EpisodeBatch, EpisodeRules, EpisodeRun, seed_generators
 from rover_gym.vector import RoverVectorEnv
 from rover_gym.vector.sb3 import RoverVecEnv
 
@@ -204,7 +204,7 @@ def test_an_episode_that_ends_takes_its_scan() -> None:
 def test_episodes_and_rules_can_be_copied(duplicate: Any) -> None:
     env = RoverEnv(**SCENES[2])
     env.reset(seed=0)
-    twin: Episode = duplicate(env._episode)
+    twin: EpisodeRun = duplicate(env._episode)
     reading = env.simulation.reading(env.goal, env.task.scan)
     normals = np.ones(env.observation_layout.size)
     action = np.full(12, 0.3)

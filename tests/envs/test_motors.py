@@ -8,7 +8,7 @@ import pytest
 
 from rover_gym import RoverEnv, RoverModel
 from rover_gym.env import drive_signs, rewards
-from rover_gym.mechanics import Episode
+from rover_gym.mechanics import EpisodeRun
 
 Array = npt.NDArray[np.float64]
 
@@ -63,7 +63,7 @@ def test_no_step_is_worth_more_than_a_hundred_whatever_the_physics_did(control_f
     state = env._episode.state()
     rewards = []
     for row in readings(env, rng, 300):
-        one = Episode(env.task.rules, **{**state, "distance": 10.0 ** rng.uniform(-3.0, 36.0)})
+        one = EpisodeRun(env.task.rules, **{**state, "distance": 10.0 ** rng.uniform(-3.0, 36.0)})
         _, reward, _, info = one.advance(row, rng.choice([-1.0, 1.0], 12))
         assert sum(info["reward_terms"].values()) == pytest.approx(reward, abs=1e-12)
         rewards.append(reward)

@@ -10,7 +10,7 @@ import numpy as np
 from rover_gym.env.episode_scene import EpisodeScene
 from rover_gym.env.progress import Progress
 from rover_gym.env.task import Task
-from rover_gym.mechanics import Episode, RoverGymError, Snapshot, StateError
+from rover_gym.mechanics import EpisodeRun, RoverGymError, Snapshot, StateError
 from rover_gym.validation import Range, refuse
 
 
@@ -28,7 +28,7 @@ class EnvSnapshot:
     random_state: Mapping[str, Any]
 
 
-def check_snapshot(task: Task, snapshot: object) -> Episode:
+def check_snapshot(task: Task, snapshot: object) -> EpisodeRun:
     """Checks that a snapshot comes from an environment with this task, and returns its episode.
 
     Raises:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rover_gym.env.quantities import Array, Observations
-from rover_gym.mechanics import Episode, EpisodeRules
+from rover_gym.mechanics import EpisodeRules, EpisodeRun
 
 
 @dataclass(frozen=True)
@@ -36,15 +36,15 @@ class Progress:
     observation: Observations
 
     @classmethod
-    def of(cls, episode: Episode) -> "Progress":
+    def of(cls, episode: EpisodeRun) -> "Progress":
         """The progress of an episode."""
         return cls(**episode.state())
 
-    def episode(self, rules: EpisodeRules) -> Episode:
+    def episode(self, rules: EpisodeRules) -> EpisodeRun:
         """The episode that continues from here.
 
         Raises:
             OptionError: A value does not fit the rules, or is not finite.
         """
         state: dict[str, Any] = vars(self)
-        return Episode(rules, **state)
+        return EpisodeRun(rules, **state)

@@ -21,7 +21,7 @@ from rover_gym.env.rocks import Rocks
 from rover_gym.env.start import Start
 from rover_gym.env.task import Task, make_task
 from rover_gym.env.wheels import N_ACTIONS
-from rover_gym.mechanics import Episode, Plane, Simulation, standard_normals
+from rover_gym.mechanics import EpisodeRun, Plane, Simulation, standard_normals
 from rover_gym.rendering.render_options import RENDER_MODES, RenderOptions
 from rover_gym.validation import Range
 
@@ -217,7 +217,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         self.action_space = gym.spaces.Box(-1.0, 1.0, (N_ACTIONS,), np.float32)
         self._simulation = Simulation(self.model, Plane(), **self.task.simulation_options)
         self._scene: EpisodeScene | None = None
-        self._episode: Episode
+        self._episode: EpisodeRun
         self._difficulty: Range | None = None
         #: Whether a step takes the height scan. Without, observations keep the last heights until
         #: `complete_observation`, or until the episode ends by itself.

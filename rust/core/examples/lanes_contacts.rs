@@ -1,9 +1,9 @@
 //! Phases of the contacts over lanes, for counting instructions and for times per rover.
 //!
-//! `lanes_contacts PHASE GROUND WIDTH REPETITIONS` replays recorded drives with random torques
-//! and runs the phases up to the one named; the difference of two runs counted by callgrind, divided by
-//! the repetitions and by the width, is the cost of a phase per rover. `lanes_contacts` alone prints
-//! times per rover.
+//! `lanes_contacts PHASE GROUND WIDTH REPETITIONS` replays recorded drives with random torques and
+//! runs the phases up to the one named; the difference of two runs counted by callgrind, divided by
+//! the repetitions and by the width, is the cost of a phase per rover. `lanes_contacts` alone
+//! prints times per rover.
 #![allow(clippy::print_stdout, clippy::inline_always)]
 
 #[path = "../../../tests/physics/exploring_scenes.rs"]
@@ -159,8 +159,8 @@ impl<T: Lane> Block<T> {
         }
     }
 
-    /// Time up to a phase per rover, ns: the best of several runs over a few steps, whose poses stay
-    /// in the cache.
+    /// Time up to a phase per rover, ns: the best of several runs over a few steps, whose poses
+    /// stay in the cache.
     fn time(&mut self, last: usize) -> f64 {
         let (few, times) = (4, 100);
         let run = |first: usize| {

@@ -13,7 +13,7 @@ use rover_core::simulation::RoverSimulation;
 
 use crate::arguments::{Given, count, number, refused};
 use crate::arrays::{fresh_table, vector};
-use crate::episode::{self, Episode};
+use crate::episode::{self, EpisodeRun};
 use crate::errors::{BorderError, Kind};
 use crate::generators::{generators, halves};
 use crate::options::SolverWords;
@@ -475,8 +475,8 @@ impl DrawnEpisodes {
     ///
     /// Raises:
     ///     OptionError: There is no such episode.
-    fn episode(&self, index: &Bound<'_, PyAny>) -> PyResult<Episode> {
-        Ok(Episode::of(self.at(index)?.episode.clone()))
+    fn episode(&self, index: &Bound<'_, PyAny>) -> PyResult<EpisodeRun> {
+        Ok(EpisodeRun::of(self.at(index)?.episode.clone()))
     }
 
     /// The ground of an episode.

@@ -1,4 +1,4 @@
-//! `Episode`: one episode of a driving task.
+//! `EpisodeRun`: one episode of a driving task.
 
 use std::sync::Arc;
 
@@ -40,7 +40,7 @@ type Step<'py> = (Bound<'py, PyArray1<f32>>, f64, bool, Bound<'py, PyDict>);
 /// Raises:
 ///     OptionError: An argument has a wrong shape or a number that is not finite.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
-pub struct Episode(Shared<Inner>);
+pub struct EpisodeRun(Shared<Inner>);
 
 struct Inner {
     episode: CoreEpisode,
@@ -123,7 +123,7 @@ fn normals(given: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f64>>> {
         .transpose()
 }
 
-impl Episode {
+impl EpisodeRun {
     pub fn of(episode: CoreEpisode) -> Self {
         Self(Shared::new(Inner {
             commands: vec![0.0; episode.rules().n_actions()],
@@ -187,7 +187,7 @@ impl Inner {
 }
 
 #[pymethods]
-impl Episode {
+impl EpisodeRun {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
     #[pyo3(signature = (rules, *, goal, domain, trunk_load_limit, difficulty, distance,
@@ -436,9 +436,9 @@ impl Episode {
 
     fn __repr__(&self) -> String {
         let Ok(held) = self.0.open() else {
-            return "Episode(stepping)".to_owned();
+            return "EpisodeRun(stepping)".to_owned();
         };
         let distance = held.episode.progress().distance;
-        format!("Episode({distance:.2} m to the goal)")
+        format!("EpisodeRun({distance:.2} m to the goal)")
     }
 }

@@ -132,8 +132,9 @@ impl EpisodeRules {
     }
 
     /// Names of the reward's terms, in the order of their sum.
-    #[classattr]
-    fn terms(py: Python<'_>) -> PyResult<Bound<'_, PyTuple>> {
+    #[getter]
+    #[allow(clippy::unused_self)] // an attribute of the object
+    fn terms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         PyTuple::new(py, TERMS)
     }
 

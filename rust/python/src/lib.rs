@@ -52,7 +52,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<draw::EpisodeDistribution>()?;
     module.add_class::<draw::DrawnEpisodes>()?;
     module.add_class::<episode_rules::EpisodeRules>()?;
-    module.add_class::<episode::Episode>()?;
+    module.add_class::<episode::EpisodeRun>()?;
     module.add_class::<episode_batch::EpisodeBatch>()?;
     module.add_class::<report::StepReport>()?;
     module.add_class::<report::Energy>()?;

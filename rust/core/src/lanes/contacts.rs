@@ -213,8 +213,8 @@ impl<T: Lane> Contacts<T> {
         ContactKey::on_ground(wheel, NEAREST, list.primitives[place])
     }
 
-    /// Fills `p` (3 n_c) with the impulses that a rover remembers of its contacts, N s, zero for new
-    /// ones. Returns whether the last step had exactly these contacts.
+    /// Fills `p` (3 n_c) with the impulses that a rover remembers of its contacts, N s, zero for
+    /// new ones. Returns whether the last step had exactly these contacts.
     #[inline(always)]
     pub fn recall(&self, lane: usize, memory: &WarmStart, p: &mut [f64]) -> bool {
         let list = &self.lists[lane];
@@ -381,8 +381,8 @@ impl<T: Lane> Contacts<T> {
         declined
     }
 
-    /// Adds the contacts of a wheel with spheres at the midpoint; it has the axle `s` and the centre
-    /// `centre` there.
+    /// Adds the contacts of a wheel with spheres at the midpoint; it has the axle `s` and the
+    /// centre `centre` there.
     #[inline(always)]
     fn look_at_spheres(
         &mut self,

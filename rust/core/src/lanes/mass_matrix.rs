@@ -462,8 +462,8 @@ fn scaled<T: Lane>(y: &[T; BASE], a: T) -> [T; BASE] {
     [y[0] * a, y[1] * a, y[2] * a, y[3] * a, y[4] * a, y[5] * a]
 }
 
-/// Eliminates velocity K of the base, when all after it are. Returns where its pivot is positive. K is
-/// a constant so that the block stays in registers.
+/// Eliminates velocity K of the base, when all after it are. Returns where its pivot is positive. K
+/// is a constant so that the block stays in registers.
 #[inline(always)]
 fn eliminate<T: Lane, const K: usize>(block: &mut [T; BLOCK], roots: &mut [T; BASE]) -> T::Mask {
     let start = K * (K + 1) / 2;

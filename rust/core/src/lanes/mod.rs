@@ -5,13 +5,14 @@
 //! ([`crate::scalar`]) that is one rover or four or eight. A step that is not ordinary is declined,
 //! rover by rover, before anything has changed; [`crate::integrator`] then takes it.
 //!
-//! - [`machine`]: what the rovers share; [`inertias`]: what they need not; [`place`]: configurations;
+//! - [`machine`]: what the rovers share; [`inertias`]: what they need not; [`place`]:
+//!   configurations;
 //! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
 //! - `parts`, [`ground`], [`forecast`], [`contacts`]: what touches what; [`rows`]: Jacobian and
 //!   Delassus operator;
 //! - [`problem`], [`modes`], [`equations`], [`newton`]: the friction-contact problems;
 //! - [`step`]: the step.
-#![allow(clippy::inline_always)] // a call would leave the instruction set that its caller is compiled for
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 pub mod bias;
 pub mod contacts;

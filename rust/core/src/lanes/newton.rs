@@ -1,13 +1,13 @@
 //! Semismooth Newton on several contact problems side by side.
 //!
-//! A step predicts each contact's [mode](super::modes) and solves the
-//! [equations](super::equations) of those modes, regularised by a proximal term `α (p − c)` about the
-//! present impulse. Its length is halved until the violation of the law is at most ten times that
-//! before: without that bound the modes cycle, with a stricter one the iteration stops beside the
-//! answer, since the law has no potential that every step could lower. If no length serves, the
-//! step ends where the first contact would leave its cone and this contact changes its mode, as in
-//! [pivoting](crate::solver), and `α` grows. Every fourth time the shortest length is taken
-//! instead, which ends the cycles of that rule.
+//! A step predicts each contact's [mode](super::modes) and solves the [equations](super::equations)
+//! of those modes, regularised by a proximal term `α (p − c)` about the present impulse. Its length
+//! is halved until the violation of the law is at most ten times that before: without that bound
+//! the modes cycle, with a stricter one the iteration stops beside the answer, since the law has no
+//! potential that every step could lower. If no length serves, the step ends where the first
+//! contact would leave its cone and this contact changes its mode, as in [pivoting](crate::solver),
+//! and `α` grows. Every fourth time the shortest length is taken instead, which ends the cycles of
+//! that rule.
 //!
 //! Measured on recorded steps of 5 ms of the built-in rover with torques and set-points redrawn
 //! every ten steps, from the impulses of the step before: 1.5 systems on average in a curve, 4.3
@@ -43,9 +43,9 @@ const HALVINGS: usize = 3;
 const FAMILIAR: f64 = 0.01;
 
 /// First `α` relative to the [regularisation](SolverOptions::regularisation) where a contact slides
-/// at the start, and its smallest value once a length was refused. Where nothing slides the first is
-/// the regularisation itself: the rounding `ε/α` in the null space of `W` would add up in a machine
-/// at rest.
+/// at the start, and its smallest value once a length was refused. Where nothing slides the first
+/// is the regularisation itself: the rounding `ε/α` in the null space of `W` would add up in a
+/// machine at rest.
 const FIRST: f64 = 0.1;
 const FLOOR: f64 = 0.3;
 

@@ -105,8 +105,8 @@ impl<T: Lane> Place<T> {
     }
 }
 
-/// Rotation by the vector `phi` (rad, world axes): the quaternion `exp(phi / 2)`, by the formulas of
-/// [`crate::spatial::exp_rotation`].
+/// Rotation by the vector `phi` (rad, world axes): the quaternion `exp(phi / 2)`, by the formulas
+/// of [`crate::spatial::exp_rotation`].
 #[inline(always)]
 fn exp_rotation<T: Lane>(phi: Vec3<T>) -> [T; 4] {
     let number = |x: f64| phi.x.like(x);

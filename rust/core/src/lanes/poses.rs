@@ -208,7 +208,8 @@ impl Axis {
         }
     }
 
-    /// `R · Rot(axis, angle)` for the sine and cosine of the angle; `turned` is the axis in the frame that `R` maps to.
+    /// `R · Rot(axis, angle)` for the sine and cosine of the angle; `turned` is the axis in the
+    /// frame that `R` maps to.
     #[inline(always)]
     pub(super) fn rotate<T: Lane>(&self, R: &Mat3<T>, turned: Vec3<T>, sin_cos: (T, T)) -> Mat3<T> {
         let (s, c) = sin_cos;

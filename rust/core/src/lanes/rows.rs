@@ -1,9 +1,10 @@
 //! Contact Jacobian and Delassus operator `W = Hᵀ M̂⁻¹ H` of a block.
 //!
-//! As in [`crate::contact::delassus`]: with `M̂ = Lᵀ D L` and `Z = D^(-1/2) L^(-T) H` the operator is
-//! `W = Zᵀ Z`. A column of Z is nonzero along the path of its wheel, and a block of W is a product
-//! over the part of the path that two wheels share. Rows belong to slots ([`super::contacts`]). A
-//! slot that is active in some lanes only never changes what the others accumulate.
+//! As in [`crate::contact::delassus`]: with `M̂ = Lᵀ D L` and `Z = D^(-1/2) L^(-T) H` the operator
+//! is `W = Zᵀ Z`. A column of Z is nonzero along the path of its wheel, and a block of W is a
+//! product over the part of the path that two wheels share. Rows belong to slots
+//! ([`super::contacts`]). A slot that is active in some lanes only never changes what the others
+//! accumulate.
 
 use super::contacts::Contacts;
 use super::machine::{Machine, velocity};

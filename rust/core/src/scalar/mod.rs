@@ -4,7 +4,7 @@
 //! - [`instructions`]: what this machine can do, found at run time, and the lane types;
 //! - [`elementary`]: sine, cosine and exponential with the same bits everywhere;
 //! - [`linear`]: vectors and matrices of three dimensions over lanes.
-#![allow(clippy::inline_always)] // a call would leave the instruction set that its caller is compiled for
+#![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
 pub mod elementary;
 pub mod instructions;

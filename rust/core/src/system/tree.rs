@@ -622,12 +622,12 @@ fn keep(kept: &mut [f64], joints: &[f64]) {
 /// penetration of 2 cm rotates by 0.4 rad.
 pub(crate) const JOINT_ARM: f64 = 0.05;
 
-/// Rotation of a free base in a step, rad, beyond which gyroscopic terms are implicit. At this angle
-/// the third-order error of the explicit terms is a thousandth of the energy.
+/// Rotation of a free base in a step, rad, beyond which gyroscopic terms are implicit. At this
+/// angle the third-order error of the explicit terms is a thousandth of the energy.
 pub(crate) const MOST_TURN: f64 = 0.1;
 
-/// The same limit for the rotation of the fastest frame, joints included, rad. A joint that snaps to
-/// a new set-point turns a light part of the machine. Measured on the drives of random policies:
+/// The same limit for the rotation of the fastest frame, joints included, rad. A joint that snaps
+/// to a new set-point turns a light part of the machine. Measured on the drives of random policies:
 /// implicit terms between this limit and the one above change no error in its third digit.
 pub(crate) const MOST_JOINT_TURN: f64 = 0.5;
 

@@ -16,8 +16,8 @@
 //! it sticks, it leaves the cone at once. Such a contact is barred, so that another one changes its
 //! mode. If none is left, its slip has changed its sign, and its friction is reversed.
 //!
-//! Measured on 19 200 solves of a rover whose torques and set-points are drawn anew every ten steps,
-//! on the plane and among rocks: 4.1 systems on average, and one solve in a thousand fails.
+//! Measured on 19 200 solves of a rover whose torques and set-points are drawn anew every ten
+//! steps, on the plane and among rocks: 4.1 systems on average, and one solve in a thousand fails.
 
 use crate::law::coulomb::ContactMode;
 use crate::problem::{Prepared, Residual};
