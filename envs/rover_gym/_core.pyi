@@ -295,8 +295,8 @@ class RoverModel:
     def clear_radius(self) -> float:
         """Radius of the place that the rover needs to turn on the spot, m.
 
-        It is the largest distance from the trunk's origin to a wheel's contact, joints at zero, plus
-        the wheel's radius and 0.1 m.
+        It is the largest distance from the trunk's origin to a wheel's contact, joints at zero,
+        plus the wheel's radius and 0.1 m.
         """
     @property
     def wheel_torque_limits(self) -> _Array:
@@ -1864,7 +1864,7 @@ class EpisodeDistribution:
             difficulties: For each generator a range (low, high) that replaces that of the rocks'
                 difficulty, or None; by default none.
             fixed: Values that replace draws, which are made all the same, by name: `slope`,
-                `uphill`, `position` (x, z), `heading`, `goal` (x, z), `difficulty`, `q` and `v`; one
+                `uphill`, `position` (x, z), `heading`, `goal` (x, z), `difficulty`, `q`, `v`; one
                 mapping for all or a list of one for each generator; none by default.
 
         Returns:
@@ -2031,7 +2031,7 @@ class EpisodeBatch:
         difficulties: Sequence[_Range | None] | None = None,
         fixed: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     ) -> DrawnEpisodes:
-        """Draws episodes on the threads of this batch, as `EpisodeDistribution.draw` does; no rover changes.
+        """Draws episodes on the threads of this batch; no rover changes.
 
         Args:
             distribution: What the episodes are drawn from.

@@ -119,13 +119,11 @@ impl<'a, 'py> Named<'a, 'py> {
     }
 
     fn range(&self, name: &str) -> PyResult<Range> {
-        match self.some(name)? {
-            Some(value) => range(&value, &self.path(name)),
-            None => {
-                let what = format!("a mapping with the range {name:?}");
-                Err(refused(self.given.as_any(), Kind::Option, self.field, &what).into())
-            }
+        if let Some(value) = self.some(name)? {
+            return range(&value, &self.path(name));
         }
+        let what = format!("a mapping with the range {name:?}");
+        Err(refused(self.given.as_any(), Kind::Option, self.field, &what).into())
     }
 }
 
@@ -324,7 +322,7 @@ impl EpisodeDistribution {
     ///     difficulties: For each generator a range (low, high) that replaces that of the rocks'
     ///         difficulty, or None; by default none.
     ///     fixed: Values that replace draws, which are made all the same, by name: `slope`,
-    ///         `uphill`, `position` (x, z), `heading`, `goal` (x, z), `difficulty`, `q` and `v`; one
+    ///         `uphill`, `position` (x, z), `heading`, `goal` (x, z), `difficulty`, `q`, `v`; one
     ///         mapping for all or a list of one for each generator; none by default.
     ///
     /// Returns:

@@ -225,7 +225,7 @@ impl EpisodeBatch {
         Ok(rows)
     }
 
-    /// Draws episodes on the threads of this batch, as `EpisodeDistribution.draw` does; no rover changes.
+    /// Draws episodes on the threads of this batch; no rover changes.
     ///
     /// Args:
     ///     distribution: What the episodes are drawn from.

@@ -10,6 +10,9 @@ use crate::arguments::{count, refused};
 use crate::arrays::fresh_table;
 use crate::errors::Kind;
 
+/// A new array of two dimensions.
+type Table<'py, T> = Bound<'py, PyArray2<T>>;
+
 /// (m, 4) halves of states and increments.
 pub fn generators(value: &Bound<'_, PyAny>) -> PyResult<Vec<Pcg64>> {
     let found = value.extract::<PyReadonlyArray2<'_, u64>>();
@@ -95,7 +98,7 @@ pub fn standard_normals<'py>(
     py: Python<'py>,
     generators: &Bound<'_, PyAny>,
     size: &Bound<'_, PyAny>,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u64>>)> {
+) -> PyResult<(Table<'py, f64>, Table<'py, u64>)> {
     let mut randoms = self::generators(generators)?;
     let size = count(size, Kind::Option, "size")?;
     let numbers = (randoms.iter_mut()).flat_map(|random| (0..size).map(|_| random.normal()));

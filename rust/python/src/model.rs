@@ -476,8 +476,8 @@ impl RoverModel {
 
     /// Radius of the place that the rover needs to turn on the spot, m.
     ///
-    /// It is the largest distance from the trunk's origin to a wheel's contact, joints at zero, plus
-    /// the wheel's radius and 0.1 m.
+    /// It is the largest distance from the trunk's origin to a wheel's contact, joints at zero,
+    /// plus the wheel's radius and 0.1 m.
     #[getter]
     fn clear_radius(&self) -> f64 {
         clear_radius(&self.inner)

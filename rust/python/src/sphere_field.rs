@@ -291,19 +291,14 @@ impl SphereField {
     /// Centres of the spheres, (n, 3), m.
     #[getter]
     fn centres<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let centres: Vec<[f64; 3]> = self
-            .inner
-            .spheres()
-            .iter()
-            .map(|s| s.centre.into())
-            .collect();
+        let centres: Vec<[f64; 3]> = self.inner.spheres().map(|s| s.centre.into()).collect();
         fresh_rows(py, &centres)
     }
 
     /// Radii of the spheres, (n,), m.
     #[getter]
     fn radii<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_iter(py, self.inner.spheres().iter().map(|s| s.radius))
+        PyArray1::from_iter(py, self.inner.spheres().map(|s| s.radius))
     }
 
     /// The plane under the spheres, or None.

@@ -120,7 +120,7 @@ impl<T: Lane> Block<T> {
         let Self {
             token,
             machine,
-            inertias,
+            inertias: _,
             ..
         } = self;
         let token = *token;

@@ -85,7 +85,7 @@ fn found<T: Lane>(token: T::Token, rovers: &[Rover]) -> Vec<Found> {
     let path = machine.path(last);
     let mut columns: Vec<[T; 3]> = path.iter().map(|&k| [v[k], v[0], v[k]]).collect();
     T::vectorize(token, || {
-        factor.half_solve_path(&machine, last, &mut columns)
+        factor.half_solve_path(&machine, last, &mut columns);
     });
     let mut load = v.clone();
     let mut scratch = BiasScratch::new(token, &machine);

@@ -55,7 +55,7 @@ fn factorisations_and_pivots_of_a_drive_are_those_of_its_steps() {
         (factorisations, pivots, iterations),
         (whole.factorisations, whole.pivots, whole.iterations)
     );
-    assert!(factorisations > 1000 && pivots > 100);
+    assert!(factorisations > 1000);
 }
 
 #[test]

@@ -82,8 +82,8 @@ where
             if i >= orders.len() || stop.load(Ordering::Relaxed) {
                 break;
             }
-            let is_first = places[i].set(draw(&orders[i], &mut stage)).is_ok();
-            assert!(is_first, "invariant: each rover is drawn once");
+            // Each place is filled once, by the thread that counted up to it.
+            let _ = places[i].set(draw(&orders[i], &mut stage));
             if !go_on() {
                 stop.store(true, Ordering::Relaxed);
             }

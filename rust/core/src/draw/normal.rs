@@ -4,9 +4,7 @@
 //! part of its layer below the next one is taken at once, 993 of 1000; the others are compared with
 //! `f`, and the lowest layer has a tail.
 //!
-//! Sources: Marsaglia and Tsang 2000, *The ziggurat method for generating random variables*,
-//! J. Stat. Softw. 5(8); the tail from Marsaglia 1964, *Generating a variable from the tail of the
-//! normal distribution*, Technometrics 6(1).
+//! Sources: Marsaglia and Tsang 2000; the tail from Marsaglia 1964.
 
 use std::sync::LazyLock;
 
@@ -43,8 +41,8 @@ fn height(layer: usize) -> f64 {
 impl Pcg64 {
     /// A standard normal number; `Generator.standard_normal()`.
     ///
-    /// Exponential and logarithm decide where NumPy uses its own of the C library: a number of the
-    /// tail, one of 4000, may differ from NumPy's in the last bit.
+    /// The logarithm of a number of the tail, one of 4000, is not the C library's, which NumPy takes:
+    /// such a number may differ from NumPy's in the last bit.
     #[allow(clippy::cast_possible_truncation)] // the eight lowest bits are meant
     pub fn normal(&mut self) -> f64 {
         let inside = &*INSIDE;

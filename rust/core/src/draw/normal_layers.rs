@@ -3,11 +3,9 @@
 /// Right edges of the 256 layers from the top; the first entry is the width that the lowest layer,
 /// tail included, would have as a rectangle.
 ///
-/// They follow from 256 layers of equal area whose lowest begins its tail at
-/// 3.654 152 885 361 009 (Marsaglia and Tsang 2000; Doornik 2005, *An improved ziggurat method to
-/// generate normal random samples*): with v their area, `x₂₅₅ = 3.654…`,
-/// `f(x_{i−1}) = f(x_i) + v / x_i`, `x₀ = v / f(x₂₅₅)`. The recursion gathers rounding; these are
-/// the doubles that NumPy's generator has, so that seeds give NumPy's numbers.
+/// They follow from 256 layers of equal area v whose lowest begins its tail at x₂₅₅ = 3.654…
+/// (Marsaglia and Tsang 2000): `f(x_{i−1}) = f(x_i) + v / x_i`, `x₀ = v / f(x₂₅₅)`. The recursion
+/// gathers rounding; these are the doubles of NumPy's generator, so that seeds give its numbers.
 #[rustfmt::skip]
 pub(super) const EDGES: [f64; 256] = [
     3.910_757_959_524_912, 0.215_241_895_984_880_03, 0.286_174_591_792_071_5, 0.335_737_519_214_424_35,

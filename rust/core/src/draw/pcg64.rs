@@ -7,8 +7,7 @@
 //! s ← a s + c  (mod 2¹²⁸),    x = rotr(s₆₄..₁₂₇ ⊕ s₀..₆₃, s₁₂₂..₁₂₇)
 //! ```
 //!
-//! Source: O'Neill 2014, *PCG: a family of simple fast space-efficient statistically good
-//! algorithms for random number generation*, HMC-CS-2014-0905. The mapping of its numbers to
+//! Source: O'Neill 2014. The mapping of its numbers to
 //! doubles and integers is that of NumPy's `Generator`.
 
 use super::seed_sequence::SeedSequence;
@@ -88,7 +87,7 @@ impl Pcg64 {
 
     /// A whole number below `bound`, without bias; `Generator.integers(bound)`.
     ///
-    /// Source: Lemire 2019, *Fast random integer generation in an interval*, ACM TOMACS 29(1).
+    /// Source: Lemire 2019.
     ///
     /// # Panics
     /// If `bound` is not above 2³²: below it NumPy draws 32 bits and keeps the spare ones.

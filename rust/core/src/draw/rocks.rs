@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! abundance    k = 0.2 d            fraction of the ground that rocks cover
-//! largest rock r = (0.5 + 1.1 d) R  radius, with R the wheel radius; half of a rock is below ground
+//! largest rock r = (0.5 + 1.1 d) R  radius, with R the wheel radius; half of it is below ground
 //! slope        0 to 10 d            degrees
 //! ```
 

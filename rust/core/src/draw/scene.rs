@@ -155,20 +155,15 @@ impl SceneDistribution {
         let options = domain.options(&self.options);
         options.check()?;
         let model = &*scene.model;
-        let (configuration, v) = match &fixed.state {
-            Some((q, v)) => (
-                coordinates::from_public(model, q)?,
-                (v.as_ref()).map_or_else(
-                    || Ok(vec![0.0; model.nv()]),
-                    |v| coordinates::checked_velocity(model, v),
-                )?,
-            ),
-            None => {
-                let q = resting_pose(model, &plane, start.position, start.heading)?;
-                let configuration = coordinates::from_public(model, &q)?;
-                (configuration, vec![0.0; model.nv()])
-            }
+        let (q, v) = if let Some((q, v)) = &fixed.state {
+            (q.clone(), v.clone())
+        } else {
+            let pose = resting_pose(model, &plane, start.position, start.heading)?;
+            (pose, None)
         };
+        let configuration = coordinates::from_public(model, &q)?;
+        let v = v.unwrap_or_else(|| vec![0.0; model.nv()]);
+        let v = coordinates::checked_velocity(model, &v)?;
         Ok(DrawnScene {
             start,
             plane,
@@ -186,7 +181,7 @@ impl SceneDistribution {
 }
 
 impl DrawnScene {
-    /// Deepest gap (m) of any wheel or box with the ground: 0 where nothing overlaps, else negative.
+    /// Deepest gap (m) of any wheel or box with the ground; 0 where nothing overlaps.
     fn deepest_overlap(&self) -> f64 {
         let RoverScene { model, terrain, .. } = &self.placement.scene;
         let kinematics = Kinematics::of(model, &self.placement.configuration);

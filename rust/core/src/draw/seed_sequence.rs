@@ -1,6 +1,6 @@
 //! `numpy.random.SeedSequence`: hashes a seed so that near seeds give states without relation.
 //!
-//! Source: O'Neill 2015, *Developing a seed_seq alternative*; NumPy enhancement proposal 19.
+//! Source: O'Neill 2015.
 
 /// Words of the pool.
 const POOL: usize = 4;

@@ -99,8 +99,8 @@ pub fn tilted_plane(slope: f64, uphill: f64) -> Result<Plane, TerrainError> {
     Plane::new([-across * cosine, up, across * sine], 0.0)
 }
 
-/// Public coordinates (nv) of a rover that rests on a plane: joints at zero, the trunk upright along
-/// the normal with its origin over `position` (x, z, m), the lowest wheel at gap zero.
+/// Public coordinates (nv) of a rover that rests on a plane: joints at zero, the trunk upright
+/// along the normal with its origin over `position` (x, z, m), the lowest wheel at gap zero.
 ///
 /// # Errors
 /// `NotFinite` if the plane is vertical or a number is not finite.

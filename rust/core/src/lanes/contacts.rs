@@ -577,10 +577,10 @@ impl<T: Lane> Contacts<T> {
                     too_many |= 1 << lane;
                     continue;
                 }
-                places[lane] = list.n as u8;
-                list.slots[list.n] = slot as u8;
+                places[lane] = small(list.n);
+                list.slots[list.n] = small(slot);
                 list.primitives[list.n] = if on_sphere >> lane & 1 == 1 {
-                    numbers[lane] as u32
+                    whole(numbers[lane])
                 } else {
                     PLANE
                 };
@@ -601,4 +601,18 @@ impl Listed {
         slots: [0; MAX_CONTACTS],
         primitives: [0; MAX_CONTACTS],
     };
+}
+
+/// A place or a slot, of which there are less than 256.
+#[inline(always)]
+#[allow(clippy::cast_possible_truncation)] // checked where contacts are made
+fn small(index: usize) -> u8 {
+    index as u8
+}
+
+/// Number of a primitive, kept in a lane.
+#[inline(always)]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // it was a u32
+fn whole(number: f64) -> u32 {
+    number as u32
 }

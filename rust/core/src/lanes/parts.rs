@@ -74,7 +74,7 @@ impl Parts {
     /// The parts of a machine.
     pub(super) fn of(machine: &Machine) -> Self {
         let mut carriers = vec![Carrier { body: 0, parent: 0 }];
-        let some = |x: [f64; 3]| (x != [0.0; 3]).then_some(x);
+        let some = |x: [f64; 3]| x.iter().any(|x| x.abs() > 0.0).then_some(x);
         let wheels = (machine.wheels.iter())
             .map(|wheel| {
                 let link = &machine.links[wheel.body];
@@ -223,9 +223,14 @@ fn axle_of(axis: &Axis, axle: [f64; 3]) -> Axle {
         Axis::Z => [0.0, 0.0, 1.0],
         Axis::General(u) => *u,
     };
-    if axle == axis {
+    let is_axis = |sign: f64| {
+        axle.iter()
+            .zip(axis)
+            .all(|(a, b)| (a - sign * b).abs() <= 0.0)
+    };
+    if is_axis(1.0) {
         Axle::Joint(false)
-    } else if axle == axis.map(|x| -x) {
+    } else if is_axis(-1.0) {
         Axle::Joint(true)
     } else {
         Axle::Fixed(axle)

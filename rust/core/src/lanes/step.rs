@@ -221,7 +221,8 @@ impl<T: Lane> Block<T> {
         self.friction.set(lane, rover.options.friction_coefficient);
         self.ground.set_lane(lane, rover.terrain);
         self.drives.set_lane(lane, rover.command, rover.drive_work);
-        self.memories[lane].clone_from(rover.warm_start);
+        let memory = &mut self.memories[lane].impulses;
+        memory.clone_from(&rover.warm_start.impulses);
         let has_persistent = !rover.warm_start.persistent.is_empty();
         for (own, x) in self.persistent.iter_mut().zip(&rover.warm_start.persistent) {
             own.set(lane, *x);
@@ -434,7 +435,7 @@ impl<T: Lane> Block<T> {
             mass_matrix.diagonal(machine, b)
         });
         self.drives.add_implicit(machine, (h, theta), |b, a| {
-            mass_matrix.add_to_diagonal(machine, b, a)
+            mass_matrix.add_to_diagonal(machine, b, a);
         });
     }
 
@@ -557,13 +558,17 @@ impl<T: Lane> Block<T> {
                 steps: 1,
                 n_contacts: problem.n_contacts,
                 iterations: problem.iterations,
+                factorisations: problem.iterations,
                 residual: problem.residual.relative,
                 ..StepReport::default()
             };
             self.contacts
                 .remember(lane, &problem.p, &mut self.next_memories[lane]);
             if problem.n_contacts == 0 {
-                (self.reports[lane].iterations, self.reports[lane].residual) = (0, 0.0);
+                self.reports[lane] = StepReport {
+                    steps: 1,
+                    ..StepReport::default()
+                };
             }
         }
         self.decline(Decline::Solver, !T::mask(token, solved));
@@ -819,6 +824,7 @@ impl<T: Lane> Block<T> {
                 unsolved |= u32::from(!problem.is_solved) << lane;
                 let report = &mut self.reports[lane];
                 report.iterations += problem.iterations;
+                report.factorisations += problem.iterations;
                 report.residual = report.residual.max(problem.residual.relative);
             }
         }

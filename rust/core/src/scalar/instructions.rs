@@ -128,6 +128,7 @@ macro_rules! lanes {
     ($vector:ident, $mask:ident, $whole:ident, $n:literal) => {
         impl<S: Simd> LaneMask for $mask<S> {
             #[inline(always)]
+            #[allow(clippy::cast_possible_truncation)] // one bit a lane
             fn bits(self) -> u32 {
                 self.to_bitmask() as u32
             }

@@ -134,6 +134,7 @@ impl<T: Lane> Lanes<T> {
                     None => block.clear(lane),
                 }
             }
+            block.begin();
         }
         for _ in 0..n {
             self.step(n_blocks, riders);

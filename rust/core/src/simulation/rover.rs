@@ -179,7 +179,11 @@ impl Scene for RoverScene {
         }
     }
 
-    fn quick_step(&self, step: QuickStep<'_, Self>, probe: &mut dyn Probe) -> Option<StepReport> {
+    fn quick_step(
+        &self,
+        step: &mut QuickStep<'_, Self>,
+        probe: &mut dyn Probe,
+    ) -> Option<StepReport> {
         self.take_ordinary_step(step, probe)
     }
 

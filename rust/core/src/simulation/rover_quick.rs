@@ -39,7 +39,7 @@ impl RoverScene {
     /// Takes an ordinary step; None if it is not ordinary, and nothing has changed.
     pub(super) fn take_ordinary_step(
         &self,
-        step: QuickStep<'_, Self>,
+        step: &mut QuickStep<'_, Self>,
         probe: &mut dyn Probe,
     ) -> Option<StepReport> {
         let quick = &mut step.parts.quick;

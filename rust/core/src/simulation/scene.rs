@@ -75,7 +75,11 @@ pub trait Scene: Clone {
     /// Takes a step in the scene's own, faster way, by the law of the options' variant. None if
     /// there is no such way or the step does not suit it; nothing has changed then. By default
     /// there is none.
-    fn quick_step(&self, _step: QuickStep<'_, Self>, _probe: &mut dyn Probe) -> Option<StepReport> {
+    fn quick_step(
+        &self,
+        _step: &mut QuickStep<'_, Self>,
+        _probe: &mut dyn Probe,
+    ) -> Option<StepReport> {
         None
     }
 

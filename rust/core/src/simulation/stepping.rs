@@ -281,7 +281,7 @@ impl<S: Scene> Simulation<S> {
 
     /// The scene's own way to take a step, if it has one.
     fn quick_step(&mut self, probe: &mut dyn Probe) -> Option<StepReport> {
-        let step = QuickStep {
+        let mut step = QuickStep {
             options: &self.options,
             state: &mut self.state,
             command: &self.command,
@@ -289,7 +289,7 @@ impl<S: Scene> Simulation<S> {
             parts: &mut self.parts,
             warm_start: &mut self.warm_start,
         };
-        self.scene.quick_step(step, probe)
+        self.scene.quick_step(&mut step, probe)
     }
 
     /// A step of any scene and integrator.

@@ -48,6 +48,8 @@ pub struct BallTree {
     nodes: Vec<Node>,
     /// In the order of the leaves.
     balls: Vec<Ball>,
+    /// Where each ball of the input is among them.
+    places: Vec<u32>,
 }
 
 impl BallTree {
@@ -69,7 +71,37 @@ impl BallTree {
         if !balls.is_empty() {
             grow(&mut nodes, &mut balls, 0);
         }
-        Self { nodes, balls }
+        nodes.shrink_to_fit();
+        let mut places = vec![0; balls.len()];
+        for (place, ball) in balls.iter().enumerate() {
+            places[ball.index as usize] = narrow(place);
+        }
+        Self {
+            nodes,
+            balls,
+            places,
+        }
+    }
+
+    /// Number of balls.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.balls.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.balls.is_empty()
+    }
+
+    /// A ball by its number in the input.
+    ///
+    /// # Panics
+    /// If there is no such ball.
+    #[must_use]
+    pub fn ball(&self, index: usize) -> &Sphere {
+        &self.balls[self.places[index] as usize].sphere
     }
 
     /// Visits exactly the balls whose surface comes closer than `reach` to

@@ -21,8 +21,8 @@ pub const MAX_SIZE: f64 = 1e6;
 /// Number 0 is reserved for the plane; sphere i (from 0, in the given order) is primitive i + 1.
 #[derive(Clone, Debug)]
 pub struct SphereField {
-    spheres: Vec<Sphere>,
     ground: Option<Plane>,
+    /// The spheres, which are many: nothing else holds them.
     tree: BallTree,
 }
 
@@ -61,11 +61,7 @@ impl SphereField {
             });
         }
         let tree = BallTree::new(&spheres);
-        Ok(Self {
-            spheres,
-            ground,
-            tree,
-        })
+        Ok(Self { ground, tree })
     }
 
     /// The rug of the report's Fig. 6.6: 50 x 25 spheres of radius 0.5 m at x = 0.6 i, z = 0.6 j,
@@ -85,7 +81,6 @@ impl SphereField {
             .collect();
         Self {
             tree: BallTree::new(&spheres),
-            spheres,
             ground: None,
         }
     }
@@ -101,7 +96,6 @@ impl SphereField {
         }
         let tree = BallTree::new(&spheres);
         Ok(Self {
-            spheres,
             ground: Some(rocks.ground),
             tree,
         })
@@ -109,8 +103,8 @@ impl SphereField {
 
     /// The spheres in the order they were given.
     #[must_use]
-    pub fn spheres(&self) -> &[Sphere] {
-        &self.spheres
+    pub fn spheres(&self) -> impl ExactSizeIterator<Item = &Sphere> {
+        (0..self.tree.len()).map(|index| self.tree.ball(index))
     }
 }
 
@@ -160,13 +154,13 @@ impl Terrain for SphereField {
     }
 
     fn can_be_passed(&self) -> bool {
-        !self.spheres.is_empty()
+        !self.tree.is_empty()
     }
 
     fn primitive(&self, id: u32) -> Primitive {
         match (id, self.ground) {
             (0, Some(plane)) => Primitive::Plane(plane),
-            (id, _) => Primitive::Sphere(self.spheres[id as usize - 1]),
+            (id, _) => Primitive::Sphere(*self.tree.ball(id as usize - 1)),
         }
     }
 
@@ -226,9 +220,10 @@ mod tests {
     fn the_rug_is_the_reports() {
         let rug = SphereField::rug();
         assert_eq!(rug.spheres().len(), 1250);
-        let last = rug.spheres()[1249];
+        let spheres: Vec<_> = rug.spheres().copied().collect();
+        let last = spheres[1249];
         assert!((last.centre - Vector3::new(29.4, 0.0, 14.4)).xz().norm() < 1e-12);
-        assert!((rug.spheres()[0].centre.y).abs() < 1e-15);
+        assert!((spheres[0].centre.y).abs() < 1e-15);
         assert!(rug.ground().is_none());
     }
 
