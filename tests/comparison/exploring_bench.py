@@ -2,7 +2,8 @@
 
 Every scene of `comparison.exploring` is measured by Rust (`cargo bench --bench exploring`), and right after by MuJoCo
 where it is installed, so that a busy machine is busy for all. The instructions of each part of a step are callgrind's,
-where valgrind is installed, over every seventh step of the first drives. It only reports.
+where valgrind is installed, over every seventh step of the first drives; a processor under valgrind may lack AVX-512.
+It only reports.
 """
 
 import argparse

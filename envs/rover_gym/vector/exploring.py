@@ -84,7 +84,8 @@ def measure_exploring(
         rounds: Measured rounds, of 100 steps each.
         progress: Called after each round.
     """
-    simulations = [_rover(ground, seed) for seed in range(num_envs)]
+    env = RoverEnv(terrain=ground)
+    simulations = [_rover(env, seed) for seed in range(num_envs)]
     batch = SimulationBatch(simulations, threads=threads)
     engines: dict[str, Callable[[Array], None]] = {"rover-gym": _ours(batch)}
     engines |= _mujoco(simulations, batch.threads)
@@ -118,13 +119,12 @@ def processor() -> str:
         return platform.processor() or platform.machine()
 
 
-def _rover(ground: Ground, seed: int) -> Simulation:
-    """A rover at rest, its wheels braked until the first command."""
-    env = RoverEnv(terrain=ground)
+def _rover(env: RoverEnv, seed: int) -> Simulation:
+    """A rover at rest on the ground of an episode, its wheels braked until the first command."""
     env.reset(seed=seed)
     terrain, start = env.simulation.terrain, env.start
     place, plane = start.position, tilted_plane(start.slope, start.uphill)
-    if ground == "sphere_field":
+    if env.rocks is not None:
         place = (0.5 * (place[0] + env.goal[0]), 0.5 * (place[1] + env.goal[1]))
     q = resting_pose(env.model, plane, place, start.heading)
     simulation = Simulation(env.model, terrain, time_step=TIME_STEP)
