@@ -79,6 +79,9 @@ pub fn seed_generators<'py>(
     fresh_table(py, rows.into_iter())
 }
 
+/// The numbers, and the generators after the draws.
+type Normals<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u64>>);
+
 /// Draws standard normal numbers as `numpy.random.Generator.standard_normal` does.
 ///
 /// Args:
@@ -95,7 +98,7 @@ pub fn standard_normals<'py>(
     py: Python<'py>,
     generators: &Bound<'_, PyAny>,
     size: &Bound<'_, PyAny>,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u64>>)> {
+) -> PyResult<Normals<'py>> {
     let mut randoms = self::generators(generators)?;
     let size = count(size, Kind::Option, "size")?;
     let numbers = (randoms.iter_mut()).flat_map(|random| (0..size).map(|_| random.normal()));

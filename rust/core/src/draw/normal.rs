@@ -41,8 +41,8 @@ fn height(layer: usize) -> f64 {
 impl Pcg64 {
     /// A standard normal number; `Generator.standard_normal()`.
     ///
-    /// The logarithm of a number of the tail, one of 4000, is not the C library's, which NumPy takes:
-    /// such a number may differ from NumPy's in the last bit.
+    /// The logarithm of a number of the tail, one of 4000, is not the C library's, which NumPy
+    /// takes: such a number may differ from NumPy's in the last bit.
     #[allow(clippy::cast_possible_truncation)] // the eight lowest bits are meant
     pub fn normal(&mut self) -> f64 {
         let inside = &*INSIDE;

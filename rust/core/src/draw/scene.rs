@@ -155,12 +155,10 @@ impl SceneDistribution {
         let options = domain.options(&self.options);
         options.check()?;
         let model = &*scene.model;
-        let (q, v) = match &fixed.state {
-            Some((q, v)) => (q.clone(), v.clone()),
-            None => {
-                let pose = resting_pose(model, &plane, start.position, start.heading)?;
-                (pose, None)
-            }
+        let resting = || resting_pose(model, &plane, start.position, start.heading);
+        let (q, v) = match fixed.state.clone() {
+            Some(state) => state,
+            None => (resting()?, None),
         };
         let configuration = coordinates::from_public(model, &q)?;
         let v = v.unwrap_or_else(|| vec![0.0; model.nv()]);
