@@ -115,10 +115,10 @@ pub fn fresh_matrix<'py>(
 }
 
 /// Fresh (m, M) array of any type.
-pub fn fresh_table<'py, T: numpy::Element, const M: usize>(
-    py: Python<'py>,
+pub fn fresh_table<T: numpy::Element, const M: usize>(
+    py: Python<'_>,
     rows: impl ExactSizeIterator<Item = [T; M]>,
-) -> PyResult<Bound<'py, PyArray2<T>>> {
+) -> PyResult<Bound<'_, PyArray2<T>>> {
     let m = rows.len();
     PyArray1::from_iter(py, rows.flatten()).reshape([m, M])
 }

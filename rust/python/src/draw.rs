@@ -119,13 +119,11 @@ impl<'a, 'py> Named<'a, 'py> {
     }
 
     fn range(&self, name: &str) -> PyResult<Range> {
-        match self.some(name)? {
-            Some(value) => range(&value, &self.path(name)),
-            None => {
-                let what = format!("a mapping with the range {name:?}");
-                Err(refused(self.given.as_any(), Kind::Option, self.field, &what).into())
-            }
+        if let Some(value) = self.some(name)? {
+            return range(&value, &self.path(name));
         }
+        let what = format!("a mapping with the range {name:?}");
+        Err(refused(self.given.as_any(), Kind::Option, self.field, &what).into())
     }
 }
 
