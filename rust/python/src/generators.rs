@@ -82,9 +82,6 @@ pub fn seed_generators<'py>(
     fresh_table(py, rows.into_iter())
 }
 
-/// The numbers, and the generators after the draws.
-type Normals<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u64>>);
-
 /// Draws standard normal numbers as `numpy.random.Generator.standard_normal` does.
 ///
 /// Args:
