@@ -18,6 +18,13 @@ pub struct Energy<T> {
     pub momentum: Vec3<T>,
 }
 
+impl<T: Lane> Energy<T> {
+    /// J.
+    pub(super) fn kinetic_and_potential(&self) -> [T; 2] {
+        [self.kinetic, self.potential]
+    }
+}
+
 /// Scratch of the energy.
 #[derive(Clone, Debug)]
 pub struct EnergyScratch<T: Lane> {

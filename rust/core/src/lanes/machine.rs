@@ -4,6 +4,7 @@
 //! velocity `b + 5`. Lengths are in m.
 
 use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
@@ -186,6 +187,21 @@ impl Machine {
             machine.add(b, body, bodies);
         }
         Ok(machine)
+    }
+
+    /// The machine itself, or an equal one that is in use: equal machines are one, so that rovers
+    /// which can share a block know each other by it.
+    #[must_use]
+    pub fn shared(self) -> Arc<Self> {
+        static IN_USE: Mutex<Vec<Weak<Machine>>> = Mutex::new(Vec::new());
+        let mut in_use = IN_USE.lock().unwrap_or_else(PoisonError::into_inner);
+        in_use.retain(|machine| machine.strong_count() > 0);
+        let equal = (in_use.iter().filter_map(Weak::upgrade)).find(|machine| **machine == self);
+        equal.unwrap_or_else(|| {
+            let own = Arc::new(self);
+            in_use.push(Arc::downgrade(&own));
+            own
+        })
     }
 
     fn add(&mut self, b: usize, body: &Body, bodies: &[Body]) {

@@ -29,6 +29,26 @@ impl<T: Lane> Place<T> {
         }
     }
 
+    /// Whether a lane has this configuration, to the last bit.
+    pub fn is_lane(&self, lane: usize, q: &Configuration) -> bool {
+        let is_same = |own: &T, x: &f64| own.get(lane).to_bits() == x.to_bits();
+        let Vec3 { x, y, z } = &self.position;
+        [x, y, z]
+            .into_iter()
+            .zip(q.position.iter())
+            .all(|(own, x)| is_same(own, x))
+            && self
+                .attitude
+                .iter()
+                .zip(q.attitude.coords.iter())
+                .all(|(own, x)| is_same(own, x))
+            && self
+                .joints
+                .iter()
+                .zip(&q.joints)
+                .all(|(own, x)| is_same(own, x))
+    }
+
     /// Replaces the configuration of a lane.
     pub fn set_lane(&mut self, lane: usize, q: &Configuration) {
         self.position.set(lane, q.position.into());

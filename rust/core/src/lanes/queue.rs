@@ -5,7 +5,7 @@
 //!
 //! Measured on 72 000 recorded steps of 5 ms of the built-in rover whose torques and set-points are
 //! drawn anew every ten steps: 2.8 systems a problem, from 1.2 (steering only) to 4.1 (rocks), and
-//! 1.2 further corrections with their factors; 0.06% are unsolved.
+//! 1.2 corrections with their factors; 0.06% are unsolved.
 
 use super::equations::Factors;
 use super::pivoting::Pivoting;

@@ -18,7 +18,7 @@ use nalgebra::Vector3;
 use super::bias::{BiasScratch, bias};
 use super::contacts::Contacts;
 use super::drives::Drives;
-use super::energy::{EnergyScratch, energy};
+use super::energy::{Energy, EnergyScratch, energy};
 use super::forecast::Forecast;
 use super::ground::Ground;
 use super::inertias::Inertias;
@@ -212,32 +212,49 @@ impl<T: Lane> Block<T> {
     /// Gives a lane to a rover of this machine, with options alike those of the others.
     /// [`Self::begin`] follows.
     pub fn board(&mut self, lane: usize, rover: &Passenger<'_>) {
+        let own = T::mask(self.token, 1 << lane);
+        self.occupied = self.occupied | own;
+        if !self.holds(lane, rover) {
+            self.is_new = self.is_new | own;
+            self.seat(lane, rover);
+        }
+        self.options.clone_from(rover.options);
+        self.friction.set(lane, rover.options.friction_coefficient);
+        self.ground.set_lane(lane, rover.terrain);
+        self.drives.set_lane(lane, rover.command, rover.drive_work);
+        self.time.set(lane, *rover.time);
+        let memory = &mut self.memories[lane].impulses;
+        memory.clone_from(&rover.warm_start.impulses);
+        let persistent = &rover.warm_start.persistent;
+        for (own, x) in self.persistent.iter_mut().zip(persistent) {
+            own.set(lane, *x);
+        }
+        self.has_persistent = self.has_persistent & !own;
+        if !persistent.is_empty() {
+            self.has_persistent = self.has_persistent | own;
+        }
+    }
+
+    /// Whether a lane has the inertia and the state of a rover, so that its energy is known.
+    fn holds(&self, lane: usize, rover: &Passenger<'_>) -> bool {
+        let is_own = |own: &T, x: &f64| own.get(lane).to_bits() == x.to_bits();
+        (self.models[lane].as_ref()).is_some_and(|own| Arc::ptr_eq(own, rover.model))
+            && self.gravity.get(lane).map(f64::to_bits)
+                == <[f64; 3]>::from(rover.options.gravity).map(f64::to_bits)
+            && self.v.iter().zip(&*rover.v).all(|(own, x)| is_own(own, x))
+            && self.start.is_lane(lane, rover.configuration)
+    }
+
+    /// Gives a lane the inertia and the state of a rover.
+    fn seat(&mut self, lane: usize, rover: &Passenger<'_>) {
         if !(self.models[lane].as_ref()).is_some_and(|own| Arc::ptr_eq(own, rover.model)) {
             self.inertias.set_lane(lane, &self.machine, rover.model);
             self.models[lane] = Some(Arc::clone(rover.model));
         }
-        self.options.clone_from(rover.options);
         self.gravity.set(lane, rover.options.gravity.into());
-        self.friction.set(lane, rover.options.friction_coefficient);
-        self.ground.set_lane(lane, rover.terrain);
-        self.drives.set_lane(lane, rover.command, rover.drive_work);
-        let memory = &mut self.memories[lane].impulses;
-        memory.clone_from(&rover.warm_start.impulses);
-        let has_persistent = !rover.warm_start.persistent.is_empty();
-        for (own, x) in self.persistent.iter_mut().zip(&rover.warm_start.persistent) {
-            own.set(lane, *x);
-        }
         self.start.set_lane(lane, rover.configuration);
         for (own, x) in self.v.iter_mut().zip(&*rover.v) {
             own.set(lane, *x);
-        }
-        self.time.set(lane, *rover.time);
-        let own = T::mask(self.token, 1 << lane);
-        self.occupied = self.occupied | own;
-        self.is_new = self.is_new | own;
-        self.has_persistent = self.has_persistent & !own;
-        if has_persistent {
-            self.has_persistent = self.has_persistent | own;
         }
     }
 
@@ -274,21 +291,26 @@ impl<T: Lane> Block<T> {
     pub fn begin(&mut self) {
         self.drives.finish_loading();
         if self.is_new.any() {
-            let energy = energy(
-                &self.machine,
-                &self.inertias,
-                &self.start,
-                &self.v,
-                self.gravity,
-                &mut self.energy_scratch,
-            );
-            let [kinetic, potential] = self.before;
-            self.before = [
-                T::select(self.is_new, energy.kinetic, kinetic),
-                T::select(self.is_new, energy.potential, potential),
-            ];
+            let energy = self.energy(State::Start);
+            self.before = select_both(self.is_new, energy.kinetic_and_potential(), self.before);
             self.is_new = T::mask(self.token, 0);
         }
+    }
+
+    /// Energy of the start or of the end of the step.
+    fn energy(&mut self, state: State) -> Energy<T> {
+        let (place, v) = match state {
+            State::Start => (&self.start, &self.v),
+            State::End => (&self.end, &self.v_end),
+        };
+        energy(
+            &self.machine,
+            &self.inertias,
+            place,
+            v,
+            self.gravity,
+            &mut self.energy_scratch,
+        )
     }
 
     /// Options of the rovers; gravity and friction are those of the last that boarded.
@@ -577,15 +599,8 @@ impl<T: Lane> Block<T> {
             #[inline(always)]
             || self.move_on(problems),
         );
-        let after = energy(
-            &self.machine,
-            &self.inertias,
-            &self.end,
-            &self.v_end,
-            self.gravity,
-            &mut self.energy_scratch,
-        );
-        self.after = [after.kinetic, after.potential];
+        let after = self.energy(State::End);
+        self.after = after.kinetic_and_potential();
         self.momentum = after.momentum;
         T::vectorize(
             token,
@@ -712,19 +727,8 @@ impl<T: Lane> Block<T> {
 
     /// Energy of the lanes whose velocity was corrected.
     fn weigh_again(&mut self) {
-        let after = energy(
-            &self.machine,
-            &self.inertias,
-            &self.end,
-            &self.v_end,
-            self.gravity,
-            &mut self.energy_scratch,
-        );
-        let [kinetic, potential] = self.after;
-        self.after = [
-            T::select(self.is_corrected, after.kinetic, kinetic),
-            T::select(self.is_corrected, after.potential, potential),
-        ];
+        let after = self.energy(State::End).kinetic_and_potential();
+        self.after = select_both(self.is_corrected, after, self.after);
     }
 
     /// Penetration that is tolerated, m, if positions are projected.
@@ -834,26 +838,16 @@ impl<T: Lane> Block<T> {
             #[inline(always)]
             || self.displace(problems),
         );
-        let lifted = energy(
-            &self.machine,
-            &self.inertias,
-            &self.end,
-            &self.v_end,
-            self.gravity,
-            &mut self.energy_scratch,
-        );
+        let lifted = self.energy(State::End).kinetic_and_potential();
         let is_moved = self.is_deep & self.going;
         let [kinetic, potential] = self.after;
-        let gained = (lifted.kinetic - kinetic) + (lifted.potential - potential);
+        let gained = (lifted[0] - kinetic) + (lifted[1] - potential);
         for (lane, report) in self.reports.iter_mut().enumerate().take(T::LANES) {
             if is_moved.get(lane) {
                 report.energy_lifted = gained.get(lane).max(0.0);
             }
         }
-        self.after = [
-            T::select(is_moved, lifted.kinetic, kinetic),
-            T::select(is_moved, lifted.potential, potential),
-        ];
+        self.after = select_both(is_moved, lifted, self.after);
     }
 
     #[inline(always)]
@@ -919,6 +913,19 @@ impl<T: Lane> Block<T> {
         self.time = T::select(going, self.time + h, self.time);
         self.drives.accept(going);
     }
+}
+
+/// A state of a block.
+#[derive(Clone, Copy, Debug)]
+enum State {
+    Start,
+    End,
+}
+
+/// `yes` in the lanes of a mask, `no` elsewhere.
+#[inline(always)]
+fn select_both<T: Lane>(lanes: T::Mask, yes: [T; 2], no: [T; 2]) -> [T; 2] {
+    [0, 1].map(|k| T::select(lanes, yes[k], no[k]))
 }
 
 /// Angular speeds of the trunk, of the fastest joint that turns a frame, and of the fastest spinner

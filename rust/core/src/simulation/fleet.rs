@@ -110,12 +110,9 @@ impl<T: Lane> Lanes<T> {
 
     fn advance(&mut self, riders: &mut [Rider<'_>], n: usize, go_on: &mut dyn FnMut() -> bool) {
         let n_seats = self.seat(riders);
+        let mut seated = self.seats[..n_seats].iter().flatten().peekable();
         for (k, rider) in riders.iter_mut().enumerate() {
-            if !self.seats[..n_seats]
-                .iter()
-                .flatten()
-                .any(|seat| seat.rider == k)
-            {
+            if seated.next_if(|seat| seat.rider == k).is_none() {
                 rider.go_alone(n, go_on);
             }
         }
@@ -158,7 +155,8 @@ impl<T: Lane> Lanes<T> {
         }
     }
 
-    /// Gives the rovers that can share blocks their seats; returns how many seats the blocks have.
+    /// Gives the rovers that can share blocks their seats, in order; returns how many seats the
+    /// blocks have.
     fn seat(&mut self, riders: &[Rider<'_>]) -> usize {
         self.seats.clear();
         let Some(first) = riders
@@ -170,7 +168,7 @@ impl<T: Lane> Lanes<T> {
         let leader = &*riders[first].rover;
         for (k, rider) in riders.iter().enumerate() {
             let is_like = match (rider.rover.machine(), leader.machine()) {
-                (Some(own), Some(other)) => Arc::ptr_eq(own, other) || own == other,
+                (Some(own), Some(other)) => Arc::ptr_eq(own, other),
                 _ => false,
             };
             if is_like && are_alike(rider.rover.options(), leader.options()) {

@@ -34,7 +34,7 @@ impl RoverScene {
     /// A machine on a terrain.
     #[must_use]
     pub fn new(model: Arc<Model>, terrain: Arc<dyn Terrain>) -> Self {
-        let machine = Machine::of(&model).ok().map(Arc::new);
+        let machine = Machine::of(&model).ok().map(Machine::shared);
         Self {
             model,
             terrain,
