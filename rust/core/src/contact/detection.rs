@@ -300,76 +300,67 @@ pub fn wheel_contact(
     terrain: &dyn Terrain,
     i: usize,
 ) -> Contact {
-    let wheel = PlacedWheel::of(model, kinematics, i);
-    let mut best = SurfacePoint::of_normal(NEAREST, wheel.centre, &Vector3::y(), f64::INFINITY);
+    let placed = placed_wheel(model, kinematics, i);
+    let centre = kinematics.point(placed.body, &Part::Wheel(i).centre(model));
+    let mut best = SurfacePoint::of_normal(NEAREST, centre, &Vector3::y(), f64::INFINITY);
     let mut primitive = 0;
-    wheel.visit_nearer(terrain, |id, point| (best, primitive) = (*point, id));
-    wheel.placed.contact(&best, primitive)
+    visit_nearer(model, kinematics, terrain, i, &mut |id, point| {
+        (best, primitive) = (*point, id);
+    });
+    placed.contact(&best, primitive)
 }
 
 /// The gap of [`wheel_contact`], m.
 #[must_use]
 pub fn wheel_gap(model: &Model, kinematics: &Kinematics, terrain: &dyn Terrain, i: usize) -> f64 {
     let mut gap = f64::INFINITY;
-    let wheel = PlacedWheel::of(model, kinematics, i);
-    wheel.visit_nearer(terrain, |_, point| gap = point.gap);
+    visit_nearer(model, kinematics, terrain, i, &mut |_, point| {
+        gap = point.gap;
+    });
     gap
 }
 
-/// A wheel whose nearest ground is searched.
-struct PlacedWheel<'a> {
-    placed: Placed,
-    /// Origin of its tree in the world, and its centre relative to that, m.
-    base: &'a Vector3<f64>,
-    centre: Vector3<f64>,
-    radius: f64,
+fn placed_wheel(model: &Model, kinematics: &Kinematics, i: usize) -> Placed {
+    let part = Part::Wheel(i);
+    Placed {
+        part,
+        body: part.body(model),
+        shape: part.place(model, kinematics),
+    }
 }
 
-impl<'a> PlacedWheel<'a> {
-    #[inline]
-    fn of(model: &Model, kinematics: &'a Kinematics, i: usize) -> Self {
-        let part = Part::Wheel(i);
-        let body = part.body(model);
-        Self {
-            base: kinematics.origin(body),
-            centre: kinematics.point(body, &part.centre(model)),
-            radius: part.bound(model),
-            placed: Placed {
-                part,
-                body,
-                shape: part.place(model, kinematics),
-            },
-        }
-    }
-
-    /// Visits points of the ground, each nearer than those before; the last one is the nearest.
-    #[inline]
-    fn visit_nearer(&self, terrain: &dyn Terrain, mut visit: impl FnMut(u32, &SurfacePoint)) {
-        let Self {
-            placed: Placed { shape, .. },
-            base,
-            centre,
-            radius,
-        } = self;
-        let mut gap = f64::INFINITY;
-        // A primitive that is not visited is further from the centre than `reach`, hence further
-        // from the wheel than reach − R.
-        let mut reach = 2.0 * radius;
-        while reach < FAR && gap + radius > reach {
-            terrain.visit_near(&(*base + centre), reach, &mut |id, primitive| {
-                let point = match primitive {
-                    Primitive::Plane(plane) => {
-                        dispatch::point_on_plane(shape, plane, base, NEAREST)
-                    }
-                    Primitive::Sphere(sphere) => dispatch::point_on_sphere(shape, sphere, base),
-                };
-                if point.gap < gap {
-                    gap = point.gap;
-                    visit(id, &point);
+/// Visits points of the ground near wheel `i`, each nearer than those before; the last one is the
+/// nearest.
+#[inline]
+fn visit_nearer(
+    model: &Model,
+    kinematics: &Kinematics,
+    terrain: &dyn Terrain,
+    i: usize,
+    visit: &mut impl FnMut(u32, &SurfacePoint),
+) {
+    let placed = placed_wheel(model, kinematics, i);
+    let centre = kinematics.point(placed.body, &placed.part.centre(model));
+    let radius = placed.part.bound(model);
+    let mut gap = f64::INFINITY;
+    // A primitive that is not visited is further from the centre than `reach`, hence further
+    // from the wheel than reach − R.
+    let mut reach = 2.0 * radius;
+    while reach < FAR && gap + radius > reach {
+        let base = kinematics.origin(placed.body);
+        terrain.visit_near(&(base + centre), reach, &mut |id, primitive| {
+            let point = match primitive {
+                Primitive::Plane(plane) => {
+                    dispatch::point_on_plane(&placed.shape, plane, base, NEAREST)
                 }
-            });
-            reach *= 2.0;
-        }
+                Primitive::Sphere(sphere) => dispatch::point_on_sphere(&placed.shape, sphere, base),
+            };
+            if point.gap < gap {
+                gap = point.gap;
+                visit(id, &point);
+            }
+        });
+        reach *= 2.0;
     }
 }
 
