@@ -1,19 +1,12 @@
 """The machine of a measurement."""
 
-import platform
 from importlib import metadata
-from pathlib import Path
+
+from rover_gym.vector.exploring import processor
+
+__all__ = ["PACKAGES", "processor", "versions"]
 
 PACKAGES = ("rover-gym", "mujoco", "drake", "pybullet", "pin", "numpy")
-
-
-def processor() -> str:
-    """What the machine calls its processor."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        return platform.processor()
 
 
 def versions() -> dict[str, str]:

@@ -58,17 +58,18 @@ def speed(
                 measure_speed(num_envs, threads, rounds=rounds, progress=advance, **arguments),
             )
     first = next(iter(told.values()))[0]
+    versions = _versions()
     machine = {
         "processor": processor(),
         "cores": os.cpu_count(),
         "instruction_set": first.instruction_set,
         "date": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
-        "packages": _versions(),
+        "packages": versions,
     }
     if as_json:
         typer.echo(json.dumps({"machine": machine, "grounds": {name: _fields(*two) for name, two in told.items()}}))
         return
-    packages = ", ".join(f"{name} {version}" for name, version in _versions().items())
+    packages = ", ".join(f"{name} {version}" for name, version in versions.items())
     typer.echo(f"{machine['processor']}, {machine['cores']} cores, {machine['instruction_set']}; {machine['date']}")
     typer.echo(f"{packages}; {num_envs} rovers, {first.threads} threads")
     for name, (exploring, environment) in told.items():

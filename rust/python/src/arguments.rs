@@ -165,6 +165,14 @@ pub fn count(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<usiz
     usize::try_from(n).map_err(|_| refused(value, kind, field, "smaller").into())
 }
 
+/// A count of at least one.
+pub fn at_least_one(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<usize> {
+    match count(value, kind, field)? {
+        0 => Err(refused(value, kind, field, "at least 1").into()),
+        n => Ok(n),
+    }
+}
+
 /// A truth value.
 pub fn flag(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<bool> {
     let is_flag = value.is_instance_of::<PyBool>() || scalar_kind(value) == Some('b');

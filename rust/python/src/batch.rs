@@ -6,7 +6,7 @@ use pyo3::types::PyDict;
 use rover_core::scalar::instructions::Instructions;
 use rover_core::simulation::{Batch, RoverSimulation as CoreSimulation};
 
-use crate::arguments::{Given, count, flags, refused};
+use crate::arguments::{Given, at_least_one, count, flags, refused};
 use crate::arrays::array;
 use crate::episode::simulation;
 use crate::errors::{BorderError, Kind, Value};
@@ -104,14 +104,8 @@ impl SimulationBatch {
             rovers.push(one.open()?.clone());
             origins.push(one.origin().clone());
         }
-        let at_least_one = |given: &Bound<'_, PyAny>| -> PyResult<usize> {
-            let threads = count(given, Kind::Option, "threads")?;
-            if threads == 0 {
-                return Err(refused(given, Kind::Option, "threads", "at least 1").into());
-            }
-            Ok(threads)
-        };
-        let threads = threads.map(at_least_one).transpose()?;
+        let threads = threads.map(|given| at_least_one(given, Kind::Option, "threads"));
+        let threads = threads.transpose()?;
         let inner = Batch::new(rovers, scan_points(scan)?, threads).map_err(BorderError::from)?;
         Ok(Self(Shared::new(Inner { inner, origins })))
     }

@@ -123,6 +123,19 @@ fn normals(given: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f64>>> {
         .transpose()
 }
 
+/// The action and the normal numbers of a control period, checked.
+fn given(
+    rules: &Rules,
+    action: &Bound<'_, PyAny>,
+    normals: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(Vec<f64>, Option<Vec<f64>>)> {
+    let action = actions(action, &[rules.n_actions()])?;
+    action::check(&action, action.len(), true).map_err(BorderError::from)?;
+    let normals = self::normals(normals)?;
+    check_normals(rules, normals.as_deref()).map_err(BorderError::from)?;
+    Ok((action, normals))
+}
+
 impl EpisodeRun {
     pub fn of(episode: CoreEpisode) -> Self {
         Self(Shared::new(Inner {
@@ -293,10 +306,7 @@ impl EpisodeRun {
         let mut held = self.0.open()?;
         let inner = &mut *held;
         let rules = inner.episode.rules().clone();
-        let action = actions(action, &[rules.n_actions()])?;
-        action::check(&action, action.len(), true).map_err(BorderError::from)?;
-        let normals = self::normals(normals)?;
-        check_normals(&rules, normals.as_deref()).map_err(BorderError::from)?;
+        let (action, normals) = given(&rules, action, normals)?;
         let mut rover = self::simulation(simulation, "simulation")?.get().open()?;
         rules
             .check_model(rover.model())
@@ -344,10 +354,7 @@ impl EpisodeRun {
     ) -> PyResult<Step<'py>> {
         let mut held = self.0.open()?;
         let rules = held.episode.rules().clone();
-        let action = actions(action, &[rules.n_actions()])?;
-        action::check(&action, action.len(), true).map_err(BorderError::from)?;
-        let normals = self::normals(normals)?;
-        check_normals(&rules, normals.as_deref()).map_err(BorderError::from)?;
+        let (action, normals) = given(&rules, action, normals)?;
         let mut row = vector(reading, Kind::Option, "reading")?;
         let n_state = rules.places().size;
         let expected = n_state + rules.settings().scan.len();

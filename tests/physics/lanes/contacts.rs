@@ -22,6 +22,8 @@ use rover_core::lanes::rows::Rows;
 use rover_core::multibody::{self, Configuration, Kinematics, Model};
 use rover_core::scalar::{Instructions, Lane, LaneMask, Single, Vec3};
 
+use crate::{Random, spread};
+
 const G: f64 = 9.81;
 const THETA: f64 = 0.5;
 const MU: f64 = 0.7;
@@ -44,19 +46,6 @@ struct Step {
 impl Step {
     fn lead(self) -> f64 {
         self.gamma * self.h - (1.0 - THETA) * self.h
-    }
-}
-
-/// Repeatable numbers in [−1, 1).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 * 2.0_f64.powi(-52) - 1.0
     }
 }
 
@@ -106,16 +95,6 @@ impl<T: Lane> Block<T> {
         }
     }
 
-    fn spread(&self, rovers: &[Rover], of: impl Fn(&Rover) -> Vec<f64>) -> Vec<T> {
-        let mut out = vec![T::splat(self.token, 0.0); of(&rovers[0]).len()];
-        for (lane, rover) in rovers.iter().enumerate() {
-            for (out, x) in out.iter_mut().zip(of(rover)) {
-                out.set(lane, x);
-            }
-        }
-        out
-    }
-
     fn step(&mut self, rovers: &[Rover], step: Step) -> Vec<Found> {
         let Self {
             token,
@@ -128,7 +107,7 @@ impl<T: Lane> Block<T> {
         for (lane, rover) in rovers.iter().enumerate() {
             start.set_lane(lane, &rover.q);
         }
-        let v = self.spread(rovers, |rover| rover.v.clone());
+        let v = spread(token, rovers, |rover| rover.v.clone());
         let machine = &self.machine;
         let inertias = &self.inertias;
         let mut poses = Vec::new();
@@ -153,7 +132,7 @@ impl<T: Lane> Block<T> {
             .assemble(machine, end, &factor, &self.contacts, &v);
         let zero = T::splat(token, 0.0);
         let mut q = vec![[zero; 3]; self.contacts.n_slots()];
-        let change = self.spread(rovers, |_| (0..v.len()).map(number).collect());
+        let change = spread(token, rovers, |_| (0..v.len()).map(number).collect());
         T::vectorize(token, || self.rows.local(&self.contacts, &change, &mut q));
         let mu = T::splat(token, MU);
         self.rows

@@ -10,20 +10,9 @@ use rover_core::scalar::Instructions;
 use rover_core::simulation::RoverSimulation;
 use rover_core::simulation::fleet::{Fleet, Rider};
 
-/// Repeatable numbers in [-1, 1].
-struct Numbers(u64);
+use crate::Random;
 
-impl Numbers {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    }
-}
-
-fn rocks(numbers: &mut Numbers) -> Arc<dyn Terrain> {
+fn rocks(numbers: &mut Random) -> Arc<dyn Terrain> {
     let mut centres = Vec::new();
     let mut radii = Vec::new();
     for _ in 0..60 {
@@ -39,7 +28,7 @@ fn rocks(numbers: &mut Numbers) -> Arc<dyn Terrain> {
 }
 
 /// A rover on its ground; every third among rocks.
-fn rover(i: usize, model: &Arc<Model>, numbers: &mut Numbers) -> RoverSimulation {
+fn rover(i: usize, model: &Arc<Model>, numbers: &mut Random) -> RoverSimulation {
     let terrain: Arc<dyn Terrain> = if i % 3 == 2 {
         rocks(numbers)
     } else {
@@ -57,7 +46,7 @@ fn rover(i: usize, model: &Arc<Model>, numbers: &mut Numbers) -> RoverSimulation
     rover
 }
 
-fn command(rover: &mut RoverSimulation, torque: f64, numbers: &mut Numbers) {
+fn command(rover: &mut RoverSimulation, torque: f64, numbers: &mut Random) {
     let torques: Vec<f64> = (0..6).map(|_| torque * numbers.next()).collect();
     let limit = rover.model().wheels()[0].steering_limit;
     let steering: Vec<f64> = (0..6).map(|_| limit * numbers.next()).collect();
@@ -84,7 +73,7 @@ fn assert_alike(a: &RoverSimulation, b: &RoverSimulation) {
 
 /// Drives rovers in a fleet and alone.
 fn drive(instructions: Instructions, n: usize, torque: f64, seed: u64) {
-    let mut numbers = Numbers(seed);
+    let mut numbers = Random(seed);
     let model = Arc::new(Model::rover());
     let mut together: Vec<RoverSimulation> =
         (0..n).map(|i| rover(i, &model, &mut numbers)).collect();
@@ -92,7 +81,7 @@ fn drive(instructions: Instructions, n: usize, torque: f64, seed: u64) {
     let mut fleet = Fleet::new(instructions);
     for _ in 0..8 {
         for (a, b) in together.iter_mut().zip(&mut alone) {
-            let mut same = Numbers(numbers.0);
+            let mut same = Random(numbers.0);
             command(a, torque, &mut numbers);
             command(b, torque, &mut same);
         }
@@ -126,7 +115,7 @@ fn narrower_lanes_give_the_same_bits() {
 
 #[test]
 fn the_quick_step_obeys_the_law_of_the_general_one() {
-    let mut numbers = Numbers(11);
+    let mut numbers = Random(11);
     let model = Arc::new(Model::rover());
     let mut worst = Vec::new();
     for i in 0..6 {

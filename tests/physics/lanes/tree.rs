@@ -15,6 +15,8 @@ use rover_core::multibody::description::{JointKind, Limits, SolidDescription};
 use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription};
 use rover_core::scalar::{Lane, LaneMask, Single, Vec3};
 
+use crate::spread;
+
 /// Time over which the configurations of a test move.
 const H: f64 = 0.3;
 
@@ -39,17 +41,6 @@ impl Found {
     }
 }
 
-fn filled<T: Lane>(token: T::Token, rovers: &[Rover], of: impl Fn(&Rover) -> Vec<f64>) -> Vec<T> {
-    let n = of(&rovers[0]).len();
-    let mut out = vec![T::splat(token, 0.0); n];
-    for (lane, rover) in rovers.iter().enumerate() {
-        for (out, x) in out.iter_mut().zip(of(rover)) {
-            out.set(lane, x);
-        }
-    }
-    out
-}
-
 /// The lane sources on as many rovers as lanes.
 fn found<T: Lane>(token: T::Token, rovers: &[Rover]) -> Vec<Found> {
     let machine = Machine::of(&rovers[0].model).unwrap();
@@ -60,8 +51,8 @@ fn found<T: Lane>(token: T::Token, rovers: &[Rover]) -> Vec<Found> {
         inertias.set_lane(lane, &machine, &rover.model);
         start.set_lane(lane, &rover.q);
     }
-    let v: Vec<T> = filled(token, rovers, |rover| rover.v.clone());
-    let gravity: Vec<T> = filled(token, rovers, |rover| rover.gravity.to_vec());
+    let v: Vec<T> = spread(token, rovers, |rover| rover.v.clone());
+    let gravity: Vec<T> = spread(token, rovers, |rover| rover.gravity.to_vec());
     let gravity = Vec3::new(gravity[0], gravity[1], gravity[2]);
 
     let mut place = start.clone();

@@ -54,6 +54,24 @@ pub fn detect(
     }
 }
 
+/// Deepest gap of any part with the ground, m; 0 where nothing overlaps.
+#[must_use]
+pub fn deepest_overlap(model: &Model, kinematics: &Kinematics, terrain: &dyn Terrain) -> f64 {
+    let (at_rest, touching) = (vec![0.0; model.nv()], Activation::default());
+    let mut contacts = Vec::new();
+    detect(
+        model,
+        kinematics,
+        kinematics,
+        terrain,
+        &at_rest,
+        &touching,
+        &mut contacts,
+    );
+    let gaps = contacts.iter().map(|contact| contact.gap);
+    gaps.fold(0.0, f64::min)
+}
+
 /// Admits the candidates that become contacts.
 struct Gate<'a> {
     model: &'a Model,

@@ -120,8 +120,7 @@ pub fn generalized_impulse(
         push(model, kinematics, contact.body, &contact.point, &force, out);
         // The other body receives the opposite impulse at the same point.
         if let Some(other) = contact.other {
-            let x = place_in_tree_of(kinematics, contact, other.body);
-            push_other(model, kinematics, other.body, &x, &-force, out);
+            push_other(model, kinematics, contact, other.body, &-force, out);
         }
     }
 }
@@ -157,15 +156,16 @@ fn push(
     }
 }
 
-/// The same, kept out of the loop over ground contacts.
+/// The same for the other body of a contact, kept out of the loop over ground contacts.
 #[cold]
 fn push_other(
     model: &Model,
     kinematics: &Kinematics,
+    contact: &Contact,
     body: usize,
-    x: &Vector3<f64>,
     force: &Vector3<f64>,
     out: &mut [f64],
 ) {
-    push(model, kinematics, body, x, force, out);
+    let x = place_in_tree_of(kinematics, contact, body);
+    push(model, kinematics, body, &x, force, out);
 }

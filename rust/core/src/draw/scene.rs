@@ -7,7 +7,7 @@ use super::error::DrawError;
 use super::pcg64::Pcg64;
 use super::rocks::{RockDistribution, RockDraw, clear_radius};
 use super::start::{FixedStart, Range, Start, StartDistribution, resting_pose, tilted_plane};
-use crate::contact::{Activation, detect};
+use crate::contact::detection::deepest_overlap;
 use crate::geometry::{Plane, SphereField, Terrain};
 use crate::integrator::StepOptions;
 use crate::multibody::{Kinematics, coordinates};
@@ -119,14 +119,11 @@ impl SceneDistribution {
     ) -> Result<DrawnScene, DrawError> {
         let rocks = self.rocks.as_ref();
         let rocks = rocks.map(|rocks| rocks.draw(random, difficulty, fixed.difficulty));
-        let start = match rocks {
-            Some(rocks) if self.slope_by_difficulty => StartDistribution {
-                slope: rocks.slope(),
-                ..self.start.clone()
-            }
-            .draw(random, &fixed.start),
-            _ => self.start.draw(random, &fixed.start),
-        };
+        let mut start = self.start.clone();
+        if let (Some(rocks), true) = (rocks, self.slope_by_difficulty) {
+            start.slope = rocks.slope();
+        }
+        let start = start.draw(random, &fixed.start);
         let domain = self.domain.draw(random);
         let (plane, ground) = match (&self.field, rocks) {
             (Some(field), _) => {
@@ -181,22 +178,10 @@ impl SceneDistribution {
 }
 
 impl DrawnScene {
-    /// Deepest gap (m) of any wheel or box with the ground; 0 where nothing overlaps.
+    /// Deepest gap of any part with the ground, m; 0 where nothing overlaps.
     fn deepest_overlap(&self) -> f64 {
         let RoverScene { model, terrain, .. } = &self.placement.scene;
         let kinematics = Kinematics::of(model, &self.placement.configuration);
-        let (at_rest, touching) = (vec![0.0; model.nv()], Activation::default());
-        let mut contacts = Vec::new();
-        detect(
-            model,
-            &kinematics,
-            &kinematics,
-            &**terrain,
-            &at_rest,
-            &touching,
-            &mut contacts,
-        );
-        let gaps = contacts.iter().map(|contact| contact.gap);
-        gaps.fold(0.0, f64::min)
+        deepest_overlap(model, &kinematics, &**terrain)
     }
 }

@@ -56,3 +56,20 @@ pub enum EpisodeError {
     #[error(transparent)]
     Batch(#[from] BatchError),
 }
+
+/// Refuses the first of some lists that has a wrong length: its name, its length and the one that
+/// it needs.
+pub(super) fn check_lengths(
+    lists: impl IntoIterator<Item = (&'static str, usize, usize)>,
+) -> Result<(), EpisodeError> {
+    let wrong = lists
+        .into_iter()
+        .find(|(_, actual, expected)| actual != expected);
+    wrong.map_or(Ok(()), |(field, actual, expected)| {
+        Err(EpisodeError::Length {
+            field,
+            expected,
+            actual,
+        })
+    })
+}

@@ -38,37 +38,22 @@ impl Quantities {
     /// From a reading without heights.
     #[must_use]
     pub fn of(places: &Places, reading: &[f64]) -> Self {
-        let scalars = &reading[places.scalars.clone()];
-        let &[
-            distance,
-            cos_tilt,
-            speed,
-            trunk_force,
-            slip_ratio,
-            work,
-            positive_work,
-            time,
-            not_converged,
-            iterations,
-            residual,
-            n_contacts,
-        ] = scalars
-        else {
+        let Ok(s) = <[f64; 12]>::try_from(&reading[places.scalars.clone()]) else {
             unreachable!("invariant: the scalars of a reading are twelve")
         };
         Self {
-            distance,
-            cos_tilt,
-            speed,
-            trunk_force,
-            slip_ratio,
-            work,
-            positive_work,
-            time,
-            not_converged,
-            iterations,
-            residual,
-            n_contacts,
+            distance: s[0],
+            cos_tilt: s[1],
+            speed: s[2],
+            trunk_force: s[3],
+            slip_ratio: s[4],
+            work: s[5],
+            positive_work: s[6],
+            time: s[7],
+            not_converged: s[8],
+            iterations: s[9],
+            residual: s[10],
+            n_contacts: s[11],
         }
     }
 

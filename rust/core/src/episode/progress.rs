@@ -41,17 +41,4 @@ impl Progress {
         let is_stuck = now.trunk_force > trunk_load_limit && now.speed <= STUCK_SPEED;
         self.stuck_time = if is_stuck { self.stuck_time + dt } else { 0.0 };
     }
-
-    /// Whether all of its numbers are finite.
-    #[must_use]
-    pub fn is_finite(&self) -> bool {
-        let numbers = [
-            self.distance,
-            self.energy,
-            self.energy_positive,
-            self.stuck_time,
-        ];
-        let mut numbers = numbers.iter().chain(&self.previous_action);
-        numbers.all(|x| x.is_finite())
-    }
 }

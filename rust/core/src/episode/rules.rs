@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::error::EpisodeError;
+use super::error::{EpisodeError, check_lengths};
 use super::reward::Weights;
 use crate::multibody::Model;
 use crate::simulation::ReadingLayout;
@@ -92,20 +92,11 @@ impl Rules {
         let n_wheels = model.wheels().len();
         let size = shared + 2 * n_wheels + 1 + settings.scan.len();
         let noise = settings.noise.len();
-        let lengths = [
+        check_lengths([
             ("torque_limits", settings.torque_limits.len(), n_wheels),
             ("scale", settings.scale.len(), size),
             ("noise", noise, if noise == 0 { 0 } else { size }),
-        ];
-        for (field, actual, expected) in lengths {
-            if actual != expected {
-                return Err(EpisodeError::Length {
-                    field,
-                    expected,
-                    actual,
-                });
-            }
-        }
+        ])?;
         let positive = |field, value: f64| (field, value, value > 0.0, "a finite number above 0");
         let not_negative =
             |field, value: f64| (field, value, value >= 0.0, "a finite number from 0");
@@ -153,15 +144,9 @@ impl Rules {
     /// # Errors
     /// `Length`, `OutOfRange`.
     pub fn check_model(&self, model: &Model) -> Result<(), EpisodeError> {
-        for ((field, expected), actual) in SIZES.iter().zip(self.sizes).zip(sizes(model)) {
-            if actual != expected {
-                return Err(EpisodeError::Length {
-                    field,
-                    expected,
-                    actual,
-                });
-            }
-        }
+        let own = sizes(model).into_iter().zip(self.sizes);
+        let lists = SIZES.into_iter().zip(own);
+        check_lengths(lists.map(|(field, (actual, expected))| (field, actual, expected)))?;
         let steered = model.wheels().iter().filter(|w| w.steering.is_some());
         let limit = steered
             .map(|w| w.steering_limit)

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::action;
 use super::ending::Ending;
-use super::error::EpisodeError;
+use super::error::{EpisodeError, check_lengths};
 use super::observation::{write_heights, write_state};
 use super::outcome::{Outcome, Quantities};
 use super::progress::Progress;
@@ -77,7 +77,7 @@ pub struct Episode {
     observation: Vec<f32>,
     outcome: Outcome,
     lacks_heights: bool,
-    /// Normal numbers of the heights that the last observation lacks.
+    /// Normal numbers of the last observation, if it lacks heights.
     owed: Vec<f64>,
 }
 
@@ -133,23 +133,11 @@ impl Episode {
         observation: Vec<f32>,
     ) -> Result<Self, EpisodeError> {
         setting.check()?;
-        let lengths = [
-            (
-                "previous_action",
-                progress.previous_action.len(),
-                rules.n_actions(),
-            ),
-            ("observation", observation.len(), rules.size()),
-        ];
-        for (field, actual, expected) in lengths {
-            if actual != expected {
-                return Err(EpisodeError::Length {
-                    field,
-                    expected,
-                    actual,
-                });
-            }
-        }
+        let (previous, size) = (progress.previous_action.len(), observation.len());
+        check_lengths([
+            ("previous_action", previous, rules.n_actions()),
+            ("observation", size, rules.size()),
+        ])?;
         let numbers = [
             ("distance", progress.distance),
             ("energy", progress.energy),
@@ -280,7 +268,7 @@ impl Episode {
             self.lacks_heights = period.heights.is_none();
             if let (true, Some(normals)) = (self.lacks_heights, normals) {
                 self.owed.clear();
-                self.owed.extend_from_slice(&normals[n_state..]);
+                self.owed.extend_from_slice(normals);
             }
         }
 
@@ -320,13 +308,10 @@ impl Episode {
         let rules = &*self.rules;
         let mut heights = vec![0.0; rules.settings().scan.len()];
         rover.read_heights(&rules.settings().scan, &mut heights);
-        let mut entries = vec![0.0; rules.size()];
-        let mut normals = vec![0.0; rules.n_state()];
-        normals.extend_from_slice(&self.owed);
-        let normals = rules.is_noisy().then_some(&normals[..]);
-        if write_heights(rules, &heights, normals, &mut entries) {
-            let n_state = rules.n_state();
-            self.observation[n_state..].copy_from_slice(&entries[n_state..]);
+        let normals = rules.is_noisy().then_some(&self.owed[..]);
+        let mut observation = self.observation.clone();
+        if write_heights(rules, &heights, normals, &mut observation) {
+            self.observation = observation;
         }
     }
 }
@@ -336,13 +321,6 @@ impl Episode {
 /// # Errors
 /// `Length`.
 pub fn check_normals(rules: &Rules, normals: Option<&[f64]>) -> Result<(), EpisodeError> {
-    let (actual, expected) = (normals.map_or(0, <[f64]>::len), rules.noise().len());
-    if actual == expected {
-        return Ok(());
-    }
-    Err(EpisodeError::Length {
-        field: "normals",
-        expected,
-        actual,
-    })
+    let given = normals.map_or(0, <[f64]>::len);
+    check_lengths([("normals", given, rules.noise().len())])
 }

@@ -309,19 +309,16 @@ fn give_commands(
     assert_eq!(torques.len(), n, "one torque a wheel");
     assert_eq!(set_points.len(), n, "one set-point a wheel");
     let own = |index: usize| index * n_wheels..(index + 1) * n_wheels;
-    let refused = |index| move |error| BatchError::Command { index, error };
     for (index, rover) in rovers.iter().enumerate() {
         if is_active(index) {
             rover
                 .check_commands(&torques[own(index)], &set_points[own(index)])
-                .map_err(refused(index))?;
+                .map_err(|error| BatchError::Command { index, error })?;
         }
     }
     for (index, rover) in rovers.iter_mut().enumerate() {
         if is_active(index) {
-            rover
-                .set_commands(&torques[own(index)], &set_points[own(index)])
-                .map_err(refused(index))?;
+            rover.take_commands(&torques[own(index)], &set_points[own(index)]);
         }
     }
     Ok(())

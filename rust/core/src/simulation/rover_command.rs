@@ -227,9 +227,14 @@ impl RoverSimulation {
         set_points: &[f64],
     ) -> Result<(), CommandError> {
         self.check_commands(torques, set_points)?;
+        self.take_commands(torques, set_points);
+        Ok(())
+    }
+
+    /// [`Self::set_commands`] after [`Self::check_commands`].
+    pub(super) fn take_commands(&mut self, torques: &[f64], set_points: &[f64]) {
         self.take_wheel_torques(torques);
         self.take_steering(set_points);
-        Ok(())
     }
 
     /// Checks whether [`Self::set_wheel_torques`] and [`Self::set_steering`] would accept these.

@@ -1,7 +1,8 @@
 //! Contact points and forces of a rover on the ground.
 
 use super::rover::RoverSimulation;
-use crate::contact::{Activation, Contact, ContactFrame, Part, detect, detection::wheel_contacts};
+use crate::contact::detection::{deepest_overlap, wheel_contacts};
+use crate::contact::{Contact, ContactFrame, Part};
 
 impl RoverSimulation {
     /// Current nearest point, frame and gap of every wheel.
@@ -10,25 +11,10 @@ impl RoverSimulation {
         wheel_contacts(self.model(), &self.kinematics(), &**self.terrain())
     }
 
-    /// Deepest gap (m) of any wheel or box with the ground now: 0 where
-    /// nothing overlaps, else negative.
+    /// Deepest gap of any part with the ground now, m; 0 where nothing overlaps.
     #[must_use]
     pub fn deepest_overlap(&self) -> f64 {
-        let mut contacts = Vec::new();
-        let (kinematics, at_rest) = (self.kinematics(), vec![0.0; self.model().nv()]);
-        let touching = Activation::default();
-        detect(
-            self.model(),
-            &kinematics,
-            &kinematics,
-            &**self.terrain(),
-            &at_rest,
-            &touching,
-            &mut contacts,
-        );
-        contacts
-            .iter()
-            .fold(0.0, |deepest, contact| deepest.min(contact.gap))
+        deepest_overlap(self.model(), &self.kinematics(), &**self.terrain())
     }
 
     /// Mean contact force of the last step on every wheel along its frame's n, t, b, N.

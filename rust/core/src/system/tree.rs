@@ -170,6 +170,19 @@ impl TreeSystem<'_> {
         base
     }
 
+    /// Largest rate of a joint that turns a frame, rad/s.
+    #[inline]
+    fn turning_of_joints(&self, v: &[f64]) -> f64 {
+        let bodies = self.model.bodies();
+        let mut joints = fastest(self.model.turning_joints(), v);
+        for &b in self.model.coupled_bodies() {
+            if let Joint::Revolute(joint) = &bodies[b].joint {
+                joints = joints.max(joint.coordinate.rate(v[bodies[b].velocity]).abs());
+            }
+        }
+        joints
+    }
+
     /// Upper bound on the speed of all points of a tree, m/s.
     fn fastest_point(&self, tree: &Tree, v: &[f64]) -> f64 {
         let v = &v[tree.velocities.clone()];
@@ -353,23 +366,18 @@ impl MechanicalSystem for TreeSystem<'_> {
     #[inline]
     fn is_gyroscopic(&self, options: &StepOptions, v: &[f64]) -> bool {
         let h = options.time_step;
-        let spin = fastest(self.model.spinning_joints(), v);
-        h * self.turning_of_bases(v) > MOST_TURN
-            || h * self.turning(v) > MOST_JOINT_TURN
+        let (base, spin) = (
+            self.turning_of_bases(v),
+            fastest(self.model.spinning_joints(), v),
+        );
+        h * base > MOST_TURN
+            || h * (base + self.turning_of_joints(v)) > MOST_JOINT_TURN
             || h * spin > MOST_SPIN
     }
 
     #[inline]
     fn turning(&self, v: &[f64]) -> f64 {
-        let base = self.turning_of_bases(v);
-        let bodies = self.model.bodies();
-        let mut joints = fastest(self.model.turning_joints(), v);
-        for &b in self.model.coupled_bodies() {
-            if let Joint::Revolute(joint) = &bodies[b].joint {
-                joints = joints.max(joint.coordinate.rate(v[bodies[b].velocity]).abs());
-            }
-        }
-        base + joints
+        self.turning_of_bases(v) + self.turning_of_joints(v)
     }
 
     fn conserves_momenta(&self) -> bool {

@@ -103,17 +103,6 @@ impl Rocks {
         1.79 + 0.152 / self.abundance
     }
 
-    /// Expected number of rocks between the smallest and the largest diameter.
-    #[must_use]
-    pub fn expected_count(&self) -> f64 {
-        self.count_of(&self.table())
-    }
-
-    fn count_of(&self, table: &[f64]) -> f64 {
-        let per_area = table.last().copied().unwrap_or_default();
-        per_area * self.area[0] * self.area[1]
-    }
-
     /// Rocks per m² from 1/max_diameter up to each node of a uniform grid in 1/D.
     fn table(&self) -> Vec<f64> {
         let (low, step) = self.grid();
@@ -225,7 +214,8 @@ impl Rocks {
     pub fn sample(&self) -> Result<Vec<Sphere>, TerrainError> {
         self.check()?;
         let table = self.table();
-        let expected = self.count_of(&table);
+        let per_area = table.last().copied().unwrap_or_default();
+        let expected = per_area * self.area[0] * self.area[1];
         check_count(expected.min(1e15).ceil() as usize)?;
         let mut random = Random::new(self.seed);
         let count = (expected + random.uniform()) as usize;
