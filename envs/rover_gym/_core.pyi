@@ -2012,10 +2012,10 @@ class EpisodeBatch:
         attempts: int = 100,
         has_scan: bool = True,
     ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_], list[int]]:
-        """Gives all rovers their actions for one control period and begins the next episodes of those
-        that are over, drawn on the threads of this batch from the rovers' own generators.
+        """Gives all rovers their actions for one control period and begins the next episodes.
 
-        Ctrl-C ends the call as it ends that of `step`.
+        Those rovers begin anew whose episode is over; what they begin is drawn on the threads of this
+        batch from their own generators. Ctrl-C ends the call as it ends that of `step`.
 
         Args:
             actions: As of `step`.
@@ -2039,9 +2039,7 @@ class EpisodeBatch:
         """
     @property
     def over(self) -> list[int]:
-        """Indices of the rovers whose episode has ended or reached the time limit, and whose next has
-        not begun, in order.
-        """
+        """Indices of the rovers whose episode is over and whose next has not begun, in order."""
     def finals(self) -> dict[int, tuple[_Observation, dict[str, Any]]]:
         """The episodes that the last call of `step_on` with `same_step` has ended.
 
@@ -2140,8 +2138,7 @@ class EpisodeBatch:
             OptionError: There is no such rover, or its episode has not begun.
         """
     def difficulty(self, index: int) -> _Range | None:
-        """Range (low, high) that replaces that of the rocks' difficulty in the next episodes of a
-        rover, or None.
+        """Range (low, high) of the rocks' difficulty in the next episodes of a rover, if it has its own.
 
         Args:
             index: Index of the rover.
@@ -2150,8 +2147,7 @@ class EpisodeBatch:
             OptionError: There is no such rover.
         """
     def set_difficulty(self, index: int, difficulty: _Range | None) -> None:
-        """Sets the range that replaces that of the rocks' difficulty in the episodes that `step_on`
-        begins with a rover.
+        """Sets the range of the rocks' difficulty in the episodes that `step_on` begins with a rover.
 
         Args:
             index: Index of the rover.

@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
-from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env import beginning
+from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.episode_scene import EpisodeScene, ResetOptions, check_difficulty, check_reset_options, scene_of
 from rover_gym.env.generators import Rows, check_seed, fresh_seed, generator_at, row_of, seeded_rows, set_row
 from rover_gym.env.observation import ObservationLayout

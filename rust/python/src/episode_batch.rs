@@ -209,10 +209,10 @@ impl EpisodeBatch {
         Ok(step)
     }
 
-    /// Gives all rovers their actions for one control period and begins the next episodes of those
-    /// that are over, drawn on the threads of this batch from the rovers' own generators.
+    /// Gives all rovers their actions for one control period and begins the next episodes.
     ///
-    /// Ctrl-C ends the call as it ends that of `step`.
+    /// Those rovers begin anew whose episode is over; what they begin is drawn on the threads of this
+    /// batch from their own generators. Ctrl-C ends the call as it ends that of `step`.
     ///
     /// Args:
     ///     actions: As of `step`.
@@ -264,8 +264,7 @@ impl EpisodeBatch {
         Ok(step)
     }
 
-    /// Indices of the rovers whose episode has ended or reached the time limit, and whose next has
-    /// not begun, in order.
+    /// Indices of the rovers whose episode is over and whose next has not begun, in order.
     #[getter]
     fn over(&self) -> PyResult<Vec<usize>> {
         Ok(self.0.open()?.batch.over())
@@ -473,8 +472,7 @@ impl EpisodeBatch {
         ))
     }
 
-    /// Range (low, high) that replaces that of the rocks' difficulty in the next episodes of a
-    /// rover, or None.
+    /// Range (low, high) of the rocks' difficulty in the next episodes of a rover, if it has its own.
     ///
     /// Args:
     ///     index: Index of the rover.
@@ -488,8 +486,7 @@ impl EpisodeBatch {
         Ok(found.map(|[low, high]| (low, high)))
     }
 
-    /// Sets the range that replaces that of the rocks' difficulty in the episodes that `step_on`
-    /// begins with a rover.
+    /// Sets the range of the rocks' difficulty in the episodes that `step_on` begins with a rover.
     ///
     /// Args:
     ///     index: Index of the rover.
