@@ -16,13 +16,23 @@ const REGISTER: usize = 8;
 /// Gaps of wheels: scratch.
 #[derive(Debug, Default)]
 pub struct WheelGaps {
-    /// Attitude and origin of each body, relative to the trunk's origin, m; of a spinner, before
-    /// its own rotation.
-    poses: Vec<(Mat3<f64>, Vec3<f64>)>,
+    poses: Vec<Pose>,
     /// Angles, sines and cosines of the joints that are not spinners', in the order of the bodies.
     turns: [Vec<f64>; 3],
     /// Poses of a machine with other joints than revolute ones.
     kinematics: Option<Kinematics>,
+}
+
+/// Pose of a body. Written number by number: a register that is stored in parts and loaded as a
+/// whole takes as long as the rest of the pose.
+#[derive(Clone, Copy, Debug)]
+struct Pose {
+    /// Attitude; without meaning for a body that only spins.
+    R: Mat3<f64>,
+    /// Origin relative to the trunk's, m.
+    r: Vec3<f64>,
+    /// The body whose attitude it has: itself, or for one that only spins its carrier.
+    frame: usize,
 }
 
 impl WheelGaps {
@@ -59,10 +69,10 @@ impl WheelGaps {
                     || self.pose(model, configuration),
                 );
                 for (gap, wheel) in gaps.iter_mut().zip(model.wheels()) {
-                    let (R, r) = &self.poses[wheel.body];
+                    let (R, r) = self.place(wheel.body);
                     let turned = |v: &Vector3<f64>| R.times_shared((*v).into());
                     let disc = Disc {
-                        centre: vector(*r + turned(&wheel.centre)),
+                        centre: vector(r + turned(&wheel.centre)),
                         axle: vector(turned(&wheel.axle)),
                         spoke: vector(turned(&wheel.spoke)),
                         radius: wheel.radius,
@@ -112,50 +122,54 @@ impl WheelGaps {
         sines_cosines(angles, sines, cosines);
 
         let attitude = configuration.attitude.to_rotation_matrix();
-        let nowhere = Vec3::new(0.0, 0.0, 0.0);
-        self.poses.clear();
-        self.poses.push((matrix(attitude.matrix()), nowhere));
+        let origin = Vec3::new(0.0, 0.0, 0.0);
+        let trunk = Pose {
+            R: matrix(attitude.matrix()),
+            r: origin,
+            frame: 0,
+        };
+        self.poses.resize(bodies.len(), trunk);
+        self.poses[0] = trunk;
         let mut turn = 0;
-        for body in &bodies[1..] {
+        for (b, body) in bodies.iter().enumerate().skip(1) {
             let (Some(parent), Joint::Revolute(joint)) = (body.parent, &body.joint) else {
                 unreachable!("invariant: all other joints turn a body on another")
             };
-            let (carrier, r) = self.poses[parent];
-            let r = r + carrier.times_shared(body.position.into());
-            let mut R = carrier;
+            let (before, own) = self.poses.split_at_mut(b);
+            let (carrier, own) = (&before[parent], &mut own[0]);
+            let R = &before[carrier.frame].R;
+            own.r = carrier.r + R.times_shared(body.position.into());
+            own.frame = b;
+            let (mut x, mut y, mut z) = (R.x, R.y, R.z);
             if let Some(fixed) = &body.rotation {
-                let column = |j: usize| carrier.times_shared(fixed.column(j).into_owned().into());
-                R = Mat3 {
-                    x: column(0),
-                    y: column(1),
-                    z: column(2),
-                };
+                let column =
+                    |j: usize| R.times_shared([fixed[(0, j)], fixed[(1, j)], fixed[(2, j)]]);
+                (x, y, z) = (column(0), column(1), column(2));
+            } else if body.is_spinner {
+                own.frame = carrier.frame;
+                continue;
             }
-            if !body.is_spinner {
-                let (s, c) = (sines[turn], cosines[turn]);
-                let Mat3 { x, y, z } = R;
-                R = match joint.axis {
-                    JointAxis::X => Mat3 {
-                        x,
-                        y: y * c + z * s,
-                        z: z * c - y * s,
-                    },
-                    JointAxis::Y => Mat3 {
-                        x: x * c - z * s,
-                        y,
-                        z: z * c + x * s,
-                    },
-                    JointAxis::Z => Mat3 {
-                        x: x * c + y * s,
-                        y: y * c - x * s,
-                        z,
-                    },
-                    JointAxis::General(_) => rotated(&joint.axis, &R, angles[turn]),
-                };
-                turn += 1;
+            let R = &mut own.R;
+            (R.x, R.y, R.z) = (x, y, z);
+            if body.is_spinner {
+                continue;
             }
-            self.poses.push((R, r));
+            let (s, c) = (sines[turn], cosines[turn]);
+            match joint.axis {
+                JointAxis::X => (R.y, R.z) = (y * c + z * s, z * c - y * s),
+                JointAxis::Y => (R.z, R.x) = (z * c + x * s, x * c - z * s),
+                JointAxis::Z => (R.x, R.y) = (x * c + y * s, y * c - x * s),
+                JointAxis::General(_) => *R = rotated(&joint.axis, R, angles[turn]),
+            }
+            turn += 1;
         }
+    }
+
+    /// Attitude of a body, but for its spin, and its origin relative to the trunk's, m.
+    #[inline(always)]
+    fn place(&self, body: usize) -> (&Mat3<f64>, Vec3<f64>) {
+        let pose = &self.poses[body];
+        (&self.poses[pose.frame].R, pose.r)
     }
 
     /// The gap of the lowest rim point of every wheel over a plane: see
@@ -173,8 +187,8 @@ impl WheelGaps {
         let n = Vec3::new(x, y, z);
         let base = n.dot(Vec3::new(o_x, o_y, o_z)) + plane.offset();
         for (gap, wheel) in gaps.iter_mut().zip(model.wheels()) {
-            let (R, r) = &self.poses[wheel.body];
-            let centre = *r + R.times_shared(wheel.centre.into());
+            let (R, r) = self.place(wheel.body);
+            let centre = r + R.times_shared(wheel.centre.into());
             let axle = R.times_shared(wheel.axle.into());
             let w = n - axle * n.dot(axle);
             *gap = base + n.dot(centre) - wheel.radius * w.norm();

@@ -15,7 +15,6 @@
 
 use super::progress::Progress;
 use super::rules::Rules;
-use crate::scalar::Single;
 
 /// Writes the entries before the heights and says whether all of them are finite.
 ///
@@ -63,24 +62,18 @@ fn write(
 ) -> bool {
     let place = start..start + values.len();
     let out = &mut out[place.clone()];
-    let inverses = &rules.inverse_scale()[place.clone()];
-    let noise = normals.map(|normals| (&normals[place.clone()], &rules.noise()[place]));
-    Single::best().vectorize(
-        #[inline(always)]
-        || {
-            let entries = out.iter_mut().zip(inverses).zip(values);
-            if let Some((normals, deviations)) = noise {
-                let noise = normals.iter().zip(deviations);
-                for (((entry, inverse), value), (z, deviation)) in entries.zip(noise) {
-                    *entry = (value * inverse + z * deviation) as f32;
-                }
-            } else {
-                for ((entry, inverse), value) in entries {
-                    *entry = (value * inverse) as f32;
-                }
-            }
-            // A fold without a branch, since all entries but few are finite.
-            out.iter().fold(true, |all, entry| all & entry.is_finite())
-        },
-    )
+    let entries = out.iter_mut().zip(&rules.inverse_scale()[place.clone()]);
+    let entries = entries.zip(values);
+    if let Some(normals) = normals {
+        let noise = normals[place.clone()].iter().zip(&rules.noise()[place]);
+        for (((entry, inverse), value), (z, deviation)) in entries.zip(noise) {
+            *entry = (value * inverse + z * deviation) as f32;
+        }
+    } else {
+        for ((entry, inverse), value) in entries {
+            *entry = (value * inverse) as f32;
+        }
+    }
+    // A fold without a branch, since all entries but few are finite.
+    out.iter().fold(true, |all, entry| all & entry.is_finite())
 }
