@@ -23,8 +23,10 @@ pub struct WheelGaps {
     kinematics: Option<Kinematics>,
 }
 
-/// Pose of a body. Written number by number: a register that is stored in parts and loaded as a
-/// whole takes as long as the rest of the pose.
+/// Columns of an attitude.
+type Columns = (Vec3<f64>, Vec3<f64>, Vec3<f64>);
+
+/// Pose of a body.
 #[derive(Clone, Copy, Debug)]
 struct Pose {
     /// Attitude; without meaning for a body that only spins.
@@ -53,33 +55,21 @@ impl WheelGaps {
             self.write_by_kinematics(model, configuration, terrain, gaps);
             return;
         }
-        let plane = terrain.ground().filter(|_| !terrain.can_be_passed());
-        let token = Single::best();
-        match plane {
-            Some(plane) => token.vectorize(
-                #[inline(always)]
-                || {
-                    self.pose(model, configuration);
-                    self.write_over_plane(model, &configuration.position, plane, gaps);
-                },
-            ),
-            None => {
-                token.vectorize(
-                    #[inline(always)]
-                    || self.pose(model, configuration),
-                );
-                for (gap, wheel) in gaps.iter_mut().zip(model.wheels()) {
-                    let (R, r) = self.place(wheel.body);
-                    let turned = |v: &Vector3<f64>| R.times_shared((*v).into());
-                    let disc = Disc {
-                        centre: vector(r + turned(&wheel.centre)),
-                        axle: vector(turned(&wheel.axle)),
-                        spoke: vector(turned(&wheel.spoke)),
-                        radius: wheel.radius,
-                    };
-                    *gap = disc_gap(&disc, &configuration.position, terrain);
-                }
-            }
+        self.pose(model, configuration);
+        if let Some(plane) = terrain.ground().filter(|_| !terrain.can_be_passed()) {
+            self.write_over_plane(model, &configuration.position, plane, gaps);
+            return;
+        }
+        for (gap, wheel) in gaps.iter_mut().zip(model.wheels()) {
+            let (R, r) = self.place(wheel.body);
+            let turned = |v: &Vector3<f64>| R.times_shared((*v).into());
+            let disc = Disc {
+                centre: vector(r + turned(&wheel.centre)),
+                axle: vector(turned(&wheel.axle)),
+                spoke: vector(turned(&wheel.spoke)),
+                radius: wheel.radius,
+            };
+            *gap = disc_gap(&disc, &configuration.position, terrain);
         }
     }
 
@@ -103,7 +93,6 @@ impl WheelGaps {
     }
 
     /// Poses of a machine on a free base whose other joints are revolute and uncoupled.
-    #[inline(always)]
     fn pose(&mut self, model: &Model, configuration: &Configuration) {
         let bodies = model.bodies();
         let [angles, sines, cosines] = &mut self.turns;
@@ -119,7 +108,10 @@ impl WheelGaps {
         angles.resize(n, 0.0);
         sines.resize(n, 0.0);
         cosines.resize(n, 0.0);
-        sines_cosines(angles, sines, cosines);
+        Single::best().vectorize(
+            #[inline(always)]
+            || sines_cosines(angles, sines, cosines),
+        );
 
         let attitude = configuration.attitude.to_rotation_matrix();
         let origin = Vec3::new(0.0, 0.0, 0.0);
@@ -149,24 +141,22 @@ impl WheelGaps {
                 own.frame = carrier.frame;
                 continue;
             }
-            let R = &mut own.R;
-            (R.x, R.y, R.z) = (x, y, z);
-            if body.is_spinner {
-                continue;
+            if !body.is_spinner {
+                let (s, c) = (sines[turn], cosines[turn]);
+                (x, y, z) = match &joint.axis {
+                    JointAxis::X => (x, y * c + z * s, z * c - y * s),
+                    JointAxis::Y => (x * c - z * s, y, z * c + x * s),
+                    JointAxis::Z => (x * c + y * s, y * c - x * s, z),
+                    JointAxis::General(_) => rotated(&joint.axis, [x, y, z], angles[turn]),
+                };
+                turn += 1;
             }
-            let (s, c) = (sines[turn], cosines[turn]);
-            match joint.axis {
-                JointAxis::X => (R.y, R.z) = (y * c + z * s, z * c - y * s),
-                JointAxis::Y => (R.z, R.x) = (z * c + x * s, x * c - z * s),
-                JointAxis::Z => (R.x, R.y) = (x * c + y * s, y * c - x * s),
-                JointAxis::General(_) => *R = rotated(&joint.axis, R, angles[turn]),
-            }
-            turn += 1;
+            own.R = Mat3 { x, y, z };
         }
     }
 
     /// Attitude of a body, but for its spin, and its origin relative to the trunk's, m.
-    #[inline(always)]
+    #[inline]
     fn place(&self, body: usize) -> (&Mat3<f64>, Vec3<f64>) {
         let pose = &self.poses[body];
         (&self.poses[pose.frame].R, pose.r)
@@ -174,7 +164,6 @@ impl WheelGaps {
 
     /// The gap of the lowest rim point of every wheel over a plane: see
     /// [`crate::geometry::query::disc_plane`].
-    #[inline(always)]
     fn write_over_plane(
         &self,
         model: &Model,
@@ -196,14 +185,15 @@ impl WheelGaps {
     }
 }
 
-/// Rotation about an axis that is none of the coordinate axes.
+/// The columns of an attitude, rotated about an axis that is none of the coordinate axes.
 #[cold]
-fn rotated(axis: &JointAxis, R: &Mat3<f64>, angle: f64) -> Mat3<f64> {
-    let R = nalgebra::Matrix3::from_columns(&[vector(R.x), vector(R.y), vector(R.z)]);
-    matrix(&axis.rotate(&R, angle).0)
+fn rotated(axis: &JointAxis, columns: [Vec3<f64>; 3], angle: f64) -> Columns {
+    let R = nalgebra::Matrix3::from_columns(&columns.map(vector));
+    let Mat3 { x, y, z } = matrix(&axis.rotate(&R, angle).0);
+    (x, y, z)
 }
 
-#[inline(always)]
+#[inline]
 fn matrix(R: &nalgebra::Matrix3<f64>) -> Mat3<f64> {
     let column = |j: usize| Vec3::new(R[(0, j)], R[(1, j)], R[(2, j)]);
     Mat3 {
@@ -213,7 +203,57 @@ fn matrix(R: &nalgebra::Matrix3<f64>) -> Mat3<f64> {
     }
 }
 
-#[inline(always)]
+#[inline]
 fn vector(v: Vec3<f64>) -> Vector3<f64> {
     Vector3::new(v.x, v.y, v.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::contact::detection::wheel_contacts;
+    use crate::geometry::SphereField;
+    use crate::multibody::{JointKind, ModelDescription, SolidDescription, coordinates};
+    use proptest::prelude::*;
+
+    /// The rover; the same with a joint about no coordinate axis; and with one that slides.
+    fn machines() -> [Model; 3] {
+        let changed = |change: fn(&mut SolidDescription)| {
+            let mut rover = ModelDescription::rover();
+            let carried = rover.solids.iter_mut().find(|s| s.parent.is_some());
+            change(carried.unwrap());
+            Model::from_description(rover).unwrap()
+        };
+        [
+            Model::rover(),
+            changed(|solid| solid.axis = Some([0.1, 0.2, 0.9])),
+            changed(|solid| solid.joint = Some(JointKind::Prismatic)),
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+        #[test]
+        fn gaps_are_those_of_the_contacts(q in prop::collection::vec(-1.0..1.0, 21)) {
+            let plane = Plane::new([0.2, 1.0, -0.1], 0.3).unwrap();
+            let (centres, radii) = ([[0.5, -0.2, 0.3], [-0.6, 0.0, 0.1]], [0.4, 0.2]);
+            let field = SphereField::new(&centres, &radii, Some(plane)).unwrap();
+            let grounds: [Arc<dyn Terrain>; 2] = [Arc::new(plane), Arc::new(field)];
+            let mut scratch = WheelGaps::default();
+            for model in machines() {
+                let place = coordinates::from_public(&model, &q).unwrap();
+                let poses = Kinematics::of(&model, &place);
+                for ground in &grounds {
+                    let mut gaps = vec![0.0; model.wheels().len()];
+                    scratch.write(&model, &place, &**ground, &mut gaps);
+                    let contacts = wheel_contacts(&model, &poses, &**ground);
+                    for (gap, contact) in gaps.iter().zip(contacts) {
+                        prop_assert!((gap - contact.gap).abs() < 1e-13, "{gap} {}", contact.gap);
+                    }
+                }
+            }
+        }
+    }
 }
