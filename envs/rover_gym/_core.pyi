@@ -2014,8 +2014,8 @@ class EpisodeBatch:
     ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_], list[int]]:
         """Gives all rovers their actions for one control period and begins the next episodes.
 
-        Those rovers begin anew whose episode is over; what they begin is drawn on the threads of this
-        batch from their own generators. Ctrl-C ends the call as it ends that of `step`.
+        Those rovers begin anew whose episode is over; what they begin is drawn on the threads of
+        this batch from their own generators. Ctrl-C ends the call as it ends that of `step`.
 
         Args:
             actions: As of `step`.
@@ -2138,7 +2138,7 @@ class EpisodeBatch:
             OptionError: There is no such rover, or its episode has not begun.
         """
     def difficulty(self, index: int) -> _Range | None:
-        """Range (low, high) of the rocks' difficulty in the next episodes of a rover, if it has its own.
+        """Range (low, high) of the rocks' difficulty in the next episodes of a rover, if any is set.
 
         Args:
             index: Index of the rover.

@@ -211,8 +211,8 @@ impl EpisodeBatch {
 
     /// Gives all rovers their actions for one control period and begins the next episodes.
     ///
-    /// Those rovers begin anew whose episode is over; what they begin is drawn on the threads of this
-    /// batch from their own generators. Ctrl-C ends the call as it ends that of `step`.
+    /// Those rovers begin anew whose episode is over; what they begin is drawn on the threads of
+    /// this batch from their own generators. Ctrl-C ends the call as it ends that of `step`.
     ///
     /// Args:
     ///     actions: As of `step`.
@@ -472,7 +472,7 @@ impl EpisodeBatch {
         ))
     }
 
-    /// Range (low, high) of the rocks' difficulty in the next episodes of a rover, if it has its own.
+    /// Range (low, high) of the rocks' difficulty in the next episodes of a rover, if any is set.
     ///
     /// Args:
     ///     index: Index of the rover.
