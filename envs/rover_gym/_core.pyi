@@ -2003,6 +2003,50 @@ class EpisodeBatch:
                 [-1, 1]. No rover has moved.
             OptionError: `active` is invalid, or an episode has not begun. No rover has moved.
         """
+    def step_on(
+        self,
+        actions: object,
+        distribution: EpisodeDistribution,
+        *,
+        same_step: bool,
+        attempts: int = 100,
+        has_scan: bool = True,
+    ) -> tuple[_Observation, _Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_], list[int]]:
+        """Gives all rovers their actions for one control period and begins the next episodes.
+
+        Those rovers begin anew whose episode is over; what they begin is drawn on the threads of
+        this batch from their own generators. Ctrl-C ends the call as it ends that of `step`.
+
+        Args:
+            actions: As of `step`.
+            distribution: What the next episodes are drawn from.
+            same_step: Whether an episode is followed by the next in the step that ends it, see
+                `finals`. If not, the next one begins in the following step; its rover does not move
+                in that step and earns nothing.
+            attempts: As of `EpisodeDistribution.draw`.
+            has_scan: As of `step`.
+
+        Returns:
+            As of `step`. Where an episode has begun, the observation is its first; with `same_step`
+            all else is that of the episode that has ended. If an episode that is to follow in the
+            same step cannot be drawn, none begins, and the next call refuses it.
+
+        Raises:
+            CommandError: As of `step`.
+            OptionError: An argument is invalid, or an episode has not begun. No rover has moved.
+            RoverGymError: As of `EpisodeDistribution.draw`, for the first rover that has one and
+                whose episode was over before this call. No rover has moved.
+        """
+    @property
+    def over(self) -> list[int]:
+        """Indices of the rovers whose episode is over and whose next has not begun, in order."""
+    def finals(self) -> dict[int, tuple[_Observation, dict[str, Any]]]:
+        """The episodes that the last call of `step_on` with `same_step` has ended.
+
+        Returns:
+            For each index of a rover, in order, the last observation (size,) float32 and the last
+            info. Empty after `step`.
+        """
     def infos(self) -> dict[str, Any]:
         """The infos of all rovers, of their last periods or beginnings.
 
@@ -2080,6 +2124,37 @@ class EpisodeBatch:
         Raises:
             OptionError: There is no such rover, its episode has not begun, or `generators` has a
                 wrong shape. Nothing has changed.
+        """
+    def origin(self, index: int) -> tuple[_Array, _Array, int, _Array]:
+        """Where and on what the episode of a rover has begun.
+
+        Args:
+            index: Index of the rover.
+
+        Returns:
+            Its rows of `DrawnEpisodes.starts`, `rocks`, `rock_seeds` and `domains`.
+
+        Raises:
+            OptionError: There is no such rover, or its episode has not begun.
+        """
+    def difficulty(self, index: int) -> _Range | None:
+        """Range (low, high) of the rocks' difficulty in the next episodes of a rover, if any is set.
+
+        Args:
+            index: Index of the rover.
+
+        Raises:
+            OptionError: There is no such rover.
+        """
+    def set_difficulty(self, index: int, difficulty: _Range | None) -> None:
+        """Sets the range of the rocks' difficulty in the episodes that `step_on` begins with a rover.
+
+        Args:
+            index: Index of the rover.
+            difficulty: The range (low, high); None for that of the distribution.
+
+        Raises:
+            OptionError: There is no such rover, or `difficulty` is no range.
         """
     def terrain(self, index: int) -> Plane | SphereField:
         """The ground of one rover.

@@ -162,7 +162,7 @@ def state_of(env: RoverVectorEnv) -> list[Any]:
         list(batch._seeds),
         batch.observation.tobytes(),
         [rover.start for rover in batch.rovers],
-        list(env._over),
+        batch.over,
     ]
 
 

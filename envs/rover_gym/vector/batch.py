@@ -5,15 +5,16 @@ rovers and threads. Each control period is one call of the compiled core: the th
 its observation, reward and termination, as it does for `RoverEnv`.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
 import numpy.typing as npt
 from gymnasium.error import ResetNeeded
 
+from rover_gym.env import beginning
 from rover_gym.env.arguments import RoverArguments, takes_arguments
-from rover_gym.env.beginning import draw_episodes
 from rover_gym.env.episode_scene import EpisodeScene, ResetOptions, check_difficulty, check_reset_options, scene_of
 from rover_gym.env.generators import Rows, check_seed, fresh_seed, generator_at, row_of, seeded_rows, set_row
 from rover_gym.env.observation import ObservationLayout
@@ -73,14 +74,11 @@ class RoverBatch:
             self.task.rules, simulation, self.n, max_steps=self.max_episode_steps, threads=threads
         )
         self.rovers = tuple(BatchRover(self, i) for i in range(self.n))
-        self._starts, self._rocks = np.zeros((self.n, 7)), np.zeros((self.n, 3))
-        self._rock_seeds, self._domains = np.zeros(self.n, np.uint64), np.zeros((self.n, 4))
         #: Generators of the rovers before their first episodes; afterwards the core has them.
         self._generators: Rows = np.zeros((self.n, 4), np.uint64)
         #: Generators that were handed out; they hold their rovers' states.
         self._lent: dict[int, np.random.Generator] = {}
         self._seeds: list[int] = [-1] * self.n
-        self._difficulties: dict[int, Range] = {}
         self._begun = np.zeros(self.n, np.bool_)
         self._started = False
 
@@ -126,17 +124,15 @@ class RoverBatch:
         anew = [k for k, seed in enumerate(given) if seed is not None]
         rows[anew] = seeded_rows([seed for seed in given if seed is not None])
         used = [self._seeds[i] if seed is None else seed for i, seed in zip(chosen, given, strict=True)]
-        difficulties = [self._difficulties.get(i) for i in chosen]
+        difficulties = [self.episodes.difficulty(i) for i in chosen]
         fixed = ResetOptions() if options is None else options
-        episodes = draw_episodes(self.task, rows, difficulties, fixed, self.episodes)
+        episodes = beginning.draw_episodes(self.task, rows, difficulties, fixed, self.episodes)
         return Drawn(episodes, chosen, used, {chosen[k] for k in anew})
 
     def begin(self, drawn: "Drawn") -> None:
         """Starts drawn episodes."""
         chosen, episodes = drawn.chosen, drawn.episodes
         self.episodes.begin(chosen, episodes)
-        self._starts[chosen], self._domains[chosen] = episodes.starts, episodes.domains
-        self._rocks[chosen], self._rock_seeds[chosen] = episodes.rocks, episodes.rock_seeds
         self._begun[chosen] = True
         for i, seed in zip(chosen, drawn.seeds, strict=True):
             self._seeds[i] = seed
@@ -164,18 +160,50 @@ class RoverBatch:
                 has changed.
             ResetNeeded: A rover has not been reset.
         """
-        if not self._started:
-            check_actions(actions, (self.n, N_ACTIONS))
-            if not self._begun.all():
-                raise ResetNeeded("a batch of rovers: call reset() first")
-            self._started = True
-        if not self.task.is_noisy or not self._lent:
+        self._check_begun(actions)
+        with self._lending(self._lent if self.task.is_noisy else ()):
             return self.episodes.step(actions, active, has_scan=has_scan)
-        lent = list(self._lent)
-        self.episodes.set_generators(lent, np.stack([row_of(self._lent[i]) for i in lent]))
-        result = self.episodes.step(actions, active, has_scan=has_scan)
-        self._hand_back(lent)
-        return result
+
+    def step_on(
+        self, actions: object, *, same_step: bool, has_scan: bool = True
+    ) -> tuple[Observations, Array, Mask, Mask, list[int]]:
+        """Applies actions for one control period; rovers whose episode is over start the next.
+
+        Args:
+            actions: As of `step`.
+            same_step: Whether an episode is followed by the next in the step that ends it; `finals` then has its last
+                observation and info. If not, the next one begins in the following step, in which its rover does not
+                move and earns nothing.
+            has_scan: As of `step`.
+
+        Returns:
+            As `step`. Where an episode has begun, the observation is its first; with `same_step` all else is that of
+            the episode that has ended. If an episode that is to follow in the same step cannot begin, the next call
+            refuses it.
+
+        Raises:
+            CommandError: As of `step`.
+            ResetNeeded: A rover has not been reset.
+            TerrainError: As `RoverEnv.reset`, for a rover whose episode was over; nothing has changed.
+        """
+        self._check_begun(actions)
+        with self._lending(self._lent):
+            return self.episodes.step_on(
+                actions,
+                self.task.episodes,
+                same_step=same_step,
+                attempts=beginning.PLACING_ATTEMPTS,
+                has_scan=has_scan,
+            )
+
+    @property
+    def over(self) -> list[int]:
+        """The rovers whose episode is over and whose next has not begun, in order."""
+        return self.episodes.over
+
+    def finals(self) -> dict[int, tuple[Observations, dict[str, Any]]]:
+        """Last observations `(size,) float32` and infos of the episodes that the last `step_on` has ended, by rover."""
+        return self.episodes.finals()
 
     def info(self, i: int) -> dict[str, Any]:
         """The info of rover i's last period or reset, as `RoverEnv` returns it."""
@@ -207,8 +235,29 @@ class RoverBatch:
         """
         if not self._begun[i]:
             raise ResetNeeded("a batch of rovers: call reset() first")
-        terrain = self.episodes.terrain(i)
-        return scene_of(self.task, self._starts[i], self._rocks[i], int(self._rock_seeds[i]), self._domains[i], terrain)
+        return scene_of(self.task, *self.episodes.origin(i), self.episodes.terrain(i))
+
+    def _check_begun(self, actions: object) -> None:
+        """Refuses a step before all rovers have been reset; once they have been, all have an episode for good."""
+        if self._started:
+            return
+        check_actions(actions, (self.n, N_ACTIONS))
+        if not self._begun.all():
+            raise ResetNeeded("a batch of rovers: call reset() first")
+        self._started = True
+
+    @contextmanager
+    def _lending(self, lent: Iterable[int]) -> Iterator[None]:
+        """Lets the core draw from generators that were handed out."""
+        lent = list(lent)
+        if not lent:
+            yield
+            return
+        self.episodes.set_generators(lent, np.stack([row_of(self._lent[i]) for i in lent]))
+        try:
+            yield
+        finally:
+            self._hand_back(lent)
 
     def _rows(self, chosen: Sequence[int]) -> Rows:
         """The present generators of some rovers, `(m, 4)`."""
@@ -340,7 +389,7 @@ class BatchRover:
         Raises:
             OptionError: The difficulty is not within 0 to 1, or there are no rocks; nothing has changed.
         """
-        self._batch._difficulties[self._i] = check_difficulty(self._batch.task, difficulty)
+        self._batch.episodes.set_difficulty(self._i, check_difficulty(self._batch.task, difficulty))
 
     @property
     def _scene(self) -> EpisodeScene:

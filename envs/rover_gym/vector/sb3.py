@@ -20,7 +20,7 @@ from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.extras import MissingExtraError
-from rover_gym.mechanics import OptionError, RoverGymError
+from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse
 from rover_gym.vector.batch import BatchRover, Drawn, RoverBatch
 
@@ -63,8 +63,6 @@ class RoverVecEnv(VecEnv):
         #: Whether a step takes the height scan, see `RoverBatch.step`.
         self.has_scan = True
         self._actions: object = None
-        #: Rovers whose next episode was refused when the last one ended.
-        self._waiting: list[int] = []
         prototype = self.prototype
         super().__init__(self.batch.n, prototype.observation_space, prototype.action_space)
 
@@ -82,7 +80,6 @@ class RoverVecEnv(VecEnv):
         """
         options = [self.batch.check_options(given) for given in self._options]
         self._begin(self.batch.draw(range(self.num_envs), self._seeds, options))
-        self._waiting = []
         self._reset_seeds()
         self._reset_options()
         return self.batch.observation
@@ -123,32 +120,32 @@ class RoverVecEnv(VecEnv):
             TerrainError: A rover's next episode cannot begin (see `RoverEnv.reset`); nothing has changed. Reset with
                 another seed or other options.
         """
-        if self._waiting:
+        # Rovers whose next episode was refused when the last one ended.
+        if waiting := self.batch.over:
             check_actions(self._actions, (self.num_envs, N_ACTIONS))
-            self._begin(self.batch.draw(self._waiting))
-            self._waiting = []
-        observation, earned, terminated, timed_out, ended = self.batch.step(self._actions, has_scan=self.has_scan)
+            self._begin(self.batch.draw(waiting))
+        observation, earned, terminated, timed_out, ended = self.batch.step_on(
+            self._actions, same_step=True, has_scan=self.has_scan
+        )
         dones = terminated | timed_out
         infos: list[dict[str, Any]] = [{"TimeLimit.truncated": False} for _ in range(self.num_envs)]
         if ended:
-            for i in ended:
-                last = self.batch.info(i)
+            for i, (seen, last) in self.batch.finals().items():
                 last["TimeLimit.truncated"] = bool(timed_out[i] and not terminated[i])
-                last["terminal_observation"] = observation[i].copy()
+                last["terminal_observation"] = seen
                 infos[i] = last
-            try:
-                self._begin(self.batch.draw(ended))
-            except RoverGymError:
-                self._waiting = ended
-            else:
-                observation[ended] = self.batch.observation[ended]
+            if not self.batch.over:
+                self._tell_resets(ended)
         # Only a rover that flies off at 1e37 m/s earns a reward out of float32's range.
         reward = np.clip(earned, -LARGEST, LARGEST).astype(np.float32)
         return observation, reward, dones, infos
 
     def _begin(self, drawn: Drawn) -> None:
         self.batch.begin(drawn)
-        for i in drawn.chosen:
+        self._tell_resets(drawn.chosen)
+
+    def _tell_resets(self, begun: Sequence[int]) -> None:
+        for i in begun:
             self.reset_infos[i] = self.batch.info(i)
 
     def close(self) -> None:

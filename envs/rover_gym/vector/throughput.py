@@ -66,16 +66,16 @@ class VectorSpeed:
         return self.num_envs / self.step
 
 
-class _TimedSimulations:
-    """Wraps a batch's simulations and sums the time of their steps."""
+class _TimedEpisodes:
+    """Wraps a batch's episodes and sums the time of their steps."""
 
     def __init__(self, batch: RoverBatch) -> None:
         self._inner = batch.episodes
         self.elapsed = 0.0
 
-    def step(self, *args: Any, **kwargs: Any) -> Any:
+    def step_on(self, *args: Any, **kwargs: Any) -> Any:
         start = time.perf_counter()
-        result = self._inner.step(*args, **kwargs)
+        result = self._inner.step_on(*args, **kwargs)
         self.elapsed += time.perf_counter() - start
         return result
 
@@ -108,7 +108,7 @@ def measure_speed(
     sync = gym.make_vec("Rover-v0", num_envs=num_envs, vectorization_mode="sync", **arguments)
     watches = []
     for env in (several, single):
-        watch: Any = _TimedSimulations(env.batch)
+        watch: Any = _TimedEpisodes(env.batch)
         env.batch.episodes = watch
         watches.append(watch)
     start = time.perf_counter()

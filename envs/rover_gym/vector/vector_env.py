@@ -1,7 +1,6 @@
 """`RoverVectorEnv`: the Gymnasium vector environment that `gymnasium.make_vec` creates."""
 
 from collections.abc import Sequence
-from contextlib import suppress
 from typing import Any, Unpack
 
 import numpy as np
@@ -15,7 +14,7 @@ from rover_gym.env.generators import spread_seeds
 from rover_gym.env.quantities import Array, Mask, Observations
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
 from rover_gym.env.wheels import N_ACTIONS
-from rover_gym.mechanics import OptionError, RoverGymError
+from rover_gym.mechanics import OptionError
 from rover_gym.validation import mapping, refuse
 from rover_gym.vector.batch import RoverBatch
 
@@ -57,8 +56,6 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         self.single_action_space = self.prototype.action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        #: Rovers whose episode is over and whose next has not begun, in order.
-        self._over: list[int] = []
 
     @property  # type: ignore[override] # as SyncVectorEnv's
     def np_random(self) -> tuple[np.random.Generator, ...]:
@@ -96,8 +93,6 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         chosen = self._check_mask(given.pop("reset_mask")) if "reset_mask" in given else list(range(self.num_envs))
         fixed = self.batch.check_options(given)
         self.batch.begin(self.batch.draw(chosen, [seeds[i] for i in chosen], fixed))
-        begun = set(chosen)
-        self._over = [i for i in self._over if i not in begun]
         if len(chosen) == self.num_envs:
             return self.batch.observation, self.batch.infos()
         infos: _Info = {}
@@ -118,40 +113,20 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
                 another seed or other options.
             ResetNeeded: A rover has not been reset, or autoreset is disabled and its episode has ended.
         """
-        starting = self._over
-        if starting:
-            observation, reward, terminated, truncated, over = self._start_and_step(actions)
-        else:
-            observation, reward, terminated, truncated, over = self.batch.step(actions)
-        self._over = over
-        finals: dict[int, _Info] = {}
-        if over and self.autoreset_mode == AutoresetMode.SAME_STEP:
-            finals = {i: {"final_obs": observation[i].copy(), "final_info": self.batch.info(i)} for i in over}
-            # If an episode is refused here, its rover stays over and the next step raises the error.
-            with suppress(RoverGymError):
-                self.batch.begin(self.batch.draw(over))
-                self._over = []
-                starting = starting + over
+        mode = self.autoreset_mode
+        if mode == AutoresetMode.DISABLED:
+            if over := self.batch.over:
+                check_actions(actions, (self.num_envs, N_ACTIONS))
+                raise ResetNeeded(f"rovers {over}: call reset() with reset_mask first")
+            observation, reward, terminated, truncated, _ = self.batch.step(actions)
+            return observation, reward, terminated, truncated, self.batch.infos()
+        same_step = mode == AutoresetMode.SAME_STEP
+        observation, reward, terminated, truncated, over = self.batch.step_on(actions, same_step=same_step)
         infos = self.batch.infos()
-        for i, final in finals.items():
-            infos = self._add_info(infos, final, i)
-        if starting:
-            observation[starting] = self.batch.observation[starting]
+        if same_step and over:
+            for i, (last, info) in self.batch.finals().items():
+                infos = self._add_info(infos, {"final_obs": last, "final_info": info}, i)
         return observation, reward, terminated, truncated, infos
-
-    def _start_and_step(self, actions: object) -> tuple[Observations, Array, Mask, Mask, list[int]]:
-        """Steps all rovers but those whose episode is over, and starts theirs."""
-        check_actions(actions, (self.num_envs, N_ACTIONS))
-        starting = self._over
-        if self.autoreset_mode == AutoresetMode.DISABLED:
-            raise ResetNeeded(f"rovers {starting}: call reset() with reset_mask first")
-        active = np.ones(self.num_envs, np.bool_)
-        active[starting] = False
-        drawn = self.batch.draw(starting)
-        observation, reward, terminated, truncated, over = self.batch.step(actions, active)
-        self.batch.begin(drawn)
-        reward[starting], terminated[starting], truncated[starting] = 0.0, False, False
-        return observation, reward, terminated, truncated, [i for i in over if active[i]]
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
         """One frame per rover with `render_mode="rgb_array"`; None without a render mode."""

@@ -4,8 +4,8 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::draw::{
-    DomainDistribution, DrawnGround, Fixed, FixedStart, Order, Pcg64, Range, RockDistribution,
-    SceneDistribution, StartDistribution,
+    Domain, DomainDistribution, DrawnGround, Fixed, FixedStart, Order, Pcg64, Range,
+    RockDistribution, RockDraw, SceneDistribution, Start, StartDistribution,
 };
 use rover_core::episode::{Beginning, EpisodeBatch, EpisodeDistribution as CoreDistribution};
 use rover_core::geometry::Terrain;
@@ -59,11 +59,11 @@ pub struct EpisodeDistribution {
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct DrawnEpisodes {
     pub drawn: Vec<Beginning>,
-    words: SolverWords,
+    pub words: SolverWords,
 }
 
 /// A range (low, high).
-fn range(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Range> {
+pub fn range(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Range> {
     let found = vector(value, Kind::Option, field)?;
     match found[..] {
         [low, high] if low.is_finite() && high.is_finite() && low <= high => Ok([low, high]),
@@ -373,14 +373,6 @@ fn rock_distribution(given: &Bound<'_, PyAny>) -> PyResult<RockDistribution> {
 }
 
 impl DrawnEpisodes {
-    /// What the border keeps beside the simulation of a scene.
-    pub fn origin(&self, scene: &Beginning) -> Origin {
-        Origin {
-            terrain: ground(&scene.scene.ground),
-            words: self.words.clone(),
-        }
-    }
-
     fn at(&self, index: &Bound<'_, PyAny>) -> PyResult<&Beginning> {
         let i = count(index, Kind::Option, "index")?;
         let len = self.drawn.len();
@@ -390,13 +382,38 @@ impl DrawnEpisodes {
 }
 
 /// A ground as Python sees it.
-fn ground(drawn: &DrawnGround) -> Ground {
+pub fn ground(drawn: &DrawnGround) -> Ground {
     match drawn {
         DrawnGround::Plane(plane) => Ground::Plane(Plane { inner: *plane }),
         DrawnGround::Field(field) => Ground::Field(SphereField {
             inner: field.clone(),
         }),
     }
+}
+
+/// A row of `DrawnEpisodes.starts`.
+pub fn start_row(start: &Start) -> [f64; 7] {
+    let ([x, z], [goal_x, goal_z]) = (start.position, start.goal);
+    [
+        start.slope,
+        start.uphill,
+        x,
+        z,
+        start.heading,
+        goal_x,
+        goal_z,
+    ]
+}
+
+/// A row of `DrawnEpisodes.domains`.
+pub fn domain_row(domain: &Domain) -> [f64; 4] {
+    let (mass, gravity) = (domain.mass_scale, domain.gravity_scale);
+    [mass, domain.friction, domain.actuator_gain, gravity]
+}
+
+/// A row of `DrawnEpisodes.rocks`.
+pub fn rocks_row(rocks: Option<RockDraw>) -> [f64; 3] {
+    rocks.map_or([0.0; 3], |r| [r.difficulty, r.abundance, r.max_radius])
 }
 
 #[pymethods]
@@ -420,19 +437,7 @@ impl DrawnEpisodes {
     /// Slope, direction of steepest ascent, x and z of the start, heading, x and z of the goal.
     #[getter]
     fn starts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let row = |one: &Beginning| {
-            let start = &one.scene.start;
-            let ([x, z], [goal_x, goal_z]) = (start.position, start.goal);
-            [
-                start.slope,
-                start.uphill,
-                x,
-                z,
-                start.heading,
-                goal_x,
-                goal_z,
-            ]
-        };
+        let row = |one: &Beginning| start_row(&one.scene.start);
         fresh_table(py, self.drawn.iter().map(row))
     }
 
@@ -441,11 +446,7 @@ impl DrawnEpisodes {
     /// Factor of the masses, friction, gain of the motors, factor of gravity.
     #[getter]
     fn domains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let row = |one: &Beginning| {
-            let domain = &one.scene.domain;
-            let (mass, gravity) = (domain.mass_scale, domain.gravity_scale);
-            [mass, domain.friction, domain.actuator_gain, gravity]
-        };
+        let row = |one: &Beginning| domain_row(&one.scene.domain);
         fresh_table(py, self.drawn.iter().map(row))
     }
 
@@ -454,10 +455,7 @@ impl DrawnEpisodes {
     /// Difficulty, abundance, radius of the largest in wheel radii.
     #[getter]
     fn rocks<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let row = |one: &Beginning| {
-            let rocks = one.scene.rocks;
-            rocks.map_or([0.0; 3], |r| [r.difficulty, r.abundance, r.max_radius])
-        };
+        let row = |one: &Beginning| rocks_row(one.scene.rocks);
         fresh_table(py, self.drawn.iter().map(row))
     }
 
@@ -517,7 +515,11 @@ impl DrawnEpisodes {
         let one = self.at(index)?;
         let made = RoverSimulation::placed(one.scene.placement.clone());
         let made = made.map_err(BorderError::from)?;
-        Ok(Simulation::of(made, self.origin(one)))
+        let origin = Origin {
+            terrain: ground(&one.scene.ground),
+            words: self.words.clone(),
+        };
+        Ok(Simulation::of(made, origin))
     }
 
     fn __len__(&self) -> usize {

@@ -4,16 +4,21 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::draw::Pcg64;
-use rover_core::episode::{EpisodeBatch as CoreBatch, EpisodeError};
+use rover_core::episode::{
+    Autoreset, EpisodeBatch as CoreBatch, EpisodeError, Stepped, Succession,
+};
 
 use crate::arguments::{Given, count, refused, whole};
 use crate::arrays::fresh_table;
 use crate::batch::{index, mask};
-use crate::draw::{DrawnEpisodes, EpisodeDistribution, Request};
+use crate::draw::{
+    DrawnEpisodes, EpisodeDistribution, Request, domain_row, ground, range, rocks_row, start_row,
+};
 use crate::episode::{actions, rules, simulation};
 use crate::errors::{BorderError, Kind};
 use crate::generators::halves;
 use crate::infos::{Told, info, infos};
+use crate::options::SolverWords;
 use crate::shared::{Shared, Watch};
 use crate::simulation::{Origin, Simulation};
 
@@ -55,6 +60,51 @@ impl Inner {
         Ok((self.batch.episode(index)?, message))
     }
 
+    /// One step, by a function of the batch, the actions and the room for the observations; and the
+    /// rovers whose next episode has begun.
+    fn step<'py>(
+        &mut self,
+        py: Python<'py>,
+        actions: &Bound<'py, PyAny>,
+        take: impl FnOnce(
+            &mut CoreBatch,
+            &[f64],
+            &mut [f32],
+            &mut dyn FnMut() -> bool,
+        ) -> Result<Stepped, EpisodeError>
+        + Send,
+    ) -> PyResult<(Step<'py>, Vec<usize>)> {
+        let batch = &mut self.batch;
+        let (n, rules) = (batch.rovers().len(), batch.rules());
+        let actions = self::actions(actions, &[n, rules.n_actions()])?;
+        let rows = PyArray2::zeros(py, [n, rules.size()], false);
+        let stepped = {
+            let mut writable = rows.readwrite();
+            let out = writable.as_slice_mut()?;
+            let mut watch = Watch::new();
+            let done = py.detach(|| take(batch, &actions, out, &mut || watch.go_on()));
+            watch.result(done)?
+        };
+        let step = (
+            rows,
+            PyArray1::from_slice(py, &stepped.rewards),
+            PyArray1::from_slice(py, &stepped.ended),
+            PyArray1::from_slice(py, &stepped.truncated),
+            stepped.over,
+        );
+        Ok((step, stepped.begun))
+    }
+
+    /// Keeps what Python is told of the simulation of an episode that has begun.
+    fn set_origin(&mut self, index: usize, words: &SolverWords) -> PyResult<()> {
+        let origin = self.batch.origin(index).map_err(BorderError::from)?;
+        self.origins[index] = Origin {
+            terrain: ground(&origin.ground),
+            words: words.clone(),
+        };
+        Ok(())
+    }
+
     /// Indices of rovers; as many as `expected`, where that is known.
     fn indices(&self, given: &Bound<'_, PyAny>, expected: Option<usize>) -> PyResult<Vec<usize>> {
         let found: Option<Vec<Bound<'_, PyAny>>> = given.extract().ok();
@@ -75,6 +125,14 @@ fn at_least_one(given: &Bound<'_, PyAny>, field: &str) -> PyResult<usize> {
         0 => Err(refused(given, Kind::Option, field, "at least 1").into()),
         n => Ok(n),
     }
+}
+
+fn distribution<'a, 'py>(
+    given: &'a Bound<'py, PyAny>,
+) -> PyResult<&'a Bound<'py, EpisodeDistribution>> {
+    let found = given.cast::<EpisodeDistribution>();
+    let what = "an EpisodeDistribution";
+    found.map_err(|_| refused(given, Kind::Option, "distribution", what).into())
 }
 
 #[pymethods]
@@ -142,40 +200,91 @@ impl EpisodeBatch {
         has_scan: bool,
     ) -> PyResult<Step<'py>> {
         let mut held = self.0.open()?;
-        let batch = &mut held.batch;
-        let (n, rules) = (batch.rovers().len(), batch.rules().clone());
-        let actions = self::actions(actions, &[n, rules.n_actions()])?;
+        let n = held.batch.rovers().len();
         let active = active.map(|given| mask(given, n)).transpose()?;
-        let rows = PyArray2::zeros(py, [n, rules.size()], false);
-        {
-            let mut writable = rows.readwrite();
-            let out = writable.as_slice_mut()?;
-            let mut watch = Watch::new();
-            let active = active.as_deref();
-            let done = py.detach(|| {
-                batch.step_while(&actions, active, has_scan, out, &mut || watch.go_on())
-            });
-            watch.result(done)?;
+        let active = active.as_deref();
+        let (step, _) = held.step(py, actions, |batch, actions, out, go_on| {
+            batch.step_while(actions, active, has_scan, out, go_on)
+        })?;
+        Ok(step)
+    }
+
+    /// Gives all rovers their actions for one control period and begins the next episodes.
+    ///
+    /// Those rovers begin anew whose episode is over; what they begin is drawn on the threads of
+    /// this batch from their own generators. Ctrl-C ends the call as it ends that of `step`.
+    ///
+    /// Args:
+    ///     actions: As of `step`.
+    ///     distribution: What the next episodes are drawn from.
+    ///     same_step: Whether an episode is followed by the next in the step that ends it, see
+    ///         `finals`. If not, the next one begins in the following step; its rover does not move
+    ///         in that step and earns nothing.
+    ///     attempts: As of `EpisodeDistribution.draw`.
+    ///     has_scan: As of `step`.
+    ///
+    /// Returns:
+    ///     As of `step`. Where an episode has begun, the observation is its first; with `same_step`
+    ///     all else is that of the episode that has ended. If an episode that is to follow in the
+    ///     same step cannot be drawn, none begins, and the next call refuses it.
+    ///
+    /// Raises:
+    ///     CommandError: As of `step`.
+    ///     OptionError: An argument is invalid, or an episode has not begun. No rover has moved.
+    ///     RoverGymError: As of `EpisodeDistribution.draw`, for the first rover that has one and
+    ///         whose episode was over before this call. No rover has moved.
+    #[pyo3(signature = (actions, distribution, *, same_step, attempts = Given::MISSING, has_scan = true),
+        text_signature = "($self, actions, distribution, *, same_step, attempts=100, has_scan=True)")]
+    fn step_on<'py>(
+        &self,
+        py: Python<'py>,
+        actions: &Bound<'py, PyAny>,
+        distribution: &Bound<'py, PyAny>,
+        same_step: bool,
+        attempts: Given<'_>,
+        has_scan: bool,
+    ) -> PyResult<Step<'py>> {
+        let distribution = self::distribution(distribution)?.get();
+        let succession = Succession {
+            distribution: &distribution.inner,
+            attempts: attempts.count(100, Kind::Option, "attempts")?,
+            autoreset: if same_step {
+                Autoreset::SameStep
+            } else {
+                Autoreset::NextStep
+            },
+        };
+        let mut held = self.0.open()?;
+        let (step, begun) = held.step(py, actions, |batch, actions, out, go_on| {
+            batch.step_on(actions, &succession, has_scan, out, go_on)
+        })?;
+        for index in begun {
+            held.set_origin(index, &distribution.words)?;
         }
-        let (mut rewards, mut ended, mut truncated) =
-            (vec![0.0; n], vec![false; n], vec![false; n]);
-        let mut over = Vec::new();
-        for i in 0..n {
-            let outcome = batch.episode(i).map_err(BorderError::from)?.outcome();
-            rewards[i] = outcome.reward;
-            ended[i] = outcome.ending.is_end();
-            truncated[i] = batch.is_truncated(i).map_err(BorderError::from)?;
-            if ended[i] || truncated[i] {
-                over.push(i);
-            }
+        Ok(step)
+    }
+
+    /// Indices of the rovers whose episode is over and whose next has not begun, in order.
+    #[getter]
+    fn over(&self) -> PyResult<Vec<usize>> {
+        Ok(self.0.open()?.batch.over())
+    }
+
+    /// The episodes that the last call of `step_on` with `same_step` has ended.
+    ///
+    /// Returns:
+    ///     For each index of a rover, in order, the last observation (size,) float32 and the last
+    ///     info. Empty after `step`.
+    fn finals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let held = self.0.open()?;
+        let finals = PyDict::new(py);
+        for one in held.batch.finals() {
+            let seen = PyArray1::from_slice(py, one.episode.observation());
+            let message = one.error.as_ref().map(ToString::to_string);
+            let told = info(py, &(&one.episode, message))?;
+            finals.set_item(one.index, (seen, told))?;
         }
-        Ok((
-            rows,
-            PyArray1::from_slice(py, &rewards),
-            PyArray1::from_slice(py, &ended),
-            PyArray1::from_slice(py, &truncated),
-            over,
-        ))
+        Ok(finals)
     }
 
     /// The infos of all rovers, of their last periods or beginnings.
@@ -250,13 +359,10 @@ impl EpisodeBatch {
         difficulties: Option<&Bound<'_, PyAny>>,
         fixed: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<DrawnEpisodes> {
-        let found = distribution.cast::<EpisodeDistribution>();
-        let what = "an EpisodeDistribution";
-        let refuse = |_| refused(distribution, Kind::Option, "distribution", what);
-        let found = found.map_err(refuse)?;
+        let distribution = self::distribution(distribution)?.get();
         let request = Request::parse(generators, attempts, difficulties, fixed)?;
         let mut held = self.0.open()?;
-        found.get().draw_on(py, &request, Some(&mut held.batch))
+        distribution.draw_on(py, &request, Some(&mut held.batch))
     }
 
     /// Begins drawn episodes.
@@ -279,7 +385,7 @@ impl EpisodeBatch {
         for (&index, one) in places.iter().zip(&drawn.drawn) {
             let begun = held.batch.begin(index, one.clone());
             begun.map_err(BorderError::from)?;
-            held.origins[index] = drawn.origin(one);
+            held.set_origin(index, &drawn.words)?;
         }
         Ok(())
     }
@@ -331,6 +437,73 @@ impl EpisodeBatch {
             set.map_err(BorderError::from)?;
         }
         Ok(())
+    }
+
+    /// Where and on what the episode of a rover has begun.
+    ///
+    /// Args:
+    ///     index: Index of the rover.
+    ///
+    /// Returns:
+    ///     Its rows of `DrawnEpisodes.starts`, `rocks`, `rock_seeds` and `domains`.
+    ///
+    /// Raises:
+    ///     OptionError: There is no such rover, or its episode has not begun.
+    #[allow(clippy::type_complexity)] // a tuple in Python
+    fn origin<'py>(
+        &self,
+        py: Python<'py>,
+        index: &Bound<'_, PyAny>,
+    ) -> PyResult<(
+        Bound<'py, PyArray1<f64>>,
+        Bound<'py, PyArray1<f64>>,
+        u64,
+        Bound<'py, PyArray1<f64>>,
+    )> {
+        let held = self.0.open()?;
+        let index = self::index(index, held.batch.rovers())?;
+        let origin = held.batch.origin(index).map_err(BorderError::from)?;
+        let episode = held.batch.episode(index).map_err(BorderError::from)?;
+        Ok((
+            PyArray1::from_slice(py, &start_row(&origin.start)),
+            PyArray1::from_slice(py, &rocks_row(origin.rocks)),
+            origin.rocks.map_or(0, |rocks| rocks.seed),
+            PyArray1::from_slice(py, &domain_row(&episode.setting().domain)),
+        ))
+    }
+
+    /// Range (low, high) of the rocks' difficulty in the next episodes of a rover, if any is set.
+    ///
+    /// Args:
+    ///     index: Index of the rover.
+    ///
+    /// Raises:
+    ///     OptionError: There is no such rover.
+    fn difficulty(&self, index: &Bound<'_, PyAny>) -> PyResult<Option<(f64, f64)>> {
+        let held = self.0.open()?;
+        let index = self::index(index, held.batch.rovers())?;
+        let found = held.batch.difficulty(index).map_err(BorderError::from)?;
+        Ok(found.map(|[low, high]| (low, high)))
+    }
+
+    /// Sets the range of the rocks' difficulty in the episodes that `step_on` begins with a rover.
+    ///
+    /// Args:
+    ///     index: Index of the rover.
+    ///     difficulty: The range (low, high); None for that of the distribution.
+    ///
+    /// Raises:
+    ///     OptionError: There is no such rover, or `difficulty` is no range.
+    fn set_difficulty(
+        &self,
+        index: &Bound<'_, PyAny>,
+        difficulty: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let mut held = self.0.open()?;
+        let index = self::index(index, held.batch.rovers())?;
+        let difficulty = difficulty.map(|given| range(given, "difficulty"));
+        let set = held.batch.set_difficulty(index, difficulty.transpose()?);
+        Ok(set.map_err(BorderError::from)?)
     }
 
     /// The ground of one rover.

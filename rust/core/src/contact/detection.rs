@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::activation::Activation;
 use super::frame::ContactFrame;
 use super::pair::{Contact, ContactKey};
-use super::part::Part;
+use super::part::{Part, place_wheel};
 use crate::geometry::query::sweep::{DEEP, first_touch};
 use crate::geometry::query::{SurfacePoint, box_sphere, disc_sphere, dispatch, sphere_sphere};
 use crate::geometry::{Disc, PlacedShape, Primitive, Sphere, Terrain};
@@ -300,60 +300,50 @@ pub fn wheel_contact(
     terrain: &dyn Terrain,
     i: usize,
 ) -> Contact {
-    let placed = placed_wheel(model, kinematics, i);
-    let centre = kinematics.point(placed.body, &Part::Wheel(i).centre(model));
-    let mut best = SurfacePoint::of_normal(NEAREST, centre, &Vector3::y(), f64::INFINITY);
+    let part = Part::Wheel(i);
+    let (body, disc) = (
+        part.body(model),
+        place_wheel(&model.wheels()[i], kinematics),
+    );
+    let mut best = SurfacePoint::of_normal(NEAREST, disc.centre, &Vector3::y(), f64::INFINITY);
     let mut primitive = 0;
-    visit_nearer(model, kinematics, terrain, i, &mut |id, point| {
+    visit_nearer(&disc, kinematics.origin(body), terrain, &mut |id, point| {
         (best, primitive) = (*point, id);
     });
-    placed.contact(&best, primitive)
+    let shape = PlacedShape::Disc(disc);
+    Placed { part, body, shape }.contact(&best, primitive)
 }
 
-/// The gap of [`wheel_contact`], m.
+/// The gap of [`wheel_contact`], m, of a disc whose coordinates have their origin at `base` (m,
+/// world).
 #[must_use]
-pub fn wheel_gap(model: &Model, kinematics: &Kinematics, terrain: &dyn Terrain, i: usize) -> f64 {
+pub fn disc_gap(disc: &Disc, base: &Vector3<f64>, terrain: &dyn Terrain) -> f64 {
     let mut gap = f64::INFINITY;
-    visit_nearer(model, kinematics, terrain, i, &mut |_, point| {
+    visit_nearer(disc, base, terrain, &mut |_, point| {
         gap = point.gap;
     });
     gap
 }
 
-fn placed_wheel(model: &Model, kinematics: &Kinematics, i: usize) -> Placed {
-    let part = Part::Wheel(i);
-    Placed {
-        part,
-        body: part.body(model),
-        shape: part.place(model, kinematics),
-    }
-}
-
-/// Visits points of the ground near wheel `i`, each nearer than those before; the last one is the
-/// nearest.
+/// Visits points of the ground near a disc, each nearer than those before; the last one is the
+/// nearest. `base` as for [`disc_gap`].
 #[inline]
 fn visit_nearer(
-    model: &Model,
-    kinematics: &Kinematics,
+    disc: &Disc,
+    base: &Vector3<f64>,
     terrain: &dyn Terrain,
-    i: usize,
     visit: &mut impl FnMut(u32, &SurfacePoint),
 ) {
-    let placed = placed_wheel(model, kinematics, i);
-    let centre = kinematics.point(placed.body, &placed.part.centre(model));
-    let radius = placed.part.bound(model);
+    let (shape, radius) = (PlacedShape::Disc(*disc), disc.radius);
     let mut gap = f64::INFINITY;
     // A primitive that is not visited is further from the centre than `reach`, hence further
     // from the wheel than reach − R.
     let mut reach = 2.0 * radius;
     while reach < FAR && gap + radius > reach {
-        let base = kinematics.origin(placed.body);
-        terrain.visit_near(&(base + centre), reach, &mut |id, primitive| {
+        terrain.visit_near(&(base + disc.centre), reach, &mut |id, primitive| {
             let point = match primitive {
-                Primitive::Plane(plane) => {
-                    dispatch::point_on_plane(&placed.shape, plane, base, NEAREST)
-                }
-                Primitive::Sphere(sphere) => dispatch::point_on_sphere(&placed.shape, sphere, base),
+                Primitive::Plane(plane) => dispatch::point_on_plane(&shape, plane, base, NEAREST),
+                Primitive::Sphere(sphere) => dispatch::point_on_sphere(&shape, sphere, base),
             };
             if point.gap < gap {
                 gap = point.gap;

@@ -5,6 +5,7 @@
 //! [`detection`] finds contacts with the ground, [`pair_detection`] contacts between bodies, and
 //! [`limit`] joints at their stops. The broad phase selects candidates, [`crate::geometry::query`]
 //! computes gaps and normals, and [`activation`] decides which contacts enter the step.
+//! [`wheel_gaps`] measures how far the wheels are from the ground and nothing else.
 //! [`relocation`] re-evaluates them in another configuration. [`jacobian`] and [`delassus`]
 //! assemble the matrices.
 
@@ -18,6 +19,7 @@ pub mod pair;
 pub mod pair_detection;
 pub mod part;
 pub mod relocation;
+pub mod wheel_gaps;
 
 pub use activation::Activation;
 pub use delassus::ContactSystem;
@@ -29,3 +31,4 @@ pub use pair::{Contact, ContactKey, Opposite, OtherSide};
 pub use pair_detection::{PairSearch, detect_pairs};
 pub use part::{Part, Side};
 pub use relocation::relocate;
+pub use wheel_gaps::WheelGaps;

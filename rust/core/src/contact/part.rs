@@ -147,8 +147,10 @@ impl Part {
     }
 }
 
+/// A wheel at the poses of `kinematics`, relative to the origin of its body's tree.
 #[inline]
-fn place_wheel(wheel: &Wheel, kinematics: &Kinematics) -> Disc {
+#[must_use]
+pub fn place_wheel(wheel: &Wheel, kinematics: &Kinematics) -> Disc {
     let R = &kinematics.R[wheel.body];
     Disc {
         centre: kinematics.point(wheel.body, &wheel.centre),

@@ -6,43 +6,39 @@
 use std::sync::Arc;
 
 use super::action;
+use super::autoreset::Final;
 use super::beginning::{Beginning, EpisodeDistribution};
+use super::control_period::{ControlPeriod, Origin, Place, Seat};
 use super::error::EpisodeError;
-use super::noise;
 use super::rules::Rules;
-use super::running::{Episode, Period};
-use crate::draw::{Order, Pcg64};
+use super::running::Episode;
+use crate::draw::{Order, Pcg64, Range};
 use crate::integrator::StepError;
-use crate::simulation::{Batch, BatchError, Done, ReadingScratch, RoverSimulation, Turn};
+use crate::simulation::{Batch, BatchError, RoverSimulation};
 
 /// Rovers with their episodes and the threads that step them.
 pub struct EpisodeBatch {
     rules: Arc<Rules>,
     batch: Batch,
-    seats: Vec<Option<Seat>>,
+    pub(super) seats: Vec<Option<Seat>>,
     max_steps: Option<u64>,
+    difficulties: Vec<Option<Range>>,
+    pub(super) finals: Vec<Final>,
 }
 
-/// A rover's episode, and what a batch keeps beside it.
-struct Seat {
-    episode: Episode,
-    /// Control periods since the episode began.
-    steps: u64,
-    /// Where its noise comes from.
-    generator: Pcg64,
-    /// Room for the commands of an action.
-    commands: Vec<f64>,
-}
-
-impl Seat {
-    fn new(episode: Episode, generator: Pcg64) -> Self {
-        Self {
-            commands: vec![0.0; episode.rules().n_actions()],
-            episode,
-            steps: 0,
-            generator,
-        }
-    }
+/// How the rovers' control periods went: an entry for each rover, and lists of indices.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Stepped {
+    /// Rewards.
+    pub rewards: Vec<f64>,
+    /// Which episodes have ended.
+    pub ended: Vec<bool>,
+    /// Which episodes have reached the time limit.
+    pub truncated: Vec<bool>,
+    /// Rovers whose episode is over, one way or the other.
+    pub over: Vec<usize>,
+    /// Rovers whose next episode has begun in this step.
+    pub begun: Vec<usize>,
 }
 
 impl EpisodeBatch {
@@ -64,6 +60,8 @@ impl EpisodeBatch {
             batch: Batch::new(vec![rover.clone(); n], Vec::new(), threads)?,
             seats: (0..n).map(|_| None).collect(),
             max_steps,
+            difficulties: vec![None; n],
+            finals: Vec::new(),
             rules,
         })
     }
@@ -105,7 +103,53 @@ impl EpisodeBatch {
     /// # Errors
     /// `NoSuchRover`, `NotBegun`.
     pub fn is_truncated(&self, index: usize) -> Result<bool, EpisodeError> {
-        Ok(is_over(self.seat(index)?.steps, self.max_steps))
+        Ok(self.seat(index)?.is_truncated(self.max_steps))
+    }
+
+    /// Rovers whose episode has ended or reached the time limit, and whose next has not begun.
+    #[must_use]
+    pub fn over(&self) -> Vec<usize> {
+        let is_over = |seat: &Option<Seat>| {
+            let seat = seat.as_ref();
+            seat.is_some_and(|seat| seat.is_over(self.max_steps))
+        };
+        let seats = self.seats.iter().enumerate();
+        seats
+            .filter(|(_, seat)| is_over(seat))
+            .map(|(i, _)| i)
+            .collect()
+    }
+
+    /// Where and on what the episode of a rover has begun.
+    ///
+    /// # Errors
+    /// `NoSuchRover`, `NotBegun`.
+    pub fn origin(&self, index: usize) -> Result<&Origin, EpisodeError> {
+        Ok(&self.seat(index)?.origin)
+    }
+
+    /// Range that replaces that of the rocks' difficulty in the next episodes of a rover.
+    ///
+    /// # Errors
+    /// `NoSuchRover`.
+    pub fn difficulty(&self, index: usize) -> Result<Option<Range>, EpisodeError> {
+        let len = self.seats.len();
+        let found = self.difficulties.get(index);
+        Ok(*found.ok_or(BatchError::NoSuchRover { index, len })?)
+    }
+
+    /// Sets this range.
+    ///
+    /// # Errors
+    /// `NoSuchRover`.
+    pub fn set_difficulty(
+        &mut self,
+        index: usize,
+        difficulty: Option<Range>,
+    ) -> Result<(), EpisodeError> {
+        self.difficulty(index)?;
+        self.difficulties[index] = difficulty;
+        Ok(())
     }
 
     /// Where the noise of a rover comes from.
@@ -179,7 +223,12 @@ impl EpisodeBatch {
             random,
         } = beginning;
         self.batch.begin(index, scene.placement, scene.start.goal)?;
-        self.seats[index] = Some(Seat::new(episode, random));
+        let origin = Origin {
+            start: scene.start,
+            rocks: scene.rocks,
+            ground: scene.ground,
+        };
+        self.seats[index] = Some(Seat::new(episode, origin, random));
         Ok(())
     }
 
@@ -203,6 +252,37 @@ impl EpisodeBatch {
         has_scan: bool,
         observations: &mut [f32],
         go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<Stepped, EpisodeError> {
+        self.check_step(actions, active)?;
+        self.finals.clear();
+        let (n, size) = (self.seats.len(), self.rules.size());
+        assert_eq!(observations.len(), n * size, "one row a rover");
+        let rows = observations.chunks_exact_mut(size);
+        let actions = actions.chunks_exact(self.rules.n_actions());
+        let seats = self.seats.iter_mut().flatten();
+        let mut places: Vec<_> = (seats.zip(rows).zip(actions).enumerate())
+            .map(|(index, ((seat, row), action))| Place {
+                is_active: active.is_none_or(|active| active[index]),
+                seat,
+                row,
+                action,
+            })
+            .collect();
+        let turn = ControlPeriod {
+            rules: &self.rules,
+            has_scan,
+            max_steps: self.max_steps,
+        };
+        let substeps = self.rules.settings().substeps;
+        self.batch.take_turns(&mut places, substeps, &turn, go_on)?;
+        Ok(self.results())
+    }
+
+    /// Checks the arguments of a step, and that all episodes have begun.
+    pub(super) fn check_step(
+        &self,
+        actions: &[f64],
+        active: Option<&[bool]>,
     ) -> Result<(), EpisodeError> {
         let (n, width) = (self.seats.len(), self.rules.n_actions());
         let flags = active.map_or(n, <[bool]>::len);
@@ -221,98 +301,22 @@ impl EpisodeBatch {
         if let Some(index) = self.seats.iter().position(Option::is_none) {
             return Err(EpisodeError::NotBegun { index });
         }
-        let size = self.rules.size();
-        assert_eq!(observations.len(), n * size, "one row a rover");
-        let rows = observations.chunks_exact_mut(size);
-        let actions = actions.chunks_exact(width);
-        let seats = self.seats.iter_mut().flatten();
-        let mut places: Vec<_> = (seats.zip(rows).zip(actions).enumerate())
-            .map(|(index, ((seat, row), action))| Place {
-                is_active: active.is_none_or(|active| active[index]),
-                seat,
-                row,
-                action,
-            })
-            .collect();
-        let turn = ControlPeriod {
-            rules: &self.rules,
-            has_scan,
-            max_steps: self.max_steps,
-        };
-        let substeps = self.rules.settings().substeps;
-        Ok(self.batch.take_turns(&mut places, substeps, &turn, go_on)?)
-    }
-}
-
-fn is_over(steps: u64, max_steps: Option<u64>) -> bool {
-    max_steps.is_some_and(|most| steps >= most)
-}
-
-/// A rover's part of a control period.
-struct Place<'a> {
-    is_active: bool,
-    seat: &'a mut Seat,
-    action: &'a [f64],
-    row: &'a mut [f32],
-}
-
-/// The turn of a rover: action, steps, reading, outcome.
-struct ControlPeriod<'a> {
-    rules: &'a Rules,
-    has_scan: bool,
-    max_steps: Option<u64>,
-}
-
-impl Turn<Place<'_>> for ControlPeriod<'_> {
-    fn is_moving(&self, place: &Place<'_>) -> bool {
-        place.is_active
+        Ok(())
     }
 
-    fn begin(&self, rover: &mut RoverSimulation, place: &mut Place<'_>) {
-        let seat = &mut *place.seat;
-        let given = (seat.episode).command(rover, place.action, &mut seat.commands);
-        assert!(
-            given.is_ok(),
-            "invariant: commands of a checked action are within the model's limits"
-        );
-    }
-
-    fn end(
-        &self,
-        rover: &RoverSimulation,
-        done: Done<'_>,
-        place: &mut Place<'_>,
-        scratch: &mut ReadingScratch,
-    ) {
-        let seat = &mut *place.seat;
-        if !done.has_moved {
-            place.row.copy_from_slice(seat.episode.observation());
-            return;
+    /// How the last control periods went.
+    pub(super) fn results(&self) -> Stepped {
+        let mut results = Stepped::default();
+        for (i, seat) in self.seats.iter().flatten().enumerate() {
+            let outcome = seat.episode.outcome();
+            let (ended, truncated) = (outcome.ending.is_end(), seat.is_truncated(self.max_steps));
+            results.rewards.push(outcome.reward);
+            results.ended.push(ended);
+            results.truncated.push(truncated);
+            if ended || truncated {
+                results.over.push(i);
+            }
         }
-        let rules = self.rules;
-        let scan = &rules.settings().scan;
-        let mut numbers = std::mem::take(&mut scratch.numbers);
-        numbers.resize(rules.places().size + scan.len() + rules.noise().len(), 0.0);
-        let (reading, rest) = numbers.split_at_mut(rules.places().size);
-        let (heights, normals) = rest.split_at_mut(scan.len());
-        rover.read_state(seat.episode.setting().goal, scratch, reading);
-        if self.has_scan {
-            rover.read_heights(scan, heights);
-        }
-        noise::draw(&mut seat.generator, normals);
-        let period = Period {
-            action: place.action,
-            heights: self.has_scan.then_some(&*heights),
-            normals: rules.is_noisy().then_some(&*normals),
-            has_failed: done.error.is_some(),
-        };
-        seat.episode.advance(reading, &period, place.row);
-        seat.steps += 1;
-        let ends = seat.episode.outcome().ending.is_end() || is_over(seat.steps, self.max_steps);
-        if ends && seat.episode.lacks_heights() {
-            seat.episode.complete(rover);
-            place.row.copy_from_slice(seat.episode.observation());
-        }
-        scratch.numbers = numbers;
+        results
     }
 }

@@ -10,11 +10,14 @@
 //! - [`rules`]: what all episodes of a task share; [`beginning`]: how one begins, in a scene that
 //!   is drawn ([`crate::draw`]);
 //! - [`running`]: one episode and its control period;
-//! - [`batch`]: many rovers side by side, each with its episode.
+//! - [`batch`]: many rovers side by side, each with its episode; [`autoreset`]: a step in which the
+//!   next episodes begin, too.
 
 pub mod action;
+pub mod autoreset;
 pub mod batch;
 pub mod beginning;
+mod control_period;
 pub mod ending;
 pub mod error;
 pub mod noise;
@@ -25,8 +28,10 @@ pub mod reward;
 pub mod rules;
 pub mod running;
 
-pub use batch::EpisodeBatch;
+pub use autoreset::{Autoreset, Final, Succession};
+pub use batch::{EpisodeBatch, Stepped};
 pub use beginning::{Beginning, EpisodeDistribution};
+pub use control_period::Origin;
 pub use ending::Ending;
 pub use error::EpisodeError;
 pub use outcome::{Outcome, Quantities};

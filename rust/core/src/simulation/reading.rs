@@ -6,9 +6,9 @@ use nalgebra::Vector3;
 
 use super::rover::RoverSimulation;
 use super::rover_contacts::WheelForces;
-use crate::contact::{Part, detection::wheel_gap};
+use crate::contact::{Part, WheelGaps};
 use crate::integrator::StepStatus;
-use crate::multibody::{Kinematics, Model, coordinates};
+use crate::multibody::{Model, coordinates};
 use crate::scalar::elementary::{hypot, sin_cos};
 use crate::spatial::HeadingPitchRoll;
 
@@ -110,6 +110,12 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
+    /// Room for the next `n` numbers.
+    fn next(&mut self, n: usize) -> &mut [f64] {
+        self.filled += n;
+        &mut self.out[self.filled - n..self.filled]
+    }
+
     fn put(&mut self, values: impl IntoIterator<Item = f64>) {
         for value in values {
             self.out[self.filled] = value;
@@ -121,21 +127,10 @@ impl Row<'_> {
 /// Scratch of readings: kept between them, so that a reading allocates nothing.
 #[derive(Debug, Default)]
 pub struct ReadingScratch {
-    kinematics: Option<Kinematics>,
+    gaps: WheelGaps,
     forces: WheelForces,
     /// Room for the numbers of a reader.
     pub numbers: Vec<f64>,
-}
-
-impl ReadingScratch {
-    /// Poses for a model.
-    fn kinematics(&mut self, model: &Model) -> &mut Kinematics {
-        if !(self.kinematics.as_ref()).is_some_and(|own| own.is_of(model)) {
-            self.kinematics = None;
-        }
-        self.kinematics
-            .get_or_insert_with(|| Kinematics::new(model))
-    }
 }
 
 impl RoverSimulation {
@@ -186,13 +181,11 @@ impl RoverSimulation {
         row.put(model.joint_velocities().iter().map(|&k| v[k]));
 
         let n_wheels = model.wheels().len();
-        let kinematics = scratch.kinematics(model);
-        kinematics.update_for_step(model, &state.configuration);
-        let gap = |i| wheel_gap(model, kinematics, &**self.terrain(), i);
-        let first = row.filled;
-        row.put((0..n_wheels).map(gap));
-        for i in first..row.filled {
-            row.put([f64::from(u8::from(row.out[i] <= CONTACT_GAP))]);
+        let (gaps, touch) = row.next(2 * n_wheels).split_at_mut(n_wheels);
+        let terrain = &**self.terrain();
+        (scratch.gaps).write(model, &state.configuration, terrain, gaps);
+        for (touch, gap) in touch.iter_mut().zip(gaps) {
+            *touch = f64::from(u8::from(*gap <= CONTACT_GAP));
         }
         scratch.forces.sum(self);
         let forces = &scratch.forces.along;

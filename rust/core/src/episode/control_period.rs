@@ -1,0 +1,121 @@
+//! The control period of a rover in a batch: action, steps, reading, outcome.
+
+use super::noise;
+use super::rules::Rules;
+use super::running::{Episode, Period};
+use crate::draw::{DrawnGround, Pcg64, RockDraw, Start};
+use crate::simulation::{Done, ReadingScratch, RoverSimulation, Turn};
+
+/// A rover's episode, and what a batch keeps beside it.
+pub(super) struct Seat {
+    pub(super) episode: Episode,
+    /// Where and on what it began.
+    pub(super) origin: Origin,
+    /// Control periods since the episode began.
+    pub(super) steps: u64,
+    /// Where its noise comes from.
+    pub(super) generator: Pcg64,
+    /// Room for the commands of an action.
+    commands: Vec<f64>,
+}
+
+/// Where and on what an episode has begun.
+#[derive(Clone, Debug)]
+pub struct Origin {
+    /// Slope, pose and goal.
+    pub start: Start,
+    /// Difficulty and rocks, where there are any.
+    pub rocks: Option<RockDraw>,
+    /// The ground.
+    pub ground: DrawnGround,
+}
+
+impl Seat {
+    pub(super) fn new(episode: Episode, origin: Origin, generator: Pcg64) -> Self {
+        Self {
+            commands: vec![0.0; episode.rules().n_actions()],
+            episode,
+            origin,
+            steps: 0,
+            generator,
+        }
+    }
+
+    /// Whether the episode has reached a time limit.
+    pub(super) fn is_truncated(&self, max_steps: Option<u64>) -> bool {
+        max_steps.is_some_and(|most| self.steps >= most)
+    }
+
+    /// Whether the episode has ended or reached a time limit.
+    pub(super) fn is_over(&self, max_steps: Option<u64>) -> bool {
+        self.episode.outcome().ending.is_end() || self.is_truncated(max_steps)
+    }
+}
+
+/// A rover's part of a control period.
+pub(super) struct Place<'a> {
+    pub(super) is_active: bool,
+    pub(super) seat: &'a mut Seat,
+    pub(super) action: &'a [f64],
+    pub(super) row: &'a mut [f32],
+}
+
+/// The turn of a rover: action, steps, reading, outcome.
+pub(super) struct ControlPeriod<'a> {
+    pub(super) rules: &'a Rules,
+    pub(super) has_scan: bool,
+    pub(super) max_steps: Option<u64>,
+}
+
+impl Turn<Place<'_>> for ControlPeriod<'_> {
+    fn is_moving(&self, place: &Place<'_>) -> bool {
+        place.is_active
+    }
+
+    fn begin(&self, rover: &mut RoverSimulation, place: &mut Place<'_>) {
+        let seat = &mut *place.seat;
+        let given = (seat.episode).command(rover, place.action, &mut seat.commands);
+        assert!(
+            given.is_ok(),
+            "invariant: commands of a checked action are within the model's limits"
+        );
+    }
+
+    fn end(
+        &self,
+        rover: &RoverSimulation,
+        done: Done<'_>,
+        place: &mut Place<'_>,
+        scratch: &mut ReadingScratch,
+    ) {
+        let seat = &mut *place.seat;
+        if !done.has_moved {
+            place.row.copy_from_slice(seat.episode.observation());
+            return;
+        }
+        let rules = self.rules;
+        let scan = &rules.settings().scan;
+        let mut numbers = std::mem::take(&mut scratch.numbers);
+        numbers.resize(rules.places().size + scan.len() + rules.noise().len(), 0.0);
+        let (reading, rest) = numbers.split_at_mut(rules.places().size);
+        let (heights, normals) = rest.split_at_mut(scan.len());
+        rover.read_state(seat.episode.setting().goal, scratch, reading);
+        if self.has_scan {
+            rover.read_heights(scan, heights);
+        }
+        noise::draw(&mut seat.generator, normals);
+        let period = Period {
+            action: place.action,
+            heights: self.has_scan.then_some(&*heights),
+            normals: rules.is_noisy().then_some(&*normals),
+            has_failed: done.error.is_some(),
+        };
+        seat.episode.advance(reading, &period, place.row);
+        seat.steps += 1;
+        if seat.episode.lacks_heights() && seat.is_over(self.max_steps) {
+            seat.episode.complete(rover);
+            place.row.copy_from_slice(seat.episode.observation());
+        }
+        scratch.numbers = numbers;
+    }
+}
