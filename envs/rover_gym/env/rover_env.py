@@ -20,7 +20,6 @@ from rover_gym.env.randomisation import Domain
 from rover_gym.env.rocks import Rocks
 from rover_gym.env.start import Start
 from rover_gym.env.task import Task, make_task
-from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.mechanics import EpisodeRun, Plane, Simulation, standard_normals
 from rover_gym.rendering.render_options import RENDER_MODES, RenderOptions
 from rover_gym.validation import Range
@@ -214,7 +213,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         self.observation_space = gym.spaces.Box(
             self.observation_layout.low, self.observation_layout.high, dtype=np.float32
         )
-        self.action_space = gym.spaces.Box(-1.0, 1.0, (N_ACTIONS,), np.float32)
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (self.task.n_actions,), np.float32)
         self._simulation = Simulation(self.model, Plane(), **self.task.simulation_options)
         self._scene: EpisodeScene | None = None
         self._episode: EpisodeRun

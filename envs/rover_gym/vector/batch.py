@@ -23,7 +23,6 @@ from rover_gym.env.rocks import Rocks
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import Start
 from rover_gym.env.task import Task, check_actions
-from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.mechanics import DrawnEpisodes, EpisodeBatch, Plane, RoverModel, Simulation
 from rover_gym.validation import Range, whole
 
@@ -165,7 +164,7 @@ class RoverBatch:
             ResetNeeded: A rover has not been reset.
         """
         if not self._started:
-            check_actions(actions, (self.n, N_ACTIONS))
+            check_actions(actions, (self.n, self.task.n_actions))
             if not self._begun.all():
                 raise ResetNeeded("a batch of rovers: call reset() first")
             self._started = True

@@ -18,7 +18,6 @@ from rover_gym.env.generators import check_seed
 from rover_gym.env.observation import LARGEST
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
-from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import OptionError, RoverGymError
 from rover_gym.validation import refuse
@@ -124,7 +123,7 @@ class RoverVecEnv(VecEnv):
                 another seed or other options.
         """
         if self._waiting:
-            check_actions(self._actions, (self.num_envs, N_ACTIONS))
+            check_actions(self._actions, (self.num_envs, self.batch.task.n_actions))
             self._begin(self.batch.draw(self._waiting))
             self._waiting = []
         observation, earned, terminated, timed_out, ended = self.batch.step(self._actions, has_scan=self.has_scan)

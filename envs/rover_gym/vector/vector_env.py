@@ -14,7 +14,6 @@ from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.generators import spread_seeds
 from rover_gym.env.quantities import Array, Mask, Observations
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
-from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.mechanics import OptionError, RoverGymError
 from rover_gym.validation import mapping, refuse
 from rover_gym.vector.batch import RoverBatch
@@ -141,7 +140,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
 
     def _start_and_step(self, actions: object) -> tuple[Observations, Array, Mask, Mask, list[int]]:
         """Steps all rovers but those whose episode is over, and starts theirs."""
-        check_actions(actions, (self.num_envs, N_ACTIONS))
+        check_actions(actions, (self.num_envs, self.batch.task.n_actions))
         starting = self._over
         if self.autoreset_mode == AutoresetMode.DISABLED:
             raise ResetNeeded(f"rovers {starting}: call reset() with reset_mask first")

@@ -37,7 +37,7 @@ struct Seat {
 impl Seat {
     fn new(episode: Episode, generator: Pcg64) -> Self {
         Self {
-            commands: vec![0.0; episode.rules().n_actions()],
+            commands: vec![0.0; episode.rules().n_commands()],
             episode,
             steps: 0,
             generator,
@@ -186,7 +186,7 @@ impl EpisodeBatch {
     /// Gives every rover its action for one control period and writes the observations
     /// (n × size, row-major).
     ///
-    /// `actions`: n × 2 n_wheels, row-major. `active`: rovers that move; the others keep state and
+    /// `actions`: n × n_actions, row-major. `active`: rovers that move; the others keep state and
     /// observation. `has_scan`: whether the heights are taken; without, only episodes that end or
     /// reach the time limit take them, and all others keep the last ones. `go_on`: as for
     /// [`Batch::step_while`]; an episode whose rover was stopped goes on as after a whole period.
