@@ -45,6 +45,7 @@ class Task:
     Attributes:
         model: The rover, before its masses are scaled; its steering is welded where it is not steered.
         steered: Whether the wheels are steered.
+        n_actions: Entries of an action: a torque per wheel, then a set-point per wheel if they are steered.
         field: The given field, which is the ground of every episode; None without one.
         rocks: Distribution of the rock fields; None without rocks.
         slope_by_difficulty: Whether the rocks' difficulty sets the slope of the ground.
@@ -64,6 +65,7 @@ class Task:
 
     model: RoverModel
     steered: bool
+    n_actions: int
     field: SphereField | None
     rocks: RockDistribution | None
     slope_by_difficulty: bool
@@ -87,11 +89,6 @@ class Task:
         if domain.gravity_scale != 1.0:
             options["gravity"] = tuple(domain.gravity_scale * g for g in self.gravity)
         return Simulation(model, terrain, **options)
-
-    @property
-    def n_actions(self) -> int:
-        """Entries of an action: a torque per wheel, then a steering set-point per wheel if they are steered."""
-        return N_ACTIONS if self.steered else N_WHEELS
 
     @property
     def is_noisy(self) -> bool:
@@ -185,6 +182,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
     return Task(
         model=rover,
         steered=steered,
+        n_actions=n_actions,
         field=field,
         rocks=rocks,
         slope_by_difficulty=slope_by_difficulty,
@@ -237,6 +235,12 @@ def _steering_limit(rover: RoverModel, asked_deg: float | None, *, steered: bool
         reason = f"must be at most the model's limit, {math.degrees(limit):g}"
         refuse(OptionError, "max_steering_deg", asked_deg, reason)
     return min(limit, math.radians(asked_deg))
+
+
+def check_steered(task: Task) -> None:
+    """Refuses a task without steering to a policy that steers."""
+    if not task.steered:
+        refuse(OptionError, "steered", False, "must be True for a policy that steers")
 
 
 def check_actions(actions: object, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:

@@ -146,7 +146,7 @@ class RoverBatch:
     def step(
         self, actions: object, active: Mask | None = None, *, has_scan: bool = True
     ) -> tuple[Observations, Array, Mask, Mask, list[int]]:
-        """Applies actions `(n, 12)` for one control period.
+        """Applies actions `(n, n_actions)` for one control period.
 
         Args:
             actions: Within [-1, 1].

@@ -109,7 +109,7 @@ class RoverVecEnv(VecEnv):
         self._options = [copy.deepcopy(dict(one or {})) for one in given]
 
     def step_async(self, actions: npt.NDArray[np.float32]) -> None:
-        """Stores the actions `(n_envs, 12)` for `step_wait`."""
+        """Stores the actions `(n_envs, n_actions)` for `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:

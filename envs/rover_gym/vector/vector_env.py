@@ -105,7 +105,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         return self.batch.observation, infos
 
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observations, Array, Mask, Mask, _Info]:
-        """Applies actions `(num_envs, 12)` for one control period.
+        """Applies actions `(num_envs, n_actions)` for one control period.
 
         An episode that cannot begin is refused before any rover moves. With autoreset in the same step, the following
         step refuses it.
