@@ -78,11 +78,9 @@ def train(
     typer.echo(f"written: {report}")
 
 
-def _train_once(
-    workers: int, envs: int, iterations: int, batch: int, environment: dict[str, Any], seed: int, folder: Path
-) -> dict[str, Any]:
-    """One training with this many env runners; the first iteration, in which they start, is not timed."""
-    config = (
+def configuration(workers: int, envs: int, batch: int, environment: dict[str, Any], seed: int) -> PPOConfig:
+    """PPO over env runners that each step `envs` rovers in one vector."""
+    return (
         PPOConfig()
         .environment("Rover", env_config=environment)
         .framework("torch")
@@ -98,6 +96,13 @@ def _train_once(
         )
         .debugging(seed=seed)
     )
+
+
+def _train_once(
+    workers: int, envs: int, iterations: int, batch: int, environment: dict[str, Any], seed: int, folder: Path
+) -> dict[str, Any]:
+    """One training with this many env runners; the first iteration, in which they start, is not timed."""
+    config = configuration(workers, envs, batch, environment, seed)
     algorithm = config.build_algo()
     sampling = learning = 0.0
     returns: list[float] = []

@@ -1,8 +1,7 @@
 """What a batch saves where no rover steers or meets a rock: `python -m comparison.batch_economies` (a minute).
 
-CPU time of the physics of the same 64 rovers on one thread under random torques: steering at random, held straight ahead
-and welded, on a plane and in a field of rocks that none of them reaches. The variants take turns; the median round of
-each counts.
+CPU time of the physics of the same 64 rovers on one thread under random torques: steering at random, held straight and
+welded, on a plane and in a field of rocks that none of them reaches. The variants take turns; the median round counts.
 """
 
 import platform
