@@ -10,7 +10,8 @@
 //! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
 //! - `parts`, [`ground`], [`forecast`], [`contacts`]: what touches what; [`rows`]: Jacobian and
 //!   Delassus operator;
-//! - [`problem`], [`modes`], [`equations`], [`newton`]: the friction-contact problems;
+//! - [`problem`], [`modes`], [`equations`], `pivoting`, `visits`, [`queue`]: the friction-contact
+//!   problems;
 //! - [`step`]: the step.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
@@ -25,11 +26,13 @@ pub mod inertias;
 pub mod machine;
 pub mod mass_matrix;
 pub mod modes;
-pub mod newton;
 mod parts;
 pub mod passenger;
+mod pivoting;
 pub mod place;
 pub mod poses;
 pub mod problem;
+pub mod queue;
 pub mod rows;
 pub mod step;
+mod visits;

@@ -1,7 +1,5 @@
-//! Modes of the contacts side by side, and their violation of the law.
-//!
-//! The modes are predicted by the projection of `z = p − ρ u` (Alart and Curnier 1991), or read
-//! from the impulses of the last step.
+//! Modes of the contacts side by side, and their violation of the law, which is measured by the
+//! projection of `z = p − ρ u` (Alart and Curnier 1991).
 
 use super::equations::Triple;
 use crate::scalar::Lane;
@@ -49,13 +47,6 @@ pub struct Law<T> {
     pub mass_squared: T,
 }
 
-/// `z_T = p_T − ρ_T u_T` and its length.
-#[derive(Clone, Copy, Debug)]
-pub struct Projected<T> {
-    z: [T; 2],
-    norm: T,
-}
-
 /// Sums over the contacts' violations.
 #[derive(Clone, Copy, Debug)]
 pub struct Violations<T> {
@@ -70,9 +61,19 @@ pub struct Violations<T> {
 /// Impulses below the limit of friction by less than this share slide.
 const AT_THE_LIMIT: f64 = 1e-9;
 
-/// Largest turning stiffness relative to `1/ρ_T`; a contact about to open would have infinitely
-/// much.
-const STIFFEST: f64 = 1e12;
+impl<T: Lane> Law<T> {
+    /// That of a contact without data.
+    #[inline(always)]
+    pub fn new(zero: T) -> Self {
+        let one = zero.like(1.0);
+        Self {
+            mu: zero,
+            rho: [one; 2],
+            inverse: [one; 2],
+            mass_squared: one,
+        }
+    }
+}
 
 impl<T: Lane> Mode<T> {
     /// Open.
@@ -88,20 +89,13 @@ impl<T: Lane> Mode<T> {
         }
     }
 
-    /// Of masks and of the slide along `e` with stiffness `gamma`; `has_friction` where the
-    /// contact can resist a slide.
+    /// Open, sticking or sliding along the present impulse `p` with the velocity `u`.
     #[inline(always)]
-    fn of(
-        mu: T,
-        closed: T::Mask,
-        stick: T::Mask,
-        has_friction: T::Mask,
-        e: [T; 2],
-        gamma: T,
-    ) -> Self {
+    pub fn of(mu: T, closed: T::Mask, sticks: T::Mask, p: &Triple<T>, u: &Triple<T>) -> Self {
         let (zero, one) = (mu.like(0.0), mu.like(1.0));
-        let slides = closed & !stick & has_friction;
-        let sticks = closed & stick;
+        let (e, gamma, norm) = slide_along(p, u);
+        let slides = closed & !sticks & zero.lt(mu) & zero.lt(norm);
+        let sticks = closed & sticks;
         let e = [T::select(slides, e[0], zero), T::select(slides, e[1], zero)];
         Self {
             a: [mu * e[0], mu * e[1]],
@@ -111,86 +105,15 @@ impl<T: Lane> Mode<T> {
             gamma: T::select(slides, gamma, T::select(sticks, zero, one)),
         }
     }
+}
 
-    /// `yes` where the mask is true, `no` elsewhere.
-    #[inline(always)]
-    pub fn select(mask: T::Mask, yes: &Self, no: &Self) -> Self {
-        Self {
-            a: [
-                T::select(mask, yes.a[0], no.a[0]),
-                T::select(mask, yes.a[1], no.a[1]),
-            ],
-            b: [
-                T::select(mask, yes.b[0], no.b[0]),
-                T::select(mask, yes.b[1], no.b[1]),
-            ],
-            closed: T::select(mask, yes.closed, no.closed),
-            stick: T::select(mask, yes.stick, no.stick),
-            gamma: T::select(mask, yes.gamma, no.gamma),
-        }
-    }
-
-    /// Predicted at an impulse `p_N` and velocity `u_N`.
-    #[inline(always)]
-    pub fn predict(law: &Law<T>, seen: &Projected<T>, p_N: T, u_N: T) -> Self {
-        let zero = p_N.like(0.0);
-        let [rho_N, rho_T] = law.rho;
-        let z_N = p_N - rho_N * u_N;
-        let Projected { z, norm } = *seen;
-        let radius = law.mu * z_N;
-        let one = zero.like(1.0);
-        let inverse = one / (rho_T * radius * norm);
-        let shared = rho_T * radius * inverse;
-        let e = [z[0] * shared, z[1] * shared];
-        let stiffest = zero.like(STIFFEST) * law.inverse[1];
-        let gamma = ((norm - radius) * norm * inverse).min(stiffest);
-        let closed = zero.lt(z_N);
-        Self::of(
-            law.mu,
-            closed,
-            norm.le(radius) & zero.lt(radius),
-            zero.lt(radius),
-            e,
-            gamma,
-        )
-    }
-
-    /// Read from the impulse itself, the answer of the last step.
-    ///
-    /// A contact without impulse counts as sticking if it approaches, else as open.
-    #[inline(always)]
-    pub fn recall(mu: T, p: &Triple<T>, u: &Triple<T>) -> Self {
-        let zero = mu.like(0.0);
-        let (e, gamma, norm) = slide_along(p, u);
-        let radius = mu * p[0];
-        let pressed = zero.lt(p[0]);
-        let below = norm.lt(radius * zero.like(1.0 - AT_THE_LIMIT));
-        let approaches = u[0].lt(zero);
-        let stick = (pressed & below) | (!pressed & approaches);
-        Self::of(mu, pressed | approaches, stick, zero.lt(radius), e, gamma)
-    }
-
-    /// A slide along the present impulse.
-    #[inline(always)]
-    pub fn slide(mu: T, p: &Triple<T>, u: &Triple<T>) -> Self {
-        let zero = mu.like(0.0);
-        let (e, gamma, norm) = slide_along(p, u);
-        let yes = zero.le(zero);
-        Self::of(mu, yes, !yes, zero.lt(mu) & zero.lt(norm), e, gamma)
-    }
-
-    /// Whether it is open, sticks or slides where another does not.
-    #[inline(always)]
-    pub fn differs(&self, other: &Self) -> T::Mask {
-        let (own, other) = (self.closed + self.stick, other.closed + other.stick);
-        own.lt(other) | other.lt(own)
-    }
-
-    /// Whether it sticks.
-    #[inline(always)]
-    pub fn sticks(&self) -> T::Mask {
-        self.stick.like(0.5).lt(self.stick)
-    }
+/// Whether the contact is closed and its impulse at the limit of friction or beyond.
+#[inline(always)]
+pub fn is_pressed_to_slide<T: Lane>(mu: T, p: &Triple<T>) -> T::Mask {
+    let zero = mu.like(0.0);
+    let norm = (p[1] * p[1] + p[2] * p[2]).sqrt();
+    let below = zero.lt(mu) & norm.lt(mu * p[0] * zero.like(1.0 - AT_THE_LIMIT));
+    zero.lt(p[0]) & !below
 }
 
 /// Direction of the tangential impulse, the turning stiffness of a slide along it, and its size.
@@ -205,13 +128,12 @@ fn slide_along<T: Lane>(p: &Triple<T>, u: &Triple<T>) -> ([T; 2], T, T) {
     ([p[1] * inverse, p[2] * inverse], gamma, norm)
 }
 
-/// Violations of the law at impulses `p` and velocities `u`, and the projected impulses.
+/// Violations of the law at impulses `p` and velocities `u`.
 #[inline(always)]
 pub fn judge<T: Lane, const C: usize>(
     laws: &[Law<T>; C],
     p: &[Triple<T>; C],
     u: &[Triple<T>; C],
-    seen: &mut [Projected<T>; C],
 ) -> Violations<T> {
     let zero = p[0][0].like(0.0);
     let one = zero.like(1.0);
@@ -235,7 +157,6 @@ pub fn judge<T: Lane, const C: usize>(
         sums.squares += square;
         sums.weighted += law.mass_squared * square;
         sums.largest = square.max(sums.largest);
-        seen[i] = Projected { z, norm };
     }
     sums
 }
@@ -259,18 +180,6 @@ impl<T: Lane> Violations<T> {
     }
 }
 
-impl<T: Lane> Projected<T> {
-    /// Nothing projected.
-    #[inline(always)]
-    pub fn none(like: T) -> Self {
-        let zero = like.like(0.0);
-        Self {
-            z: [zero; 2],
-            norm: zero,
-        }
-    }
-}
-
 /// Where a contact limits a step, as a fraction of it: 1 where it does not.
 #[derive(Clone, Copy, Debug)]
 pub struct Limit<T: Lane> {
@@ -287,9 +196,14 @@ fn outside<T: Lane>(mu: T, x: &Triple<T>, y: &Triple<T>) -> T {
 }
 
 /// Smallest fraction of the step from `p` to `trial` at which a sticking contact reaches the limit
-/// of friction, or a sliding one opens.
+/// of friction, or a sliding one opens. `closed`, `sticks`: its mode.
 #[inline(always)]
-pub fn limit<T: Lane>(mode: &Mode<T>, mu: T, p: &Triple<T>, trial: &Triple<T>) -> Limit<T> {
+pub fn limit<T: Lane>(
+    (closed, sticks): (T::Mask, T::Mask),
+    mu: T,
+    p: &Triple<T>,
+    trial: &Triple<T>,
+) -> Limit<T> {
     let (zero, one) = (mu.like(0.0), mu.like(1.0));
     let d = [trial[0] - p[0], trial[1] - p[1], trial[2] - p[2]];
     // |p_T + t d_T|² = μ² (p_N + t d_N)²
@@ -305,12 +219,11 @@ pub fn limit<T: Lane>(mode: &Mode<T>, mu: T, p: &Triple<T>, trial: &Triple<T>) -
     let second = T::select(zero.le(second), second, one);
     let inside = first.min(second).min(one);
     let at_the_limit = T::select(ahead, zero, one);
-    let sticks = mode.sticks();
+    let sticks = closed & sticks;
     let pressed = zero.lt(p[0]);
     let stays = outside(mu, trial, trial).le(zero) & zero.lt(trial[0]);
     let leaves = T::select(zero.le(c), at_the_limit, inside);
     let opens = T::select(trial[0].lt(zero), p[0] / -d[0], one);
-    let closed = zero.lt(mode.closed);
     let t = T::select(
         sticks & pressed & !stays,
         leaves,

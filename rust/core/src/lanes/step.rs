@@ -2,7 +2,7 @@
 //!
 //! The formulas are those of [`crate::integrator::moreau_jean`] with explicit gyroscopic terms and
 //! inelastic contact. A step has three parts, between which the contact problems of all blocks are
-//! solved together ([`super::newton`]):
+//! solved together ([`super::queue`]):
 //!
 //! 1. [`Block::prepare`] — poses, contacts, forces, the friction-contact problem;
 //! 2. [`Block::conclude`] — the new velocity and configuration, energy audit, and where contacts

@@ -10,8 +10,8 @@ use std::sync::Arc;
 use super::rover::RoverSimulation;
 use crate::integrator::{NoProbe, StepError, StepReport};
 use crate::lanes::machine::Machine;
-use crate::lanes::newton;
 use crate::lanes::problem::ContactProblem;
+use crate::lanes::queue;
 use crate::lanes::step::{Block, are_alike};
 use crate::scalar::{Instructions, Lane};
 
@@ -216,7 +216,7 @@ impl<T: Lane> Lanes<T> {
             block.prepare(problems, probe);
         }
         let solver = blocks[0].options().solver;
-        newton::solve_all::<T>(self.token, problems, &solver);
+        queue::solve_all::<T>(self.token, problems, &solver);
         let mut is_deep = false;
         for (block, problems) in blocks.iter_mut().zip(problems.chunks_exact(T::LANES)) {
             is_deep |= block.conclude(problems, probe);
@@ -225,7 +225,7 @@ impl<T: Lane> Lanes<T> {
             for (block, problems) in blocks.iter_mut().zip(problems.chunks_exact_mut(T::LANES)) {
                 block.set_gaps(problems);
             }
-            newton::solve_all::<T>(self.token, problems, &solver);
+            queue::solve_all::<T>(self.token, problems, &solver);
         }
         for (block, problems) in blocks.iter_mut().zip(problems.chunks_exact(T::LANES)) {
             block.finish(is_deep.then_some(problems), probe);

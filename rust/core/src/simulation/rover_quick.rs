@@ -7,9 +7,9 @@ use super::rover::{RoverScene, RoverSimulation};
 use super::scene::QuickStep;
 use crate::integrator::{NoProbe, Phase, Probe, StepError, StepReport};
 use crate::lanes::machine::Machine;
-use crate::lanes::newton;
 use crate::lanes::passenger::Passenger;
 use crate::lanes::problem::ContactProblem;
+use crate::lanes::queue;
 use crate::lanes::step::{Block, admits};
 use crate::scalar::{Lane, Single};
 
@@ -66,14 +66,14 @@ impl RoverScene {
         let problems = &mut quick.problem[..];
         block.prepare(problems, probe);
         let solver = &step.options.solver;
-        newton::solve_all::<f64>(token, problems, solver);
+        queue::solve_all::<f64>(token, problems, solver);
         probe.end(Phase::Solve);
         let is_deep = block.conclude(problems, probe);
         let gap_problems = &mut quick.gap_problem[..];
         if is_deep {
             gap_problems.clone_from_slice(problems);
             block.set_gaps(gap_problems);
-            newton::solve_all::<f64>(token, gap_problems, solver);
+            queue::solve_all::<f64>(token, gap_problems, solver);
         }
         block.finish(is_deep.then_some(&*gap_problems), probe);
         if block.declined(0).is_some() {

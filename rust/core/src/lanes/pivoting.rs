@@ -1,0 +1,413 @@
+//! Pivoting on the contact modes of several problems side by side: the rules of
+//! [`crate::solver`]'s pivoting, in lanes.
+//!
+//! From a warm start a step goes to the [answer of the present modes](super::equations) as far as
+//! all cones allow. The contact that blocks then slides or opens. After a full step the contact
+//! whose velocity contradicts its mode most is corrected, unless the residual falls fast: then the
+//! modes are right, and the next step removes the curvature of the slides. A contact whose friction
+//! pushes along its slip, but which would leave its cone at once if it stuck, is barred, so that
+//! another one changes its mode. If none is left, its friction is reversed.
+
+use super::equations::{Block, Factors, Triple, newton_point, velocities};
+use super::modes::{Law, Limit, Mode, Violations, is_pressed_to_slide, judge, limit};
+use super::problem::{MAX_BLOCKS, block};
+use super::visits::Visits;
+use crate::law::coulomb::ContactMode;
+use crate::scalar::{Lane, LaneMask};
+use crate::solver::solve_one_contact;
+
+/// First `α` of the proximal term `α (p − c)`, relative to the mean diagonal of `W`. A step's error
+/// is `α` times the change of the impulse, and the rounding of `W p + q`, divided by `α`, drifts
+/// into the null space of `W`. The ratio test bounds that where wheels slide. A parked rover, whose
+/// impulses hardly change, collects it step by step: its `α` is larger.
+const ALPHA: f64 = 1e-8;
+const PARKED_ALPHA: f64 = 1e-6;
+
+/// Squared relative residual below which a rover without a slide counts as parked.
+const PARKED: f64 = 1e-12;
+
+/// Factor by which `α` shrinks when a full step gains nothing, and its smallest value.
+const SHRINK: f64 = 1e-3;
+const SMALLEST: f64 = 1e-14;
+
+/// Share of the squared residual that a full step must leave, if it gains nothing, and if it gains
+/// so much that the modes stay.
+const NO_GAIN: f64 = 0.25;
+const HOLD: f64 = 1e-4;
+
+/// Fraction of a step below which the impulse stays where it was.
+const NO_MOVE: f64 = 1e-6;
+
+/// Steps without progress after which the modes go in circles.
+const PATIENCE: f64 = 4.0;
+
+/// Most reversals of friction.
+const REVERSALS: f64 = 2.0;
+
+/// Impulses that stick may leave the cone by this share, which is rounding.
+const BEYOND: f64 = 1.0 + 1e-12;
+
+/// Problems of at most `C` contacts that are being solved, one a lane.
+#[derive(Clone, Debug)]
+pub(super) struct Pivoting<T: Lane, const C: usize> {
+    pub(super) W: [Block<T>; MAX_BLOCKS],
+    pub(super) q: [Triple<T>; C],
+    pub(super) laws: [Law<T>; C],
+    /// Mean diagonal of `W`, 1/kg.
+    pub(super) mean: T,
+    /// Impulses and their velocities.
+    pub(super) p: [Triple<T>; C],
+    pub(super) u: [Triple<T>; C],
+    /// Violations of the law by them.
+    pub(super) sums: Violations<T>,
+    /// Lanes whose modes go in circles.
+    pub(super) lost: T::Mask,
+    /// Squares of `1/|q|` and `1/|(ρ_i q_i)|`.
+    pub(super) inverses: [T; 2],
+    alpha: T,
+    first_alpha: T,
+    trial: [Triple<T>; C],
+    modes: [Mode<T>; C],
+    closed: [T::Mask; C],
+    sticks: [T::Mask; C],
+    barred: [T::Mask; C],
+    /// The contact that has just been let stick.
+    freed: [T::Mask; C],
+    /// Lanes whose last step was a full one.
+    full: T::Mask,
+    /// Squared relative residual after the last full step.
+    last: T,
+    visits: Visits<T>,
+    reversals: T,
+}
+
+impl<T: Lane, const C: usize> Pivoting<T, C> {
+    #[inline(always)]
+    pub(super) fn new(token: T::Token) -> Self {
+        let (zero, one) = (T::splat(token, 0.0), T::splat(token, 1.0));
+        let none = T::mask(token, 0);
+        Self {
+            W: [[zero; 9]; MAX_BLOCKS],
+            q: [[zero; 3]; C],
+            laws: [Law::new(zero); C],
+            mean: one,
+            p: [[zero; 3]; C],
+            u: [[zero; 3]; C],
+            sums: Violations::none(zero),
+            lost: none,
+            inverses: [zero, one],
+            alpha: one,
+            first_alpha: one,
+            trial: [[zero; 3]; C],
+            modes: [Mode::open(zero); C],
+            closed: [none; C],
+            sticks: [none; C],
+            barred: [none; C],
+            freed: [none; C],
+            full: none,
+            last: zero,
+            visits: Visits::new(zero),
+            reversals: zero,
+        }
+    }
+
+    /// Squares of the two numbers of the residual.
+    #[inline(always)]
+    pub(super) fn residual(&self) -> [T; 2] {
+        let speed = self.sums.squares * self.inverses[0];
+        let impulse = self.sums.weighted * self.inverses[1];
+        [speed.max(impulse), self.sums.largest]
+    }
+
+    /// Begins the lanes of a mask: velocities, violations and modes of their impulses.
+    #[inline(always)]
+    pub(super) fn begin(&mut self, lanes: T::Mask) {
+        let zero = self.mean.like(0.0);
+        self.renew_velocities(lanes);
+        self.sums = judge(&self.laws, &self.p, &self.u);
+        let mut slides = !lanes & lanes;
+        for i in 0..C {
+            let (p, mu) = (&self.p[i], self.laws[i].mu);
+            let pressed = zero.lt(p[0]);
+            let approaches = self.u[i][0].lt(zero);
+            let limit = is_pressed_to_slide(mu, p);
+            let sticks = (pressed & !limit) | (!pressed & approaches);
+            slides = slides | (limit & zero.lt(mu));
+            self.closed[i] = replaced::<T>(lanes, pressed | approaches, self.closed[i]);
+            self.sticks[i] = replaced::<T>(lanes, sticks, self.sticks[i]);
+            self.barred[i] = self.barred[i] & !lanes;
+            self.freed[i] = self.freed[i] & !lanes;
+        }
+        let [relative, _] = self.residual();
+        self.last = T::select(lanes, relative, self.last);
+        let is_parked = !slides & relative.lt(zero.like(PARKED));
+        let first = T::select(is_parked, zero.like(PARKED_ALPHA), zero.like(ALPHA)) * self.mean;
+        self.first_alpha = T::select(lanes, first, self.first_alpha);
+        self.alpha = T::select(lanes, first, self.alpha);
+        self.visits.forget(lanes);
+        self.reversals = T::select(lanes, zero.like(REVERSALS), self.reversals);
+        self.full = self.full & !lanes;
+        self.lost = self.lost & !lanes;
+    }
+
+    /// `u = W p + q` in the lanes of a mask.
+    #[inline(always)]
+    fn renew_velocities(&mut self, lanes: T::Mask) {
+        velocities(&self.W, &self.q, &self.p, &mut self.trial);
+        for (u, new) in self.u.iter_mut().zip(&self.trial) {
+            for (u, new) in u.iter_mut().zip(new) {
+                *u = T::select(lanes, *new, *u);
+            }
+        }
+    }
+
+    /// A step of the lanes of a mask, as far as the cones allow; a blocking contact changes its
+    /// mode.
+    #[inline(always)]
+    pub(super) fn step(&mut self, active: T::Mask, factors: &mut Factors<T, C>) {
+        let (zero, one) = (self.mean.like(0.0), self.mean.like(1.0));
+        for i in 0..C {
+            let (mu, p, u) = (self.laws[i].mu, &self.p[i], &self.u[i]);
+            self.modes[i] = Mode::of(mu, self.closed[i], self.sticks[i], p, u);
+        }
+        let (W, q) = (&self.W, &self.q);
+        newton_point(
+            W,
+            q,
+            &self.p,
+            self.alpha,
+            &self.modes,
+            factors,
+            &mut self.trial,
+        );
+        let mut first = one;
+        let mut limits = [Limit {
+            t: one,
+            slides: active,
+        }; C];
+        for i in 0..C {
+            let trial = &mut self.trial[i];
+            let slides = self.closed[i] & !self.sticks[i] & zero.lt(trial[0]);
+            return_to_cone::<T>(slides, self.laws[i].mu, trial);
+            let (closed, sticks) = (self.closed[i], self.sticks[i]);
+            limits[i] = limit((closed, sticks), self.laws[i].mu, &self.p[i], trial);
+            first = limits[i].t.min(first);
+        }
+        let blocked = active & first.lt(one);
+        if blocked.any() {
+            self.stop_at(blocked, first, &limits);
+        } else {
+            self.p = self.trial;
+        }
+        for freed in &mut self.freed {
+            *freed = *freed & !active;
+        }
+        self.full = active & !blocked;
+        velocities(&self.W, &self.q, &self.p, &mut self.u);
+        self.sums = judge(&self.laws, &self.p, &self.u);
+    }
+
+    /// Moves the impulses of blocked lanes to where the first contact blocks, which changes its
+    /// mode; those of the others to the trial.
+    #[inline(always)]
+    fn stop_at(&mut self, blocked: T::Mask, first: T, limits: &[Limit<T>; C]) {
+        let zero = first.like(0.0);
+        let moves = zero.like(NO_MOVE).lt(first);
+        let mut left = blocked;
+        for i in 0..C {
+            let (p, trial) = (&mut self.p[i], &self.trial[i]);
+            for k in 0..3 {
+                let between = p[k] + first * (trial[k] - p[k]);
+                p[k] = T::select(blocked, between, trial[k]);
+            }
+            let hit = left & limits[i].t.le(first);
+            left = left & !hit;
+            let opens = hit & !limits[i].slides;
+            self.barred[i] = (self.barred[i] & !(blocked & moves)) | (hit & !moves & self.freed[i]);
+            self.sticks[i] = self.sticks[i] & !hit;
+            self.closed[i] = self.closed[i] & !opens;
+            let slides = blocked & self.closed[i] & !self.sticks[i];
+            return_to_cone::<T>(slides, self.laws[i].mu, p);
+            for p in p {
+                *p = T::select(opens, zero, *p);
+            }
+        }
+    }
+
+    /// The next modes of the lanes of a mask, where the last step was a full one and did not solve.
+    #[inline(always)]
+    pub(super) fn correct(&mut self, active: T::Mask) {
+        let full = self.full & active;
+        if !full.any() {
+            return;
+        }
+        let like = self.mean;
+        let zero = like.like(0.0);
+        let [relative, _] = self.residual();
+        let gain = relative / self.last;
+        self.last = T::select(full, relative, self.last);
+        let gains_nothing = full & like.like(NO_GAIN).lt(gain);
+        let smaller = (like.like(SHRINK) * self.alpha).max(like.like(SMALLEST) * self.mean);
+        self.alpha = T::select(gains_nothing, smaller, self.alpha);
+        self.visits.enter(full, self.number(), relative);
+        let looks = full & !gain.lt(like.like(HOLD));
+        if !looks.any() {
+            return;
+        }
+        let (found, worst) = self.worst_contradiction(looks);
+        let circles = looks & like.like(PATIENCE).lt(self.visits.idle);
+        let stuck = circles | (gains_nothing & looks & !zero.lt(worst));
+        let reversed = if stuck.any() {
+            self.reverse(stuck)
+        } else {
+            stuck
+        };
+        self.lost = self.lost | (circles & !reversed);
+        let mut moved = reversed;
+        for i in 0..C {
+            let here = found[i] & !reversed;
+            self.freed[i] = here;
+            if here.any() {
+                moved = moved | self.change_mode(i, here);
+            }
+        }
+        if moved.any() {
+            self.renew_velocities(moved);
+        }
+        if reversed.any() {
+            self.sums = judge(&self.laws, &self.p, &self.u);
+            let [relative, _] = self.residual();
+            self.last = T::select(reversed, relative, self.last);
+        }
+    }
+
+    /// The modes as a number that is not zero.
+    #[inline(always)]
+    fn number(&self) -> T {
+        let one = self.mean.like(1.0);
+        let (zero, two) = (one.like(0.0), one.like(2.0));
+        let mut number = one;
+        for (closed, sticks) in self.closed.iter().zip(&self.sticks) {
+            let digit = T::select(*closed, T::select(*sticks, one, two), zero);
+            number = number * one.like(3.0) + digit;
+        }
+        number
+    }
+
+    /// The contact that contradicts its mode most, unless it is barred, in the lanes of a mask, and
+    /// by how much; zero where none does.
+    #[inline(always)]
+    fn worst_contradiction(&self, lanes: T::Mask) -> ([T::Mask; C], T) {
+        let zero = self.mean.like(0.0);
+        let mut worst = zero;
+        let mut found = [!lanes & lanes; C];
+        for i in 0..C {
+            let (p, u, mu) = (&self.p[i], &self.u[i], self.laws[i].mu);
+            let norm = (p[1] * p[1] + p[2] * p[2]).sqrt();
+            let beyond = zero.lt(p[0]) & (mu * p[0] * zero.like(BEYOND)).lt(norm);
+            let of_stick = T::select(beyond | p[0].lt(zero), zero.like(f64::INFINITY), zero);
+            // Friction that pushes along the slip.
+            let along = (p[1] * u[1] + p[2] * u[2]) / norm;
+            let of_slide = T::select(zero.lt(norm), along, zero);
+            let amount = T::select(self.sticks[i], of_stick, of_slide);
+            let amount = T::select(self.closed[i], amount, -u[0]);
+            let here = lanes & !self.barred[i] & worst.lt(amount);
+            worst = T::select(here, amount, worst);
+            for other in &mut found[..i] {
+                *other = *other & !here;
+            }
+            found[i] = here;
+        }
+        (found, worst)
+    }
+
+    /// Turns the friction of barred contacts against their slip and frees them, in the lanes of a
+    /// mask. Returns where there was one.
+    #[inline(always)]
+    fn reverse(&mut self, stuck: T::Mask) -> T::Mask {
+        let zero = self.mean.like(0.0);
+        let may = stuck & zero.lt(self.reversals);
+        let mut reversed = !stuck & stuck;
+        for i in 0..C {
+            let (p, u, mu) = (&mut self.p[i], &self.u[i], self.laws[i].mu);
+            let slip = (u[1] * u[1] + u[2] * u[2]).sqrt();
+            let here = may & self.barred[i] & zero.lt(slip);
+            reversed = reversed | here;
+            self.barred[i] = self.barred[i] & !here;
+            let scale = -(mu * p[0].max(zero)) / slip;
+            p[1] = T::select(here, scale * u[1], p[1]);
+            p[2] = T::select(here, scale * u[2], p[2]);
+        }
+        let left = self.reversals - zero.like(1.0);
+        self.reversals = T::select(reversed, left, self.reversals);
+        self.alpha = T::select(reversed, self.first_alpha, self.alpha);
+        self.visits.forget(reversed);
+        reversed
+    }
+
+    /// Gives contact `i` the mode that its contradiction asks for, in the lanes of a mask. Returns
+    /// where its impulse moved.
+    #[inline(always)]
+    fn change_mode(&mut self, i: usize, lanes: T::Mask) -> T::Mask {
+        let zero = self.mean.like(0.0);
+        let p = &mut self.p[i];
+        let (closed, stuck) = (
+            lanes & self.closed[i],
+            lanes & self.sticks[i] & self.closed[i],
+        );
+        let opens = stuck & p[0].lt(zero);
+        let slides = stuck & !opens;
+        let closes = lanes & !closed;
+        return_to_cone::<T>(slides, self.laws[i].mu, p);
+        for p in p {
+            *p = T::select(opens, zero, *p);
+        }
+        self.closed[i] = (self.closed[i] & !opens) | closes;
+        self.sticks[i] = (self.sticks[i] & !stuck) | (closed & !stuck);
+        let mut bits = closes.bits();
+        while bits != 0 {
+            self.close(i, bits.trailing_zeros() as usize);
+            bits &= bits - 1;
+        }
+        opens | slides | closes
+    }
+
+    /// Closes contact `i` of a lane with its own solution, all others fixed, since it may slide at
+    /// once.
+    #[inline(always)]
+    fn close(&mut self, i: usize, lane: usize) {
+        let [a, b, c, d, e, f, g, h, k] = self.W[block(i, i)].map(|w| w.get(lane));
+        // Its impulse is zero, so that u is its free velocity.
+        let free = self.u[i].map(|u| u.get(lane));
+        let mu = self.laws[i].mu.get(lane);
+        let own = solve_one_contact(&[[a, b, c], [d, e, f], [g, h, k]], &free, mu);
+        for (p, own) in self.p[i].iter_mut().zip(own.impulse) {
+            p.set(lane, own);
+        }
+        let here = T::mask(self.mean.token(), 1 << lane);
+        self.sticks[i] = self.sticks[i] & !here;
+        if own.mode == ContactMode::Stick {
+            self.sticks[i] = self.sticks[i] | here;
+        }
+    }
+}
+
+/// `new` in the lanes of a mask, `old` elsewhere.
+#[inline(always)]
+fn replaced<T: Lane>(lanes: T::Mask, new: T::Mask, old: T::Mask) -> T::Mask {
+    (lanes & new) | (old & !lanes)
+}
+
+/// Scales the tangential impulse to `μ p_N` in the lanes of a mask.
+#[inline(always)]
+fn return_to_cone<T: Lane>(lanes: T::Mask, mu: T, p: &mut Triple<T>) {
+    if !lanes.any() {
+        return;
+    }
+    let zero = mu.like(0.0);
+    let norm = (p[1] * p[1] + p[2] * p[2]).sqrt();
+    let scale = T::select(zero.lt(norm), mu * p[0].max(zero) / norm, zero);
+    for p in &mut p[1..] {
+        *p = T::select(lanes, *p * scale, *p);
+    }
+}

@@ -1,0 +1,78 @@
+//! Which modes a solve has tried, and with what success.
+
+use crate::scalar::{Lane, LaneMask};
+
+/// Modes remembered.
+const MEMORY: usize = 8;
+
+/// Share of a squared residual that counts as a smaller one.
+const LEAST_GAIN: f64 = 0.25;
+
+/// The modes of past full steps and the smallest squared residual with each, lane by lane.
+#[derive(Clone, Debug)]
+pub struct Visits<T> {
+    modes: [T; MEMORY],
+    least: [T; MEMORY],
+    /// Place of the next modes.
+    next: T,
+    /// Full steps since the last with new modes or a smaller residual.
+    pub idle: T,
+}
+
+impl<T: Lane> Visits<T> {
+    /// Nothing visited.
+    #[inline(always)]
+    pub fn new(zero: T) -> Self {
+        Self {
+            modes: [zero; MEMORY],
+            least: [zero; MEMORY],
+            next: zero,
+            idle: zero,
+        }
+    }
+
+    /// Forgets the visits of the lanes of a mask.
+    #[inline(always)]
+    pub fn forget(&mut self, lanes: T::Mask) {
+        let zero = self.idle.like(0.0);
+        for modes in &mut self.modes {
+            *modes = T::select(lanes, zero, *modes);
+        }
+        self.next = T::select(lanes, zero, self.next);
+        self.idle = T::select(lanes, zero, self.idle);
+    }
+
+    /// Enters the modes of a full step in the lanes of a mask, as a number that is not zero, and
+    /// the squared residual after it.
+    #[inline(always)]
+    pub fn enter(&mut self, lanes: T::Mask, modes: T, residual: T) {
+        let (zero, one) = (modes.like(0.0), modes.like(1.0));
+        let mut known = !lanes & lanes;
+        let mut better = known;
+        for k in 0..MEMORY {
+            let here = lanes & !known & equal(self.modes[k], modes);
+            known = known | here;
+            let smaller = here & residual.lt(modes.like(LEAST_GAIN) * self.least[k]);
+            better = better | smaller;
+            self.least[k] = T::select(smaller, residual, self.least[k]);
+        }
+        let new = lanes & !known;
+        if new.any() {
+            for k in 0..MEMORY {
+                let here = new & equal(modes.like(k as f64), self.next);
+                self.modes[k] = T::select(here, modes, self.modes[k]);
+                self.least[k] = T::select(here, residual, self.least[k]);
+            }
+            let next = self.next + one;
+            let next = T::select(next.lt(one.like(MEMORY as f64)), next, zero);
+            self.next = T::select(new, next, self.next);
+        }
+        let idle = T::select(new | better, zero, self.idle + one);
+        self.idle = T::select(lanes, idle, self.idle);
+    }
+}
+
+#[inline(always)]
+fn equal<T: Lane>(a: T, b: T) -> T::Mask {
+    a.le(b) & b.le(a)
+}
