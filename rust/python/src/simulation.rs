@@ -232,9 +232,9 @@ impl Simulation {
         settings(&gravity, &self.options, &self.origin.words)
     }
 
-    /// Rovers that a batch steps together in one register of this machine: 8, 4 or 1.
+    /// Rovers that a batch steps together in one register of this machine.
     ///
-    /// 1 too if no step is ordinary, as `never_ordinary` then says.
+    /// Either 8, 4 or 1, and always 1 if no step is ordinary, as `never_ordinary` then says.
     #[getter]
     fn lanes(&self) -> PyResult<usize> {
         Ok(self.open()?.lanes())
