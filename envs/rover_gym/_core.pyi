@@ -858,9 +858,9 @@ class Simulation:
         """The keyword arguments that make a simulation with the same options."""
     @property
     def lanes(self) -> Literal[1, 4, 8]:
-        """Rovers that a batch steps together in one register of this machine: 8, 4 or 1.
+        """Rovers that a batch steps together in one register of this machine.
 
-        1 too if no step is ordinary, as `never_ordinary` then says.
+        Either 8, 4 or 1, and always 1 if no step is ordinary, as `never_ordinary` then says.
         """
     @property
     def never_ordinary(self) -> str | None:
