@@ -165,16 +165,13 @@ fn under_lower<T: Lane>(x: &Block<T>, f: &Block<T>) -> Block<T> {
     out
 }
 
-/// The impulses `C y` of the Newton step, into `y`; `factors` is scratch.
+/// Factors the system of the modes.
 #[inline(always)]
-pub fn newton_point<T: Lane, const C: usize>(
+pub fn factorise<T: Lane, const C: usize>(
     W: &[Block<T>; MAX_BLOCKS],
-    q: &[Triple<T>; C],
-    centre: &[Triple<T>; C],
     alpha: T,
     modes: &[Mode<T>; C],
     factors: &mut Factors<T, C>,
-    y: &mut [Triple<T>; C],
 ) {
     for k in 0..C {
         let mut diagonal = assemble(W[block(k, k)], Some(alpha), &modes[k], &modes[k]);
@@ -198,29 +195,18 @@ pub fn newton_point<T: Lane, const C: usize>(
             }
             factors[k][i] = under_lower(&x, &pivot);
         }
-        // The right-hand side is one more column.
-        let Mode {
-            closed, b, stick, ..
-        } = &modes[k];
-        let (c, q) = (&centre[k], &q[k]);
-        let rhs = [
-            alpha * c[0] - q[0],
-            alpha * c[1] - q[1],
-            alpha * c[2] - q[2],
-        ];
-        let mut own = [
-            *closed * rhs[0],
-            b[0] * rhs[1] + b[1] * rhs[2],
-            *stick * rhs[2],
-        ];
+    }
+}
+
+/// Solves the factored system for a right-hand side `y`, in place.
+#[inline(always)]
+fn solve<T: Lane, const C: usize>(factors: &Factors<T, C>, y: &mut [Triple<T>; C]) {
+    for k in 0..C {
+        let mut own = y[k];
         for m in 0..k {
-            let l = &factors[k][m];
-            for r in 0..3 {
-                own[r] -= l[3 * r] * y[m][0];
-                own[r] -= l[3 * r + 1] * y[m][1];
-                own[r] -= l[3 * r + 2] * y[m][2];
-            }
+            subtract(&mut own, &factors[k][m], &y[m]);
         }
+        let pivot = &factors[k][k];
         own[1] -= pivot[3] * own[0];
         own[2] = own[2] - pivot[6] * own[0] - pivot[7] * own[1];
         y[k] = own;
@@ -228,12 +214,7 @@ pub fn newton_point<T: Lane, const C: usize>(
     for k in (0..C).rev() {
         let mut own = y[k];
         for m in k + 1..C {
-            let u = &factors[k][m];
-            for r in 0..3 {
-                own[r] -= u[3 * r] * y[m][0];
-                own[r] -= u[3 * r + 1] * y[m][1];
-                own[r] -= u[3 * r + 2] * y[m][2];
-            }
+            subtract(&mut own, &factors[k][m], &y[m]);
         }
         let f = &factors[k][k];
         own[2] *= f[8];
@@ -241,9 +222,74 @@ pub fn newton_point<T: Lane, const C: usize>(
         own[0] = (own[0] - f[1] * own[1] - f[2] * own[2]) * f[0];
         y[k] = own;
     }
+}
+
+/// `own −= x y`.
+#[inline(always)]
+fn subtract<T: Lane>(own: &mut Triple<T>, x: &Block<T>, y: &Triple<T>) {
+    for r in 0..3 {
+        own[r] -= x[3 * r] * y[0];
+        own[r] -= x[3 * r + 1] * y[1];
+        own[r] -= x[3 * r + 2] * y[2];
+    }
+}
+
+/// `Bᵀ x` of a contact.
+#[inline(always)]
+fn across<T: Lane>(mode: &Mode<T>, x: [T; 3]) -> Triple<T> {
+    let Mode {
+        closed, b, stick, ..
+    } = mode;
+    [*closed * x[0], b[0] * x[1] + b[1] * x[2], *stick * x[2]]
+}
+
+/// `C y` of a contact.
+#[inline(always)]
+fn impulse<T: Lane>(mode: &Mode<T>, [y0, y1, y2]: Triple<T>) -> Triple<T> {
+    let Mode { a, b, .. } = mode;
+    [y0, a[0] * y0 + b[0] * y1, a[1] * y0 + b[1] * y1 + y2]
+}
+
+/// The impulses `C y` of the Newton step about the impulses `centre`, into `y`.
+#[inline(always)]
+pub fn newton_point<T: Lane, const C: usize>(
+    factors: &Factors<T, C>,
+    q: &[Triple<T>; C],
+    centre: &[Triple<T>; C],
+    alpha: T,
+    modes: &[Mode<T>; C],
+    y: &mut [Triple<T>; C],
+) {
     for k in 0..C {
-        let Mode { a, b, .. } = &modes[k];
-        let [y0, y1, y2] = y[k];
-        y[k] = [y0, a[0] * y0 + b[0] * y1, a[1] * y0 + b[1] * y1 + y2];
+        let (c, q) = (&centre[k], &q[k]);
+        let rest = [
+            alpha * c[0] - q[0],
+            alpha * c[1] - q[1],
+            alpha * c[2] - q[2],
+        ];
+        y[k] = across(&modes[k], rest);
+    }
+    solve(factors, y);
+    for k in 0..C {
+        y[k] = impulse(&modes[k], y[k]);
+    }
+}
+
+/// The change `C y` of the impulses, into `y`, that removes the velocities `u` as far as the modes
+/// allow; the factors may be those of modes at nearby impulses.
+#[inline(always)]
+pub fn correction<T: Lane, const C: usize>(
+    factors: &Factors<T, C>,
+    u: &[Triple<T>; C],
+    modes: &[Mode<T>; C],
+    y: &mut [Triple<T>; C],
+) {
+    for k in 0..C {
+        let [u0, u1, u2] = u[k];
+        y[k] = across(&modes[k], [-u0, -u1, -u2]);
+    }
+    solve(factors, y);
+    for k in 0..C {
+        y[k] = impulse(&modes[k], y[k]);
     }
 }

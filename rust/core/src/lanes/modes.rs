@@ -173,6 +173,16 @@ impl<T: Lane> Violations<T> {
         }
     }
 
+    /// `yes` where the mask is true, `no` elsewhere.
+    #[inline(always)]
+    pub fn select(mask: T::Mask, yes: &Self, no: &Self) -> Self {
+        Self {
+            squares: T::select(mask, yes.squares, no.squares),
+            weighted: T::select(mask, yes.weighted, no.weighted),
+            largest: T::select(mask, yes.largest, no.largest),
+        }
+    }
+
     /// Whether the sums are finite, and with them all impulses and velocities.
     #[inline(always)]
     pub fn is_finite(&self) -> T::Mask {

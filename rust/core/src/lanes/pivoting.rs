@@ -8,7 +8,7 @@
 //! pushes along its slip, but which would leave its cone at once if it stuck, is barred, so that
 //! another one changes its mode. If none is left, its friction is reversed.
 
-use super::equations::{Block, Factors, Triple, newton_point, velocities};
+use super::equations::{Block, Factors, Triple, correction, factorise, newton_point, velocities};
 use super::modes::{Law, Limit, Mode, Violations, is_pressed_to_slide, judge, limit};
 use super::problem::{MAX_BLOCKS, block};
 use super::visits::Visits;
@@ -34,6 +34,10 @@ const SMALLEST: f64 = 1e-14;
 /// so much that the modes stay.
 const NO_GAIN: f64 = 0.25;
 const HOLD: f64 = 1e-4;
+
+/// Squared relative residual after a full step below which the same factors may correct the rest: a
+/// rover that sticks is solved then. Where the slides still turn, a fresh step gains more.
+const NEAR: f64 = 1e-6;
 
 /// Fraction of a step below which the impulse stays where it was.
 const NO_MOVE: f64 = 1e-6;
@@ -119,6 +123,13 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
         [speed.max(impulse), self.sums.largest]
     }
 
+    /// Where squares of the residual are within tolerances.
+    #[inline(always)]
+    pub(super) fn is_solved(&self, tolerances: [T; 2]) -> T::Mask {
+        let [relative, largest] = self.residual();
+        relative.le(tolerances[0]) & largest.le(tolerances[1])
+    }
+
     /// Begins the lanes of a mask: velocities, violations and modes of their impulses.
     #[inline(always)]
     pub(super) fn begin(&mut self, lanes: T::Mask) {
@@ -154,11 +165,7 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
     #[inline(always)]
     fn renew_velocities(&mut self, lanes: T::Mask) {
         velocities(&self.W, &self.q, &self.p, &mut self.trial);
-        for (u, new) in self.u.iter_mut().zip(&self.trial) {
-            for (u, new) in u.iter_mut().zip(new) {
-                *u = T::select(lanes, *new, *u);
-            }
-        }
+        select(lanes, &self.trial, &mut self.u);
     }
 
     /// A step of the lanes of a mask, as far as the cones allow; a blocking contact changes its
@@ -166,18 +173,14 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
     #[inline(always)]
     pub(super) fn step(&mut self, active: T::Mask, factors: &mut Factors<T, C>) {
         let (zero, one) = (self.mean.like(0.0), self.mean.like(1.0));
-        for i in 0..C {
-            let (mu, p, u) = (self.laws[i].mu, &self.p[i], &self.u[i]);
-            self.modes[i] = Mode::of(mu, self.closed[i], self.sticks[i], p, u);
-        }
-        let (W, q) = (&self.W, &self.q);
+        self.find_modes();
+        factorise(&self.W, self.alpha, &self.modes, factors);
         newton_point(
-            W,
-            q,
+            factors,
+            &self.q,
             &self.p,
             self.alpha,
             &self.modes,
-            factors,
             &mut self.trial,
         );
         let mut first = one;
@@ -205,6 +208,46 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
         self.full = active & !blocked;
         velocities(&self.W, &self.q, &self.p, &mut self.u);
         self.sums = judge(&self.laws, &self.p, &self.u);
+    }
+
+    /// Modes at the present impulses.
+    #[inline(always)]
+    fn find_modes(&mut self) {
+        for i in 0..C {
+            let (mu, p, u) = (self.laws[i].mu, &self.p[i], &self.u[i]);
+            self.modes[i] = Mode::of(mu, self.closed[i], self.sticks[i], p, u);
+        }
+    }
+
+    /// Where the last step was a full one and came near the answer.
+    #[inline(always)]
+    pub(super) fn is_near(&self) -> T::Mask {
+        let [relative, _] = self.residual();
+        self.full & relative.lt(relative.like(NEAR))
+    }
+
+    /// Corrects the impulses of the lanes of a mask with the factors of their last step, where that
+    /// makes the violations smaller.
+    #[inline(always)]
+    pub(super) fn refine(&mut self, lanes: T::Mask, factors: &Factors<T, C>) {
+        let zero = self.mean.like(0.0);
+        self.find_modes();
+        correction(factors, &self.u, &self.modes, &mut self.trial);
+        let mut u = self.u;
+        for i in 0..C {
+            let trial = &mut self.trial[i];
+            for (trial, p) in trial.iter_mut().zip(self.p[i]) {
+                *trial += p;
+            }
+            let slides = self.closed[i] & !self.sticks[i] & zero.lt(trial[0]);
+            return_to_cone::<T>(slides, self.laws[i].mu, trial);
+        }
+        velocities(&self.W, &self.q, &self.trial, &mut u);
+        let sums = judge(&self.laws, &self.trial, &u);
+        let better = lanes & sums.weighted.lt(self.sums.weighted);
+        select(better, &self.trial, &mut self.p);
+        select(better, &u, &mut self.u);
+        self.sums = Violations::select(better, &sums, &self.sums);
     }
 
     /// Moves the impulses of blocked lanes to where the first contact blocks, which changes its
@@ -396,6 +439,16 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
 #[inline(always)]
 fn replaced<T: Lane>(lanes: T::Mask, new: T::Mask, old: T::Mask) -> T::Mask {
     (lanes & new) | (old & !lanes)
+}
+
+/// `out = new` in the lanes of a mask.
+#[inline(always)]
+fn select<T: Lane, const C: usize>(lanes: T::Mask, new: &[Triple<T>; C], out: &mut [Triple<T>; C]) {
+    for i in 0..C {
+        for k in 0..3 {
+            out[i][k] = T::select(lanes, new[i][k], out[i][k]);
+        }
+    }
 }
 
 /// Scales the tangential impulse to `μ p_N` in the lanes of a mask.
