@@ -100,6 +100,7 @@ def train(
     )
 
     learn_seconds = time.process_time() - learn_clock
+    environment_seconds = rovers.cpu_seconds + watched.cpu_seconds
     model.logger.close()
     checkpoint.write()
     source = {
@@ -109,7 +110,9 @@ def train(
         "decisions": model.num_timesteps,
         "wall_seconds": round(time.perf_counter() - clock, 1),
         "cpu_seconds": round(time.process_time() - cpu_clock, 1),
-        "environment_share": round((rovers.cpu_seconds + watched.cpu_seconds) / max(learn_seconds, 1e-9), 3),
+        "environment_cpu_seconds": round(environment_seconds, 1),
+        "learner_cpu_seconds": round(learn_seconds - environment_seconds, 1),
+        "environment_share": round(environment_seconds / max(learn_seconds, 1e-9), 3),
         "resumed_from": part,
         **origin,
     }

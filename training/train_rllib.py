@@ -19,17 +19,24 @@ from ray.rllib.algorithms.ppo import PPOConfig
 from ray.rllib.utils.metrics import ENV_RUNNER_RESULTS, EPISODE_RETURN_MEAN
 from ray.tune.registry import register_env
 
-from rover_gym.policy import DriveByCommand
+from rover_gym.policy import CommandVectorEnv, DriveByCommand
+from rover_gym.vector import RoverVectorEnv
 
 # Control periods per decision: 0.3 s, as in configs/plane.yaml.
 REPEAT = 6
 
 
-def make_rover(config: dict[str, Any]) -> gym.Env[Any, Any]:
-    """Makes one rover on the machine of the env runner."""
+def make_rovers(config: dict[str, Any]) -> gym.Env[Any, Any] | gym.vector.VectorEnv[Any, Any, Any]:
+    """Makes an env runner's rovers, `num_envs` of them in one vector that a single thread steps; without it one rover.
+
+    RLlib gives the number where its `gym_env_vectorize_mode` is "vector_entry_point".
+    """
     arguments = dict(config)
     command = arguments.pop("command", {})
-    return DriveByCommand(gym.make("rover_gym:Rover-v0", **arguments), **command)
+    n = arguments.pop("num_envs", None)
+    if n is None:
+        return DriveByCommand(gym.make("rover_gym:Rover-v0", **arguments), **command)
+    return CommandVectorEnv(RoverVectorEnv(n, threads=1, **arguments), **command)
 
 
 def train(
@@ -50,7 +57,7 @@ def train(
     # Ray's own default lets its workers wait for everything else on the machine.
     os.environ.setdefault("RAY_worker_niceness", "0")
     ray.init(address=address, num_cpus=None if address else max(3, os.cpu_count() or 1), log_to_driver=False)
-    register_env("Rover", make_rover)
+    register_env("Rover", make_rovers)
     environment: dict[str, Any] = {"command": {"repeat": REPEAT}, "max_episode_steps": 600}
     if rocks:
         environment |= {"terrain": "sphere_field", "height_scan": (32, 16, 0.1)}
@@ -71,21 +78,31 @@ def train(
     typer.echo(f"written: {report}")
 
 
-def _train_once(
-    workers: int, envs: int, iterations: int, batch: int, environment: dict[str, Any], seed: int, folder: Path
-) -> dict[str, Any]:
-    """One training with this many env runners; the first iteration, in which they start, is not timed."""
-    config = (
+def configuration(workers: int, envs: int, batch: int, environment: dict[str, Any], seed: int) -> PPOConfig:
+    """PPO over env runners that each step `envs` rovers in one vector."""
+    return (
         PPOConfig()
         .environment("Rover", env_config=environment)
         .framework("torch")
-        .env_runners(num_env_runners=workers, num_envs_per_env_runner=envs, num_cpus_per_env_runner=1)
+        .env_runners(
+            num_env_runners=workers,
+            num_envs_per_env_runner=envs,
+            num_cpus_per_env_runner=1,
+            gym_env_vectorize_mode="vector_entry_point",
+        )
         .learners(num_learners=0)
         .training(
             lr=1e-3, gamma=0.97, lambda_=0.95, train_batch_size_per_learner=batch, minibatch_size=512, num_epochs=6
         )
         .debugging(seed=seed)
     )
+
+
+def _train_once(
+    workers: int, envs: int, iterations: int, batch: int, environment: dict[str, Any], seed: int, folder: Path
+) -> dict[str, Any]:
+    """One training with this many env runners; the first iteration, in which they start, is not timed."""
+    config = configuration(workers, envs, batch, environment, seed)
     algorithm = config.build_algo()
     sampling = learning = 0.0
     returns: list[float] = []

@@ -857,6 +857,18 @@ class Simulation:
     def settings(self) -> dict[str, Any]:
         """The keyword arguments that make a simulation with the same options."""
     @property
+    def lanes(self) -> Literal[1, 4, 8]:
+        """Rovers that a batch steps together in one register of this machine.
+
+        Either 8, 4 or 1, and always 1 if no step is ordinary, as `never_ordinary` then says.
+        """
+    @property
+    def never_ordinary(self) -> str | None:
+        """Why none of the steps is ordinary, so that all are taken the general way; None if they are.
+
+        Single steps may still turn out not to be ordinary, as when the trunk touches the ground.
+        """
+    @property
     def q(self) -> _Array:
         """Coordinates, (nq,), m and rad.
 
@@ -1636,7 +1648,8 @@ class EpisodeRules:
         substeps: Physics steps of a control period.
         dt: Control period, s.
         torque_limits: Torque of a torque action of 1, (n_wheels,), N m.
-        max_steering: Set-point of a steering action of 1, rad.
+        max_steering: Set-point of a steering action of 1, rad; 0 if the wheels are not steered,
+            whose actions are then the torques alone: n_actions is n_wheels instead of 2 n_wheels.
         goal_tolerance: Distance within which the goal is reached, m.
         cos_max_tilt: Cosine of the tilt beyond which the rover has rolled over.
         stuck_time: Time until a high-centred rover ends the episode, s.
@@ -1684,7 +1697,7 @@ class EpisodeRun:
         trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
         difficulty: Difficulty of the rocks.
         distance: Horizontal distance to the goal, m.
-        previous_action: The last action, (2 n_wheels,).
+        previous_action: The last action, (n_actions,).
         energy: Work of the motors since the beginning, driving or braking, J.
         energy_positive: Its driving part, J.
         stuck_time: How long the rover has been high-centred, s.
@@ -1754,7 +1767,7 @@ class EpisodeRun:
 
         Args:
             simulation: The rover of this episode.
-            action: Torques, then steering, within [-1, 1], (2 n_wheels,).
+            action: Torques, then steering, within [-1, 1], (n_actions,).
             normals: A standard normal number for each entry of the observation, (size,), where the
                 rules have noise.
             has_scan: Whether the heights are taken. Without, only a period that ends the episode
@@ -1988,7 +2001,7 @@ class EpisodeBatch:
         one.
 
         Args:
-            actions: As of `EpisodeRun.step`, (n_rovers, 2 n_wheels).
+            actions: As of `EpisodeRun.step`, (n_rovers, n_actions).
             active: Which rovers move, (n_rovers,); all by default. The others stay as they are.
             has_scan: Whether the heights are taken. Without, only episodes that end or reach the
                 time limit take them; the others keep the last ones.

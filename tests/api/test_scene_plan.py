@@ -19,11 +19,12 @@ from rover_gym import (
     TerrainError,
 )
 from rover_gym.env import resting_pose, tilted_plane
+from rover_gym.mechanics import SimulationBatch
 from rover_gym.planar import MirroredRoverSimulation
 from rover_gym.planning import Scene, ScenePlan, measure_economies, plan
 from rover_gym.planning.planner import WELD_ERROR
 
-PARTS = ["ground", "steering", "base", "scheme", "contact solver", "step"]
+PARTS = ["ground", "steering", "base", "scheme", "contact solver", "step", "steps", "in a batch"]
 
 
 def straight(terrain: Plane | SphereField | None = None, **facts: object) -> Scene:
@@ -90,6 +91,37 @@ def test_nothing_is_welded_where_wheels_may_turn_by_themselves() -> None:
     trailing = plan(straight(model=RoverModel.from_dict(description)))
     assert trailing.kind == "full"
     assert "beside their steering axes" in trailing.decisions[1].reason
+
+
+def decided(scene: Scene, part: str) -> tuple[str, str]:
+    return next((row["built"], row["reason"]) for row in plan(scene).explain() if row["part"] == part)
+
+
+def test_a_plan_says_which_steps_are_ordinary() -> None:
+    width = SimulationBatch([Simulation()])
+    lanes = Simulation().lanes
+    for scene in (Scene(), Scene(SphereField.rug(), start=np.zeros(21)), Scene(steered=False)):
+        built, _ = decided(scene, "steps")
+        assert built.startswith("ordinary: in lanes")
+        assert width.instruction_set in built
+        assert lanes == 1 or f"{lanes} rovers to a register" in built
+    for scene, why in (
+        (Scene(tumbles=True), "Newton"),
+        (Scene(options={"restitution": 0.5}), "restitution is 0.5"),
+        (Scene(options={"solver": "newton"}), "method"),
+        (straight(), "planar"),
+    ):
+        built, reason = decided(scene, "steps")
+        assert built.startswith("general")
+        assert why in reason
+
+
+def test_a_plan_says_what_a_batch_leaves_out() -> None:
+    assert decided(Scene(), "in a batch")[0] == "RoverVectorEnv with its defaults"
+    assert decided(Scene(steered=False), "in a batch")[0] == "RoverVectorEnv with steered False"
+    rocks = SphereField(np.array([(3.0, 0.0, 0.0)]), np.array([0.1]), Plane())
+    assert "sphere_field" in decided(Scene(rocks), "in a batch")[0]
+    assert decided(Scene(rocks, reach=0.5), "in a batch")[0] == "RoverVectorEnv with its defaults"
 
 
 @pytest.mark.parametrize("slope", [0.0, 5.0, -10.0])

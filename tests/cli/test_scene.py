@@ -25,6 +25,8 @@ def test_explain_lists_every_part_with_its_reason() -> None:
     assert result.exit_code == 0, result.output
     for part in ("ground", "steering", "base", "scheme", "contact solver", "step", "6 joints welded", "no search"):
         assert part in result.output
+    assert "general, one rover at a time" in result.output
+    assert "ordinary: in lanes" in rover("--explain").output
 
 
 @pytest.mark.parametrize("terrain", ["plane", "rocks", "rug"])
@@ -33,7 +35,7 @@ def test_every_terrain_has_a_plan(terrain: str) -> None:
     assert result.exit_code == 0, result.output
     report = json.loads(result.stdout)
     assert report["model"] == "full"
-    assert len(report["parts"]) == 6
+    assert len(report["parts"]) == 8
     assert "measured" not in report
 
 

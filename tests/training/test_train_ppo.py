@@ -63,6 +63,8 @@ def test_the_run_leaves_what_it_was(run: Path) -> None:
     assert report["seed"] == 3
     assert report["decisions"] == 2048
     assert 0.0 < report["environment_share"] < 1.0
+    assert report["environment_cpu_seconds"] > 0.0
+    assert report["learner_cpu_seconds"] > 0.0
     assert {"rover-gym", "stable-baselines3", "torch"} <= report["versions"].keys()
     assert "revision" in report
     assert read_config(run / "config.yaml").total_steps == 2048

@@ -6,7 +6,7 @@ package's errors. Its string form is what the card prints under "may be".
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -110,16 +110,17 @@ def check_gravity(field: str, value: object) -> tuple[float, ...]:
 
 
 def check_model(field: str, value: object) -> RoverModel:
-    """Checks a model, which must have the wheels and steering joints that actions drive."""
+    """Checks a model, which must have the wheels that actions drive."""
     if not isinstance(value, RoverModel):
         refuse(ModelError, field, value, "must be a RoverModel")
-    for name, indices in (
-        ("wheel_joint_indices", value.wheel_joint_indices),
-        ("steering_joint_indices", value.steering_joint_indices),
-    ):
-        if len(indices) != N_WHEELS or min(indices) < 0:
-            refuse(ModelError, f"{field}.{name}", indices, f"must be {N_WHEELS} joints that move")
+    check_joints(f"{field}.wheel_joint_indices", value.wheel_joint_indices)
     return value
+
+
+def check_joints(field: str, indices: Sequence[int]) -> None:
+    """Checks that there is a joint for every wheel, and that it moves."""
+    if len(indices) != N_WHEELS or min(indices) < 0:
+        refuse(ModelError, field, indices, f"must be {N_WHEELS} joints that move")
 
 
 def check_solver_options(field: str, value: object) -> Mapping[str, Any]:

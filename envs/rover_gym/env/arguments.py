@@ -29,7 +29,7 @@ from rover_gym.env.argument_checks import (
 from rover_gym.env.rocks import MAX_ABUNDANCE, ROCK_RADII, check_scan
 from rover_gym.mechanics import RoverModel, SphereField
 from rover_gym.rendering.render_options import check_render_mode, check_render_options
-from rover_gym.validation import Range, mapping
+from rover_gym.validation import Range, flag, mapping
 
 F = TypeVar("F", bound=Callable[..., Any])
 C = TypeVar("C", bound=type)
@@ -116,6 +116,10 @@ class RoverArguments(TypedDict, total=False):
         Argument(
             0.5, Number(above=0.0, at_most=MAX_DISTANCE), "the goal is reached within it; among rocks at most 100", "m"
         ),
+    ]
+    steered: Annotated[
+        bool,
+        Argument(True, Special("True or False", flag), "False: steering welded straight ahead, actions of six torques"),
     ]
     max_steering_deg: Annotated[
         float | None,

@@ -110,7 +110,9 @@ class ObservationLayout(Mapping[str, slice]):
         return {field.name: values[..., field.slice].copy() for field in self.fields}
 
 
-def build_layout(model: RoverModel, gravity_magnitude: float, n_scan: int = 0) -> ObservationLayout:
+def build_layout(
+    model: RoverModel, gravity_magnitude: float, n_scan: int = 0, n_actions: int = N_ACTIONS
+) -> ObservationLayout:
     """Builds the layout of `Rover-v0` for a model, a gravity magnitude (m/s2) and a height scan of `n_scan` points."""
     nq, nv = model.nq, model.nv
     wheel_load = model.mass * gravity_magnitude / N_WHEELS
@@ -137,7 +139,7 @@ def build_layout(model: RoverModel, gravity_magnitude: float, n_scan: int = 0) -
         ("ground_normal", "", [1.0] * 3, (-1.0, 1.0), "the normal of the ground plane in the trunk frame"),
         ("goal", "m", [GOAL_SCALE] * 2, any_number, "goal ahead and to the right of the trunk, horizontal"),
         ("goal_distance", "m", [GOAL_SCALE], no_less, "horizontal distance to the goal"),
-        ("previous_action", "", [1.0] * N_ACTIONS, (-1.0, 1.0), "the action before this observation"),
+        ("previous_action", "", [1.0] * n_actions, (-1.0, 1.0), "the action before this observation"),
         ("stuck", "", [1.0], (0.0, 1.0), "fraction of the time to high-centring"),
     ]
     if n_scan:

@@ -20,7 +20,6 @@ from rover_gym.env.randomisation import Domain
 from rover_gym.env.rocks import Rocks
 from rover_gym.env.start import Start
 from rover_gym.env.task import Task, make_task
-from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.mechanics import EpisodeRun, Plane, Simulation, standard_normals
 from rover_gym.rendering.render_options import RENDER_MODES, RenderOptions
 from rover_gym.validation import Range
@@ -61,6 +60,9 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | 10    | steering set-point of MR, positive turns the wheel left | [-1, 1] | max_steering_deg | rad  |
     | 11    | steering set-point of BR, positive turns the wheel left | [-1, 1] | max_steering_deg | rad  |
 
+    With `steered=False` nothing steers: the steering joints are welded straight ahead, the rover has 15 degrees of
+    freedom, a step costs less, and an action is its six torques, `Box(-1, 1, (6,), float32)`.
+
     ## Motors
 
     A motor delivers its command within its torque-speed line. At a wheel speed omega that is at most
@@ -100,6 +102,8 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     The trunk frame is x forward, y up, z to the right of the trunk. `q` is the simulation's, with the
     wheels' angles wrapped to one turn. Forces are those of the last physics step, zero at reset.
+
+    Without steering (`steered=False`) `q` and `velocity` have 15 entries each and `previous_action` six, 73 in all.
 
     `height_scan` adds one more field, `height_scan`: the heights (m, scale 1) of the visible ground, rocks included,
     relative to the trunk's origin, on a grid of points around it in the heading frame. The first entries are the
@@ -214,7 +218,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
         self.observation_space = gym.spaces.Box(
             self.observation_layout.low, self.observation_layout.high, dtype=np.float32
         )
-        self.action_space = gym.spaces.Box(-1.0, 1.0, (N_ACTIONS,), np.float32)
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (self.task.n_actions,), np.float32)
         self._simulation = Simulation(self.model, Plane(), **self.task.simulation_options)
         self._scene: EpisodeScene | None = None
         self._episode: EpisodeRun

@@ -9,10 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env import rewards
+from rover_gym.env.argument_checks import check_joints
 from rover_gym.env.observation import ObservationLayout, build_layout
 from rover_gym.env.randomisation import Domain, DomainDistribution
 from rover_gym.env.rocks import MAX_GOAL_DISTANCE, RockDistribution, rock_distribution
 from rover_gym.env.start import StartDistribution, slope_of
+from rover_gym.env.wheels import N_ACTIONS, N_WHEELS
 from rover_gym.mechanics import (
     CommandError,
     EpisodeDistribution,
@@ -41,7 +43,9 @@ class Task:
     """The checked arguments of `RoverEnv` and the quantities derived from them; angles in radians.
 
     Attributes:
-        model: The rover, before its masses are scaled.
+        model: The rover, before its masses are scaled; its steering is welded where it is not steered.
+        steered: Whether the wheels are steered.
+        n_actions: Entries of an action: a torque per wheel, then a set-point per wheel if they are steered.
         field: The given field, which is the ground of every episode; None without one.
         rocks: Distribution of the rock fields; None without rocks.
         slope_by_difficulty: Whether the rocks' difficulty sets the slope of the ground.
@@ -53,13 +57,15 @@ class Task:
         substeps: Physics steps per control period.
         dt: Control period, s.
         simulation_options: Keyword arguments of `Simulation`.
-        max_steering: Set-point of a steering action of 1, rad.
+        max_steering: Set-point of a steering action of 1, rad; 0 where the wheels are not steered.
         layout: Layout of the observation.
         rules: What the core needs to run an episode.
         episodes: What the core draws episodes from.
     """
 
     model: RoverModel
+    steered: bool
+    n_actions: int
     field: SphereField | None
     rocks: RockDistribution | None
     slope_by_difficulty: bool
@@ -132,7 +138,8 @@ def make_task(given: Mapping[str, Any]) -> Task:
     )
     step = given["time_step"]
     substeps = _substeps(given["control_frequency"], step)
-    rover = RoverModel() if model is None else model
+    steered = given["steered"]
+    rover = _rover(model, steered=steered)
     gravity = given["gravity"]
     options = {
         "gravity": gravity,
@@ -143,8 +150,9 @@ def make_task(given: Mapping[str, Any]) -> Task:
     }
     simulation = Simulation(rover, Plane(), **options)  # the core validates the simulation options
     points = None if scan is None else scan.offsets
-    layout = build_layout(rover, math.hypot(*gravity), 0 if points is None else len(points))
-    max_steering = _steering_limit(rover, given["max_steering_deg"])
+    n_actions = N_ACTIONS if steered else N_WHEELS
+    layout = build_layout(rover, math.hypot(*gravity), 0 if points is None else len(points), n_actions)
+    max_steering = _steering_limit(rover, given["max_steering_deg"], steered=steered)
     weights = dict(rewards.WEIGHTS) if given["reward_weights"] is None else given["reward_weights"]
     rules = EpisodeRules(
         rover,
@@ -173,6 +181,8 @@ def make_task(given: Mapping[str, Any]) -> Task:
     )
     return Task(
         model=rover,
+        steered=steered,
+        n_actions=n_actions,
         field=field,
         rocks=rocks,
         slope_by_difficulty=slope_by_difficulty,
@@ -203,8 +213,21 @@ def _substeps(frequency: float, step: float) -> int:
     return substeps
 
 
-def _steering_limit(rover: RoverModel, asked_deg: float | None) -> float:
-    """Set-point of a steering action of 1, rad, which must be within every wheel's limit."""
+def _rover(model: RoverModel | None, *, steered: bool) -> RoverModel:
+    """The rover to simulate, with its steering joints welded where it is not steered."""
+    rover = RoverModel() if model is None else model
+    if steered:
+        check_joints("model.steering_joint_indices", rover.steering_joint_indices)
+        return rover
+    return rover.weld([rover.dof_names[i] for i in rover.steering_joint_indices if i >= 0])
+
+
+def _steering_limit(rover: RoverModel, asked_deg: float | None, *, steered: bool) -> float:
+    """Set-point of a steering action of 1, rad, which must be within every wheel's limit; 0 without steering."""
+    if not steered:
+        if asked_deg is not None:
+            refuse(OptionError, "max_steering_deg", asked_deg, "needs steered=True")
+        return 0.0
     limit: float = min(wheel["steering_limit"] for wheel in rover.to_dict()["wheels"])
     if asked_deg is None:
         return limit
@@ -214,8 +237,14 @@ def _steering_limit(rover: RoverModel, asked_deg: float | None) -> float:
     return min(limit, math.radians(asked_deg))
 
 
+def check_steered(task: Task) -> None:
+    """Refuses a task without steering to a policy that steers."""
+    if not task.steered:
+        refuse(OptionError, "steered", False, "must be True for a policy that steers")
+
+
 def check_actions(actions: object, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
-    """Checks actions `(12,)` or `(n, 12)` within [-1, 1] and returns a float64 copy."""
+    """Checks actions `(n_actions,)` or `(n, n_actions)` within [-1, 1] and returns a float64 copy."""
     commands = array("action", actions, error=CommandError)
     if commands.shape != shape:
         refuse(CommandError, "action", commands.shape, f"must have shape {shape}")

@@ -6,7 +6,7 @@ import numpy.typing as npt
 from rover_gym.mechanics import Plane, RoverModel
 
 N_WHEELS = 6
-#: One torque and one steering set-point per wheel.
+#: Entries of a steered rover's action: one torque and one steering set-point per wheel.
 N_ACTIONS = 12
 
 #: The slip ratio is meaningless while both wheel and rim are slower than this, m/s; equals the core's `SLIP_SPEED`.

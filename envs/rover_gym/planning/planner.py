@@ -14,6 +14,7 @@ from rover_gym.mechanics import (
     Plane,
     RoverModel,
     Simulation,
+    SimulationBatch,
     SphereField,
     StateError,
     TerrainError,
@@ -31,6 +32,9 @@ WELD_ERROR = 1e-6
 PLANAR_ERROR = 1e-7
 #: The same between the linearised and the Newton scheme, over the step size squared, m/s2. Largest measured: 3.3e-3.
 LINEARISED_ERROR = 1e-2
+#: Time of a batch's physics with welded steering over that with steering, on the plane, and among rocks that are never
+#: met over that on the plane: `python -m comparison.batch_economies`.
+BATCH_WELDED, BATCH_UNMET = 0.5, 1.1
 #: Largest wheel gap (m) at which the start counts as resting on the plane.
 RESTING = 1e-6
 _STRAIGHT = 1e-12  # rad or m: deviation from symmetry that counts as rounding
@@ -75,8 +79,8 @@ def plan(scene: Scene, accuracy: Accuracy = "balanced", *, planar: bool = True) 
         base = Decision("base", "free: 6 coordinates", f"no planar model: {obstacle}")
     variant, variant_decision = _variant(scene, chosen, calm=weld)
     options = {**scene.options, **chosen, "variant": variant}
-    # Check the options now rather than when the simulation is built.
-    Simulation(model, terrain, **options)
+    # The core checks the options now rather than when the simulation is built.
+    simulation = Simulation(model, terrain, **options)
     decisions = (
         terrain_decision,
         weld_decision,
@@ -92,6 +96,8 @@ def plan(scene: Scene, accuracy: Accuracy = "balanced", *, planar: bool = True) 
             f"{1e3 * options['time_step']:g} ms, tolerance {options['tolerance']:g}",
             f"accuracy {accuracy!r}",
         ),
+        _steps(simulation, kind),
+        _batch(terrain, welded=weld),
     )
     return ScenePlan(scene, kind, model, terrain, start, options, decisions)
 
@@ -223,6 +229,34 @@ def _obstacle(scene: Scene, terrain: Plane | SphereField, start: Array, *, welde
     if np.abs(start[still]).max(initial=0.0) > _STRAIGHT or max(apart) > _STRAIGHT:
         return "the start is not symmetric"
     return None
+
+
+def _steps(simulation: Simulation, kind: Kind) -> Decision:
+    if kind == "planar":
+        return Decision("steps", "general, one rover at a time", "the planar image has steps of its own, without lanes")
+    if (why := simulation.never_ordinary) is not None:
+        return Decision("steps", "general, one rover at a time", why)
+    register = "one rover to a register" if simulation.lanes == 1 else f"{simulation.lanes} rovers to a register"
+    return Decision(
+        "steps",
+        f"ordinary: in lanes, {register} ({SimulationBatch([simulation]).instruction_set})",
+        "wheels on plane or spheres, inelastic; a step that is not ordinary, as when the trunk touches, is general",
+    )
+
+
+def _batch(terrain: Plane | SphereField, *, welded: bool) -> Decision:
+    """The vector environment of such rovers, and what it saves."""
+    arguments = []
+    why = "steering may move"
+    if welded:
+        arguments.append("steered False")
+        why = f"welded steering takes {BATCH_WELDED:g} of the time"
+    if isinstance(terrain, Plane):
+        why += f"; no rock is met, and a field of them would take {BATCH_UNMET:g} of the time"
+    else:
+        arguments.append("terrain 'sphere_field'")
+        why += "; rocks may be met"
+    return Decision("in a batch", f"RoverVectorEnv with {' and '.join(arguments) or 'its defaults'}", why)
 
 
 def _variant(scene: Scene, chosen: dict[str, Any], *, calm: bool) -> tuple[str, Decision]:

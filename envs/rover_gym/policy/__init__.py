@@ -2,6 +2,7 @@
 
 from rover_gym.policy.baseline import ENDS, BaselineInterrupt, BaselineRow, measure_baseline, wilson_interval
 from rover_gym.policy.command import CommandController, CommandLimits
+from rover_gym.policy.command_vector_env import CommandVectorEnv
 from rover_gym.policy.drive_by_command import DriveByCommand
 from rover_gym.policy.episodes import Episode, Policy, run_episode
 from rover_gym.policy.evaluation import (
@@ -27,6 +28,7 @@ __all__ = [
     "BaselineRow",
     "CommandController",
     "CommandLimits",
+    "CommandVectorEnv",
     "DriveByCommand",
     "Episode",
     "EvaluatedEpisode",

@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
+from rover_gym.env.task import check_steered
 from rover_gym.env.wheels import N_ACTIONS, N_WHEELS, drive_signs, wheel_centres
 from rover_gym.mechanics import OptionError, atan2, sin_cos
 from rover_gym.validation import flag, number, refuse
@@ -70,6 +71,7 @@ class CommandController:
     def __init__(self, rover: RoverEnv, limits: CommandLimits | None = None, *, guided: bool = True) -> None:
         if limits is not None and not isinstance(limits, CommandLimits):
             refuse(OptionError, "limits", limits, "must be CommandLimits")
+        check_steered(rover.task)
         self.limits = CommandLimits() if limits is None else limits
         self.guided = flag("guided", guided)
         layout, model = rover.observation_layout, rover.model

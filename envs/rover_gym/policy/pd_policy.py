@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
+from rover_gym.env.task import check_steered
 from rover_gym.env.wheels import N_ACTIONS, N_WHEELS, drive_signs, wheel_centres
 from rover_gym.mechanics import OptionError, StateError, atan2, sin_cos
 from rover_gym.validation import array, number, refuse
@@ -68,6 +69,7 @@ class PDPolicy:
         rover = find_rover_env(env)
         if gains is not None and not isinstance(gains, PDGains):
             refuse(OptionError, "gains", gains, "must be PDGains")
+        check_steered(rover.task)
         self.gains = PDGains() if gains is None else gains
         layout, model = rover.observation_layout, rover.model
         self._size = layout.size

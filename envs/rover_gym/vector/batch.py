@@ -24,7 +24,6 @@ from rover_gym.env.rocks import Rocks
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.start import Start
 from rover_gym.env.task import Task, check_actions
-from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.mechanics import DrawnEpisodes, EpisodeBatch, Plane, RoverModel, Simulation
 from rover_gym.validation import Range, whole
 
@@ -143,7 +142,7 @@ class RoverBatch:
     def step(
         self, actions: object, active: Mask | None = None, *, has_scan: bool = True
     ) -> tuple[Observations, Array, Mask, Mask, list[int]]:
-        """Applies actions `(n, 12)` for one control period.
+        """Applies actions `(n, n_actions)` for one control period.
 
         Args:
             actions: Within [-1, 1].
@@ -241,7 +240,7 @@ class RoverBatch:
         """Refuses a step before all rovers have been reset; once they have been, all have an episode for good."""
         if self._started:
             return
-        check_actions(actions, (self.n, N_ACTIONS))
+        check_actions(actions, (self.n, self.task.n_actions))
         if not self._begun.all():
             raise ResetNeeded("a batch of rovers: call reset() first")
         self._started = True

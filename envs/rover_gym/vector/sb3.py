@@ -18,7 +18,6 @@ from rover_gym.env.generators import check_seed
 from rover_gym.env.observation import LARGEST
 from rover_gym.env.rover_env import RoverEnv
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
-from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.extras import MissingExtraError
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import refuse
@@ -107,7 +106,7 @@ class RoverVecEnv(VecEnv):
         self._options = [copy.deepcopy(dict(one or {})) for one in given]
 
     def step_async(self, actions: npt.NDArray[np.float32]) -> None:
-        """Stores the actions `(n_envs, 12)` for `step_wait`."""
+        """Stores the actions `(n_envs, n_actions)` for `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> VecEnvStepReturn:
@@ -122,7 +121,7 @@ class RoverVecEnv(VecEnv):
         """
         # Rovers whose next episode was refused when the last one ended.
         if waiting := self.batch.over:
-            check_actions(self._actions, (self.num_envs, N_ACTIONS))
+            check_actions(self._actions, (self.num_envs, self.batch.task.n_actions))
             self._begin(self.batch.draw(waiting))
         observation, earned, terminated, timed_out, ended = self.batch.step_on(
             self._actions, same_step=True, has_scan=self.has_scan

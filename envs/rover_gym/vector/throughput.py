@@ -119,7 +119,7 @@ def measure_speed(
     rng = np.random.default_rng(0)
     times: list[tuple[float, float, float, float]] = []
     for _ in range(rounds + 1):
-        actions = rng.uniform(-_EFFORT, _EFFORT, (steps, num_envs, 12)).astype(np.float32)
+        actions = rng.uniform(-_EFFORT, _EFFORT, (steps, num_envs, several.batch.task.n_actions)).astype(np.float32)
         for watch in watches:
             watch.elapsed = 0.0
         whole, _, of_sync = (_mean_step(env, actions) for env in (several, single, sync))

@@ -13,7 +13,6 @@ from rover_gym.env.arguments import RoverArguments, takes_arguments
 from rover_gym.env.generators import spread_seeds
 from rover_gym.env.quantities import Array, Mask, Observations
 from rover_gym.env.task import MAX_EPISODE_STEPS, check_actions
-from rover_gym.env.wheels import N_ACTIONS
 from rover_gym.mechanics import OptionError
 from rover_gym.validation import mapping, refuse
 from rover_gym.vector.batch import RoverBatch
@@ -101,7 +100,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         return self.batch.observation, infos
 
     def step(self, actions: npt.NDArray[np.float32]) -> tuple[Observations, Array, Mask, Mask, _Info]:
-        """Applies actions `(num_envs, 12)` for one control period.
+        """Applies actions `(num_envs, n_actions)` for one control period.
 
         An episode that cannot begin is refused before any rover moves. With autoreset in the same step, the following
         step refuses it.
@@ -116,7 +115,7 @@ class RoverVectorEnv(VectorEnv[Observations, npt.NDArray[np.float32], Any]):
         mode = self.autoreset_mode
         if mode == AutoresetMode.DISABLED:
             if over := self.batch.over:
-                check_actions(actions, (self.num_envs, N_ACTIONS))
+                check_actions(actions, (self.num_envs, self.batch.task.n_actions))
                 raise ResetNeeded(f"rovers {over}: call reset() with reset_mask first")
             observation, reward, terminated, truncated, _ = self.batch.step(actions)
             return observation, reward, terminated, truncated, self.batch.infos()

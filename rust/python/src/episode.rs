@@ -31,7 +31,7 @@ type Step<'py> = (Bound<'py, PyArray1<f32>>, f64, bool, Bound<'py, PyDict>);
 ///     trunk_load_limit: Force on the trunk beyond which the rover is high-centred, N.
 ///     difficulty: Difficulty of the rocks.
 ///     distance: Horizontal distance to the goal, m.
-///     previous_action: The last action, (2 n_wheels,).
+///     previous_action: The last action, (n_actions,).
 ///     energy: Work of the motors since the beginning, driving or braking, J.
 ///     energy_positive: Its driving part, J.
 ///     stuck_time: How long the rover has been high-centred, s.
@@ -139,7 +139,7 @@ fn given(
 impl EpisodeRun {
     pub fn of(episode: CoreEpisode) -> Self {
         Self(Shared::new(Inner {
-            commands: vec![0.0; episode.rules().n_actions()],
+            commands: vec![0.0; episode.rules().n_commands()],
             scratch: ReadingScratch::default(),
             episode,
         }))
@@ -281,7 +281,7 @@ impl EpisodeRun {
     ///
     /// Args:
     ///     simulation: The rover of this episode.
-    ///     action: Torques, then steering, within [-1, 1], (2 n_wheels,).
+    ///     action: Torques, then steering, within [-1, 1], (n_actions,).
     ///     normals: A standard normal number for each entry of the observation, (size,), where the
     ///         rules have noise.
     ///     has_scan: Whether the heights are taken. Without, only a period that ends the episode

@@ -177,7 +177,7 @@ impl EpisodeBatch {
     /// one.
     ///
     /// Args:
-    ///     actions: As of `EpisodeRun.step`, (n_rovers, 2 n_wheels).
+    ///     actions: As of `EpisodeRun.step`, (n_rovers, n_actions).
     ///     active: Which rovers move, (n_rovers,); all by default. The others stay as they are.
     ///     has_scan: Whether the heights are taken. Without, only episodes that end or reach the
     ///         time limit take them; the others keep the last ones.

@@ -232,6 +232,22 @@ impl Simulation {
         settings(&gravity, &self.options, &self.origin.words)
     }
 
+    /// Rovers that a batch steps together in one register of this machine.
+    ///
+    /// Either 8, 4 or 1, and always 1 if no step is ordinary, as `never_ordinary` then says.
+    #[getter]
+    fn lanes(&self) -> PyResult<usize> {
+        Ok(self.open()?.lanes())
+    }
+
+    /// Why none of the steps is ordinary, so that all are taken the general way; None if they are.
+    ///
+    /// Single steps may still turn out not to be ordinary, as when the trunk touches the ground.
+    #[getter]
+    fn never_ordinary(&self) -> PyResult<Option<String>> {
+        Ok(self.open()?.never_ordinary().map(|why| why.to_string()))
+    }
+
     /// Coordinates, (nq,), m and rad.
     ///
     /// x, y, z of the trunk's origin; roll, heading, pitch; joints.

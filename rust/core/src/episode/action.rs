@@ -1,6 +1,7 @@
 //! From an action to the commands of the wheels.
 //!
-//! An action is one number in [-1, 1] for each wheel's torque, then one for each wheel's steering:
+//! An action is one number in [-1, 1] for each wheel's torque, then one for each wheel's steering,
+//! unless the wheels are not steered:
 //!
 //! ```text
 //! torque_i    = a_i · torque_limit_i · gain        N m
@@ -32,7 +33,8 @@ pub fn check(actions: &[f64], width: usize, is_single: bool) -> Result<(), Episo
     })
 }
 
-/// Writes the torques (N m) and the steering set-points (rad) of an action (2 n_wheels).
+/// Writes the torques (N m) and the steering set-points (rad) of an action (n_actions); set-points
+/// are 0 where the wheels are not steered.
 ///
 /// `gain`: torque given over torque asked.
 ///
@@ -53,6 +55,7 @@ pub fn commands(
     {
         *own = a * limit * gain;
     }
+    set_points.fill(0.0);
     for (own, a) in set_points.iter_mut().zip(steer) {
         *own = a * rules.settings().max_steering;
     }

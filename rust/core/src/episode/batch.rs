@@ -235,7 +235,7 @@ impl EpisodeBatch {
     /// Gives every rover its action for one control period and writes the observations
     /// (n × size, row-major).
     ///
-    /// `actions`: n × 2 n_wheels, row-major. `active`: rovers that move; the others keep state and
+    /// `actions`: n × n_actions, row-major. `active`: rovers that move; the others keep state and
     /// observation. `has_scan`: whether the heights are taken; without, only episodes that end or
     /// reach the time limit take them, and all others keep the last ones. `go_on`: as for
     /// [`Batch::step_while`]; an episode whose rover was stopped goes on as after a whole period.

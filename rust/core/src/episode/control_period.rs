@@ -33,7 +33,7 @@ pub struct Origin {
 impl Seat {
     pub(super) fn new(episode: Episode, origin: Origin, generator: Pcg64) -> Self {
         Self {
-            commands: vec![0.0; episode.rules().n_actions()],
+            commands: vec![0.0; episode.rules().n_commands()],
             episode,
             origin,
             steps: 0,

@@ -7,7 +7,7 @@
 //! | values | size |
 //! |---|---|
 //! | a reading from `pose` to `target` ([`crate::simulation::ReadingLayout`]) | nq + nv + 5 n + 6 |
-//! | the previous action | 2 n |
+//! | the previous action | n, or 2 n with steering |
 //! | fraction of the time to high-centring | 1 |
 //! | heights of the scan | points |
 //!

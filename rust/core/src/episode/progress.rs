@@ -8,7 +8,7 @@ use super::outcome::Quantities;
 pub struct Progress {
     /// Horizontal distance to the goal, m.
     pub distance: f64,
-    /// The last action (2 n_wheels); zeros at the beginning.
+    /// The last action (n_actions); zeros at the beginning.
     pub previous_action: Vec<f64>,
     /// Work of the motors since the beginning, driving or braking, J.
     pub energy: f64,

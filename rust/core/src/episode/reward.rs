@@ -108,15 +108,14 @@ fn within(quantity: f64, most: f64) -> f64 {
     quantity.clamp(-most, most)
 }
 
-/// Sums over the wheels of the squared changes between two actions (2 n_wheels): of the torques,
-/// and of the steering.
+/// Sums over the wheels of the squared changes between two actions (n_actions): of the torques, and
+/// of the steering.
 #[must_use]
-pub fn squared_changes(action: &[f64], before: &[f64]) -> [f64; 2] {
+pub fn squared_changes(action: &[f64], before: &[f64], n_wheels: usize) -> [f64; 2] {
     let sum = |a: &[f64], b: &[f64]| {
         let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
         squares.fold(0.0, |sum, square| sum + square)
     };
-    let n_wheels = action.len() / 2;
     let (drive, steer) = action.split_at(n_wheels);
     let (drive_before, steer_before) = before.split_at(n_wheels);
     [sum(drive, drive_before), sum(steer, steer_before)]
@@ -132,7 +131,7 @@ mod tests {
         let earned = Earned {
             now,
             distance_before: 1e30,
-            changes: squared_changes(&[1.0; 12], &[-1.0; 12]),
+            changes: squared_changes(&[1.0; 12], &[-1.0; 12], 6),
             n_wheels: 6,
             dt,
             ending,

@@ -17,7 +17,7 @@ pub struct Settings {
     pub dt: f64,
     /// Torque of a torque action of 1, (n_wheels), N m.
     pub torque_limits: Vec<f64>,
-    /// Set-point of a steering action of 1, rad.
+    /// Set-point of a steering action of 1, rad; 0 if the wheels are not steered.
     pub max_steering: f64,
     /// Distance within which the goal is reached, m.
     pub goal_tolerance: f64,
@@ -71,6 +71,12 @@ impl PartialEq for Rules {
     }
 }
 
+/// Entries of an action.
+fn n_actions(settings: &Settings) -> usize {
+    let is_steered = settings.max_steering > 0.0;
+    settings.torque_limits.len() * (1 + usize::from(is_steered))
+}
+
 impl Rules {
     /// Rules for a model.
     ///
@@ -90,7 +96,7 @@ impl Rules {
             size: layout.size(),
         };
         let n_wheels = model.wheels().len();
-        let size = shared + 2 * n_wheels + 1 + settings.scan.len();
+        let size = shared + n_actions(&settings) + 1 + settings.scan.len();
         let noise = settings.noise.len();
         check_lengths([
             ("torque_limits", settings.torque_limits.len(), n_wheels),
@@ -175,9 +181,15 @@ impl Rules {
         self.settings.torque_limits.len()
     }
 
-    /// Entries of an action.
+    /// Entries of an action: the wheels' torques and, if they are steered, their steering.
     #[must_use]
     pub fn n_actions(&self) -> usize {
+        n_actions(&self.settings)
+    }
+
+    /// Commands of a rover: a torque and a set-point for each wheel.
+    #[must_use]
+    pub fn n_commands(&self) -> usize {
         2 * self.n_wheels()
     }
 

@@ -58,7 +58,7 @@ impl Setting {
 /// A control period seen from its end.
 #[derive(Clone, Copy, Debug)]
 pub struct Period<'a> {
-    /// Its action (2 n_wheels).
+    /// Its action (n_actions).
     pub action: &'a [f64],
     /// Heights of the scan; None where it was not taken.
     pub heights: Option<&'a [f64]>,
@@ -206,9 +206,9 @@ impl Episode {
         &self.outcome
     }
 
-    /// Gives a rover the commands of an action (2 n_wheels) that has been checked.
+    /// Gives a rover the commands of an action (n_actions) that has been checked.
     ///
-    /// `commands`: room for as many numbers.
+    /// `commands`: room for them (n_commands).
     ///
     /// # Errors
     /// A command that the rover's model refuses, see [`Rules::check_model`].
@@ -248,7 +248,11 @@ impl Episode {
             now.distance = self.progress.distance;
         }
         let distance_before = self.progress.distance;
-        let changes = squared_changes(period.action, &self.progress.previous_action);
+        let changes = squared_changes(
+            period.action,
+            &self.progress.previous_action,
+            rules.n_wheels(),
+        );
         let dt = rules.settings().dt;
         (self.progress).advance(period.action, &now, dt, self.setting.trunk_load_limit);
 

@@ -4,7 +4,7 @@
 //! - [`state`], [`snapshot`], [`active_contact`]: its state, the data needed to continue, its
 //!   contacts;
 //! - [`rover`]: a rover on a terrain, with its [commands](rover_command), its
-//!   [contacts](rover_contacts), its ordinary steps and its [`reading`];
+//!   [contacts](rover_contacts), its [ordinary] steps and its [`reading`];
 //! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains,
 //!   perhaps with a machine on it;
 //! - [`batch`]: many rovers side by side, each with its [turn](turns); [`profile`]: time spent in each part of a step.
@@ -14,6 +14,7 @@ pub mod batch;
 pub mod error;
 pub mod fleet;
 pub mod grains;
+pub mod ordinary;
 pub mod planar;
 mod pool;
 pub mod profile;
@@ -34,6 +35,7 @@ pub use error::{BatchError, CommandError, SnapshotError};
 pub use grains::{
     BedCommand, BedMemory, GrainBed, GrainSimulation, SoilSetupError, SoilSimulation, soil_options,
 };
+pub use ordinary::NeverOrdinary;
 pub use planar::{
     BallSimulation, MirroredRoverSimulation, PlanarScene, PlanarSimulation, TwoWheelRoverSimulation,
 };

@@ -1,0 +1,103 @@
+"""A Gymnasium vector of rovers with commands as actions and features as observations."""
+
+from dataclasses import fields
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+from gymnasium.vector import AutoresetMode, VectorWrapper
+from gymnasium.vector.utils import batch_space
+
+from rover_gym.env.quantities import Mask
+from rover_gym.mechanics import CommandError, OptionError
+from rover_gym.policy.command import N_COMMANDS, CommandController, CommandLimits
+from rover_gym.policy.drive_by_command import MAX_REPEAT
+from rover_gym.policy.features import LARGEST_FEATURE, Features
+from rover_gym.validation import array, known_keys, refuse, whole
+from rover_gym.vector.vector_env import RoverVectorEnv
+
+Array = npt.NDArray[np.float32]
+
+
+class CommandVectorEnv(VectorWrapper):
+    """Holds each rover's command for several steps and sums the rewards, as `DriveByCommand` does for one rover.
+
+    Observations, rewards and ends equal, bit for bit, those of a `SyncVectorEnv` of `DriveByCommand`s; the rovers are
+    stepped together. A rover whose episode ends while its command is held stands still until the next command, which
+    starts its next episode.
+
+    Example:
+        >>> envs = CommandVectorEnv(gym.make_vec("Rover-v0", 64), repeat=6)
+
+    Args:
+        env: A `RoverVectorEnv` with autoreset in the next step; wrappers go around this one.
+        repeat: Steps that a command is held.
+        guided: Whether actions are offsets from the guide's command.
+        pool: Height-scan points per pooling cell, lengthwise and crosswise.
+        **limits: Fields of `CommandLimits`.
+
+    Raises:
+        OptionError: An argument is out of range, or `env` is another environment.
+    """
+
+    def __init__(
+        self, env: RoverVectorEnv, repeat: int = 4, *, guided: bool = False, pool: int = 1, **limits: float
+    ) -> None:
+        if not isinstance(env, RoverVectorEnv):
+            refuse(OptionError, "env", env, "must be a RoverVectorEnv, as gymnasium.make_vec makes it")
+        if env.autoreset_mode != AutoresetMode.NEXT_STEP:
+            refuse(OptionError, "env.autoreset_mode", env.autoreset_mode.value, "must be NextStep")
+        self._repeat = whole("repeat", repeat, at_least=1, at_most=MAX_REPEAT)
+        known_keys("limits", limits, [field.name for field in fields(CommandLimits)])
+        super().__init__(env)
+        self._rovers = env
+        self._features = Features(env.prototype, pool)
+        self._controller = CommandController(env.prototype, CommandLimits(**limits), guided=guided)
+        self._seen = np.zeros((self.num_envs, env.prototype.observation_layout.size), np.float32)
+        self._over: Mask = np.zeros(self.num_envs, np.bool_)
+        self.single_observation_space = gym.spaces.Box(
+            -LARGEST_FEATURE, LARGEST_FEATURE, (self._features.size,), np.float32
+        )
+        self.single_action_space = gym.spaces.Box(-1.0, 1.0, (N_COMMANDS,), np.float32)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Starts episodes, as `RoverVectorEnv.reset`."""
+        self._seen, infos = self._rovers.reset(seed=seed, options=options)
+        self._over &= ~(options or {}).get("reset_mask", np.True_)
+        return self._features(self._seen), infos
+
+    def step(self, actions: npt.ArrayLike) -> tuple[Array, npt.NDArray[np.float64], Mask, Mask, dict[str, Any]]:
+        """Holds commands `(num_envs, 3)`, clipped to [-1, 1], for `repeat` steps or until a rover's episode ends.
+
+        Raises:
+            CommandError: The commands have a wrong shape or an entry that is not finite; nothing has changed.
+            TerrainError: A rover's next episode cannot begin; nothing has changed.
+            ResetNeeded: A rover has not been reset.
+        """
+        commands = array("action", actions, error=CommandError)
+        if commands.shape != (self.num_envs, N_COMMANDS):
+            refuse(CommandError, "action", commands.shape, f"must have shape {(self.num_envs, N_COMMANDS)}")
+        if not np.isfinite(commands).all():
+            refuse(CommandError, "action", actions, "must be finite")
+        if self._over.any():
+            self._seen, _ = self._rovers.reset(options={"reset_mask": self._over})
+        active = ~self._over
+        self._over = np.zeros(self.num_envs, np.bool_)
+        rewards = np.zeros(self.num_envs)
+        terminated, truncated = self._over.copy(), self._over.copy()
+        for left in reversed(range(self._repeat)):
+            if not active.any():
+                break
+            moves = self._controller.act(self._seen, commands)
+            self._seen, earned, ended, timed_out, _ = self._rovers.batch.step(moves, active, has_scan=left == 0)
+            rewards[active] += earned[active]
+            terminated |= ended & active
+            truncated |= timed_out & active
+            active &= ~(terminated | truncated)
+        self._over = terminated | truncated
+        return self._features(self._seen), rewards, terminated, truncated, self._rovers.batch.infos()

@@ -1,0 +1,54 @@
+"""Which simulations take ordinary steps, in lanes, and why the others do not."""
+
+from typing import Any
+
+import pytest
+
+from rover_gym import Plane, RoverModel, Simulation, SphereField
+from rover_gym.mechanics import SimulationBatch
+
+LANES = {"AVX-512": 8, "AVX2": 4, "baseline": 1}
+
+
+def steering_joints(model: RoverModel) -> list[str]:
+    return [model.dof_names[i] for i in model.steering_joint_indices]
+
+
+@pytest.mark.parametrize("terrain", [Plane(), SphereField.rug()])
+@pytest.mark.parametrize("welded", [False, True])
+def test_the_rover_steps_in_lanes_welded_or_not(terrain: Plane | SphereField, welded: bool) -> None:
+    model = RoverModel()
+    simulation = Simulation(model.weld(steering_joints(model)) if welded else model, terrain)
+    assert simulation.never_ordinary is None
+    assert simulation.lanes == LANES[SimulationBatch([simulation]).instruction_set]
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"restitution": 0.25}, "the restitution is 0.25, not 0"),
+        ({"variant": "newton"}, "the variant is Newton's"),
+        ({"solver": "newton"}, "the solver's method is chosen, not automatic"),
+        ({"warm_start": False}, "the warm start is off"),
+    ],
+)
+def test_options_that_are_not_ordinary_are_named(options: dict[str, Any], reason: str) -> None:
+    simulation = Simulation(**options)
+    assert simulation.never_ordinary == reason
+    assert simulation.lanes == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"limits": [-0.5, 0.5]}, "the joint of 'left_bogie' has stops"),
+        ({"damping": 3.0}, "the joint of 'left_bogie' has a spring, a damper or a rotor"),
+    ],
+)
+def test_machines_that_are_not_ordinary_name_the_joint(changes: dict[str, Any], reason: str) -> None:
+    description = RoverModel().to_dict()
+    bogie = next(solid for solid in description["solids"] if solid["name"] == "left_bogie")
+    bogie.update(changes)
+    simulation = Simulation(RoverModel.from_dict(description))
+    assert simulation.never_ordinary == reason
+    assert simulation.lanes == 1

@@ -1,0 +1,100 @@
+"""`steered=False`: the steering is welded, actions are torques, and everything else is as with the steering at zero."""
+
+import copy
+import pickle
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from rover_gym import CommandError, ModelError, OptionError, PDPolicy, RoverEnv, RoverModel
+from rover_gym.policy import CommandController
+from rover_gym.vector import RoverVectorEnv
+
+ROCKS: dict[str, Any] = {"terrain": "sphere_field", "height_scan": (5, 3, 0.4), "difficulty": 0.8}
+
+
+def torques(n: int, steps: int, seed: int = 0) -> Any:
+    return np.random.default_rng(seed).uniform(-0.4, 0.4, (steps, n, 6)).astype(np.float32)
+
+
+def test_spaces_hold_torques_and_what_still_moves() -> None:
+    env = RoverEnv(steered=False)
+    assert env.action_space.shape == (6,)
+    assert env.observation_space.shape == (73,)
+    sizes = {field.name: field.size for field in env.observation_layout.fields}
+    assert (sizes["q"], sizes["velocity"], sizes["previous_action"]) == (15, 15, 6)
+    assert env.model.steering_joint_indices == [-1] * 6
+    assert env.simulation.never_ordinary is None
+    observation, _ = env.reset(seed=0)
+    assert observation in env.observation_space
+    action = np.array([0.1, -0.2, 0.3, 0.0, 0.2, 0.1], np.float32)
+    observation, _, _, _, info = env.step(action)
+    values = env.observation_layout.split(observation)
+    np.testing.assert_allclose(values["previous_action"], action)
+    np.testing.assert_allclose(env.simulation.wheel_torques, 150.0 * action, rtol=1e-6)
+    assert info["reward_terms"]["torque_change"] == pytest.approx(-0.02 * float(np.mean(action.astype(float) ** 2)))
+    assert info["reward_terms"]["steering_change"] == 0.0
+
+
+def test_a_straight_drive_is_that_of_steering_held_at_zero() -> None:
+    welded, held = RoverEnv(steered=False), RoverEnv()
+    for env in (welded, held):
+        env.reset(seed=0, options={"position": (0.0, 0.0), "heading_deg": 20.0, "goal": (50.0, 0.0)})
+    for _ in range(60):
+        welded.step(np.full(6, 0.1, np.float32))
+        held.step(np.concatenate((np.full(6, 0.1), np.zeros(6))).astype(np.float32))
+    assert welded.simulation.q[0] > 0.5
+    np.testing.assert_allclose(welded.simulation.q[:6], held.simulation.q[:6], atol=1e-6)
+
+
+@pytest.mark.parametrize("arguments", [{}, ROCKS, {"mass_scale": (0.8, 1.2)}])
+def test_rovers_of_a_batch_move_as_alone(arguments: dict[str, Any]) -> None:
+    ours = gym.make_vec("Rover-v0", 3, steered=False, max_episode_steps=9, threads=2, **arguments)
+    assert type(ours) is RoverVectorEnv
+    alone = gym.make_vec("Rover-v0", 3, "sync", steered=False, max_episode_steps=9, **arguments)
+    np.testing.assert_array_equal(ours.reset(seed=4)[0], alone.reset(seed=4)[0])
+    for action in torques(3, 25):
+        for one, other in zip(ours.step(action)[:-1], alone.step(action)[:-1], strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+def test_a_snapshot_and_a_pickle_go_on_alike() -> None:
+    env, other = RoverEnv(steered=False), RoverEnv(steered=False)
+    env.reset(seed=1)
+    env.step(np.full(6, 0.3, np.float32))
+    other.restore(pickle.loads(pickle.dumps(env.snapshot())))  # noqa: S301 - our own
+    assert repr(copy.deepcopy(env.task.rules)) == "EpisodeRules(6 actions, 73 observed)"
+    action = np.full(6, -0.2, np.float32)
+    np.testing.assert_array_equal(env.step(action)[0], other.step(action)[0])
+    with pytest.raises(ValueError, match="arguments"):
+        RoverEnv().restore(env.snapshot())
+
+
+def test_a_model_without_steering_needs_it() -> None:
+    model = RoverModel()
+    fixed = model.weld([model.dof_names[i] for i in model.steering_joint_indices])
+    assert RoverEnv(model=fixed, steered=False).model.nv == 15
+    with pytest.raises(ModelError) as caught:
+        RoverEnv(model=fixed)
+    assert caught.value.field == "model.steering_joint_indices"
+
+
+def test_what_needs_steering_is_refused() -> None:
+    with pytest.raises(OptionError, match="max_steering_deg") as caught:
+        RoverEnv(steered=False, max_steering_deg=10.0)
+    assert caught.value.field == "max_steering_deg"
+    env = RoverEnv(steered=False)
+    for policy in (PDPolicy, CommandController):
+        with pytest.raises(OptionError) as caught:
+            policy(env)
+        assert caught.value.field == "steered"
+    env.reset(seed=0)
+    for actions in (np.zeros(12), np.full(6, 1.5)):
+        with pytest.raises(CommandError):
+            env.step(actions.astype(np.float32))
+    rovers = RoverVectorEnv(2, steered=False)
+    rovers.reset(seed=0)
+    with pytest.raises(CommandError):
+        rovers.step(np.zeros((2, 12), np.float32))
