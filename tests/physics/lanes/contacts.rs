@@ -18,7 +18,7 @@ use rover_core::lanes::mass_matrix::{Factor, MassMatrix};
 use rover_core::lanes::place::Place;
 use rover_core::lanes::poses::Poses;
 use rover_core::lanes::problem::{ContactProblem, block};
-use rover_core::lanes::rows::Rows;
+use rover_core::lanes::rows::{Answer, Rows};
 use rover_core::multibody::{self, Configuration, Kinematics, Model};
 use rover_core::scalar::{Instructions, Lane, LaneMask, Single, Vec3};
 
@@ -147,7 +147,8 @@ impl<T: Lane> Block<T> {
         let mut impulse = vec![zero; v.len()];
         let all = T::mask(token, u32::MAX);
         T::vectorize(token, || {
-            self.rows.impulses(&self.contacts, &self.problems, &mut p);
+            self.rows
+                .read(&self.contacts, &self.problems, Answer::Impulses, &mut p);
             self.rows.add_impulses(&self.contacts, all, &p, &mut y);
             self.rows
                 .generalized_impulse(&self.contacts, end, all, &p, &mut impulse);

@@ -68,64 +68,51 @@ pub fn bias<T: Lane>(
         scratch.token,
         #[inline(always)]
         || {
-            bias_here(machine, inertias, poses, v, gravity, scratch, out);
+            let n = machine.links.len();
+            let (links, inertias) = (&machine.links[..n], &inertias.bodies[..n]);
+            let (poses, moved) = (&poses.bodies[..n], &mut scratch.bodies[..n]);
+            let (base, rates) = v.split_at(BASE);
+            let (out_base, out) = out.split_at_mut(BASE);
+            let (rates, out) = (&rates[..n - 1], &mut out[..n - 1]);
+            let zero = Vec3::splat(scratch.token, [0.0; 3]);
+            moved[0] = Moved {
+                omega: Vec3::new(base[3], base[4], base[5]),
+                alpha: zero,
+                origin: -gravity,
+                force: zero,
+                moment: zero,
+            };
+            moved[0].load(&links[0], &inertias[0], &poses[0]);
+            for b in 1..n {
+                let (before, own) = moved.split_at_mut(b);
+                let (link, pose) = (&links[b], &poses[b]);
+                let carrier = &mut before[link.parent];
+                let (omega, d) = (carrier.omega, pose.lever);
+                let spin = pose.axis * rates[b - 1];
+                let mut body = Moved {
+                    omega: omega + spin,
+                    alpha: carrier.alpha + omega.cross(spin),
+                    origin: carrier.origin + carrier.alpha.cross(d) + omega.cross(omega.cross(d)),
+                    force: zero,
+                    moment: zero,
+                };
+                body.load(link, &inertias[b], pose);
+                if link.is_leaf {
+                    out[b - 1] = body.rest_on(carrier, pose);
+                } else {
+                    own[0] = body;
+                }
+            }
+            for b in (1..n).rev() {
+                if !links[b].is_leaf {
+                    let (before, own) = moved.split_at_mut(b);
+                    out[b - 1] = own[0].rest_on(&mut before[links[b].parent], &poses[b]);
+                }
+            }
+            let Moved { force, moment, .. } = moved[0];
+            out_base.copy_from_slice(&[force.x, force.y, force.z, moment.x, moment.y, moment.z]);
         },
     );
-}
-
-#[inline(always)]
-fn bias_here<T: Lane>(
-    machine: &Machine,
-    inertias: &Inertias<T>,
-    poses: &Poses<T>,
-    v: &[T],
-    gravity: Vec3<T>,
-    scratch: &mut BiasScratch<T>,
-    out: &mut [T],
-) {
-    let n = machine.links.len();
-    let (links, inertias) = (&machine.links[..n], &inertias.bodies[..n]);
-    let (poses, moved) = (&poses.bodies[..n], &mut scratch.bodies[..n]);
-    let (base, rates) = v.split_at(BASE);
-    let (out_base, out) = out.split_at_mut(BASE);
-    let (rates, out) = (&rates[..n - 1], &mut out[..n - 1]);
-    let zero = Vec3::splat(scratch.token, [0.0; 3]);
-    moved[0] = Moved {
-        omega: Vec3::new(base[3], base[4], base[5]),
-        alpha: zero,
-        origin: -gravity,
-        force: zero,
-        moment: zero,
-    };
-    moved[0].load(&links[0], &inertias[0], &poses[0]);
-    for b in 1..n {
-        let (before, own) = moved.split_at_mut(b);
-        let (link, pose) = (&links[b], &poses[b]);
-        let carrier = &mut before[link.parent];
-        let (omega, d) = (carrier.omega, pose.lever);
-        let spin = pose.axis * rates[b - 1];
-        let mut body = Moved {
-            omega: omega + spin,
-            alpha: carrier.alpha + omega.cross(spin),
-            origin: carrier.origin + carrier.alpha.cross(d) + omega.cross(omega.cross(d)),
-            force: zero,
-            moment: zero,
-        };
-        body.load(link, &inertias[b], pose);
-        if link.is_leaf {
-            out[b - 1] = body.rest_on(carrier, pose);
-        } else {
-            own[0] = body;
-        }
-    }
-    for b in (1..n).rev() {
-        if !links[b].is_leaf {
-            let (before, own) = moved.split_at_mut(b);
-            out[b - 1] = own[0].rest_on(&mut before[links[b].parent], &poses[b]);
-        }
-    }
-    let Moved { force, moment, .. } = moved[0];
-    out_base.copy_from_slice(&[force.x, force.y, force.z, moment.x, moment.y, moment.z]);
 }
 
 impl<T: Lane> Moved<T> {

@@ -263,35 +263,32 @@ impl<T: Lane> Contacts<T> {
         T::vectorize(
             self.token,
             #[inline(always)]
-            || self.detect_here(ground, middle, end, v, forecast),
+            || {
+                let sight = Sight {
+                    middle,
+                    end,
+                    v,
+                    forecast,
+                    height: ground.height(middle.origin),
+                };
+                self.look(ground, &sight)
+            },
         )
     }
 
+    /// Fills all slots with the contacts at the midpoint and evaluates them at the end.
     #[inline(always)]
-    fn detect_here(
-        &mut self,
-        ground: &mut Ground<T>,
-        middle: &Poses<T>,
-        end: &Poses<T>,
-        v: &[T],
-        forecast: &Forecast<T>,
-    ) -> T::Mask {
-        let sight = Sight {
-            middle,
-            end,
-            v,
-            forecast,
-            height: ground.height(middle.origin),
-        };
+    fn look(&mut self, ground: &mut Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
+        let Sight { middle, end, v, .. } = *sight;
         self.parts.find_twists(middle, v, &mut self.twists);
         let mut declined = T::mask(self.token, 0);
         for b in 0..self.parts.boxes.len() {
-            declined = declined | self.look_at_box(b, ground, &sight);
+            declined = declined | self.look_at_box(b, ground, sight);
         }
         self.used.clear();
         let height_at_end = ground.height(end.origin);
         for w in 0..self.parts.wheels.len() {
-            declined = declined | self.look_at_wheel(w, ground, &sight);
+            declined = declined | self.look_at_wheel(w, ground, sight);
             let first = SLOTS * w;
             if !self.slots[first].active.any() {
                 continue;

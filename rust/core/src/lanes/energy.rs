@@ -90,81 +90,71 @@ pub fn energy<T: Lane>(
     T::vectorize(
         scratch.token,
         #[inline(always)]
-        || energy_here(machine, inertias, place, v, gravity, scratch),
+        || {
+            let n = machine.links.len();
+            let (links, own_inertias) = (&machine.links[..n], &inertias.bodies[..n]);
+            let bodies = &mut scratch.bodies[..n];
+            let (base, rates) = v.split_at(BASE);
+            let rates = &rates[..n - 1];
+            let mut turns = scratch.turns.of(machine, place);
+            let zero = T::splat(scratch.token, 0.0);
+            let mut sums = Sums {
+                twice_kinetic: zero,
+                momentum: Vec3::new(zero, zero, zero),
+                fall: gravity.dot(place.position) * inertias.mass,
+            };
+            bodies[0] = Moving {
+                R: rotation(&place.attitude),
+                velocity: Vec3::new(base[0], base[1], base[2]),
+                omega: Vec3::new(base[3], base[4], base[5]),
+                fall: zero,
+            };
+            let Moving {
+                R,
+                velocity,
+                omega,
+                fall,
+            } = &bodies[0];
+            sums.add(
+                &links[0],
+                &own_inertias[0],
+                (R, *velocity, *omega, *fall),
+                gravity,
+            );
+            for b in 1..n {
+                let (before, own) = bodies.split_at_mut(b);
+                let link = &links[b];
+                let carrier = &before[link.parent];
+                let lever = link.lever(&carrier.R);
+                let velocity = carrier.velocity + carrier.omega.cross(lever);
+                let fall = carrier.fall + gravity.dot(lever);
+                let frame = match &link.rotation {
+                    None => carrier.R,
+                    Some(fixed) => times_columns(&carrier.R, fixed),
+                };
+                let axis = link.axis.turned(&frame);
+                let omega = carrier.omega + axis * rates[b - 1];
+                let inertia = &own_inertias[b];
+                if link.is_spinner {
+                    sums.add(link, inertia, (&frame, velocity, omega, fall), gravity);
+                    continue;
+                }
+                let R = link.axis.rotate(&frame, axis, turns.next());
+                sums.add(link, inertia, (&R, velocity, omega, fall), gravity);
+                own[0] = Moving {
+                    R,
+                    velocity,
+                    omega,
+                    fall,
+                };
+            }
+            Energy {
+                kinetic: sums.twice_kinetic * zero.like(0.5),
+                potential: -sums.fall,
+                momentum: sums.momentum,
+            }
+        },
     )
-}
-
-#[inline(always)]
-fn energy_here<T: Lane>(
-    machine: &Machine,
-    inertias: &Inertias<T>,
-    place: &Place<T>,
-    v: &[T],
-    gravity: Vec3<T>,
-    scratch: &mut EnergyScratch<T>,
-) -> Energy<T> {
-    let n = machine.links.len();
-    let (links, own_inertias) = (&machine.links[..n], &inertias.bodies[..n]);
-    let bodies = &mut scratch.bodies[..n];
-    let (base, rates) = v.split_at(BASE);
-    let rates = &rates[..n - 1];
-    let mut turns = scratch.turns.of(machine, place);
-    let zero = T::splat(scratch.token, 0.0);
-    let mut sums = Sums {
-        twice_kinetic: zero,
-        momentum: Vec3::new(zero, zero, zero),
-        fall: gravity.dot(place.position) * inertias.mass,
-    };
-    bodies[0] = Moving {
-        R: rotation(&place.attitude),
-        velocity: Vec3::new(base[0], base[1], base[2]),
-        omega: Vec3::new(base[3], base[4], base[5]),
-        fall: zero,
-    };
-    let Moving {
-        R,
-        velocity,
-        omega,
-        fall,
-    } = &bodies[0];
-    sums.add(
-        &links[0],
-        &own_inertias[0],
-        (R, *velocity, *omega, *fall),
-        gravity,
-    );
-    for b in 1..n {
-        let (before, own) = bodies.split_at_mut(b);
-        let link = &links[b];
-        let carrier = &before[link.parent];
-        let lever = link.lever(&carrier.R);
-        let velocity = carrier.velocity + carrier.omega.cross(lever);
-        let fall = carrier.fall + gravity.dot(lever);
-        let frame = match &link.rotation {
-            None => carrier.R,
-            Some(fixed) => times_columns(&carrier.R, fixed),
-        };
-        let axis = link.axis.turned(&frame);
-        let omega = carrier.omega + axis * rates[b - 1];
-        let inertia = &own_inertias[b];
-        if link.is_spinner {
-            sums.add(link, inertia, (&frame, velocity, omega, fall), gravity);
-            continue;
-        }
-        let R = link.axis.rotate(&frame, axis, turns.next());
-        sums.add(link, inertia, (&R, velocity, omega, fall), gravity);
-        own[0] = Moving {
-            R,
-            velocity,
-            omega,
-            fall,
-        };
-    }
-    Energy {
-        kinetic: sums.twice_kinetic * zero.like(0.5),
-        potential: -sums.fall,
-        momentum: sums.momentum,
-    }
 }
 
 impl<T: Lane> Sums<T> {

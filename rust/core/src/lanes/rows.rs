@@ -10,12 +10,21 @@ use super::contacts::Contacts;
 use super::machine::{Machine, velocity};
 use super::mass_matrix::Factor;
 use super::poses::Poses;
-use super::problem::{ContactProblem, MAX_UNKNOWNS, block};
+use super::problem::{ContactProblem, block};
 use crate::multibody::model::BASE;
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
 
 /// Entries of a contact along n, t, b.
 pub type Triple<T> = [T; 3];
+
+/// What is read of a problem.
+#[derive(Clone, Copy, Debug)]
+pub enum Answer {
+    /// Impulses, N s.
+    Impulses,
+    /// Velocities, m/s.
+    Velocities,
+}
 
 /// The contacts of a block in matrix form.
 #[derive(Clone, Debug)]
@@ -313,53 +322,16 @@ impl<T: Lane> Rows<T> {
         );
     }
 
-    /// Reads impulses by slot from the problems, N s. Slots that a lane does not use are left as
-    /// they are.
+    /// Reads an answer of the problems by slot. Slots that a lane does not use are left as they are.
     ///
     /// # Panics
     /// If there are fewer problems than lanes.
     #[inline(always)]
-    pub fn impulses(
+    pub fn read(
         &self,
         contacts: &Contacts<T>,
         problems: &[ContactProblem],
-        p: &mut [Triple<T>],
-    ) {
-        self.read(
-            contacts,
-            problems,
-            #[inline(always)]
-            |problem| &problem.p,
-            p,
-        );
-    }
-
-    /// Reads velocities by slot from the problems, m/s, likewise.
-    ///
-    /// # Panics
-    /// If there are fewer problems than lanes.
-    #[inline(always)]
-    pub fn velocities(
-        &self,
-        contacts: &Contacts<T>,
-        problems: &[ContactProblem],
-        u: &mut [Triple<T>],
-    ) {
-        self.read(
-            contacts,
-            problems,
-            #[inline(always)]
-            |problem| &problem.u,
-            u,
-        );
-    }
-
-    #[inline(always)]
-    fn read(
-        &self,
-        contacts: &Contacts<T>,
-        problems: &[ContactProblem],
-        of: impl Fn(&ContactProblem) -> &[f64; MAX_UNKNOWNS],
+        answer: Answer,
         out: &mut [Triple<T>],
     ) {
         let problems = &problems[..T::LANES];
@@ -370,7 +342,12 @@ impl<T: Lane> Rows<T> {
                 contacts.slot(slot).active,
                 #[inline(always)]
                 |lane| {
-                    let own = &of(&problems[lane])[3 * usize::from(places[lane])..][..3];
+                    let problem = &problems[lane];
+                    let all = match answer {
+                        Answer::Impulses => &problem.p,
+                        Answer::Velocities => &problem.u,
+                    };
+                    let own = &all[3 * usize::from(places[lane])..][..3];
                     for i in 0..3 {
                         values[i][lane] = own[i];
                     }

@@ -28,7 +28,7 @@ use super::passenger::Passenger;
 use super::place::Place;
 use super::poses::Poses;
 use super::problem::{ContactProblem, MAX_CONTACTS};
-use super::rows::{Rows, Triple};
+use super::rows::{Answer, Rows, Triple};
 use crate::contact::Contact;
 use crate::integrator::energy_audit::{COARSE, GAIN, RAISE, ROUNDINGS};
 use crate::integrator::position_projection::FARTHEST;
@@ -500,7 +500,8 @@ impl<T: Lane> Block<T> {
         let zero = self.number(0.0);
         let (h, _) = self.time_step();
         if is_any {
-            self.rows.impulses(&self.contacts, problems, &mut self.p);
+            self.rows
+                .read(&self.contacts, problems, Answer::Impulses, &mut self.p);
             let (contacts, end) = (&self.contacts, &self.poses_end);
             self.rows
                 .generalized_impulse(contacts, end, self.persists, &self.p, &mut self.pushed);
@@ -623,8 +624,10 @@ impl<T: Lane> Block<T> {
 
     #[inline(always)]
     fn move_on(&mut self, problems: &[ContactProblem]) {
-        self.rows.impulses(&self.contacts, problems, &mut self.p);
-        self.rows.velocities(&self.contacts, problems, &mut self.u);
+        self.rows
+            .read(&self.contacts, problems, Answer::Impulses, &mut self.p);
+        self.rows
+            .read(&self.contacts, problems, Answer::Velocities, &mut self.u);
         self.rows
             .add_impulses(&self.contacts, self.occupied, &self.p, &mut self.y);
         self.factor.half_solve_back(&self.machine, &mut self.y);
@@ -862,7 +865,8 @@ impl<T: Lane> Block<T> {
         }
         let farthest = T::load(self.token, &farthest[..T::LANES]);
         let mut pushes = std::mem::take(&mut self.pushes);
-        self.rows.impulses(&self.contacts, problems, &mut pushes);
+        self.rows
+            .read(&self.contacts, problems, Answer::Impulses, &mut pushes);
         self.y.fill(zero);
         self.rows
             .add_impulses(&self.contacts, self.is_deep, &pushes, &mut self.y);
