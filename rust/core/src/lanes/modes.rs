@@ -2,7 +2,7 @@
 //! projection of `z = p − ρ u` (Alart and Curnier 1991).
 
 use super::equations::Triple;
-use crate::scalar::Lane;
+use crate::scalar::{Lane, LaneMask};
 
 /// The linearised equations of one contact.
 ///
@@ -215,6 +215,25 @@ pub fn limit<T: Lane>(
     trial: &Triple<T>,
 ) -> Limit<T> {
     let (zero, one) = (mu.like(0.0), mu.like(1.0));
+    let sticks = closed & sticks;
+    let pressed = zero.lt(p[0]);
+    let stays = outside(mu, trial, trial).le(zero) & zero.lt(trial[0]);
+    let leaves = sticks & pressed & !stays;
+    let opens = closed & !sticks & pressed & trial[0].lt(zero);
+    let mut t = one;
+    if leaves.any() {
+        t = T::select(leaves, way_to_the_limit(mu, p, trial), t);
+    }
+    if opens.any() {
+        t = T::select(opens, p[0] / (p[0] - trial[0]), t);
+    }
+    Limit { t, slides: sticks }
+}
+
+/// Fraction of the way from `p` to `trial` at which an impulse reaches the limit of friction.
+#[inline(always)]
+fn way_to_the_limit<T: Lane>(mu: T, p: &Triple<T>, trial: &Triple<T>) -> T {
+    let (zero, one) = (mu.like(0.0), mu.like(1.0));
     let d = [trial[0] - p[0], trial[1] - p[1], trial[2] - p[2]];
     // |p_T + t d_T|² = μ² (p_N + t d_N)²
     let a = outside(mu, &d, &d);
@@ -228,16 +247,5 @@ pub fn limit<T: Lane>(
     let first = T::select(zero.le(first), first, one);
     let second = T::select(zero.le(second), second, one);
     let inside = first.min(second).min(one);
-    let at_the_limit = T::select(ahead, zero, one);
-    let sticks = closed & sticks;
-    let pressed = zero.lt(p[0]);
-    let stays = outside(mu, trial, trial).le(zero) & zero.lt(trial[0]);
-    let leaves = T::select(zero.le(c), at_the_limit, inside);
-    let opens = T::select(trial[0].lt(zero), p[0] / -d[0], one);
-    let t = T::select(
-        sticks & pressed & !stays,
-        leaves,
-        T::select(closed & !sticks & pressed, opens, one),
-    );
-    Limit { t, slides: sticks }
+    T::select(zero.le(c), T::select(ahead, zero, one), inside)
 }
