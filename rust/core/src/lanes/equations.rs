@@ -92,16 +92,17 @@ fn assemble<T: Lane>(
         ..
     } = row_mode;
     let mut out = x;
+    let zero = gamma.like(0.0);
     for k in 0..3 {
-        out[k] = *closed * x[k];
+        out[k] = T::select(*closed, x[k], zero);
         out[3 + k] = b[0] * x[3 + k] + b[1] * x[6 + k];
-        out[6 + k] = *stick * x[6 + k];
+        out[6 + k] = T::select(*stick, x[6 + k], zero);
     }
     if alpha.is_some() {
         let one = gamma.like(1.0);
-        out[0] += one - *closed;
+        out[0] += T::select(*closed, zero, one);
         out[4] += *gamma;
-        out[8] += one - *stick;
+        out[8] += T::select(*stick, zero, one);
     }
     out
 }
@@ -240,7 +241,12 @@ fn across<T: Lane>(mode: &Mode<T>, x: [T; 3]) -> Triple<T> {
     let Mode {
         closed, b, stick, ..
     } = mode;
-    [*closed * x[0], b[0] * x[1] + b[1] * x[2], *stick * x[2]]
+    let zero = x[0].like(0.0);
+    [
+        T::select(*closed, x[0], zero),
+        b[0] * x[1] + b[1] * x[2],
+        T::select(*stick, x[2], zero),
+    ]
 }
 
 /// `C y` of a contact.

@@ -21,15 +21,15 @@ use crate::scalar::{Lane, LaneMask};
 ///
 /// A column marked `-` may be anything, since its unknown is zero.
 #[derive(Clone, Copy, Debug)]
-pub struct Mode<T> {
+pub struct Mode<T: Lane> {
     /// `μ e`, zero unless sliding.
     pub a: [T; 2],
     /// `(−e2, e1)`; (1, 0) if sticking, zero if open or without friction.
     pub b: [T; 2],
-    /// 1 if closed, 0 if open.
-    pub closed: T,
-    /// 1 if sticking, 0 otherwise.
-    pub stick: T,
+    /// Whether it is closed.
+    pub closed: T::Mask,
+    /// Whether it sticks.
+    pub stick: T::Mask,
     /// Turning stiffness of the second equation, 1/kg; 1 where `b` is zero.
     pub gamma: T,
 }
@@ -83,8 +83,8 @@ impl<T: Lane> Mode<T> {
         Self {
             a: [zero; 2],
             b: [zero; 2],
-            closed: zero,
-            stick: zero,
+            closed: one.lt(zero),
+            stick: one.lt(zero),
             gamma: one,
         }
     }
@@ -100,8 +100,8 @@ impl<T: Lane> Mode<T> {
         Self {
             a: [mu * e[0], mu * e[1]],
             b: [T::select(sticks, one, -e[1]), e[0]],
-            closed: T::select(closed, one, zero),
-            stick: T::select(sticks, one, zero),
+            closed,
+            stick: sticks,
             gamma: T::select(slides, gamma, T::select(sticks, zero, one)),
         }
     }
