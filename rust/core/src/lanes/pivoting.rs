@@ -3,10 +3,11 @@
 //!
 //! From a warm start a step goes to the [answer of the present modes](super::equations) as far as
 //! all cones allow. The contact that blocks then slides or opens. After a full step the contact
-//! whose velocity contradicts its mode most is corrected, unless the residual falls fast: then the
-//! modes are right, and the next step removes the curvature of the slides. A contact whose friction
-//! pushes along its slip, but which would leave its cone at once if it stuck, is barred, so that
-//! another one changes its mode. If none is left, its friction is reversed.
+//! whose velocity contradicts its mode most is corrected, with those that do so as much, unless the
+//! residual falls fast: then the modes are right, and the next step removes the curvature of the
+//! slides. A contact whose friction pushes along its slip, but which would leave its cone at once
+//! if it stuck, is barred, so that another one changes its mode. If none is left, its friction is
+//! reversed.
 
 use super::equations::{Block, Factors, Triple, correction, factorise, newton_point, velocities};
 use super::modes::{Law, Limit, Mode, Violations, is_pressed_to_slide, judge, limit};
@@ -41,6 +42,10 @@ const NEAR: f64 = 1e-6;
 
 /// Fraction of a step below which the impulse stays where it was.
 const NO_MOVE: f64 = 1e-6;
+
+/// Contacts that block at the same place, or contradict their modes as much, to this share, change
+/// together: in a machine that is its own mirror image one of a pair must not go first.
+const ALIKE: f64 = 1.0 - 1e-6;
 
 /// Steps without progress after which the modes go in circles.
 const PATIENCE: f64 = 4.0;
@@ -250,21 +255,20 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
         self.sums = Violations::select(better, &sums, &self.sums);
     }
 
-    /// Moves the impulses of blocked lanes to where the first contact blocks, which changes its
-    /// mode; those of the others to the trial.
+    /// Moves the impulses of blocked lanes to where the first contacts block, which change their
+    /// modes; those of the others to the trial.
     #[inline(always)]
     fn stop_at(&mut self, blocked: T::Mask, first: T, limits: &[Limit<T>; C]) {
-        let zero = first.like(0.0);
+        let (zero, one) = (first.like(0.0), first.like(1.0));
         let moves = zero.like(NO_MOVE).lt(first);
-        let mut left = blocked;
         for i in 0..C {
             let (p, trial) = (&mut self.p[i], &self.trial[i]);
             for k in 0..3 {
                 let between = p[k] + first * (trial[k] - p[k]);
                 p[k] = T::select(blocked, between, trial[k]);
             }
-            let hit = left & limits[i].t.le(first);
-            left = left & !hit;
+            let t = limits[i].t;
+            let hit = blocked & t.lt(one) & (t * zero.like(ALIKE)).le(first);
             let opens = hit & !limits[i].slides;
             self.barred[i] = (self.barred[i] & !(blocked & moves)) | (hit & !moves & self.freed[i]);
             self.sticks[i] = self.sticks[i] & !hit;
@@ -290,16 +294,18 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
         let gain = relative / self.last;
         self.last = T::select(full, relative, self.last);
         let gains_nothing = full & like.like(NO_GAIN).lt(gain);
-        let smaller = (like.like(SHRINK) * self.alpha).max(like.like(SMALLEST) * self.mean);
-        self.alpha = T::select(gains_nothing, smaller, self.alpha);
         self.visits.enter(full, self.number(), relative);
         let looks = full & !gain.lt(like.like(HOLD));
         if !looks.any() {
             return;
         }
         let (found, worst) = self.worst_contradiction(looks);
+        // With the right modes nothing but α is left in the way.
+        let is_settled = gains_nothing & looks & !zero.lt(worst);
+        let smaller = (like.like(SHRINK) * self.alpha).max(like.like(SMALLEST) * self.mean);
+        self.alpha = T::select(is_settled, smaller, self.alpha);
         let circles = looks & like.like(PATIENCE).lt(self.visits.idle);
-        let stuck = circles | (gains_nothing & looks & !zero.lt(worst));
+        let stuck = circles | is_settled;
         let reversed = if stuck.any() {
             self.reverse(stuck)
         } else {
@@ -337,13 +343,14 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
         number
     }
 
-    /// The contact that contradicts its mode most, unless it is barred, in the lanes of a mask, and
-    /// by how much; zero where none does.
+    /// The contacts that contradict their modes most, unless they are barred, in the lanes of a
+    /// mask, and by how much; zero where none does.
     #[inline(always)]
     fn worst_contradiction(&self, lanes: T::Mask) -> ([T::Mask; C], T) {
         let zero = self.mean.like(0.0);
         let mut worst = zero;
         let mut found = [!lanes & lanes; C];
+        let mut amounts = [zero; C];
         for i in 0..C {
             let (p, u, mu) = (&self.p[i], &self.u[i], self.laws[i].mu);
             let norm = (p[1] * p[1] + p[2] * p[2]).sqrt();
@@ -354,12 +361,14 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
             let of_slide = T::select(zero.lt(norm), along, zero);
             let amount = T::select(self.sticks[i], of_stick, of_slide);
             let amount = T::select(self.closed[i], amount, -u[0]);
-            let here = lanes & !self.barred[i] & worst.lt(amount);
-            worst = T::select(here, amount, worst);
-            for other in &mut found[..i] {
-                *other = *other & !here;
-            }
-            found[i] = here;
+            let amount = T::select(lanes & !self.barred[i], amount, zero);
+            amounts[i] = amount;
+            worst = amount.max(worst);
+        }
+        let least = worst * zero.like(ALIKE);
+        let is_any = zero.lt(worst);
+        for i in 0..C {
+            found[i] = is_any & least.le(amounts[i]);
         }
         (found, worst)
     }

@@ -5,7 +5,7 @@
 //!
 //! Measured on recorded drives of the built-in rover in steps of 5 ms, with torques and set-points
 //! drawn anew every ten steps: 2.2 systems a problem when it only steers, 3.3 with torques up to
-//! 60 N m, 3.5 to 4.1 among rocks; at most 0.2% are unsolved.
+//! 60 N m, 3.5 to 4.2 among rocks; at most 0.2% are unsolved.
 
 use super::equations::Factors;
 use super::pivoting::Pivoting;
