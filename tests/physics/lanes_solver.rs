@@ -73,7 +73,24 @@ fn assert_sound(problem: &ContactProblem, start: &ContactProblem) {
         residual.velocity <= options.velocity_tolerance,
         "{residual:?}"
     );
-    assert!((residual.relative - problem.residual.relative).abs() < 1e-14);
+    let difference = (residual.relative - problem.residual.relative).abs();
+    let rounding = rounding_of_velocities(&W, problem);
+    assert!(difference < 1e-14 + rounding, "{difference:e} {rounding:e}");
+}
+
+/// What the order of the sums in `W p` may change of the relative residual.
+fn rounding_of_velocities(W: &[f64], problem: &ContactProblem) -> f64 {
+    let n = problem.n_unknowns();
+    let magnitude = |row: &[f64]| -> f64 {
+        let terms = row.iter().zip(&problem.p[..n]);
+        terms.map(|(w, p)| (w * p).abs()).sum()
+    };
+    let largest = W.chunks_exact(n.max(1)).map(magnitude).fold(0.0, f64::max);
+    let speed = problem.q[..n].iter().map(|q| q * q).sum::<f64>().sqrt();
+    if speed == 0.0 {
+        return 0.0;
+    }
+    n as f64 * f64::EPSILON * largest / speed
 }
 
 /// Each problem solved alone.
@@ -308,7 +325,7 @@ fn random_problem(draw: &mut Draw, n_contacts: usize, rank: usize, cold: bool) -
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(24) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(200) })]
 
     #[test]
     fn every_answer_has_the_bits_of_the_problem_alone(
