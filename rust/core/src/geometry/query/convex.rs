@@ -474,7 +474,8 @@ mod tests {
                 prop_assert!(separation(&first, &second, &beside) <= near.gap + 1e-8);
             }
             let back = nearest_points(&second, &first);
-            prop_assert!((back.gap - near.gap).abs() < tolerance);
+            // Either may be off by the tolerance.
+            prop_assert!((back.gap - near.gap).abs() < 2.0 * tolerance);
         }
 
         #[test]
