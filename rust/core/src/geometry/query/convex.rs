@@ -8,7 +8,7 @@
 //!
 //! Distances are exact to 1e-11 of the shapes' size, and so are overlaps of shapes with corners.
 //! Round rims take some twenty iterations; the overlap of a wheel a whole radius inside a box is
-//! accurate to 1e-5 of its size.
+//! accurate to 2e-5 of its size.
 //!
 //! Source: Gilbert, Johnson and Keerthi 1988 (distance); van den Bergen 2001 (penetration depth).
 
@@ -474,8 +474,9 @@ mod tests {
                 prop_assert!(separation(&first, &second, &beside) <= near.gap + 1e-8);
             }
             let back = nearest_points(&second, &first);
-            // Either may be off by the tolerance.
-            prop_assert!((back.gap - near.gap).abs() < 2.0 * tolerance);
+            // A round rim ends with its last vertex, one way round or the other.
+            let tolerance = if near.gap > 0.0 { 1e-8 } else { 2e-5 };
+            prop_assert!((back.gap - near.gap).abs() < tolerance, "{} {}", back.gap, near.gap);
         }
 
         #[test]
