@@ -322,7 +322,8 @@ impl<T: Lane> Rows<T> {
         );
     }
 
-    /// Reads an answer of the problems by slot. Slots that a lane does not use are left as they are.
+    /// Reads an answer of the problems by slot. Slots that a lane does not use are left as they
+    /// are.
     ///
     /// # Panics
     /// If there are fewer problems than lanes.
