@@ -8,7 +8,7 @@ use rover_core::episode::{
     Autoreset, EpisodeBatch as CoreBatch, EpisodeError, Stepped, Succession,
 };
 
-use crate::arguments::{Given, count, refused, whole};
+use crate::arguments::{Given, at_least_one, refused, whole};
 use crate::arrays::fresh_table;
 use crate::batch::{index, mask};
 use crate::draw::{
@@ -119,14 +119,6 @@ impl Inner {
     }
 }
 
-/// A count of at least one.
-fn at_least_one(given: &Bound<'_, PyAny>, field: &str) -> PyResult<usize> {
-    match count(given, Kind::Option, field)? {
-        0 => Err(refused(given, Kind::Option, field, "at least 1").into()),
-        n => Ok(n),
-    }
-}
-
 fn distribution<'a, 'py>(
     given: &'a Bound<'py, PyAny>,
 ) -> PyResult<&'a Bound<'py, EpisodeDistribution>> {
@@ -147,9 +139,9 @@ impl EpisodeBatch {
         threads: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let rules = self::rules(rules)?;
-        let n = at_least_one(n, "n")?;
+        let n = at_least_one(n, Kind::Option, "n")?;
         let max_steps = max_steps.map(|given| whole(given, Kind::Option, "max_steps"));
-        let threads = threads.map(|given| at_least_one(given, "threads"));
+        let threads = threads.map(|given| at_least_one(given, Kind::Option, "threads"));
         let one = self::simulation(simulation, "simulation")?.get();
         let rover = one.open()?;
         let batch = CoreBatch::new(

@@ -9,7 +9,7 @@ use super::action;
 use super::autoreset::Final;
 use super::beginning::{Beginning, EpisodeDistribution};
 use super::control_period::{ControlPeriod, Origin, Place, Seat};
-use super::error::EpisodeError;
+use super::error::{EpisodeError, check_lengths};
 use super::rules::Rules;
 use super::running::Episode;
 use crate::draw::{Order, Pcg64, Range};
@@ -286,17 +286,7 @@ impl EpisodeBatch {
     ) -> Result<(), EpisodeError> {
         let (n, width) = (self.seats.len(), self.rules.n_actions());
         let flags = active.map_or(n, <[bool]>::len);
-        for (field, actual, expected) in
-            [("action", actions.len(), n * width), ("active", flags, n)]
-        {
-            if actual != expected {
-                return Err(EpisodeError::Length {
-                    field,
-                    expected,
-                    actual,
-                });
-            }
-        }
+        check_lengths([("action", actions.len(), n * width), ("active", flags, n)])?;
         action::check(actions, width, false)?;
         if let Some(index) = self.seats.iter().position(Option::is_none) {
             return Err(EpisodeError::NotBegun { index });
