@@ -27,8 +27,8 @@ const PARKED_ALPHA: f64 = 1e-6;
 /// Squared relative residual below which a rover without a slide counts as parked.
 const PARKED: f64 = 1e-12;
 
-/// Factor by which `α` shrinks when a full step with the right modes gains nothing, and its smallest
-/// value.
+/// Factor by which `α` shrinks when a full step with the right modes gains nothing, and its
+/// smallest value.
 const SHRINK: f64 = 1e-3;
 const SMALLEST: f64 = 1e-14;
 
