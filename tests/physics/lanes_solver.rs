@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, UnilateralContact};
 use rover_core::lanes::problem::{ContactProblem, MAX_CONTACTS, block};
-use rover_core::lanes::queue::{MAX_STEPS, solve_all};
+use rover_core::lanes::queue::{MAX_ITERATIONS, solve_all};
 use rover_core::multibody::{Configuration, Model};
 use rover_core::problem::{Dimension, FrictionContactProblem, evaluate};
 use rover_core::scalar::Single;
@@ -55,7 +55,7 @@ fn problem(W: &[f64], q: &[f64], mu: &[f64], p: &[f64]) -> ContactProblem {
 fn assert_sound(problem: &ContactProblem, start: &ContactProblem) {
     let n = problem.n_unknowns();
     assert!(problem.p.iter().chain(&problem.u).all(|x| x.is_finite()));
-    assert!(problem.iterations <= MAX_STEPS);
+    assert!(problem.iterations <= MAX_ITERATIONS);
     if !problem.is_solved {
         assert_eq!(problem.p, start.p);
         return;
@@ -187,7 +187,7 @@ fn drive_of(model: Model, height: f64, largest: f64, steps: usize) -> Vec<Contac
 
 #[test]
 fn an_exploring_rover_is_solved_in_few_steps() {
-    for (torque, mean, unsolved) in [(0.0, 3.0, 0), (60.0, 4.4, 4), (150.0, 5.2, 4)] {
+    for (torque, mean, unsolved) in [(0.0, 3.0, 0), (60.0, 4.4, 0), (150.0, 5.2, 0)] {
         let problems = drive(torque, 600);
         assert!(problems.len() > 500);
         let mut found = problems.clone();
@@ -218,7 +218,7 @@ fn squeezed_wheels_are_solved() {
         assert_sound(found, start);
     }
     let left = found.iter().filter(|p| !p.is_solved).count();
-    assert!(left <= 4, "{left} unsolved");
+    assert!(left == 0, "{left} unsolved");
 }
 
 #[test]

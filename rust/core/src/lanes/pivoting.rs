@@ -74,6 +74,9 @@ pub(super) struct Pivoting<T: Lane, const C: usize> {
     pub(super) lost: T::Mask,
     /// Squares of `1/|q|` and `1/|(ρ_i q_i)|`.
     pub(super) inverses: [T; 2],
+    /// `α` that an attempt asks for, relative to the mean diagonal of `W`; 0 for that which suits
+    /// the start.
+    pub(super) asked: T,
     alpha: T,
     first_alpha: T,
     trial: [Triple<T>; C],
@@ -106,6 +109,7 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
             sums: Violations::none(zero),
             lost: none,
             inverses: [zero, one],
+            asked: zero,
             alpha: one,
             first_alpha: one,
             trial: [[zero; 3]; C],
@@ -158,7 +162,8 @@ impl<T: Lane, const C: usize> Pivoting<T, C> {
         let [relative, _] = self.residual();
         self.last = T::select(lanes, relative, self.last);
         let is_parked = !slides & relative.lt(zero.like(PARKED));
-        let first = T::select(is_parked, zero.like(PARKED_ALPHA), zero.like(ALPHA)) * self.mean;
+        let first = T::select(is_parked, zero.like(PARKED_ALPHA), zero.like(ALPHA));
+        let first = T::select(zero.lt(self.asked), self.asked, first) * self.mean;
         self.first_alpha = T::select(lanes, first, self.first_alpha);
         self.alpha = T::select(lanes, first, self.alpha);
         self.visits.forget(lanes);

@@ -11,6 +11,6 @@ pub(super) mod gauss_seidel;
 pub(super) mod guided;
 pub(super) mod newton;
 mod pivot_rules;
-pub(super) mod pivoting;
+pub(crate) mod pivoting;
 pub(super) mod proximal;
 pub(super) mod restarts;
