@@ -2,8 +2,8 @@
 //!
 //! A rover over a plane alone pays for the plane alone. Spheres are searched rover by rover, and
 //! seldom: a wheel keeps those near it until it has moved further than the search looked ahead, and
-//! a box keeps its distance to the nearest. What is kept decides only what need not be examined, so
-//! a step does not depend on when a search was made.
+//! a box keeps its distance to the nearest and, near rocks, the nearest themselves. What is kept
+//! decides only what need not be examined, so a step does not depend on when a search was made.
 
 use std::sync::Arc;
 
@@ -19,8 +19,11 @@ const MAX_NEAR: usize = 8;
 /// Twice as far examines twice as many spheres a step and searches half as often.
 const AHEAD: [f64; 3] = [0.1, 0.02, 0.0];
 
-/// How far beyond its reach a search for a box looks, m.
+/// How far beyond its reach a search for a box looks, and how near the spheres are that it keeps,
+/// m. A box that drives close over rocks then measures some of them at every step and searches a
+/// few times a metre.
 const AHEAD_OF_BOX: f64 = 0.5;
+const KEPT_BY_BOX: f64 = 0.15;
 
 /// Covers the rounding of distances, m, for coordinates up to the size of a terrain.
 const ROUNDING: f64 = 1e-6;
@@ -58,11 +61,34 @@ struct Near<T> {
 /// The spheres around a box.
 #[derive(Clone, Debug)]
 struct Around<T> {
-    /// Place and attitude of the box when they were searched; world, m.
+    /// Place and attitude of the box when its clearance was measured; world, m.
     from: Vec3<T>,
     R: Mat3<T>,
     /// No sphere comes nearer to the box than this, m.
     clearance: T,
+    kept: [Kept; MAX_LANES],
+}
+
+/// The spheres nearest to a rover's box.
+#[derive(Clone, Debug)]
+struct Kept {
+    /// Place and attitude of the box when they were searched; world, m.
+    from: Vector3<f64>,
+    R: Matrix3<f64>,
+    /// They are all that come as near to the box as this, m; −∞ if there were too many.
+    within: f64,
+    spheres: [Sphere; MAX_NEAR],
+    n: usize,
+}
+
+impl Kept {
+    const NOTHING: Self = Self {
+        from: Vector3::new(0.0, 0.0, 0.0),
+        R: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        within: f64::NEG_INFINITY,
+        spheres: [NONE; MAX_NEAR],
+        n: 0,
+    };
 }
 
 /// The ground of a block.
@@ -106,6 +132,7 @@ impl<T: Lane> Ground<T> {
                 z: nowhere,
             },
             clearance: T::splat(token, f64::INFINITY),
+            kept: [Kept::NOTHING; MAX_LANES],
         };
         Self {
             normal: Vec3::splat(token, [0.0, 1.0, 0.0]),
@@ -149,6 +176,7 @@ impl<T: Lane> Ground<T> {
         for around in &mut self.boxes {
             around.from.set(lane, [0.0; 3]);
             around.clearance.set(lane, known);
+            around.kept[lane].within = f64::NEG_INFINITY;
         }
     }
 
@@ -286,7 +314,6 @@ impl<T: Lane> Near<T> {
 
 impl<T: Lane> Around<T> {
     /// Measures the clearance of one rover's box. True if it is at most `need`, m.
-    #[cold]
     fn search(
         &mut self,
         lane: usize,
@@ -295,12 +322,16 @@ impl<T: Lane> Around<T> {
         bound: f64,
         need: f64,
     ) -> bool {
-        let mut clearance = need + AHEAD_OF_BOX;
-        visit_spheres(field, &solid.centre, bound + clearance, |_, sphere| {
-            let local = solid.R.tr_mul(&(sphere.centre - solid.centre));
-            let outside = (local.abs() - solid.half_size).map(|x| x.max(0.0));
-            clearance = clearance.min(outside.norm() - sphere.radius);
-        });
+        let kept = &mut self.kept[lane];
+        let moved = (solid.centre - kept.from).norm() + (solid.R - kept.R).norm() * bound;
+        let clearance = if moved + need + ROUNDING <= kept.within {
+            let nearest = |least: f64, sphere| least.min(clearance_of(solid, sphere));
+            kept.spheres[..kept.n]
+                .iter()
+                .fold(kept.within - moved, nearest)
+        } else {
+            kept.search(field, solid, bound, need)
+        };
         self.from.set(lane, solid.centre.into());
         self.R.x.set(lane, solid.axis(0).into());
         self.R.y.set(lane, solid.axis(1).into());
@@ -308,6 +339,39 @@ impl<T: Lane> Around<T> {
         self.clearance.set(lane, clearance);
         clearance <= need
     }
+}
+
+impl Kept {
+    /// Searches the spheres around the box anew and returns its clearance, m.
+    #[cold]
+    fn search(&mut self, field: &dyn Terrain, solid: &OrientedBox, bound: f64, need: f64) -> f64 {
+        let mut clearance = need + AHEAD_OF_BOX;
+        self.within = need + KEPT_BY_BOX;
+        self.n = 0;
+        visit_spheres(field, &solid.centre, bound + clearance, |_, sphere| {
+            let own = clearance_of(solid, sphere);
+            clearance = clearance.min(own);
+            if own <= self.within {
+                match self.spheres.get_mut(self.n) {
+                    Some(place) => {
+                        *place = *sphere;
+                        self.n += 1;
+                    }
+                    None => self.within = f64::NEG_INFINITY,
+                }
+            }
+        });
+        self.from = solid.centre;
+        self.R = solid.R;
+        clearance
+    }
+}
+
+/// Distance of a sphere from a box, negative where they overlap, m.
+fn clearance_of(solid: &OrientedBox, sphere: &Sphere) -> f64 {
+    let local = solid.R.tr_mul(&(sphere.centre - solid.centre));
+    let outside = (local.abs() - solid.half_size).map(|x| x.max(0.0));
+    outside.norm() - sphere.radius
 }
 
 /// Upper bound on the motion of a point at unit distance from the centre: the Frobenius norm of the

@@ -10,11 +10,12 @@
 //! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
 //! - `parts`, [`ground`], [`forecast`], [`contacts`]: what touches what; [`rows`]: Jacobian and
 //!   Delassus operator;
-//! - [`problem`], [`modes`], [`equations`], `pivoting`, `visits`, [`queue`]: the friction-contact
+//! - [`problem`], [`modes`], [`equations`], `pivoting`, `visits`, `bench`, [`queue`]: the friction-contact
 //!   problems;
 //! - [`step`]: the step.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
+mod bench;
 pub mod bias;
 pub mod contacts;
 pub mod drives;

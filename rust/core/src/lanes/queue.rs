@@ -1,25 +1,22 @@
 //! The queue of the contact problems of several rovers.
 //!
-//! Lanes take the next problem when theirs is done, so that the cost follows the mean of the steps
-//! and not the largest. No lane's bits depend on its neighbours.
+//! Rovers never wait for each other: while one problem takes long, the groups whose problems are
+//! all done go on to their next step and bring new ones.
 //!
 //! Measured on recorded drives of the built-in rover in steps of 5 ms, with torques and set-points
 //! drawn anew every ten steps: 2.2 systems a problem when it only steers, 3.3 with torques up to
 //! 60 N m, 3.5 to 4.2 among rocks. Of 1.6 million problems of longer drives, on the plane and among
 //! rocks, 4912 resist the first attempt and 67 all four.
 
-use super::equations::Factors;
-use super::pivoting::Pivoting;
-use super::problem::{ContactProblem, MAX_CONTACTS, block};
-use crate::problem::{ContactScales, Magnitudes, Residual};
-use crate::scalar::{Lane, LaneMask, MAX_LANES};
-use crate::solver::{FURTHER_ALPHAS, SolverOptions};
+use std::collections::VecDeque;
 
-/// Most steps of an attempt. What is unsolved then goes in circles, mostly.
-const MAX_STEPS: usize = 80;
+use super::bench::{Bench, Line};
+use super::problem::{ContactProblem, MAX_CONTACTS};
+use crate::problem::Residual;
+use crate::scalar::Lane;
+use crate::solver::SolverOptions;
 
-/// Most steps of a solve: those of the first attempt and of all further ones.
-pub const MAX_ITERATIONS: usize = MAX_STEPS * (1 + FURTHER_ALPHAS.len());
+pub use super::bench::MAX_ITERATIONS;
 
 /// Contacts up to which the smaller system serves, that of a rover with six wheels on the plane.
 const FEW: usize = 6;
@@ -27,8 +24,7 @@ const FEW: usize = 6;
 /// Solves all problems. Up to the list's end each lane has one to work on.
 ///
 /// A problem that takes too long, or goes in circles, is tried again from its start with another
-/// `α`. One that resists, or has numbers that are not finite, keeps its starting
-/// impulse.
+/// `α`. One that resists, or has numbers that are not finite, keeps its starting impulse.
 ///
 /// # Panics
 /// If a problem has more contacts than fit.
@@ -39,34 +35,44 @@ pub fn solve_all<T: Lane>(
 ) {
     let mut most = 0;
     for problem in problems.iter_mut() {
-        assert!(
-            problem.n_contacts <= MAX_CONTACTS,
-            "at most {MAX_CONTACTS} contacts"
-        );
         problem.begin();
         if !problem.is_solved {
             most = most.max(problem.n_contacts);
         }
     }
+    let tolerances = squares::<T>(token, options);
     if most > 0 {
         T::vectorize(
             token,
             #[inline(always)]
-            || solve_some::<T, FEW>(token, problems, options, 1),
+            || solve_some::<T, FEW>(token, problems, tolerances, 1),
         );
     }
     if most > FEW {
         T::vectorize(
             token,
             #[inline(always)]
-            || solve_some::<T, MAX_CONTACTS>(token, problems, options, FEW + 1),
+            || solve_some::<T, MAX_CONTACTS>(token, problems, tolerances, FEW + 1),
         );
     }
 }
 
+/// Squares of the tolerances.
+#[inline(always)]
+fn squares<T: Lane>(token: T::Token, options: &SolverOptions) -> [T; 2] {
+    [options.tolerance, options.velocity_tolerance].map(|x| T::splat(token, x * x))
+}
+
 impl ContactProblem {
     /// Forgets any earlier answer. Without contacts or free velocity the answer is zero.
+    ///
+    /// # Panics
+    /// If there are more contacts than fit.
     fn begin(&mut self) {
+        assert!(
+            self.n_contacts <= MAX_CONTACTS,
+            "at most {MAX_CONTACTS} contacts"
+        );
         let n = self.n_unknowns();
         let at_rest = self.q[..n].iter().all(|x| *x == 0.0);
         self.iterations = 0;
@@ -85,233 +91,209 @@ impl ContactProblem {
     }
 }
 
-/// Lanes with their problems.
-struct Bench<T: Lane, const C: usize> {
-    pivoting: Pivoting<T, C>,
-    /// Which problem each lane has, and how many steps its attempt has taken.
-    problem: [usize; MAX_LANES],
-    steps: [usize; MAX_LANES],
-    /// Attempts of each lane that failed, and its steps in them.
-    failed: [usize; MAX_LANES],
-    before: [usize; MAX_LANES],
-}
-
-impl<T: Lane, const C: usize> Bench<T, C> {
-    #[inline(always)]
-    fn new(token: T::Token) -> Self {
-        Self {
-            pivoting: Pivoting::new(token),
-            problem: [0; MAX_LANES],
-            steps: [0; MAX_LANES],
-            failed: [0; MAX_LANES],
-            before: [0; MAX_LANES],
-        }
-    }
-
-    /// Gives a lane a problem. [`Pivoting::begin`] follows.
-    #[inline(always)]
-    fn load(&mut self, lane: usize, index: usize, problem: &ContactProblem) {
-        let n = problem.n_contacts;
-        let mut trace = 0.0;
-        let mut data = Magnitudes::default();
-        let own = &mut self.pivoting;
-        assert!(lane < T::LANES, "a lane");
-        for (b, (own, w)) in own
-            .W
-            .iter_mut()
-            .zip(&problem.W)
-            .take(block(C, 0))
-            .enumerate()
-        {
-            let is_used = b < block(n, 0);
-            for k in 0..9 {
-                own[k].set(lane, if is_used { w[k] } else { 0.0 });
-            }
-        }
-        for i in 0..C {
-            let is_used = i < n;
-            let w = &problem.W[block(i, i)];
-            let (normal, tangential) = if is_used {
-                (w[0], w[4] + w[8])
-            } else {
-                (1.0, 2.0)
-            };
-            let scales = ContactScales::new::<3>(normal, tangential);
-            let [rho_N, rho_T] = scales.modes;
-            let law = &mut own.laws[i];
-            law.mu.set(lane, if is_used { problem.mu[i] } else { 0.0 });
-            law.rho[0].set(lane, rho_N);
-            law.rho[1].set(lane, rho_T);
-            law.inverse[0].set(lane, 1.0 / rho_N);
-            law.inverse[1].set(lane, 1.0 / rho_T);
-            law.mass_squared.set(lane, scales.mass * scales.mass);
-            for k in 0..3 {
-                let at = 3 * i + k;
-                let (p, q) = if is_used {
-                    (problem.p[at], problem.q[at])
-                } else {
-                    (0.0, 0.0)
-                };
-                own.p[i][k].set(lane, p);
-                own.q[i][k].set(lane, q);
-            }
-            if is_used {
-                trace += normal + tangential;
-                data.add(&problem.q[3 * i..3 * i + 3], scales.mass);
-            }
-        }
-        let mean = trace / (3 * n) as f64;
-        let [speed, impulse] = data.inverses();
-        own.mean.set(lane, if mean > 0.0 { mean } else { 1.0 });
-        own.asked.set(lane, 0.0);
-        own.inverses[0].set(lane, speed * speed);
-        own.inverses[1].set(lane, impulse * impulse);
-        self.steps[lane] = 0;
-        self.failed[lane] = 0;
-        self.before[lane] = 0;
-        self.problem[lane] = index;
-    }
-
-    /// Lets a lane try its problem again from the start, with another `α`, if there is one left.
-    /// [`Pivoting::begin`] follows.
-    #[inline(always)]
-    fn retry(&mut self, lane: usize, problem: &ContactProblem) -> bool {
-        let Some(alpha) = FURTHER_ALPHAS.get(self.failed[lane]) else {
-            return false;
-        };
-        self.failed[lane] += 1;
-        self.before[lane] += self.steps[lane];
-        self.steps[lane] = 0;
-        let own = &mut self.pivoting;
-        own.asked.set(lane, *alpha);
-        for i in 0..problem.n_contacts {
-            for k in 0..3 {
-                own.p[i][k].set(lane, problem.p[3 * i + k]);
-            }
-        }
-        true
-    }
-
-    /// Writes a lane's answer to its problem, or that there is none.
-    #[inline(always)]
-    fn store(&self, lane: usize, problem: &mut ContactProblem, is_solved: bool) {
-        problem.iterations = self.before[lane] + self.steps[lane];
-        problem.is_solved = is_solved;
-        if !is_solved {
-            return;
-        }
-        let own = &self.pivoting;
-        let [relative, largest] = own.residual();
-        problem.residual = Residual {
-            relative: relative.get(lane).sqrt(),
-            velocity: largest.get(lane).sqrt(),
-        };
-        for i in 0..problem.n_contacts {
-            for k in 0..3 {
-                problem.p[3 * i + k] = own.p[i][k].get(lane);
-                problem.u[3 * i + k] = own.u[i][k].get(lane);
-            }
-        }
-    }
-
-    /// A step of the lanes of a mask. Returns the lanes that have taken all that they may.
-    #[inline(always)]
-    fn step(&mut self, active: T::Mask, tolerances: [T; 2], factors: &mut Factors<T, C>) -> u32 {
-        let own = &mut self.pivoting;
-        own.correct(active);
-        own.step(active, factors);
-        let nearly = active & own.is_near() & !own.is_solved(tolerances);
-        if nearly.any() {
-            own.refine(nearly, factors);
-        }
-        let mut late = 0;
-        for lane in 0..T::LANES {
-            self.steps[lane] += 1;
-            late |= u32::from(self.steps[lane] >= MAX_STEPS) << lane;
-        }
-        late
-    }
-}
-
-/// Index of the next problem of `least` to `C` contacts that is to be solved.
-#[inline(always)]
-fn next<const C: usize>(problems: &[ContactProblem], from: usize, least: usize) -> usize {
-    let mut at = from;
-    while at < problems.len() {
-        let problem = &problems[at];
-        if !problem.is_solved && (least..=C).contains(&problem.n_contacts) {
-            break;
-        }
-        at += 1;
-    }
-    at
-}
-
 /// Solves the problems of `least` to `C` contacts.
 #[inline(always)]
 fn solve_some<T: Lane, const C: usize>(
     token: T::Token,
     problems: &mut [ContactProblem],
-    options: &SolverOptions,
+    tolerances: [T; 2],
     least: usize,
 ) {
-    let zero = T::splat(token, 0.0);
-    let square = |x: f64| T::splat(token, x * x);
-    let tolerances = [
-        square(options.tolerance),
-        square(options.velocity_tolerance),
-    ];
-    let mut bench = Bench::<T, C>::new(token);
-    let mut factors: Factors<T, C> = [[[zero; 9]; C]; C];
-    let mut waiting = 0;
-    let mut active = 0;
-    let mut late = 0;
-    // Lanes without a problem.
-    let mut idle = (1_u32 << T::LANES) - 1;
-    // Lanes that try their problem again.
-    let mut again = 0;
-    loop {
-        let mut new = std::mem::take(&mut again);
-        while idle != 0 {
-            let lane = idle.trailing_zeros() as usize;
-            idle &= idle - 1;
-            waiting = next::<C>(problems, waiting, least);
-            if waiting < problems.len() {
-                bench.load(lane, waiting, &problems[waiting]);
-                waiting += 1;
-                new |= 1 << lane;
+    let mut line = List {
+        at: 0,
+        least,
+        most: C,
+    };
+    Bench::<T, C>::new(token).run(token, problems, tolerances, &mut line);
+}
+
+/// The problems of a list with `least` to `most` contacts that are to be solved.
+struct List {
+    at: usize,
+    least: usize,
+    most: usize,
+}
+
+impl Line for List {
+    #[inline(always)]
+    fn next(&mut self, problems: &[ContactProblem]) -> Option<usize> {
+        let rest = problems.get(self.at..)?;
+        let ahead = rest.iter().position(|problem| {
+            !problem.is_solved && (self.least..=self.most).contains(&problem.n_contacts)
+        })?;
+        let index = self.at + ahead;
+        self.at = index + 1;
+        Some(index)
+    }
+
+    #[inline(always)]
+    fn end(&mut self, _: usize) {}
+
+    #[inline(always)]
+    fn may_leave(&self, _: usize) -> bool {
+        false
+    }
+}
+
+/// Problems of several groups, which enter at any time. A group has as many places as a register
+/// has lanes: problem `k` is of group `k / T::LANES`.
+pub struct Queue<T: Lane> {
+    token: T::Token,
+    few: Box<Bench<T, FEW>>,
+    many: Box<Bench<T, MAX_CONTACTS>>,
+    /// Problems that wait for a lane, for each of the two.
+    waiting: [VecDeque<usize>; 2],
+    groups: Groups,
+}
+
+/// How far the groups are.
+#[derive(Debug, Default)]
+struct Groups {
+    n_lanes: usize,
+    /// Problems of each that have not ended.
+    left: Vec<usize>,
+    /// Those without any left, in the order in which they ended.
+    ready: VecDeque<usize>,
+}
+
+/// The waiting problems of a bench.
+struct Waiting<'a> {
+    problems: &'a mut VecDeque<usize>,
+    groups: &'a mut Groups,
+    /// Problems of the other bench.
+    n_others: usize,
+}
+
+impl Line for Waiting<'_> {
+    #[inline(always)]
+    fn next(&mut self, _: &[ContactProblem]) -> Option<usize> {
+        self.problems.pop_front()
+    }
+
+    #[inline(always)]
+    fn end(&mut self, index: usize) {
+        self.groups.end(index);
+    }
+
+    #[inline(always)]
+    fn may_leave(&self, n_active: usize) -> bool {
+        !self.groups.ready.is_empty() || self.n_others > n_active
+    }
+}
+
+impl Groups {
+    #[inline(always)]
+    fn end(&mut self, index: usize) {
+        let group = index / self.n_lanes;
+        self.left[group] -= 1;
+        if self.left[group] == 0 {
+            self.ready.push_back(group);
+        }
+    }
+}
+
+impl<T: Lane> Queue<T> {
+    /// Without problems.
+    #[must_use]
+    pub fn new(token: T::Token) -> Self {
+        Self {
+            token,
+            few: Box::new(Bench::new(token)),
+            many: Box::new(Bench::new(token)),
+            waiting: [VecDeque::new(), VecDeque::new()],
+            groups: Groups {
+                n_lanes: T::LANES,
+                ..Groups::default()
+            },
+        }
+    }
+
+    /// Makes room for `n` groups; all earlier ones must have been given back.
+    pub fn begin(&mut self, n: usize) {
+        debug_assert!(self.groups.left.iter().all(|left| *left == 0));
+        self.groups.left.clear();
+        self.groups.left.resize(n, 0);
+        self.groups.ready.clear();
+    }
+
+    /// Enters those problems of a group that `is_asked` names by their place in it. The answers are
+    /// as of [`solve_all`]; the others are left as they are.
+    ///
+    /// # Panics
+    /// If a problem has more contacts than fit, or there are more groups than [`Self::begin`] said.
+    pub fn enter(
+        &mut self,
+        group: usize,
+        problems: &mut [ContactProblem],
+        is_asked: impl Fn(usize) -> bool,
+    ) {
+        let first = group * T::LANES;
+        let own = &mut problems[first..][..T::LANES];
+        let mut left = 0;
+        for (place, problem) in own.iter_mut().enumerate().filter(|(k, _)| is_asked(*k)) {
+            problem.begin();
+            if !problem.is_solved {
+                let is_large = problem.n_contacts > FEW;
+                self.waiting[usize::from(is_large)].push_back(first + place);
+                left += 1;
             }
         }
-        active |= new;
-        late &= !new;
-        if active == 0 {
-            return;
+        self.groups.left[group] = left;
+        if left == 0 {
+            self.groups.ready.push_back(group);
         }
-        let own = &mut bench.pivoting;
-        if new != 0 {
-            own.begin(T::mask(token, new));
-        }
-        let solved = own.is_solved(tolerances);
-        let ends = (solved | own.lost | !own.sums.is_finite()).bits() | late;
-        let ended = active & ends;
-        if ended != 0 {
-            let solved = solved.bits();
-            let mut left = ended;
-            while left != 0 {
-                let lane = left.trailing_zeros() as usize;
-                left &= left - 1;
-                let problem = &mut problems[bench.problem[lane]];
-                let is_solved = solved >> lane & 1 == 1;
-                if !is_solved && bench.retry(lane, problem) {
-                    again |= 1 << lane;
-                } else {
-                    bench.store(lane, problem, is_solved);
-                }
+    }
+
+    /// Works until the problems of a group have all ended, at least, and returns such a group; None
+    /// if there are no problems. `problems`: those of all groups.
+    pub fn next_group(
+        &mut self,
+        problems: &mut [ContactProblem],
+        options: &SolverOptions,
+    ) -> Option<usize> {
+        let tolerances = squares::<T>(self.token, options);
+        loop {
+            let few = self.waiting[0].len() + self.few.n_active();
+            let many = self.waiting[1].len() + self.many.n_active();
+            let is_starved = few.max(many) < T::LANES;
+            if (is_starved || few + many == 0)
+                && let Some(group) = self.groups.ready.pop_front()
+            {
+                return Some(group);
             }
-            active &= !ended;
-            idle = ended & !again;
-            continue;
+            if few + many == 0 {
+                return None;
+            }
+            self.work(problems, tolerances, many > few, few.min(many));
         }
-        late = bench.step(T::mask(token, active), tolerances, &mut factors);
+    }
+
+    /// Lets one of the benches work; `n_others`: problems of the other one.
+    fn work(
+        &mut self,
+        problems: &mut [ContactProblem],
+        tolerances: [T; 2],
+        is_many: bool,
+        n_others: usize,
+    ) {
+        let (token, few, many) = (self.token, &mut *self.few, &mut *self.many);
+        let mut line = Waiting {
+            problems: &mut self.waiting[usize::from(is_many)],
+            groups: &mut self.groups,
+            n_others,
+        };
+        if is_many {
+            T::vectorize(
+                token,
+                #[inline(always)]
+                || many.run(token, problems, tolerances, &mut line),
+            );
+        } else {
+            T::vectorize(
+                token,
+                #[inline(always)]
+                || few.run(token, problems, tolerances, &mut line),
+            );
+        }
     }
 }

@@ -325,6 +325,12 @@ impl<T: Lane> Block<T> {
         self.reasons[lane]
     }
 
+    /// Whether a lane takes part in the present step.
+    #[must_use]
+    pub fn is_going(&self, lane: usize) -> bool {
+        self.going.get(lane)
+    }
+
     /// Report of a lane's last step.
     #[must_use]
     pub fn report(&self, lane: usize) -> &StepReport {

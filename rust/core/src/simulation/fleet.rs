@@ -1,9 +1,9 @@
 //! Rovers that one thread steps together, several to a register.
 //!
-//! Rovers of one machine with alike options fill the lanes of blocks ([`crate::lanes`]); in each
-//! step the contact problems of all blocks are solved together. A lane whose step is not ordinary
-//! is taken by the general step, alone, and comes back. Every rover moves as it would alone, to the
-//! last bit.
+//! Rovers of one machine with alike options fill the lanes of blocks ([`crate::lanes`]). The contact
+//! problems of all blocks wait in one queue; a block goes on to its next step as soon as its own
+//! are solved, whatever the others do. A lane whose step is not ordinary is taken by the general
+//! step, alone, and comes back. Every rover moves as it would alone, to the last bit.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::rover::RoverSimulation;
 use crate::integrator::{NoProbe, StepError, StepReport};
 use crate::lanes::machine::Machine;
 use crate::lanes::problem::ContactProblem;
-use crate::lanes::queue;
+use crate::lanes::queue::Queue;
 use crate::lanes::step::{Block, are_alike};
 use crate::scalar::{Instructions, Lane};
 
@@ -55,8 +55,8 @@ impl Fleet {
         Self { crew }
     }
 
-    /// Takes `n` steps with each rover, but stops after a whole one once `go_on`, asked after each
-    /// step, returns false. A failed step ends the call of its own rover only.
+    /// Takes `n` steps with each rover, but lets each stop after a whole one once `go_on`, asked
+    /// after each step of a block, returns false. A failed step ends the call of its own rover only.
     pub fn advance(&mut self, riders: &mut [Rider<'_>], n: usize, go_on: &mut dyn FnMut() -> bool) {
         match &mut self.crew {
             Crew::Singles => {
@@ -93,8 +93,20 @@ struct Lanes<T: Lane> {
     token: T::Token,
     machine: Option<Arc<Machine>>,
     blocks: Vec<Block<T>>,
+    /// How far each block is.
+    courses: Vec<Course>,
+    queue: Queue<T>,
     problems: Vec<ContactProblem>,
     seats: Vec<Option<Seat>>,
+}
+
+/// How far a block is in a call.
+#[derive(Clone, Copy, Debug)]
+struct Course {
+    /// Steps that it has not finished.
+    left: usize,
+    /// Whether its problems are those of the position projection.
+    projects: bool,
 }
 
 impl<T: Lane> Lanes<T> {
@@ -103,6 +115,8 @@ impl<T: Lane> Lanes<T> {
             token,
             machine: None,
             blocks: Vec::new(),
+            courses: Vec::new(),
+            queue: Queue::new(token),
             problems: Vec::new(),
             seats: Vec::new(),
         }
@@ -133,12 +147,7 @@ impl<T: Lane> Lanes<T> {
             }
             block.begin();
         }
-        for _ in 0..n {
-            self.step(n_blocks, riders);
-            if !go_on() {
-                break;
-            }
-        }
+        self.step(n_blocks, riders, n, go_on);
         for (b, block) in self.blocks[..n_blocks].iter_mut().enumerate() {
             for (lane, seat) in self.seats[b * T::LANES..][..T::LANES].iter().enumerate() {
                 if let Some(seat) = seat.filter(|seat| !seat.has_failed) {
@@ -206,59 +215,97 @@ impl<T: Lane> Lanes<T> {
         n_seats
     }
 
-    /// One step of every block.
-    fn step(&mut self, n_blocks: usize, riders: &mut [Rider<'_>]) {
-        let (blocks, probe) = (&mut self.blocks[..n_blocks], &mut NoProbe);
-        let problems = &mut self.problems[..n_blocks * T::LANES];
-        for (block, problems) in blocks.iter_mut().zip(problems.chunks_exact_mut(T::LANES)) {
-            block.prepare(problems, probe);
+    /// `n` steps of every block, or fewer once `go_on` returns false.
+    fn step(
+        &mut self,
+        n_blocks: usize,
+        riders: &mut [Rider<'_>],
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) {
+        let solver = self.blocks[0].options().solver;
+        self.queue.begin(n_blocks);
+        self.courses.clear();
+        let start = Course {
+            left: n,
+            projects: false,
+        };
+        self.courses.resize(n_blocks, start);
+        if n == 0 {
+            return;
         }
-        let solver = blocks[0].options().solver;
-        queue::solve_all::<T>(self.token, problems, &solver);
-        let mut is_deep = false;
-        for (block, problems) in blocks.iter_mut().zip(problems.chunks_exact(T::LANES)) {
-            is_deep |= block.conclude(problems, probe);
+        for b in 0..n_blocks {
+            self.prepare(b);
         }
-        if is_deep {
-            for (block, problems) in blocks.iter_mut().zip(problems.chunks_exact_mut(T::LANES)) {
-                block.set_gaps(problems);
+        let mut goes_on = true;
+        while let Some(b) = self.queue.next_group(&mut self.problems, &solver) {
+            if self.conclude(b) {
+                continue;
             }
-            queue::solve_all::<T>(self.token, problems, &solver);
+            self.part(b, riders);
+            goes_on = goes_on && go_on();
+            self.courses[b].left -= 1;
+            if goes_on && self.courses[b].left > 0 {
+                self.prepare(b);
+            }
         }
-        for (block, problems) in blocks.iter_mut().zip(problems.chunks_exact(T::LANES)) {
-            block.finish(is_deep.then_some(problems), probe);
+    }
+
+    /// First part of a block's step: its problems enter the queue.
+    fn prepare(&mut self, b: usize) {
+        let block = &mut self.blocks[b];
+        block.prepare(&mut self.problems[b * T::LANES..][..T::LANES], &mut NoProbe);
+        (self.queue).enter(b, &mut self.problems, |lane| block.is_going(lane));
+    }
+
+    /// The rest of a block's step, once its problems have ended. Returns whether those of the
+    /// position projection must be solved before.
+    fn conclude(&mut self, b: usize) -> bool {
+        let (block, course) = (&mut self.blocks[b], &mut self.courses[b]);
+        let problems = &mut self.problems[b * T::LANES..][..T::LANES];
+        let projects = std::mem::take(&mut course.projects);
+        if !projects && block.conclude(problems, &mut NoProbe) {
+            block.set_gaps(problems);
+            course.projects = true;
+            self.queue.enter(b, &mut self.problems, |_| true);
+            return true;
         }
-        for (b, block) in blocks.iter_mut().enumerate() {
-            let seats = &mut self.seats[b * T::LANES..][..T::LANES];
-            let mut is_changed = false;
-            for (lane, seat) in seats.iter_mut().enumerate() {
-                let Some(seat) = seat.as_mut().filter(|seat| !seat.has_failed) else {
-                    continue;
-                };
-                if block.declined(lane).is_none() {
-                    seat.report.merge(block.report(lane));
-                    seat.is_general = false;
-                    continue;
+        block.finish(projects.then_some(problems), &mut NoProbe);
+        false
+    }
+
+    /// Notes the reports of a block's step; rovers whose step was not ordinary take it alone.
+    fn part(&mut self, b: usize, riders: &mut [Rider<'_>]) {
+        let block = &mut self.blocks[b];
+        let seats = &mut self.seats[b * T::LANES..][..T::LANES];
+        let mut is_changed = false;
+        for (lane, seat) in seats.iter_mut().enumerate() {
+            let Some(seat) = seat.as_mut().filter(|seat| !seat.has_failed) else {
+                continue;
+            };
+            if block.declined(lane).is_none() {
+                seat.report.merge(block.report(lane));
+                seat.is_general = false;
+                continue;
+            }
+            let Rider { rover, error } = &mut riders[seat.rider];
+            rover.alight(block, lane);
+            match rover.step_generally() {
+                Ok(report) => {
+                    seat.report.merge(&report);
+                    seat.is_general = true;
+                    rover.board(block, lane);
                 }
-                let Rider { rover, error } = &mut riders[seat.rider];
-                rover.alight(block, lane);
-                match rover.step_generally() {
-                    Ok(report) => {
-                        seat.report.merge(&report);
-                        seat.is_general = true;
-                        rover.board(block, lane);
-                    }
-                    Err(why) => {
-                        **error = Some(why);
-                        seat.has_failed = true;
-                        block.clear(lane);
-                    }
+                Err(why) => {
+                    **error = Some(why);
+                    seat.has_failed = true;
+                    block.clear(lane);
                 }
-                is_changed = true;
             }
-            if is_changed {
-                block.begin();
-            }
+            is_changed = true;
+        }
+        if is_changed {
+            block.begin();
         }
     }
 }

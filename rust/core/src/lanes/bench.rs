@@ -1,0 +1,253 @@
+//! Lanes that solve contact problems, each its own.
+//!
+//! A lane takes the next problem when its own is done, so that the cost follows the mean of the
+//! steps and not the largest. No lane's bits depend on its neighbours.
+
+use super::equations::Factors;
+use super::pivoting::Pivoting;
+use super::problem::{ContactProblem, block};
+use crate::problem::{ContactScales, Magnitudes, Residual};
+use crate::scalar::{Lane, LaneMask, MAX_LANES};
+use crate::solver::FURTHER_ALPHAS;
+
+/// Most steps of an attempt. What is unsolved then goes in circles, mostly.
+const MAX_STEPS: usize = 80;
+
+/// Most steps of a solve: those of the first attempt and of all further ones.
+pub const MAX_ITERATIONS: usize = MAX_STEPS * (1 + FURTHER_ALPHAS.len());
+
+/// Where a bench gets its problems and leaves their answers.
+pub(super) trait Line {
+    /// Index of the next problem.
+    fn next(&mut self, problems: &[ContactProblem]) -> Option<usize>;
+
+    /// A problem has ended.
+    fn end(&mut self, index: usize);
+
+    /// Whether to stop although lanes still work; asked when there is no problem for a lane.
+    fn may_leave(&self, n_active: usize) -> bool;
+}
+
+/// Lanes with their problems of at most `C` contacts.
+pub(super) struct Bench<T: Lane, const C: usize> {
+    pivoting: Pivoting<T, C>,
+    factors: Factors<T, C>,
+    /// Lanes with a problem, those that have taken all steps of an attempt, and those that begin
+    /// another one.
+    active: u32,
+    late: u32,
+    again: u32,
+    /// Which problem each lane has, and how many steps its attempt has taken.
+    problem: [usize; MAX_LANES],
+    steps: [usize; MAX_LANES],
+    /// Attempts of each lane that failed, and its steps in them.
+    failed: [usize; MAX_LANES],
+    before: [usize; MAX_LANES],
+}
+
+impl<T: Lane, const C: usize> Bench<T, C> {
+    #[inline(always)]
+    pub(super) fn new(token: T::Token) -> Self {
+        let zero = T::splat(token, 0.0);
+        Self {
+            pivoting: Pivoting::new(token),
+            factors: [[[zero; 9]; C]; C],
+            active: 0,
+            late: 0,
+            again: 0,
+            problem: [0; MAX_LANES],
+            steps: [0; MAX_LANES],
+            failed: [0; MAX_LANES],
+            before: [0; MAX_LANES],
+        }
+    }
+
+    /// Gives a lane a problem. [`Pivoting::begin`] follows.
+    #[inline(always)]
+    fn load(&mut self, lane: usize, index: usize, problem: &ContactProblem) {
+        let n = problem.n_contacts;
+        let mut trace = 0.0;
+        let mut data = Magnitudes::default();
+        let own = &mut self.pivoting;
+        assert!(lane < T::LANES, "a lane");
+        for (b, (own, w)) in own
+            .W
+            .iter_mut()
+            .zip(&problem.W)
+            .take(block(C, 0))
+            .enumerate()
+        {
+            let is_used = b < block(n, 0);
+            for k in 0..9 {
+                own[k].set(lane, if is_used { w[k] } else { 0.0 });
+            }
+        }
+        for i in 0..C {
+            let is_used = i < n;
+            let w = &problem.W[block(i, i)];
+            let (normal, tangential) = if is_used {
+                (w[0], w[4] + w[8])
+            } else {
+                (1.0, 2.0)
+            };
+            let scales = ContactScales::new::<3>(normal, tangential);
+            let [rho_N, rho_T] = scales.modes;
+            let law = &mut own.laws[i];
+            law.mu.set(lane, if is_used { problem.mu[i] } else { 0.0 });
+            law.rho[0].set(lane, rho_N);
+            law.rho[1].set(lane, rho_T);
+            law.inverse[0].set(lane, 1.0 / rho_N);
+            law.inverse[1].set(lane, 1.0 / rho_T);
+            law.mass_squared.set(lane, scales.mass * scales.mass);
+            for k in 0..3 {
+                let at = 3 * i + k;
+                let (p, q) = if is_used {
+                    (problem.p[at], problem.q[at])
+                } else {
+                    (0.0, 0.0)
+                };
+                own.p[i][k].set(lane, p);
+                own.q[i][k].set(lane, q);
+            }
+            if is_used {
+                trace += normal + tangential;
+                data.add(&problem.q[3 * i..3 * i + 3], scales.mass);
+            }
+        }
+        let mean = trace / (3 * n) as f64;
+        let [speed, impulse] = data.inverses();
+        own.mean.set(lane, if mean > 0.0 { mean } else { 1.0 });
+        own.asked.set(lane, 0.0);
+        own.inverses[0].set(lane, speed * speed);
+        own.inverses[1].set(lane, impulse * impulse);
+        self.steps[lane] = 0;
+        self.failed[lane] = 0;
+        self.before[lane] = 0;
+        self.problem[lane] = index;
+    }
+
+    /// Lets a lane try its problem again from the start, with another `α`, if there is one left.
+    /// [`Pivoting::begin`] follows.
+    #[inline(always)]
+    fn retry(&mut self, lane: usize, problem: &ContactProblem) -> bool {
+        let Some(alpha) = FURTHER_ALPHAS.get(self.failed[lane]) else {
+            return false;
+        };
+        self.failed[lane] += 1;
+        self.before[lane] += self.steps[lane];
+        self.steps[lane] = 0;
+        let own = &mut self.pivoting;
+        own.asked.set(lane, *alpha);
+        for i in 0..problem.n_contacts {
+            for k in 0..3 {
+                own.p[i][k].set(lane, problem.p[3 * i + k]);
+            }
+        }
+        true
+    }
+
+    /// Writes a lane's answer to its problem, or that there is none.
+    #[inline(always)]
+    fn store(&self, lane: usize, problem: &mut ContactProblem, is_solved: bool) {
+        problem.iterations = self.before[lane] + self.steps[lane];
+        problem.is_solved = is_solved;
+        if !is_solved {
+            return;
+        }
+        let own = &self.pivoting;
+        let [relative, largest] = own.residual();
+        problem.residual = Residual {
+            relative: relative.get(lane).sqrt(),
+            velocity: largest.get(lane).sqrt(),
+        };
+        for i in 0..problem.n_contacts {
+            for k in 0..3 {
+                problem.p[3 * i + k] = own.p[i][k].get(lane);
+                problem.u[3 * i + k] = own.u[i][k].get(lane);
+            }
+        }
+    }
+
+    /// A step of all lanes that have a problem.
+    #[inline(always)]
+    fn step(&mut self, token: T::Token, tolerances: [T; 2]) {
+        let own = &mut self.pivoting;
+        let active = T::mask(token, self.active);
+        own.correct(active);
+        own.step(active, &mut self.factors);
+        let nearly = active & own.is_near() & !own.is_solved(tolerances);
+        if nearly.any() {
+            own.refine(nearly, &self.factors);
+        }
+        self.late = 0;
+        for lane in 0..T::LANES {
+            self.steps[lane] += 1;
+            self.late |= u32::from(self.steps[lane] >= MAX_STEPS) << lane;
+        }
+    }
+
+    /// Lanes with a problem.
+    pub(super) fn n_active(&self) -> usize {
+        (self.active | self.again).count_ones() as usize
+    }
+
+    /// Solves the problems of a line, until it has no more or lets the bench leave. Problems that
+    /// are not solved then stay with their lanes. `tolerances`: squares.
+    #[inline(always)]
+    pub(super) fn run(
+        &mut self,
+        token: T::Token,
+        problems: &mut [ContactProblem],
+        tolerances: [T; 2],
+        line: &mut impl Line,
+    ) {
+        let mut has_gone_on = false;
+        loop {
+            let mut new = std::mem::take(&mut self.again);
+            let mut idle = ((1_u32 << T::LANES) - 1) & !self.active & !new;
+            while idle != 0 {
+                let Some(index) = line.next(problems) else {
+                    break;
+                };
+                let lane = idle.trailing_zeros();
+                idle &= idle - 1;
+                self.load(lane as usize, index, &problems[index]);
+                new |= 1 << lane;
+            }
+            self.active |= new;
+            self.late &= !new;
+            if new != 0 {
+                self.pivoting.begin(T::mask(token, new));
+            }
+            let n_active = self.n_active();
+            if n_active == 0 || (has_gone_on && n_active < T::LANES && line.may_leave(n_active)) {
+                return;
+            }
+            has_gone_on = true;
+            let own = &mut self.pivoting;
+            let solved = own.is_solved(tolerances);
+            let ends = (solved | own.lost | !own.sums.is_finite()).bits() | self.late;
+            let ended = self.active & ends;
+            if ended == 0 {
+                self.step(token, tolerances);
+                continue;
+            }
+            self.active &= !ended;
+            let solved = solved.bits();
+            let mut left = ended;
+            while left != 0 {
+                let lane = left.trailing_zeros() as usize;
+                left &= left - 1;
+                let index = self.problem[lane];
+                let problem = &mut problems[index];
+                let is_solved = solved >> lane & 1 == 1;
+                if !is_solved && self.retry(lane, problem) {
+                    self.again |= 1 << lane;
+                } else {
+                    self.store(lane, problem, is_solved);
+                    line.end(index);
+                }
+            }
+        }
+    }
+}
