@@ -5,6 +5,7 @@
 //! ([`crate::scalar`]) that is one rover or four or eight. A step that is not ordinary is declined,
 //! rover by rover, before anything has changed; [`crate::integrator`] then takes it.
 //!
+//! - [`admission`]: which rovers have ordinary steps;
 //! - [`machine`]: what the rovers share; [`inertias`]: what they need not; [`place`]:
 //!   configurations;
 //! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
@@ -15,6 +16,7 @@
 //! - [`step`]: the step.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 
+pub mod admission;
 mod bench;
 pub mod bias;
 pub mod contacts;

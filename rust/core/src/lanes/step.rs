@@ -32,11 +32,10 @@ use super::rows::{Answer, Rows, Triple};
 use crate::contact::Contact;
 use crate::integrator::energy_audit::{COARSE, GAIN, RAISE, ROUNDINGS};
 use crate::integrator::position_projection::FARTHEST;
-use crate::integrator::{Phase, Probe, Stabilisation, StepOptions, StepReport, Variant, WarmStart};
+use crate::integrator::{Phase, Probe, Stabilisation, StepOptions, StepReport, WarmStart};
 use crate::multibody::Model;
 use crate::multibody::model::BASE;
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Vec3};
-use crate::solver::Method;
 use crate::system::tree::{JOINT_ARM, MOST_JOINT_TURN, MOST_SPIN, MOST_TURN};
 
 /// Why a lane was declined in its last step.
@@ -59,15 +58,6 @@ pub enum Decline {
     Projection,
     /// Something is not finite.
     NotFinite,
-}
-
-/// Whether steps with these options can be ordinary.
-#[must_use]
-pub fn admits(options: &StepOptions) -> bool {
-    options.variant == Variant::Linearised
-        && options.restitution == 0.0
-        && options.warm_start
-        && options.solver.method == Method::Auto
 }
 
 /// Whether two rovers may share a block: gravity and friction may differ.

@@ -35,7 +35,6 @@ pub use error::{BatchError, CommandError, SnapshotError};
 pub use grains::{
     BedCommand, BedMemory, GrainBed, GrainSimulation, SoilSetupError, SoilSimulation, soil_options,
 };
-pub use ordinary::NeverOrdinary;
 pub use planar::{
     BallSimulation, MirroredRoverSimulation, PlanarScene, PlanarSimulation, TwoWheelRoverSimulation,
 };

@@ -15,7 +15,7 @@ use super::stepping::Simulation;
 use crate::contact::{Contact, Opposite, Part};
 use crate::geometry::Terrain;
 use crate::integrator::{OptionsError, Probe, StepOptions, StepReport};
-use crate::lanes::machine::Machine;
+use crate::lanes::machine::{Machine, NotOrdinary};
 use crate::multibody::{Configuration, Energy, Kinematics, Model, Momentum, momentum};
 use crate::system::{TreeScratch, TreeSystem};
 
@@ -26,15 +26,15 @@ pub struct RoverScene {
     pub model: Arc<Model>,
     /// The ground.
     pub terrain: Arc<dyn Terrain>,
-    /// The machine of its ordinary steps, if it has any.
-    pub(super) machine: Option<Arc<Machine>>,
+    /// The machine of its ordinary steps, or why it has none.
+    pub(super) machine: Result<Arc<Machine>, NotOrdinary>,
 }
 
 impl RoverScene {
     /// A machine on a terrain.
     #[must_use]
     pub fn new(model: Arc<Model>, terrain: Arc<dyn Terrain>) -> Self {
-        let machine = Machine::of(&model).ok().map(Machine::shared);
+        let machine = Machine::of(&model).map(Machine::shared);
         Self {
             model,
             terrain,

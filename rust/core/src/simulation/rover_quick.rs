@@ -5,12 +5,13 @@ use std::sync::Arc;
 use super::active_contact::ActiveContact;
 use super::rover::{RoverScene, RoverSimulation};
 use super::scene::QuickStep;
-use crate::integrator::{NoProbe, Phase, Probe, StepError, StepReport};
+use crate::integrator::{NoProbe, Phase, Probe, StepError, StepOptions, StepReport};
+use crate::lanes::admission::admit;
 use crate::lanes::machine::Machine;
 use crate::lanes::passenger::Passenger;
 use crate::lanes::problem::ContactProblem;
 use crate::lanes::queue;
-use crate::lanes::step::{Block, admits};
+use crate::lanes::step::Block;
 use crate::scalar::{Lane, Single};
 
 /// A block of one lane, made when first needed. It holds no state: a copy has none.
@@ -36,6 +37,12 @@ impl std::fmt::Debug for Quick {
 }
 
 impl RoverScene {
+    /// The machine of its ordinary steps; none if with these options no step is ordinary.
+    fn ordinary_machine(&self, options: &StepOptions) -> Option<&Arc<Machine>> {
+        admit(options).ok()?;
+        self.machine.as_ref().ok()
+    }
+
     /// Takes an ordinary step; None if it is not ordinary, and nothing has changed.
     pub(super) fn take_ordinary_step(
         &self,
@@ -44,7 +51,7 @@ impl RoverScene {
     ) -> Option<StepReport> {
         let quick = &mut step.parts.quick;
         quick.is_last = false;
-        let machine = self.machine.as_ref().filter(|_| admits(step.options))?;
+        let machine = self.ordinary_machine(step.options)?;
         let token = Single::best();
         let block = quick
             .block
@@ -96,10 +103,7 @@ impl Quick {
 impl RoverSimulation {
     /// The machine of its ordinary steps; none if its steps are never ordinary.
     pub(super) fn machine(&self) -> Option<&Arc<Machine>> {
-        self.scene
-            .machine
-            .as_ref()
-            .filter(|_| admits(&self.options))
+        self.scene.ordinary_machine(&self.options)
     }
 
     /// Takes a lane of a block. [`Block::begin`] follows.

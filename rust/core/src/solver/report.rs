@@ -137,7 +137,7 @@ pub struct Rungs {
 
 impl Rungs {
     /// Most stages of one solve; later ones would not be listed.
-    const MOST: usize = 9;
+    const MOST: usize = 7;
 
     /// Adds a stage.
     #[inline]

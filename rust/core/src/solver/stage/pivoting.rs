@@ -321,3 +321,31 @@ pub(in crate::solver) fn pivots<const D: usize>(
     }
     (SolveStatus::Stalled, residual)
 }
+
+/// Pivots from the start that the scratch keeps, with one of [`FURTHER_ALPHAS`] after the other,
+/// and gives the nearest answer. `u` is `W p + q` on return; `iterations` is advanced by the linear
+/// solves.
+pub(in crate::solver) fn further_pivots<const D: usize>(
+    data: &Prepared<'_>,
+    options: &SolverOptions,
+    p: &mut [f64],
+    u: &mut [f64],
+    scratch: &mut Scratch,
+    iterations: &mut usize,
+) -> (SolveStatus, Residual) {
+    let mut best: Option<(SolveStatus, Residual)> = None;
+    for alpha in FURTHER_ALPHAS {
+        p.copy_from_slice(&scratch.start);
+        let found = pivots::<D>(data, options, Some(alpha), p, u, scratch, iterations);
+        if found.0 == SolveStatus::Converged {
+            return found;
+        }
+        if best.is_none_or(|(_, best)| found.1.relative < best.relative) {
+            best = Some(found);
+            scratch.best.copy_from_slice(p);
+        }
+    }
+    p.copy_from_slice(&scratch.best);
+    data.W.multiply_add(p, data.q, u);
+    best.unwrap_or((SolveStatus::Stalled, Residual::UNSOLVED))
+}

@@ -164,13 +164,9 @@ pub(in crate::solver) fn escalate<const D: usize>(
         if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
             return outcome;
         }
-        for alpha in pivoting::FURTHER_ALPHAS {
-            p.copy_from_slice(&scratch.start);
-            let found =
-                pivoting::pivots::<D>(data, options, Some(alpha), p, u, scratch, iterations);
-            if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
-                return outcome;
-            }
+        let found = pivoting::further_pivots::<D>(data, options, p, u, scratch, iterations);
+        if let Some(outcome) = ladder.enter(Stage::Pivoting, found, p, scratch, *iterations) {
+            return outcome;
         }
         // Friction may point to modes that lead nowhere: the next path starts from the loads alone.
         for (p, start) in p.chunks_exact_mut(D).zip(scratch.start.chunks_exact(D)) {
