@@ -526,6 +526,40 @@ fn every_lane_has_the_bits_of_a_rover_alone() {
     }
 }
 
+/// The trunk moves by four times its distance from the rock in half a step, along it.
+#[test]
+fn a_trunk_close_over_a_rock_that_it_does_not_touch_is_ordinary() {
+    let model = Model::rover();
+    let mut random = Random(5);
+    let plane: Arc<dyn Terrain> = Arc::new(Plane::ground());
+    let mut rover = rover(&model, &plane, &mut random, 1e-4, 0.0);
+    rover.v.fill(0.0);
+    let step = STEPS[2];
+    let put = |rover: &mut Rover, y: f64| {
+        let centre = [rover.q.position.x, y, rover.q.position.z];
+        let rock = SphereField::new(&[centre], &[0.1], Some(Plane::ground())).unwrap();
+        rover.terrain = Arc::new(rock);
+        expected(&model, rover, step).1
+    };
+    let (mut below, mut above) = (-0.1, rover.q.position.y);
+    assert!(!put(&mut rover, below) && put(&mut rover, above));
+    while above - below > 1e-6 {
+        let y = 0.5 * (below + above);
+        *(if put(&mut rover, y) {
+            &mut above
+        } else {
+            &mut below
+        }) = y;
+    }
+    rover.v[0] = 1.0;
+    for (distance, is_ordinary) in [(-1e-3, false), (2.5e-3, true), (5e-3, true)] {
+        put(&mut rover, below - distance);
+        let mut block = Block::<f64>::new(Single::best(), &model, std::slice::from_ref(&rover));
+        let found = &block.step(std::slice::from_ref(&rover), step)[0];
+        assert_eq!(check(&model, &rover, step, found), is_ordinary);
+    }
+}
+
 /// Spheres are kept from step to step. A rover that comes from elsewhere finds what one finds that
 /// has just been put there.
 #[test]

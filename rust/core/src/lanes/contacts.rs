@@ -309,7 +309,7 @@ impl<T: Lane> Contacts<T> {
         declined | self.list_contacts()
     }
 
-    /// Whether a box is near the ground.
+    /// Whether a box may touch the ground.
     #[inline(always)]
     fn look_at_box(
         &mut self,
@@ -337,7 +337,7 @@ impl<T: Lane> Contacts<T> {
         let bound = T::splat(self.token, solid.bound);
         let motion = shift.norm() + turning(&at_end.R, &pose.R) * bound;
         let world = sight.middle.origin + centre;
-        near_plane | ground.is_near_box(number, world, &R, solid.half_size, reach + motion)
+        near_plane | ground.is_near_box(number, world, &R, solid.half_size, (reach, motion))
     }
 
     /// Fills the slots of a wheel with its contacts at the midpoint.

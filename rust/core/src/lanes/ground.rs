@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::geometry::query::sweep::DEEP;
 use crate::geometry::{OrientedBox, Primitive, Sphere, Terrain};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Mat3, Vec3};
 
@@ -227,8 +228,9 @@ impl<T: Lane> Ground<T> {
         T::mask(need.token(), too_many)
     }
 
-    /// Whether a sphere comes as near as `need` (m) to a box with its centre at `centre` (world, m)
-    /// and the axes `R`.
+    /// Whether a sphere comes as near as `reach` (m) to a box with its centre at `centre` (world, m)
+    /// and the axes `R`, or so near that the box, which moves by up to `motion` (m) in half a step,
+    /// may pass it.
     #[inline(always)]
     pub(super) fn is_near_box(
         &mut self,
@@ -236,8 +238,9 @@ impl<T: Lane> Ground<T> {
         centre: Vec3<T>,
         R: &Mat3<T>,
         half_size: [f64; 3],
-        need: T,
+        (reach, motion): (T, T),
     ) -> T::Mask {
+        let need = reach + motion;
         let around = &mut self.boxes[number];
         let bound = Vector3::from(half_size).norm();
         let moved = (centre - around.from).norm() + turning(R, &around.R) * need.like(bound);
@@ -254,7 +257,11 @@ impl<T: Lane> Ground<T> {
                     R: Matrix3::from_columns(&columns),
                     half_size: Vector3::from(half_size),
                 };
-                if around.search(lane, &**field, &solid, bound, need.get(lane)) {
+                let near = Nearness {
+                    reach: reach.get(lane),
+                    motion: motion.get(lane),
+                };
+                if around.search(lane, &**field, &solid, bound, near) {
                     is_near |= 1 << lane;
                 }
             }
@@ -313,44 +320,71 @@ impl<T: Lane> Near<T> {
 }
 
 impl<T: Lane> Around<T> {
-    /// Measures the clearance of one rover's box. True if it is at most `need`, m.
+    /// Measures the clearance of one rover's box. True if a sphere is near.
     fn search(
         &mut self,
         lane: usize,
         field: &dyn Terrain,
         solid: &OrientedBox,
         bound: f64,
-        need: f64,
+        near: Nearness,
     ) -> bool {
         let kept = &mut self.kept[lane];
         let moved = (solid.centre - kept.from).norm() + (solid.R - kept.R).norm() * bound;
-        let clearance = if moved + need + ROUNDING <= kept.within {
-            let nearest = |least: f64, sphere| least.min(clearance_of(solid, sphere));
-            kept.spheres[..kept.n]
-                .iter()
-                .fold(kept.within - moved, nearest)
+        let need = near.reach + near.motion;
+        let (mut clearance, mut is_near) = (kept.within - moved, false);
+        if moved + need + ROUNDING <= kept.within {
+            for sphere in &kept.spheres[..kept.n] {
+                let own = clearance_of(solid, sphere);
+                clearance = clearance.min(own);
+                is_near |= near.includes(own, sphere.radius);
+            }
         } else {
-            kept.search(field, solid, bound, need)
-        };
+            (clearance, is_near) = kept.search(field, solid, bound, near);
+        }
         self.from.set(lane, solid.centre.into());
         self.R.x.set(lane, solid.axis(0).into());
         self.R.y.set(lane, solid.axis(1).into());
         self.R.z.set(lane, solid.axis(2).into());
         self.clearance.set(lane, clearance);
-        clearance <= need
+        is_near
+    }
+}
+
+/// Which spheres are near a box, by the rules of [`crate::contact::detection`].
+#[derive(Clone, Copy, Debug)]
+struct Nearness {
+    /// Distance up to which a sphere may be a contact, m.
+    reach: f64,
+    /// Upper bound on the motion of the box in half a step, m.
+    motion: f64,
+}
+
+impl Nearness {
+    /// Whether a sphere at a distance (m) from the box is.
+    fn includes(&self, distance: f64, radius: f64) -> bool {
+        distance <= self.reach + ROUNDING || distance - self.motion <= ROUNDING - DEEP * radius
     }
 }
 
 impl Kept {
-    /// Searches the spheres around the box anew and returns its clearance, m.
+    /// Searches the spheres around the box anew. Returns its clearance, m, and whether one is near.
     #[cold]
-    fn search(&mut self, field: &dyn Terrain, solid: &OrientedBox, bound: f64, need: f64) -> f64 {
-        let mut clearance = need + AHEAD_OF_BOX;
+    fn search(
+        &mut self,
+        field: &dyn Terrain,
+        solid: &OrientedBox,
+        bound: f64,
+        near: Nearness,
+    ) -> (f64, bool) {
+        let need = near.reach + near.motion;
+        let (mut clearance, mut is_near) = (need + AHEAD_OF_BOX, false);
         self.within = need + KEPT_BY_BOX;
         self.n = 0;
         visit_spheres(field, &solid.centre, bound + clearance, |_, sphere| {
             let own = clearance_of(solid, sphere);
             clearance = clearance.min(own);
+            is_near |= near.includes(own, sphere.radius);
             if own <= self.within {
                 match self.spheres.get_mut(self.n) {
                     Some(place) => {
@@ -363,11 +397,11 @@ impl Kept {
         });
         self.from = solid.centre;
         self.R = solid.R;
-        clearance
+        (clearance, is_near)
     }
 }
 
-/// Distance of a sphere from a box, negative where they overlap, m.
+/// Distance of a sphere from a box, m; at least minus the radius.
 fn clearance_of(solid: &OrientedBox, sphere: &Sphere) -> f64 {
     let local = solid.R.tr_mul(&(sphere.centre - solid.centre));
     let outside = (local.abs() - solid.half_size).map(|x| x.max(0.0));

@@ -5,14 +5,13 @@
 //! ([`crate::scalar`]) that is one rover or four or eight. A step that is not ordinary is declined,
 //! rover by rover, before anything has changed; [`crate::integrator`] then takes it.
 //!
-//! - [`admission`]: which rovers have ordinary steps;
-//! - [`machine`]: what the rovers share; [`inertias`]: what they need not; [`place`]:
-//!   configurations;
+//! - [`admission`]: which rovers have ordinary steps; [`machine`]: what the rovers share;
+//!   [`inertias`]: what they need not; [`place`]: configurations;
 //! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
 //! - `parts`, [`ground`], [`forecast`], [`contacts`]: what touches what; [`rows`]: Jacobian and
 //!   Delassus operator;
-//! - [`problem`], [`modes`], [`equations`], `pivoting`, `visits`, `bench`, [`queue`]: the friction-contact
-//!   problems;
+//! - [`problem`], [`modes`], [`equations`], `pivoting`, `visits`, `bench`, [`queue`]: the
+//!   friction-contact problems;
 //! - [`step`]: the step.
 #![allow(clippy::inline_always)] // a call leaves the instructions that its caller is compiled for
 

@@ -1,8 +1,8 @@
 //! The ordinary step of a block of rovers.
 //!
 //! The formulas are those of [`crate::integrator::moreau_jean`] with explicit gyroscopic terms and
-//! inelastic contact. A step has three parts, between which the contact problems of all blocks are
-//! solved together ([`super::queue`]):
+//! inelastic contact. A step has three parts, between which its contact problems are solved with
+//! those of other blocks ([`super::queue`]):
 //!
 //! 1. [`Block::prepare`] — poses, contacts, forces, the friction-contact problem;
 //! 2. [`Block::conclude`] — the new velocity and configuration, energy audit, and where contacts

@@ -1,9 +1,9 @@
 //! Rovers that one thread steps together, several to a register.
 //!
-//! Rovers of one machine with alike options fill the lanes of blocks ([`crate::lanes`]). The contact
-//! problems of all blocks wait in one queue; a block goes on to its next step as soon as its own
-//! are solved, whatever the others do. A lane whose step is not ordinary is taken by the general
-//! step, alone, and comes back. Every rover moves as it would alone, to the last bit.
+//! Rovers of one machine with alike options fill the lanes of blocks ([`crate::lanes`]). The
+//! contact problems of all blocks wait in one queue; a block goes on to its next step as soon as
+//! its own are solved, whatever the others do. A lane whose step is not ordinary is taken by the
+//! general step, alone, and comes back. Every rover moves as it would alone, to the last bit.
 
 use std::sync::Arc;
 
@@ -56,7 +56,8 @@ impl Fleet {
     }
 
     /// Takes `n` steps with each rover, but lets each stop after a whole one once `go_on`, asked
-    /// after each step of a block, returns false. A failed step ends the call of its own rover only.
+    /// after each step of a block, returns false. A failed step ends the call of its own rover
+    /// only.
     pub fn advance(&mut self, riders: &mut [Rider<'_>], n: usize, go_on: &mut dyn FnMut() -> bool) {
         match &mut self.crew {
             Crew::Singles => {
