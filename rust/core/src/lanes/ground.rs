@@ -228,9 +228,9 @@ impl<T: Lane> Ground<T> {
         T::mask(need.token(), too_many)
     }
 
-    /// Whether a sphere comes as near as `reach` (m) to a box with its centre at `centre` (world, m)
-    /// and the axes `R`, or so near that the box, which moves by up to `motion` (m) in half a step,
-    /// may pass it.
+    /// Whether a sphere comes as near as `reach` (m) to a box with its centre at `centre` (world,
+    /// m) and the axes `R`, or so near that the box, which moves by up to `motion` (m) in half a
+    /// step, may pass it.
     #[inline(always)]
     pub(super) fn is_near_box(
         &mut self,
