@@ -8,10 +8,10 @@ use proptest::prelude::*;
 use rover_core::geometry::Plane;
 use rover_core::integrator::{StepOptions, UnilateralContact};
 use rover_core::lanes::problem::{ContactProblem, MAX_CONTACTS, block};
-use rover_core::lanes::queue::{MAX_ITERATIONS, solve_all};
+use rover_core::lanes::queue::{MAX_ITERATIONS, Queue, solve_all};
 use rover_core::multibody::{Configuration, Model};
 use rover_core::problem::{Dimension, FrictionContactProblem, evaluate};
-use rover_core::scalar::Single;
+use rover_core::scalar::{Lane, Single};
 use rover_core::simulation::RoverSimulation;
 use rover_core::solver::SolverOptions;
 
@@ -291,6 +291,56 @@ fn without_free_velocity_or_contacts_the_answer_is_zero() {
                 .all(|x| *x == 0.0)
         );
     }
+}
+
+/// Lets each group of problems through a queue as often as there are `rounds`; a group goes on with
+/// its next problems while others are still at work.
+fn assert_queue_gives_the_same<T: Lane>(token: T::Token, rounds: &[Vec<ContactProblem>]) {
+    let options = SolverOptions::default();
+    let n_groups = rounds[0].len() / T::LANES;
+    let mut problems = rounds[0].clone();
+    let mut queue = Queue::<T>::new(token);
+    queue.begin(n_groups);
+    for group in 0..n_groups {
+        queue.enter(group, &mut problems, |_| true);
+    }
+    let mut done = vec![0; n_groups];
+    while let Some(group) = queue.next_group(&mut problems, &options) {
+        let own = group * T::LANES..(group + 1) * T::LANES;
+        let alone = solve_alone(&rounds[done[group]][own.clone()]);
+        for (found, alone) in problems[own.clone()].iter().zip(&alone) {
+            assert_same(found, alone);
+        }
+        done[group] += 1;
+        if let Some(next) = rounds.get(done[group]) {
+            problems[own.clone()].clone_from_slice(&next[own]);
+            queue.enter(group, &mut problems, |_| true);
+        }
+    }
+    assert!(done.iter().all(|done| *done == rounds.len()));
+}
+
+#[test]
+fn groups_that_never_wait_for_each_other_get_the_same_answers() {
+    let mut draw = Draw(7);
+    let rounds: Vec<Vec<ContactProblem>> = (0..6)
+        .map(|round| {
+            let mut problems = drive(150.0, 32 * (round + 1)).split_off(32 * round);
+            problems.truncate(24);
+            // Some have more contacts than the smaller system takes, or none, or resist.
+            for k in 0..8 {
+                let n = [8, 0, 7, 6][k % 4];
+                problems.insert(3 * k, random_problem(&mut draw, n, 5, k % 3 == 0));
+            }
+            problems
+        })
+        .collect();
+    assert!(rounds.iter().all(|round| round.len() == 32));
+    assert_queue_gives_the_same::<f64>(Single::best(), &rounds);
+    fearless_simd::dispatch!(Level::new(), token => {
+        assert_queue_gives_the_same::<f64x4<_>>(token, &rounds);
+        assert_queue_gives_the_same::<f64x8<_>>(token, &rounds);
+    });
 }
 
 /// `W = G Gᵀ` of `rank` columns, `q` in its range.

@@ -244,8 +244,8 @@ impl<T: Lane> Queue<T> {
         }
     }
 
-    /// Works until the problems of a group have all ended, at least, and returns such a group; None
-    /// if there are no problems. `problems`: those of all groups.
+    /// Works as long as its lanes are full, and until the problems of a group have all ended.
+    /// Returns such a group; None if there are no problems. `problems`: those of all groups.
     pub fn next_group(
         &mut self,
         problems: &mut [ContactProblem],
@@ -256,9 +256,7 @@ impl<T: Lane> Queue<T> {
             let few = self.waiting[0].len() + self.few.n_active();
             let many = self.waiting[1].len() + self.many.n_active();
             let is_starved = few.max(many) < T::LANES;
-            if (is_starved || few + many == 0)
-                && let Some(group) = self.groups.ready.pop_front()
-            {
+            if is_starved && let Some(group) = self.groups.ready.pop_front() {
                 return Some(group);
             }
             if few + many == 0 {

@@ -243,7 +243,7 @@ impl<T: Lane> Lanes<T> {
             if self.conclude(b) {
                 continue;
             }
-            self.part(b, riders);
+            self.settle(b, riders);
             goes_on = goes_on && go_on();
             self.courses[b].left -= 1;
             if goes_on && self.courses[b].left > 0 {
@@ -276,7 +276,7 @@ impl<T: Lane> Lanes<T> {
     }
 
     /// Notes the reports of a block's step; rovers whose step was not ordinary take it alone.
-    fn part(&mut self, b: usize, riders: &mut [Rider<'_>]) {
+    fn settle(&mut self, b: usize, riders: &mut [Rider<'_>]) {
         let block = &mut self.blocks[b];
         let seats = &mut self.seats[b * T::LANES..][..T::LANES];
         let mut is_changed = false;
