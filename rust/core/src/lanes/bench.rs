@@ -186,6 +186,11 @@ impl<T: Lane, const C: usize> Bench<T, C> {
         }
     }
 
+    /// Forgets the problems of all lanes.
+    pub(super) fn clear(&mut self) {
+        (self.active, self.late, self.again) = (0, 0, 0);
+    }
+
     /// Lanes with a problem.
     pub(super) fn n_active(&self) -> usize {
         (self.active | self.again).count_ones() as usize

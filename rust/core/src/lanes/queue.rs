@@ -208,9 +208,11 @@ impl<T: Lane> Queue<T> {
         }
     }
 
-    /// Makes room for `n` groups; all earlier ones must have been given back.
+    /// Makes room for `n` groups and forgets all earlier ones.
     pub fn begin(&mut self, n: usize) {
-        debug_assert!(self.groups.left.iter().all(|left| *left == 0));
+        self.few.clear();
+        self.many.clear();
+        self.waiting.iter_mut().for_each(VecDeque::clear);
         self.groups.left.clear();
         self.groups.left.resize(n, 0);
         self.groups.ready.clear();
