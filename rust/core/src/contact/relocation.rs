@@ -36,6 +36,9 @@ pub fn relocate(
             dispatch::point_over_tangent(&shape, n, &touch(&sphere, n, base))
         }
         Primitive::Sphere(sphere) => dispatch::point_on_sphere(&shape, &sphere, base),
+        Primitive::Face(face) => dispatch::point_on_plane(&shape, &face.plane, base, feature),
+        Primitive::Edge(edge) => dispatch::point_at_edge(&shape, &edge, base, feature),
+        Primitive::Vertex(vertex) => dispatch::point_at_vertex(&shape, &vertex, base),
     };
     contact.frame = ContactFrame::on_ground(&shape, &point);
     (contact.point, contact.gap) = (point.point, point.gap);

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::error::TerrainError;
 use super::plane::Plane;
 use super::rocks::Rocks;
-use super::{Primitive, Terrain};
+use super::{Coverage, Primitive, Terrain};
 use crate::geometry::broad_phase::BallTree;
 use crate::geometry::shape::Sphere;
 use crate::scalar::elementary::{hypot, sin_cos};
@@ -119,7 +119,11 @@ pub(super) fn check_count(count: usize) -> Result<(), TerrainError> {
     Ok(())
 }
 
-fn check_entry(field: &'static str, index: usize, value: f64) -> Result<(), TerrainError> {
+pub(super) fn check_entry(
+    field: &'static str,
+    index: usize,
+    value: f64,
+) -> Result<(), TerrainError> {
     if !value.is_finite() {
         return Err(TerrainError::EntryNotFinite {
             field,
@@ -157,10 +161,27 @@ impl Terrain for SphereField {
         !self.tree.is_empty()
     }
 
+    fn is_plane(&self) -> bool {
+        self.ground.is_some() && self.tree.is_empty()
+    }
+
     fn primitive(&self, id: u32) -> Primitive {
         match (id, self.ground) {
             (0, Some(plane)) => Primitive::Plane(plane),
             (id, _) => Primitive::Sphere(*self.tree.ball(id as usize - 1)),
+        }
+    }
+
+    #[allow(clippy::cast_possible_truncation)] // at most the limit of spheres
+    fn n_primitives(&self) -> u32 {
+        self.tree.len() as u32 + 1
+    }
+
+    fn coverage(&self, _centre: &Vector3<f64>, _radius: f64) -> Coverage {
+        if self.ground.is_some() {
+            Coverage::Known
+        } else {
+            Coverage::Silent
         }
     }
 
