@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::activation::Activation;
 use super::frame::ContactFrame;
-use super::pair::{Contact, ContactKey};
+use super::pair::{Contact, ContactKey, ON_SURFACE};
 use super::part::{Part, place_wheel};
 use crate::geometry::query::sweep::{DEEP, first_touch};
 use crate::geometry::query::{SurfacePoint, box_sphere, disc_sphere, dispatch, sphere_sphere};
@@ -201,7 +201,7 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
             }
             piece => visit_on_surface(&placed.shape, piece, base, gate.reach, |point| {
                 if is_on_surface(terrain, id, base, point) {
-                    gate.offer(&placed, point, id);
+                    gate.offer(&placed, &on_surface(point), id);
                 }
             }),
         },
@@ -227,6 +227,15 @@ fn visit_on_surface(
             }
         }
         Primitive::Plane(_) | Primitive::Sphere(_) => {}
+    }
+}
+
+/// The point with its feature marked.
+#[inline]
+fn on_surface(point: &SurfacePoint) -> SurfacePoint {
+    SurfacePoint {
+        feature: point.feature | ON_SURFACE,
+        ..*point
     }
 }
 
@@ -405,7 +414,7 @@ fn visit_nearer(
                 }
                 piece => visit_on_surface(&shape, piece, base, f64::INFINITY, |point| {
                     if point.feature == NEAREST && is_on_surface(terrain, id, base, point) {
-                        take(point);
+                        take(&on_surface(point));
                     }
                 }),
             }

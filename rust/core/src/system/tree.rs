@@ -31,7 +31,7 @@ impl UnilateralContact for Contact {
 
     #[inline]
     fn key(&self) -> ContactKey {
-        self.key
+        self.key.lasting()
     }
 
     #[inline]

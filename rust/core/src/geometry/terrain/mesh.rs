@@ -220,8 +220,15 @@ impl TriangleMesh {
             let is_left = |a: u32, b: u32| {
                 let (low, high) = (a.min(b), a.max(b));
                 let (p, q) = (&self.vertices[low as usize], &self.vertices[high as usize]);
-                let side = (q.z - p.z) * (x - p.x) - (q.x - p.x) * (z - p.z);
-                (side >= 0.0) == (low == a)
+                let (dx, dz) = (q.x - p.x, q.z - p.z);
+                let side = dz * (x - p.x) - dx * (z - p.z);
+                // A point on an edge is taken to be a little further along x, and less along z.
+                let sides = [side, dz, -dx];
+                let is_left = sides
+                    .iter()
+                    .find(|s| s.abs() > 0.0)
+                    .is_some_and(|s| *s > 0.0);
+                is_left == (low == a)
             };
             let [a, b, c] = *triangle;
             let sides = [is_left(a, b), is_left(b, c), is_left(c, a)];
