@@ -11,7 +11,7 @@ use rover_core::nalgebra::{UnitQuaternion, Vector3};
 
 const RADIUS: f64 = 0.15;
 
-/// A rough map: heights of some centimetres, cells of about a decimetre.
+/// A rough map with slopes of up to 40 degrees.
 fn rough() -> impl Strategy<Value = HeightField> {
     (
         prop::collection::vec(-1.0..1.0, 11 * 11),
@@ -19,6 +19,7 @@ fn rough() -> impl Strategy<Value = HeightField> {
         0.03..0.2_f64,
     )
         .prop_map(|(heights, roughness, spacing)| {
+            let roughness = roughness * spacing;
             #[allow(clippy::cast_possible_truncation)] // a map is single
             let heights = heights
                 .iter()

@@ -2,12 +2,13 @@
 //! faces and edges on a convex vertex.
 //!
 //! Of the box's twelve edges those along one axis share the normal `n ∝ e × f` with an edge of the
-//! surface, and the side of n decides which of the four can touch. The feature at an edge is the
-//! axis.
+//! surface, and the side of n decides which of the four can touch. A corner that has not yet come
+//! down to an edge is met too. The feature at an edge is the axis, or 3 and the corner's number.
 
 use nalgebra::Vector3;
 
 use super::{NEAREST, SurfacePoint, box_plane, box_sphere};
+use crate::geometry::shape::oriented_box::signs;
 use crate::geometry::terrain::surface::{Edge, Face, Vertex};
 use crate::geometry::{OrientedBox, Sphere};
 
@@ -49,17 +50,60 @@ pub fn crossings(
             visit(&point);
         }
     }
+    for number in 0..8 {
+        let (point, place) = corner_over(solid, edge, base, number);
+        let supports = solid.R.tr_mul(&point.n).dot(&signs(number)) < 0.0
+            && (0..3).all(|k| solid.axis(k).dot(&point.n) * signs(number)[k] <= 0.0);
+        if point.gap > 0.0
+            && point.gap <= reach
+            && supports
+            && edge.admits(&point.n)
+            && edge.has(place, 0.0)
+        {
+            visit(&point);
+        }
+    }
 }
 
-/// The crossing of the box's edge along an axis, wherever it is; the box's lowest corner if the
-/// edges are parallel.
-#[must_use]
-pub fn crossing_of(
+/// A corner over the line of an edge, and its place along it, m.
+fn corner_over(
     solid: &OrientedBox,
     edge: &Edge,
     base: &Vector3<f64>,
-    axis: usize,
+    number: usize,
+) -> (SurfacePoint, f64) {
+    let corner = solid.corner(number);
+    let from_start = corner - (edge.start - base);
+    let place = from_start.dot(&edge.along);
+    let across = from_start - edge.along * place;
+    let gap = across.norm();
+    let up = (edge.normals[0] + edge.normals[1]).normalize();
+    let n = across
+        .try_normalize(0.0)
+        .filter(|n| n.dot(&up) > 0.0)
+        .unwrap_or(up);
+    let gap = gap.copysign(n.dot(&across));
+    (
+        SurfacePoint::of_normal(CORNERS + number, corner, &n, gap),
+        place,
+    )
+}
+
+/// Feature of the first corner.
+const CORNERS: usize = 3;
+
+/// The point of a feature, wherever it is; the box's lowest corner if the edges are parallel.
+#[must_use]
+pub fn point_at_edge(
+    solid: &OrientedBox,
+    edge: &Edge,
+    base: &Vector3<f64>,
+    feature: usize,
 ) -> SurfacePoint {
+    if feature >= CORNERS {
+        return corner_over(solid, edge, base, feature - CORNERS).0;
+    }
+    let axis = feature;
     let crossing = crossing(solid, edge, base, axis);
     crossing.map_or_else(
         || {

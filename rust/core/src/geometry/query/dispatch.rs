@@ -120,7 +120,7 @@ pub fn point_at_edge(
 ) -> SurfacePoint {
     match shape {
         PlacedShape::Disc(disc) => disc_triangle::nearest_at_edge(disc, edge, base),
-        PlacedShape::Box(solid) => box_triangle::crossing_of(solid, edge, base, feature),
+        PlacedShape::Box(solid) => box_triangle::point_at_edge(solid, edge, base, feature),
         PlacedShape::Sphere(sphere) => sphere_triangle::nearest_at_edge(sphere, edge, base),
     }
 }

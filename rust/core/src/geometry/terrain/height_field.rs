@@ -337,11 +337,16 @@ impl HeightField {
     fn vertex(&self, place: Place) -> Option<Vertex> {
         let height = self.corner(place);
         let [i, j] = place;
+        let mut is_flat = true;
         for [di, dj] in &SPOKES[..3] {
             let mean = 0.5 * (self.corner([i + di, j + dj]) + self.corner([i - di, j - dj]));
-            if !(height > mean) {
+            if !(height >= mean) {
                 return None;
             }
+            is_flat &= height <= mean;
+        }
+        if is_flat {
+            return None;
         }
         let own = self.point(place);
         let mut spokes = [Vector3::zeros(); MAX_SPOKES];

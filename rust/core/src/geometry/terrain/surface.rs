@@ -121,11 +121,13 @@ pub struct Vertex {
 }
 
 impl Vertex {
-    /// Whether the surface falls off on all sides of the plane with this normal.
+    /// Whether the surface lies below the plane with this unit normal on all sides, or in it but
+    /// for one.
     #[inline]
     #[must_use]
     pub fn admits(&self, n: &Vector3<f64>) -> bool {
-        self.spokes[..self.n].iter().all(|spoke| n.dot(spoke) < 0.0)
+        let rises = || self.spokes[..self.n].iter().map(|spoke| n.dot(spoke));
+        rises().all(|rise| rise <= OVERLAP) && rises().any(|rise| rise < -OVERLAP)
     }
 }
 
