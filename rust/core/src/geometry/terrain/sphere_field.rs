@@ -101,6 +101,33 @@ impl SphereField {
         })
     }
 
+    /// Rocks that lie on another terrain, which is not part of the field: each is raised by the
+    /// height of the ground under its middle. Where there is none there are no rocks.
+    ///
+    /// # Errors
+    /// As [`Self::rocks`]; `Empty` if no rock is left.
+    pub fn rocks_on(rocks: &Rocks, ground: &dyn Terrain) -> Result<Self, TerrainError> {
+        let flat = Rocks {
+            ground: Plane::ground(),
+            ..rocks.clone()
+        };
+        let raised = |sphere: Sphere| {
+            let [x, y, z]: [f64; 3] = sphere.centre.into();
+            let height = ground.height(x, z)?;
+            let centre = Vector3::new(x, y + height, z);
+            Some(Sphere { centre, ..sphere })
+        };
+        let spheres: Vec<Sphere> = flat.sample()?.into_iter().filter_map(raised).collect();
+        if spheres.is_empty() {
+            return Err(TerrainError::Empty);
+        }
+        for (index, sphere) in spheres.iter().enumerate() {
+            (sphere.centre.iter()).try_for_each(|&x| check_entry("centres", index, x))?;
+        }
+        let tree = BallTree::new(&spheres);
+        Ok(Self { ground: None, tree })
+    }
+
     /// The spheres in the order they were given.
     #[must_use]
     pub fn spheres(&self) -> impl ExactSizeIterator<Item = &Sphere> {
