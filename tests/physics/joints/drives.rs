@@ -109,6 +109,8 @@ fn drives_survive_both_formats_and_bad_ones_are_refused_by_field() {
             axle: [0.0, 1.0, 0.0],
             radius: 0.1,
             contact_radius: None,
+            width: None,
+            rounding: None,
             torque_limit: 1.0,
             drive_sign: 1.0,
             motor: None,

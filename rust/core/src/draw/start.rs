@@ -210,7 +210,7 @@ pub fn resting_on(
         let kinematics = Kinematics::of(model, &configuration);
         for wheel in model.wheels() {
             let centre = configuration.position + kinematics.point(wheel.body, &wheel.centre);
-            if let Coverage::Unknown([x, z]) = terrain.coverage(&centre, wheel.radius) {
+            if let Coverage::Unknown([x, z]) = terrain.coverage(&centre, wheel.bound()) {
                 return Err(PlacementError::NoGround { x, z });
             }
         }

@@ -126,7 +126,7 @@ pub struct SolidDescription {
     pub locked: Option<f64>,
 }
 
-/// A wheel: a disc of zero width, fixed to a solid.
+/// A wheel, fixed to a solid: a thin disc, or a cylinder with rounded edges.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WheelDescription {
@@ -141,6 +141,13 @@ pub struct WheelDescription {
     /// Contact radius with the ground, m, if it differs from the disc's; `radius` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact_radius: Option<f64>,
+    /// Width along the axle, m, with the solid's origin in its middle; 0, a thin disc, by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub width: Option<f64>,
+    /// Radius of the rounded edges of its rim, m, from 0 for a cylinder, the default, to half the
+    /// width for a torus.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rounding: Option<f64>,
     /// Largest driving torque, N m.
     pub torque_limit: f64,
     /// 1 or −1: joint torque of a positive (forward) command.

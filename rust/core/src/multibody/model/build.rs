@@ -411,6 +411,8 @@ fn wheels(
             axle,
             spoke: perpendicular(&axle),
             radius: wheel.contact_radius.unwrap_or(wheel.radius),
+            width: wheel.width.unwrap_or(0.0),
+            rounding: wheel.rounding.unwrap_or(0.0),
             torque_limit: wheel.torque_limit,
             drive_sign: wheel.drive_sign,
             motor: wheel.motor,

@@ -17,7 +17,7 @@ pub struct Frame {
     pub rotation: Matrix3<f64>,
 }
 
-/// A wheel: a disc of radius `radius` and zero width, fixed to a body.
+/// A wheel fixed to a body: a thin disc, or a cylinder with rounded edges.
 #[derive(Clone, Debug)]
 pub struct Wheel {
     /// Short name, such as `FL`.
@@ -33,6 +33,10 @@ pub struct Wheel {
     pub spoke: Vector3<f64>,
     /// Contact radius, m.
     pub radius: f64,
+    /// Width of the tread with its rounded edges, m; 0 for a thin disc.
+    pub width: f64,
+    /// Radius of its edges, m: at most half the width.
+    pub rounding: f64,
     /// Largest driving torque, N m.
     pub torque_limit: f64,
     /// 1 or −1: joint torque of a positive (forward) command.
@@ -46,6 +50,26 @@ pub struct Wheel {
     pub steering: Option<usize>,
     /// Largest steering set-point in either direction, rad.
     pub steering_limit: f64,
+}
+
+impl Wheel {
+    /// Whether it is not a thin disc.
+    #[inline]
+    #[must_use]
+    pub fn is_wide(&self) -> bool {
+        self.width > 0.0
+    }
+
+    /// Radius of a bounding ball about the centre, m.
+    #[inline]
+    #[must_use]
+    pub fn bound(&self) -> f64 {
+        if self.is_wide() {
+            (self.radius - self.rounding).hypot(0.5 * self.width - self.rounding) + self.rounding
+        } else {
+            self.radius
+        }
+    }
 }
 
 /// A box that collides with the ground and with other bodies.
