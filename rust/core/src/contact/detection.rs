@@ -435,8 +435,9 @@ fn visit_nearer(
     let mut gap = f64::INFINITY;
     // A primitive that is not visited is further from the centre than `reach`, hence further
     // from the wheel than reach − R.
-    let mut reach = 2.0 * radius;
+    let mut reach = radius;
     while reach < FAR && gap + radius > reach {
+        reach *= 2.0;
         terrain.visit_near(&(base + centre), reach, &mut |id, primitive| {
             let mut take = |point: &SurfacePoint| {
                 if point.gap < gap {
@@ -458,7 +459,6 @@ fn visit_nearer(
                 }),
             }
         });
-        reach *= 2.0;
     }
 }
 
