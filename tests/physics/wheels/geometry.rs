@@ -3,13 +3,15 @@
 use std::f64::consts::TAU;
 
 use proptest::prelude::*;
-use rover_core::contact::detection::wheel_gap;
+use rover_core::contact::detection::{wheel_contact, wheel_gap};
 use rover_core::geometry::query::{dispatch, roller_sphere};
 use rover_core::geometry::{HeightField, Plane, Roller, Sphere, SphereField, SupportMap, Terrain};
-use rover_core::nalgebra::Vector3;
+use rover_core::multibody::{Configuration, Kinematics};
+use rover_core::nalgebra::{UnitQuaternion, Vector3};
 
+use crate::sphere_scenes::field;
 use crate::surface_scenes::map;
-use crate::wheel_scenes::{roller, shape, surface};
+use crate::wheel_scenes::{lone, roller, shape, surface};
 
 /// Radius, width and share of the rounding of a wheel.
 fn sizes() -> impl Strategy<Value = [f64; 3]> {
@@ -162,6 +164,42 @@ proptest! {
         }
         wheel.core.centre.y += depth + coarse + 0.01;
         prop_assert!(wheel_gap(&shape(&wheel), &Vector3::zeros(), &field) > 0.0);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+    /// Along any motion the gap changes by the normal velocity of the material point.
+    #[test]
+    fn the_gap_changes_by_the_normal_velocity(
+        turn in prop::array::uniform3(-2.0..2.0), share in 0.0..1.0, height in 0.1..0.4,
+        v in prop::collection::vec(-1.0..1.0, 6), ground in 0..3_usize,
+    ) {
+        let model = lone(0.1, 0.05 * share);
+        let ground: Box<dyn Terrain> = match ground {
+            0 => Box::new(Plane::new([0.2, 1.0, -0.1], 0.0).unwrap()),
+            1 => Box::new(field(&[[0.02, -0.1, 0.03, 0.1]])),
+            _ => Box::new(map(2, 4.0, |x, _| -0.7 * x.abs())),
+        };
+        let mut start = Configuration::zero(&model);
+        start.position = Vector3::new(0.03, height, -0.02);
+        start.attitude = UnitQuaternion::from_scaled_axis(Vector3::from(turn));
+        let contact_at = |q: &Configuration| wheel_contact(&model, &Kinematics::of(&model, q), &*ground, 0);
+        let contact = contact_at(&start);
+        let step = 1e-6;
+        let moved = |h: f64| {
+            let mut moved = start.clone();
+            moved.set_moved(&model, &start, &v, h);
+            contact_at(&moved)
+        };
+        let (before, after) = (moved(-step), moved(step));
+        // Where the nearest point jumps the gap has a kink.
+        prop_assume!((before.point - after.point).norm() < 1e-3);
+        let rate = (after.gap - before.gap) / (2.0 * step);
+        let [a, b, c, x, y, z] = v[..] else { unreachable!() };
+        let velocity = Vector3::new(a, b, c) + Vector3::new(x, y, z).cross(&contact.point);
+        let expected = contact.frame.n.dot(&velocity);
+        prop_assert!((rate - expected).abs() < 1e-5, "{rate} for {expected}");
     }
 }
 

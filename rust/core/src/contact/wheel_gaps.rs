@@ -226,16 +226,22 @@ mod tests {
     use crate::multibody::{JointKind, ModelDescription, SolidDescription, coordinates};
     use proptest::prelude::*;
 
-    /// The rover; the same with a joint about no coordinate axis; and with one that slides.
-    fn machines() -> [Model; 3] {
+    /// The rover; the same with wide wheels, with a joint about no coordinate axis, and with one
+    /// that slides.
+    fn machines() -> [Model; 4] {
         let changed = |change: fn(&mut SolidDescription)| {
             let mut rover = ModelDescription::rover();
             let carried = rover.solids.iter_mut().find(|s| s.parent.is_some());
             change(carried.unwrap());
             Model::from_description(rover).unwrap()
         };
+        let mut wide = ModelDescription::rover();
+        for wheel in &mut wide.wheels {
+            (wheel.width, wheel.rounding) = (Some(0.1), Some(0.02));
+        }
         [
             Model::rover(),
+            Model::from_description(wide).unwrap(),
             changed(|solid| solid.axis = Some([0.1, 0.2, 0.9])),
             changed(|solid| solid.joint = Some(JointKind::Prismatic)),
         ]
