@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::contact::{Contact, detection::wheel_contacts};
-use rover_core::draw::{resting_pose, rocks::clear_radius};
+use rover_core::draw::{resting_on, resting_pose, rocks::clear_radius};
 use rover_core::multibody::bias::BiasScratch;
 use rover_core::multibody::{
     Configuration, Joint, Kinematics, MassMatrix, Model, ModelDescription, ModelError, bias,
@@ -19,8 +19,8 @@ use crate::arguments::{self, Given, number};
 use crate::arrays::{fresh, fresh_blocks, fresh_matrix, fresh_rows, triple, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::files::{self, in_file, read_text, write_text};
+use crate::ground::Ground;
 use crate::motor::{self, Motor};
-use crate::sphere_field::Ground;
 
 /// A pair of fresh vectors.
 pub type Pair<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
@@ -700,7 +700,7 @@ impl RoverModel {
     ///
     /// Args:
     ///     q: Coordinates, (nq,).
-    ///     terrain: A `Plane` or a `SphereField`.
+    ///     terrain: A terrain, or a list of several.
     ///     coordinates: "state" or "report".
     ///
     /// Returns:
@@ -741,27 +741,31 @@ impl RoverModel {
     fn resting_pose<'py>(
         &self,
         py: Python<'py>,
-        plane: &Bound<'_, PyAny>,
+        terrain: &Bound<'_, PyAny>,
         position: &Bound<'_, PyAny>,
         heading: &Bound<'_, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let Ground::Plane(plane) = Ground::parse(plane)? else {
-            return Err(arguments::refused(plane, Kind::Terrain, "plane", "a Plane").into());
-        };
+        let ground = Ground::parse(terrain)?;
         let place = <[f64; 2]>::try_from(vector(position, Kind::State, "position")?);
         let what = "two numbers";
         let place =
             place.map_err(|_| arguments::refused(position, Kind::State, "position", what))?;
         let heading = number(heading, Kind::State, "heading")?;
-        let q = resting_pose(&self.inner, &plane.inner, place, heading);
-        Ok(fresh(py, &q.map_err(BorderError::from)?))
+        let q = if let Ground::Plane(plane) = &ground {
+            resting_pose(&self.inner, &plane.inner, place, heading).map_err(BorderError::from)?
+        } else {
+            let terrain = ground.terrain();
+            let q = py.detach(|| resting_on(&self.inner, &*terrain, place, heading));
+            q.map_err(BorderError::from)?
+        };
+        Ok(fresh(py, &q))
     }
 
     /// The point of each wheel's rim that is nearest to the terrain.
     ///
     /// Args:
     ///     q: Coordinates, (nq,).
-    ///     terrain: A `Plane` or a `SphereField`.
+    ///     terrain: A terrain, or a list of several.
     ///     coordinates: "state" or "report".
     ///
     /// Returns:
@@ -791,7 +795,7 @@ impl RoverModel {
     ///
     /// Args:
     ///     q: Coordinates, (nq,).
-    ///     terrain: A `Plane` or a `SphereField`.
+    ///     terrain: A terrain, or a list of several.
     ///     coordinates: "state" or "report".
     ///
     /// Returns:
