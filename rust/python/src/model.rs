@@ -722,13 +722,15 @@ impl RoverModel {
         Ok(PyArray1::from_iter(py, contacts.iter().map(|c| c.gap)))
     }
 
-    /// The coordinates of the rover at rest on a plane.
+    /// The coordinates of the rover at rest on a terrain.
     ///
-    /// The joints are at zero, the trunk is upright along the normal with its origin above the
-    /// position, and the lowest wheel has gap zero.
+    /// On a plane the joints are at zero, the trunk is upright along the normal with its origin
+    /// above the position, and the lowest wheel has gap zero. On any other terrain the height of
+    /// the trunk, its pitch and roll and the joints that carry wheels bring all wheels down to the
+    /// ground as far as they can; no wheel is in it.
     ///
     /// Args:
-    ///     plane: The plane, which must not be vertical.
+    ///     terrain: A terrain, or a list of several; a plane must not be vertical.
     ///     position: x and z, (2,), m.
     ///     heading: Heading, rad.
     ///
@@ -736,7 +738,8 @@ impl RoverModel {
     ///     Coordinates of the state, (nq,).
     ///
     /// Raises:
-    ///     TerrainError: `plane` is no plane.
+    ///     TerrainError: `terrain` is no terrain, or does not say what the ground is under the
+    ///         trunk or a wheel.
     ///     StateError: A number is not finite, or the plane is vertical.
     fn resting_pose<'py>(
         &self,
