@@ -18,7 +18,7 @@ use super::parts::{Parts, Twist};
 use super::poses::Poses;
 use super::problem::MAX_CONTACTS;
 use crate::contact::detection::touch_of_disc;
-use crate::contact::pair::ON_SURFACE;
+use crate::contact::pair::{ANY_PIECE, ON_SURFACE};
 use crate::contact::{Contact, ContactFrame, ContactKey, Part};
 use crate::geometry::query::NEAREST;
 use crate::geometry::query::sweep::DEEP;
@@ -223,7 +223,7 @@ impl<T: Lane> Contacts<T> {
         let list = &self.lists[lane];
         let mut is_same = memory.impulses.len() == list.n;
         for (place, out) in p.chunks_exact_mut(3).enumerate().take(list.n) {
-            let wanted = Self::key(list, place).lasting();
+            let wanted = Self::key(list, place);
             let same = memory.impulses.get(place);
             let known = if let Some((_, known)) = same.filter(|(key, _)| *key == wanted) {
                 *known
@@ -243,7 +243,7 @@ impl<T: Lane> Contacts<T> {
         let list = &self.lists[lane];
         memory.impulses.clear();
         for (place, p) in p.chunks_exact(3).enumerate().take(list.n) {
-            let known = (Self::key(list, place).lasting(), [p[0], p[1], p[2]]);
+            let known = (Self::key(list, place), [p[0], p[1], p[2]]);
             memory.impulses.push(known);
         }
     }
@@ -595,9 +595,10 @@ impl<T: Lane> Contacts<T> {
                 list.features[list.n] = NEAREST;
                 list.primitives[list.n] = if on_sphere >> lane & 1 == 1 {
                     whole(numbers[lane])
-                } else if let Some(piece) = ground.piece_under(Self::wheel(slot), lane) {
+                } else if ground.is_surface(lane) {
+                    // Which piece was found depends on when a search was made.
                     list.features[list.n] = NEAREST | ON_SURFACE;
-                    piece
+                    ANY_PIECE
                 } else {
                     PLANE
                 };

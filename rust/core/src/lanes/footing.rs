@@ -30,8 +30,8 @@ pub struct Footing<T> {
     pub normal: Vec3<T>,
     /// m; ∞ where there is nothing.
     pub offset: T,
-    /// Number of the piece in the terrain.
-    pub pieces: [u32; MAX_LANES],
+    /// Number of the edge or vertex in the terrain.
+    pieces: [u32; MAX_LANES],
     /// Place of the wheel's centre at the last search for a plane, world, m.
     from: [Vector3<f64>; MAX_LANES],
     /// Its result holds as far from there as this, m.
@@ -163,8 +163,7 @@ impl<T: Lane> Footing<T> {
                 if let Some(found) = only_plane(terrain, &centre, disc.radius + within) {
                     self.flat |= own;
                     self.offset.set(lane, f64::INFINITY);
-                    if let Some((piece, plane)) = found {
-                        self.pieces[lane] = piece;
+                    if let Some(plane) = found {
                         self.put(lane, &plane);
                     }
                     return true;
@@ -201,18 +200,14 @@ fn plane_at(point: &SurfacePoint, base: &Vector3<f64>) -> Plane {
     Plane::through(&(base + point.point - point.n * point.gap), point.n)
 }
 
-/// The plane that all pieces near a place lie in, with the number of one of them; None if they lie
-/// in several, `Some(None)` if there are none.
-fn only_plane(
-    terrain: &dyn Terrain,
-    centre: &Vector3<f64>,
-    within: f64,
-) -> Option<Option<(u32, Plane)>> {
-    let mut only: Option<(u32, Plane)> = None;
+/// The plane that all pieces near a place lie in; None if they lie in several, `Some(None)` if
+/// there are none.
+fn only_plane(terrain: &dyn Terrain, centre: &Vector3<f64>, within: f64) -> Option<Option<Plane>> {
+    let mut only: Option<Plane> = None;
     let mut is_one = true;
-    terrain.visit_near(centre, within, &mut |id, piece| match (piece, &only) {
-        (Primitive::Face(face), None) => only = Some((id, face.plane)),
-        (Primitive::Face(face), Some((_, plane))) => is_one &= face.plane == *plane,
+    terrain.visit_near(centre, within, &mut |_, piece| match (piece, &only) {
+        (Primitive::Face(face), None) => only = Some(face.plane),
+        (Primitive::Face(face), Some(plane)) => is_one &= face.plane == *plane,
         (Primitive::Sphere(_), _) => {} // measured by itself
         _ => is_one = false,
     });

@@ -263,11 +263,10 @@ impl<T: Lane> Ground<T> {
         (footing.normal, footing.offset)
     }
 
-    /// Numbers of the pieces of a surface under a wheel, for the rovers that stand on one.
+    /// Whether a rover's ground is a surface.
     #[inline(always)]
-    pub(super) fn piece_under(&self, wheel: usize, lane: usize) -> Option<u32> {
-        let piece = self.footings[wheel].pieces[lane];
-        self.surfaces[lane].as_ref().map(|_| piece)
+    pub(super) fn is_surface(&self, lane: usize) -> bool {
+        self.surfaces[lane].is_some()
     }
 
     /// Height of a point over the plane, m.
