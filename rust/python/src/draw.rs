@@ -16,11 +16,12 @@ use crate::arrays::{fresh_table, vector};
 use crate::episode::{self, EpisodeRun};
 use crate::errors::{BorderError, Kind};
 use crate::generators::{generators, halves};
+use crate::ground::Ground;
 use crate::options::SolverWords;
 use crate::plane::Plane;
 use crate::shared::Watch;
 use crate::simulation::{Origin, Simulation};
-use crate::sphere_field::{Ground, SphereField};
+use crate::sphere_field::SphereField;
 
 /// Positional and keyword arguments.
 type NewArguments<'py> = ((Bound<'py, PyAny>, Bound<'py, PyAny>), Bound<'py, PyDict>);

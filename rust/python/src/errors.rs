@@ -5,7 +5,7 @@ use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple, PyType};
-use rover_core::draw::DrawError;
+use rover_core::draw::{DrawError, PlacementError};
 use rover_core::episode::EpisodeError;
 use rover_core::geometry::TerrainError;
 use rover_core::integrator::{OptionsError, StepError};
@@ -270,7 +270,20 @@ impl From<TerrainError> for BorderError {
             } => (Some(index), Value::Number(*value)),
             TerrainError::MismatchedLengths { radii, .. } => (None, Value::Count(*radii)),
             TerrainError::TooMany { count, .. } => (None, Value::Count(*count)),
-            TerrainError::Empty => (None, Value::Count(0)),
+            TerrainError::Empty | TerrainError::NoTriangles | TerrainError::NoParts => {
+                (None, Value::Count(0))
+            }
+            TerrainError::BadHeight { value, .. } => (None, Value::Number(*value)),
+            TerrainError::WrongCount { count, .. } => (None, Value::Count(*count)),
+            TerrainError::NoSuchVertex { index, vertex, .. } => {
+                (Some(index), Value::Count(*vertex))
+            }
+            TerrainError::FlatTriangle { index }
+            | TerrainError::NotASurface { index, .. }
+            | TerrainError::SecondPlane { index } => (Some(index), Value::Count(*index)),
+            TerrainError::MapSize { .. } | TerrainError::NoData | TerrainError::TooManyPieces => {
+                (None, Value::Nothing)
+            }
         };
         Self {
             kind: Kind::Terrain,
@@ -418,11 +431,31 @@ impl From<SnapshotError> for BorderError {
 
 impl From<StepError> for BorderError {
     fn from(e: StepError) -> Self {
+        let (field, value) = match &e {
+            StepError::NoGround { x, z, .. } => {
+                (Some("terrain".to_owned()), Value::Numbers(vec![*x, *z]))
+            }
+            _ => (None, Value::Nothing),
+        };
         Self {
             kind: Kind::Step,
             message: e.to_string(),
-            field: None,
-            value: Value::Nothing,
+            field,
+            value,
+        }
+    }
+}
+
+impl From<PlacementError> for BorderError {
+    fn from(e: PlacementError) -> Self {
+        match e {
+            PlacementError::State(e) => Self::from(e),
+            PlacementError::NoGround { x, z } => Self {
+                kind: Kind::Terrain,
+                message: e.to_string(),
+                field: Some("position".to_owned()),
+                value: Value::Numbers(vec![x, z]),
+            },
         }
     }
 }
