@@ -17,6 +17,7 @@ mod friction_contact;
 mod generators;
 mod infos;
 mod model;
+mod model_files;
 mod motor;
 mod options;
 mod planar;
