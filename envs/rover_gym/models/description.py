@@ -14,8 +14,8 @@ from rover_gym.models.roles import WheelRole
 GRAVITY = 9.81
 #: Torque limit of a wheel where the file states none: this times its share of the weight times its radius.
 TORQUE_SHARE = 1.0
-#: Gains of a steering joint where the file has none, as those of the built-in rover: stiffness over the wheel's share of
-#: the weight times its radius, 1/rad, and damping over stiffness, s.
+#: Gains of a steering joint where the file has none, as those of the built-in rover: stiffness over the wheel's share
+#: of the weight times its radius, 1/rad, and damping over stiffness, s.
 STEERING_STIFFNESS, STEERING_TIME = 10.0, 0.0133
 STEERING_LIMIT = 0.7  # rad, where the file states none
 UNLIMITED = 1e9  # N m, the torque limit of a motor for which the file states none
@@ -162,7 +162,7 @@ def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, gains: Gai
     if limit is None:
         limit = TORQUE_SHARE * weight * role.radius
         tree.assumed.append(
-            f"wheel {role.link}: torque limit {limit:.4g} N m, its share of the weight times its radius"
+            f"wheel {role.link}: torque limit {limit:.4g} N m, its share of the weight times the radius"
         )
     wheel = {
         "name": role.link,
@@ -249,9 +249,7 @@ def _turn_steering_axes_up(tree: RobotTree, steering: set[str], P: Array) -> Non
             if other.joint.follows is not None and other.joint.follows[0] == joint.name:
                 followed, ratio, offset = other.joint.follows
                 other.joint.follows = (followed, -ratio, offset)
-        tree.assumed.append(
-            f"steering {name}: its axis points down and is reversed, so that positive turns to the left"
-        )
+        tree.assumed.append(f"steering {name}: its axis points down and is reversed: positive turns to the left")
 
 
 def _move_limits_to_followed_joints(tree: RobotTree) -> None:
@@ -278,7 +276,7 @@ def _move_limits_to_followed_joints(tree: RobotTree) -> None:
 
 def _followed_first(tree: RobotTree) -> list[FileLink]:
     """Parents before children, followed joints before those that follow, one tree after the other."""
-    roots = {}
+    roots: dict[str, str] = {}
     for link in tree.links.values():
         roots[link.name] = link.name if link.parent is None else roots[link.parent]
     order: list[FileLink] = []

@@ -57,7 +57,7 @@ class WrittenSolid:
             self.kind = "fixed"
 
     def shapes(self) -> Iterable[tuple[dict[str, Any], Array, Array, bool, bool]]:
-        """Every shape with its centre (3,), m, its rotation from z-up axes (3, 3), and whether it collides and is drawn."""
+        """Shapes with centre (3,), m, rotation from z-up axes (3, 3), and whether they collide and are drawn."""
         Q = Z_UP_TO_Y_UP.T
         if (shape := self.source.get("shape")) is not None:
             yield shape, self.centre, np.eye(3), bool(self.source.get("collides")), True
@@ -80,18 +80,18 @@ def principal(shape: dict[str, Any], mass: float) -> Array:
     """Principal inertias (3,) of a shape about its centre, kg m²."""
     if shape["kind"] == "box":
         a, b, c = shape["size"]
-        return mass / 12.0 * np.array([b * b + c * c, a * a + c * c, a * a + b * b])
+        return np.array([b * b + c * c, a * a + c * c, a * a + b * b]) * float(mass / 12.0)
     r = shape["radius"]
     if shape["kind"] == "cylinder":
         across = mass / 12.0 * (3.0 * r * r + shape["height"] ** 2)
         return np.array([across, mass * r * r / 2.0, across])
     if shape["kind"] == "disc":
-        return mass * r * r * np.array([0.25, 0.25, 0.5])
+        return np.array([0.25, 0.25, 0.5]) * float(mass * r * r)
     return np.full(3, 0.4 * mass * r * r)
 
 
 def _mass_properties(solid: dict[str, Any]) -> tuple[Array, Array]:
-    """Mass centre (3,), m, and inertia about it (3, 3), kg m², as `docs/models.md` says they follow from a description."""
+    """Mass centre (3,), m, and inertia about it (3, 3), kg m², as stated or as they follow from the shapes."""
     centre = np.array(solid.get("centre_of_mass") or (0.0, 0.0, 0.0))
     if solid.get("inertia") is not None:
         xx, yy, zz, xy, xz, yz = solid["inertia"]

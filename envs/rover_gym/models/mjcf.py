@@ -1,4 +1,4 @@
-"""Reads an MJCF into a `RobotTree`. MuJoCo compiles the file, so defaults, includes, angles and inertias are its own."""
+"""Reads an MJCF into a `RobotTree`. MuJoCo compiles it, so defaults, includes, angles and inertias are MuJoCo's."""
 
 from __future__ import annotations
 

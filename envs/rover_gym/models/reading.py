@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from rover_gym.models.file_axes import axes_of
 from rover_gym.models.import_report import ImportReport, solid_rows, together
 from rover_gym.models.massless_links import join_massless_links
 from rover_gym.models.mjcf import read_mjcf_tree
-from rover_gym.models.robot_tree import IGNORABLE, RobotTree
+from rover_gym.models.robot_tree import IGNORABLE, RobotTree, check_kinds
 from rover_gym.models.roles import Steering, Wheels, find_wheels
 from rover_gym.models.urdf import read_urdf_tree
 from rover_gym.validation import number, refuse
@@ -51,8 +51,7 @@ def _read(
     if free_base is not None and not isinstance(free_base, bool):
         refuse(ModelError, "free_base", free_base, "must be True or False")
     P = axes_of(forward)
-    if isinstance(ignore, str) or not isinstance(ignore, Iterable) or (unknown := set(ignore) - set(IGNORABLE)):
-        refuse(ModelError, "ignore", ignore, f"must be a list of {', '.join(IGNORABLE)}")
+    ignored = check_kinds(ignore, IGNORABLE)
     given = {
         "torque_limit": torque_limit,
         "steering_stiffness": steering_stiffness,
@@ -66,7 +65,7 @@ def _read(
         }
     )
     place = Path(os.fsdecode(path))
-    tree = reader(place, ignore=frozenset(ignore))
+    tree = reader(place, ignore=ignored)
     join_massless_links(tree, free_base=bool(free_base))
     for link in tree.links.values():
         if link.parent is None and free_base is not None and link.joint.kind in ("fixed", "free"):

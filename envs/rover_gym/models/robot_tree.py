@@ -11,7 +11,7 @@ import numpy as np
 
 from rover_gym.mechanics import ModelError
 from rover_gym.models.file_axes import Array
-from rover_gym.validation import shown
+from rover_gym.validation import refuse, shown
 
 #: What would change the motion if it were left out, and is therefore refused unless `ignore` names it.
 IGNORABLE = ("friction", "actuators", "closed loops", "tendons", "springs", "fluid")
@@ -138,12 +138,24 @@ class RobotTree:
         return [link for link in self.links.values() if link.parent == name]
 
     def poses(self) -> dict[str, tuple[Array, Array]]:
-        """Rotation (3, 3) and origin (3,), m, of every link in the world, all joints at zero and roots as in the file."""
+        """Rotation (3, 3) and origin (3,), m, of every link in the world: joints at zero, roots as in the file."""
         found: dict[str, tuple[Array, Array]] = {}
         for link in self.links.values():
             R, p = found[link.parent] if link.parent is not None else (np.eye(3), np.zeros(3))
             found[link.name] = (R @ link.rotation, p + R @ link.position)
         return found
+
+
+def check_kinds(value: object, known: tuple[str, ...]) -> frozenset[str]:
+    """The kinds that an argument `ignore` names.
+
+    Raises:
+        ModelError: It is no collection of known kinds.
+    """
+    kinds = list(value) if isinstance(value, Collection) and not isinstance(value, str) else [None]
+    if not all(isinstance(kind, str) and kind in known for kind in kinds):
+        refuse(ModelError, "ignore", value, f"must be a list of {', '.join(known)}")
+    return frozenset(map(str, kinds))
 
 
 def refuse_in(path: Path, where: str, value: object, reason: str) -> NoReturn:

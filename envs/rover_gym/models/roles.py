@@ -77,8 +77,8 @@ def find_wheels(tree: RobotTree, up: Array, ahead: Array, wheels: Wheels, steeri
         link = tree.links[name]
         if link.joint.kind != "revolute":
             tree.refuse(f"link[{name}].joint", link.joint.kind, "the joint of a wheel must be revolute")
-        radius, shift = _size(tree, link, radius)
-        found.append(WheelRole(name, radius, shift, bool(axis(link) @ left > 0.0)))
+        measured, shift = _size(tree, link, radius)
+        found.append(WheelRole(name, measured, shift, bool(axis(link) @ left > 0.0)))
     names = [wheel.link for wheel in found]
     steers = _steering(tree, names, steering, {name: abs(float(axis(link) @ up)) for name, link in tree.links.items()})
     for wheel in found:
@@ -92,14 +92,13 @@ def resolve(tree: RobotTree, field: str, name: object) -> str:
     Raises:
         ModelError: There is neither.
     """
-    if isinstance(name, str):
-        if name in tree.links:
-            return name
-        for link in tree.links.values():
-            if link.joint.name == name:
-                return link.name
-    known = ", ".join(name for name, link in tree.links.items() if link.joint.kind == "revolute")
-    refuse(ModelError, field, name, f"there is no such link or joint in {tree.path}; turning are {known or 'none'}")
+    if isinstance(name, str) and name in tree.links:
+        return name
+    found = next((link.name for link in tree.links.values() if link.joint.name == name), None)
+    if found is None:
+        known = ", ".join(name for name, link in tree.links.items() if link.joint.kind == "revolute")
+        refuse(ModelError, field, name, f"there is no such link or joint in {tree.path}; turning are {known or 'none'}")
+    return found
 
 
 def _chosen(
@@ -162,11 +161,11 @@ def _size(tree: RobotTree, link: FileLink, radius: float | None) -> tuple[float,
         measured, reason = _mesh_size(link, meshes)
         if measured is not None:
             return (measured[0] if radius is None else radius), measured[1]
-    if radius is not None:
-        tree.assumed.append(f"wheel {link.name}: centred at its joint, since it {reason}")
-        return radius, 0.0
-    give = f"wheels={{{link.name!r}: radius}} with the names and radii of all wheels"
-    tree.refuse(f"link[{link.name}]", link.name, f"this wheel {reason}: give {give}")
+    if radius is None:
+        give = f"wheels={{{link.name!r}: radius}} with the names and radii of all wheels"
+        tree.refuse(f"link[{link.name}]", link.name, f"this wheel {reason}: give {give}")
+    tree.assumed.append(f"wheel {link.name}: centred at its joint, since it {reason}")
+    return radius, 0.0
 
 
 def _round_shape(link: FileLink) -> tuple[float, float] | None:
@@ -179,9 +178,9 @@ def _round_shape(link: FileLink) -> tuple[float, float] | None:
         along = float(off @ link.joint.axis)
         radius = shape.size[0]
         is_coaxial = shape.kind == "sphere" or abs(float(shape.rotation[:, 2] @ link.joint.axis)) > 1.0 - 1e-6
-        if is_coaxial and np.linalg.norm(off - along * link.joint.axis) <= ECCENTRIC * radius:
-            if best is None or radius > best[0]:
-                best = (radius, along)
+        is_centred = np.linalg.norm(off - along * link.joint.axis) <= ECCENTRIC * radius
+        if is_coaxial and is_centred and (best is None or radius > best[0]):
+            best = (radius, along)
     return best
 
 
@@ -239,9 +238,9 @@ def _steering(tree: RobotTree, wheels: list[str], steering: Steering, upright: d
                     found[wheel] = name
                     break
                 continue
-            link = tree.links[name]
-            is_upright = link.joint.kind == "revolute" and upright[name] > 1.0 - TILT
-            if is_upright and not others and link.joint.follows is None:
+            carrier = tree.links[name].joint
+            is_upright = carrier.kind == "revolute" and upright[name] > 1.0 - TILT
+            if is_upright and not others and carrier.follows is None:
                 found[wheel] = name
                 break
     if given is not None and (unused := [name for name in given if name not in found.values()]):

@@ -8,10 +8,10 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from rover_gym.mechanics import ModelError, RoverModel
+from rover_gym.mechanics import RoverModel
 from rover_gym.models.file_axes import Array, roll_pitch_yaw, turn_z_to
 from rover_gym.models.file_writing import WHEEL_WIDTH, WrittenSolid, text_of, write_xml, written_solids
-from rover_gym.validation import refuse
+from rover_gym.models.robot_tree import check_kinds
 
 #: What URDF cannot express and `ignore` may name.
 IGNORABLE = ("springs", "armature")
@@ -21,8 +21,7 @@ WORLD = "world"
 
 def write_urdf(model: RoverModel, path: object, *, ignore: Collection[str] = ()) -> None:
     """Writes a URDF; the arguments are those of `RoverModel.to_urdf`."""
-    if isinstance(ignore, str) or not isinstance(ignore, Collection) or set(ignore) - set(IGNORABLE):
-        refuse(ModelError, "ignore", ignore, f"must be a list of {', '.join(IGNORABLE)}")
+    ignore = check_kinds(ignore, IGNORABLE)
     description = model.to_dict()
     wheels = {wheel["solid"]: wheel for wheel in description["wheels"]}
     robot = ET.Element("robot", name=description["name"] or "robot")
