@@ -1,6 +1,6 @@
 """What a URDF may hold: its elements and attributes, checked before anything is read from them.
 
-Source: the XML specification of ROS's urdf package.
+The tables follow the XML specification of ROS's package urdf.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def parse(path: Path) -> tuple[Any, list[str]]:
         refuse_in(path, "line 1", root.tag, "is MJCF: read it with from_mjcf")
     if root.tag != "robot":
         refuse_in(path, f"line {root.sourceline}", root.tag, "a URDF's root element is <robot>")
-    if any("xacro" in space for space in root.nsmap.values()) and any("xacro" in str(one.tag) for one in root.iter()):
+    if any(one.prefix == "xacro" for one in root.iter()):
         refuse_in(path, "line 1", path.name, "has xacro macros: expand them with the program xacro first")
     n_elements = sum(1 for _ in root.iter())
     if n_elements > MAX_ELEMENTS:

@@ -14,7 +14,10 @@ const GALLERY: [(&str, &str); 5] = [
         "open-rover",
         include_str!("../../../models/open-rover.toml"),
     ),
-    ("husky", include_str!("../../../models/husky.toml")),
+    (
+        "skid-steered",
+        include_str!("../../../models/skid-steered.toml"),
+    ),
     (
         "four-steered",
         include_str!("../../../models/four-steered.toml"),
