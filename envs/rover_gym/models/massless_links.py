@@ -41,14 +41,14 @@ def join_massless_links(tree: RobotTree, *, free_base: bool) -> None:
 
 def _join(tree: RobotTree, link: FileLink, other: FileLink) -> None:
     R, p = link.rotation, link.position
+    other.inertia = other.inertia + R @ link.inertia @ R.T  # a file may state an inertia without a mass
     if link.mass > 0.0:
         centre = p + R @ link.centre
         mass = other.mass + link.mass
         together = (other.mass * other.centre + link.mass * centre) / mass
-        inertia = other.inertia + R @ link.inertia @ R.T
         for m, c in ((other.mass, other.centre), (link.mass, centre)):
-            inertia = inertia + m * _steiner(c - together)
-        other.mass, other.centre, other.inertia = mass, together, inertia
+            other.inertia = other.inertia + m * _steiner(c - together)
+        other.mass, other.centre = mass, together
     for shape in link.shapes:
         shape.position, shape.rotation = p + R @ shape.position, R @ shape.rotation
         other.shapes.append(shape)
