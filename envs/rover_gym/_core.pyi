@@ -250,13 +250,13 @@ class RoverModel:
     ) -> RoverModel:
         """Reads a URDF file.
 
-        The file's axes (x forward, y left, z up) are converted to ours (x forward, y up, z right) in
-        every frame. `import_report` says what was understood, assumed and left out.
+        The file's axes (x forward, y left, z up) are converted to ours (x forward, y up, z right)
+        in every frame. `import_report` says what was understood, assumed and left out.
 
         Args:
             path: Path of the file.
-            wheels: Names of the wheels' links or joints, or their radii by name, m. None: found from
-                shapes and names. An empty list: none.
+            wheels: Names of the wheels' links or joints, or their radii by name, m. None: found
+                from shapes and names. An empty list: none.
             steering: Names of the steering links or joints, or those of each wheel by its name.
                 None: found from their axes. An empty list: none.
             free_base: Whether the root moves freely; otherwise it is fixed to the world.
@@ -298,8 +298,8 @@ class RoverModel:
 
         Args:
             path: Path of the file.
-            wheels: Names of the wheels' bodies or joints, or their radii by name, m. None: found from
-                shapes and names. An empty list: none.
+            wheels: Names of the wheels' bodies or joints, or their radii by name, m. None: found
+                from shapes and names. An empty list: none.
             steering: Names of the steering bodies or joints, or those of each wheel by its name.
                 None: found from their axes. An empty list: none.
             free_base: Whether the root moves freely. None: as in the file.
@@ -315,8 +315,8 @@ class RoverModel:
             The model.
 
         Raises:
-            ModelError: MuJoCo refuses the file, it holds what cannot be simulated, or it leaves open
-                which bodies are wheels.
+            ModelError: MuJoCo refuses the file, it holds what cannot be simulated, or it leaves
+                open which bodies are wheels.
             ImportError: MuJoCo is not installed.
             OSError: The file cannot be read.
         """
