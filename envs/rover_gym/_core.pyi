@@ -1785,8 +1785,8 @@ class EpisodeRules:
         substeps: Physics steps of a control period.
         dt: Control period, s.
         torque_limits: Torque of a torque action of 1, (n_wheels,), N m.
-        max_steering: Set-point of a steering action of 1, rad; 0 if the wheels are not steered,
-            whose actions are then the torques alone: n_actions is n_wheels instead of 2 n_wheels.
+        max_steering: Set-point of a steering action of 1, rad. Actions have an entry for each
+            steering joint, in the order of the wheels, after the torques; none if this is 0.
         goal_tolerance: Distance within which the goal is reached, m.
         cos_max_tilt: Cosine of the tilt beyond which the rover has rolled over.
         stuck_time: Time until a high-centred rover ends the episode, s.

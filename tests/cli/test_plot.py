@@ -11,6 +11,7 @@ import h5py
 import matplotlib as mpl
 import numpy as np
 import pytest
+from machines import MACHINES
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
@@ -24,6 +25,7 @@ from rover_gym.figures.derived_signals import contact_velocities, motor_work, sl
 from rover_gym.figures.run_figures import DRAWINGS, drawable
 from rover_gym.figures.style import COLOURS, STYLE, WHEELS
 from rover_gym.figures.wheel_paths import footprints
+from rover_gym.figures.wheel_style import WheelStyle
 from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
 from rover_gym.reproduction import inclined_plane, sphere_rug
 
@@ -354,3 +356,24 @@ def test_without_matplotlib_the_error_names_the_extra(
     assert "pip install 'rover-gym[demo]'" in result.stderr
     assert len(result.stderr.splitlines()) == 1
     assert not (tmp_path / "plots").exists()
+
+
+@pytest.mark.parametrize("name", ["skid", "axle", "eight"])
+def test_figures_of_other_rovers_show_their_wheels(name: str, tmp_path: Path) -> None:
+    model = MACHINES[name][1]
+    simulation = Simulation(model)
+    simulation.set_wheel_torques([2.0] * len(model.wheel_names))
+    sampler = RoverSampler(model)
+    about = describe(simulation, "another rover")
+    with Recorder(tmp_path / "run.h5", sampler.channels, about, terrain=simulation.terrain) as recorder:
+        for _ in range(40):
+            step = simulation.step(2)
+            recorder.append(sampler.row(simulation, residual=step.residual, iterations=step.iterations))
+    run = read_run(tmp_path / "run.h5")
+    style = WheelStyle.of(run.model)
+    assert sorted(style.sides[0] + style.sides[1]) == sorted(model.wheel_names)
+    assert all(wheel in style.sides[0] for wheel in model.wheel_names if "L" in wheel)
+    left, right = drawn("wheel-gaps", run).axes
+    for wheel, gaps in zip(model.wheel_names, run.trajectory["wheel_gaps"].T, strict=True):
+        assert curves(left if "L" in wheel else right)[wheel] == pytest.approx(1e3 * gaps)
+    assert len(draw_run(run, tmp_path, file_format="svg")) >= 8

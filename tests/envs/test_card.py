@@ -189,6 +189,6 @@ def test_layout_splits_batches(env: RoverEnv) -> None:
 
 @pytest.mark.parametrize("gravity", [9.81, 3.72])
 def test_forces_are_measured_in_wheel_loads(env: RoverEnv, gravity: float) -> None:
-    layout = build_layout(env.model, gravity)
+    layout = build_layout(env.model, gravity, 0, env.task.n_actions)
     scale = layout.scale[layout["normal_force"]]
     np.testing.assert_allclose(scale, env.model.mass * gravity / 6)

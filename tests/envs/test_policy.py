@@ -40,7 +40,7 @@ def test_axles_meet_in_one_turning_centre(fraction: float) -> None:
     assert max(map(abs, angles)) <= POLICY._max_steering * (1.0 + 1e-12)
     for (x, z), angle in zip(CENTRES, angles, strict=True):
         # The centre, (x_c, -1 / curvature), lies on the axle: no part along the rolling direction.
-        along = (POLICY._x_c - x) * curvature * math.cos(angle) - (-1.0 - z * curvature) * math.sin(angle)
+        along = (POLICY._turning.x_c - x) * curvature * math.cos(angle) - (-1.0 - z * curvature) * math.sin(angle)
         assert abs(along) < 1e-12
         assert math.cos(angle) > 0.0
 

@@ -8,8 +8,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from rover_gym import CommandError, ModelError, OptionError, PDPolicy, RoverEnv, RoverModel
-from rover_gym.policy import CommandController
+from rover_gym import CommandError, OptionError, RoverEnv, RoverModel
 from rover_gym.vector import RoverVectorEnv
 
 ROCKS: dict[str, Any] = {"terrain": "sphere_field", "height_scan": (5, 3, 0.4), "difficulty": 0.8}
@@ -72,13 +71,13 @@ def test_a_snapshot_and_a_pickle_go_on_alike() -> None:
         RoverEnv().restore(env.snapshot())
 
 
-def test_a_model_without_steering_needs_it() -> None:
+def test_a_model_whose_steering_is_locked_does_not_steer() -> None:
     model = RoverModel()
     fixed = model.weld([model.dof_names[i] for i in model.steering_joint_indices])
     assert RoverEnv(model=fixed, steered=False).model.nv == 15
-    with pytest.raises(ModelError) as caught:
-        RoverEnv(model=fixed)
-    assert caught.value.field == "model.steering_joint_indices"
+    assert RoverEnv(model=fixed).action_space.shape == (6,)
+    half = model.weld([model.dof_names[i] for i in model.steering_joint_indices[:4]])
+    assert RoverEnv(model=half).action_space.shape == (8,)
 
 
 def test_what_needs_steering_is_refused() -> None:
@@ -86,10 +85,6 @@ def test_what_needs_steering_is_refused() -> None:
         RoverEnv(steered=False, max_steering_deg=10.0)
     assert caught.value.field == "max_steering_deg"
     env = RoverEnv(steered=False)
-    for policy in (PDPolicy, CommandController):
-        with pytest.raises(OptionError) as caught:
-            policy(env)
-        assert caught.value.field == "steered"
     env.reset(seed=0)
     for actions in (np.zeros(12), np.full(6, 1.5)):
         with pytest.raises(CommandError):

@@ -6,12 +6,11 @@ package's errors. Its string form is what the card prints under "may be".
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from rover_gym.env import rewards
-from rover_gym.env.wheels import N_WHEELS
 from rover_gym.mechanics import ModelError, OptionError, RoverModel, SphereField, TerrainError
 from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector
 
@@ -110,17 +109,15 @@ def check_gravity(field: str, value: object) -> tuple[float, ...]:
 
 
 def check_model(field: str, value: object) -> RoverModel:
-    """Checks a model, which must have the wheels that actions drive."""
+    """Checks a model: one free rover, with wheels whose joints move."""
     if not isinstance(value, RoverModel):
         refuse(ModelError, field, value, "must be a RoverModel")
-    check_joints(f"{field}.wheel_joint_indices", value.wheel_joint_indices)
+    if not value.wheel_names:
+        refuse(ModelError, f"{field}.wheels", [], "must have at least one wheel")
+    indices = value.wheel_joint_indices
+    if min(indices) < 0:
+        refuse(ModelError, f"{field}.wheel_joint_indices", indices, "must be joints that move")
     return value
-
-
-def check_joints(field: str, indices: Sequence[int]) -> None:
-    """Checks that there is a joint for every wheel, and that it moves."""
-    if len(indices) != N_WHEELS or min(indices) < 0:
-        refuse(ModelError, field, indices, f"must be {N_WHEELS} joints that move")
 
 
 def check_solver_options(field: str, value: object) -> Mapping[str, Any]:

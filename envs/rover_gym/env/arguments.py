@@ -119,7 +119,7 @@ class RoverArguments(TypedDict, total=False):
     ]
     steered: Annotated[
         bool,
-        Argument(True, Special("True or False", flag), "False: steering welded straight ahead, actions of six torques"),
+        Argument(True, Special("True or False", flag), "False: steering welded straight ahead, actions are torques"),
     ]
     max_steering_deg: Annotated[
         float | None,
@@ -172,7 +172,7 @@ class RoverArguments(TypedDict, total=False):
     time_step: Annotated[float, Argument(0.005, Number(at_least=MIN_TIME_STEP, at_most=1.0), "of the physics", "s")]
     model: Annotated[
         RoverModel | None,
-        Argument(None, Special("a `RoverModel` with six driven, steered wheels", check_model), "None: `RoverModel()`"),
+        Argument(None, Special("a `RoverModel` with wheels that turn", check_model), "None: `RoverModel()`"),
     ]
     solver_options: Annotated[
         Mapping[str, Any] | None,

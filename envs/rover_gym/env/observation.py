@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.env.wheels import N_ACTIONS, N_WHEELS
 from rover_gym.mechanics import RoverModel, StateError
 from rover_gym.validation import array, refuse
 
-# Scales in m, rad/s and m. Forces are scaled by the mean wheel load, m g / 6.
+# Scales in m, rad/s and m. Forces are scaled by the mean wheel load, m g / n.
 GAP_SCALE = 0.1
 WHEEL_RATE_SCALE = 10.0
 GOAL_SCALE = 10.0
@@ -110,12 +109,10 @@ class ObservationLayout(Mapping[str, slice]):
         return {field.name: values[..., field.slice].copy() for field in self.fields}
 
 
-def build_layout(
-    model: RoverModel, gravity_magnitude: float, n_scan: int = 0, n_actions: int = N_ACTIONS
-) -> ObservationLayout:
+def build_layout(model: RoverModel, gravity_magnitude: float, n_scan: int, n_actions: int) -> ObservationLayout:
     """Builds the layout of `Rover-v0` for a model, a gravity magnitude (m/s2) and a height scan of `n_scan` points."""
-    nq, nv = model.nq, model.nv
-    wheel_load = model.mass * gravity_magnitude / N_WHEELS
+    nq, nv, n = model.nq, model.nv, len(model.wheel_names)
+    wheel_load = model.mass * gravity_magnitude / n
 
     # The trunk's six velocities come first, then the joints in the order of q.
     velocity_scale = [1.0] * nv
@@ -126,16 +123,10 @@ def build_layout(
     rows: list[tuple[str, str, list[float], tuple[float, float], str]] = [
         ("q", "m, rad", [1.0] * nq, any_number, "trunk x, y, z, roll, heading, pitch; joint angles"),
         ("velocity", "m/s, rad/s", velocity_scale, any_number, "trunk linear, angular in its frame; joint rates"),
-        ("wheel_gap", "m", [GAP_SCALE] * N_WHEELS, any_number, "distance of each wheel to ground and rocks"),
-        ("wheel_contact", "", [1.0] * N_WHEELS, (0.0, 1.0), "1 where the gap is at most 1 mm, else 0"),
-        (
-            "normal_force",
-            "N",
-            [wheel_load] * N_WHEELS,
-            any_number,
-            "ground or rock on wheel, along the contact's normal",
-        ),
-        ("tangential_force", "N", [wheel_load] * 2 * N_WHEELS, any_number, "the same, rolling then lateral"),
+        ("wheel_gap", "m", [GAP_SCALE] * n, any_number, "distance of each wheel to ground and rocks"),
+        ("wheel_contact", "", [1.0] * n, (0.0, 1.0), "1 where the gap is at most 1 mm, else 0"),
+        ("normal_force", "N", [wheel_load] * n, any_number, "ground or rock on wheel, along the contact's normal"),
+        ("tangential_force", "N", [wheel_load] * 2 * n, any_number, "the same, rolling then lateral"),
         ("ground_normal", "", [1.0] * 3, (-1.0, 1.0), "the normal of the ground plane in the trunk frame"),
         ("goal", "m", [GOAL_SCALE] * 2, any_number, "goal ahead and to the right of the trunk, horizontal"),
         ("goal_distance", "m", [GOAL_SCALE], no_less, "horizontal distance to the goal"),

@@ -17,7 +17,7 @@ class Progress:
         trunk_load_limit: Trunk force beyond which the rover is high-centred, N.
         difficulty: Difficulty of the rocks.
         distance: Horizontal distance to the goal, m.
-        previous_action: `(12,)` last action.
+        previous_action: `(n_actions,)` last action.
         energy: Motor work since reset, braking counted, J.
         energy_positive: Motor work since reset, driving only, J.
         stuck_time: How long the rover has been high-centred, s.

@@ -1,4 +1,4 @@
-"""`Rover-v0`: drive a six-wheel rover to a goal. The class docstring is the environment's card."""
+"""`Rover-v0`: drive a rover to a goal. The class docstring is the environment's card."""
 
 import copy
 from dataclasses import asdict
@@ -62,6 +62,13 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
 
     With `steered=False` nothing steers: the steering joints are welded straight ahead, the rover has 15 degrees of
     freedom, a step costs less, and an action is its six torques, `Box(-1, 1, (6,), float32)`.
+
+    ## Other rovers
+
+    Any `RoverModel` with wheels that turn drives here; this card describes the built-in one. An action has a torque for
+    each wheel, in the model's order, then a set-point for each joint that steers, in the order of its wheels: wheels
+    on a common steering joint share one. Observation, scales (m g over the number of wheels), rewards (means over the
+    wheels, and over the joints that steer) and policies follow; `observation_layout` has the fields and their sizes.
 
     ## Motors
 

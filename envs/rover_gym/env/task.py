@@ -9,12 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env import rewards
-from rover_gym.env.argument_checks import check_joints
 from rover_gym.env.observation import ObservationLayout, build_layout
 from rover_gym.env.randomisation import Domain, DomainDistribution
 from rover_gym.env.rocks import MAX_GOAL_DISTANCE, RockDistribution, rock_distribution
 from rover_gym.env.start import StartDistribution, slope_of
-from rover_gym.env.wheels import N_ACTIONS, N_WHEELS
+from rover_gym.env.wheels import Steering
 from rover_gym.mechanics import (
     CommandError,
     EpisodeDistribution,
@@ -44,8 +43,8 @@ class Task:
 
     Attributes:
         model: The rover, before its masses are scaled; its steering is welded where it is not steered.
-        steered: Whether the wheels are steered.
-        n_actions: Entries of an action: a torque per wheel, then a set-point per wheel if they are steered.
+        steering: The steering entries of an action; none where nothing steers.
+        n_actions: Entries of an action: a torque for each wheel, then a set-point for each joint that steers.
         field: The given field, which is the ground of every episode; None without one.
         rocks: Distribution of the rock fields; None without rocks.
         slope_by_difficulty: Whether the rocks' difficulty sets the slope of the ground.
@@ -57,14 +56,14 @@ class Task:
         substeps: Physics steps per control period.
         dt: Control period, s.
         simulation_options: Keyword arguments of `Simulation`.
-        max_steering: Set-point of a steering action of 1, rad; 0 where the wheels are not steered.
+        max_steering: Set-point of a steering action of 1, rad; 0 where nothing steers.
         layout: Layout of the observation.
         rules: What the core needs to run an episode.
         episodes: What the core draws episodes from.
     """
 
     model: RoverModel
-    steered: bool
+    steering: Steering
     n_actions: int
     field: SphereField | None
     rocks: RockDistribution | None
@@ -138,8 +137,8 @@ def make_task(given: Mapping[str, Any]) -> Task:
     )
     step = given["time_step"]
     substeps = _substeps(given["control_frequency"], step)
-    steered = given["steered"]
-    rover = _rover(model, steered=steered)
+    rover = _rover(model, steered=given["steered"])
+    steering = Steering.of(rover)
     gravity = given["gravity"]
     options = {
         "gravity": gravity,
@@ -150,9 +149,9 @@ def make_task(given: Mapping[str, Any]) -> Task:
     }
     simulation = Simulation(rover, Plane(), **options)  # the core validates the simulation options
     points = None if scan is None else scan.offsets
-    n_actions = N_ACTIONS if steered else N_WHEELS
+    n_actions = len(rover.wheel_names) + len(steering.joints)
     layout = build_layout(rover, math.hypot(*gravity), 0 if points is None else len(points), n_actions)
-    max_steering = _steering_limit(rover, given["max_steering_deg"], steered=steered)
+    max_steering = _steering_limit(rover, steering, given["max_steering_deg"])
     weights = dict(rewards.WEIGHTS) if given["reward_weights"] is None else given["reward_weights"]
     rules = EpisodeRules(
         rover,
@@ -181,7 +180,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
     )
     return Task(
         model=rover,
-        steered=steered,
+        steering=steering,
         n_actions=n_actions,
         field=field,
         rocks=rocks,
@@ -217,30 +216,24 @@ def _rover(model: RoverModel | None, *, steered: bool) -> RoverModel:
     """The rover to simulate, with its steering joints welded where it is not steered."""
     rover = RoverModel() if model is None else model
     if steered:
-        check_joints("model.steering_joint_indices", rover.steering_joint_indices)
         return rover
     return rover.weld([rover.dof_names[i] for i in rover.steering_joint_indices if i >= 0])
 
 
-def _steering_limit(rover: RoverModel, asked_deg: float | None, *, steered: bool) -> float:
-    """Set-point of a steering action of 1, rad, which must be within every wheel's limit; 0 without steering."""
-    if not steered:
+def _steering_limit(rover: RoverModel, steering: Steering, asked_deg: float | None) -> float:
+    """Set-point of a steering action of 1, rad, which must be within every steered wheel's limit; 0 without any."""
+    if not steering.joints:
         if asked_deg is not None:
-            refuse(OptionError, "max_steering_deg", asked_deg, "needs steered=True")
+            refuse(OptionError, "max_steering_deg", asked_deg, "needs wheels that steer")
         return 0.0
-    limit: float = min(wheel["steering_limit"] for wheel in rover.to_dict()["wheels"])
+    wheels = zip(rover.to_dict()["wheels"], steering.entries, strict=True)
+    limit: float = min(wheel["steering_limit"] for wheel, entry in wheels if entry >= 0)
     if asked_deg is None:
         return limit
     if math.radians(asked_deg) > limit * (1.0 + 1e-12):
         reason = f"must be at most the model's limit, {math.degrees(limit):g}"
         refuse(OptionError, "max_steering_deg", asked_deg, reason)
     return min(limit, math.radians(asked_deg))
-
-
-def check_steered(task: Task) -> None:
-    """Refuses a task without steering to a policy that steers."""
-    if not task.steered:
-        refuse(OptionError, "steered", False, "must be True for a policy that steers")
 
 
 def check_actions(actions: object, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:

@@ -14,13 +14,10 @@ from rover_gym.figures.signals import SMOOTHED, WINDOW, extremes, finite, linear
 from rover_gym.figures.style import (
     DARK,
     QUANTITY_COLOURS,
-    SIDES,
-    WHEELS,
     panel_legend,
-    plot_wheels,
     title,
-    wheel_legend,
 )
+from rover_gym.figures.wheel_style import WheelStyle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,43 +33,50 @@ SET_POINT: dict[str, Any] = {"linestyle": (0, (1, 1.5)), "linewidth": 1.0}
 
 def wheel_gaps(figure: Sheet, run: RoverRun) -> None:
     """Gap between each wheel and the ground, left and right wheels in separate panels."""
+    style = WheelStyle.of(run.model)
     panels = figure.subplots(2, 1, sharex=True, sharey=True)
     gaps = 1e3 * finite(run.trajectory["wheel_gaps"])
-    for axes, wheels, name in zip(panels, SIDES, ("left", "right"), strict=True):
+    for axes, wheels, name in zip(panels, style.sides, ("left", "right"), strict=True):
         axes.axhline(0.0, color=DARK, linewidth=0.6)
-        plot_wheels(axes, run.time, gaps, wheels, nested=True)
+        style.plot(axes, run.time, gaps, wheels, nested=True)
         axes.set(ylabel=f"gap, {name} wheels (mm)")
     linear_then_log(panels[0], 10.0, *extremes(gaps, -1.0, 1.0))
     panels[1].set(xlabel="time (s)")
     title(figure, "Gaps between wheels and ground, negative where they overlap", run)
-    wheel_legend(figure)
+    style.legend(figure)
 
 
 def wheel_loads(figure: Sheet, run: RoverRun) -> None:
     """Normal force on each wheel, left and right wheels in separate panels."""
+    style = WheelStyle.of(run.model)
     panels = figure.subplots(2, 1, sharex=True, sharey=True)
     forces = finite(run.trajectory["wheel_forces"][:, :, 0])
     gravity = run.trajectory.attributes.get("solver", {}).get("gravity", (0.0, -9.81, 0.0))
-    share = run.model.mass * float(np.linalg.norm(gravity)) / len(WHEELS)
-    for axes, wheels, name in zip(panels, SIDES, ("left", "right"), strict=True):
+    share = run.model.mass * float(np.linalg.norm(gravity)) / len(run.model.wheel_names)
+    for axes, wheels, name in zip(panels, style.sides, ("left", "right"), strict=True):
         axes.axhline(share, color=DARK, linewidth=0.8, linestyle=(0, (4, 3)))
-        plot_raw_and_smooth(axes, run.time, forces, wheels)
+        plot_raw_and_smooth(axes, style, run.time, forces, wheels)
         axes.set(ylabel=f"load, {name} wheels (N)")
     _, largest = extremes(forces, 0.0, 0.0)
     linear_then_log(panels[0], round_up(max(1.8 * share, LEAST_LOAD)), 0.0, largest)
     panels[1].set(xlabel="time (s)")
     title(figure, f"Normal force on the wheels, mean over {_averaged(run)}", run)
-    wheel_legend(figure, {f"a sixth of the weight, {share:.4g} N": {"color": DARK, "linestyle": (0, (4, 3))}}, SMOOTHED)
+    style.legend(
+        figure,
+        {f"{style.share} of the weight, {share:.4g} N": {"color": DARK, "linestyle": (0, (4, 3))}},
+        SMOOTHED,
+    )
 
 
 def slip(figure: Sheet, run: RoverRun) -> None:
     """Sliding speed of each loaded wheel, and the mean slip ratio."""
+    style = WheelStyle.of(run.model)
     left, right, below = figure.subplots(3, 1, sharex=True)
     right.sharey(left)
     u = contact_velocities(run)
     sliding = 1e3 * np.hypot(u[..., 1], u[..., 2])
-    for axes, wheels, name in zip((left, right), SIDES, ("left", "right"), strict=True):
-        plot_raw_and_smooth(axes, run.time, sliding, wheels)
+    for axes, wheels, name in zip((left, right), style.sides, ("left", "right"), strict=True):
+        plot_raw_and_smooth(axes, style, run.time, sliding, wheels)
         axes.set(ylabel=f"sliding,\n{name} wheels (mm/s)")
     largest = float(np.nanmax(sliding, initial=0.0))
     # Rolling wheels creep by the solver's tolerance: an axis in nm/s would show nothing else.
@@ -86,7 +90,7 @@ def slip(figure: Sheet, run: RoverRun) -> None:
     below.set(xlabel="time (s)", ylabel="slip ratio (%)", ylim=(-0.05, 1.05 * max(float(ratios.max()), 1.0)))
     panel_legend(below)
     title(figure, "Sliding of loaded wheels at the ground", run)
-    wheel_legend(figure, note=SMOOTHED)
+    style.legend(figure, note=SMOOTHED)
 
 
 def attitude(figure: Sheet, run: RoverRun) -> None:
@@ -111,17 +115,18 @@ def attitude(figure: Sheet, run: RoverRun) -> None:
 
 def torques(figure: Sheet, run: RoverRun) -> None:
     """Driving torques, and steering angles with their set-points, left and right wheels in separate panels."""
+    style = WheelStyle.of(run.model)
     panels = figure.subplots(2, 2, sharex=True, sharey="row")
     trajectory = run.trajectory
     columns = np.array(run.model.steering_joint_indices)
     steering = np.degrees(trajectory["q"][:, columns])
     steering[:, columns < 0] = np.nan  # welded, or a wheel without a steering joint
-    for (drive, steer), wheels, name in zip(panels.T, SIDES, ("left", "right"), strict=True):
+    for (drive, steer), wheels, name in zip(panels.T, style.sides, ("left", "right"), strict=True):
         # A command holds until the row that shows it.
-        plot_wheels(drive, run.time, trajectory["wheel_torques"], wheels, nested=True, drawstyle="steps-pre")
-        plot_wheels(steer, run.time, steering, wheels, nested=True)
+        style.plot(drive, run.time, trajectory["wheel_torques"], wheels, nested=True, drawstyle="steps-pre")
+        style.plot(steer, run.time, steering, wheels, nested=True)
         for wheel in wheels:
-            i = WHEELS.index(wheel)
+            i = run.model.wheel_names.index(wheel)
             set_point = np.degrees(trajectory["steering_set_points"][:, i])
             steer.plot(run.time, set_point, color=DARK, label=f"_{wheel} set-point", drawstyle="steps-pre", **SET_POINT)
         drive.set(title=f"{name} wheels")
@@ -133,7 +138,7 @@ def torques(figure: Sheet, run: RoverRun) -> None:
     panels[0, 0].set_ylim(min(low, -margin), max(high, margin))  # include zero, as a reference for a constant torque
     _at_least(panels[1, 0], 1.0)
     title(figure, "Driving torques and steering", run)
-    wheel_legend(figure, {"steering set-point": {"color": DARK, **SET_POINT}})
+    style.legend(figure, {"steering set-point": {"color": DARK, **SET_POINT}})
 
 
 def energy(figure: Sheet, run: RoverRun) -> None:

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rover_gym.figures import run_curves as curves
 from rover_gym.figures.saving import check_format, save_figures
-from rover_gym.figures.style import WHEELS, WIDTH
+from rover_gym.figures.style import WIDTH
 from rover_gym.figures.wheel_paths import path_from_above
-from rover_gym.record.trajectory_format import RecordingError
-from rover_gym.validation import refuse
 
 if TYPE_CHECKING:
     from rover_gym.figures.style import Sheet
@@ -65,12 +63,9 @@ def draw_run(run: RoverRun, folder: str | Path, *, file_format: str = "png", wit
 
     Raises:
         OptionError: The file format is unknown.
-        RecordingError: The rover does not have the wheels that the figures show.
         MissingExtraError: matplotlib is not installed.
     """
     check_format(file_format)
-    if sorted(run.model.wheel_names) != sorted(WHEELS):
-        refuse(RecordingError, "wheels", run.model.wheel_names, f"figures are drawn of {', '.join(WHEELS)} only")
     paths = []
     for name, drawing in drawable(run).items():
         one = {name: partial(_fill, draw=drawing.draw, run=run)}

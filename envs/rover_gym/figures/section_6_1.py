@@ -14,9 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.figures.saving import save_figures
-from rover_gym.figures.style import COLOURS, NAMES, QUANTITY_COLOURS, WHEELS, plot_wheels, step_size
+from rover_gym.figures.style import COLOURS, NAMES, QUANTITY_COLOURS, WHEELS, step_size
+from rover_gym.figures.wheel_style import WheelStyle
 from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.reproduction.inclined_plane import reference_data
+from rover_gym.reproduction.report_rover import report_model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,7 +72,7 @@ def wheel_traces(figure: Figure, trajectory: Trajectory) -> None:
 def contact_distances(figure: Figure, trajectory: Trajectory) -> None:
     """Figure 6.3: the six gaps against time, with a close view of the ground."""
     ours, published = figure.subplots(1, 2, sharey=True, sharex=True)
-    plot_wheels(ours, trajectory["time"], 100.0 * trajectory["wheel_gaps"])
+    WheelStyle.of(report_model()).plot(ours, trajectory["time"], 100.0 * trajectory["wheel_gaps"])
     _plot_siconos(ours, "gap", 100.0)
     _plot_published(published, "fig_6_3_gaps")
     ours.set(
@@ -112,7 +114,7 @@ def steering_angles(figure: Figure, trajectory: Trajectory) -> None:
     """Figure 6.5: the six steering angles against time."""
     columns = [7, 8, 12, 13, 17, 18]
     ours, published = figure.subplots(1, 2, sharex=True)
-    plot_wheels(ours, trajectory["time"], trajectory["q"][:, columns])
+    WheelStyle.of(report_model()).plot(ours, trajectory["time"], trajectory["q"][:, columns])
     _plot_siconos(ours, "steering")
     _plot_published(published, "fig_6_5_steering")
     ours.set(

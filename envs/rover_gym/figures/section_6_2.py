@@ -10,7 +10,8 @@ import numpy as np
 
 from rover_gym.figures.saving import save_figures
 from rover_gym.figures.signals import SMOOTHED, linear_then_log, plot_raw_and_smooth
-from rover_gym.figures.style import COLOURS, NAMES, SIDES, WHEELS, circle, close_up, plot_wheels, step_size
+from rover_gym.figures.style import COLOURS, NAMES, SIDES, WHEELS, circle, close_up, step_size
+from rover_gym.figures.wheel_style import WheelStyle
 from rover_gym.mechanics import SphereField
 from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.reproduction.report_rover import WHEEL_RADIUS, report_model
@@ -70,7 +71,7 @@ def contact_distances(figure: Figure, trajectory: Trajectory) -> None:
     """Section 6.2: the six gaps against time, left and right wheels in separate panels."""
     panels = figure.subplots(1, 2, sharey=True, sharex=True)
     for axes, wheels, name in zip(panels, SIDES, ("left", "right"), strict=True):
-        plot_wheels(axes, trajectory["time"], 100.0 * trajectory["wheel_gaps"], wheels)
+        WheelStyle.of(report_model()).plot(axes, trajectory["time"], 100.0 * trajectory["wheel_gaps"], wheels)
         axes.set(
             title=f"{name} wheels, step {step_size(trajectory)}", xlabel="time (s)", xlim=(0.0, 25.0), ylim=(-1.0, 5.0)
         )
@@ -83,7 +84,9 @@ def reaction_forces(figure: Figure, trajectory: Trajectory) -> None:
     """Section 6.2: normal force on each wheel against time, left and right wheels in separate panels."""
     panels = figure.subplots(1, 2, sharey=True, sharex=True)
     for axes, wheels, name in zip(panels, SIDES, ("left", "right"), strict=True):
-        plot_raw_and_smooth(axes, trajectory["time"], trajectory["wheel_forces"][:, :, 0], wheels)
+        plot_raw_and_smooth(
+            axes, WheelStyle.of(report_model()), trajectory["time"], trajectory["wheel_forces"][:, :, 0], wheels
+        )
         axes.set(title=f"{name} wheels, mean over each step of {step_size(trajectory)}", xlabel="time (s)")
         axes.set_xlim(0.0, 25.0)
         axes.legend(loc="upper right", title=SMOOTHED.replace("; ", "\n"), title_fontsize=8.0)

@@ -7,24 +7,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rover_gym.figures.derived_signals import Array, smooth
-from rover_gym.figures.style import COLOURS, WHEELS, plot_wheels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from rover_gym.figures.wheel_style import WheelStyle
 
 WINDOW = 0.5  # s, smoothing window: a few periods of the contact chatter, far less than a manoeuvre
 SMOOTHED = f"bold: smoothed over {WINDOW:g} s; light: every sample"
 
 
-def plot_raw_and_smooth(axes: Axes, time: Array, values: Array, wheels: tuple[str, ...]) -> None:
-    """Draws every sample as a light line, and the smoothed curve; values (n, 6)."""
+def plot_raw_and_smooth(axes: Axes, style: WheelStyle, time: Array, values: Array, wheels: tuple[str, ...]) -> None:
+    """Draws every sample as a light line, and the smoothed curve; values (n, n_wheels)."""
     measured = np.array(values)
     measured[0] = np.nan  # no step had been taken
     smoothed = smooth(time, measured, WINDOW)
     for wheel in wheels:
-        i = WHEELS.index(wheel)
-        axes.plot(time, values[:, i], color=COLOURS[wheel], linewidth=0.5, alpha=0.35, label=f"_{wheel} samples")
-    plot_wheels(axes, time, smoothed, wheels)
+        i = style.names.index(wheel)
+        axes.plot(time, values[:, i], color=style.colours[wheel], linewidth=0.5, alpha=0.35, label=f"_{wheel} samples")
+    style.plot(axes, time, smoothed, wheels)
 
 
 def finite(values: Array) -> Array:

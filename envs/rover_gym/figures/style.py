@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.extras import require
 from rover_gym.record.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -68,16 +66,6 @@ def title(figure: Sheet, what: str, run: RoverRun) -> None:
     figure.suptitle(f"{what}\n{plain(run.title)}{broken_off}")
 
 
-def wheel_legend(figure: Sheet, others: Mapping[str, Mapping[str, Any]] | None = None, note: str | None = None) -> None:
-    """One legend below the figure: left wheels over right ones, other lines by their style, a note on the lines."""
-    lines = require("matplotlib.lines", "demo")
-    pairs = [wheel for pair in zip(*SIDES, strict=True) for wheel in pair]
-    entries = {NAMES[wheel]: {"color": COLOURS[wheel]} for wheel in pairs} | dict(others or {})
-    handles = [lines.Line2D([], [], label=label, **style) for label, style in entries.items()]
-    columns = (len(handles) + 1) // 2
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, title=note, title_fontsize=9.0)
-
-
 def panel_legend(axes: Axes) -> None:
     """The legend of one panel, in a row above it, where it covers no curve."""
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, borderaxespad=0.1)
@@ -94,19 +82,6 @@ def close_up(axes: Axes, x: npt.NDArray[np.float64], y: npt.NDArray[np.float64],
     axes.set_xlim(x.min() - margin, x.max() + margin)
     axes.set_ylim(y.min() - margin, y.max() + margin)
     axes.set_aspect("equal", adjustable="box")
-
-
-def plot_wheels(
-    axes: Axes, time: Any, values: Any, wheels: tuple[str, ...] = WHEELS, *, nested: bool = False, **style: Any
-) -> None:
-    """Draws one line per wheel, in its colour: values (n, 6) over time (n,), s.
-
-    Nested lines are wide for the back wheels and narrow for the front ones on top, so that coinciding curves all stay
-    visible.
-    """
-    for wheel in reversed(wheels) if nested else wheels:
-        width: dict[str, Any] = {"linewidth": NESTED_WIDTHS[wheel[0]]} if nested else {}
-        axes.plot(time, values[:, WHEELS.index(wheel)], color=COLOURS[wheel], label=NAMES[wheel], **width, **style)
 
 
 def step_size(trajectory: Trajectory) -> str:

@@ -8,7 +8,8 @@ import numpy as np
 
 from rover_gym.extras import require
 from rover_gym.figures.derived_signals import Array
-from rover_gym.figures.style import COLOURS, NESTED_WIDTHS, WHEELS, title, wheel_legend
+from rover_gym.figures.style import title
+from rover_gym.figures.wheel_style import WheelStyle
 from rover_gym.mechanics import Plane, SphereField
 
 if TYPE_CHECKING:
@@ -46,9 +47,11 @@ def path_from_above(figure: Sheet, run: RoverRun) -> None:
     others: dict[str, dict[str, Any]] = {}
     if isinstance(run.terrain, SphereField):
         _draw_spheres(figure, axes, run.terrain)
-    for wheel in reversed(WHEELS):  # wide tracks for the back wheels, narrow ones for the front wheels on top
-        x, _, z = centres[:, WHEELS.index(wheel)].T
-        axes.plot(z, x, color=COLOURS[wheel], linewidth=NESTED_WIDTHS[wheel[0]], label=f"_{wheel} track")
+    wheels = WheelStyle.of(run.model)
+    # Wide tracks for the back wheels, narrow ones for the front wheels on top.
+    for wheel in sorted(wheels.names, key=lambda name: -wheels.widths[name]):
+        x, _, z = centres[:, wheels.names.index(wheel)].T
+        axes.plot(z, x, color=wheels.colours[wheel], linewidth=wheels.widths[wheel], label=f"_{wheel} track")
     axes.plot(trunk[:, 2], trunk[:, 0], color="black", linewidth=1.0, label="_trunk")
     others["trunk's origin"] = {"color": "black", "linewidth": 1.0}
     axes.plot(trunk[0, 2], trunk[0, 0], "o", color="black", markersize=6, zorder=4, label="_start")
@@ -61,7 +64,7 @@ def path_from_above(figure: Sheet, run: RoverRun) -> None:
     others["heading"] = {"marker": "$\u2192$", "color": "black", "linestyle": "none", "markersize": 9}
     axes.set(xlabel="to the right, z (m)", ylabel="forward, x (m)")
     title(figure, f"The way from above, {run.time[-1] - run.time[0]:.3g} s{_slope(run.terrain)}", run)
-    wheel_legend(figure, others)
+    wheels.legend(figure, others)
 
 
 def footprints(field: SphereField) -> Footprints:

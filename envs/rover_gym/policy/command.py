@@ -8,8 +8,9 @@ of a wheel at `(x, z)` from that point, divided by `v`, is
     left     l = sin(beta) + kappa x
 
 The wheel is steered to `delta = atan2(l, a)`, within the steering limit, and its rim speed is
-`v (a cos(delta) + l sin(delta))`. With beta = 0 these are `PDPolicy`'s formulas. The torques come from the same wheel
-speed controller, with a feedforward of the force that holds the rover on a slope.
+`v (a cos(delta) + l sin(delta))`. A wheel that does not steer has delta = 0. With beta = 0 these are `PDPolicy`'s
+formulas. The torques come from the same wheel speed controller, with a feedforward of the force that holds the rover
+on a slope.
 
 A policy's action is the command itself, or an offset from the command of a guide that ignores rocks: full speed along
 the circle that is tangential to the heading and passes through the goal (pure pursuit).
@@ -23,9 +24,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.task import check_steered
-from rover_gym.env.wheels import N_ACTIONS, N_WHEELS, drive_signs, wheel_centres
 from rover_gym.mechanics import OptionError, atan2, sin_cos
+from rover_gym.policy.turning import SCRUB_RATE, WIDENING, YAW, Turning
 from rover_gym.validation import flag, number, refuse
 
 Array = npt.NDArray[np.float64]
@@ -60,7 +60,7 @@ class CommandLimits:
 
 
 class CommandController:
-    """Turns commands `(n, 3)` in [-1, 1] into actions `(n, 12)` of `Rover-v0`.
+    """Turns commands `(n, 3)` in [-1, 1] into actions `(n, n_actions)` of `Rover-v0`.
 
     Args:
         rover: The environment, read once for the layout and the rover's constants.
@@ -71,7 +71,6 @@ class CommandController:
     def __init__(self, rover: RoverEnv, limits: CommandLimits | None = None, *, guided: bool = True) -> None:
         if limits is not None and not isinstance(limits, CommandLimits):
             refuse(OptionError, "limits", limits, "must be CommandLimits")
-        check_steered(rover.task)
         self.limits = CommandLimits() if limits is None else limits
         self.guided = flag("guided", guided)
         layout, model = rover.observation_layout, rover.model
@@ -79,20 +78,29 @@ class CommandController:
         self._pitch = q + 5
         self._goal = layout["goal"]
         self._goal_scale = layout.scale[self._goal]
-        self._steering = np.array([q + i for i in model.steering_joint_indices])
+        weight = model.mass * math.hypot(*rover.gravity)
+        turning = Turning.of(model, weight, rover.dt)
+        self._entries = np.array(turning.steering.entries)
+        self._steered_wheels = turning.steering.wheels
+        self._steering = np.array([q + i for i in turning.steering.joints], dtype=np.intp)
+        self._skids = turning.skids
+        self._widening = WIDENING if turning.skids else 1.0
+        self._yaw_rate = velocity + YAW
+        self._yaw_gain, self._scrub = np.array(turning.yaw_gain), np.array(turning.scrub)
         self._rates = np.array([velocity + i for i in model.wheel_joint_indices])
         self._rate_scale = layout.scale[self._rates]
-        centres = wheel_centres(model)
-        self._x = centres[:, 0] - 0.5 * (centres[:, 0].min() + centres[:, 0].max())
-        self._z = centres[:, 1]
-        self._rim_per_rate = model.wheel_radii * drive_signs(model)
+        self._x, self._z = np.array(turning.wheels).T
+        self._rim_per_rate = np.array(turning.rim_per_rate)
         self._lever = model.wheel_radii / model.wheel_torque_limits
         self._max_steering = rover.max_steering
-        self._inertia = model.mass / N_WHEELS / self.limits.response
-        self._load = model.mass * math.hypot(*rover.gravity) / N_WHEELS
+        self._n_wheels = len(turning.wheels)
+        self._n_actions = rover.task.n_actions
+        inertia = model.mass / self._n_wheels / self.limits.response
+        self._inertia = np.minimum(inertia, turning.most_gain)
+        self._load = weight / self._n_wheels
 
     def act(self, observations: npt.NDArray[Any], commands: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
-        """The actions `(n, 12)` for observations `(n, size)`, scaled as the environment returns them."""
+        """The actions `(n, n_actions)` for observations `(n, size)`, scaled as the environment returns them."""
         seen = observations.astype(np.float64, copy=False)
         command = np.clip(commands.astype(np.float64, copy=False), -1.0, 1.0)
         if self.guided:
@@ -102,21 +110,35 @@ class CommandController:
         sideways = math.radians(self.limits.sideways_deg) * command[:, 2:3]
 
         sine, cosine = sin_cos(sideways)
-        ahead = cosine + curvature * self._z
+        ahead = cosine + self._widening * curvature * self._z
         left = sine + curvature * self._x
-        angles = np.clip(atan2(left, ahead), -self._max_steering, self._max_steering)
+        set_points = self._set_points(atan2(left, ahead))
         # Slow down until the wheels reach their steering angles; otherwise they scrub and the path deviates.
-        off = np.abs(angles - seen[:, self._steering]).max(axis=1, keepdims=True)
+        off = np.abs(set_points - seen[:, self._steering]).max(axis=1, keepdims=True, initial=0.0)
         speed = speed * np.maximum(0.2, 1.0 - 2.0 * off)
+        # A wheel that does not steer takes the zero that follows the set-points.
+        angles = np.concatenate((set_points, np.zeros((len(seen), 1))), axis=1)[:, self._entries]
         sine, cosine = sin_cos(angles)
         wanted = speed * (ahead * cosine + left * sine)
 
         rim = self._rim_per_rate * self._rate_scale * seen[:, self._rates]
-        hold = self._load * sin_cos(seen[:, self._pitch, None])[0]
-        actions = np.empty((len(seen), N_ACTIONS), dtype=np.float32)
-        actions[:, :N_WHEELS] = np.clip(self._lever * (hold + self._inertia * (wanted - rim)), -1.0, 1.0)
-        actions[:, N_WHEELS:] = np.clip(angles / self._max_steering, -1.0, 1.0)
+        force = self._load * sin_cos(seen[:, self._pitch, None])[0]
+        if self._skids:
+            yaw_rate = speed * curvature
+            missing = yaw_rate - seen[:, self._yaw_rate, None]
+            force = force + self._yaw_gain * missing + self._scrub * np.clip(yaw_rate / SCRUB_RATE, -1.0, 1.0)
+        actions = np.empty((len(seen), self._n_actions), dtype=np.float32)
+        actions[:, : self._n_wheels] = np.clip(self._lever * (force + self._inertia * (wanted - rim)), -1.0, 1.0)
+        if self._steered_wheels:
+            actions[:, self._n_wheels :] = np.clip(set_points / self._max_steering, -1.0, 1.0)
         return actions
+
+    def _set_points(self, angles: Array) -> Array:
+        """`(n, joints)` the mean angle of each joint's wheels, rad, within the steering limit; from `(n, n_wheels)`."""
+        means = [angles[:, own].mean(axis=1) for own in self._steered_wheels]
+        stacked = np.stack(means, axis=1) if means else np.zeros((len(angles), 0))
+        within: Array = np.clip(stacked, -self._max_steering, self._max_steering)
+        return within
 
     def guide(self, seen: Array) -> Array:
         """The guide's commands `(n, 3)`: pure pursuit of the goal, at the largest curvature if the goal lies behind."""

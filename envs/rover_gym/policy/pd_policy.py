@@ -1,12 +1,6 @@
 """The PD baseline, which drives by the observation alone with one turning centre and wheel speed control.
 
-All six wheels are tangential to circles about one turning centre at `(x_c, -1/kappa)` in the trunk's (x, z), where
-`kappa` is the curvature, positive to the left. A wheel at `(x, z)` then needs
-
-    steering  tan(delta) = kappa (x - x_c) / (1 + kappa z)
-    speed     v_i = v sqrt((1 + kappa z)^2 + (kappa (x - x_c))^2)
-
-where `v` is the speed of the point `(x_c, 0)`.
+It drives any rover: one whose wheels steer, all or some, and one that turns by skidding (`policy.turning`).
 """
 
 import math
@@ -18,9 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.task import check_steered
-from rover_gym.env.wheels import N_ACTIONS, N_WHEELS, drive_signs, wheel_centres
 from rover_gym.mechanics import OptionError, StateError, atan2, sin_cos
+from rover_gym.policy.turning import SCRUB_RATE, WIDENING, YAW, Turning
 from rover_gym.validation import array, number, refuse
 
 _Row = Sequence[float]
@@ -69,28 +62,28 @@ class PDPolicy:
         rover = find_rover_env(env)
         if gains is not None and not isinstance(gains, PDGains):
             refuse(OptionError, "gains", gains, "must be PDGains")
-        check_steered(rover.task)
         self.gains = PDGains() if gains is None else gains
         layout, model = rover.observation_layout, rover.model
         self._size = layout.size
         self._scale = layout.scale
         self._roll = layout["q"].start + 3
         self._pitch = layout["q"].start + 5
-        self._steering = [layout["q"].start + i for i in model.steering_joint_indices]
         self._rates = [layout["velocity"].start + i for i in model.wheel_joint_indices]
         self._forward_speed = layout["velocity"].start
+        self._yaw_rate = layout["velocity"].start + YAW
         self._goal = layout["goal"].start
 
-        centres = wheel_centres(model)
-        self._x_c = 0.5 * float(centres[:, 0].min() + centres[:, 0].max())
-        self._wheels: list[tuple[float, float]] = [(float(x - self._x_c), float(z)) for x, z in centres]
+        self._weight = model.mass * math.hypot(*rover.gravity)
+        self._turning = Turning.of(model, self._weight, rover.dt)
+        self._steering = [layout["q"].start + i for i in self._turning.steering.joints]
+        self._steered_wheels = self._turning.steering.wheels
         self._radii: list[float] = model.wheel_radii.tolist()
-        self._rim_per_rate: list[float] = (model.wheel_radii * drive_signs(model)).tolist()
         self._torque_limits: list[float] = model.wheel_torque_limits.tolist()
+        self._n_wheels = len(self._radii)
+        self._n_actions = rover.task.n_actions
         self._max_steering = rover.max_steering
         self._mass = model.mass
-        self._weight = model.mass * math.hypot(*rover.gravity)
-        self.max_curvature = self._find_max_curvature()
+        self.max_curvature = self._turning.max_curvature(self._max_steering)
 
     def predict(
         self,
@@ -99,7 +92,7 @@ class PDPolicy:
         episode_start: npt.NDArray[np.bool_] | None = None,
         deterministic: bool = True,
     ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...] | None]:
-        """The action for an observation `(size,)`, or the actions `(n, 12)` for a batch `(n, size)`.
+        """The action for an observation `(size,)`, or the actions `(n, n_actions)` for a batch `(n, size)`.
 
         The signature is stable-baselines3's. The policy has no state: it returns `state` unchanged and ignores
         `episode_start` and `deterministic`.
@@ -115,21 +108,26 @@ class PDPolicy:
         values = given * self._scale
         if values.ndim == 1:
             return np.array(self._act(values.tolist()), dtype=np.float32), state
-        actions = np.empty((len(values), N_ACTIONS), dtype=np.float32)
+        actions = np.empty((len(values), self._n_actions), dtype=np.float32)
         for action, row in zip(actions, values.tolist(), strict=True):
             action[:] = self._act(row)
         return actions, state
 
     def steering_angles(self, curvature: float) -> list[float]:
-        """The six steering angles, rad, at which all axles meet in the turning centre of a curvature, 1/m."""
-        return [atan2(curvature * x, 1.0 + curvature * z) for x, z in self._wheels]
+        """The angle of each steering joint, rad, at which all axles meet in the turning centre of a curvature, 1/m.
+
+        A joint that steers several wheels takes the mean of their angles.
+        """
+        wheels = self._turning.wheels
+        angles = [atan2(curvature * x, 1.0 + curvature * z) for x, z in wheels]
+        return [sum(angles[i] for i in own) / len(own) for own in self._steered_wheels]
 
     def _act(self, row: _Row) -> list[float]:
         """The action for one observation in SI units."""
         gains = self.gains
         speed_now = row[self._forward_speed]
         ahead, right = row[self._goal], row[self._goal + 1]
-        direction, curvature = self._way(ahead - self._x_c, -right, speed_now)
+        direction, curvature = self._way(ahead - self._turning.x_c, -right, speed_now)
         angles = self.steering_angles(curvature)
 
         distance = math.hypot(ahead, right)
@@ -139,19 +137,28 @@ class PDPolicy:
             math.sqrt(gains.final_speed * gains.final_speed + 2.0 * gains.braking * distance),
         )
         # Slow down until the wheels reach their steering angles; otherwise they scrub and the path deviates.
-        off = max(abs(angle - row[i]) for angle, i in zip(angles, self._steering, strict=True))
+        off = max((abs(angle - row[i]) for angle, i in zip(angles, self._steering, strict=True)), default=0.0)
         speed *= direction * max(0.2, 1.0 - 2.0 * off)
 
         # Force per wheel that holds the rover on the slope, and the gain of the speed controller.
-        hold = self._weight * sin_cos(row[self._pitch])[0] / N_WHEELS
-        inertia = self._mass / N_WHEELS / gains.response
-        action = [0.0] * N_ACTIONS
-        for i, (x, z) in enumerate(self._wheels):
-            wanted = speed * math.hypot(1.0 + curvature * z, curvature * x)
-            rim = self._rim_per_rate[i] * row[self._rates[i]]
-            torque = self._radii[i] * (hold + inertia * (wanted - rim))
+        hold = self._weight * sin_cos(row[self._pitch])[0] / self._n_wheels
+        inertia = self._mass / self._n_wheels / gains.response
+        turning = self._turning
+        yaw_rate = speed * curvature
+        scrub = min(1.0, max(-1.0, yaw_rate / SCRUB_RATE))
+        action = [0.0] * self._n_actions
+        for i, (x, z) in enumerate(turning.wheels):
+            force = hold
+            if turning.skids:
+                wanted = speed * (1.0 + WIDENING * curvature * z)
+                force += turning.yaw_gain[i] * (yaw_rate - row[self._yaw_rate]) + turning.scrub[i] * scrub
+            else:
+                wanted = speed * math.hypot(1.0 + curvature * z, curvature * x)
+            rim = turning.rim_per_rate[i] * row[self._rates[i]]
+            torque = self._radii[i] * (force + min(inertia, turning.most_gain[i]) * (wanted - rim))
             action[i] = _clip(torque / self._torque_limits[i])
-            action[N_WHEELS + i] = _clip(angles[i] / self._max_steering)
+        for k, angle in enumerate(angles, self._n_wheels):
+            action[k] = _clip(angle / self._max_steering)
         return action
 
     def _way(self, ahead: float, left: float, speed_now: float) -> tuple[float, float]:
@@ -171,16 +178,6 @@ class PDPolicy:
             pursuit = 2.0 * side * left / (ahead * ahead + left * left)
             return direction, side * min(pursuit, self.max_curvature)
         return direction, side * self.max_curvature
-
-    def _find_max_curvature(self) -> float:
-        """The largest curvature that keeps every wheel within the steering limit.
-
-        This solves tan(delta) = kappa |x| / (1 - kappa |z|) of the inner wheels for kappa. delta stays below 90
-        degrees, since a wheel beyond the turning centre would have to turn round.
-        """
-        sine, cosine = sin_cos(min(self._max_steering, math.radians(89.0)))
-        tangent = sine / cosine
-        return min(tangent / (abs(x) + abs(z) * tangent) for x, z in self._wheels)
 
 
 def _turn_and_straight(ahead: float, left: float, radius: float) -> float:

@@ -82,7 +82,7 @@ class TrainedPolicy:
         episode_start: npt.NDArray[np.bool_] | None = None,
         deterministic: bool = True,  # noqa: ARG002 - the signature is stable-baselines3's
     ) -> tuple[npt.NDArray[np.float32], tuple[npt.NDArray[Any], ...] | None]:
-        """The action for an observation `(size,)`, or the actions `(n, 12)` for a batch `(n, size)`.
+        """The action for an observation `(size,)`, or the actions `(n, n_actions)` for a batch `(n, size)`.
 
         A command is held for `card.hold` seconds. The returned state counts them: pass it in with the next observation,
         and mark with `episode_start` `(n,)` where an episode begins. Without a state every command is new.

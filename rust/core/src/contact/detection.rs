@@ -4,11 +4,11 @@ use nalgebra::Vector3;
 
 use super::activation::Activation;
 use super::frame::ContactFrame;
-use super::pair::{Contact, ContactKey};
+use super::pair::{Contact, ContactKey, ON_SURFACE};
 use super::part::{Part, place_wheel};
 use crate::geometry::query::sweep::{DEEP, first_touch};
 use crate::geometry::query::{SurfacePoint, box_sphere, disc_sphere, dispatch, sphere_sphere};
-use crate::geometry::{Disc, PlacedShape, Primitive, Sphere, Terrain};
+use crate::geometry::{Coverage, Disc, PlacedShape, Primitive, Sphere, Terrain};
 use crate::multibody::{Kinematics, Model};
 
 /// On a sphere: the nearest point.
@@ -23,7 +23,8 @@ pub(super) const PASSING: u16 = 1;
 ///
 /// `kinematics`: poses at the step's midpoint, where gaps are measured. `end`: poses at the
 /// predicted end of the step, which determine the motion within the step. The contacts keep the
-/// geometry of the midpoint; see [`super::relocate`].
+/// geometry of the midpoint; see [`super::relocate`]. Returns a place (x, z, m) near the machine
+/// where the ground is not known, if there is one.
 pub fn detect(
     model: &Model,
     kinematics: &Kinematics,
@@ -32,7 +33,7 @@ pub fn detect(
     v: &[f64],
     activation: &Activation,
     out: &mut Vec<Contact>,
-) {
+) -> Option<[f64; 2]> {
     out.clear();
     let mut gate = Gate {
         model,
@@ -41,6 +42,7 @@ pub fn detect(
         activation,
         reach: activation.reach(),
         can_be_passed: terrain.can_be_passed(),
+        unknown: None,
         out,
     };
     for i in 0..model.wheels().len() {
@@ -52,6 +54,7 @@ pub fn detect(
     for i in 0..model.spheres().len() {
         candidates(Part::Sphere(i), end, terrain, &mut gate);
     }
+    gate.unknown
 }
 
 /// Deepest gap of any part with the ground, m; 0 where nothing overlaps.
@@ -80,6 +83,7 @@ struct Gate<'a> {
     activation: &'a Activation,
     reach: f64,
     can_be_passed: bool,
+    unknown: Option<[f64; 2]>,
     out: &'a mut Vec<Contact>,
 }
 
@@ -173,6 +177,9 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
     } else {
         (Vector3::zeros(), 0.0)
     };
+    if let Coverage::Unknown(place) = terrain.coverage(&(base + centre), bound) {
+        gate.unknown = Some(place);
+    }
     terrain.visit_near(
         &(base + centre),
         bound + gate.reach + motion,
@@ -192,9 +199,60 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
                     touch(&placed, end, model, sphere, base, &half_way)
                 });
             }
+            piece => visit_on_surface(&placed.shape, piece, base, gate.reach, |point| {
+                if is_on_surface(terrain, id, base, point) {
+                    gate.offer(&placed, &on_surface(point), id);
+                }
+            }),
         },
     );
 }
+
+/// Visits the points of a shape on a piece of a surface whose gap is at most `reach`, m.
+#[inline]
+fn visit_on_surface(
+    shape: &PlacedShape,
+    piece: &Primitive,
+    base: &Vector3<f64>,
+    reach: f64,
+    mut visit: impl FnMut(&SurfacePoint),
+) {
+    match piece {
+        Primitive::Face(face) => dispatch::visit_on_face(shape, face, base, reach, visit),
+        Primitive::Edge(edge) => dispatch::visit_at_edge(shape, edge, base, reach, visit),
+        Primitive::Vertex(vertex) => {
+            let near = dispatch::point_at_vertex(shape, vertex, base);
+            if near.gap <= reach && vertex.admits(&near.n) {
+                visit(&near);
+            }
+        }
+        Primitive::Plane(_) | Primitive::Sphere(_) => {}
+    }
+}
+
+/// The point with its feature marked.
+#[inline]
+fn on_surface(point: &SurfacePoint) -> SurfacePoint {
+    SurfacePoint {
+        feature: point.feature | ON_SURFACE,
+        ..*point
+    }
+}
+
+/// Whether a point on a piece of a surface is a contact: one behind the piece's plane must be in
+/// the ground, and not only beyond the far side of a ridge or a rock.
+#[inline]
+fn is_on_surface(
+    terrain: &dyn Terrain,
+    id: u32,
+    base: &Vector3<f64>,
+    point: &SurfacePoint,
+) -> bool {
+    point.gap >= -SHALLOW || terrain.is_inside(id, &(base + point.point))
+}
+
+/// Depth up to which a point is taken to be in the ground, m.
+const SHALLOW: f64 = 1e-9;
 
 /// Whether a sphere's centre, relative to a shape's centre, is further than `within` from the
 /// shape, by an inexpensive bound.
@@ -341,13 +399,24 @@ fn visit_nearer(
     let mut reach = 2.0 * radius;
     while reach < FAR && gap + radius > reach {
         terrain.visit_near(&(base + disc.centre), reach, &mut |id, primitive| {
-            let point = match primitive {
-                Primitive::Plane(plane) => dispatch::point_on_plane(&shape, plane, base, NEAREST),
-                Primitive::Sphere(sphere) => dispatch::point_on_sphere(&shape, sphere, base),
+            let mut take = |point: &SurfacePoint| {
+                if point.gap < gap {
+                    gap = point.gap;
+                    visit(id, point);
+                }
             };
-            if point.gap < gap {
-                gap = point.gap;
-                visit(id, &point);
+            match primitive {
+                Primitive::Plane(plane) => {
+                    take(&dispatch::point_on_plane(&shape, plane, base, NEAREST));
+                }
+                Primitive::Sphere(sphere) => {
+                    take(&dispatch::point_on_sphere(&shape, sphere, base));
+                }
+                piece => visit_on_surface(&shape, piece, base, f64::INFINITY, |point| {
+                    if point.feature == NEAREST && is_on_surface(terrain, id, base, point) {
+                        take(&on_surface(point));
+                    }
+                }),
             }
         });
         reach *= 2.0;

@@ -28,7 +28,7 @@ pub enum Opposite {
 pub struct ContactKey {
     /// [`Part::code`] of the part.
     pub part: u16,
-    /// On the ground, the rim point or corner; on a sphere of the ground, 0 for the nearest point
+    /// On the ground, the rim point or corner, with [`ON_SURFACE`] on a surface; on a sphere of the ground, 0 for the nearest point
     /// and 1 for a part that passes the sphere within one step. Between bodies, the feature of
     /// [`crate::geometry::query::PairPoint`]. For a joint, 0 is the lower stop and 1 the upper.
     pub feature: u16,
@@ -36,7 +36,27 @@ pub struct ContactKey {
     pub opposite: Opposite,
 }
 
+/// Marks the features of contacts with a face, an edge or a vertex of a surface.
+pub const ON_SURFACE: usize = 0x100;
+
+/// Number of all surfaces in [`ContactKey::lasting`].
+const ANY_PIECE: u32 = u32::MAX;
+
 impl ContactKey {
+    /// The key by which the next step knows the contact: on a surface the same for all pieces, so
+    /// that a wheel which rolls over an inner edge keeps its contact.
+    #[inline]
+    #[must_use]
+    pub fn lasting(self) -> Self {
+        if usize::from(self.feature) & ON_SURFACE == 0 {
+            return self;
+        }
+        Self {
+            opposite: Opposite::Ground(ANY_PIECE),
+            ..self
+        }
+    }
+
     /// Key of a part's feature on a primitive of the ground.
     ///
     /// # Panics

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::detection::PASSING;
 use super::frame::ContactFrame;
-use super::pair::{Contact, Opposite, OtherSide};
+use super::pair::{Contact, ON_SURFACE, Opposite, OtherSide};
 use super::part::Part;
 use crate::geometry::query::dispatch;
 use crate::geometry::{PlacedShape, Primitive, Sphere, Terrain};
@@ -27,7 +27,7 @@ pub fn relocate(
         (Opposite::Part(_), None) | (Opposite::Stop, _) => return,
     };
     let base = kinematics.origin(contact.body);
-    let feature = usize::from(contact.key.feature);
+    let feature = usize::from(contact.key.feature) & !ON_SURFACE;
     let shape = contact.part.place(model, kinematics);
     let point = match terrain.primitive(primitive) {
         Primitive::Plane(plane) => dispatch::point_on_plane(&shape, &plane, base, feature),
@@ -36,6 +36,9 @@ pub fn relocate(
             dispatch::point_over_tangent(&shape, n, &touch(&sphere, n, base))
         }
         Primitive::Sphere(sphere) => dispatch::point_on_sphere(&shape, &sphere, base),
+        Primitive::Face(face) => dispatch::point_on_plane(&shape, &face.plane, base, feature),
+        Primitive::Edge(edge) => dispatch::point_at_edge(&shape, &edge, base, feature),
+        Primitive::Vertex(vertex) => dispatch::point_at_vertex(&shape, &vertex, base),
     };
     contact.frame = ContactFrame::on_ground(&shape, &point);
     (contact.point, contact.gap) = (point.point, point.gap);

@@ -56,7 +56,7 @@ impl WheelGaps {
             return;
         }
         self.pose(model, configuration);
-        if let Some(plane) = terrain.ground().filter(|_| !terrain.can_be_passed()) {
+        if let Some(plane) = terrain.ground().filter(|_| terrain.is_plane()) {
             self.write_over_plane(model, &configuration.position, plane, gaps);
             return;
         }

@@ -24,4 +24,7 @@ pub use many::{Drawn, Order, draw_many};
 pub use pcg64::{Pcg64, Pcg64State};
 pub use rocks::{RockDistribution, RockDraw};
 pub use scene::{DrawnGround, DrawnScene, Fixed, SceneDistribution};
-pub use start::{FixedStart, Range, Start, StartDistribution, resting_pose, tilted_plane};
+pub use start::{
+    FixedStart, PlacementError, Range, Start, StartDistribution, resting_on, resting_pose,
+    tilted_plane,
+};

@@ -7,10 +7,11 @@ use std::f64::consts::TAU;
 
 use super::pcg64::Pcg64;
 use crate::contact::detection::wheel_contacts;
-use crate::geometry::{Plane, Terrain, TerrainError};
+use crate::geometry::{Coverage, Plane, Terrain, TerrainError};
 use crate::multibody::{Kinematics, Model, StateError, coordinates};
-use crate::scalar::elementary::{asin, atan2, sin_cos};
-use nalgebra::Vector3;
+use crate::scalar::elementary::{asin, atan2, hypot, sin_cos};
+use nalgebra::{DMatrix, DVector, Vector3};
+use thiserror::Error;
 
 /// Bounds of a uniform draw, low and high.
 pub type Range = [f64; 2];
@@ -138,6 +139,173 @@ pub fn resting_pose(
     Ok(q)
 }
 
+/// Why a rover cannot be put on a terrain.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum PlacementError {
+    /// A number that is no coordinate.
+    #[error(transparent)]
+    State(#[from] StateError),
+    /// Nothing is known of the ground there.
+    #[error(
+        "position: no ground is known at x = {x} m, z = {z} m: it is off the map or has no data there"
+    )]
+    NoGround {
+        /// World, m.
+        x: f64,
+        /// World, m.
+        z: f64,
+    },
+}
+
+/// Public coordinates (nv) of a rover that stands on a terrain of any shape: the trunk's origin
+/// over `position` (x, z, m), no wheel in the ground.
+///
+/// Height, pitch, roll and the free joints bring the wheels down to the ground together: Gauss and
+/// Newton's iteration on the gaps, with the smallest change of all. The rover may still roll off.
+///
+/// # Errors
+/// `NoGround` where the ground under the trunk or a wheel is not known; `State` for a number that
+/// is not finite.
+///
+/// # Panics
+/// If the model has fewer than six velocities.
+pub fn resting_on(
+    model: &Model,
+    terrain: &dyn Terrain,
+    position: [f64; 2],
+    heading: f64,
+) -> Result<Vec<f64>, PlacementError> {
+    let [x, z] = position;
+    let height = |x: f64, z: f64| {
+        terrain
+            .height(x, z)
+            .ok_or(PlacementError::NoGround { x, z })
+    };
+    let y = height(x, z)?;
+    // The slope between the ends of a cross as wide as the rover stands.
+    let zero = Kinematics::of(
+        model,
+        &coordinates::from_public(model, &vec![0.0; model.nv()])?,
+    );
+    let wheels = model
+        .wheels()
+        .iter()
+        .map(|wheel| zero.point(wheel.body, &wheel.centre));
+    let half = wheels.map(|x| hypot(x.x, x.z)).fold(0.1, f64::max) * 0.7;
+    let slope = |dx: f64, dz: f64| {
+        let (ahead, behind) = (
+            terrain.height(x + dx, z + dz),
+            terrain.height(x - dx, z - dz),
+        );
+        ahead
+            .zip(behind)
+            .map_or(0.0, |(a, b)| (a - b) / (2.0 * half))
+    };
+    let normal = Vector3::new(-slope(half, 0.0), 1.0, -slope(0.0, half)).normalize();
+    let plane = Plane::through(&Vector3::new(x, y, z), normal);
+    let q = resting_pose(model, &plane, position, heading)?;
+
+    let gaps = |q: &[f64]| -> Result<DVector<f64>, PlacementError> {
+        let configuration = coordinates::from_public(model, q)?;
+        let kinematics = Kinematics::of(model, &configuration);
+        for wheel in model.wheels() {
+            let centre = configuration.position + kinematics.point(wheel.body, &wheel.centre);
+            if let Coverage::Unknown([x, z]) = terrain.coverage(&centre, wheel.radius) {
+                return Err(PlacementError::NoGround { x, z });
+            }
+        }
+        let contacts = wheel_contacts(model, &kinematics, terrain);
+        let gaps = contacts.iter().map(|contact| contact.gap);
+        Ok(DVector::from_iterator(contacts.len(), gaps))
+    };
+    let lift = |mut q: Vec<f64>| -> Result<Vec<f64>, PlacementError> {
+        for _ in 0..LIFTS {
+            let lowest = gaps(&q)?.min();
+            if !(lowest.abs() > TOUCHING) || lowest.is_infinite() {
+                break;
+            }
+            q[1] -= lowest;
+        }
+        Ok(q)
+    };
+    let mut best = lift(q)?;
+    let moved: Vec<usize> = [1, 3, 5].into_iter().chain(free_joints(model)).collect();
+    let mut q = best.clone();
+    let spread = |gaps: &DVector<f64>| gaps.norm();
+    let mut least = spread(&gaps(&best)?);
+    for _ in 0..ITERATIONS {
+        let now = gaps(&q)?;
+        let mut slopes = DMatrix::zeros(now.len(), moved.len());
+        for (mut column, &k) in slopes.column_iter_mut().zip(&moved) {
+            let mut beside = q.clone();
+            beside[k] += DIFFERENCE;
+            column.copy_from(&((gaps(&beside)? - &now) / DIFFERENCE));
+        }
+        let Ok(step) = slopes.svd(true, true).solve(&now, RANK) else {
+            break;
+        };
+        let shorten = (LONGEST / step.amax().max(LONGEST)).min(1.0);
+        for (&k, change) in moved.iter().zip(step.iter()) {
+            q[k] -= shorten * change;
+        }
+        if !is_within_stops(model, &q) {
+            break;
+        }
+        let lifted = lift(q.clone())?;
+        let own = spread(&gaps(&lifted)?);
+        if own < least {
+            (best, least) = (lifted, own);
+        }
+        if least < TOUCHING {
+            break;
+        }
+    }
+    Ok(best)
+}
+
+/// Most iterations, and most that bring the lowest wheel to the ground.
+const ITERATIONS: usize = 20;
+const LIFTS: usize = 60;
+
+/// Gap of a wheel that stands, m.
+const TOUCHING: f64 = 1e-9;
+
+/// Change of a coordinate for a difference quotient, rad or m.
+const DIFFERENCE: f64 = 1e-6;
+
+/// Share below which a direction does not move the wheels.
+const RANK: f64 = 1e-3;
+
+/// Longest change of a coordinate in an iteration, rad or m.
+const LONGEST: f64 = 0.2;
+
+/// Public coordinates of joints that neither turn a wheel nor steer it nor hold themselves.
+fn free_joints(model: &Model) -> Vec<usize> {
+    let is_wheels = |j: usize| {
+        let mut wheels = model.wheels().iter();
+        wheels.any(|wheel| wheel.joint == Some(j) || wheel.steering == Some(j))
+    };
+    let is_free = |j: &usize| {
+        let joint = &model.joints()[*j];
+        joint.hold.stiffness <= 0.0 && joint.drive.is_none() && !is_wheels(*j)
+    };
+    (0..model.n_joints())
+        .filter(is_free)
+        .map(|j| FIRST_JOINT + j)
+        .collect()
+}
+
+/// Public coordinate of the first joint of a machine on a free base.
+const FIRST_JOINT: usize = 6;
+
+fn is_within_stops(model: &Model, q: &[f64]) -> bool {
+    let joints = model.joints().iter().zip(&q[FIRST_JOINT..]);
+    joints.into_iter().all(|(joint, x)| {
+        let stops = joint.limits;
+        stops.is_none_or(|stops| (stops.lower..=stops.upper).contains(x))
+    })
+}
+
 /// The angle in [−π, π] that differs by whole turns, without rounding.
 fn wrapped(angle: f64) -> f64 {
     let rest = angle % TAU;
@@ -170,6 +338,44 @@ mod tests {
         ] {
             assert_eq!(wrapped(angle), expected, "{angle}");
         }
+    }
+
+    #[test]
+    fn a_rover_on_hills_stands_on_all_six_wheels_and_stays() {
+        use crate::geometry::HeightField;
+        use crate::integrator::StepOptions;
+        use crate::simulation::RoverSimulation;
+        use std::sync::Arc;
+        let n = 81;
+        #[allow(clippy::cast_possible_truncation)] // a map is single
+        let heights: Vec<f32> = (0..n * n)
+            .map(|k| {
+                let (x, z) = ((k % n) as f64 * 0.1, (k / n) as f64 * 0.1);
+                (0.12 * (1.7 * x).sin() * (1.3 * z).cos() + 0.1 * x) as f32
+            })
+            .collect();
+        let field: Arc<dyn Terrain> =
+            Arc::new(HeightField::new(heights, [n, n], [0.1; 2], [-4.0; 2]).unwrap());
+        let model = Arc::new(Model::rover());
+        for (position, heading) in [([0.0, 0.0], 0.0), ([1.2, -0.7], 1.0), ([-1.0, 1.5], -2.5)] {
+            let q = resting_on(&model, &*field, position, heading).unwrap();
+            assert!((q[0] - position[0]).abs() < 1e-15 && (q[2] - position[1]).abs() < 1e-15);
+            let configuration = coordinates::from_public(&model, &q).unwrap();
+            let kinematics = Kinematics::of(&model, &configuration);
+            let gaps = wheel_contacts(&model, &kinematics, &*field);
+            for contact in &gaps {
+                assert!((-1e-8..1e-6).contains(&contact.gap), "{}", contact.gap);
+            }
+            let options = StepOptions::default();
+            let mut rover =
+                RoverSimulation::new(Arc::clone(&model), Arc::clone(&field), options).unwrap();
+            rover.set_state(configuration.clone(), vec![0.0; model.nv()]);
+            rover.step(1).unwrap();
+            let speed = rover.state().v.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            assert!(speed < 0.2, "{speed}");
+        }
+        let off = resting_on(&model, &*field, [3.9, 0.0], 0.0).unwrap_err();
+        assert!(matches!(off, PlacementError::NoGround { .. }), "{off}");
     }
 
     #[test]

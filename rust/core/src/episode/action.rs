@@ -1,11 +1,11 @@
 //! From an action to the commands of the wheels.
 //!
-//! An action is one number in [-1, 1] for each wheel's torque, then one for each wheel's steering,
-//! unless the wheels are not steered:
+//! An action is one number in [-1, 1] for the torque of each of the n wheels, then one for each
+//! steering joint, in the order of the wheels:
 //!
 //! ```text
 //! torque_i    = a_i · torque_limit_i · gain        N m
-//! set_point_i = a_(n + i) · max_steering           rad
+//! set_point_i = a_(n + k) · max_steering           rad, k the joint that steers wheel i
 //! ```
 
 use super::error::EpisodeError;
@@ -33,8 +33,8 @@ pub fn check(actions: &[f64], width: usize, is_single: bool) -> Result<(), Episo
     })
 }
 
-/// Writes the torques (N m) and the steering set-points (rad) of an action (n_actions); set-points
-/// are 0 where the wheels are not steered.
+/// Writes the torques (N m) and the steering set-points (rad) of an action (n_actions), each
+/// (n_wheels); the set-points of wheels that it does not steer are 0.
 ///
 /// `gain`: torque given over torque asked.
 ///
@@ -55,9 +55,8 @@ pub fn commands(
     {
         *own = a * limit * gain;
     }
-    set_points.fill(0.0);
-    for (own, a) in set_points.iter_mut().zip(steer) {
-        *own = a * rules.settings().max_steering;
+    for (own, entry) in set_points.iter_mut().zip(rules.steering_entries()) {
+        *own = entry.map_or(0.0, |k| steer[k] * rules.settings().max_steering);
     }
 }
 

@@ -7,7 +7,7 @@
 //! | values | size |
 //! |---|---|
 //! | a reading from `pose` to `target` ([`crate::simulation::ReadingLayout`]) | nq + nv + 5 n + 6 |
-//! | the previous action | n, or 2 n with steering |
+//! | the previous action | n, and one for each steering joint |
 //! | fraction of the time to high-centring | 1 |
 //! | heights of the scan | points |
 //!

@@ -8,7 +8,7 @@
 //! | `slip` | mean slip ratio of the wheels in contact, times dt |
 //! | `tilt` | `1 - cos(tilt)` of the trunk, times dt |
 //! | `torque_change` | mean square over the wheels of the change of the torque's action |
-//! | `steering_change` | the same of the steering's |
+//! | `steering_change` | the same over the steering joints, of the steering's |
 //! | `success` | 1 in the period that reaches the goal |
 //! | `failure` | 1 in a period that ends in failure |
 //!
@@ -59,10 +59,10 @@ pub struct Earned<'a> {
     pub now: &'a Quantities,
     /// Distance to the goal before it, m.
     pub distance_before: f64,
-    /// Sums over the wheels of the squared changes of the actions: torques, steering.
+    /// Sums of the squared changes of the actions: of the torques, of the steering.
     pub changes: [f64; 2],
-    /// Number of wheels.
-    pub n_wheels: usize,
+    /// Entries of an action that are summed, in the same order.
+    pub entries: [usize; 2],
     /// Its length, s.
     pub dt: f64,
     /// How it ended.
@@ -85,6 +85,8 @@ pub fn terms(weights: &Weights, earned: &Earned<'_>) -> [f64; N_TERMS] {
         failure,
     ] = *weights;
     let dt = earned.dt.min(MOST_TIME);
+    let mean_change =
+        |weight: f64, k: usize| weight * earned.changes[k] / earned.entries[k].max(1) as f64;
     let one_if = |is_so: bool| f64::from(u8::from(is_so));
     let mut terms = [
         progress * within(earned.distance_before - now.distance, MOST_PROGRESS),
@@ -92,8 +94,8 @@ pub fn terms(weights: &Weights, earned: &Earned<'_>) -> [f64; N_TERMS] {
         energy * within(now.work, MOST_WORK),
         slip * within(now.slip_ratio, MOST_RATIO) * dt,
         tilt * within(1.0 - now.cos_tilt, MOST_RATIO) * dt,
-        torque_change * earned.changes[0] / earned.n_wheels as f64,
-        steering_change * earned.changes[1] / earned.n_wheels as f64,
+        mean_change(torque_change, 0),
+        mean_change(steering_change, 1),
         success * one_if(earned.ending == Ending::Goal) + 0.0, // no negative zero
         failure * one_if(earned.ending.is_failure()) + 0.0,
     ];
@@ -108,8 +110,7 @@ fn within(quantity: f64, most: f64) -> f64 {
     quantity.clamp(-most, most)
 }
 
-/// Sums over the wheels of the squared changes between two actions (n_actions): of the torques, and
-/// of the steering.
+/// Sums of the squared changes between two actions (n_actions): of the torques, of the steering.
 #[must_use]
 pub fn squared_changes(action: &[f64], before: &[f64], n_wheels: usize) -> [f64; 2] {
     let sum = |a: &[f64], b: &[f64]| {
@@ -132,7 +133,7 @@ mod tests {
             now,
             distance_before: 1e30,
             changes: squared_changes(&[1.0; 12], &[-1.0; 12], 6),
-            n_wheels: 6,
+            entries: [6, 6],
             dt,
             ending,
         };

@@ -17,7 +17,7 @@ pub struct Settings {
     pub dt: f64,
     /// Torque of a torque action of 1, (n_wheels), N m.
     pub torque_limits: Vec<f64>,
-    /// Set-point of a steering action of 1, rad; 0 if the wheels are not steered.
+    /// Set-point of a steering action of 1, rad; 0 if actions do not steer.
     pub max_steering: f64,
     /// Distance within which the goal is reached, m.
     pub goal_tolerance: f64,
@@ -54,6 +54,45 @@ pub struct Rules {
     inverse_scale: Vec<f64>,
     places: Places,
     sizes: [usize; 3],
+    steering: Steering,
+}
+
+/// Which entry of an action's steering each wheel follows.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Steering {
+    /// By wheel; None where actions do not steer it.
+    entries: Vec<Option<usize>>,
+    n_entries: usize,
+}
+
+impl Steering {
+    /// One entry for each steering joint, in the order of the wheels: wheels that share a joint
+    /// share its entry.
+    fn of(model: &Model) -> Self {
+        let mut joints = Vec::new();
+        let mut entry_of = |joint: usize| {
+            let known = joints.iter().position(|own| *own == joint);
+            known.unwrap_or_else(|| {
+                joints.push(joint);
+                joints.len() - 1
+            })
+        };
+        let entries = (model.wheels().iter())
+            .map(|wheel| wheel.steering.map(&mut entry_of))
+            .collect();
+        Self {
+            entries,
+            n_entries: joints.len(),
+        }
+    }
+
+    /// Actions do not steer.
+    fn none(model: &Model) -> Self {
+        Self {
+            entries: vec![None; model.wheels().len()],
+            n_entries: 0,
+        }
+    }
 }
 
 /// What a reading's size depends on.
@@ -67,14 +106,10 @@ fn sizes(model: &Model) -> [usize; 3] {
 /// Rules are equal if episodes under them are.
 impl PartialEq for Rules {
     fn eq(&self, other: &Self) -> bool {
-        self.settings == other.settings && self.sizes == other.sizes
+        self.settings == other.settings
+            && self.sizes == other.sizes
+            && self.steering == other.steering
     }
-}
-
-/// Entries of an action.
-fn n_actions(settings: &Settings) -> usize {
-    let is_steered = settings.max_steering > 0.0;
-    settings.torque_limits.len() * (1 + usize::from(is_steered))
 }
 
 impl Rules {
@@ -96,7 +131,13 @@ impl Rules {
             size: layout.size(),
         };
         let n_wheels = model.wheels().len();
-        let size = shared + n_actions(&settings) + 1 + settings.scan.len();
+        let steering = if settings.max_steering > 0.0 {
+            Steering::of(&model)
+        } else {
+            Steering::none(&model)
+        };
+        let n_actions = n_wheels + steering.n_entries;
+        let size = shared + n_actions + 1 + settings.scan.len();
         let noise = settings.noise.len();
         check_lengths([
             ("torque_limits", settings.torque_limits.len(), n_wheels),
@@ -135,6 +176,7 @@ impl Rules {
             model,
             settings,
             places,
+            steering,
         })
     }
 
@@ -153,16 +195,15 @@ impl Rules {
         let own = sizes(model).into_iter().zip(self.sizes);
         let lists = SIZES.into_iter().zip(own);
         check_lengths(lists.map(|(field, (actual, expected))| (field, actual, expected)))?;
-        let steered = model.wheels().iter().filter(|w| w.steering.is_some());
-        let limit = steered
-            .map(|w| w.steering_limit)
+        let is_steered = |wheel: usize| self.steering.entries[wheel].is_some();
+        let limit = (model.wheels().iter().enumerate())
+            .filter(|(wheel, _)| is_steered(*wheel))
+            .map(|(_, own)| own.steering.map_or(0.0, |_| own.steering_limit))
             .fold(f64::INFINITY, f64::min);
-        let has_fixed = model.wheels().iter().any(|w| w.steering.is_none());
-        let limit = if has_fixed { 0.0 } else { limit };
         if self.settings.max_steering > limit * (1.0 + 1e-12) {
             return Err(EpisodeError::OutOfRange {
                 field: "max_steering",
-                range: "within the steering limit of every wheel",
+                range: "within the steering limit of every steered wheel",
                 value: self.settings.max_steering,
             });
         }
@@ -181,10 +222,23 @@ impl Rules {
         self.settings.torque_limits.len()
     }
 
-    /// Entries of an action: the wheels' torques and, if they are steered, their steering.
+    /// Entries of an action: a torque for each wheel, and a set-point for each steering joint if
+    /// actions steer.
     #[must_use]
     pub fn n_actions(&self) -> usize {
-        n_actions(&self.settings)
+        self.n_wheels() + self.n_steering()
+    }
+
+    /// Entries of an action's steering.
+    #[must_use]
+    pub fn n_steering(&self) -> usize {
+        self.steering.n_entries
+    }
+
+    /// Which of them each wheel follows; None where actions do not steer it.
+    #[must_use]
+    pub fn steering_entries(&self) -> &[Option<usize>] {
+        &self.steering.entries
     }
 
     /// Commands of a rover: a torque and a set-point for each wheel.

@@ -281,7 +281,7 @@ impl Episode {
             now: &now,
             distance_before,
             changes,
-            n_wheels: rules.n_wheels(),
+            entries: [rules.n_wheels(), rules.n_steering()],
             dt,
             ending,
         };

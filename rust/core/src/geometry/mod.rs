@@ -13,4 +13,7 @@ pub mod terrain;
 
 pub use shape::{Disc, OrientedBox, PlacedShape, Sphere, SupportMap};
 pub use support::{Facing, Support};
-pub use terrain::{Clearing, Plane, Primitive, Rocks, SphereField, Terrain, TerrainError};
+pub use terrain::{
+    Clearing, Coverage, HeightField, Plane, Primitive, Rocks, SphereField, Terrain, TerrainError,
+    TriangleMesh, Union,
+};

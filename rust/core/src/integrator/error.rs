@@ -36,6 +36,18 @@ pub enum StepError {
         /// Time before the step, s.
         time: f64,
     },
+    /// The machine came to where its terrain does not say what the ground is.
+    #[error(
+        "terrain: no ground is known at x = {x} m, z = {z} m, which the machine reached at t = {time} s: it is off the map or has no data there; the state before the step was kept"
+    )]
+    NoGround {
+        /// Time before the step, s.
+        time: f64,
+        /// World, m.
+        x: f64,
+        /// World, m.
+        z: f64,
+    },
     /// Too many events: an event-driven scheme cannot pass the point where they accumulate.
     #[error(
         "{events} events before t = {time} s in one step: they accumulate, and an event-driven scheme cannot pass; the state before the step was kept"

@@ -105,6 +105,12 @@ pub trait MechanicalSystem {
     /// Measures point, frame and gap of the same features again at the end pose.
     fn relocate(&mut self, contacts: &mut [Self::Contact]);
 
+    /// A place (x, z, m) near the machine where the last detection found that the ground is not
+    /// known. The step then fails. By default all ground is known.
+    fn unknown_ground(&self) -> Option<[f64; 2]> {
+        None
+    }
+
     /// μ of one contact.
     fn friction_coefficient(&self, options: &StepOptions, _contact: &Self::Contact) -> f64 {
         options.friction_coefficient

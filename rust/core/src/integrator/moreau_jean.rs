@@ -555,6 +555,9 @@ pub(super) fn finish<S: MechanicalSystem>(
     if !is_finite {
         return Err(StepError::NonFinite { time: *time });
     }
+    if let Some([x, z]) = system.unknown_ground() {
+        return Err(StepError::NoGround { time: *time, x, z });
+    }
     system.accept();
     std::mem::swap(configuration, &mut ws.end);
     v.copy_from_slice(&ws.v);

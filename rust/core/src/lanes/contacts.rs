@@ -281,7 +281,7 @@ impl<T: Lane> Contacts<T> {
     fn look(&mut self, ground: &mut Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
         let Sight { middle, end, v, .. } = *sight;
         self.parts.find_twists(middle, v, &mut self.twists);
-        let mut declined = T::mask(self.token, 0);
+        let mut declined = ground.on_surface;
         for b in 0..self.parts.boxes.len() {
             declined = declined | self.look_at_box(b, ground, sight);
         }

@@ -104,6 +104,8 @@ pub struct Ground<T: Lane> {
     /// Those that may have more than a plane.
     fields: Vec<Option<Arc<dyn Terrain>>>,
     has_spheres: bool,
+    /// Rovers on a surface.
+    pub(super) on_surface: T::Mask,
     wheels: Vec<Near<T>>,
     boxes: Vec<Around<T>>,
 }
@@ -141,6 +143,7 @@ impl<T: Lane> Ground<T> {
             terrains: vec![None; T::LANES],
             fields: vec![None; T::LANES],
             has_spheres: false,
+            on_surface: T::mask(token, 0),
             wheels: vec![near; n_wheels],
             boxes: vec![around; n_boxes],
         }
@@ -160,9 +163,14 @@ impl<T: Lane> Ground<T> {
         };
         self.normal.set(lane, normal);
         self.offset.set(lane, offset);
-        let is_plane = plane.is_some() && !terrain.can_be_passed();
+        let is_plane = terrain.is_plane();
         self.fields[lane] = (!is_plane).then(|| Arc::clone(terrain));
         self.has_spheres = self.fields.iter().any(Option::is_some);
+        let own = T::mask(self.offset.token(), 1 << lane);
+        self.on_surface = self.on_surface & !own;
+        if terrain.has_surface() {
+            self.on_surface = self.on_surface | own;
+        }
         // A plane alone needs no search, and the first step on spheres makes one.
         let known = if is_plane {
             f64::INFINITY
@@ -424,7 +432,8 @@ fn visit_spheres(
     mut visit: impl FnMut(u32, &Sphere),
 ) {
     field.visit_near(centre, within, &mut |number, primitive| match primitive {
-        Primitive::Plane(_) => {} // the ground's own, measured by itself
+        // A plane is the ground's own, measured by itself.
+        Primitive::Plane(_) | Primitive::Face(_) | Primitive::Edge(_) | Primitive::Vertex(_) => {}
         Primitive::Sphere(sphere) => {
             if sphere.distance(centre) <= within {
                 visit(number, sphere);

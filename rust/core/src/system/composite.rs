@@ -426,6 +426,11 @@ where
         out.extend(parts.listed());
     }
 
+    fn unknown_ground(&self) -> Option<[f64; 2]> {
+        let first = self.first.unknown_ground();
+        first.or_else(|| self.second.unknown_ground())
+    }
+
     fn relocate(&mut self, contacts: &mut [Self::Contact]) {
         let parts = &mut *self.parts;
         parts.sort(contacts);

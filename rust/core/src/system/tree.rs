@@ -31,7 +31,7 @@ impl UnilateralContact for Contact {
 
     #[inline]
     fn key(&self) -> ContactKey {
-        self.key
+        self.key.lasting()
     }
 
     #[inline]
@@ -68,6 +68,8 @@ pub struct TreeScratch {
     gyroscopic: GyroscopicScratch,
     force: Vec<f64>,
     pairs: PairSearch,
+    /// Found by the last detection, x and z, m.
+    unknown_ground: Option<[f64; 2]>,
     /// Joint coordinates at the midpoint and at the end of the step (n_joints); empty if no joint
     /// has a stop.
     joints_middle: Vec<f64>,
@@ -102,6 +104,7 @@ impl TreeScratch {
             gyroscopic: GyroscopicScratch::default(),
             force: vec![0.0; model.nv()],
             pairs: PairSearch::new(model),
+            unknown_ground: None,
             joints_middle: limited.clone(),
             joints_end: limited,
             system: ContactSystem::with_capacity(model, n),
@@ -260,7 +263,7 @@ impl MechanicalSystem for TreeSystem<'_> {
             (fastest, next) = (fastest.max(speed), next.max(fastest.min(speed)));
         }
         activation.margin = activation.lead.abs() * (fastest + next);
-        detect(
+        self.parts.unknown_ground = detect(
             self.model,
             &self.parts.kinematics,
             &self.parts.kinematics_end,
@@ -277,6 +280,10 @@ impl MechanicalSystem for TreeSystem<'_> {
         } = &mut *self.parts;
         detect_pairs(self.model, kinematics, v, &activation, pairs, out);
         detect_limits(self.model, kinematics, joints_middle, v, &activation, out);
+    }
+
+    fn unknown_ground(&self) -> Option<[f64; 2]> {
+        self.parts.unknown_ground
     }
 
     #[inline]

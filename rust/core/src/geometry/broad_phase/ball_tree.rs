@@ -123,11 +123,16 @@ impl BallTree {
 
     /// Visits exactly the balls that the vertical line through (x, z) meets.
     pub fn visit_column(&self, x: f64, z: f64, mut visit: impl FnMut(&Sphere)) {
+        self.visit_column_indexed(x, z, |index| visit(self.ball(index as usize)));
+    }
+
+    /// The same with the numbers of the balls in the input.
+    pub fn visit_column_indexed(&self, x: f64, z: f64, mut visit: impl FnMut(u32)) {
         let line = Vector3::new(x, 0.0, z);
         self.search(&line, &[0.0, f64::INFINITY, 0.0], |ball| {
             let Sphere { centre, radius } = &ball.sphere;
             if hypot(centre.x - x, centre.z - z) <= *radius {
-                visit(&ball.sphere);
+                visit(ball.index);
             }
         });
     }

@@ -5,9 +5,11 @@
 use nalgebra::Vector3;
 
 use super::{
-    PairPoint, SurfacePoint, box_box, box_plane, box_sphere, convex, disc_box, disc_disc,
-    disc_plane, disc_sphere, sphere_plane, sphere_sphere,
+    PairPoint, SurfacePoint, box_box, box_plane, box_sphere, box_triangle, convex, disc_box,
+    disc_disc, disc_plane, disc_sphere, disc_triangle, sphere_plane, sphere_sphere,
+    sphere_triangle,
 };
+use crate::geometry::terrain::surface::{Edge, Face, Vertex};
 use crate::geometry::{PlacedShape, Plane, Sphere};
 
 /// Visits the points of a shape over a plane of the ground whose gap is at most `reach`, m.
@@ -57,6 +59,80 @@ pub fn point_on_sphere(shape: &PlacedShape, ground: &Sphere, base: &Vector3<f64>
         PlacedShape::Disc(disc) => disc_sphere::nearest_point(disc, ground, base),
         PlacedShape::Box(solid) => box_sphere::nearest_point(solid, ground, base),
         PlacedShape::Sphere(sphere) => sphere_sphere::nearest_point(sphere, ground, base),
+    }
+}
+
+/// Visits the points of a shape over a face of a surface whose gap is at most `reach`, m.
+#[inline]
+pub fn visit_on_face(
+    shape: &PlacedShape,
+    face: &Face,
+    base: &Vector3<f64>,
+    reach: f64,
+    mut visit: impl FnMut(&SurfacePoint),
+) {
+    match shape {
+        PlacedShape::Disc(disc) => {
+            disc_triangle::rim_points_over_face(disc, face, base, reach, visit);
+        }
+        PlacedShape::Box(solid) => {
+            box_triangle::corners_over_face(solid, face, base, reach, visit);
+        }
+        PlacedShape::Sphere(sphere) => {
+            let low = sphere_triangle::lowest_over_face(sphere, face, base);
+            if let Some(low) = low.filter(|low| low.gap <= reach) {
+                visit(&low);
+            }
+        }
+    }
+}
+
+/// Visits the points of a shape at a convex edge of a surface whose gap is at most `reach`, m.
+#[inline]
+pub fn visit_at_edge(
+    shape: &PlacedShape,
+    edge: &Edge,
+    base: &Vector3<f64>,
+    reach: f64,
+    mut visit: impl FnMut(&SurfacePoint),
+) {
+    let point = match shape {
+        PlacedShape::Disc(disc) => disc_triangle::rim_point_at_edge(disc, edge, base),
+        PlacedShape::Box(solid) => {
+            box_triangle::crossings(solid, edge, base, reach, visit);
+            return;
+        }
+        PlacedShape::Sphere(sphere) => sphere_triangle::point_at_edge(sphere, edge, base),
+    };
+    if let Some(point) = point.filter(|point| point.gap <= reach) {
+        visit(&point);
+    }
+}
+
+/// The point of a feature at a convex edge of a surface, wherever it is.
+#[inline]
+#[must_use]
+pub fn point_at_edge(
+    shape: &PlacedShape,
+    edge: &Edge,
+    base: &Vector3<f64>,
+    feature: usize,
+) -> SurfacePoint {
+    match shape {
+        PlacedShape::Disc(disc) => disc_triangle::nearest_at_edge(disc, edge, base),
+        PlacedShape::Box(solid) => box_triangle::point_at_edge(solid, edge, base, feature),
+        PlacedShape::Sphere(sphere) => sphere_triangle::nearest_at_edge(sphere, edge, base),
+    }
+}
+
+/// The point of a shape at a convex vertex of a surface, wherever it is.
+#[inline]
+#[must_use]
+pub fn point_at_vertex(shape: &PlacedShape, vertex: &Vertex, base: &Vector3<f64>) -> SurfacePoint {
+    match shape {
+        PlacedShape::Disc(disc) => disc_triangle::nearest_at_vertex(disc, vertex, base),
+        PlacedShape::Box(solid) => box_triangle::nearest_at_vertex(solid, vertex, base),
+        PlacedShape::Sphere(sphere) => sphere_triangle::nearest_at_vertex(sphere, vertex, base),
     }
 }
 

@@ -1,10 +1,10 @@
 //! Signed distance, points and normal of a pair of shapes: one module per pair, one dispatcher.
 //!
-//! | | plane | sphere of the ground | disc | box | sphere |
-//! |---|---|---|---|---|---|
-//! | disc | [`disc_plane`] | [`disc_sphere`] | [`disc_disc`] | [`disc_box`] | [`disc_sphere`] |
-//! | box | [`box_plane`] | [`box_sphere`] | | [`box_box`] | [`box_sphere`] |
-//! | sphere | [`sphere_plane`] | [`sphere_sphere`] | | | [`sphere_sphere`] |
+//! | | plane | sphere of the ground | triangles | disc | box | sphere |
+//! |---|---|---|---|---|---|---|
+//! | disc | [`disc_plane`] | [`disc_sphere`] | [`disc_triangle`] | [`disc_disc`] | [`disc_box`] | [`disc_sphere`] |
+//! | box | [`box_plane`] | [`box_sphere`] | [`box_triangle`] | | [`box_box`] | [`box_sphere`] |
+//! | sphere | [`sphere_plane`] | [`sphere_sphere`] | [`sphere_triangle`] | | | [`sphere_sphere`] |
 //!
 //! The gap is positive where the shapes are apart. Its rate is the normal part of the relative
 //! velocity of the two *material* points, exactly unless a module states the error. [`convex`]
@@ -16,14 +16,17 @@
 pub mod box_box;
 pub mod box_plane;
 pub mod box_sphere;
+pub mod box_triangle;
 pub mod convex;
 pub mod disc_box;
 pub mod disc_disc;
 pub mod disc_plane;
 pub mod disc_sphere;
+pub mod disc_triangle;
 pub mod dispatch;
 pub mod sphere_plane;
 pub mod sphere_sphere;
+pub mod sphere_triangle;
 pub mod sweep;
 
 use nalgebra::Vector3;

@@ -68,6 +68,87 @@ pub enum TerrainError {
         /// How many there may be.
         limit: usize,
     },
+    /// A height that is infinite or too large.
+    #[error(
+        "heights[{row}, {column}]: must be at most {limit} m in size or nan for no data, is {value}"
+    )]
+    BadHeight {
+        /// Row, along z.
+        row: usize,
+        /// Column, along x.
+        column: usize,
+        /// What was given, m.
+        value: f64,
+        /// Largest allowed, m.
+        limit: f64,
+    },
+    /// A map of another size than its heights.
+    #[error("heights: needs {rows} rows of {columns} numbers, has {count} numbers")]
+    WrongCount {
+        /// Rows.
+        rows: usize,
+        /// Columns.
+        columns: usize,
+        /// Numbers.
+        count: usize,
+    },
+    /// A map without a cell, or with too many.
+    #[error("heights: needs from 2 x 2 to {limit} numbers, has {rows} x {columns}")]
+    MapSize {
+        /// Rows.
+        rows: usize,
+        /// Columns.
+        columns: usize,
+        /// Most numbers.
+        limit: usize,
+    },
+    /// A map of which nothing is known.
+    #[error("heights: no cell has data at all of its corners")]
+    NoData,
+    /// A mesh without triangles.
+    #[error("triangles: a mesh needs at least one")]
+    NoTriangles,
+    /// A triangle that names a vertex that is not there.
+    #[error("triangles[{index}]: names vertex {vertex}, there are {vertices}")]
+    NoSuchVertex {
+        /// Number of the triangle.
+        index: usize,
+        /// What it names.
+        vertex: usize,
+        /// How many there are.
+        vertices: usize,
+    },
+    /// A triangle without an area.
+    #[error("triangles[{index}]: has no area")]
+    FlatTriangle {
+        /// Number of the triangle.
+        index: usize,
+    },
+    /// An edge of three triangles, or of two that face opposite ways.
+    #[error(
+        "triangles[{index}]: its edge from vertex {from} to {to} belongs to another triangle in the \
+         same direction; a surface needs triangles that all turn counterclockwise, seen from outside"
+    )]
+    NotASurface {
+        /// Number of the triangle.
+        index: usize,
+        /// Vertex where the edge begins.
+        from: usize,
+        /// Vertex where it ends.
+        to: usize,
+    },
+    /// Nothing to combine.
+    #[error("parts: a union needs at least one terrain")]
+    NoParts,
+    /// More planes than one in a union.
+    #[error("parts[{index}]: a second plane; a union takes one at most")]
+    SecondPlane {
+        /// Number of the part.
+        index: usize,
+    },
+    /// More primitives than can be numbered.
+    #[error("parts: their pieces are more than can be numbered, 2^32")]
+    TooManyPieces,
     /// A number that describes a field of rocks, outside its range.
     #[error("{field}: must be {range}, is {value}")]
     OutOfRange {
@@ -92,6 +173,15 @@ impl TerrainError {
             Self::NoDirection { .. } => "normal",
             Self::NonPositiveRadius { .. } | Self::MismatchedLengths { .. } => "radii",
             Self::Empty | Self::TooMany { .. } => "centres",
+            Self::BadHeight { .. }
+            | Self::WrongCount { .. }
+            | Self::MapSize { .. }
+            | Self::NoData => "heights",
+            Self::NoTriangles
+            | Self::NoSuchVertex { .. }
+            | Self::FlatTriangle { .. }
+            | Self::NotASurface { .. } => "triangles",
+            Self::NoParts | Self::SecondPlane { .. } | Self::TooManyPieces => "parts",
         }
     }
 }

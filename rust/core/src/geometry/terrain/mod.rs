@@ -4,16 +4,25 @@
 //! of a machine ([`super::query`]).
 
 pub mod error;
+pub mod height_field;
+pub mod mesh;
 pub mod plane;
 pub mod rocks;
 pub mod sphere_field;
+pub mod surface;
+mod tiles;
+pub mod union;
 
 use nalgebra::Vector3;
 
 pub use error::TerrainError;
+pub use height_field::HeightField;
+pub use mesh::TriangleMesh;
 pub use plane::Plane;
 pub use rocks::{Clearing, Rocks};
 pub use sphere_field::SphereField;
+pub use surface::{Edge, Face, Vertex};
+pub use union::Union;
 
 use super::shape::Sphere;
 
@@ -24,6 +33,23 @@ pub enum Primitive {
     Plane(Plane),
     /// A ball.
     Sphere(Sphere),
+    /// A triangle of a surface.
+    Face(Face),
+    /// A convex edge of a surface.
+    Edge(Edge),
+    /// A convex vertex of a surface.
+    Vertex(Vertex),
+}
+
+/// What a terrain knows of the ground under a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Coverage {
+    /// There is ground.
+    Known,
+    /// It says nothing of the ground there: there are only things that lie on it.
+    Silent,
+    /// The ground is not known at this place (x, z), m.
+    Unknown([f64; 2]),
 }
 
 /// The ground. Immutable, shared between threads.
@@ -39,8 +65,32 @@ pub trait Terrain: Send + Sync {
         true
     }
 
+    /// Whether it is a plane and nothing else.
+    fn is_plane(&self) -> bool {
+        false
+    }
+
+    /// Whether it has pieces of a surface.
+    fn has_surface(&self) -> bool {
+        false
+    }
+
     /// The primitive with a number from [`Self::visit_near`].
     fn primitive(&self, id: u32) -> Primitive;
+
+    /// Numbers of primitives are below this.
+    fn n_primitives(&self) -> u32;
+
+    /// Whether a point of a part (world, m) behind the plane of a primitive is in the ground, and
+    /// not merely beyond its other side. Asked of pieces of a surface only.
+    fn is_inside(&self, _id: u32, _point: &Vector3<f64>) -> bool {
+        true
+    }
+
+    /// What is known of the ground within `radius` (m) of `centre`, seen from above.
+    fn coverage(&self, _centre: &Vector3<f64>, _radius: f64) -> Coverage {
+        Coverage::Known
+    }
 
     /// Height y (m) of the visible surface at (x, z); `None` where there is none.
     fn height(&self, x: f64, z: f64) -> Option<f64>;

@@ -63,6 +63,16 @@ impl Plane {
         Ok(Self { normal, offset })
     }
 
+    /// Through a point (world, m) with a unit normal.
+    #[inline]
+    pub(crate) fn through(x: &Vector3<f64>, normal: Vector3<f64>) -> Self {
+        let offset = -normal.dot(x);
+        Self {
+            normal: Unit::new_unchecked(normal),
+            offset,
+        }
+    }
+
     /// Flat ground at height 0.
     #[must_use]
     pub fn ground() -> Self {
@@ -109,8 +119,17 @@ impl Terrain for Plane {
     }
 
     #[inline]
+    fn is_plane(&self) -> bool {
+        true
+    }
+
+    #[inline]
     fn primitive(&self, _id: u32) -> Primitive {
         Primitive::Plane(*self)
+    }
+
+    fn n_primitives(&self) -> u32 {
+        1
     }
 
     fn height(&self, x: f64, z: f64) -> Option<f64> {

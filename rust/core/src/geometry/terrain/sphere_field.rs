@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::error::TerrainError;
 use super::plane::Plane;
 use super::rocks::Rocks;
-use super::{Primitive, Terrain};
+use super::{Coverage, Primitive, Terrain};
 use crate::geometry::broad_phase::BallTree;
 use crate::geometry::shape::Sphere;
 use crate::scalar::elementary::{hypot, sin_cos};
@@ -101,6 +101,33 @@ impl SphereField {
         })
     }
 
+    /// Rocks that lie on another terrain, which is not part of the field: each is raised by the
+    /// height of the ground under its middle. Where there is none there are no rocks.
+    ///
+    /// # Errors
+    /// As [`Self::rocks`]; `Empty` if no rock is left.
+    pub fn rocks_on(rocks: &Rocks, ground: &dyn Terrain) -> Result<Self, TerrainError> {
+        let flat = Rocks {
+            ground: Plane::ground(),
+            ..rocks.clone()
+        };
+        let raised = |sphere: Sphere| {
+            let [x, y, z]: [f64; 3] = sphere.centre.into();
+            let height = ground.height(x, z)?;
+            let centre = Vector3::new(x, y + height, z);
+            Some(Sphere { centre, ..sphere })
+        };
+        let spheres: Vec<Sphere> = flat.sample()?.into_iter().filter_map(raised).collect();
+        if spheres.is_empty() {
+            return Err(TerrainError::Empty);
+        }
+        for (index, sphere) in spheres.iter().enumerate() {
+            (sphere.centre.iter()).try_for_each(|&x| check_entry("centres", index, x))?;
+        }
+        let tree = BallTree::new(&spheres);
+        Ok(Self { ground: None, tree })
+    }
+
     /// The spheres in the order they were given.
     #[must_use]
     pub fn spheres(&self) -> impl ExactSizeIterator<Item = &Sphere> {
@@ -119,7 +146,11 @@ pub(super) fn check_count(count: usize) -> Result<(), TerrainError> {
     Ok(())
 }
 
-fn check_entry(field: &'static str, index: usize, value: f64) -> Result<(), TerrainError> {
+pub(super) fn check_entry(
+    field: &'static str,
+    index: usize,
+    value: f64,
+) -> Result<(), TerrainError> {
     if !value.is_finite() {
         return Err(TerrainError::EntryNotFinite {
             field,
@@ -157,10 +188,27 @@ impl Terrain for SphereField {
         !self.tree.is_empty()
     }
 
+    fn is_plane(&self) -> bool {
+        self.ground.is_some() && self.tree.is_empty()
+    }
+
     fn primitive(&self, id: u32) -> Primitive {
         match (id, self.ground) {
             (0, Some(plane)) => Primitive::Plane(plane),
             (id, _) => Primitive::Sphere(*self.tree.ball(id as usize - 1)),
+        }
+    }
+
+    #[allow(clippy::cast_possible_truncation)] // at most the limit of spheres
+    fn n_primitives(&self) -> u32 {
+        self.tree.len() as u32 + 1
+    }
+
+    fn coverage(&self, _centre: &Vector3<f64>, _radius: f64) -> Coverage {
+        if self.ground.is_some() {
+            Coverage::Known
+        } else {
+            Coverage::Silent
         }
     }
 

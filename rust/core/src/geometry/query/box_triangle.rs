@@ -1,0 +1,165 @@
+//! Box on a triangulated surface: its corners over a face, its edges across a convex edge, its
+//! faces and edges on a convex vertex.
+//!
+//! Of the box's twelve edges those along one axis share the normal `n ∝ e × f` with an edge of the
+//! surface, and the side of n decides which of the four can touch. A corner that has not yet come
+//! down to an edge is met too. The feature at an edge is the axis, or 3 and the corner's number.
+
+use nalgebra::Vector3;
+
+use super::{NEAREST, SurfacePoint, box_plane, box_sphere};
+use crate::geometry::shape::oriented_box::signs;
+use crate::geometry::terrain::surface::{Edge, Face, Vertex};
+use crate::geometry::{OrientedBox, Sphere};
+
+/// Sine of the angle between two edges below which they have no common normal.
+const PARALLEL: f64 = 1e-9;
+
+/// Corners over a face whose gap is at most `reach`; `base` as in [`super::dispatch`].
+#[inline]
+pub fn corners_over_face(
+    solid: &OrientedBox,
+    face: &Face,
+    base: &Vector3<f64>,
+    reach: f64,
+    mut visit: impl FnMut(&SurfacePoint),
+) {
+    box_plane::corners(solid, &face.plane, base, reach, |point| {
+        if face.admits(&(base + point.point)) {
+            visit(point);
+        }
+    });
+}
+
+/// Visits the crossings of the box's edges with an edge of the surface whose gap is at most
+/// `reach`.
+pub fn crossings(
+    solid: &OrientedBox,
+    edge: &Edge,
+    base: &Vector3<f64>,
+    reach: f64,
+    mut visit: impl FnMut(&SurfacePoint),
+) {
+    for axis in 0..3 {
+        let Some((point, place, own)) = crossing(solid, edge, base, axis) else {
+            continue;
+        };
+        let is_between = own.abs() <= solid.half_size[axis];
+        if is_between && point.gap <= reach && edge.admits(&point.n) && edge.has(place, -point.gap)
+        {
+            visit(&point);
+        }
+    }
+    for number in 0..8 {
+        let (point, place) = corner_over(solid, edge, base, number);
+        let supports = solid.R.tr_mul(&point.n).dot(&signs(number)) < 0.0
+            && (0..3).all(|k| solid.axis(k).dot(&point.n) * signs(number)[k] <= 0.0);
+        if point.gap > 0.0
+            && point.gap <= reach
+            && supports
+            && edge.admits(&point.n)
+            && edge.has(place, 0.0)
+        {
+            visit(&point);
+        }
+    }
+}
+
+/// A corner over the line of an edge, and its place along it, m.
+fn corner_over(
+    solid: &OrientedBox,
+    edge: &Edge,
+    base: &Vector3<f64>,
+    number: usize,
+) -> (SurfacePoint, f64) {
+    let corner = solid.corner(number);
+    let from_start = corner - (edge.start - base);
+    let place = from_start.dot(&edge.along);
+    let across = from_start - edge.along * place;
+    let gap = across.norm();
+    let up = (edge.normals[0] + edge.normals[1]).normalize();
+    let n = across
+        .try_normalize(0.0)
+        .filter(|n| n.dot(&up) > 0.0)
+        .unwrap_or(up);
+    let gap = gap.copysign(n.dot(&across));
+    (
+        SurfacePoint::of_normal(CORNERS + number, corner, &n, gap),
+        place,
+    )
+}
+
+/// Feature of the first corner.
+const CORNERS: usize = 3;
+
+/// The point of a feature, wherever it is; the box's lowest corner if the edges are parallel.
+#[must_use]
+pub fn point_at_edge(
+    solid: &OrientedBox,
+    edge: &Edge,
+    base: &Vector3<f64>,
+    feature: usize,
+) -> SurfacePoint {
+    if feature >= CORNERS {
+        return corner_over(solid, edge, base, feature - CORNERS).0;
+    }
+    let axis = feature;
+    let crossing = crossing(solid, edge, base, axis);
+    crossing.map_or_else(
+        || {
+            let n = (edge.normals[0] + edge.normals[1]).normalize();
+            let point = crate::geometry::SupportMap::support(solid, &-n);
+            let gap = n.dot(&(point - (edge.start - base)));
+            SurfacePoint::of_normal(axis, point, &n, gap)
+        },
+        |(point, ..)| point,
+    )
+}
+
+/// The crossing with the lowest of the box's edges along an axis, its place along the edge of the
+/// surface (m from the start) and along the box's (m from the middle).
+fn crossing(
+    solid: &OrientedBox,
+    edge: &Edge,
+    base: &Vector3<f64>,
+    axis: usize,
+) -> Option<(SurfacePoint, f64, f64)> {
+    let f = solid.axis(axis);
+    let across = edge.along.cross(&f);
+    let sine = across.norm();
+    if sine <= PARALLEL {
+        return None;
+    }
+    let up = (edge.normals[0] + edge.normals[1]).dot(&across);
+    let n = across / if up < 0.0 { -sine } else { sine };
+    let mut local = solid.R.tr_mul(&n).map(|x| -1.0_f64.copysign(x));
+    local[axis] = 0.0;
+    let middle = solid.centre + solid.R * local.component_mul(&solid.half_size);
+    let between = middle - (edge.start - base);
+    let gap = n.dot(&between);
+    // between + s f − t e = gap n
+    let rest = between - n * gap;
+    let (along, own, c) = (rest.dot(&edge.along), rest.dot(&f), edge.along.dot(&f));
+    let s = (c * along - own) / (sine * sine);
+    let place = along + s * c;
+    let point = SurfacePoint::of_normal(axis, middle + f * s, &n, gap);
+    Some((point, place, s))
+}
+
+/// The point that a vertex pushes, wherever it is.
+#[inline]
+#[must_use]
+pub fn nearest_at_vertex(
+    solid: &OrientedBox,
+    vertex: &Vertex,
+    base: &Vector3<f64>,
+) -> SurfacePoint {
+    let point = Sphere {
+        centre: vertex.place,
+        radius: 0.0,
+    };
+    SurfacePoint {
+        feature: NEAREST,
+        ..box_sphere::nearest_point(solid, &point, base)
+    }
+}

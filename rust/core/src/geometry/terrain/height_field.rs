@@ -1,0 +1,510 @@
+//! Height field: a grid of heights with two triangles a cell.
+//!
+//! Height (j, i), row j and column i, stands at `x = x₀ + i dx`, `z = z₀ + j dz`. Each cell is cut
+//! along the diagonal from its corner (j, i) to (j + 1, i + 1). The ground fills everything below
+//! the surface. A height that is nan is no data: triangles that need it do not exist, and the
+//! ground there is unknown, as it is beyond the map.
+//!
+//! The piece `6 (j n_x + i) + k` belongs to the corner (j, i): k = 0 is the face with
+//! `u ≥ v` (u, v: shares of the cell along x and z), 1 the other face, 2 the edge along x, 3 that
+//! along z, 4 the diagonal, 5 the vertex. Faces are computed when they are needed, so the map costs
+//! four bytes a height, and a hundredth of that for the bounds of tiles.
+
+use nalgebra::Vector3;
+
+use super::error::TerrainError;
+use super::plane::Plane;
+use super::sphere_field::MAX_SIZE;
+use super::surface::{Edge, Face, Hinge, MAX_SPOKES, Vertex};
+use super::tiles::{Tile, Tiles};
+use super::{Coverage, Primitive, Terrain};
+
+/// Pieces that belong to one corner.
+const PIECES: u32 = 6;
+
+/// Most heights: their pieces are numbered with 32 bits.
+pub const MAX_HEIGHTS: usize = (u32::MAX / PIECES) as usize;
+
+/// Neighbours of a vertex: columns and rows.
+const SPOKES: [[isize; 2]; 6] = [[1, 0], [1, 1], [0, 1], [-1, 0], [-1, -1], [0, -1]];
+
+/// A map of heights. Immutable.
+#[derive(Clone, Debug)]
+pub struct HeightField {
+    /// Row by row, m.
+    heights: Vec<f32>,
+    columns: usize,
+    rows: usize,
+    /// dx, dz, m.
+    spacing: [f64; 2],
+    /// x₀, z₀, m.
+    origin: [f64; 2],
+    tiles: Tiles,
+}
+
+/// One of the two faces of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Half {
+    /// u ≥ v.
+    Low,
+    /// u < v.
+    High,
+}
+
+/// A cell or corner: column and row, which may be off the map.
+type Place = [isize; 2];
+
+impl HeightField {
+    /// From heights (rows x columns, row by row, m), the spacing of columns and rows (dx, dz, m)
+    /// and the place of the first height (x₀, z₀, m).
+    ///
+    /// # Errors
+    /// `WrongCount`, `MapSize`, `BadHeight`, `NoData`; `OutOfRange` for a spacing that is not
+    /// positive or a map that reaches beyond 1e6 m.
+    pub fn new(
+        heights: Vec<f32>,
+        [rows, columns]: [usize; 2],
+        spacing: [f64; 2],
+        origin: [f64; 2],
+    ) -> Result<Self, TerrainError> {
+        let count = heights.len();
+        if rows < 2 || columns < 2 || count > MAX_HEIGHTS {
+            let limit = MAX_HEIGHTS;
+            return Err(TerrainError::MapSize {
+                rows,
+                columns,
+                limit,
+            });
+        }
+        if rows.checked_mul(columns) != Some(count) {
+            return Err(TerrainError::WrongCount {
+                rows,
+                columns,
+                count,
+            });
+        }
+        for (axis, n) in [columns, rows].into_iter().enumerate() {
+            let (step, begin) = (spacing[axis], origin[axis]);
+            if !(step >= MIN_SPACING && step <= MAX_SIZE) {
+                return Err(TerrainError::OutOfRange {
+                    field: "spacing",
+                    range: "from 1e-4 to 1e6 m",
+                    value: step,
+                });
+            }
+            let end = begin + (n - 1) as f64 * step;
+            for value in [begin, end] {
+                if !(value.abs() <= MAX_SIZE) {
+                    return Err(TerrainError::OutOfRange {
+                        field: "origin",
+                        range: "such that the map lies within 1e6 m of the world's origin",
+                        value,
+                    });
+                }
+            }
+        }
+        let wrong = |h: &f32| f64::from(h.abs()) > MAX_SIZE;
+        if let Some(at) = heights.iter().position(wrong) {
+            return Err(TerrainError::BadHeight {
+                row: at / columns,
+                column: at % columns,
+                value: f64::from(heights[at]),
+                limit: MAX_SIZE,
+            });
+        }
+        let tiles = Tiles::new(&heights, columns, rows);
+        let field = Self {
+            heights,
+            columns,
+            rows,
+            spacing,
+            origin,
+            tiles,
+        };
+        if field.tiles.has_hole() && !field.has_a_face() {
+            return Err(TerrainError::NoData);
+        }
+        Ok(field)
+    }
+
+    fn has_a_face(&self) -> bool {
+        (0..self.rows - 1).any(|j| {
+            (0..self.columns - 1).any(|i| {
+                [Half::Low, Half::High]
+                    .iter()
+                    .any(|&half| self.normal([narrow(i), narrow(j)], half).is_some())
+            })
+        })
+    }
+
+    /// Heights, row by row, m; nan for no data.
+    #[must_use]
+    pub fn heights(&self) -> &[f32] {
+        &self.heights
+    }
+
+    /// Rows and columns.
+    #[must_use]
+    pub fn shape(&self) -> [usize; 2] {
+        [self.rows, self.columns]
+    }
+
+    /// dx, dz, m.
+    #[must_use]
+    pub fn spacing(&self) -> [f64; 2] {
+        self.spacing
+    }
+
+    /// x₀, z₀, m.
+    #[must_use]
+    pub fn origin(&self) -> [f64; 2] {
+        self.origin
+    }
+
+    /// Memory, bytes.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        size_of_val(&self.heights[..]) + self.tiles.size()
+    }
+
+    /// Visits the corners (column, row) of the cells that a ball of radius `reach` (m) about
+    /// `centre` (world, m) may touch, from above or from within the ground.
+    #[inline]
+    pub fn visit_cells(
+        &self,
+        centre: &Vector3<f64>,
+        reach: f64,
+        mut visit: impl FnMut(usize, usize),
+    ) {
+        let along = |axis: usize, x: f64| (x - self.origin[axis]) / self.spacing[axis];
+        let local = [along(0, centre.x), along(1, centre.z)];
+        let range = |axis: usize, n: usize| {
+            let half = reach / self.spacing[axis];
+            let last = (n - 2) as f64;
+            let low = (local[axis] - half).floor().max(0.0);
+            let high = (local[axis] + half).floor().min(last);
+            (low <= high).then(|| [index(low), index(high)])
+        };
+        let (Some(columns), Some(rows)) = (range(0, self.columns), range(1, self.rows)) else {
+            return;
+        };
+        // Lowest height of the ball over a rectangle of cells.
+        let bottom = |[i, j]: [usize; 2], [w, h]: [usize; 2]| {
+            let beyond = |axis: usize, first: usize, n: usize| {
+                let low = first as f64 - local[axis];
+                let high = local[axis] - (first + n) as f64;
+                low.max(high).max(0.0) * self.spacing[axis]
+            };
+            let (x, z) = (beyond(0, i, w), beyond(1, j, h));
+            let rest = reach * reach - x * x - z * z;
+            if rest < 0.0 {
+                f64::INFINITY
+            } else {
+                centre.y - rest.sqrt()
+            }
+        };
+        self.tiles.visit(
+            columns,
+            rows,
+            |tile: &Tile| f64::from(tile.highest) >= bottom(tile.first, tile.size),
+            |[i, j]| {
+                let at = j * self.columns + i;
+                let (near, far) = (
+                    &self.heights[at..at + 2],
+                    &self.heights[at + self.columns..][..2],
+                );
+                let highest = near[0].max(near[1]).max(far[0]).max(far[1]);
+                if f64::from(highest) >= bottom([i, j], [1, 1]) {
+                    visit(i, j);
+                }
+            },
+        );
+    }
+
+    /// Height of a corner, m; nan where there is none.
+    #[inline]
+    fn corner(&self, [i, j]: Place) -> f64 {
+        let at = |k: isize, n: usize| usize::try_from(k).ok().filter(|&k| k < n);
+        match (at(i, self.columns), at(j, self.rows)) {
+            (Some(i), Some(j)) => f64::from(self.heights[j * self.columns + i]),
+            _ => f64::NAN,
+        }
+    }
+
+    /// A corner, world, m.
+    #[inline]
+    fn point(&self, place: Place) -> Vector3<f64> {
+        let [i, j] = place;
+        Vector3::new(
+            self.origin[0] + i as f64 * self.spacing[0],
+            self.corner(place),
+            self.origin[1] + j as f64 * self.spacing[1],
+        )
+    }
+
+    /// Unit normal of a face; None where there is none.
+    #[inline]
+    fn normal(&self, [i, j]: Place, half: Half) -> Option<Vector3<f64>> {
+        let (a, d) = (self.corner([i, j]), self.corner([i + 1, j + 1]));
+        let [dx, dz] = self.spacing;
+        let (x, z) = match half {
+            Half::Low => {
+                let b = self.corner([i + 1, j]);
+                ((b - a) / dx, (d - b) / dz)
+            }
+            Half::High => {
+                let c = self.corner([i, j + 1]);
+                ((d - c) / dx, (c - a) / dz)
+            }
+        };
+        let square = 1.0 + x * x + z * z;
+        square
+            .is_finite()
+            .then(|| Vector3::new(-x, 1.0, -z) / square.sqrt())
+    }
+
+    /// The edge k = 2, 3, 4 of a corner: its end, and its two faces in the order of [`Hinge`].
+    #[inline]
+    fn ends_and_faces([i, j]: Place, k: u32) -> (Place, [(Place, Half); 2]) {
+        match k {
+            2 => ([i + 1, j], [([i, j - 1], Half::High), ([i, j], Half::Low)]),
+            3 => ([i, j + 1], [([i, j], Half::High), ([i - 1, j], Half::Low)]),
+            _ => ([i + 1, j + 1], [([i, j], Half::Low), ([i, j], Half::High)]),
+        }
+    }
+
+    /// The hinge at an edge of a face; a face without a neighbour there is bounded as if the
+    /// surface went on flat.
+    #[inline]
+    fn hinge(&self, place: Place, k: u32) -> Option<Hinge> {
+        let (end, [first, second]) = Self::ends_and_faces(place, k);
+        let (first, second) = (
+            self.normal(first.0, first.1),
+            self.normal(second.0, second.1),
+        );
+        let normals = match (&first, &second) {
+            (Some(first), Some(second)) => [first, second],
+            (Some(own), None) | (None, Some(own)) => [own, own],
+            (None, None) => return None,
+        };
+        Some(Hinge::new(&self.point(place), &self.point(end), normals))
+    }
+
+    /// A face of a cell.
+    #[inline]
+    fn face(&self, place: Place, half: Half) -> Option<Face> {
+        let n = self.normal(place, half)?;
+        let plane = Plane::through(&self.point(place), n);
+        let [i, j] = place;
+        let (edges, sides) = match half {
+            Half::Low => ([(place, 2), ([i + 1, j], 3), (place, 4)], [1, 1, 0]),
+            Half::High => ([([i, j + 1], 2), (place, 3), (place, 4)], [0, 0, 1]),
+        };
+        let wall = |k: usize| {
+            let (corner, edge): (Place, u32) = edges[k];
+            self.hinge(corner, edge).map(|hinge| hinge.walls[sides[k]])
+        };
+        Some(Face {
+            plane,
+            walls: [wall(0)?, wall(1)?, wall(2)?],
+        })
+    }
+
+    /// A convex edge.
+    #[inline]
+    fn edge(&self, place: Place, k: u32) -> Option<Edge> {
+        let (end, [first, second]) = Self::ends_and_faces(place, k);
+        let normals = [
+            self.normal(first.0, first.1)?,
+            self.normal(second.0, second.1)?,
+        ];
+        let (start, end) = (self.point(place), self.point(end));
+        let hinge = Hinge::new(&start, &end, [&normals[0], &normals[1]]);
+        if !hinge.is_convex {
+            return None;
+        }
+        let length = (end - start).norm();
+        Some(Edge {
+            start,
+            along: (end - start) / length,
+            length,
+            normals,
+        })
+    }
+
+    /// A vertex that may be convex.
+    #[inline]
+    fn vertex(&self, place: Place) -> Option<Vertex> {
+        let height = self.corner(place);
+        let [i, j] = place;
+        let mut is_flat = true;
+        for [di, dj] in &SPOKES[..3] {
+            let mean = 0.5 * (self.corner([i + di, j + dj]) + self.corner([i - di, j - dj]));
+            if !(height >= mean) {
+                return None;
+            }
+            is_flat &= height <= mean;
+        }
+        if is_flat {
+            return None;
+        }
+        let own = self.point(place);
+        let mut spokes = [Vector3::zeros(); MAX_SPOKES];
+        for (spoke, [di, dj]) in spokes.iter_mut().zip(SPOKES) {
+            *spoke = self.point([i + di, j + dj]) - own;
+        }
+        Some(Vertex {
+            place: own,
+            spokes,
+            n: SPOKES.len(),
+        })
+    }
+
+    /// A piece of a corner.
+    fn piece(&self, place: Place, k: u32) -> Option<Primitive> {
+        match k {
+            0 => self.face(place, Half::Low).map(Primitive::Face),
+            1 => self.face(place, Half::High).map(Primitive::Face),
+            5 => self.vertex(place).map(Primitive::Vertex),
+            _ => self.edge(place, k).map(Primitive::Edge),
+        }
+    }
+
+    /// The cell under a place, and u and v within it; None off the map.
+    #[inline]
+    fn cell_at(&self, x: f64, z: f64) -> Option<([usize; 2], [f64; 2])> {
+        let cell = |axis: usize, x: f64, n: usize| {
+            let local = (x - self.origin[axis]) / self.spacing[axis];
+            let last = (n - 1) as f64;
+            (local >= 0.0 && local <= last).then(|| {
+                let whole = local.floor().min(last - 1.0);
+                (index(whole), local - whole)
+            })
+        };
+        let ((i, u), (j, v)) = (cell(0, x, self.columns)?, cell(1, z, self.rows)?);
+        Some(([i, j], [u, v]))
+    }
+}
+
+/// Smallest spacing, m.
+const MIN_SPACING: f64 = 1e-4;
+
+#[allow(clippy::cast_possible_wrap)] // at most the number of heights
+fn narrow(index: usize) -> isize {
+    index as isize
+}
+
+#[inline]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // whole and within the map
+fn index(x: f64) -> usize {
+    x as usize
+}
+
+impl Terrain for HeightField {
+    fn visit_near(
+        &self,
+        centre: &Vector3<f64>,
+        reach: f64,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
+        let columns = self.columns;
+        self.visit_cells(centre, reach, |i, j| {
+            let own = [narrow(i), narrow(j)];
+            let first = number(j * columns + i);
+            for k in 0..PIECES {
+                if let Some(piece) = self.piece(own, k) {
+                    visit(first + k, &piece);
+                }
+            }
+        });
+    }
+
+    fn can_be_passed(&self) -> bool {
+        false
+    }
+
+    fn has_surface(&self) -> bool {
+        true
+    }
+
+    fn primitive(&self, id: u32) -> Primitive {
+        let corner = (id / PIECES) as usize;
+        let place = [narrow(corner % self.columns), narrow(corner / self.columns)];
+        let piece = self.piece(place, id % PIECES);
+        piece.unwrap_or_else(|| unreachable!("invariant: piece {id} was visited"))
+    }
+
+    fn n_primitives(&self) -> u32 {
+        number(self.heights.len())
+    }
+
+    fn is_inside(&self, _id: u32, point: &Vector3<f64>) -> bool {
+        let surface = self.height(point.x, point.z);
+        surface.is_some_and(|y| point.y <= y + SURFACE)
+    }
+
+    fn coverage(&self, centre: &Vector3<f64>, radius: f64) -> Coverage {
+        let [x, z] = [centre.x, centre.z];
+        let mut range = [[0; 2]; 2];
+        for (axis, (x, n)) in [(x, self.columns), (z, self.rows)].into_iter().enumerate() {
+            let local = (x - self.origin[axis]) / self.spacing[axis];
+            let half = radius / self.spacing[axis];
+            let last = (n - 1) as f64;
+            let (low, high) = (local - half, local + half);
+            if !(low >= 0.0 && high <= last) {
+                return Coverage::Unknown([centre.x, centre.z]);
+            }
+            range[axis] = [index(low.floor()), index(high.floor().min(last - 1.0))];
+        }
+        if !self.tiles.has_hole() {
+            return Coverage::Known;
+        }
+        let mut hole = None;
+        self.tiles.visit(
+            range[0],
+            range[1],
+            |tile| tile.has_hole,
+            |[i, j]| {
+                for corner in [[i, j], [i + 1, j], [i, j + 1], [i + 1, j + 1]] {
+                    let place = corner.map(narrow);
+                    if self.corner(place).is_nan() {
+                        let [i, j] = corner.map(|k| k as f64);
+                        hole = Some([
+                            self.origin[0] + i * self.spacing[0],
+                            self.origin[1] + j * self.spacing[1],
+                        ]);
+                    }
+                }
+            },
+        );
+        hole.map_or(Coverage::Known, Coverage::Unknown)
+    }
+
+    fn height(&self, x: f64, z: f64) -> Option<f64> {
+        let ([i, j], [u, v]) = self.cell_at(x, z)?;
+        let [i, j] = [narrow(i), narrow(j)];
+        let (a, d) = (self.corner([i, j]), self.corner([i + 1, j + 1]));
+        let y = if u >= v {
+            let b = self.corner([i + 1, j]);
+            a + u * (b - a) + v * (d - b)
+        } else {
+            let c = self.corner([i, j + 1]);
+            a + u * (d - c) + v * (c - a)
+        };
+        y.is_finite().then_some(y)
+    }
+
+    fn ground(&self) -> Option<&Plane> {
+        None
+    }
+}
+
+/// How far above the surface a point that is in the ground may seem to be by rounding, m.
+const SURFACE: f64 = 1e-9;
+
+/// Number of the first piece of a corner.
+#[inline]
+fn number(corner: usize) -> u32 {
+    let corner = u32::try_from(corner).unwrap_or_else(|_| unreachable!("invariant: few corners"));
+    PIECES * corner
+}

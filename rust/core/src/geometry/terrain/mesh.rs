@@ -1,0 +1,376 @@
+//! Triangle mesh: rocks and other things of any shape.
+//!
+//! Triangles turn counterclockwise, seen from outside. A closed mesh is filled. The border of an
+//! open one pushes outwards too, and what lies below it is inside.
+
+use std::collections::HashMap;
+
+use nalgebra::Vector3;
+
+use super::error::TerrainError;
+use super::plane::Plane;
+use super::sphere_field::check_entry;
+use super::surface::{Edge, Face, Hinge, MAX_SPOKES, Vertex, Wall};
+use super::{Coverage, Primitive, Terrain};
+use crate::geometry::broad_phase::BallTree;
+use crate::geometry::shape::Sphere;
+use crate::scalar::elementary::sin_cos;
+
+/// Most triangles of a mesh.
+pub const MAX_TRIANGLES: usize = 5_000_000;
+
+/// No neighbour.
+const NONE: u32 = u32::MAX;
+
+/// Triangles in space. Immutable.
+///
+/// With m triangles, face t is primitive t, the edge from the k-th vertex of triangle t to the next
+/// is m + 3 t + k, of the lower of its two triangles, and vertex i is 4 m + i.
+#[derive(Clone, Debug)]
+pub struct TriangleMesh {
+    vertices: Vec<Vector3<f64>>,
+    triangles: Vec<[u32; 3]>,
+    normals: Vec<Vector3<f64>>,
+    /// Triangle beyond each edge.
+    neighbours: Vec<[u32; 3]>,
+    /// First triangle of each vertex.
+    owners: Vec<u32>,
+    /// Neighbours of vertex i: `spokes[begins[i]..begins[i + 1]]`.
+    begins: Vec<u32>,
+    spokes: Vec<u32>,
+    /// Bounding balls of the triangles.
+    tree: BallTree,
+}
+
+impl TriangleMesh {
+    /// From vertices (n, 3), m, and triangles (m, 3) of their numbers.
+    ///
+    /// # Errors
+    /// `EntryNotFinite`, `TooFar`, `TooMany`, `Empty`, `NoSuchVertex`, `FlatTriangle`,
+    /// `NotASurface`.
+    pub fn new(vertices: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Self, TerrainError> {
+        if triangles.is_empty() {
+            return Err(TerrainError::NoTriangles);
+        }
+        for count in [triangles.len(), vertices.len()] {
+            let limit = MAX_TRIANGLES;
+            if count > limit {
+                return Err(TerrainError::TooMany { count, limit });
+            }
+        }
+        for (index, vertex) in vertices.iter().enumerate() {
+            (vertex.iter()).try_for_each(|&x| check_entry("vertices", index, x))?;
+        }
+        let vertices: Vec<_> = vertices.iter().map(|&v| Vector3::from(v)).collect();
+        let mut normals = Vec::with_capacity(triangles.len());
+        let mut balls = Vec::with_capacity(triangles.len());
+        let mut own = Vec::with_capacity(triangles.len());
+        for (index, triangle) in triangles.iter().enumerate() {
+            if let Some(&vertex) = triangle.iter().find(|&&v| v >= vertices.len()) {
+                return Err(TerrainError::NoSuchVertex {
+                    index,
+                    vertex,
+                    vertices: vertices.len(),
+                });
+            }
+            let [a, b, c] = triangle.map(|v| vertices[v]);
+            let (ab, ac) = (b - a, c - a);
+            let area = ab.cross(&ac);
+            let longest = ab
+                .norm_squared()
+                .max(ac.norm_squared())
+                .max((c - b).norm_squared());
+            if !(area.norm() > 1e-9 * longest) {
+                return Err(TerrainError::FlatTriangle { index });
+            }
+            normals.push(area.normalize());
+            let centre = (a + b + c) / 3.0;
+            let radius = [a, b, c]
+                .map(|x| (x - centre).norm())
+                .into_iter()
+                .fold(0.0, f64::max);
+            balls.push(Sphere { centre, radius });
+            own.push(triangle.map(narrow));
+        }
+        let neighbours = find_neighbours(&own)?;
+        let (owners, begins, spokes) = find_spokes(&own, vertices.len());
+        Ok(Self {
+            vertices,
+            triangles: own,
+            normals,
+            neighbours,
+            owners,
+            begins,
+            spokes,
+            tree: BallTree::new(&balls),
+        })
+    }
+
+    /// Vertices, m.
+    #[must_use]
+    pub fn vertices(&self) -> &[Vector3<f64>] {
+        &self.vertices
+    }
+
+    /// Triangles, by the numbers of their vertices.
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// Whether no triangle has a border.
+    #[must_use]
+    pub fn is_closed(&self) -> bool {
+        self.neighbours.iter().flatten().all(|&t| t != NONE)
+    }
+
+    fn ends(&self, t: usize, k: usize) -> [Vector3<f64>; 2] {
+        let triangle = &self.triangles[t];
+        [triangle[k], triangle[(k + 1) % 3]].map(|v| self.vertices[v as usize])
+    }
+
+    /// The normal beyond an edge; at a border the one that points out.
+    fn normal_beyond(&self, t: usize, k: usize) -> Vector3<f64> {
+        match self.neighbours[t][k] {
+            NONE => {
+                let [a, b] = self.ends(t, k);
+                (b - a).cross(&self.normals[t]).normalize()
+            }
+            other => self.normals[other as usize],
+        }
+    }
+
+    fn hinge(&self, t: usize, k: usize) -> Hinge {
+        let [a, b] = self.ends(t, k);
+        Hinge::new(&a, &b, [&self.normals[t], &self.normal_beyond(t, k)])
+    }
+
+    fn wall(&self, t: usize, k: usize) -> Wall {
+        let other = self.neighbours[t][k] as usize;
+        if self.neighbours[t][k] == NONE || t < other {
+            return self.hinge(t, k).walls[0];
+        }
+        let same = |&l: &usize| {
+            self.neighbours[other][l] as usize == t && {
+                let (own, its) = (&self.triangles[t], &self.triangles[other]);
+                its[l] == own[(k + 1) % 3]
+            }
+        };
+        let l = (0..3).find(same).unwrap_or(0);
+        self.hinge(other, l).walls[1]
+    }
+
+    fn face(&self, t: usize) -> Face {
+        let [a, _] = self.ends(t, 0);
+        Face {
+            plane: Plane::through(&a, self.normals[t]),
+            walls: [0, 1, 2].map(|k| self.wall(t, k)),
+        }
+    }
+
+    /// The edge, if it is convex and the triangle's own.
+    fn edge(&self, t: usize, k: usize) -> Option<Edge> {
+        let other = self.neighbours[t][k];
+        if (other as usize) < t || !self.hinge(t, k).is_convex {
+            return None;
+        }
+        let [start, end] = self.ends(t, k);
+        let length = (end - start).norm();
+        Some(Edge {
+            start,
+            along: (end - start) / length,
+            length,
+            normals: [self.normals[t], self.normal_beyond(t, k)],
+        })
+    }
+
+    /// A vertex. Of more neighbours than it can keep it keeps those around it.
+    fn vertex(&self, i: usize) -> Vertex {
+        let place = self.vertices[i];
+        let range = self.begins[i] as usize..self.begins[i + 1] as usize;
+        let all = &self.spokes[range];
+        let mut spokes = [Vector3::zeros(); MAX_SPOKES];
+        let from_here = |&j: &u32| self.vertices[j as usize] - place;
+        if all.len() <= MAX_SPOKES {
+            for (spoke, j) in spokes.iter_mut().zip(all) {
+                *spoke = from_here(j);
+            }
+            let n = all.len();
+            return Vertex { place, spokes, n };
+        }
+        let n = self.normals[self.owners[i] as usize];
+        let right = crate::geometry::query::any_tangent(&n);
+        let ahead = n.cross(&right);
+        for (k, spoke) in spokes.iter_mut().enumerate() {
+            let (sine, cosine) = sin_cos(std::f64::consts::TAU * k as f64 / MAX_SPOKES as f64);
+            let direction = right * cosine + ahead * sine;
+            let along = |j: &u32| from_here(j).normalize().dot(&direction);
+            let best = all.iter().max_by(|a, b| along(a).total_cmp(&along(b)));
+            *spoke = best.map_or(-n, from_here);
+        }
+        let n = MAX_SPOKES;
+        Vertex { place, spokes, n }
+    }
+
+    /// Visits the height at which each triangle crosses the vertical through (x, z), and whether it
+    /// faces up. Of triangles that share an edge one has it.
+    fn visit_crossings(&self, x: f64, z: f64, mut visit: impl FnMut(f64, bool)) {
+        self.tree.visit_column_indexed(x, z, |t| {
+            let triangle = &self.triangles[t as usize];
+            let is_left = |a: u32, b: u32| {
+                let (low, high) = (a.min(b), a.max(b));
+                let (p, q) = (&self.vertices[low as usize], &self.vertices[high as usize]);
+                let (dx, dz) = (q.x - p.x, q.z - p.z);
+                let side = dz * (x - p.x) - dx * (z - p.z);
+                // A point on an edge is taken to be a little further along x, and less along z.
+                let sides = [side, dz, -dx];
+                let is_left = sides
+                    .iter()
+                    .find(|s| s.abs() > 0.0)
+                    .is_some_and(|s| *s > 0.0);
+                is_left == (low == a)
+            };
+            let [a, b, c] = *triangle;
+            let sides = [is_left(a, b), is_left(b, c), is_left(c, a)];
+            let n = &self.normals[t as usize];
+            if sides.iter().all(|&s| s == sides[0]) && n.y.abs() > 1e-12 {
+                let p = &self.vertices[a as usize];
+                let y = p.y - (n.x * (x - p.x) + n.z * (z - p.z)) / n.y;
+                visit(y, n.y > 0.0);
+            }
+        });
+    }
+}
+
+fn narrow(x: usize) -> u32 {
+    u32::try_from(x).unwrap_or_else(|_| unreachable!("invariant: few triangles"))
+}
+
+/// Triangles beyond the edges of each.
+fn find_neighbours(triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, TerrainError> {
+    let mut edges = HashMap::with_capacity(3 * triangles.len());
+    for (index, triangle) in triangles.iter().enumerate() {
+        for k in 0..3 {
+            let (from, to) = (triangle[k], triangle[(k + 1) % 3]);
+            if edges.insert((from, to), narrow(index)).is_some() {
+                return Err(TerrainError::NotASurface {
+                    index,
+                    from: from as usize,
+                    to: to as usize,
+                });
+            }
+        }
+    }
+    let beyond = |triangle: &[u32; 3], k: usize| {
+        let back = (triangle[(k + 1) % 3], triangle[k]);
+        edges.get(&back).copied().unwrap_or(NONE)
+    };
+    let all = triangles.iter();
+    Ok(all
+        .map(|triangle| [0, 1, 2].map(|k| beyond(triangle, k)))
+        .collect())
+}
+
+/// First triangle of each vertex, and the neighbours of all vertices.
+fn find_spokes(triangles: &[[u32; 3]], n: usize) -> (Vec<u32>, Vec<u32>, Vec<u32>) {
+    let mut owners = vec![NONE; n];
+    let mut pairs = Vec::with_capacity(6 * triangles.len());
+    for (t, triangle) in triangles.iter().enumerate().rev() {
+        for k in 0..3 {
+            let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
+            owners[a as usize] = narrow(t);
+            pairs.extend([(a, b), (b, a)]);
+        }
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    let mut begins = vec![0; n + 1];
+    for &(a, _) in &pairs {
+        begins[a as usize + 1] += 1;
+    }
+    for i in 0..n {
+        begins[i + 1] += begins[i];
+    }
+    (owners, begins, pairs.into_iter().map(|(_, b)| b).collect())
+}
+
+impl Terrain for TriangleMesh {
+    fn visit_near(
+        &self,
+        centre: &Vector3<f64>,
+        reach: f64,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
+        let m = narrow(self.triangles.len());
+        self.tree.visit_near(centre, reach, |t, _| {
+            visit(t, &Primitive::Face(self.face(t as usize)));
+            for k in 0..3 {
+                if let Some(edge) = self.edge(t as usize, k) {
+                    visit(m + 3 * t + narrow(k), &Primitive::Edge(edge));
+                }
+            }
+            for v in self.triangles[t as usize] {
+                if self.owners[v as usize] == t {
+                    visit(4 * m + v, &Primitive::Vertex(self.vertex(v as usize)));
+                }
+            }
+        });
+    }
+
+    fn can_be_passed(&self) -> bool {
+        false
+    }
+
+    fn has_surface(&self) -> bool {
+        true
+    }
+
+    fn primitive(&self, id: u32) -> Primitive {
+        let (id, m) = (id as usize, self.triangles.len());
+        if id < m {
+            Primitive::Face(self.face(id))
+        } else if id < 4 * m {
+            let (t, k) = ((id - m) / 3, (id - m) % 3);
+            let edge = self.edge(t, k);
+            Primitive::Edge(
+                edge.unwrap_or_else(|| unreachable!("invariant: edge {id} was visited")),
+            )
+        } else {
+            Primitive::Vertex(self.vertex(id - 4 * m))
+        }
+    }
+
+    fn n_primitives(&self) -> u32 {
+        narrow(4 * self.triangles.len() + self.vertices.len())
+    }
+
+    /// Whether an odd number of triangles is above the point.
+    fn is_inside(&self, _id: u32, point: &Vector3<f64>) -> bool {
+        let mut above = 0;
+        self.visit_crossings(point.x, point.z, |y, _| {
+            above += usize::from(y > point.y - SURFACE);
+        });
+        above % 2 == 1
+    }
+
+    fn coverage(&self, _centre: &Vector3<f64>, _radius: f64) -> Coverage {
+        Coverage::Silent
+    }
+
+    fn height(&self, x: f64, z: f64) -> Option<f64> {
+        let mut highest: Option<f64> = None;
+        self.visit_crossings(x, z, |y, faces_up| {
+            if faces_up {
+                highest = Some(highest.map_or(y, |h| h.max(y)));
+            }
+        });
+        highest
+    }
+
+    fn ground(&self) -> Option<&Plane> {
+        None
+    }
+}
+
+/// How far above the surface a point that is in the ground may seem to be by rounding, m.
+const SURFACE: f64 = 1e-9;

@@ -1,0 +1,208 @@
+//! Pieces of a triangulated surface: faces, convex edges and convex vertices.
+//!
+//! The ground lies below the surface. A piece pushes along its normals: a face along its own, a
+//! convex edge along those between its two faces', a convex vertex along those between its edges'.
+//! A flat or concave edge pushes along nothing, so a part that rolls over it feels the faces alone.
+//!
+//! A part touches a face only with a point over it. What is over a face is bounded by a [`Wall`]
+//! through each of its edges: perpendicular to the face at a convex edge, where the edge takes
+//! over, and through the bisector at any other, where the neighbour does. Two faces with the same
+//! wall never both have a point, and one of them always has it.
+
+use nalgebra::Vector3;
+
+use super::plane::Plane;
+
+/// Sine of the angle between two faces below which their edge is flat.
+const FLAT: f64 = 1e-12;
+
+/// How far a convex edge reaches over its faces, m, so that rounding leaves no slit between them.
+/// Both push alike there.
+pub const OVERLAP: f64 = 1e-10;
+
+/// One side of a plane through an edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wall {
+    /// Of any length.
+    normal: Vector3<f64>,
+    offset: f64,
+    /// The open side, where `normal · x < offset`; otherwise the closed one.
+    is_open: bool,
+}
+
+impl Wall {
+    fn through(a: &Vector3<f64>, normal: Vector3<f64>, is_open: bool) -> Self {
+        let offset = normal.dot(a);
+        Self {
+            normal,
+            offset,
+            is_open,
+        }
+    }
+
+    /// Whether a point (world, m) is on this side.
+    #[inline]
+    #[must_use]
+    pub fn admits(&self, x: &Vector3<f64>) -> bool {
+        (self.normal.dot(x) >= self.offset) != self.is_open
+    }
+}
+
+/// A triangle of the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Face {
+    /// Through its vertices.
+    pub plane: Plane,
+    /// Around what is over it.
+    pub walls: [Wall; 3],
+}
+
+impl Face {
+    /// Whether a point (world, m) is over the face, or under it.
+    #[inline]
+    #[must_use]
+    pub fn admits(&self, x: &Vector3<f64>) -> bool {
+        self.walls.iter().all(|wall| wall.admits(x))
+    }
+}
+
+/// A convex edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edge {
+    /// Where it begins, world, m.
+    pub start: Vector3<f64>,
+    /// Unit direction.
+    pub along: Vector3<f64>,
+    /// m.
+    pub length: f64,
+    /// Unit normals of its faces: of the one on the side of `normal × along`, and of the other.
+    pub normals: [Vector3<f64>; 2],
+}
+
+impl Edge {
+    /// Which of the normals through a point x, given from the start of the edge (m), leads away
+    /// from the edge: positive beyond the face of the first, where n is that of the second.
+    #[inline]
+    #[must_use]
+    pub fn lean(&self, n: &Vector3<f64>, x: &Vector3<f64>) -> f64 {
+        n.cross(&self.along).dot(x)
+    }
+
+    /// Whether a unit normal lies strictly between those of the faces.
+    #[inline]
+    #[must_use]
+    pub fn admits(&self, n: &Vector3<f64>) -> bool {
+        let [first, second] = &self.normals;
+        self.lean(first, n) < 0.0 && self.lean(second, n) > 0.0
+    }
+
+    /// Whether a place along the edge (m from its start) belongs to it, for a part that is `depth`
+    /// (m) in the ground there: it leans off a vertex by no more than it is deep.
+    #[inline]
+    #[must_use]
+    pub fn has(&self, place: f64, depth: f64) -> bool {
+        let over = depth.max(0.0);
+        place >= -over && place < self.length + over
+    }
+}
+
+/// Most edges that bound a vertex.
+pub const MAX_SPOKES: usize = 12;
+
+/// A convex vertex.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vertex {
+    /// World, m.
+    pub place: Vector3<f64>,
+    /// To its neighbours, m.
+    pub spokes: [Vector3<f64>; MAX_SPOKES],
+    /// Neighbours.
+    pub n: usize,
+}
+
+impl Vertex {
+    /// Whether the surface lies below the plane with this unit normal on all sides, or in it but
+    /// for one.
+    #[inline]
+    #[must_use]
+    pub fn admits(&self, n: &Vector3<f64>) -> bool {
+        let rises = || self.spokes[..self.n].iter().map(|spoke| n.dot(spoke));
+        rises().all(|rise| rise <= OVERLAP) && rises().any(|rise| rise < -OVERLAP)
+    }
+}
+
+/// An edge as its two faces see it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hinge {
+    /// Walls of the first and of the second face.
+    pub walls: [Wall; 2],
+    /// Whether the surface bends away from the free side.
+    pub is_convex: bool,
+}
+
+impl Hinge {
+    /// Of the edge from a to b (world, m) between a face with the unit normal `first`, on the side
+    /// of `first × (b − a)`, and one with the unit normal `second`.
+    #[inline]
+    #[must_use]
+    pub fn new(a: &Vector3<f64>, b: &Vector3<f64>, normals: [&Vector3<f64>; 2]) -> Self {
+        let [first, second] = normals;
+        let e = b - a;
+        let into_first = first.cross(&e);
+        let bend = into_first.dot(second);
+        let is_convex = bend < 0.0 && bend * bend > FLAT * FLAT * e.norm_squared();
+        let walls = if is_convex {
+            let into_second = e.cross(second);
+            [
+                Wall::through(a, into_first, false),
+                Wall::through(a, into_second, false),
+            ]
+        } else {
+            let bisector = (first + second).cross(&e);
+            [false, true].map(|is_open| Wall::through(a, bisector, is_open))
+        };
+        Self { walls, is_convex }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn roof(left: f64, right: f64) -> [Vector3<f64>; 2] {
+        // Slopes dy/dx on the side of negative and positive x.
+        [left, right].map(|slope| Vector3::new(-slope, 1.0, 0.0).normalize())
+    }
+
+    #[test]
+    fn a_ridge_is_convex_and_a_valley_and_a_plane_are_not() {
+        let (a, b) = (Vector3::zeros(), -Vector3::z());
+        for (slopes, is_convex) in [
+            ((0.5, -0.5), true),
+            ((-0.5, 0.5), false),
+            ((0.3, 0.3), false),
+            ((0.3, 0.2), true),
+        ] {
+            let [first, second] = roof(slopes.0, slopes.1);
+            // The first face lies at negative x: y × (−z) = −x.
+            let hinge = Hinge::new(&a, &b, [&first, &second]);
+            assert_eq!(hinge.is_convex, is_convex, "{slopes:?}");
+            let left = Vector3::new(-1.0, -slopes.0, 0.2);
+            assert!(hinge.walls[0].admits(&left) && !hinge.walls[1].admits(&left));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn one_of_two_faces_answers_at_an_edge_that_is_not_convex(
+            left in -1.0..1.0, bend in 0.0..1.0, x in prop::array::uniform3(-1.0..1.0),
+        ) {
+            let [first, second] = roof(left, left + bend);
+            let hinge = Hinge::new(&Vector3::zeros(), &-Vector3::z(), [&first, &second]);
+            for x in [Vector3::from(x), Vector3::zeros(), Vector3::z()] {
+                prop_assert!(hinge.walls[0].admits(&x) != hinge.walls[1].admits(&x));
+            }
+        }
+    }
+}

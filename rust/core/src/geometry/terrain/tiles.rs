@@ -1,0 +1,179 @@
+//! Bounds of the tiles of a height field, level by level.
+//!
+//! A tile of the first level has 16 x 16 cells, one of each further level 4 x 4 tiles of that
+//! before, up to a single one. A search descends from the top, so it costs the tiles that it finds
+//! and the logarithm of the map's size.
+
+/// Cells along the side of a tile of the first level.
+const FIRST: usize = 16;
+
+/// Tiles of one level along the side of a tile of the next.
+const FACTOR: usize = 4;
+
+/// Highest point of a tile, and whether a height is missing.
+#[derive(Clone, Copy, Debug)]
+struct Bound {
+    highest: f32,
+    has_hole: bool,
+}
+
+#[derive(Clone, Debug)]
+struct Level {
+    /// Cells along the side of a tile.
+    side: usize,
+    columns: usize,
+    rows: usize,
+    bounds: Vec<Bound>,
+}
+
+/// A tile or a part of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tile {
+    /// Column and row of its first cell.
+    pub first: [usize; 2],
+    /// Columns and rows of cells.
+    pub size: [usize; 2],
+    /// m; −∞ without data.
+    pub highest: f32,
+    pub has_hole: bool,
+}
+
+/// Bounds of all tiles.
+#[derive(Clone, Debug)]
+pub(super) struct Tiles {
+    levels: Vec<Level>,
+}
+
+impl Tiles {
+    /// Of a map of `columns` x `rows` heights.
+    pub(super) fn new(heights: &[f32], columns: usize, rows: usize) -> Self {
+        let cells = [columns - 1, rows - 1];
+        let [wide, high] = cells.map(|n| n.div_ceil(FIRST));
+        let mut bounds = Vec::with_capacity(wide * high);
+        for row in 0..high {
+            for column in 0..wide {
+                let mut bound = Bound::NOTHING;
+                let (begin, end) = (column * FIRST, (column * FIRST + FIRST + 1).min(columns));
+                for j in row * FIRST..(row * FIRST + FIRST + 1).min(rows) {
+                    for &h in &heights[j * columns + begin..j * columns + end] {
+                        bound.highest = bound.highest.max(h);
+                        bound.has_hole |= h.is_nan();
+                    }
+                }
+                bounds.push(bound);
+            }
+        }
+        let mut levels = vec![Level {
+            side: FIRST,
+            columns: wide,
+            rows: high,
+            bounds,
+        }];
+        while let Some(last) = levels.last().filter(|level| level.bounds.len() > 1) {
+            let next = last.coarser();
+            levels.push(next);
+        }
+        Self { levels }
+    }
+
+    /// Whether any height is missing.
+    pub(super) fn has_hole(&self) -> bool {
+        let top = self.levels.last();
+        top.is_some_and(|level| level.bounds.iter().any(|bound| bound.has_hole))
+    }
+
+    /// Bytes.
+    pub(super) fn size(&self) -> usize {
+        self.levels
+            .iter()
+            .map(|level| size_of_val(&level.bounds[..]))
+            .sum()
+    }
+
+    /// Visits the cells in ranges of columns and rows (first and last) whose tiles are all wanted.
+    #[inline]
+    pub(super) fn visit(
+        &self,
+        columns: [usize; 2],
+        rows: [usize; 2],
+        wants: impl Fn(&Tile) -> bool,
+        mut visit: impl FnMut([usize; 2]),
+    ) {
+        // Few tiles need no descent.
+        let spans = |side: usize| {
+            let [w, h] = [columns, rows].map(|[a, b]| b / side - a / side + 1);
+            w * h
+        };
+        let few = |level: &Level| spans(level.side) <= FACTOR * FACTOR;
+        let depth = self
+            .levels
+            .iter()
+            .position(few)
+            .unwrap_or(self.levels.len() - 1);
+        self.descend(depth, columns, rows, &wants, &mut visit);
+    }
+
+    fn descend(
+        &self,
+        depth: usize,
+        columns: [usize; 2],
+        rows: [usize; 2],
+        wants: &impl Fn(&Tile) -> bool,
+        visit: &mut impl FnMut([usize; 2]),
+    ) {
+        let level = &self.levels[depth];
+        let side = level.side;
+        for row in rows[0] / side..=rows[1] / side {
+            for column in columns[0] / side..=columns[1] / side {
+                let within =
+                    |k: usize, [a, b]: [usize; 2]| [a.max(k * side), b.min(k * side + side - 1)];
+                let (own_columns, own_rows) = (within(column, columns), within(row, rows));
+                let bound = &level.bounds[row * level.columns + column];
+                let tile = Tile {
+                    first: [own_columns[0], own_rows[0]],
+                    size: [own_columns, own_rows].map(|[a, b]| b - a + 1),
+                    highest: bound.highest,
+                    has_hole: bound.has_hole,
+                };
+                if !wants(&tile) {
+                    continue;
+                }
+                if depth > 0 {
+                    self.descend(depth - 1, own_columns, own_rows, wants, visit);
+                    continue;
+                }
+                for j in own_rows[0]..=own_rows[1] {
+                    for i in own_columns[0]..=own_columns[1] {
+                        visit([i, j]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Level {
+    fn coarser(&self) -> Self {
+        let [columns, rows] = [self.columns, self.rows].map(|n| n.div_ceil(FACTOR));
+        let mut bounds = vec![Bound::NOTHING; columns * rows];
+        for (at, bound) in self.bounds.iter().enumerate() {
+            let (row, column) = (at / self.columns / FACTOR, at % self.columns / FACTOR);
+            let own = &mut bounds[row * columns + column];
+            own.highest = own.highest.max(bound.highest);
+            own.has_hole |= bound.has_hole;
+        }
+        Self {
+            side: self.side * FACTOR,
+            columns,
+            rows,
+            bounds,
+        }
+    }
+}
+
+impl Bound {
+    const NOTHING: Self = Self {
+        highest: f32::NEG_INFINITY,
+        has_hole: false,
+    };
+}

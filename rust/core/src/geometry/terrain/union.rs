@@ -1,0 +1,130 @@
+//! Several terrains as one.
+
+use std::fmt;
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+
+use super::error::TerrainError;
+use super::plane::Plane;
+use super::{Coverage, Primitive, Terrain};
+
+/// Everything that any of several terrains has. Immutable.
+///
+/// The primitives of a part are numbered from where those of the part before it end. The part with
+/// a plane comes first, since a plane has number 0.
+#[derive(Clone)]
+pub struct Union {
+    parts: Vec<Arc<dyn Terrain>>,
+    /// Number of the first primitive of each part.
+    first: Vec<u32>,
+}
+
+impl fmt::Debug for Union {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Union")
+            .field("first", &self.first)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Union {
+    /// Of its parts.
+    ///
+    /// # Errors
+    /// `NoParts`, `SecondPlane`, `TooManyPieces`.
+    pub fn new(mut parts: Vec<Arc<dyn Terrain>>) -> Result<Self, TerrainError> {
+        if parts.is_empty() {
+            return Err(TerrainError::NoParts);
+        }
+        let mut planes = (0..parts.len()).filter(|&k| parts[k].ground().is_some());
+        if let (Some(plane), second) = (planes.next(), planes.next()) {
+            if let Some(index) = second {
+                return Err(TerrainError::SecondPlane { index });
+            }
+            parts[..=plane].rotate_right(1);
+        }
+        let mut first = Vec::with_capacity(parts.len());
+        let mut sum = 0_u32;
+        for part in &parts {
+            first.push(sum);
+            let next = sum.checked_add(part.n_primitives());
+            sum = next.ok_or(TerrainError::TooManyPieces)?;
+        }
+        Ok(Self { parts, first })
+    }
+
+    /// Its parts in the order of their numbers.
+    #[must_use]
+    pub fn parts(&self) -> &[Arc<dyn Terrain>] {
+        &self.parts
+    }
+
+    fn owner(&self, id: u32) -> (&dyn Terrain, u32) {
+        let k = self.first.partition_point(|&first| first <= id) - 1;
+        (&*self.parts[k], id - self.first[k])
+    }
+}
+
+impl Terrain for Union {
+    fn visit_near(
+        &self,
+        centre: &Vector3<f64>,
+        reach: f64,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
+        for (part, first) in self.parts.iter().zip(&self.first) {
+            part.visit_near(centre, reach, &mut |id, primitive| {
+                visit(first + id, primitive)
+            });
+        }
+    }
+
+    fn can_be_passed(&self) -> bool {
+        self.parts.iter().any(|part| part.can_be_passed())
+    }
+
+    fn is_plane(&self) -> bool {
+        self.parts.iter().all(|part| part.is_plane())
+    }
+
+    fn has_surface(&self) -> bool {
+        self.parts.iter().any(|part| part.has_surface())
+    }
+
+    fn primitive(&self, id: u32) -> Primitive {
+        let (part, own) = self.owner(id);
+        part.primitive(own)
+    }
+
+    fn n_primitives(&self) -> u32 {
+        self.parts.iter().map(|part| part.n_primitives()).sum()
+    }
+
+    fn is_inside(&self, id: u32, point: &Vector3<f64>) -> bool {
+        let (part, own) = self.owner(id);
+        part.is_inside(own, point)
+    }
+
+    /// Known where one part knows it; unknown where one that should does not.
+    fn coverage(&self, centre: &Vector3<f64>, radius: f64) -> Coverage {
+        let mut coverage = Coverage::Silent;
+        for part in &self.parts {
+            match part.coverage(centre, radius) {
+                Coverage::Known => return Coverage::Known,
+                Coverage::Silent => {}
+                unknown @ Coverage::Unknown(_) => coverage = unknown,
+            }
+        }
+        coverage
+    }
+
+    fn height(&self, x: f64, z: f64) -> Option<f64> {
+        let heights = self.parts.iter().filter_map(|part| part.height(x, z));
+        heights.reduce(f64::max)
+    }
+
+    fn ground(&self) -> Option<&Plane> {
+        self.parts[0].ground()
+    }
+}

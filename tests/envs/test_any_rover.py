@@ -1,0 +1,123 @@
+"""Rovers of other builds in the environment: actions, observation, policies and batches follow the model."""
+
+import pickle
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from machines import MACHINES, axle, machine
+
+from rover_gym import ModelError, PDPolicy, RoverEnv, RoverModel
+from rover_gym.policy import CommandController
+from rover_gym.policy.turning import Turning
+from rover_gym.vector import RoverVectorEnv
+
+NAMES = sorted(MACHINES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_spaces_follow_the_model(name: str) -> None:
+    n_actions, model = MACHINES[name]
+    env = RoverEnv(model=model)
+    n = len(model.wheel_names)
+    assert env.action_space.shape == (n_actions,)
+    sizes = {field.name: field.size for field in env.observation_layout.fields}
+    assert sizes["q"] == sizes["velocity"] == model.nv
+    assert [sizes[f] for f in ("wheel_gap", "normal_force", "tangential_force")] == [n, n, 2 * n]
+    assert sizes["previous_action"] == n_actions
+    check_env(env, skip_render_check=True)
+
+
+def test_each_entry_reaches_its_wheel_and_its_joint() -> None:
+    env = RoverEnv(model=MACHINES["front"][1])
+    env.reset(seed=0)
+    env.step(np.array([0.1, -0.2, 0.3, 0.4, 0.5, -0.25], np.float32))
+    np.testing.assert_allclose(env.simulation.wheel_torques, [2.0, -4.0, 6.0, 8.0], rtol=1e-6)
+    np.testing.assert_allclose(env.simulation.steering, [0.4, -0.2, 0.0, 0.0], rtol=1e-6)
+
+
+def test_wheels_of_one_axle_share_its_set_point() -> None:
+    env = RoverEnv(model=axle(), max_steering_deg=20.0)
+    env.reset(seed=0)
+    for _ in range(20):
+        _, _, _, _, info = env.step(np.array([0, 0, 0, 0, 0.5], np.float32))
+    expected = np.radians(10.0)
+    np.testing.assert_allclose(env.simulation.steering, [expected, expected, 0.0, 0.0])
+    assert env.simulation.q[env.model.steering_joint_indices[0]] == pytest.approx(expected, abs=0.02)
+    assert info["reward_terms"]["steering_change"] == 0.0
+
+
+def test_the_reward_takes_means_over_wheels_and_over_joints_that_steer() -> None:
+    env = RoverEnv(model=MACHINES["front"][1])
+    env.reset(seed=0)
+    terms = env.step(np.array([0.4, 0.0, 0.0, 0.0, 0.2, 0.0], np.float32))[-1]["reward_terms"]
+    assert terms["torque_change"] == pytest.approx(-0.02 * 0.4**2 / 4, rel=1e-6)
+    assert terms["steering_change"] == pytest.approx(-0.02 * 0.2**2 / 2, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_rovers_of_a_batch_move_as_alone(name: str) -> None:
+    n_actions, model = MACHINES[name]
+    arguments: dict[str, Any] = {"model": model, "max_episode_steps": 9, "terrain": "sphere_field", "difficulty": 0.5}
+    ours = gym.make_vec("Rover-v0", 3, threads=2, **arguments)
+    assert type(ours) is RoverVectorEnv
+    alone = gym.make_vec("Rover-v0", 3, "sync", **arguments)
+    np.testing.assert_array_equal(ours.reset(seed=4)[0], alone.reset(seed=4)[0])
+    for action in np.random.default_rng(0).uniform(-0.5, 0.5, (20, 3, n_actions)).astype(np.float32):
+        for one, other in zip(ours.step(action)[:-1], alone.step(action)[:-1], strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("kind", ["baseline", "command"])
+def test_policies_reach_the_goal_on_the_plane(name: str, kind: str) -> None:
+    n_episodes = 10
+    envs = RoverVectorEnv(n_episodes, model=MACHINES[name][1])
+    observation, _ = envs.reset(seed=20)
+    baseline, controller = PDPolicy(envs), CommandController(envs.batch.prototype, guided=True)
+    reached = np.zeros(n_episodes, bool)
+    for _ in range(600):
+        if kind == "baseline":
+            actions = baseline.predict(observation)[0]
+        else:
+            actions = controller.act(observation, np.zeros((n_episodes, 3)))
+        observation, _, terminated, _, info = envs.step(actions)
+        reached |= terminated & info.get("success", np.zeros(n_episodes, bool))
+        if reached.all():
+            break
+    assert reached.all()
+
+
+def test_axles_meet_in_the_turning_centre_of_the_wheels_that_do_not_steer() -> None:
+    env = RoverEnv(model=MACHINES["front"][1])
+    policy = PDPolicy(env)
+    left, right = policy.steering_angles(0.5)
+    # The back axle is 0.6 m behind the front one, the centre 2 m to its left.
+    np.testing.assert_allclose(np.tan([left, right]), [0.6 / 1.7, 0.6 / 2.3], rtol=1e-12)
+    turning = Turning.of(env.model, 100.0, env.dt)
+    assert turning.x_c == pytest.approx(-0.3)
+    assert policy.steering_angles(policy.max_curvature)[0] == pytest.approx(env.max_steering)
+
+
+def test_a_snapshot_goes_on_alike() -> None:
+    env, other = (RoverEnv(model=axle()) for _ in range(2))
+    env.reset(seed=1)
+    action = np.array([0.2, 0.2, 0.1, 0.1, 0.3], np.float32)
+    env.step(action)
+    other.restore(pickle.loads(pickle.dumps(env.snapshot())))  # noqa: S301 - our own
+    np.testing.assert_array_equal(env.step(action)[0], other.step(action)[0])
+    with pytest.raises(ValueError, match="arguments"):
+        RoverEnv(model=MACHINES["all"][1]).restore(env.snapshot())
+
+
+def test_wheels_that_cannot_turn_are_refused() -> None:
+    described = machine("none", []).to_dict()
+    with pytest.raises(ModelError) as caught:
+        RoverEnv(model=RoverModel.from_dict(described))
+    assert caught.value.field == "model.wheels"
+    model = MACHINES["skid"][1]
+    with pytest.raises(ModelError) as caught:
+        RoverEnv(model=model.weld(["wheel_FL"]))
+    assert caught.value.field == "model.wheel_joint_indices"

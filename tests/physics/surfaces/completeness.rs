@@ -1,0 +1,175 @@
+//! No place and no attitude is without a contact, and none has a false one.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use proptest::prelude::*;
+use rover_core::contact::detection::{deepest_overlap, disc_gap};
+use rover_core::geometry::{Disc, HeightField, Terrain};
+use rover_core::multibody::{Configuration, Kinematics, Model, ModelDescription};
+use rover_core::nalgebra::{UnitQuaternion, Vector3};
+
+const RADIUS: f64 = 0.15;
+
+/// A rough map with slopes of up to 40 degrees.
+fn rough() -> impl Strategy<Value = HeightField> {
+    (
+        prop::collection::vec(-1.0..1.0, 11 * 11),
+        0.01..0.12_f64,
+        0.03..0.2_f64,
+    )
+        .prop_map(|(heights, roughness, spacing)| {
+            let roughness = roughness * spacing;
+            #[allow(clippy::cast_possible_truncation)] // a map is single
+            let heights = heights
+                .iter()
+                .map(|h: &f64| (h * roughness) as f32)
+                .collect();
+            let low = -5.0 * spacing;
+            HeightField::new(heights, [11, 11], [spacing; 2], [low; 2]).unwrap()
+        })
+}
+
+/// By how much a disc must be lifted to be free of the ground, from many points of its rim.
+fn lift(disc: &Disc, field: &HeightField) -> f64 {
+    let side = disc.axle.cross(&disc.spoke);
+    let over = |phi: f64| {
+        let x = disc.centre + (disc.spoke * phi.cos() + side * phi.sin()) * disc.radius;
+        field
+            .height(x.x, x.z)
+            .map_or(f64::NEG_INFINITY, |y| y - x.y)
+    };
+    let n = 20_000;
+    (0..n)
+        .map(|k| over(TAU * f64::from(k) / f64::from(n)))
+        .fold(f64::NEG_INFINITY, f64::max)
+}
+
+fn wheel(field: &HeightField, [x, z, heading, lean]: [f64; 4]) -> Disc {
+    let [dx, dz] = field.spacing();
+    let turn = UnitQuaternion::from_euler_angles(lean, 0.0, 0.0);
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), heading) * turn;
+    Disc {
+        centre: Vector3::new(2.0 * x * dx, 0.0, 2.0 * z * dz),
+        axle: turn * Vector3::z(),
+        spoke: turn * Vector3::x(),
+        radius: RADIUS.min(2.5 * dx),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+    /// The lowest point of all, wherever it is, is found: lifted free the gap is zero, and
+    /// sunk in there is a contact that is about as deep.
+    #[test]
+    fn a_wheel_always_has_the_contact_that_holds_it(
+        field in rough(),
+        x in -1.0..1.0, z in -1.0..1.0, heading in 0.0..TAU, lean in -0.5..0.5,
+        depth in prop_oneof![Just(0.0), 1e-6..1e-3, 1e-3..1e-2],
+    ) {
+        let mut disc = wheel(&field, [x, z, heading, lean]);
+        disc.centre.y += lift(&disc, &field) - depth;
+        let gap = disc_gap(&disc, &Vector3::zeros(), &field);
+        // The rim was sampled: the lift is too small by the rim's arc or the slope's rise there.
+        let coarse = 2e-4;
+        prop_assert!(gap < coarse, "{gap}");
+        prop_assert!(gap > -depth - coarse, "{gap} {depth}");
+        if depth > 1e-3 {
+            // A slope of at most about 80 degrees takes this share of the depth.
+            prop_assert!(gap < -0.05 * depth + coarse, "{gap} {depth}");
+        }
+    }
+
+    /// Of two descriptions of a place far from the origin and near it the second is exact.
+    #[test]
+    fn a_wheel_that_is_clear_has_no_contact(
+        field in rough(),
+        x in -1.0..1.0, z in -1.0..1.0, heading in 0.0..TAU, lean in -0.5..0.5, clear in 1e-3..0.2,
+    ) {
+        let mut disc = wheel(&field, [x, z, heading, lean]);
+        disc.centre.y += lift(&disc, &field) + clear;
+        prop_assert!(disc_gap(&disc, &Vector3::zeros(), &field) > 0.0);
+    }
+}
+
+/// One free body.
+fn body(shape: &str) -> Model {
+    let text = format!(
+        "name = \"stone\"\n[[solids]]\nname = \"stone\"\njoint = \"free\"\nmass = 3.0\n\
+         collides = true\n{shape}\n"
+    );
+    Model::from_description(ModelDescription::from_toml(&text).unwrap()).unwrap()
+}
+
+fn overlap(model: &Model, field: &HeightField, q: &Configuration) -> f64 {
+    deepest_overlap(model, &Kinematics::of(model, q), field)
+}
+
+/// Lowest height of the body at which it is free of the ground, from points on its surface.
+fn free_height(points: &[Vector3<f64>], q: &Configuration, field: &HeightField) -> f64 {
+    let over = |x: &Vector3<f64>| {
+        let x = q.position + q.attitude * x;
+        field
+            .height(x.x, x.z)
+            .map_or(f64::NEG_INFINITY, |y| y - x.y)
+    };
+    q.position.y + points.iter().map(over).fold(f64::NEG_INFINITY, f64::max)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
+    #[test]
+    fn a_ball_and_a_box_always_have_the_contact_that_holds_them(
+        field in rough(), x in -1.0..1.0, z in -1.0..1.0, turn in prop::array::uniform3(-3.0..3.0),
+    ) {
+        let [dx, dz] = field.spacing();
+        let size = 2.0 * dx.min(0.1);
+        let n = 60;
+        let grid = move |k: u32| -1.0 + 2.0 * f64::from(k) / f64::from(n);
+        let mut faces = Vec::new();
+        for i in 0..=n {
+            for j in 0..=n {
+                for side in [-1.0, 1.0] {
+                    let (a, b) = (grid(i), grid(j));
+                    faces.extend([[a, b, side], [a, side, b], [side, a, b]].map(Vector3::from));
+                }
+            }
+        }
+        let ball: Vec<_> = faces.iter().map(|x| x.normalize() * (0.5 * size)).collect();
+        let block: Vec<_> = faces.iter().map(|x| x * (0.5 * size)).collect();
+        let shapes = [
+            (format!("shape = {{ kind = \"sphere\", radius = {} }}", 0.5 * size), ball),
+            (format!("shape = {{ kind = \"box\", size = [{size}, {size}, {size}] }}"), block),
+        ];
+        for (shape, points) in shapes {
+            let model = body(&shape);
+            let mut q = Configuration::zero(&model);
+            q.position = Vector3::new(2.0 * x * dx, 0.0, 2.0 * z * dz);
+            q.attitude = UnitQuaternion::from_euler_angles(turn[0], turn[1], turn[2]);
+            let free = free_height(&points, &q, &field);
+            let coarse = 0.1 * size;
+            q.position.y = free + coarse;
+            prop_assert!(overlap(&model, &field, &q) >= 0.0, "{shape}");
+            q.position.y = free - 1e-3;
+            let depth = -overlap(&model, &field, &q);
+            prop_assert!(depth > 1e-5 && depth < 1e-3 + coarse, "{shape} {depth}");
+        }
+    }
+}
+
+#[test]
+fn the_far_side_of_a_ridge_does_not_push() {
+    // A ridge along z; the wheel stands beside it and touches nothing.
+    let field = crate::surface_scenes::map(40, 0.1, |x, _| if x.abs() < 0.05 { 1.0 } else { 0.0 });
+    for side in [-1.0, 1.0] {
+        let disc = Disc {
+            centre: Vector3::new(side * 0.5, 0.3, 0.02),
+            axle: Vector3::z(),
+            spoke: Vector3::x(),
+            radius: 0.25,
+        };
+        let terrain: Arc<dyn Terrain> = Arc::new(field.clone());
+        let gap = disc_gap(&disc, &Vector3::zeros(), &*terrain);
+        assert!((gap - 0.05).abs() < 1e-12, "{gap}");
+    }
+}

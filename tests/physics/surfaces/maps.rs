@@ -1,0 +1,129 @@
+//! Maps that are large, and maps that are refused.
+
+use std::time::Instant;
+
+use rover_core::geometry::{HeightField, Terrain, TerrainError};
+use rover_core::nalgebra::Vector3;
+
+fn visited(field: &HeightField, reach: f64) -> (usize, usize) {
+    let (mut cells, mut pieces) = (0, 0);
+    let centre = Vector3::new(0.213, 0.15, -0.307);
+    field.visit_cells(&centre, reach, |_, _| cells += 1);
+    field.visit_near(&centre, reach, &mut |_, _| pieces += 1);
+    (cells, pieces)
+}
+
+#[test]
+fn a_large_map_loads_quickly_and_a_step_visits_no_more_of_it() {
+    let heights = |n: usize| {
+        #[allow(clippy::cast_precision_loss)] // some wave
+        let wave = move |k: usize| (((k % n) as f32 - (n / 2) as f32) * 0.05).sin() * 0.1;
+        (0..n * n).map(wave).collect::<Vec<f32>>()
+    };
+    let place = |n: usize| [-0.05 * (n / 2) as f64; 2];
+    let counts = [64, 512, 4096].map(|n: usize| {
+        let heights = heights(n);
+        let start = Instant::now();
+        let field = HeightField::new(heights, [n, n], [0.05; 2], place(n)).unwrap();
+        // A test profile is several times slower than a release.
+        assert!(start.elapsed().as_secs_f64() < 10.0);
+        assert!(field.size() < 2 * 4 * n * n);
+        visited(&field, 0.2)
+    });
+    assert!(counts[0].0 < 80, "{counts:?}");
+    assert_eq!(counts[0], counts[2]);
+    assert_eq!(counts[1], counts[2]);
+}
+
+#[test]
+fn a_wide_search_finds_the_cells_that_looking_at_all_finds() {
+    let heights: Vec<f32> = (0..300_u16 * 200)
+        .map(|k| f32::from(k % 97) * 0.05)
+        .collect();
+    let field = HeightField::new(heights, [200, 300], [0.1, 0.2], [-3.0, 5.0]).unwrap();
+    for (centre, reach) in [
+        (Vector3::new(10.0, 5.5, 20.0), 2.0),
+        (Vector3::new(-4.0, 6.0, 4.0), 9.0),
+        (Vector3::new(5.0, 0.0, 9.0), 0.3),
+        (Vector3::new(5.0, 9.0, 9.0), 3.0),
+    ] {
+        let mut found = Vec::new();
+        field.visit_cells(&centre, reach, |i, j| found.push([j, i]));
+        let count = found.len();
+        found.sort_unstable();
+        found.dedup();
+        assert_eq!(found.len(), count);
+        for j in 0..199 {
+            for i in 0..299 {
+                let corner =
+                    |axis: usize, k: usize| field.origin()[axis] + k as f64 * field.spacing()[axis];
+                let beyond = |axis: usize, k: usize, x: f64| {
+                    (corner(axis, k) - x).max(x - corner(axis, k + 1)).max(0.0)
+                };
+                let (x, z) = (beyond(0, i, centre.x), beyond(1, j, centre.z));
+                if (reach * reach - x * x - z * z).abs() < 1e-6 {
+                    continue;
+                }
+                let bottom = centre.y - (reach * reach - x * x - z * z).sqrt();
+                let at = |i: usize, j: usize| f64::from(field.heights()[j * 300 + i]);
+                let highest = at(i, j)
+                    .max(at(i + 1, j))
+                    .max(at(i, j + 1))
+                    .max(at(i + 1, j + 1));
+                // Within rounding of the ball's rim either answer is right.
+                if (highest - bottom).abs() < 1e-6 {
+                    continue;
+                }
+                let is_near = highest >= bottom;
+                assert_eq!(found.binary_search(&[j, i]).is_ok(), is_near, "{i} {j}");
+            }
+        }
+    }
+}
+
+#[test]
+fn bad_maps_are_refused() {
+    let refuse = |heights: Vec<f32>, shape, spacing, origin| -> TerrainError {
+        HeightField::new(heights, shape, spacing, origin).unwrap_err()
+    };
+    let flat = vec![0.0; 6];
+    let cases = [
+        (
+            refuse(flat.clone(), [2, 2], [1.0; 2], [0.0; 2]),
+            "heights: needs 2 rows of 2",
+        ),
+        (
+            refuse(vec![0.0; 3], [1, 3], [1.0; 2], [0.0; 2]),
+            "heights: needs from 2 x 2",
+        ),
+        (
+            refuse(flat.clone(), [2, 3], [0.0, 1.0], [0.0; 2]),
+            "spacing: must be from 1e-4",
+        ),
+        (
+            refuse(flat.clone(), [2, 3], [1.0, f64::NAN], [0.0; 2]),
+            "spacing: must be",
+        ),
+        (
+            refuse(flat, [2, 3], [1.0; 2], [f64::INFINITY, 0.0]),
+            "origin: must be",
+        ),
+        (
+            refuse(vec![f32::NAN; 6], [2, 3], [1.0; 2], [0.0; 2]),
+            "heights: no cell has data",
+        ),
+        (
+            refuse(
+                vec![0.0, 0.0, 0.0, 0.0, f32::INFINITY, 0.0],
+                [2, 3],
+                [1.0; 2],
+                [0.0; 2],
+            ),
+            "heights[1, 1]: must be at most",
+        ),
+    ];
+    for (error, begin) in cases {
+        assert!(error.to_string().starts_with(begin), "{error}");
+        assert!(begin.starts_with(error.field()), "{error}");
+    }
+}
