@@ -218,6 +218,9 @@ impl From<ModelError> for BorderError {
             | ModelError::MassesContradict { value, .. }
             | ModelError::RadiusContradictsShape { value, .. }
             | ModelError::NotASign { value, .. } => Value::Number(*value),
+            #[allow(clippy::cast_precision_loss)] // a number to show
+            ModelError::UnknownFormat { format } => Value::Number(*format as f64),
+            ModelError::UnknownModel { name, .. } => Value::Text(name.clone()),
             ModelError::TooMany { count, .. } => Value::Count(*count),
             ModelError::NoDirection { value, .. } => Value::Numbers(value.to_vec()),
             ModelError::ImpossibleInertia { principal, .. } => Value::Numbers(principal.to_vec()),

@@ -50,9 +50,10 @@ pub struct HillDraw {
 impl HillDistribution {
     /// Draws the hills of an episode.
     pub fn draw(&self, random: &mut Pcg64, difficulty: f64) -> HillDraw {
+        let (n, drawn) = (N as u64, random.below(1 << 63));
         HillDraw {
             rms_slope: self.rms_slope.unwrap_or(HARDEST_SLOPE * difficulty),
-            offset: [random.below(N as u64), random.below(N as u64)],
+            offset: [drawn % n, drawn / n % n],
         }
     }
 }
