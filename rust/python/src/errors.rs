@@ -5,7 +5,7 @@ use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple, PyType};
-use rover_core::draw::{DrawError, PlacementError};
+use rover_core::draw::{DrawError, PlacementError, Unsuitable};
 use rover_core::episode::EpisodeError;
 use rover_core::geometry::TerrainError;
 use rover_core::integrator::{OptionsError, StepError};
@@ -188,6 +188,18 @@ impl BorderError {
             message,
             field: Some(field.to_owned()),
             value,
+        }
+    }
+}
+
+impl BorderError {
+    /// A goal that does not suit the ground; the message is still to be written.
+    fn of_goal(x: f64, z: f64) -> Self {
+        Self {
+            kind: Kind::Terrain,
+            message: String::new(),
+            field: Some("goal".to_owned()),
+            value: Value::Numbers(vec![x, z]),
         }
     }
 }
@@ -383,6 +395,15 @@ impl From<DrawError> for BorderError {
                 field: Some("terrain".to_owned()),
                 value: Value::Number(overlap),
             },
+            DrawError::Unsuitable { why, attempts } => {
+                let message = format!("{why}, in the last of {attempts} scenes");
+                let own = match why {
+                    Unsuitable::Placement(why) => why.into(),
+                    Unsuitable::NoGoal { x, z } => Self::of_goal(x, z),
+                    Unsuitable::NoWay { to: [x, z], .. } => Self::of_goal(x, z),
+                };
+                Self { message, ..own }
+            }
             DrawError::Terrain(e) => e.into(),
             DrawError::Model(e) => e.into(),
             DrawError::State(e) => e.into(),

@@ -3,12 +3,13 @@
 //! - [`pcg64`]: the generator of NumPy's `default_rng`, number for number; [`seed_sequence`]: its
 //!   state for a seed; [`normal`]: standard normal numbers;
 //! - [`start`]: slope, pose and goal; [`rocks`]: rocks by difficulty; [`hills`]: fractal ground;
-//!   [`way`]: whether a way leads to the goal; [`domain`]: properties of rover and world;
+//!   [`ground`]: the ground of all of them; [`way`]: whether a way leads to the goal; [`domain`]: properties of rover and world;
 //! - [`scene`]: all of these, and the rover in them; [`many`]: the next scenes of many rovers, on
 //!   several threads.
 
 pub mod domain;
 pub mod error;
+pub mod ground;
 pub mod hills;
 pub mod many;
 pub mod normal;
@@ -22,11 +23,12 @@ pub mod way;
 
 pub use domain::{Domain, DomainDistribution};
 pub use error::{DrawError, Unsuitable};
+pub use ground::{DrawnGround, GroundDistribution};
 pub use hills::{HillDistribution, HillDraw};
 pub use many::{Drawn, Order, draw_many};
 pub use pcg64::{Pcg64, Pcg64State};
 pub use rocks::{RockDistribution, RockDraw};
-pub use scene::{DrawnGround, DrawnScene, Fixed, GroundDistribution, SceneDistribution};
+pub use scene::{DrawnScene, Fixed, SceneDistribution};
 pub use start::{
     FixedStart, PlacementError, Range, Start, StartDistribution, resting_on, resting_pose,
     tilted_plane,

@@ -1,11 +1,10 @@
 //! The scene of an episode: ground, rocks, start, goal and properties of rover and world.
 
-use std::fmt;
 use std::sync::Arc;
 
 use super::domain::{Domain, DomainDistribution};
 use super::error::{DrawError, Unsuitable};
-use super::hills::HillDistribution;
+use super::ground::{DrawnGround, GroundDistribution};
 use super::pcg64::Pcg64;
 use super::rocks::{RockDistribution, RockDraw, clear_radius};
 use super::start::{
@@ -14,7 +13,6 @@ use super::start::{
 };
 use super::way;
 use crate::contact::detection::deepest_overlap;
-use crate::geometry::{HeightField, Plane, SphereField, Terrain, TerrainError, Union};
 use crate::integrator::StepOptions;
 use crate::multibody::{Kinematics, coordinates};
 use crate::simulation::{Placement, RoverScene};
@@ -43,27 +41,6 @@ pub struct SceneDistribution {
     pub goal_tolerance: f64,
 }
 
-/// What the ground of episodes is.
-#[derive(Clone)]
-pub enum GroundDistribution {
-    /// A plane with the slope of the start.
-    Tilted,
-    /// The same terrain in every episode.
-    Given(Arc<dyn Terrain>),
-    /// Hills, whose slope follows from the difficulty of the rocks.
-    Hills(HillDistribution),
-}
-
-impl fmt::Debug for GroundDistribution {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Tilted => f.write_str("Tilted"),
-            Self::Given(_) => f.write_str("Given(..)"),
-            Self::Hills(hills) => f.debug_tuple("Hills").field(hills).finish(),
-        }
-    }
-}
-
 /// What replaces the draws of one episode.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fixed {
@@ -73,59 +50,6 @@ pub struct Fixed {
     pub difficulty: Option<f64>,
     /// Public coordinates and velocity (nv each), the latter at rest by default.
     pub state: Option<(Vec<f64>, Option<Vec<f64>>)>,
-}
-
-/// The ground of an episode.
-#[derive(Clone)]
-pub enum DrawnGround {
-    /// A plane.
-    Plane(Plane),
-    /// Spheres on a plane.
-    Field(Arc<SphereField>),
-    /// A map, and the rocks on it, if there are any.
-    Map(Arc<HeightField>, Option<Arc<SphereField>>),
-    /// The terrain of all episodes.
-    Given(Arc<dyn Terrain>),
-}
-
-impl DrawnGround {
-    /// Height of the ground without the rocks on it, m; None where it is not known.
-    #[must_use]
-    pub fn height(&self, x: f64, z: f64) -> Option<f64> {
-        match self {
-            Self::Plane(plane) => plane.height(x, z),
-            Self::Field(field) => field.ground().and_then(|plane| plane.height(x, z)),
-            Self::Map(map, _) => map.height(x, z),
-            Self::Given(terrain) => terrain.height(x, z),
-        }
-    }
-}
-
-impl fmt::Debug for DrawnGround {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Plane(_) => "Plane(..)",
-            Self::Field(_) => "Field(..)",
-            Self::Map(..) => "Map(..)",
-            Self::Given(_) => "Given(..)",
-        })
-    }
-}
-
-impl DrawnGround {
-    /// As a simulation takes it.
-    ///
-    /// # Errors
-    /// As [`Union::new`].
-    pub fn terrain(&self) -> Result<Arc<dyn Terrain>, TerrainError> {
-        Ok(match self {
-            Self::Plane(plane) => Arc::new(*plane),
-            Self::Field(field) => field.clone(),
-            Self::Map(map, None) => map.clone(),
-            Self::Map(map, Some(rocks)) => Arc::new(Union::new(vec![map.clone(), rocks.clone()])?),
-            Self::Given(terrain) => terrain.clone(),
-        })
-    }
 }
 
 /// A drawn scene, in which the rover has room.
@@ -192,7 +116,7 @@ impl SceneDistribution {
         let start = start.draw(random, &fixed.start);
         let domain = self.domain.draw(random);
         let ground = self.lay_out(random, &start, rocks)?;
-        let terrain = ground.terrain()?;
+        let terrain = ground.terrain();
         let scene = match domain.scaled(&self.rover.model)? {
             Some(scaled) => RoverScene::new(Arc::new(scaled), terrain),
             None => self.rover.on(terrain),
@@ -251,7 +175,7 @@ impl SceneDistribution {
         let model = &self.rover.model;
         let (radius, tolerance) = (clear_radius(model), self.goal_tolerance);
         match &self.ground {
-            GroundDistribution::Given(terrain) => Ok(DrawnGround::Given(terrain.clone())),
+            GroundDistribution::Given(ground) => Ok(ground.clone()),
             GroundDistribution::Tilted => {
                 let plane = tilted_plane(start.slope, start.uphill)?;
                 let Some(rocks) = rocks else {
@@ -267,7 +191,11 @@ impl SceneDistribution {
                     Some(rocks) => rocks.lay_on(model, start, &map, radius, tolerance)?,
                     None => None,
                 };
-                Ok(DrawnGround::Map(Arc::new(map), field.map(Arc::new)))
+                let map = DrawnGround::Map(Arc::new(map));
+                Ok(match field {
+                    Some(field) => map.with(DrawnGround::Field(Arc::new(field)))?,
+                    None => map,
+                })
             }
         }
     }
