@@ -4,7 +4,7 @@ SI units and radians everywhere. World frame: x forward, y up, z to the right. W
 listed FL, FR, ML, BL, MR, BR. Every array returned is new.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from os import PathLike
 from typing import Any, Literal, TypeAlias, final, overload
 
@@ -161,8 +161,8 @@ class Motor:
 class RoverModel:
     """A machine: a tree of solids under a free base, read from data. Immutable.
 
-    `RoverModel()` is the built-in six-wheel rover. The other constructors are `from_file`,
-    `from_text` and `from_dict`.
+    `RoverModel()` is the built-in six-wheel rover. The other constructors are `named`,
+    `from_file`, `from_text`, `from_dict`, `from_urdf` and `from_mjcf`.
 
     Methods that take coordinates understand two sets of them, by the argument `coordinates`:
     "state", the `q` and `v` of `Simulation`, and "report", the Cardan angles of the 2010 report and
@@ -223,6 +223,143 @@ class RoverModel:
         """The description as TOML text, as `from_text` reads it."""
     def to_dict(self) -> dict[str, Any]:
         """The description as nested dictionaries and lists, as `from_dict` reads it."""
+    @staticmethod
+    def named(name: str) -> RoverModel:
+        """The model of the gallery with this name.
+
+        Args:
+            name: One of `names()`.
+
+        Returns:
+            The model.
+
+        Raises:
+            ModelError: There is no such model; the message lists those that there are.
+        """
+    @staticmethod
+    def names() -> list[str]:
+        """Names of the models of the gallery; the first is the built-in rover."""
+    @staticmethod
+    def from_urdf(
+        path: str | Any,
+        *,
+        wheels: Sequence[str] | Mapping[str, float] | None = None,
+        steering: Sequence[str] | Mapping[str, str] | None = None,
+        free_base: bool = True,
+        forward: str = "x",
+        torque_limit: float | None = None,
+        steering_stiffness: float | None = None,
+        steering_damping: float | None = None,
+        steering_limit: float | None = None,
+        ignore: Collection[str] = (),
+    ) -> RoverModel:
+        """Reads a URDF file.
+
+        The file's axes (x forward, y left, z up) are converted to ours (x forward, y up, z right)
+        in every frame. `import_report` says what was understood, assumed and left out.
+
+        Args:
+            path: Path of the file.
+            wheels: Names of the wheels' links or joints, or their radii by name, m. None: found
+                from shapes and names. An empty list: none.
+            steering: Names of the steering links or joints, or those of each wheel by its name.
+                None: found from their axes. An empty list: none.
+            free_base: Whether the root moves freely; otherwise it is fixed to the world.
+            forward: The file's axis along which the machine drives: "x", "-x", "y" or "-y".
+            torque_limit: Largest torque of every wheel, N m; by default the file's.
+            steering_stiffness: Stiffness of every steering controller, N m/rad.
+            steering_damping: Damping of every steering controller, N m s/rad.
+            steering_limit: Largest steering set-point, rad; by default the joint's stop.
+            ignore: Kinds of what changes the motion and is left out all the same: "friction",
+                "actuators", "closed loops", "tendons", "springs", "fluid".
+
+        Returns:
+            The model.
+
+        Raises:
+            ModelError: The file is malformed, holds what cannot be simulated, or leaves open which
+                links are wheels; the message names file, element and value.
+            ImportError: The extra `models` is not installed.
+            OSError: The file cannot be read.
+        """
+    @staticmethod
+    def from_mjcf(
+        path: str | Any,
+        *,
+        wheels: Sequence[str] | Mapping[str, float] | None = None,
+        steering: Sequence[str] | Mapping[str, str] | None = None,
+        free_base: bool | None = None,
+        forward: str = "x",
+        torque_limit: float | None = None,
+        steering_stiffness: float | None = None,
+        steering_damping: float | None = None,
+        steering_limit: float | None = None,
+        ignore: Collection[str] = (),
+    ) -> RoverModel:
+        """Reads an MJCF file, which MuJoCo compiles.
+
+        As `from_urdf`, but that the file says whether the base is free, and position servos become
+        gains of held joints.
+
+        Args:
+            path: Path of the file.
+            wheels: Names of the wheels' bodies or joints, or their radii by name, m. None: found
+                from shapes and names. An empty list: none.
+            steering: Names of the steering bodies or joints, or those of each wheel by its name.
+                None: found from their axes. An empty list: none.
+            free_base: Whether the root moves freely. None: as in the file.
+            forward: The file's axis along which the machine drives: "x", "-x", "y" or "-y".
+            torque_limit: Largest torque of every wheel, N m; by default the file's.
+            steering_stiffness: Stiffness of every steering controller, N m/rad.
+            steering_damping: Damping of every steering controller, N m s/rad.
+            steering_limit: Largest steering set-point, rad; by default the joint's stop.
+            ignore: Kinds of what changes the motion and is left out all the same: "friction",
+                "actuators", "closed loops", "tendons", "springs", "fluid".
+
+        Returns:
+            The model.
+
+        Raises:
+            ModelError: MuJoCo refuses the file, it holds what cannot be simulated, or it leaves
+                open which bodies are wheels.
+            ImportError: MuJoCo is not installed.
+            OSError: The file cannot be read.
+        """
+    @property
+    def import_report(self) -> Any:
+        """What the import of this model understood, assumed and left out.
+
+        A `rover_gym.models.ImportReport`; None for a model that was not imported, and for one that
+        was derived from an imported one.
+        """
+    def to_urdf(self, path: str | Any, *, ignore: Collection[str] = ()) -> None:
+        """Writes a URDF file, for other programs: x forward, y left, z up.
+
+        Wheels are written as cylinders, a tenth of their radius wide.
+
+        Args:
+            path: Path of the file.
+            ignore: Kinds of what the format cannot express and is left out all the same: "springs",
+                "armature".
+
+        Raises:
+            ModelError: The model has a spherical joint, several trees, or what the format cannot
+                express and `ignore` does not name.
+            OSError: The file cannot be written.
+        """
+    def to_mjcf(self, path: str | Any) -> None:
+        """Writes an MJCF file, for MuJoCo: x forward, y left, z up.
+
+        Wheels are written as cylinders, a tenth of their radius wide, their drives as motors, held
+        steering as position servos, and coupled joints as equality constraints, which MuJoCo
+        satisfies approximately.
+
+        Args:
+            path: Path of the file.
+
+        Raises:
+            OSError: The file cannot be written.
+        """
     def replace(
         self,
         *,

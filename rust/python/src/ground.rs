@@ -5,6 +5,7 @@ use std::sync::Arc;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
+use rover_core::draw::DrawnGround;
 use rover_core::geometry::{Terrain, Union as CoreUnion};
 
 use crate::arguments::{refused, shown};
@@ -39,6 +40,38 @@ impl Ground {
             Self::Map(map) => map.inner.clone(),
             Self::Mesh(mesh) => mesh.inner.clone(),
             Self::Union(union) => union.inner.clone(),
+        }
+    }
+
+    /// What episodes are drawn on.
+    pub fn drawn(&self) -> DrawnGround {
+        match self {
+            Self::Plane(plane) => DrawnGround::Plane(plane.inner),
+            Self::Field(field) => DrawnGround::Field(field.inner.clone()),
+            Self::Map(map) => DrawnGround::Map(map.inner.clone()),
+            Self::Mesh(mesh) => DrawnGround::Mesh(mesh.inner.clone()),
+            Self::Union(union) => {
+                let parts = union.parts.iter().map(Self::drawn).collect();
+                DrawnGround::Union(union.inner.clone(), parts)
+            }
+        }
+    }
+
+    /// What an episode was drawn on.
+    pub fn of(drawn: &DrawnGround) -> Self {
+        match drawn {
+            DrawnGround::Plane(plane) => Self::Plane(Plane { inner: *plane }),
+            DrawnGround::Field(field) => Self::Field(SphereField {
+                inner: field.clone(),
+            }),
+            DrawnGround::Map(map) => Self::Map(HeightField { inner: map.clone() }),
+            DrawnGround::Mesh(mesh) => Self::Mesh(TriangleMesh {
+                inner: mesh.clone(),
+            }),
+            DrawnGround::Union(union, parts) => Self::Union(Union {
+                inner: union.clone(),
+                parts: parts.iter().map(Self::of).collect(),
+            }),
         }
     }
 

@@ -19,6 +19,7 @@ mod ground;
 mod height_field;
 mod infos;
 mod model;
+mod model_files;
 mod motor;
 mod options;
 mod planar;

@@ -183,9 +183,7 @@ impl Simulation {
     /// The machine.
     #[getter]
     fn model(&self) -> RoverModel {
-        RoverModel {
-            inner: self.model.clone(),
-        }
+        self.model.clone().into()
     }
 
     /// The ground.
