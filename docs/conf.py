@@ -69,7 +69,8 @@ def _command_line() -> str:
     """The help of every command."""
     parts = ["# The command line\n"]
     runner = CliRunner(env={"TERMINAL_WIDTH": "100", "COLUMNS": "100", "NO_COLOR": "1"})
-    for command in ([], ["drive"], ["baseline"], ["report"], ["plot"], ["replay"], ["scene"]):
+    models = [["model", name] for name in ("import", "show", "check")]
+    for command in ([], ["drive"], ["baseline"], ["report"], ["plot"], ["replay"], ["scene"], *models):
         text = runner.invoke(rover, [*command, "--help"], prog_name="rover").output
         parts.append(f"```text\n$ {' '.join(['rover', *command, '--help'])}\n{text.rstrip()}\n```\n")
     return "\n".join(parts)

@@ -5,6 +5,7 @@ The package consists of the subpackages below. Each one may import those above i
     mechanics      the compiled core: models, grounds, simulations, the contact solver
     validation     argument checks, with errors that name the field
     extras         optional packages
+    models         models from and to URDF and MJCF files
     rendering      images of a rover: frames and video
     env            `Rover-v0`: its card, arguments and control period
     vector         batches of rovers, for Gymnasium and for stable-baselines3
@@ -25,6 +26,7 @@ from rover_gym.env.rover_env import RoverEnv
 from rover_gym.mechanics import (
     BusyError,
     CommandError,
+    HeightField,
     ModelError,
     Motor,
     OptionError,
@@ -37,7 +39,10 @@ from rover_gym.mechanics import (
     SphereField,
     StateError,
     StepError,
+    Terrain,
     TerrainError,
+    TriangleMesh,
+    Union,
     __version__,
     accuracy_options,
     solve_friction_contact,
@@ -50,6 +55,7 @@ register_environments()
 __all__ = [
     "BusyError",
     "CommandError",
+    "HeightField",
     "ModelError",
     "Motor",
     "OptionError",
@@ -64,7 +70,10 @@ __all__ = [
     "SphereField",
     "StateError",
     "StepError",
+    "Terrain",
     "TerrainError",
+    "TriangleMesh",
+    "Union",
     "__version__",
     "accuracy_options",
     "solve_friction_contact",

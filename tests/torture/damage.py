@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import importlib.util
 import json
 import re
 import tempfile
@@ -30,7 +31,16 @@ from rover_gym.policy.shipped import FOLDER
 from rover_gym.record import Recorder, RoverSampler, describe, read_run
 from rover_gym.soil import SoilSimulation, SoilSnapshot, soil_packing
 from torture.ledger import Ledger
-from torture.mutate import UNKIND_NUMBERS, UNKIND_TEXT, mutate_bytes, mutate_hdf5, mutate_json, mutate_npz, mutate_value
+from torture.mutate import (
+    UNKIND_NUMBERS,
+    UNKIND_TEXT,
+    mutate_bytes,
+    mutate_hdf5,
+    mutate_json,
+    mutate_npz,
+    mutate_value,
+    mutate_xml,
+)
 from torture.regime import Bounds, Regime
 
 Random = np.random.Generator
@@ -164,6 +174,40 @@ def models(random: Random, ledger: Ledger) -> None:
         sim = attempt(ledger, "Simulation", lambda found=found: Simulation(found))
         if sim is not None:
             use(ledger, "a damaged model", sim)
+
+
+#: Writer, reader and ending of the kinds of robot files, by the package that reads them.
+ROBOT_FILES: dict[str, tuple[Callable[[RoverModel, Path], None], Callable[[Path], RoverModel], str]] = {
+    "yourdfpy": (RoverModel.to_urdf, RoverModel.from_urdf, "urdf"),
+    "mujoco": (RoverModel.to_mjcf, RoverModel.from_mjcf, "xml"),
+}
+
+
+@cache
+def _robot(package: str) -> str:
+    """The file of a rover with coupled rockers, stops, steering and drives."""
+    write, _, ending = ROBOT_FILES[package]
+    path = _folder() / f"sound.{ending}"
+    write(RoverModel.named("open-rover"), path)
+    return path.read_text(encoding="utf-8")
+
+
+def robots(random: Random, ledger: Ledger) -> None:
+    """URDF and MJCF files changed as text and by elements, where their parsers are installed; what is read is driven."""
+    packages = [name for name in ROBOT_FILES if importlib.util.find_spec(name) is not None]
+    for turn in range(10 if packages else 0):
+        package = packages[turn % len(packages)]
+        _, read, ending = ROBOT_FILES[package]
+        path = _folder() / f"robot.{ending}"
+        path.write_bytes(mutate_xml(random, _robot(package)).encode("utf-8", errors="surrogatepass"))
+        found = attempt(ledger, f"{ending} {package}", lambda read=read, path=path: read(path))
+        if found is None:
+            continue
+        if attempt(ledger, "RoverModel.from_dict", lambda found=found: RoverModel.from_dict(found.to_dict())) != found:
+            ledger.find("an imported model is another after its way through its description")
+        sim = attempt(ledger, "Simulation", lambda found=found: Simulation(found))
+        if sim is not None:
+            use(ledger, "a damaged robot", sim)
 
 
 def _moving() -> Simulation:
@@ -433,6 +477,7 @@ REGIMES = [
     Regime("damaged runs", runs, 10, INPUTS),
     Regime("damaged policies", policies, 10, INPUTS),
     Regime("damaged models", models, 20, INPUTS),
+    Regime("damaged robot files", robots, 20, INPUTS),
     Regime("damaged snapshots", snapshots, 20, INPUTS),
     Regime("damaged rock fields", rocks, 10, INPUTS),
     Regime("nonsensical arguments", arguments, 60, INPUTS),

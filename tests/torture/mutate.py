@@ -12,6 +12,7 @@ from __future__ import annotations
 import copy
 import io
 import json
+import re
 import zipfile
 from typing import TYPE_CHECKING, Any
 
@@ -104,6 +105,32 @@ def mutate_value(rng: np.random.Generator, value: Any) -> Any:
     else:
         where[key] = _unkind(rng)
     return root[0]
+
+
+def mutate_xml(rng: np.random.Generator, text: str) -> str:
+    """Changes attributes and elements of an XML text, or the text itself."""
+    if rng.random() < 0.2:
+        return mutate_bytes(rng, text.encode()).decode("utf-8", errors="replace")
+    if rng.random() < 0.05:
+        return text.replace(">", ">" + "<a>" * int(rng.choice([10, 300, DEEP])), 1)
+    for _ in range(rng.integers(1, 4)):
+        attributes = list(re.finditer(r'(?<=[\w:]=")[^"]*(?=")', text))
+        elements = list(re.finditer(r"<(\w+)[^<>]*/>", text))
+        kind = rng.integers(5)
+        if kind < 3 and attributes:
+            place = attributes[rng.integers(len(attributes))]
+            other = attributes[rng.integers(len(attributes))][0]
+            unkind = str(UNKIND_NUMBERS[rng.integers(len(UNKIND_NUMBERS))])
+            words = UNKIND_TEXT[rng.integers(len(UNKIND_TEXT))].encode("utf-8", "replace").decode()
+            numbers = " ".join([unkind] * int(rng.integers(1, 5)))
+            value = (other, numbers, words)[rng.integers(3)]
+            text = text[: place.start()] + value + text[place.end() :]
+        elif elements:
+            place = elements[rng.integers(len(elements))]
+            other = elements[rng.integers(len(elements))][0]
+            value = ("", place[0] * 2, other)[rng.integers(3)]
+            text = text[: place.start()] + value + text[place.end() :]
+    return text
 
 
 def mutate_npz(rng: np.random.Generator, data: bytes) -> bytes:

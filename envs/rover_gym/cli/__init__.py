@@ -8,6 +8,7 @@ import typer
 from rover_gym.cli.baseline_command import baseline
 from rover_gym.cli.console import DEBUG, one_line
 from rover_gym.cli.drive_command import drive
+from rover_gym.cli.model_command import model
 from rover_gym.cli.planar_commands import planar
 from rover_gym.cli.plot_command import plot
 from rover_gym.cli.replay_command import replay
@@ -29,6 +30,7 @@ app.command()(report)
 app.command()(plot)
 app.command()(replay)
 app.command()(scene)
+app.add_typer(model, name="model")
 app.add_typer(planar, name="planar")
 app.command()(speed)
 

@@ -126,9 +126,7 @@ impl EpisodeRules {
             named.set_item("noise", fresh(py, &settings.noise))?;
         }
         named.set_item("scan", fresh_rows(py, &settings.scan)?)?;
-        let model = RoverModel {
-            inner: self.inner.model().clone(),
-        };
+        let model = RoverModel::from(self.inner.model().clone());
         Ok(((model,), named))
     }
 

@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::contact::{Contact, detection::wheel_contacts};
-use rover_core::draw::{resting_pose, rocks::clear_radius};
+use rover_core::draw::{resting_on, resting_pose, rocks::clear_radius};
 use rover_core::multibody::bias::BiasScratch;
 use rover_core::multibody::{
     Configuration, Joint, Kinematics, MassMatrix, Model, ModelDescription, ModelError, bias,
@@ -19,16 +19,17 @@ use crate::arguments::{self, Given, number};
 use crate::arrays::{fresh, fresh_blocks, fresh_matrix, fresh_rows, triple, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::files::{self, in_file, read_text, write_text};
+use crate::ground::Ground;
+use crate::model_files;
 use crate::motor::{self, Motor};
-use crate::sphere_field::Ground;
 
 /// A pair of fresh vectors.
 pub type Pair<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
 /// A machine: a tree of solids under a free base, read from data. Immutable.
 ///
-/// `RoverModel()` is the built-in six-wheel rover. The other constructors are `from_file`,
-/// `from_text` and `from_dict`.
+/// `RoverModel()` is the built-in six-wheel rover. The other constructors are `named`,
+/// `from_file`, `from_text`, `from_dict`, `from_urdf` and `from_mjcf`.
 ///
 /// Methods that take coordinates understand two sets of them, by the argument `coordinates`:
 /// "state", the `q` and `v` of `Simulation`, and "report", the Cardan angles of the 2010 report and
@@ -37,6 +38,17 @@ pub type Pair<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 #[derive(Clone)]
 pub struct RoverModel {
     pub inner: Arc<Model>,
+    /// What an import reported.
+    pub report: Option<Arc<Py<PyAny>>>,
+}
+
+impl From<Arc<Model>> for RoverModel {
+    fn from(inner: Arc<Model>) -> Self {
+        Self {
+            inner,
+            report: None,
+        }
+    }
 }
 
 /// How a user's `q` and velocities are to be read.
@@ -87,9 +99,7 @@ impl Coordinates {
 
 impl RoverModel {
     fn wrap(model: Result<Model, ModelError>) -> PyResult<Self> {
-        Ok(Self {
-            inner: Arc::new(model.map_err(BorderError::from)?),
-        })
+        Ok(Arc::new(model.map_err(BorderError::from)?).into())
     }
 
     fn placed(
@@ -179,9 +189,7 @@ pub fn poses<'py>(
 impl RoverModel {
     #[new]
     fn new() -> Self {
-        Self {
-            inner: Arc::new(Model::rover()),
-        }
+        Arc::new(Model::rover()).into()
     }
 
     /// Reads a model file (TOML).
@@ -201,9 +209,7 @@ impl RoverModel {
         let path = files::path(path, Kind::Model)?;
         let text = read_text(py, &path, Kind::Model, MAX_TEXT)?;
         let model = ModelDescription::from_toml(&text).and_then(Model::from_description);
-        Ok(Self {
-            inner: Arc::new(model.map_err(|e| in_file(e.into(), &path))?),
-        })
+        Ok(Arc::new(model.map_err(|e| in_file(e.into(), &path))?).into())
     }
 
     /// Reads a model from TOML text.
@@ -283,6 +289,192 @@ impl RoverModel {
             .to_json()
             .map_err(BorderError::from)?;
         py.import("json")?.call_method1("loads", (text,))
+    }
+
+    /// The model of the gallery with this name.
+    ///
+    /// Args:
+    ///     name: One of `names()`.
+    ///
+    /// Returns:
+    ///     The model.
+    ///
+    /// Raises:
+    ///     ModelError: There is no such model; the message lists those that there are.
+    #[staticmethod]
+    fn named(name: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let name = arguments::text(name, Kind::Model, "name")?;
+        Self::wrap(ModelDescription::named(&name).and_then(Model::from_description))
+    }
+
+    /// Names of the models of the gallery; the first is the built-in rover.
+    #[staticmethod]
+    fn names() -> Vec<&'static str> {
+        ModelDescription::names().to_vec()
+    }
+
+    /// Reads a URDF file.
+    ///
+    /// The file's axes (x forward, y left, z up) are converted to ours (x forward, y up, z right)
+    /// in every frame. `import_report` says what was understood, assumed and left out.
+    ///
+    /// Args:
+    ///     path: Path of the file.
+    ///     wheels: Names of the wheels' links or joints, or their radii by name, m. None: found
+    ///         from shapes and names. An empty list: none.
+    ///     steering: Names of the steering links or joints, or those of each wheel by its name.
+    ///         None: found from their axes. An empty list: none.
+    ///     free_base: Whether the root moves freely; otherwise it is fixed to the world.
+    ///     forward: The file's axis along which the machine drives: "x", "-x", "y" or "-y".
+    ///     torque_limit: Largest torque of every wheel, N m; by default the file's.
+    ///     steering_stiffness: Stiffness of every steering controller, N m/rad.
+    ///     steering_damping: Damping of every steering controller, N m s/rad.
+    ///     steering_limit: Largest steering set-point, rad; by default the joint's stop.
+    ///     ignore: Kinds of what changes the motion and is left out all the same: "friction",
+    ///         "actuators", "closed loops", "tendons", "springs", "fluid".
+    ///
+    /// Returns:
+    ///     The model.
+    ///
+    /// Raises:
+    ///     ModelError: The file is malformed, holds what cannot be simulated, or leaves open which
+    ///         links are wheels; the message names file, element and value.
+    ///     ImportError: The extra `models` is not installed.
+    ///     OSError: The file cannot be read.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, wheels = Given::MISSING, steering = Given::MISSING, free_base = Given::MISSING,
+        forward = Given::MISSING, torque_limit = Given::MISSING, steering_stiffness = Given::MISSING,
+        steering_damping = Given::MISSING, steering_limit = Given::MISSING, ignore = Given::MISSING),
+        text_signature = "(path, *, wheels=None, steering=None, free_base=True, forward=\"x\", torque_limit=None, \
+        steering_stiffness=None, steering_damping=None, steering_limit=None, ignore=())")]
+    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python method
+    fn from_urdf<'py>(
+        path: &Bound<'py, PyAny>,
+        wheels: Given<'py>,
+        steering: Given<'py>,
+        free_base: Given<'py>,
+        forward: Given<'py>,
+        torque_limit: Given<'py>,
+        steering_stiffness: Given<'py>,
+        steering_damping: Given<'py>,
+        steering_limit: Given<'py>,
+        ignore: Given<'py>,
+    ) -> PyResult<Self> {
+        let options = vec![
+            ("wheels", wheels),
+            ("steering", steering),
+            ("free_base", free_base),
+            ("forward", forward),
+            ("torque_limit", torque_limit),
+            ("steering_stiffness", steering_stiffness),
+            ("steering_damping", steering_damping),
+            ("steering_limit", steering_limit),
+            ("ignore", ignore),
+        ];
+        model_files::read("read_urdf", path, options)
+    }
+
+    /// Reads an MJCF file, which MuJoCo compiles.
+    ///
+    /// As `from_urdf`, but that the file says whether the base is free, and position servos become
+    /// gains of held joints.
+    ///
+    /// Args:
+    ///     path: Path of the file.
+    ///     wheels: Names of the wheels' bodies or joints, or their radii by name, m. None: found
+    ///         from shapes and names. An empty list: none.
+    ///     steering: Names of the steering bodies or joints, or those of each wheel by its name.
+    ///         None: found from their axes. An empty list: none.
+    ///     free_base: Whether the root moves freely. None: as in the file.
+    ///     forward: The file's axis along which the machine drives: "x", "-x", "y" or "-y".
+    ///     torque_limit: Largest torque of every wheel, N m; by default the file's.
+    ///     steering_stiffness: Stiffness of every steering controller, N m/rad.
+    ///     steering_damping: Damping of every steering controller, N m s/rad.
+    ///     steering_limit: Largest steering set-point, rad; by default the joint's stop.
+    ///     ignore: Kinds of what changes the motion and is left out all the same: "friction",
+    ///         "actuators", "closed loops", "tendons", "springs", "fluid".
+    ///
+    /// Returns:
+    ///     The model.
+    ///
+    /// Raises:
+    ///     ModelError: MuJoCo refuses the file, it holds what cannot be simulated, or it leaves
+    ///         open which bodies are wheels.
+    ///     ImportError: MuJoCo is not installed.
+    ///     OSError: The file cannot be read.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, wheels = Given::MISSING, steering = Given::MISSING, free_base = Given::MISSING,
+        forward = Given::MISSING, torque_limit = Given::MISSING, steering_stiffness = Given::MISSING,
+        steering_damping = Given::MISSING, steering_limit = Given::MISSING, ignore = Given::MISSING),
+        text_signature = "(path, *, wheels=None, steering=None, free_base=None, forward=\"x\", torque_limit=None, \
+        steering_stiffness=None, steering_damping=None, steering_limit=None, ignore=())")]
+    #[allow(clippy::too_many_arguments)] // keyword arguments of a Python method
+    fn from_mjcf<'py>(
+        path: &Bound<'py, PyAny>,
+        wheels: Given<'py>,
+        steering: Given<'py>,
+        free_base: Given<'py>,
+        forward: Given<'py>,
+        torque_limit: Given<'py>,
+        steering_stiffness: Given<'py>,
+        steering_damping: Given<'py>,
+        steering_limit: Given<'py>,
+        ignore: Given<'py>,
+    ) -> PyResult<Self> {
+        let options = vec![
+            ("wheels", wheels),
+            ("steering", steering),
+            ("free_base", free_base),
+            ("forward", forward),
+            ("torque_limit", torque_limit),
+            ("steering_stiffness", steering_stiffness),
+            ("steering_damping", steering_damping),
+            ("steering_limit", steering_limit),
+            ("ignore", ignore),
+        ];
+        model_files::read("read_mjcf", path, options)
+    }
+
+    /// What the import of this model understood, assumed and left out.
+    ///
+    /// A `rover_gym.models.ImportReport`; None for a model that was not imported, and for one that
+    /// was derived from an imported one.
+    #[getter]
+    fn import_report(&self, py: Python<'_>) -> Option<Py<PyAny>> {
+        self.report.as_ref().map(|report| report.clone_ref(py))
+    }
+
+    /// Writes a URDF file, for other programs: x forward, y left, z up.
+    ///
+    /// Wheels are written as cylinders, a tenth of their radius wide.
+    ///
+    /// Args:
+    ///     path: Path of the file.
+    ///     ignore: Kinds of what the format cannot express and is left out all the same: "springs",
+    ///         "armature".
+    ///
+    /// Raises:
+    ///     ModelError: The model has a spherical joint, several trees, or what the format cannot
+    ///         express and `ignore` does not name.
+    ///     OSError: The file cannot be written.
+    #[pyo3(signature = (path, *, ignore = Given::MISSING), text_signature = "($self, path, *, ignore=())")]
+    fn to_urdf<'py>(&self, path: &Bound<'py, PyAny>, ignore: Given<'py>) -> PyResult<()> {
+        model_files::write("write_urdf", self.clone(), path, vec![("ignore", ignore)])
+    }
+
+    /// Writes an MJCF file, for MuJoCo: x forward, y left, z up.
+    ///
+    /// Wheels are written as cylinders, a tenth of their radius wide, their drives as motors, held
+    /// steering as position servos, and coupled joints as equality constraints, which MuJoCo
+    /// satisfies approximately.
+    ///
+    /// Args:
+    ///     path: Path of the file.
+    ///
+    /// Raises:
+    ///     OSError: The file cannot be written.
+    fn to_mjcf(&self, path: &Bound<'_, PyAny>) -> PyResult<()> {
+        model_files::write("write_mjcf", self.clone(), path, Vec::new())
     }
 
     /// Returns a model that differs in what is given.
@@ -700,7 +892,7 @@ impl RoverModel {
     ///
     /// Args:
     ///     q: Coordinates, (nq,).
-    ///     terrain: A `Plane` or a `SphereField`.
+    ///     terrain: A terrain, or a list of several.
     ///     coordinates: "state" or "report".
     ///
     /// Returns:
@@ -722,13 +914,15 @@ impl RoverModel {
         Ok(PyArray1::from_iter(py, contacts.iter().map(|c| c.gap)))
     }
 
-    /// The coordinates of the rover at rest on a plane.
+    /// The coordinates of the rover at rest on a terrain.
     ///
-    /// The joints are at zero, the trunk is upright along the normal with its origin above the
-    /// position, and the lowest wheel has gap zero.
+    /// On a plane the joints are at zero, the trunk is upright along the normal with its origin
+    /// above the position, and the lowest wheel has gap zero. On any other terrain the height of
+    /// the trunk, its pitch and roll and the joints that carry wheels bring all wheels down to the
+    /// ground as far as they can; no wheel is in it.
     ///
     /// Args:
-    ///     plane: The plane, which must not be vertical.
+    ///     terrain: A terrain, or a list of several; a plane must not be vertical.
     ///     position: x and z, (2,), m.
     ///     heading: Heading, rad.
     ///
@@ -736,32 +930,37 @@ impl RoverModel {
     ///     Coordinates of the state, (nq,).
     ///
     /// Raises:
-    ///     TerrainError: `plane` is no plane.
+    ///     TerrainError: `terrain` is no terrain, or does not say what the ground is under the
+    ///         trunk or a wheel.
     ///     StateError: A number is not finite, or the plane is vertical.
     fn resting_pose<'py>(
         &self,
         py: Python<'py>,
-        plane: &Bound<'_, PyAny>,
+        terrain: &Bound<'_, PyAny>,
         position: &Bound<'_, PyAny>,
         heading: &Bound<'_, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let Ground::Plane(plane) = Ground::parse(plane)? else {
-            return Err(arguments::refused(plane, Kind::Terrain, "plane", "a Plane").into());
-        };
+        let ground = Ground::parse(terrain)?;
         let place = <[f64; 2]>::try_from(vector(position, Kind::State, "position")?);
         let what = "two numbers";
         let place =
             place.map_err(|_| arguments::refused(position, Kind::State, "position", what))?;
         let heading = number(heading, Kind::State, "heading")?;
-        let q = resting_pose(&self.inner, &plane.inner, place, heading);
-        Ok(fresh(py, &q.map_err(BorderError::from)?))
+        let q = if let Ground::Plane(plane) = &ground {
+            resting_pose(&self.inner, &plane.inner, place, heading).map_err(BorderError::from)?
+        } else {
+            let terrain = ground.terrain();
+            let q = py.detach(|| resting_on(&self.inner, &*terrain, place, heading));
+            q.map_err(BorderError::from)?
+        };
+        Ok(fresh(py, &q))
     }
 
     /// The point of each wheel's rim that is nearest to the terrain.
     ///
     /// Args:
     ///     q: Coordinates, (nq,).
-    ///     terrain: A `Plane` or a `SphereField`.
+    ///     terrain: A terrain, or a list of several.
     ///     coordinates: "state" or "report".
     ///
     /// Returns:
@@ -791,7 +990,7 @@ impl RoverModel {
     ///
     /// Args:
     ///     q: Coordinates, (nq,).
-    ///     terrain: A `Plane` or a `SphereField`.
+    ///     terrain: A terrain, or a list of several.
     ///     coordinates: "state" or "report".
     ///
     /// Returns:

@@ -221,7 +221,7 @@ impl MirroredRoverSimulation {
             wheels: rover.wheel_names(),
         };
         let parameters = PyDict::new(ground.py());
-        parameters.set_item("model", RoverModel { inner })?;
+        parameters.set_item("model", RoverModel::from(inner))?;
         let base =
             PlanarSimulation::build(Machine::MirroredRover, rover, ground, parameters, options)?;
         Ok(PyClassInitializer::from(base).add_subclass(own))

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 use rover_core::geometry::{SphereField, Terrain};
 use rover_core::integrator::{StepOptions, Variant};
-use rover_core::multibody::{Configuration, JointKind, Model, ModelDescription, SolidDescription};
+use rover_core::multibody::{
+    Configuration, FORMAT, JointKind, Model, ModelDescription, SolidDescription,
+};
 use rover_core::simulation::RoverSimulation;
 
 /// A solid of 1 kg with a joint; all other fields have their defaults.
@@ -27,6 +29,7 @@ pub fn solid(name: &str, parent: Option<&str>, joint: JointKind) -> SolidDescrip
 pub fn machine(solids: Vec<SolidDescription>) -> ModelDescription {
     ModelDescription {
         self_contact: false,
+        format: FORMAT,
         name: "machine".into(),
         solids,
         wheels: Vec::new(),

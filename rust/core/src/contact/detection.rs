@@ -215,7 +215,7 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
 
 /// Visits the points of a shape on a piece of a surface whose gap is at most `reach`, m.
 #[inline]
-fn visit_on_surface(
+pub(crate) fn visit_on_surface(
     shape: &PlacedShape,
     piece: &Primitive,
     base: &Vector3<f64>,
@@ -247,7 +247,7 @@ fn on_surface(point: &SurfacePoint) -> SurfacePoint {
 /// Whether a point on a piece of a surface is a contact: one behind the piece's plane must be in
 /// the ground, and not only beyond the far side of a ridge or a rock.
 #[inline]
-fn is_on_surface(
+pub(crate) fn is_on_surface(
     terrain: &dyn Terrain,
     id: u32,
     base: &Vector3<f64>,

@@ -12,6 +12,20 @@ pub enum ModelError {
         /// The parser's own words, with line and column.
         message: String,
     },
+    /// A format that this version does not read.
+    #[error("format: this version reads format 1, the file has {format}")]
+    UnknownFormat {
+        /// What the file says.
+        format: i64,
+    },
+    /// A name that is not in the gallery.
+    #[error("name: there is no model {name:?}; there are {known}")]
+    UnknownModel {
+        /// What was given.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
     /// No solids at all.
     #[error("solids: a model needs at least one solid")]
     NoSolids,
@@ -237,6 +251,8 @@ impl ModelError {
     pub fn field(&self) -> &str {
         match self {
             Self::Unreadable { .. } => "text",
+            Self::UnknownFormat { .. } => "format",
+            Self::UnknownModel { .. } => "name",
             Self::NoSolids => "solids",
             Self::DuplicateName { field, .. }
             | Self::UnknownParent { field, .. }

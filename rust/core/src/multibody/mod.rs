@@ -21,7 +21,7 @@ pub mod state;
 
 pub use bias::bias;
 pub use description::{
-    CouplingDescription, DriveDescription, Hold, JointKind, Limits, MassProperties,
+    CouplingDescription, DriveDescription, FORMAT, Hold, JointKind, Limits, MassProperties,
     ModelDescription, Shape, ShapeDescription, SolidDescription, Spring, TagDescription,
     WheelDescription,
 };

@@ -10,6 +10,8 @@
 //! along z, 4 the diagonal, 5 the vertex. Faces are computed when they are needed, so the map costs
 //! four bytes a height, and a hundredth of that for the bounds of tiles.
 
+use std::cell::Cell;
+
 use nalgebra::Vector3;
 
 use super::error::TerrainError;
@@ -441,6 +443,31 @@ impl Terrain for HeightField {
     fn is_inside(&self, _id: u32, point: &Vector3<f64>) -> bool {
         let surface = self.height(point.x, point.z);
         surface.is_some_and(|y| point.y <= y + SURFACE)
+    }
+
+    fn highest(&self, centre: &Vector3<f64>, radius: f64) -> f64 {
+        let range = |axis: usize, x: f64, n: usize| {
+            let local = (x - self.origin[axis]) / self.spacing[axis];
+            let half = radius / self.spacing[axis];
+            let last = (n - 2) as f64;
+            let within = |x: f64| index(x.floor().clamp(0.0, last));
+            [within(local - half), within(local + half)]
+        };
+        let columns = range(0, centre.x, self.columns);
+        let rows = range(1, centre.z, self.rows);
+        let highest = Cell::new(f32::NEG_INFINITY);
+        self.tiles.visit(
+            columns,
+            rows,
+            |tile| tile.highest > highest.get(),
+            |[i, j]| {
+                let at = j * self.columns + i;
+                let corners = [at, at + 1, at + self.columns, at + self.columns + 1];
+                let own = corners.map(|k| self.heights[k]);
+                highest.set(own.into_iter().fold(highest.get(), f32::max));
+            },
+        );
+        f64::from(highest.get())
     }
 
     fn coverage(&self, centre: &Vector3<f64>, radius: f64) -> Coverage {

@@ -92,6 +92,11 @@ pub trait Terrain: Send + Sync {
         Coverage::Known
     }
 
+    /// A height (m) that no surface exceeds within `radius` (m) of `centre`, seen from above.
+    fn highest(&self, _centre: &Vector3<f64>, _radius: f64) -> f64 {
+        f64::INFINITY
+    }
+
     /// Height y (m) of the visible surface at (x, z); `None` where there is none.
     fn height(&self, x: f64, z: f64) -> Option<f64>;
 

@@ -119,6 +119,12 @@ impl Terrain for Union {
         coverage
     }
 
+    fn highest(&self, centre: &Vector3<f64>, radius: f64) -> f64 {
+        let surfaces = self.parts.iter().filter(|part| part.has_surface());
+        let heights = surfaces.map(|part| part.highest(centre, radius));
+        heights.fold(f64::NEG_INFINITY, f64::max)
+    }
+
     fn height(&self, x: f64, z: f64) -> Option<f64> {
         let heights = self.parts.iter().filter_map(|part| part.height(x, z));
         heights.reduce(f64::max)

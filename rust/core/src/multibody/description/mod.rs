@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 pub(super) mod check;
 mod check_shapes;
+mod gallery;
 pub mod joint;
 mod masses;
 pub mod shape;
@@ -20,10 +21,20 @@ pub use shape::{Shape, ShapeDescription};
 /// The built-in rover: Table 4.1 and Fig. 4.5 of the report, in SI units.
 const ROVER: &str = include_str!("../../../models/rover.toml");
 
+/// The version of the format that is read and written.
+pub const FORMAT: u32 = 1;
+
+fn current_format() -> u32 {
+    FORMAT
+}
+
 /// Kinematic trees of solids, with their wheels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelDescription {
+    /// Version of the format, [`FORMAT`]; a file without one has the first.
+    #[serde(default = "current_format", skip_serializing)]
+    pub format: u32,
     /// Name of the machine.
     pub name: String,
     /// Solids. Parents precede their children, and the solids of one tree are listed together.
@@ -167,6 +178,35 @@ pub struct WheelDescription {
 /// [`MAX_SOLIDS`](super::model::MAX_SOLIDS) solids needs a twentieth of it.
 pub const MAX_TEXT: usize = 16 << 20;
 
+/// What a text of any format says about itself.
+#[derive(Deserialize)]
+struct Header {
+    #[serde(default = "first_format")]
+    format: i64,
+}
+
+fn first_format() -> i64 {
+    1
+}
+
+/// What was read; where that is of another format, or failed because of it, an error that says so.
+fn read<E: ToString>(
+    parsed: Result<ModelDescription, E>,
+    format: impl Fn() -> Option<i64>,
+) -> Result<ModelDescription, ModelError> {
+    match parsed {
+        Ok(description) if description.format == FORMAT => Ok(description),
+        other => match format() {
+            Some(format) if format != i64::from(FORMAT) => {
+                Err(ModelError::UnknownFormat { format })
+            }
+            _ => other.map_err(|e| ModelError::Unreadable {
+                message: e.to_string(),
+            }),
+        },
+    }
+}
+
 fn check_length(text: &str) -> Result<(), ModelError> {
     if text.len() > MAX_TEXT {
         return Err(ModelError::TooMany {
@@ -256,6 +296,7 @@ impl ModelDescription {
         let parsed = Self::from_toml(ROVER);
         assert!(parsed.is_ok(), "the built-in rover is readable");
         parsed.unwrap_or_else(|_| Self {
+            format: FORMAT,
             name: String::new(),
             solids: Vec::new(),
             wheels: Vec::new(),
@@ -271,9 +312,8 @@ impl ModelDescription {
     /// [`MAX_TEXT`].
     pub fn from_toml(text: &str) -> Result<Self, ModelError> {
         check_length(text)?;
-        toml::from_str(text).map_err(|e| ModelError::Unreadable {
-            message: e.to_string(),
-        })
+        let format = || Some(toml::from_str::<Header>(text).ok()?.format);
+        read(toml::from_str(text), format)
     }
 
     /// Writes TOML from which [`Self::from_toml`] reads the same description.
@@ -281,9 +321,10 @@ impl ModelDescription {
     /// # Errors
     /// [`ModelError::Unreadable`] if a value has no TOML form.
     pub fn to_toml(&self) -> Result<String, ModelError> {
-        toml::to_string(self).map_err(|e| ModelError::Unreadable {
+        let text = toml::to_string(self).map_err(|e| ModelError::Unreadable {
             message: e.to_string(),
-        })
+        })?;
+        Ok(format!("format = {FORMAT}\n{text}"))
     }
 
     /// Reads JSON.
@@ -293,9 +334,8 @@ impl ModelDescription {
     /// [`MAX_TEXT`].
     pub fn from_json(text: &str) -> Result<Self, ModelError> {
         check_length(text)?;
-        serde_json::from_str(text).map_err(|e| ModelError::Unreadable {
-            message: e.to_string(),
-        })
+        let format = || Some(serde_json::from_str::<Header>(text).ok()?.format);
+        read(serde_json::from_str(text), format)
     }
 
     /// Writes JSON.
@@ -324,6 +364,17 @@ mod tests {
             ModelDescription::from_json(&rover.to_json().unwrap()).unwrap(),
             rover
         );
+    }
+
+    #[test]
+    fn a_later_format_is_refused_as_such_even_where_it_has_fields_that_are_unknown() {
+        let text = "format = 2\nname = 'x'\nsolids = []\nlegs = 4";
+        let error = ModelDescription::from_toml(text).unwrap_err();
+        assert_eq!(error, ModelError::UnknownFormat { format: 2 });
+        let error = ModelDescription::from_json(r#"{"format": 7}"#).unwrap_err();
+        assert_eq!(error, ModelError::UnknownFormat { format: 7 });
+        let written = ModelDescription::rover().to_toml().unwrap();
+        assert!(written.starts_with("format = 1\n"));
     }
 
     #[test]

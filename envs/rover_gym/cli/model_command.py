@@ -1,0 +1,146 @@
+"""`rover model import|show|check`: models from files of other programs, and what they are."""
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from rover_gym.cli.console import check_file, console, plain_errors, say_path
+from rover_gym.extras import require
+from rover_gym.figures.model_drawing import write_model_picture
+from rover_gym.figures.saving import check_format
+from rover_gym.mechanics import OptionError, RoverModel
+from rover_gym.models import check_statics, open_model, solid_rows
+from rover_gym.validation import refuse
+
+model = typer.Typer(help="Models: read URDF and MJCF, show and check any model.", no_args_is_help=True)
+
+Named = Annotated[str, typer.Argument(metavar="FILE_OR_NAME", help="A name of the gallery, or a model's file.")]
+Picture = Annotated[Path | None, typer.Option(dir_okay=False, help="Picture to write: .png, .svg or .pdf.")]
+
+
+@model.command("import")
+@plain_errors
+def import_model(
+    *,
+    file: Annotated[Path, typer.Argument(help="A URDF (.urdf) or an MJCF (.xml).")],
+    output: Annotated[Path, typer.Option(dir_okay=False, help="Model file to write (TOML).")] = Path("rover.toml"),
+    picture: Annotated[Path | None, typer.Option(dir_okay=False, help="Picture; beside the model by default.")] = None,
+    wheel: Annotated[
+        list[str] | None, typer.Option(help="A wheel's link or joint, or NAME=RADIUS in m. Repeat for each wheel.")
+    ] = None,
+    steering: Annotated[
+        list[str] | None, typer.Option(help="A steering link or joint, or WHEEL=JOINT. Repeat for each.")
+    ] = None,
+    fixed_base: Annotated[bool, typer.Option("--fixed-base", help="Fix the root to the world.")] = False,
+    forward: Annotated[str, typer.Option(help="The file's axis of driving: x, -x, y or -y.")] = "x",
+    torque_limit: Annotated[float | None, typer.Option(help="Largest torque of a wheel, N m.")] = None,
+    ignore: Annotated[
+        list[str] | None, typer.Option(help="What to leave out although it changes the motion, such as friction.")
+    ] = None,
+) -> None:
+    """Read a URDF or MJCF, tell what was understood, and write a model file and a picture."""
+    require("matplotlib", "demo")
+    picture = picture or output.with_suffix(".png")
+    check_format(picture.suffix.removeprefix("."))
+    for option, path in (("output", output), ("picture", picture)):
+        if path.exists() and file.exists() and path.samefile(file):
+            refuse(OptionError, option, str(path), "would replace the file that is read")
+        check_file(option, path)
+    options: dict[str, object] = {"forward": forward, "torque_limit": torque_limit, "ignore": ignore or ()}
+    options |= {"wheels": _radii(wheel), "steering": _pairs(steering)}
+    if fixed_base:
+        options["free_base"] = False
+    read = open_model(file, **options)
+    _print_solids(read)
+    report = read.import_report
+    for title, entries in (("assumed", report.assumed), ("not simulated", report.left_out)):
+        for entry in entries:
+            console().print(f"{title}: {entry}", markup=False)
+    output.parent.mkdir(parents=True, exist_ok=True)
+    read.to_file(output)
+    say_path("model", output)
+    say_path("picture", write_model_picture(read, picture))
+
+
+@model.command()
+@plain_errors
+def show(*, name: Named, picture: Picture = None) -> None:
+    """Show a model's solids, joints and wheels, and draw it where a picture is named."""
+    if picture is not None:
+        require("matplotlib", "demo")
+        check_format(picture.suffix.removeprefix("."))
+        check_file("picture", picture)
+    found = open_model(name)
+    _print_solids(found)
+    if picture is not None:
+        say_path("picture", write_model_picture(found, picture))
+
+
+@model.command()
+@plain_errors
+def check(
+    *,
+    name: Named,
+    friction: Annotated[float, typer.Option(help="Friction coefficient of wheel and ground.")] = 0.7,
+) -> None:
+    """Set a rover on level ground: wheel loads, steering geometry, clearance, and the step that it can climb."""
+    found = open_model(name)
+    statics = check_statics(found, friction=friction)
+    console().print(f"{found.name} on level ground, 9.81 m/s²", markup=False)
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for heading in ("wheel", "load", "share"):
+        table.add_column(heading, justify="left" if heading == "wheel" else "right")
+    for wheel, load in zip(found.wheel_names, statics.loads, strict=True):
+        table.add_row(wheel, f"{load:.5g} N", f"{load / max(float(statics.loads.sum()), 1e-300):.1%}")
+    console().print(table)
+    roll, pitch = (math.degrees(angle) for angle in statics.attitude)
+    is_bare = math.isinf(statics.clearance)
+    turning = "" if math.isinf(statics.turning_radius) else f", radius from {statics.turning_radius:.3g} m"
+    lines = [
+        f"at rest: roll {roll:.2f}°, pitch {pitch:.2f}°, largest velocity {statics.rest_speed:.1e}",
+        f"wheelbase {statics.wheelbase:.4g} m, track {statics.track:.4g} m",
+        f"clearance: {'no limit, since only wheels touch' if is_bare else f'{statics.clearance:.3g} m'}",
+        f"turning centre: {statics.turning_centre}{turning}",
+        f"step that it can climb at friction {statics.friction:g}: {'at least ' if statics.climbs_wall else ''}"
+        f"{statics.step_height:.3g} m"
+        + (" (the wheels' radius: equilibrium holds on a wall)" if statics.climbs_wall else ""),
+    ]
+    for line in lines:
+        console().print(line, markup=False)
+
+
+def _print_solids(found: RoverModel) -> None:
+    title = f"{found.name}: {found.mass:.5g} kg, {found.nv} degrees of freedom, {len(found.wheel_names)} wheels"
+    console().print(title, markup=False)
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for heading in ("solid", "joint", "on", "mass", "role"):
+        table.add_column(heading, justify="right" if heading == "mass" else "left")
+    for name, joint, parent, mass, role in solid_rows(found):
+        table.add_row(name, joint, parent, f"{mass:.4g} kg", role)
+    console().print(table)
+
+
+def _radii(given: list[str] | None) -> list[str] | dict[str, float] | None:
+    pairs = _pairs(given, "wheel")
+    if not isinstance(pairs, dict):
+        return pairs
+    radii = {}
+    for name, radius in pairs.items():
+        try:
+            radii[name] = float(radius)
+        except ValueError:
+            refuse(OptionError, "wheel", f"{name}={radius}", "the radius must be a number")
+    return radii
+
+
+def _pairs(given: list[str] | None, option: str = "steering") -> list[str] | dict[str, str] | None:
+    if not given or not any("=" in entry for entry in given):
+        return given or None
+    if not all("=" in entry for entry in given):
+        refuse(OptionError, option, given, "must be all names or all NAME=VALUE")
+    pairs = [entry.partition("=") for entry in given]
+    return {name: value for name, _, value in pairs}

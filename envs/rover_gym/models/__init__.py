@@ -1,0 +1,23 @@
+"""Models by name or file: URDF and MJCF in and out, and what a model is on level ground.
+
+`RoverModel.from_urdf`, `from_mjcf`, `to_urdf` and `to_mjcf` call this room.
+"""
+
+from rover_gym.models.import_report import ImportReport, solid_rows
+from rover_gym.models.lookup import open_model
+from rover_gym.models.mjcf_writer import write_mjcf
+from rover_gym.models.reading import read_mjcf, read_urdf
+from rover_gym.models.statics import Statics, check_statics
+from rover_gym.models.urdf_writer import write_urdf
+
+__all__ = [
+    "ImportReport",
+    "Statics",
+    "check_statics",
+    "open_model",
+    "read_mjcf",
+    "read_urdf",
+    "solid_rows",
+    "write_mjcf",
+    "write_urdf",
+]

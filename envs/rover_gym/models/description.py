@@ -1,0 +1,305 @@
+"""Turns a `RobotTree` with its wheels into the description that `RoverModel.from_dict` reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rover_gym.models.file_axes import Z_UP_TO_Y_UP, Array, rotation_vector, turn_z_to
+from rover_gym.models.robot_tree import FileJoint, FileLink, FileShape, RobotTree
+from rover_gym.models.roles import WheelRole
+
+GRAVITY = 9.81
+#: Torque limit of a wheel where the file states none: this times its share of the weight times its radius.
+TORQUE_SHARE = 1.0
+#: Gains of a steering joint where the file has none, as those of the built-in rover: stiffness over the wheel's share
+#: of the weight times its radius, 1/rad, and damping over stiffness, s.
+STEERING_STIFFNESS, STEERING_TIME = 10.0, 0.0133
+STEERING_LIMIT = 0.7  # rad, where the file states none
+UNLIMITED = 1e9  # N m, the torque limit of a motor for which the file states none
+
+
+@dataclass(frozen=True)
+class Gains:
+    """What a user gives for all wheels and steering joints; None: as the file states, otherwise assumed.
+
+    Attributes:
+        torque_limit: Of a wheel, N m.
+        steering_stiffness: N m/rad.
+        steering_damping: N m s/rad.
+        steering_limit: rad.
+    """
+
+    torque_limit: float | None = None
+    steering_stiffness: float | None = None
+    steering_damping: float | None = None
+    steering_limit: float | None = None
+
+
+def describe(tree: RobotTree, roles: list[WheelRole], P: Array, gains: Gains) -> dict[str, Any]:
+    """The description of a robot.
+
+    Args:
+        tree: The robot, links without mass joined.
+        roles: Its wheels.
+        P: Rotation from the file's axes to those of this package, (3, 3).
+        gains: What the user gave.
+
+    Raises:
+        ModelError: The file holds what has no place in a description.
+    """
+    wheels = {role.link: role for role in roles}
+    _turn_steering_axes_up(tree, {role.steering for role in roles if role.steering}, P)
+    _move_limits_to_followed_joints(tree)
+    anchors = {}
+    for link in tree.links.values():
+        shift = wheels[link.name].shift if link.name in wheels else 0.0
+        anchors[link.name] = link.joint.anchor + shift * link.joint.axis
+    # A free root is upright where the file puts it.
+    axes = {link.name: P @ link.rotation if link.joint.kind == "free" else P for link in tree.links.values()}
+    weight = sum(link.mass for link in tree.links.values()) * GRAVITY / max(len(roles), 1)
+    steering = {role.steering: role for role in roles if role.steering is not None}
+    solids, tags = [], []
+    for link in _followed_first(tree):
+        solids.append(_solid(tree, link, anchors, axes, P, wheels.get(link.name)))
+        _add_control(tree, link, solids[-1], steering.get(link.name), weight, gains, is_wheel=link.name in wheels)
+        for name, point in link.points:
+            place = _numbers(axes[link.name] @ (point - anchors[link.name]))
+            tags.append({"name": name, "solid": link.name, "position": place})
+    description: dict[str, Any] = {"name": tree.name, "solids": solids}
+    description["wheels"] = [_wheel(tree, role, axes[role.link], weight, gains) for role in roles]
+    if tags:
+        description["tags"] = tags
+    return description
+
+
+def _solid(
+    tree: RobotTree, link: FileLink, anchors: dict[str, Array], axes: dict[str, Array], P: Array, role: WheelRole | None
+) -> dict[str, Any]:
+    A, anchor, joint = axes[link.name], anchors[link.name], link.joint
+    solid: dict[str, Any] = {"name": link.name}
+    if link.parent is not None:
+        solid["parent"] = link.parent
+    solid["joint"] = joint.kind
+    if joint.kind != "free":
+        above, origin = (P, np.zeros(3)) if link.parent is None else (axes[link.parent], anchors[link.parent])
+        solid["position"] = _numbers(above @ (link.position + link.rotation @ anchor - origin))
+        turn = rotation_vector(above @ link.rotation @ A.T)
+        if np.linalg.norm(turn) > 1e-15:
+            solid["rotation"] = _numbers(turn)
+    if joint.kind in ("revolute", "prismatic"):
+        solid["axis"] = _numbers(A @ joint.axis)
+        _add_passive(tree, joint, solid)
+    solid["mass"] = float(link.mass)
+    solid["centre_of_mass"] = _numbers(A @ (link.centre - anchor))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = A @ link.inertia @ A.T
+    solid["inertia"] = _numbers(np.array([xx, yy, zz, xy, xz, yz]))
+    shapes = _shapes(tree, link, A, anchor, role)
+    if shapes:
+        solid["shapes"] = shapes
+    return solid
+
+
+def _add_passive(tree: RobotTree, joint: FileJoint, solid: dict[str, Any]) -> None:
+    if joint.limits is not None:
+        solid["limits"] = {"lower": float(joint.limits[0]), "upper": float(joint.limits[1])}
+    if joint.damping != 0.0:
+        solid["damping"] = float(joint.damping)
+    if joint.armature != 0.0:
+        solid["armature"] = float(joint.armature)
+    if joint.stiffness != 0.0:
+        solid["spring"] = {"stiffness": float(joint.stiffness), "rest": float(joint.rest)}
+    if joint.follows is not None:
+        name, ratio, offset = joint.follows
+        followed = next(link.name for link in tree.links.values() if link.joint.name == name)
+        solid["coupled"] = {"joint": followed, "ratio": float(ratio), "offset": float(offset)}
+
+
+def _add_control(
+    tree: RobotTree,
+    link: FileLink,
+    solid: dict[str, Any],
+    steered: WheelRole | None,
+    weight: float,
+    gains: Gains,
+    *,
+    is_wheel: bool,
+) -> None:
+    joint = link.joint
+    if joint.kind not in ("revolute", "prismatic") or joint.follows is not None:
+        if joint.is_driven or joint.hold is not None:
+            tree.left_out.append(f"joint[{joint.name}]: its motor, since a {joint.kind} or coupled joint has none")
+        return
+    if steered is not None:
+        stiffness = (joint.hold or (0.0, 0.0))[0] or STEERING_STIFFNESS * weight * steered.radius
+        if gains.steering_stiffness is not None:
+            stiffness = gains.steering_stiffness
+        elif joint.hold is None:
+            tree.assumed.append(f"steering {link.name}: stiffness {stiffness:.4g} N m/rad")
+        damping = (joint.hold or (0.0, 0.0))[1] or STEERING_TIME * stiffness
+        if gains.steering_damping is not None:
+            damping = gains.steering_damping
+        elif joint.hold is None:
+            tree.assumed.append(f"steering {link.name}: damping {damping:.4g} N m s/rad")
+        solid["hold"] = {"stiffness": float(stiffness), "damping": float(damping)}
+        return
+    if joint.hold is not None:
+        solid["hold"] = {"stiffness": float(joint.hold[0]), "damping": float(joint.hold[1])}
+    if joint.is_driven and not is_wheel:
+        if joint.kind == "prismatic":
+            tree.left_out.append(f"joint[{joint.name}]: its motor, since only revolute joints have drives")
+        else:
+            solid["drive"] = {"torque_limit": float(joint.torque_limit or UNLIMITED)}
+            if not joint.torque_limit:
+                tree.assumed.append(f"joint {joint.name}: torque limit {UNLIMITED:g} N m, since the file states none")
+
+
+def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, gains: Gains) -> dict[str, Any]:
+    joint = tree.links[role.link].joint
+    limit = gains.torque_limit if gains.torque_limit is not None else joint.torque_limit
+    if limit is None:
+        limit = TORQUE_SHARE * weight * role.radius
+        tree.assumed.append(
+            f"wheel {role.link}: torque limit {limit:.4g} N m, its share of the weight times the radius"
+        )
+    wheel = {
+        "name": role.link,
+        "solid": role.link,
+        "axle": _numbers(A @ joint.axis),
+        "radius": float(role.radius),
+        "torque_limit": float(limit),
+        "drive_sign": 1.0 if role.is_forward else -1.0,
+    }
+    if role.steering is not None:
+        stops = tree.links[role.steering].joint.limits
+        reach = STEERING_LIMIT if stops is None else min(abs(stop) for stop in stops) or max(abs(s) for s in stops)
+        if gains.steering_limit is not None:
+            reach = gains.steering_limit
+        elif stops is None:
+            tree.assumed.append(f"steering {role.steering}: set-points up to {reach:g} rad")
+        wheel |= {"steering": role.steering, "steering_limit": float(reach)}
+    return wheel
+
+
+def _shapes(tree: RobotTree, link: FileLink, A: Array, anchor: Array, role: WheelRole | None) -> list[dict[str, Any]]:
+    """A wheel touches as a disc, everything else as the boxes and spheres of the file."""
+    found: list[dict[str, Any]] = []
+    is_drawn = any(shape.visible and shape.mesh is None for shape in link.shapes)
+    touching = False
+    for shape in link.shapes:
+        where = f"link[{link.name}]: a {shape.kind}"
+        if shape.kind not in ("box", "cylinder", "sphere"):
+            if shape.collides and role is None:
+                tree.left_out.append(f"{where} that touches, since only boxes and spheres can")
+            elif shape.visible:
+                tree.left_out.append(f"{where} that is drawn")
+            continue
+        can_touch = shape.kind != "cylinder" and role is None
+        if shape.collides and not can_touch and role is None:
+            tree.left_out.append(f"{where} that touches, since only boxes and spheres can; it is drawn")
+        collides = shape.collides and can_touch
+        visible = shape.visible or not is_drawn
+        if not collides and not visible:
+            continue
+        touching |= collides
+        found.append(_shape(shape, A, anchor, collides=collides, visible=visible))
+    if role is not None:
+        turn = rotation_vector(turn_z_to(A @ link.joint.axis))
+        disc: dict[str, Any] = {"kind": "disc", "radius": float(role.radius)}
+        found.append(disc | ({"rotation": _numbers(turn)} if np.any(turn) else {}))
+    return found
+
+
+def _shape(shape: FileShape, A: Array, anchor: Array, *, collides: bool, visible: bool) -> dict[str, Any]:
+    made: dict[str, Any] = {"kind": shape.kind}
+    if shape.kind == "box":
+        x, y, z = shape.size  # our y is the file's z
+        made["size"] = [float(x), float(z), float(y)]
+    elif shape.kind == "cylinder":
+        made["radius"], made["height"] = (float(size) for size in shape.size)
+    else:
+        made["radius"] = float(shape.size[0])
+    position = _numbers(A @ (shape.position - anchor))
+    if any(position):
+        made["position"] = position
+    turn = rotation_vector(A @ shape.rotation @ Z_UP_TO_Y_UP.T)
+    if shape.kind != "sphere" and np.linalg.norm(turn) > 1e-15:
+        made["rotation"] = _numbers(turn)
+    if collides:
+        made["collides"] = True
+    if not visible:
+        made["visible"] = False
+    return made
+
+
+def _turn_steering_axes_up(tree: RobotTree, steering: set[str], P: Array) -> None:
+    """Reverses steering joints whose axis points down, so that a positive angle turns to the left everywhere."""
+    poses, up = tree.poses(), P.T @ (0.0, 1.0, 0.0)
+    for name in sorted(steering):
+        link = tree.links[name]
+        if float(poses[name][0] @ link.joint.axis @ up) > 0.0:
+            continue
+        joint = link.joint
+        joint.axis, joint.rest = -joint.axis, -joint.rest
+        if joint.limits is not None:
+            joint.limits = (-joint.limits[1], -joint.limits[0])
+        for other in tree.links.values():
+            if other.joint.follows is not None and other.joint.follows[0] == joint.name:
+                followed, ratio, offset = other.joint.follows
+                other.joint.follows = (followed, -ratio, offset)
+        tree.assumed.append(f"steering {name}: its axis points down and is reversed: positive turns to the left")
+
+
+def _move_limits_to_followed_joints(tree: RobotTree) -> None:
+    """The stops of a joint that follows another become stops of the other."""
+    by_joint = {link.joint.name: link for link in tree.links.values()}
+    for link in tree.links.values():
+        if link.joint.follows is None:
+            continue
+        name, ratio, offset = link.joint.follows
+        at = f"joint[{link.joint.name}].mimic"
+        if name not in by_joint:
+            tree.refuse(f"{at}.joint", name, "this joint does not move")
+        if link.joint.limits is not None and ratio != 0.0:
+            lower, upper = sorted((limit - offset) / ratio for limit in link.joint.limits)
+            followed = by_joint[name].joint
+            own = followed.limits or (-np.inf, np.inf)
+            followed.limits = (max(own[0], lower), min(own[1], upper))
+            if not followed.limits[0] < followed.limits[1]:
+                tree.refuse(
+                    f"{at}", list(followed.limits), "its limits and those of the followed joint exclude each other"
+                )
+        link.joint.limits = None
+
+
+def _followed_first(tree: RobotTree) -> list[FileLink]:
+    """Parents before children, followed joints before those that follow, one tree after the other."""
+    roots: dict[str, str] = {}
+    for link in tree.links.values():
+        roots[link.name] = link.name if link.parent is None else roots[link.parent]
+    order: list[FileLink] = []
+    placed, joints = set(), set()
+    waiting = sorted(tree.links.values(), key=lambda link: list(tree.links).index(roots[link.name]))
+    while waiting:
+        ready = next(
+            (
+                link
+                for link in waiting
+                if (link.parent is None or link.parent in placed)
+                and (link.joint.follows is None or link.joint.follows[0] in joints)
+            ),
+            None,
+        )
+        if ready is None:
+            tree.refuse("mimic", [link.joint.name for link in waiting][:5], "these joints follow each other")
+        order.append(ready)
+        waiting.remove(ready)
+        placed.add(ready.name)
+        joints.add(ready.joint.name)
+    return order
+
+
+def _numbers(values: Array) -> list[float]:
+    return [float(value) + 0.0 for value in values]

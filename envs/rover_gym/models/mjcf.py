@@ -1,0 +1,243 @@
+"""Reads an MJCF into a `RobotTree`. MuJoCo compiles it, so defaults, includes, angles and inertias are MuJoCo's."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rover_gym.extras import require
+from rover_gym.models.file_axes import from_quaternion
+from rover_gym.models.robot_tree import FileJoint, FileLink, FileShape, RobotTree, refuse_in
+
+#: Largest file, bytes.
+MAX_BYTES = 16 << 20
+
+
+def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
+    """Reads the bodies and joints of an MJCF.
+
+    Args:
+        path: The file.
+        ignore: Kinds of what changes the motion and is to be left out all the same.
+
+    Raises:
+        ModelError: MuJoCo refuses the file, or it holds what cannot be simulated.
+        MissingExtraError: MuJoCo is not installed.
+        OSError: The file cannot be read.
+    """
+    mujoco = require("mujoco", "models")
+    size = path.stat().st_size
+    if size > MAX_BYTES:
+        refuse_in(path, "file", size, f"must have at most {MAX_BYTES} bytes")
+    with path.open("rb"):  # an error of the system, where there is one, says more than MuJoCo's
+        pass
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
+        refuse_in(path, "MuJoCo", path.name, f"refuses the file ({' '.join(str(error).split())})")
+    reader = _Reader(mujoco, model, path, ignore)
+    reader.check_options()
+    reader.add_links()
+    reader.add_couplings()
+    reader.check_tendons()
+    reader.add_actuators()
+    return reader.tree
+
+
+class _Reader:
+    """One compiled model on its way into a tree."""
+
+    def __init__(self, mujoco: Any, model: Any, path: Path, ignore: Collection[str]) -> None:
+        self.mujoco, self.model, self.ignore = mujoco, model, ignore
+        self.tree = RobotTree(path, self._text(0) or path.stem, {})
+        self.joints: dict[int, FileJoint] = {}
+
+    def check_options(self) -> None:
+        """Refuses what acts on the whole scene and is not simulated."""
+        m = self.model
+        option = m.opt
+        if option.density != 0.0 or option.viscosity != 0.0:
+            value = [float(option.density), float(option.viscosity)]
+            self._leave_out("fluid", "option.density", value, "forces of a fluid are not simulated")
+        for count, where in ((m.nflex, "flex"), (m.nplugin, "plugin"), (m.nmocap, "mocap")):
+            if count:
+                self.tree.refuse(where, int(count), "is not simulated")
+        if np.any(m.body_gravcomp):
+            self.tree.refuse("body.gravcomp", float(m.body_gravcomp.max()), "gravity compensation is not simulated")
+        gravity = [float(x) for x in option.gravity]
+        self.tree.left_out.append(f"option: gravity {gravity} and contact parameters, which a Simulation is given")
+        if m.nsensor:
+            self.tree.left_out.append(f"sensor: {m.nsensor} of them")
+
+    def add_links(self) -> None:
+        """Adds the bodies that belong to a machine; what stands fixed to the world alone is scenery."""
+        m = self.model
+        moves = np.zeros(m.nbody, dtype=bool)
+        for body in range(m.nbody - 1, 0, -1):
+            moves[body] |= m.body_jntnum[body] > 0
+            moves[m.body_parentid[body]] |= moves[body]
+        scenery = [self._body(b) for b in range(1, m.nbody) if m.body_rootid[b] == b and not moves[b]]
+        if scenery or m.body_geomnum[0]:
+            self.tree.left_out.append(f"what stands on the world: {', '.join(scenery) or 'shapes of the worldbody'}")
+        for body in range(1, m.nbody):
+            if not moves[m.body_rootid[body]]:
+                continue
+            parent = int(m.body_parentid[body])
+            link = FileLink(
+                self._body(body),
+                self._body(parent) if parent else None,
+                self._joint(body),
+                np.array(m.body_pos[body]),
+                from_quaternion(m.body_quat[body]),
+                float(m.body_mass[body]),
+                np.array(m.body_ipos[body]),
+            )
+            R = from_quaternion(m.body_iquat[body])
+            link.inertia = R @ np.diag(m.body_inertia[body]) @ R.T
+            first = int(m.body_geomadr[body])
+            link.shapes = [self._shape(geom) for geom in range(first, first + int(m.body_geomnum[body]))]
+            self.tree.links[link.name] = link
+        if not self.tree.links:
+            self.tree.refuse("worldbody", self.model.nbody - 1, "has no body that moves")
+
+    def add_couplings(self) -> None:
+        """Linear couplings of two joints are exact here; other equality constraints are refused."""
+        m, kinds = self.model, self.mujoco.mjtEq
+        for eq in range(m.neq):
+            if not m.eq_active0[eq]:
+                continue
+            where = f"equality[{eq}]"
+            first, second = int(m.eq_obj1id[eq]), int(m.eq_obj2id[eq])
+            terms = [float(x) for x in m.eq_data[eq, :5]]
+            if m.eq_type[eq] != kinds.mjEQ_JOINT or second < 0 or any(terms[2:]):
+                reason = "only linear couplings of two joints are simulated"
+                self._leave_out("closed loops", where, kinds(int(m.eq_type[eq])).name, reason)
+                continue
+            joint = self.joints[first]
+            if joint.follows is not None:
+                self.tree.refuse(where, joint.name, "this joint follows another already")
+            joint.follows = (self.joints[second].name, terms[1], terms[0])
+
+    def check_tendons(self) -> None:
+        """Tendons that pull or stop are refused; others measure only."""
+        m = self.model
+        for tendon in range(m.ntendon):
+            if np.any(m.tendon_stiffness[tendon]) or np.any(m.tendon_damping[tendon]) or m.tendon_limited[tendon]:
+                name = self._name(self.mujoco.mjtObj.mjOBJ_TENDON, tendon)
+                self._leave_out("tendons", f"tendon[{name}]", name, "tendons are not simulated")
+
+    def add_actuators(self) -> None:
+        """Motors become torque limits and position servos become gains; others are refused."""
+        m, mj = self.model, self.mujoco
+        joint_kinds = (int(mj.mjtTrn.mjTRN_JOINT), int(mj.mjtTrn.mjTRN_JOINTINPARENT))
+        for actuator in range(m.nu):
+            name = self._name(mj.mjtObj.mjOBJ_ACTUATOR, actuator)
+            where = f"actuator[{name}]"
+            target = int(m.actuator_trnid[actuator, 0])
+            is_plain = m.actuator_dyntype[actuator] == mj.mjtDyn.mjDYN_NONE
+            is_plain = is_plain and m.actuator_gaintype[actuator] == mj.mjtGain.mjGAIN_FIXED
+            is_plain = is_plain and not np.any(getattr(m, "actuator_dampingpoly", np.zeros((m.nu, 1)))[actuator])
+            if int(m.actuator_trntype[actuator]) not in joint_kinds or not is_plain or target not in self.joints:
+                self._leave_out("actuators", where, name, "only motors and position servos of joints are simulated")
+                continue
+            joint, gear = self.joints[target], float(m.actuator_gear[actuator, 0])
+            gain, bias = float(m.actuator_gainprm[actuator, 0]), [float(x) for x in m.actuator_biasprm[actuator, :3]]
+            limits = []
+            if m.actuator_forcelimited[actuator]:
+                limits.append(abs(gear) * float(np.abs(m.actuator_forcerange[actuator]).max()))
+            if m.actuator_biastype[actuator] == mj.mjtBias.mjBIAS_NONE:
+                if m.actuator_ctrllimited[actuator]:
+                    limits.append(abs(gear * gain) * float(np.abs(m.actuator_ctrlrange[actuator]).max()))
+                joint.is_driven = True
+                joint.torque_limit = min(limits, default=None)
+            elif m.actuator_biastype[actuator] == mj.mjtBias.mjBIAS_AFFINE and bias[0] == 0.0 and bias[1] == -gain:
+                joint.hold = (gain * gear**2, -bias[2] * gear**2)
+            else:
+                self._leave_out("actuators", where, [gain, *bias], "only motors and position servos are simulated")
+
+    def _joint(self, body: int) -> FileJoint:
+        m, kinds = self.model, self.mujoco.mjtJoint
+        count, index = int(m.body_jntnum[body]), int(m.body_jntadr[body])
+        where = f"body[{self._body(body)}]"
+        if count == 0:
+            return FileJoint(f"{self._body(body)}_fixed", "fixed")
+        if count > 1:
+            self.tree.refuse(f"{where}.joint", count, "a body must have one joint: put bodies with mass between them")
+        name = self.mujoco.mj_id2name(m, self.mujoco.mjtObj.mjOBJ_JOINT, index) or f"{self._body(body)}_joint"
+        kind, dof = int(m.jnt_type[index]), int(m.jnt_dofadr[index])
+        n_dofs = {kinds.mjJNT_FREE: 6, kinds.mjJNT_BALL: 3}.get(kind, 1)
+        dofs = slice(dof, dof + n_dofs)
+        at = f"joint[{name}]"
+        if np.any(m.dof_frictionloss[dofs]):
+            value = float(m.dof_frictionloss[dofs].max())
+            self._leave_out("friction", f"{at}.frictionloss", value, "dry friction is not simulated")
+        damping, armature = np.array(m.dof_damping[dofs]), np.array(m.dof_armature[dofs])
+        stiffness = float(np.ravel(m.jnt_stiffness[index])[0])
+        for field in ("dof_dampingpoly", "jnt_stiffnesspoly"):
+            if np.any(getattr(m, field, np.zeros((m.nv + 1, 1)))[dof if "dof" in field else index]):
+                self._leave_out("springs", f"{at}.{field[4:]}", None, "springs and dampers must be linear")
+        if n_dofs > 1:
+            if np.any(damping) or np.any(armature):
+                values = [float(damping.max()), float(armature.max())]
+                reason = "damping and armature of free and ball joints are not simulated"
+                self._leave_out("friction", at, values, reason)
+            if stiffness != 0.0:
+                self._leave_out("springs", f"{at}.stiffness", stiffness, "springs of ball joints are not simulated")
+            if m.jnt_limited[index]:
+                self.tree.refuse(f"{at}.range", m.jnt_range[index].tolist(), "a ball joint has no limits here")
+            joint = FileJoint(name, "free" if n_dofs == 6 else "spherical", np.array(m.jnt_pos[index]))
+            self.joints[index] = joint
+            return joint
+        zero = float(m.qpos0[m.jnt_qposadr[index]])
+        joint = FileJoint(
+            name,
+            "revolute" if kind == kinds.mjJNT_HINGE else "prismatic",
+            np.array(m.jnt_pos[index]),
+            np.array(m.jnt_axis[index]),
+            damping=float(damping[0]),
+            armature=float(armature[0]),
+            stiffness=stiffness,
+            rest=float(m.qpos_spring[m.jnt_qposadr[index]]) - zero,
+        )
+        if m.jnt_limited[index]:
+            joint.limits = (float(m.jnt_range[index, 0]) - zero, float(m.jnt_range[index, 1]) - zero)
+        if zero != 0.0:
+            self.tree.assumed.append(f"joint {name}: its coordinate counts from the file's ref {zero:g}")
+        self.joints[index] = joint
+        return joint
+
+    def _shape(self, geom: int) -> FileShape:
+        m, kinds = self.model, self.mujoco.mjtGeom
+        R, p = from_quaternion(m.geom_quat[geom]), np.array(m.geom_pos[geom])
+        size = [float(x) for x in m.geom_size[geom]]
+        collides = bool(m.geom_contype[geom] or m.geom_conaffinity[geom])
+        made = FileShape("mesh", (), p, R, collides, bool(m.geom_rgba[geom, 3] > 0.0))
+        match int(m.geom_type[geom]):
+            case kinds.mjGEOM_BOX:
+                made.kind, made.size = "box", (2.0 * size[0], 2.0 * size[1], 2.0 * size[2])
+            case kinds.mjGEOM_CYLINDER:
+                made.kind, made.size = "cylinder", (size[0], 2.0 * size[1])
+            case kinds.mjGEOM_SPHERE:
+                made.kind, made.size = "sphere", (size[0],)
+            case kinds.mjGEOM_MESH:
+                mesh = int(m.geom_dataid[geom])
+                first = int(m.mesh_vertadr[mesh])
+                made.mesh = np.array(m.mesh_vert[first : first + int(m.mesh_vertnum[mesh])], dtype=np.float64)
+            case other:
+                made.kind = kinds(other).name.removeprefix("mjGEOM_").lower()
+        return made
+
+    def _leave_out(self, kind: str, where: str, value: object, reason: str) -> None:
+        self.tree.leave_out(kind, where, value, reason, self.ignore)
+
+    def _name(self, kind: Any, index: int) -> str:
+        return self.mujoco.mj_id2name(self.model, kind, index) or str(index)
+
+    def _body(self, body: int) -> str:
+        return self.mujoco.mj_id2name(self.model, self.mujoco.mjtObj.mjOBJ_BODY, body) or f"body{body}"
+
+    def _text(self, address: int) -> str:
+        return str(bytes(self.model.names[address:]).split(b"\0")[0].decode("utf-8", "replace"))

@@ -1,0 +1,111 @@
+"""Writes a model as MJCF."""
+
+from __future__ import annotations
+
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from rover_gym.mechanics import RoverModel
+from rover_gym.models.file_axes import Array, quaternion, turn_z_to
+from rover_gym.models.file_writing import WHEEL_WIDTH, WrittenSolid, text_of, write_xml, written_solids
+
+JOINTS = {"revolute": "hinge", "prismatic": "slide", "spherical": "ball"}
+
+
+def write_mjcf(model: RoverModel, path: object) -> None:
+    """Writes an MJCF; the arguments are those of `RoverModel.to_mjcf`."""
+    description = model.to_dict()
+    wheels = {wheel["solid"]: wheel for wheel in description["wheels"]}
+    steering = {wheel["steering"]: wheel for wheel in description["wheels"] if wheel.get("steering")}
+    root = ET.Element("mujoco", model=description["name"] or "robot")
+    ET.SubElement(root, "compiler", angle="radian", autolimits="true", balanceinertia="false")
+    world = ET.SubElement(root, "worldbody")
+    equality, actuator = ET.SubElement(root, "equality"), ET.SubElement(root, "actuator")
+    bodies: dict[str, ET.Element] = {}
+    for solid in written_solids(model):
+        above = world if solid.parent is None else bodies[solid.parent]
+        bodies[solid.name] = _body(above, solid, wheels.get(solid.name))
+        _add_control(actuator, solid, wheels.get(solid.name), solid.name in steering)
+        coupled = solid.source.get("coupled")
+        if coupled is not None:
+            terms = text_of((coupled.get("offset", 0.0), coupled["ratio"], 0.0, 0.0, 0.0))
+            ET.SubElement(equality, "joint", joint1=solid.name, joint2=coupled["joint"], polycoef=terms)
+    for tag in description.get("tags") or ():
+        x, y, z = tag["position"]
+        ET.SubElement(bodies[tag["solid"]], "site", name=tag["name"], pos=text_of((x, -z, y)))
+    write_xml(root, path)
+
+
+def _body(above: ET.Element, solid: WrittenSolid, wheel: dict[str, Any] | None) -> ET.Element:
+    pose = {"pos": text_of(solid.position), "quat": _quaternion(solid.rotation)}
+    body = ET.SubElement(above, "body", {"name": solid.name, **pose})
+    source = solid.source
+    if solid.kind == "free":
+        ET.SubElement(body, "freejoint", name=solid.name)
+    elif solid.kind in JOINTS:
+        joint = {"name": solid.name, "type": JOINTS[solid.kind]}
+        if solid.kind != "spherical":
+            joint["axis"] = text_of(solid.axis)
+            for field in ("damping", "armature"):
+                if source.get(field):
+                    joint[field] = text_of(source[field])
+            if (spring := source.get("spring")) is not None:
+                joint |= {"stiffness": text_of(spring["stiffness"]), "springref": text_of(spring.get("rest", 0.0))}
+            if (limits := source.get("limits")) is not None:
+                joint["range"] = text_of((limits["lower"], limits["upper"]))
+        ET.SubElement(body, "joint", joint)
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = solid.inertia
+    inertia = text_of((xx, yy, zz, xy, xz, yz))
+    ET.SubElement(body, "inertial", pos=text_of(solid.centre), mass=text_of(solid.mass), fullinertia=inertia)
+    for shape, centre, R, collides, visible in solid.shapes():
+        if shape["kind"] != "disc" or wheel is None:
+            _add_geom(body, shape, centre, R, collides=collides, visible=visible)
+    if wheel is not None:
+        x, y, z = wheel["axle"]
+        radius = wheel.get("contact_radius") or wheel["radius"]
+        rim = {"kind": "cylinder", "radius": radius, "height": WHEEL_WIDTH * radius}
+        axle = np.array([x, -z, y]) / np.linalg.norm((x, y, z))
+        _add_geom(body, rim, np.zeros(3), turn_z_to(axle), collides=True, visible=True)
+    return body
+
+
+def _add_geom(
+    body: ET.Element, shape: dict[str, Any], centre: Array, R: Array, *, collides: bool, visible: bool
+) -> None:
+    if shape["kind"] == "disc":  # about our z, which is the file's -y
+        R = R @ turn_z_to(np.array([0.0, -1.0, 0.0]))
+    geom = {"pos": text_of(centre), "quat": _quaternion(R), "mass": "0"}
+    match shape["kind"]:
+        case "box":
+            x, y, z = shape["size"]
+            geom |= {"type": "box", "size": text_of((x / 2.0, z / 2.0, y / 2.0))}
+        case "sphere":
+            geom |= {"type": "sphere", "size": text_of(shape["radius"])}
+        case _:
+            length = shape.get("height") or WHEEL_WIDTH * shape["radius"]
+            geom |= {"type": "cylinder", "size": text_of((shape["radius"], length / 2.0))}
+    if not collides:
+        geom |= {"contype": "0", "conaffinity": "0"}
+    if not visible:
+        geom["rgba"] = "0 0 0 0"
+    ET.SubElement(body, "geom", geom)
+
+
+def _add_control(actuator: ET.Element, solid: WrittenSolid, wheel: dict[str, Any] | None, is_steering: bool) -> None:
+    """A motor for what is driven, a position servo for steering joints, which are held."""
+    drive = solid.source.get("drive") if solid.kind == "revolute" else None
+    limit = wheel["torque_limit"] if wheel is not None else (drive or {}).get("torque_limit")
+    if solid.kind == "revolute" and limit:
+        span = text_of((-limit, limit))
+        ET.SubElement(actuator, "motor", name=f"drive_{solid.name}", joint=solid.name, ctrlrange=span)
+    hold = solid.source.get("hold")
+    if is_steering and hold is not None and solid.kind == "revolute":
+        gains = {"kp": text_of(hold["stiffness"]), "kv": text_of(hold["damping"])}
+        ET.SubElement(actuator, "position", {"name": f"hold_{solid.name}", "joint": solid.name, **gains})
+
+
+def _quaternion(R: Array) -> str:
+    w, v = quaternion(R)
+    return text_of((w, *v))

@@ -1,0 +1,95 @@
+"""Models from URDF and MJCF files: `RoverModel.from_urdf` and `RoverModel.from_mjcf`."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Collection
+from pathlib import Path
+from typing import Any
+
+from rover_gym.mechanics import ModelError, RoverModel
+from rover_gym.models.description import Gains, describe
+from rover_gym.models.file_axes import axes_of
+from rover_gym.models.import_report import ImportReport, solid_rows, together
+from rover_gym.models.massless_links import join_massless_links
+from rover_gym.models.mjcf import read_mjcf_tree
+from rover_gym.models.robot_tree import IGNORABLE, RobotTree, check_kinds
+from rover_gym.models.roles import Steering, Wheels, find_wheels
+from rover_gym.models.urdf import read_urdf_tree
+from rover_gym.validation import number, refuse
+
+SOLID = re.compile(r"(solids|wheels|tags)\[(\d+)\]")
+
+
+def read_urdf(path: object, *, free_base: bool = True, **options: Any) -> tuple[RoverModel, ImportReport]:
+    """Reads a URDF; the arguments are those of `RoverModel.from_urdf`."""
+    return _read(read_urdf_tree, path, free_base, **options)
+
+
+def read_mjcf(path: object, *, free_base: bool | None = None, **options: Any) -> tuple[RoverModel, ImportReport]:
+    """Reads an MJCF; the arguments are those of `RoverModel.from_mjcf`."""
+    return _read(read_mjcf_tree, path, free_base, **options)
+
+
+def _read(
+    reader: Callable[..., RobotTree],
+    path: object,
+    free_base: bool | None,
+    *,
+    wheels: Wheels = None,
+    steering: Steering = None,
+    forward: str = "x",
+    torque_limit: float | None = None,
+    steering_stiffness: float | None = None,
+    steering_damping: float | None = None,
+    steering_limit: float | None = None,
+    ignore: Collection[str] = (),
+) -> tuple[RoverModel, ImportReport]:
+    if not isinstance(path, (str, os.PathLike)):
+        refuse(ModelError, "path", path, "must be a path")
+    if free_base is not None and not isinstance(free_base, bool):
+        refuse(ModelError, "free_base", free_base, "must be True or False")
+    P = axes_of(forward)
+    ignored = check_kinds(ignore, IGNORABLE)
+    given = {
+        "torque_limit": torque_limit,
+        "steering_stiffness": steering_stiffness,
+        "steering_damping": steering_damping,
+        "steering_limit": steering_limit,
+    }
+    gains = Gains(
+        **{
+            name: None if value is None else number(name, value, at_least=0.0, error=ModelError)
+            for name, value in given.items()
+        }
+    )
+    place = Path(os.fsdecode(path))
+    tree = reader(place, ignore=ignored)
+    join_massless_links(tree, free_base=bool(free_base))
+    for link in tree.links.values():
+        if link.parent is None and free_base is not None and link.joint.kind in ("fixed", "free"):
+            link.joint.kind = "free" if free_base else "fixed"
+        elif link.parent is not None and link.joint.kind == "free":
+            tree.refuse(f"joint[{link.joint.name}]", "floating", "only a root can float freely")
+    roles = find_wheels(tree, P.T @ (0.0, 1.0, 0.0), P.T @ (1.0, 0.0, 0.0), wheels, steering)
+    description = describe(tree, roles, P, gains)
+    try:
+        model = RoverModel.from_dict(description)
+    except ModelError as error:
+        raise _by_name(tree, description, error) from None
+    report = ImportReport(str(place), together(tree.assumed), together(tree.left_out), solid_rows(model))
+    return model, report
+
+
+def _by_name(tree: RobotTree, description: dict[str, Any], error: ModelError) -> ModelError:
+    """The error of a description with the file and the names of links in place of positions in a list."""
+
+    def name(match: re.Match[str]) -> str:
+        kind, index = match[1], int(match[2])
+        return f"{'link' if kind == 'solids' else kind[:-1]}[{description[kind][index]['name']}]"
+
+    named = ModelError(f"{tree.path}: {SOLID.sub(name, str(error))}")
+    named.field = SOLID.sub(name, error.field) if isinstance(error.field, str) else error.field
+    named.value = error.value
+    return named

@@ -1,0 +1,258 @@
+"""Which links are wheels, which joints steer them and how large they are: as told, otherwise from geometry and names.
+
+A candidate for a wheel is a link at the end of a branch that turns without limits about a level axis. Of the
+candidates those are wheels that have a round shape about their axis, or whose name says so. A wheel is steered by the
+nearest joint above it that turns about an upright axis and carries no other wheel. What is left open by this is
+refused, with the candidates.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rover_gym.extras import MissingExtraError, require
+from rover_gym.mechanics import ModelError
+from rover_gym.models.file_axes import Array
+from rover_gym.models.robot_tree import FileLink, FileShape, RobotTree
+from rover_gym.validation import number, refuse
+
+NAMED = re.compile(r"wheel|tyre|tire", re.IGNORECASE)
+NOT_NAMED = re.compile(r"steer|hub|mount|fork|knuckle|arm|axle|motor|caster_base|support", re.IGNORECASE)
+
+#: Sine of the largest tilt of an axle from level and of a steering axis from upright.
+TILT = 0.1
+#: Largest distance of a wheel's shape from its axis and deviation from round, as a share of its radius.
+ECCENTRIC = 0.02
+#: Two wheels stand on one ground if their lowest points differ by less than this share of the radius.
+LEVEL = 0.5
+
+Wheels = Sequence[str] | Mapping[str, float] | None
+Steering = Sequence[str] | Mapping[str, str] | None
+
+
+@dataclass
+class WheelRole:
+    """A wheel that was found.
+
+    Attributes:
+        link: Its link.
+        radius: Radius, m.
+        shift: Of its centre from the joint's origin along the axis, m.
+        is_forward: Whether a positive joint velocity drives it forward.
+        steering: The link whose joint steers it.
+    """
+
+    link: str
+    radius: float
+    shift: float
+    is_forward: bool
+    steering: str | None = None
+
+
+def find_wheels(tree: RobotTree, up: Array, ahead: Array, wheels: Wheels, steering: Steering) -> list[WheelRole]:
+    """Finds wheels and their steering joints.
+
+    Args:
+        tree: The robot.
+        up: Unit vector upwards in the file's axes, (3,).
+        ahead: Unit vector forward in the file's axes, (3,).
+        wheels: Names of the wheels' links or joints, or their radii by name, m. None: found. Empty: none.
+        steering: Names of the steering links or joints, or those by wheel. None: found. Empty: none.
+
+    Raises:
+        ModelError: A name is unknown, a radius is neither given nor found, or more than one reading is possible.
+    """
+    poses = tree.poses()
+    left = np.cross(up, ahead)
+
+    def axis(link: FileLink) -> Array:
+        return np.asarray(poses[link.name][0] @ link.joint.axis)
+
+    found = []
+    for name, radius in _chosen(tree, poses, up, wheels).items():
+        link = tree.links[name]
+        if link.joint.kind != "revolute":
+            tree.refuse(f"link[{name}].joint", link.joint.kind, "the joint of a wheel must be revolute")
+        measured, shift = _size(tree, link, radius)
+        found.append(WheelRole(name, measured, shift, bool(axis(link) @ left > 0.0)))
+    names = [wheel.link for wheel in found]
+    steers = _steering(tree, names, steering, {name: abs(float(axis(link) @ up)) for name, link in tree.links.items()})
+    for wheel in found:
+        wheel.steering = steers.get(wheel.link)
+    return found
+
+
+def resolve(tree: RobotTree, field: str, name: object) -> str:
+    """The link of this name, or the one whose joint has it.
+
+    Raises:
+        ModelError: There is neither.
+    """
+    if isinstance(name, str) and name in tree.links:
+        return name
+    found = next((link.name for link in tree.links.values() if link.joint.name == name), None)
+    if found is None:
+        known = ", ".join(name for name, link in tree.links.items() if link.joint.kind == "revolute")
+        refuse(ModelError, field, name, f"there is no such link or joint in {tree.path}; turning are {known or 'none'}")
+    return found
+
+
+def _chosen(
+    tree: RobotTree, poses: dict[str, tuple[Array, Array]], up: Array, wheels: Wheels
+) -> dict[str, float | None]:
+    if isinstance(wheels, str):
+        refuse(ModelError, "wheels", wheels, "must be names, or radii by name")
+    if isinstance(wheels, Mapping):
+        return {
+            resolve(tree, "wheels", name): number(f"wheels[{name}]", radius, above=0.0, error=ModelError)
+            for name, radius in wheels.items()
+        }
+    if wheels is not None:
+        if not isinstance(wheels, Iterable):
+            refuse(ModelError, "wheels", wheels, "must be names, or radii by name")
+        return {resolve(tree, "wheels", name): None for name in wheels}
+    candidates = [
+        link
+        for link in tree.links.values()
+        if link.joint.kind == "revolute"
+        and link.joint.limits is None
+        and link.joint.follows is None
+        and abs(float(poses[link.name][0] @ link.joint.axis @ up)) < TILT
+        and not any(child.joint.kind != "fixed" for child in _below(tree, link.name))
+    ]
+    named = [one for one in candidates if NAMED.search(f"{one.name} {one.joint.name}")]
+    named = [one for one in named if not NOT_NAMED.search(one.name)] or named
+    round_ones = {one.name: size for one in candidates if (size := _round_shape(one)) is not None}
+    chosen = [one.name for one in named] or list(round_ones)
+    doubtful = [name for name in round_ones if name not in chosen]
+    lowest = {name: float(up @ poses[name][1]) - size[0] for name, size in round_ones.items()}
+    floor = min((lowest[name] for name in chosen if name in lowest), default=None)
+    if floor is not None:
+        doubtful = [name for name in doubtful if lowest[name] < floor + LEVEL * round_ones[name][0]]
+        if doubtful:
+            refuse(
+                ModelError,
+                "wheels",
+                None,
+                f"{', '.join(doubtful)} may be wheels of {tree.path} like {', '.join(chosen)}: say which are",
+            )
+    return dict.fromkeys(chosen)
+
+
+def _below(tree: RobotTree, name: str) -> list[FileLink]:
+    found = tree.children(name)
+    for child in list(found):
+        found += _below(tree, child.name)
+    return found
+
+
+def _size(tree: RobotTree, link: FileLink, radius: float | None) -> tuple[float, float]:
+    """Radius of a wheel and shift of its centre along the axis, m."""
+    size = _round_shape(link)
+    if size is not None:
+        return (size[0] if radius is None else radius), size[1]
+    meshes = [shape for shape in link.shapes if shape.mesh is not None]
+    reason = "has no cylinder or sphere about its axis"
+    if meshes:
+        measured, reason = _mesh_size(link, meshes)
+        if measured is not None:
+            return (measured[0] if radius is None else radius), measured[1]
+    if radius is None:
+        give = f"wheels={{{link.name!r}: radius}} with the names and radii of all wheels"
+        tree.refuse(f"link[{link.name}]", link.name, f"this wheel {reason}: give {give}")
+    tree.assumed.append(f"wheel {link.name}: centred at its joint, since it {reason}")
+    return radius, 0.0
+
+
+def _round_shape(link: FileLink) -> tuple[float, float] | None:
+    """Radius of the largest cylinder, disc or sphere about a link's axis, and its place along the axis, m."""
+    best: tuple[float, float] | None = None
+    for shape in sorted(link.shapes, key=lambda shape: not shape.collides):
+        if shape.kind not in ("cylinder", "sphere") or (best is not None and not shape.collides):
+            continue
+        off = shape.position - link.joint.anchor
+        along = float(off @ link.joint.axis)
+        radius = shape.size[0]
+        is_coaxial = shape.kind == "sphere" or abs(float(shape.rotation[:, 2] @ link.joint.axis)) > 1.0 - 1e-6
+        is_centred = np.linalg.norm(off - along * link.joint.axis) <= ECCENTRIC * radius
+        if is_coaxial and is_centred and (best is None or radius > best[0]):
+            best = (radius, along)
+    return best
+
+
+def _mesh_size(link: FileLink, meshes: list[FileShape]) -> tuple[tuple[float, float] | None, str]:
+    for shape in sorted(meshes, key=lambda shape: not shape.collides):
+        points: Array
+        if isinstance(shape.mesh, np.ndarray):
+            points = shape.mesh
+        else:
+            try:
+                loader = require("trimesh", "models")
+            except MissingExtraError as error:
+                return None, f"is a mesh, and {error}"
+            try:
+                points = np.asarray(loader.load_mesh(shape.mesh).vertices, dtype=np.float64)
+            except Exception as error:  # whatever a parser of meshes makes of a damaged file
+                return None, f"is the mesh {shape.mesh}, which cannot be read ({type(error).__name__}: {error})"
+        if len(points) < 3:
+            return None, f"is the mesh {shape.mesh}, which has no surface"
+        scale = np.ones(3) if shape.scale is None else shape.scale
+        placed = (points * scale) @ shape.rotation.T + shape.position - link.joint.anchor
+        along = placed @ link.joint.axis
+        across = placed - np.outer(along, link.joint.axis)
+        radii = np.linalg.norm(across, axis=1)
+        radius = float(radii.max())
+        if np.linalg.norm((across.max(axis=0) + across.min(axis=0)) / 2.0) > 5.0 * ECCENTRIC * radius:
+            return None, "is a mesh that is not round about its axis"
+        return (radius, float(along.max() + along.min()) / 2.0), ""
+    return None, "has no mesh"
+
+
+def _steering(tree: RobotTree, wheels: list[str], steering: Steering, upright: dict[str, float]) -> dict[str, str]:
+    """The steering link of each wheel that has one."""
+    if isinstance(steering, str):
+        refuse(ModelError, "steering", steering, "must be names, or joints by wheel")
+    if isinstance(steering, Mapping):
+        found = {}
+        for wheel, joint in steering.items():
+            link = resolve(tree, "steering", wheel)
+            if link not in wheels:
+                refuse(ModelError, "steering", wheel, f"is not a wheel; wheels are {', '.join(wheels) or 'none'}")
+            found[link] = resolve(tree, "steering", joint)
+            if found[link] not in _above(tree, link):
+                refuse(ModelError, "steering", joint, f"does not carry the wheel {wheel!r}")
+        return found
+    if steering is not None and not isinstance(steering, Iterable):
+        refuse(ModelError, "steering", steering, "must be names, or joints by wheel")
+    given = None if steering is None else [resolve(tree, "steering", name) for name in steering]
+    found = {}
+    for wheel in wheels:
+        for name in _above(tree, wheel):
+            others = [other for other in wheels if other != wheel and name in _above(tree, other)]
+            if given is not None:
+                if name in given:
+                    found[wheel] = name
+                    break
+                continue
+            carrier = tree.links[name].joint
+            is_upright = carrier.kind == "revolute" and upright[name] > 1.0 - TILT
+            if is_upright and not others and carrier.follows is None:
+                found[wheel] = name
+                break
+    if given is not None and (unused := [name for name in given if name not in found.values()]):
+        refuse(ModelError, "steering", unused, f"carries none of the wheels {', '.join(wheels) or '(none)'}")
+    return found
+
+
+def _above(tree: RobotTree, name: str) -> list[str]:
+    """The links that carry a link, nearest first."""
+    found = []
+    parent = tree.links[name].parent
+    while parent is not None:
+        found.append(parent)
+        parent = tree.links[parent].parent
+    return found

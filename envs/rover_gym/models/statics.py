@@ -1,0 +1,182 @@
+"""A rover at rest on level ground: wheel loads, steering geometry, clearance and the step that it can climb.
+
+Steering. All wheels roll without slipping sideways if the axles of the unsteered ones lie on one line, x = x0, and
+those of the steered ones meet it at one point, z = Z from the middle. A wheel at (x, z) then steers by
+atan((x - x0)/(Z - z)), and with a largest angle d the nearest point is at |Z| = |z| + |x - x0|/tan d for the wheel that
+needs most.
+
+Step. A wheel of radius R touches the edge of a step of height h at the angle a from the lowest point, cos a = 1 - h/R.
+With the load W_i on the front wheels, the whole weight W and the friction mu = tan phi, equilibrium at the edge, where
+the wheel drives with mu N, needs a push of W_i tan(a - phi) from the others, which give at most mu (W - W_i). Hence
+a = phi + atan(mu (W - W_i)/W_i) at most, and from 90 degrees on a wall. The load that moves backwards as the front
+rises is neglected. Source: the equilibrium of a wheel at an edge, as in Thomas and Vantsevich 2010.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.mechanics import ModelError, Plane, RoverModel, Simulation
+from rover_gym.models.file_axes import rotation_matrix
+from rover_gym.validation import number, refuse
+
+Array = npt.NDArray[np.float64]
+
+#: The rover has settled when nothing moves faster than this, m/s and rad/s.
+AT_REST = 1e-7
+#: Longest time to settle, s.
+PATIENCE = 20.0
+#: Unsteered wheels share an axle line if they lie within this share of their radius.
+ALIGNED = 0.02
+
+
+@dataclass(frozen=True)
+class Statics:
+    """What a check of a model found; lengths in m, forces in N, angles in rad.
+
+    Attributes:
+        loads: Normal force of the ground on each wheel, (n_wheels,).
+        rest_speed: Largest velocity that was left when the loads were read, m/s and rad/s.
+        attitude: Roll and pitch at rest.
+        wheelbase: Distance between the foremost and the hindmost axle.
+        track: Largest distance between two wheels of one axle.
+        clearance: Height of the lowest point that collides and is no wheel, infinite where nothing collides.
+        turning_centre: How the wheels can roll about one point, in words.
+        turning_radius: Smallest distance of that point from the middle, 0 on the spot, infinite where there is none.
+        step_height: Height of the step that the front wheels can climb.
+        climbs_wall: Whether they could climb a wall.
+        friction: The friction that was assumed.
+    """
+
+    loads: Array
+    rest_speed: float
+    attitude: tuple[float, float]
+    wheelbase: float
+    track: float
+    clearance: float
+    turning_centre: str
+    turning_radius: float
+    step_height: float
+    climbs_wall: bool
+    friction: float
+
+
+def check_statics(model: RoverModel, *, friction: float = 0.7) -> Statics:
+    """Sets a rover on level ground, brakes and steering held, and reads loads and geometry.
+
+    Args:
+        model: The rover.
+        friction: Of wheel and ground.
+
+    Raises:
+        ModelError: The model has no wheels or its base is not free.
+        OptionError: `friction` is no positive number.
+    """
+    friction = number("friction", friction, above=0.0, at_most=10.0)
+    if not model.wheel_names or model.dof_names[:1] != ["x"]:
+        refuse(ModelError, "model", model.name, "needs wheels and a free base to stand on level ground")
+    sim = Simulation(model, friction=friction)
+    sim.set_state(model.resting_pose(Plane(), (0.0, 0.0), 0.0))
+    while sim.time < PATIENCE:
+        sim.step(100)
+        if float(np.abs(sim.v).max()) < AT_REST:
+            break
+    q = sim.q
+    loads = np.zeros(len(model.wheel_names))
+    contacts = sim.contacts
+    forces = contacts.impulses[:, 0] / sim.time_step
+    for kind, wheel, force in zip(contacts.kinds, contacts.wheels, forces, strict=True):
+        if kind == "wheel":
+            loads[int(wheel)] += force
+    tags, radii = sim.tags(), model.wheel_radii
+    heading = sim.rotation[:, 0]
+    ahead = np.array([heading[0], 0.0, heading[2]]) / math.hypot(heading[0], heading[2])
+    right = np.array([-ahead[2], 0.0, ahead[0]])
+    solids = [wheel["solid"] for wheel in model.to_dict()["wheels"]]
+    centres = np.array([tags[solid] - q[:3] for solid in solids])
+    x, z = centres @ ahead, centres @ right
+    centre, radius = _turning(model, x, z)
+    front = np.flatnonzero(x > x.max() - float(radii.max()))
+    height, is_wall = _step(model, loads, front, friction)
+    return Statics(
+        loads,
+        float(np.abs(sim.v).max()),
+        (float(q[3]), float(q[5])),
+        float(np.ptp(x)),
+        _track(x, z, radii),
+        _clearance(model, sim),
+        centre,
+        radius,
+        height,
+        is_wall,
+        friction,
+    )
+
+
+def _track(x: Array, z: Array, radii: Array) -> float:
+    return max(float(np.ptp(z[np.abs(x - one) < radius])) for one, radius in zip(x, radii, strict=True))
+
+
+def _turning(model: RoverModel, x: Array, z: Array) -> tuple[str, float]:
+    steered = np.array([index >= 0 for index in model.steering_joint_indices])
+    fixed = x[~steered]
+    if not steered.any():
+        return "none is steered: it turns by skidding", 0.0 if len(x) > 2 else math.inf
+    radii = model.wheel_radii
+    if len(fixed) and np.ptp(fixed) > ALIGNED * float(radii.max()):
+        return f"none: the unsteered wheels lie up to {np.ptp(fixed):.3g} m from one axle line", math.inf
+    line = float(fixed.mean()) if len(fixed) else float((x.max() + x.min()) / 2.0)
+    limit = np.array([wheel.get("steering_limit") or 0.0 for wheel in model.to_dict()["wheels"]])
+    offsets = np.abs(x - line)
+    on_the_spot = np.arctan2(offsets, np.abs(z))[steered]
+    if np.all(on_the_spot <= limit[steered] + 1e-9):
+        return "all wheels can point about the middle: it turns on the spot", 0.0
+    reach = np.tan(np.minimum(limit[steered], math.pi / 2.0))
+    with np.errstate(divide="ignore"):
+        radius = float(np.max(np.abs(z[steered]) + offsets[steered] / reach))
+    return f"a common one on the line {round(line, 4) + 0.0:+.4g} m ahead of the trunk's origin", radius
+
+
+def _step(model: RoverModel, loads: Array, front: npt.NDArray[np.intp], friction: float) -> tuple[float, bool]:
+    whole, share = float(loads.sum()), float(loads[front].sum())
+    radius = float(model.wheel_radii[front].min())
+    if share <= 0.0 or whole <= share:
+        return 0.0, False
+    # What a wheel's torque can hold at its own load limits the friction that it can use.
+    torque = model.wheel_torque_limits
+    usable = np.minimum(friction, torque / np.maximum(model.wheel_radii * loads, 1e-12))
+    own = float(usable[front].mean())
+    others = np.setdiff1d(np.arange(len(loads)), front)
+    push = float((usable[others] * loads[others]).sum())
+    angle = math.atan(own) + math.atan(push / share)
+    if angle >= math.pi / 2.0:
+        return radius, True
+    return radius * (1.0 - math.cos(angle)), False
+
+
+def _clearance(model: RoverModel, sim: Simulation) -> float:
+    lowest = math.inf
+    wheels = {wheel["solid"] for wheel in model.to_dict()["wheels"]}
+    poses = sim.poses()
+    for solid in model.to_dict()["solids"]:
+        shapes = list(solid.get("shapes") or ())
+        if solid.get("shape") and solid.get("collides"):
+            place = solid.get("centre_of_mass") or (0.0, 0.0, 0.0)
+            shapes.append(solid["shape"] | {"collides": True, "position": place})
+        for shape in shapes:
+            if shape.get("collides") and solid["name"] not in wheels:
+                origin, rotation = poses[solid["name"]]
+                lowest = min(lowest, _lowest(shape, origin, rotation))
+    return lowest
+
+
+def _lowest(shape: dict[str, object], origin: Array, rotation: Array) -> float:
+    centre = origin + rotation @ np.array(shape.get("position") or (0.0, 0.0, 0.0))
+    if shape["kind"] == "sphere":
+        return float(centre[1]) - float(str(shape["radius"]))
+    turn = rotation @ rotation_matrix(np.array(shape.get("rotation") or (0.0, 0.0, 0.0)))
+    return float(centre[1] - np.abs(turn[1]) @ np.array(shape["size"]) / 2.0)

@@ -1,0 +1,178 @@
+"""Reads a URDF into a `RobotTree`. The parser is yourdfpy's; the checks before it are those of `urdf_schema`."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rover_gym.extras import require
+from rover_gym.models.file_axes import Array
+from rover_gym.models.robot_tree import FileJoint, FileLink, FileShape, RobotTree, refuse_in
+from rover_gym.models.urdf_schema import parse
+
+KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
+
+
+def read_urdf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
+    """Reads the links and joints of a URDF.
+
+    Args:
+        path: The file.
+        ignore: Kinds of what changes the motion and is to be left out all the same.
+
+    Raises:
+        ModelError: The file is malformed, contradicts itself or holds what cannot be simulated.
+        MissingExtraError: yourdfpy is not installed.
+        OSError: The file cannot be read.
+    """
+    parser = require("yourdfpy", "models")
+    root, others = parse(path)
+    etree = require("lxml.etree", "models")
+    # Parsed anew from the checked tree: what could not be read strictly never gets here.
+    robot = parser.URDF.load(
+        io.BytesIO(etree.tostring(root)), build_scene_graph=False, load_meshes=False, mesh_dir=str(path.parent)
+    ).robot
+    tree = RobotTree(path, robot.name or path.stem, {}, left_out=others)
+    _check_names(path, robot)
+    for element in root.findall("gazebo"):
+        if any("joint" in str(one.tag) for one in element.iter()):
+            tree.leave_out("closed loops", "gazebo", element.get("reference"), "closes a loop by a joint", ignore)
+    carriers = {joint.child: joint for joint in robot.joints}
+    links = {link.name: link for link in robot.links}
+    driven = {joint.name for transmission in robot.transmission for joint in transmission.joints}
+    for name in _parents_first(path, links, carriers):
+        carrier = carriers.get(name)
+        joint = _joint(tree, carrier, ignore) if carrier is not None else FileJoint(name, "fixed")
+        joint.is_driven = joint.name in driven and carrier is not None
+        R, p = _pose(carrier.origin if carrier is not None else None)
+        link = FileLink(name, None if carrier is None else carrier.parent, joint, p, R)
+        _add_body(path, links[name], link)
+        link.shapes = [
+            _shape(path, one, collides=collides)
+            for ones, collides in ((links[name].collisions, True), (links[name].visuals, False))
+            for one in ones
+        ]
+        tree.links[name] = link
+    return tree
+
+
+def _check_names(path: Path, robot: Any) -> None:
+    if not robot.links:
+        refuse_in(path, "robot", robot.name, "has no links")
+    names = [link.name for link in robot.links]
+    joints = [joint.name for joint in robot.joints]
+    for kind, given in (("link", names), ("joint", joints)):
+        twice = next((name for name in given if given.count(name) > 1), None) if len(set(given)) < len(given) else None
+        if twice is not None:
+            refuse_in(path, f"{kind}[{twice}].name", twice, "is used twice")
+    known, carried = set(names), set()
+    for joint in robot.joints:
+        for field in ("parent", "child"):
+            if getattr(joint, field) not in known:
+                refuse_in(path, f"joint[{joint.name}].{field}", getattr(joint, field), "there is no such link")
+        if joint.child in carried:
+            refuse_in(path, f"joint[{joint.name}].child", joint.child, "another joint carries this link: a closed loop")
+        carried.add(joint.child)
+        if joint.mimic is not None and joint.mimic.joint not in joints:
+            refuse_in(path, f"joint[{joint.name}].mimic.joint", joint.mimic.joint, "there is no such joint")
+    roots = known - carried
+    if len(roots) != 1:
+        reason = "the links stand in a circle" if not roots else "one link must carry all others; these have no joint"
+        refuse_in(path, "robot", sorted(roots) or names[:5], reason)
+
+
+def _parents_first(path: Path, links: dict[str, Any], carriers: dict[str, Any]) -> list[str]:
+    below: dict[str, list[str]] = {}
+    for name, joint in carriers.items():
+        below.setdefault(joint.parent, []).append(name)
+    order: list[str] = []
+    waiting = [name for name in links if name not in carriers]
+    while waiting:
+        order.append(waiting.pop(0))
+        waiting = [*below.get(order[-1], []), *waiting]
+    if len(order) < len(links):
+        refuse_in(path, "robot", sorted(set(links) - set(order))[:5], "these links carry each other in a circle")
+    return order
+
+
+def _pose(origin: Array | None) -> tuple[Array, Array]:
+    return (np.eye(3), np.zeros(3)) if origin is None else (np.array(origin[:3, :3]), np.array(origin[:3, 3]))
+
+
+def _joint(tree: RobotTree, source: Any, ignore: Collection[str]) -> FileJoint:
+    at = f"joint[{source.name}]"
+    if source.type == "floating":
+        return FileJoint(source.name, "free")
+    if source.type not in KINDS:
+        tree.refuse(f"{at}.type", source.type, f"must be one of {', '.join(KINDS)}")
+    joint = FileJoint(source.name, KINDS[source.type])
+    if joint.kind == "fixed":
+        return joint
+    axis = np.array([1.0, 0.0, 0.0] if source.axis is None else source.axis)
+    if not np.linalg.norm(axis) > 1e-9:
+        tree.refuse(f"{at}.axis", axis.tolist(), "must have a direction")
+    joint.axis = axis / np.linalg.norm(axis)
+    if source.type in ("revolute", "prismatic"):
+        if source.limit is None:
+            tree.refuse(f"{at}.limit", None, f"a {source.type} joint must have limits")
+        joint.limits = (source.limit.lower or 0.0, source.limit.upper or 0.0)
+        if not joint.limits[0] < joint.limits[1]:
+            tree.refuse(f"{at}.limit", list(joint.limits), "the lower limit must be below the upper one")
+    if source.limit is not None:
+        joint.torque_limit = source.limit.effort or None
+        if source.limit.velocity:
+            tree.left_out.append(f"{at}: a limit of its speed")
+    if source.dynamics is not None:
+        joint.damping = float(source.dynamics.damping or 0.0)
+        friction = float(source.dynamics.friction or 0.0)
+        if friction != 0.0:
+            tree.leave_out("friction", f"{at}.dynamics.friction", friction, "dry friction is not simulated", ignore)
+    if source.mimic is not None:
+        ratio, offset = source.mimic.multiplier, source.mimic.offset
+        joint.follows = (source.mimic.joint, 1.0 if ratio is None else ratio, offset or 0.0)
+    return joint
+
+
+def _add_body(path: Path, source: Any, link: FileLink) -> None:
+    if source.inertial is None:
+        return
+    R, p = _pose(source.inertial.origin)
+    link.mass, link.centre = float(source.inertial.mass), p
+    if link.mass < 0.0:
+        refuse_in(path, f"link[{link.name}].inertial.mass", link.mass, "must not be negative")
+    link.inertia = R @ np.array(source.inertial.inertia, dtype=np.float64) @ R.T
+
+
+def _shape(path: Path, source: Any, *, collides: bool) -> FileShape:
+    R, p = _pose(source.origin)
+    geometry = source.geometry
+    made = FileShape("mesh", (), p, R, collides, not collides)
+    if geometry.box is not None:
+        made.kind, made.size = "box", tuple(float(s) for s in geometry.box.size)
+    elif geometry.cylinder is not None:
+        made.kind, made.size = "cylinder", (float(geometry.cylinder.radius), float(geometry.cylinder.length))
+    elif geometry.sphere is not None:
+        made.kind, made.size = "sphere", (float(geometry.sphere.radius),)
+    elif geometry.mesh is not None:
+        made.mesh, made.scale = _mesh_file(path, geometry.mesh.filename), _scale(geometry.mesh.scale)
+    return made
+
+
+def _scale(given: Any) -> Array:
+    return np.ones(3) if given is None else np.broadcast_to(np.asarray(given, dtype=np.float64), 3).copy()
+
+
+def _mesh_file(path: Path, name: str) -> Path:
+    """The file of a mesh: beside the URDF, or for `package://` in a folder above it."""
+    relative = name.partition("://")[2] if "://" in name else name
+    pieces = Path(relative).parts
+    for folder in path.absolute().parents:
+        for skipped in range(min(2, len(pieces))):
+            found = folder.joinpath(*pieces[skipped:])
+            if found.is_file():
+                return found
+    return path.parent / relative

@@ -1,0 +1,131 @@
+"""Writes a model as URDF."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from rover_gym.mechanics import RoverModel
+from rover_gym.models.file_axes import Array, roll_pitch_yaw, turn_z_to
+from rover_gym.models.file_writing import WHEEL_WIDTH, WrittenSolid, text_of, write_xml, written_solids
+from rover_gym.models.robot_tree import check_kinds
+
+#: What URDF cannot express and `ignore` may name.
+IGNORABLE = ("springs", "armature")
+FAST = 1e3  # rad/s, the velocity limit where there is no motor: URDF wants one
+WORLD = "world"
+
+
+def write_urdf(model: RoverModel, path: object, *, ignore: Collection[str] = ()) -> None:
+    """Writes a URDF; the arguments are those of `RoverModel.to_urdf`."""
+    ignore = check_kinds(ignore, IGNORABLE)
+    description = model.to_dict()
+    wheels = {wheel["solid"]: wheel for wheel in description["wheels"]}
+    robot = ET.Element("robot", name=description["name"] or "robot")
+    solids = written_solids(model)
+    roots = [solid for solid in solids if solid.parent is None]
+    if len(roots) > 1:
+        roots[1].refuse("parent", None, "a URDF has one tree")
+    if roots[0].kind != "free":
+        if any(solid.name == WORLD for solid in solids):
+            roots[0].refuse("name", WORLD, "this name is the world's in a URDF")
+        ET.SubElement(robot, "link", name=WORLD)
+    drives = {solid["name"]: (solid.get("drive") or {}).get("torque_limit") for solid in description["solids"]}
+    for solid in solids:
+        _check(solid, ignore)
+        robot.append(_link(solid, wheels.get(solid.name)))
+        if solid.kind != "free":
+            robot.append(_joint(solid, wheels.get(solid.name), drives[solid.name]))
+    for tag in description.get("tags") or ():
+        ET.SubElement(robot, "link", name=tag["name"])
+        joint = ET.SubElement(robot, "joint", name=f"{tag['name']}_fixed", type="fixed")
+        x, y, z = tag["position"]
+        ET.SubElement(joint, "origin", xyz=text_of((x, -z, y)), rpy="0 0 0")
+        ET.SubElement(joint, "parent", link=tag["solid"])
+        ET.SubElement(joint, "child", link=tag["name"])
+    for name in [*wheels, *(name for name, limit in drives.items() if limit is not None)]:
+        transmission = ET.SubElement(robot, "transmission", name=f"drive_{name}")
+        ET.SubElement(transmission, "type").text = "transmission_interface/SimpleTransmission"
+        ET.SubElement(transmission, "joint", name=name)
+        ET.SubElement(transmission, "actuator", name=f"motor_{name}")
+    write_xml(robot, path)
+
+
+def _check(solid: WrittenSolid, ignore: Collection[str]) -> None:
+    if solid.kind == "spherical":
+        solid.refuse("joint", solid.kind, "URDF has no spherical joints")
+    for field, kind in (("spring", "springs"), ("armature", "armature")):
+        if solid.source.get(field) and kind not in ignore:
+            solid.refuse(field, solid.source[field], f'URDF has no {kind}; to_mjcf has, or ignore=["{kind}"]')
+
+
+def _link(solid: WrittenSolid, wheel: dict[str, Any] | None) -> ET.Element:
+    link = ET.Element("link", name=solid.name)
+    inertial = ET.SubElement(link, "inertial")
+    ET.SubElement(inertial, "origin", xyz=text_of(solid.centre), rpy="0 0 0")
+    ET.SubElement(inertial, "mass", value=text_of(solid.mass))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = solid.inertia
+    entries = {"ixx": xx, "iyy": yy, "izz": zz, "ixy": xy, "ixz": xz, "iyz": yz}
+    ET.SubElement(inertial, "inertia", {name: text_of(float(value)) for name, value in entries.items()})
+    for shape, centre, R, collides, visible in solid.shapes():
+        if visible or shape["kind"] == "disc":
+            _add_shape(link, "visual", shape, centre, R)
+        if collides:
+            _add_shape(link, "collision", shape, centre, R)
+    if wheel is not None:
+        x, y, z = wheel["axle"]
+        radius = wheel.get("contact_radius") or wheel["radius"]
+        rim = {"kind": "cylinder", "radius": radius, "height": WHEEL_WIDTH * radius}
+        axle = np.array([x, -z, y]) / np.linalg.norm((x, y, z))
+        _add_shape(link, "collision", rim, np.zeros(3), turn_z_to(axle))
+    return link
+
+
+def _add_shape(link: ET.Element, role: str, shape: dict[str, Any], centre: Array, R: Array) -> None:
+    element = ET.SubElement(link, role)
+    if shape["kind"] == "disc":  # about our z, which is the file's -y
+        R = R @ turn_z_to(np.array([0.0, -1.0, 0.0]))
+    ET.SubElement(element, "origin", xyz=text_of(centre), rpy=text_of(roll_pitch_yaw(R)))
+    geometry = ET.SubElement(element, "geometry")
+    match shape["kind"]:
+        case "box":
+            x, y, z = shape["size"]
+            ET.SubElement(geometry, "box", size=text_of((x, z, y)))
+        case "sphere":
+            ET.SubElement(geometry, "sphere", radius=text_of(shape["radius"]))
+        case _:
+            length = shape.get("height") or WHEEL_WIDTH * shape["radius"]
+            ET.SubElement(geometry, "cylinder", radius=text_of(shape["radius"]), length=text_of(length))
+
+
+def _joint(solid: WrittenSolid, wheel: dict[str, Any] | None, drive: float | None) -> ET.Element:
+    source = solid.source
+    limits = source.get("limits") if solid.kind != "fixed" else None
+    coupled = source.get("coupled")
+    kind = solid.kind
+    if kind == "revolute" and limits is None:
+        kind = "continuous"
+    if kind == "prismatic" and limits is None:
+        limits = {"lower": -1e9, "upper": 1e9}
+    joint = ET.Element("joint", name=solid.name, type=kind)
+    ET.SubElement(joint, "origin", xyz=text_of(solid.position), rpy=text_of(roll_pitch_yaw(solid.rotation)))
+    ET.SubElement(joint, "parent", link=solid.parent or WORLD)
+    ET.SubElement(joint, "child", link=solid.name)
+    if kind == "fixed":
+        return joint
+    ET.SubElement(joint, "axis", xyz=text_of(solid.axis))
+    motor = (wheel or {}).get("motor") or {}
+    effort = wheel["torque_limit"] if wheel is not None else (drive or 0.0)
+    limit = {"effort": text_of(effort), "velocity": text_of(motor.get("no_load_speed", FAST))}
+    if limits is not None:
+        limit |= {"lower": text_of(limits["lower"]), "upper": text_of(limits["upper"])}
+    ET.SubElement(joint, "limit", limit)
+    if source.get("damping"):
+        ET.SubElement(joint, "dynamics", damping=text_of(source["damping"]), friction="0")
+    if coupled is not None:
+        entries = {"multiplier": text_of(coupled["ratio"]), "offset": text_of(coupled.get("offset", 0.0))}
+        ET.SubElement(joint, "mimic", {"joint": coupled["joint"], **entries})
+    return joint

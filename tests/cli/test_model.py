@@ -1,0 +1,82 @@
+"""`rover model import|show|check`."""
+
+from pathlib import Path
+
+import pytest
+from models.robot_files import rover as robot_text
+from models.robot_files import write
+from typer.testing import CliRunner, Result
+
+from rover_gym import RoverModel
+from rover_gym.cli import app
+
+
+def rover(*arguments: str) -> Result:
+    return CliRunner(env={"COLUMNS": "200", "NO_COLOR": "1"}).invoke(app, ["model", *arguments])
+
+
+@pytest.mark.parametrize("name", RoverModel.names())
+def test_every_model_of_the_gallery_is_shown_and_checked(name: str) -> None:
+    shown = rover("show", name)
+    assert shown.exit_code == 0, shown.output
+    for solid in RoverModel.named(name).solid_names:
+        assert solid in shown.output
+    checked = rover("check", name)
+    assert checked.exit_code == 0, checked.output
+    for what in ("load", "wheelbase", "clearance", "turning centre", "step that it can climb at friction 0.7"):
+        assert what in checked.output
+
+
+def test_an_import_writes_the_model_and_its_picture(tmp_path: Path) -> None:
+    pytest.importorskip("yourdfpy")
+    pytest.importorskip("matplotlib")
+    file = write(tmp_path, robot_text())
+    output = tmp_path / "models" / "small.toml"
+    result = rover("import", str(file), "--output", str(output))
+    assert result.exit_code == 0, result.output
+    for what in ("chassis", "steers left_wheel", "assumed: ", "not simulated: ", "follows left_rocker by -1"):
+        assert what in result.output
+    assert RoverModel.from_file(output) == RoverModel.from_urdf(file)
+    assert output.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+    given = rover(
+        "import", str(file), "--output", str(output), "--wheel", "left_wheel=0.3", "--wheel", "right_drive=0.25"
+    )
+    assert given.exit_code == 0, given.output
+    assert RoverModel.from_file(output).wheel_radii.tolist() == [0.3, 0.25]
+    shown = rover("show", str(output), "--picture", str(tmp_path / "small.svg"))
+    assert shown.exit_code == 0, shown.output
+    assert (tmp_path / "small.svg").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["show", "opportunity"], "mars-rover"),
+        (["show", "nothing.toml"], "nothing.toml"),
+        (["show", "rover", "--picture", "rover.gif"], "png"),
+        (["check", "rover", "--friction", "0"], "friction"),
+        (["import", "rover"], "only URDF and MJCF"),
+        (["import", "nothing.urdf", "--wheel", "a=b"], "the radius must be a number"),
+        (["import", "nothing.urdf", "--wheel", "a=1", "--wheel", "b"], "all names or all"),
+        (["import", "nothing.urdf"], "nothing.urdf"),
+    ],
+)
+def test_bad_input_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], expected: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = rover(*arguments)
+    assert result.exit_code == 2
+    assert expected in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_model_without_wheels_stands_on_nothing(tmp_path: Path) -> None:
+    ball = {"name": "arm", "joint": "fixed", "position": [0, 0, 0], "mass": 1.0}
+    arm = {"name": "arm", "solids": [ball | {"shape": {"kind": "sphere", "radius": 0.1}}]}
+    RoverModel.from_dict(arm).to_file(tmp_path / "arm.toml")
+    assert rover("show", str(tmp_path / "arm.toml")).exit_code == 0
+    result = rover("check", str(tmp_path / "arm.toml"))
+    assert result.exit_code == 2
+    assert "wheels" in result.stderr

@@ -1,0 +1,94 @@
+"""MJCF files as models: MuJoCo compiles them, and its own mass matrix and bias are the reference."""
+
+import numpy as np
+import pytest
+from models.robot_files import write
+
+from rover_gym import ModelError, RoverModel
+
+mujoco = pytest.importorskip("mujoco")
+
+CART = """
+<mujoco model="cart">
+  <compiler angle="degree"/>
+  <default><joint damping="0.1" armature="0.02"/></default>
+  <worldbody>
+    <geom type="plane" size="1 1 1"/>
+    <body name="chassis" pos="0 0 1" euler="0 0 90">
+      <freejoint/>
+      <geom type="box" size="0.5 0.3 0.1" mass="10"/>
+      <body name="arm" pos="0.2 0 0.1" euler="10 20 30">
+        <joint name="elbow" type="hinge" pos="0.05 0 0.1" axis="0 1 1" range="-40 60" ref="15" stiffness="2" springref="5"/>
+        <geom type="capsule" size="0.05 0.2" pos="0 0 0.2"/>
+        <body name="slider" pos="0 0 0.4"><joint name="slide" type="slide" axis="1 0 0"/><geom type="sphere" size="0.1"/></body>
+      </body>
+      <body name="wheel_left" pos="0 0.4 -0.1" euler="90 0 0">
+        <joint name="roll_left" axis="0 0 -1"/><geom type="cylinder" size="0.15 0.04"/>
+      </body>
+      <body name="wheel_right" pos="0 -0.4 -0.1" euler="90 0 0">
+        <joint name="roll_right" axis="0 0 -1"/><geom type="cylinder" size="0.15 0.04"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor joint="roll_left" ctrlrange="-2 2" gear="3"/>
+    <position joint="elbow" kp="7" kv="0.5"/>
+  </actuator>
+  <!--more-->
+</mujoco>
+"""
+
+
+def test_joints_drives_and_gains_are_the_files(tmp_path):
+    model = RoverModel.from_mjcf(write(tmp_path, CART, "cart.xml"))
+    assert model.wheel_names == ["wheel_left", "wheel_right"]
+    assert model.wheel_radii.tolist() == [0.15, 0.15]
+    assert model.wheel_torque_limits[0] == 6.0
+    solids = {solid["name"]: solid for solid in model.to_dict()["solids"]}
+    arm = solids["arm"]
+    # Our coordinate counts from `ref`.
+    assert np.degrees([arm["limits"]["lower"], arm["limits"]["upper"]]) == pytest.approx([-55.0, 45.0])
+    assert np.degrees(arm["spring"]["rest"]) == pytest.approx(-10.0)
+    assert arm["hold"] == {"stiffness": 7.0, "damping": 0.5}
+    assert (arm["damping"], arm["armature"]) == (0.1, 0.02)
+    report = "\n".join([*model.import_report.assumed, *model.import_report.left_out])
+    for what in ("ref", "gravity", "worldbody", "a capsule that touches"):
+        assert what in report
+
+
+REFUSED = {
+    "two joints": ('<freejoint/>', '<joint type="slide" axis="1 0 0"/><joint/>', r"body\[chassis\]\.joint.*got 2"),
+    "friction": ('name="slide"', 'name="slide" frictionloss="0.2"', r'joint\[slide\]\.frictionloss.*0\.2'),
+    "a velocity servo": ("<position joint", '<velocity kv="2" joint="slide"/><position joint', r"actuator\["),
+    "a muscle": ("<position joint", '<muscle joint="slide" lengthrange="0 1"/><position joint', r"actuator\["),
+    "a weld": ("<!--more-->", '<equality><weld body1="arm" body2="wheel_left"/></equality>', r"equality\[0\]"),
+    "a curve": ("<!--more-->", '<equality><joint joint1="elbow" joint2="slide" polycoef="0 1 2 0 0"/></equality>', r"equality\[0\]"),
+    "a tendon": ("<!--more-->", '<tendon><fixed name="t" stiffness="3"><joint joint="slide" coef="1"/></fixed></tendon>', r"tendon\[t\]"),
+    "air": ("<compiler", '<option density="1.2"/><compiler', "option.density"),
+    "no gravity": ('name="arm"', 'name="arm" gravcomp="1"', "gravcomp"),
+    "no XML": ("<mujoco", "<mujoco <", "MuJoCo: refuses the file"),
+    "an unknown element": ("<freejoint/>", "<freejoint/><engine/>", "MuJoCo: refuses the file.*engine"),
+    "an unknown mesh": ('type="sphere" size="0.1"', 'type="mesh" mesh="m"', "MuJoCo: refuses the file"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_cannot_be_simulated_is_refused(tmp_path, what):
+    old, new, expected = REFUSED[what]
+    assert old in CART
+    path = write(tmp_path, CART.replace(old, new, 1), "cart.xml")
+    with pytest.raises(ModelError, match=expected) as caught:
+        RoverModel.from_mjcf(path)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+def test_what_is_ignored_by_word_is_listed(tmp_path):
+    text = CART.replace('name="slide"', 'name="slide" frictionloss="0.2"')
+    model = RoverModel.from_mjcf(write(tmp_path, text, "cart.xml"), ignore=["friction"])
+    assert any("left out as told" in entry for entry in model.import_report.left_out)
+
+
+def test_a_linear_coupling_becomes_exact(tmp_path):
+    more = '<equality><joint joint1="roll_right" joint2="roll_left" polycoef="0 -1 0 0 0"/></equality>'
+    model = RoverModel.from_mjcf(write(tmp_path, CART.replace("<!--more-->", more), "cart.xml"))
+    assert "wheel_right" not in model.dof_names

@@ -1,0 +1,237 @@
+"""URDF files as models: axes, roles, what is welded, left out or refused."""
+
+import numpy as np
+import pytest
+from models.robot_files import LIMIT, body, changed, joint, rover, write
+
+from rover_gym import ModelError, RoverModel, Simulation
+
+pytest.importorskip("yourdfpy")
+
+TO_OURS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+
+
+def test_axes_masses_and_roles_are_the_files(tmp_path):
+    model = RoverModel.from_urdf(write(tmp_path, rover()))
+    assert model.name == "small"
+    assert model.mass == pytest.approx(50.0 + 2 * (5.0 + 1.0 + 2.0) + 2.0)
+    assert model.wheel_names == ["left_wheel", "right_wheel", "rear_wheel"]
+    assert model.wheel_radii.tolist() == [0.2] * 3
+    assert [model.dof_names[i] if i >= 0 else "" for i in model.steering_joint_indices] == [
+        "left_fork",
+        "right_fork",
+        "",
+    ]
+    poses = model.poses(np.zeros(model.nq))
+    # The wheel's centre is that of its cylinder, 5 cm along the axle from the joint; forward, left and up in the file.
+    np.testing.assert_allclose(poses["left_wheel"][0], TO_OURS @ (0.5, 0.55, -0.2), atol=1e-15)
+    np.testing.assert_allclose(model.tags(np.zeros(model.nq))["mast_head"], TO_OURS @ (0.3, 0.1, 0.5), atol=1e-15)
+    description = model.to_dict()
+    chassis = description["solids"][0]
+    np.testing.assert_allclose(chassis["centre_of_mass"], TO_OURS @ (0.01, 0.02, 0.03))
+    assert chassis["shapes"][0]["size"] == [1.0, 0.2, 0.6]
+    assert [wheel["drive_sign"] for wheel in description["wheels"]] == [1.0, 1.0, 1.0]
+    assert "q = " not in str(model.import_report)
+    assert model.import_report.path.endswith("robot.urdf")
+
+
+def test_a_positive_command_drives_forward_whatever_the_axis(tmp_path):
+    for axis in ("0 1 0", "0 -1 0"):
+        model = RoverModel.from_urdf(
+            write(tmp_path, rover(wheel_axis=axis)), steering_stiffness=1e4, steering_damping=1e2
+        )
+        sim = Simulation(model)
+        sim.set_state(model.resting_pose(sim.terrain, (0.0, 0.0), 0.0))
+        sim.set_wheel_torques([5.0] * 3)
+        sim.step(100)
+        assert sim.q[0] > 0.05, axis
+
+
+def test_the_rockers_of_a_differential_move_oppositely(tmp_path):
+    model = RoverModel.from_urdf(write(tmp_path, rover()))
+    assert "left_rocker" in model.dof_names
+    assert "right_rocker" not in model.dof_names
+    solids = {solid["name"]: solid for solid in model.to_dict()["solids"]}
+    assert solids["right_rocker"]["coupled"] == {"joint": "left_rocker", "ratio": -1.0, "offset": 0.0}
+    # The stops of both hold for the one that is left: [-0.6, 0.5] and its mirror image.
+    assert solids["left_rocker"]["limits"] == {"lower": -0.5, "upper": 0.5}
+
+
+def test_steering_axes_that_point_down_are_reversed(tmp_path):
+    model = RoverModel.from_urdf(write(tmp_path, rover(steer_axis="0 0 -1")))
+    fork = next(solid for solid in model.to_dict()["solids"] if solid["name"] == "left_fork")
+    assert fork["axis"] == [0.0, 1.0, 0.0]
+    assert fork["limits"] == {"lower": -0.5, "upper": 0.6}
+    assert any("reversed" in entry for entry in model.import_report.assumed)
+
+
+def test_what_is_assumed_is_said_and_what_is_given_is_taken(tmp_path):
+    path = write(tmp_path, rover())
+    report = RoverModel.from_urdf(path).import_report
+    assert any("torque limit" in entry for entry in report.assumed)
+    given = {"torque_limit": 12.0, "steering_stiffness": 300.0, "steering_damping": 4.0, "steering_limit": 0.3}
+    model = RoverModel.from_urdf(path, **given)
+    assert model.import_report.assumed == ()
+    assert model.wheel_torque_limits.tolist() == [12.0] * 3
+    assert model.steering_limit == 0.3
+    fork = next(solid for solid in model.to_dict()["solids"] if solid["name"] == "left_fork")
+    assert fork["hold"] == {"stiffness": 300.0, "damping": 4.0}
+
+
+def test_another_forward_axis_turns_the_machine(tmp_path):
+    path = write(tmp_path, rover())
+    with pytest.raises(ModelError, match="forward"):
+        RoverModel.from_urdf(path, forward="z")
+    model = RoverModel.from_urdf(path, forward="-x")
+    zero = np.zeros(model.nq)
+    plain = RoverModel.from_urdf(path)
+    np.testing.assert_allclose(
+        model.poses(zero)["left_wheel"][0], plain.poses(zero)["left_wheel"][0] * (-1.0, 1.0, -1.0), atol=1e-15
+    )
+    assert [wheel["drive_sign"] for wheel in model.to_dict()["wheels"]] == [-1.0] * 3
+
+
+def test_a_fixed_base_and_a_massless_root(tmp_path):
+    path = write(tmp_path, rover())
+    fixed = RoverModel.from_urdf(path, free_base=False)
+    assert fixed.nv == RoverModel.from_urdf(path).nv - 6
+    footprint = '<link name="footprint"/>' + joint("stand", "fixed", "footprint", "chassis", at="0 0 0.4")
+    standing = RoverModel.from_urdf(write(tmp_path, rover(extra=footprint)))
+    assert standing.mass == pytest.approx(fixed.mass)
+    tags = standing.tags(np.zeros(standing.nq))
+    np.testing.assert_allclose(tags["chassis"] - tags["footprint"], (0.0, 0.4, 0.0), atol=1e-15)
+    world = '<link name="world"/>' + joint("floating", "floating", "world", "chassis")
+    assert RoverModel.from_urdf(write(tmp_path, rover(extra=world))).nv == standing.nv
+
+
+def test_names_and_radii_can_be_given(tmp_path):
+    path = write(tmp_path, rover(wheel="", names=("a", "b")))
+    with pytest.raises(ModelError, match="radius") as caught:
+        RoverModel.from_urdf(path, wheels=["a", "b"])
+    assert "link[a]" in str(caught.value)
+    model = RoverModel.from_urdf(path, wheels={"a": 0.3, "right_drive": 0.25}, steering={"a": "left_steer"})
+    assert model.wheel_names == ["a", "b"]
+    assert model.wheel_radii.tolist() == [0.3, 0.25]
+    assert [i >= 0 for i in model.steering_joint_indices] == [True, False]
+    assert RoverModel.from_urdf(path, wheels=[]).wheel_names == []
+
+
+def test_round_links_beside_those_named_wheel_are_ambiguous(tmp_path):
+    path = write(tmp_path, rover(names=("left_wheel", "right_roller")))
+    with pytest.raises(ModelError, match="right_roller may be wheels") as caught:
+        RoverModel.from_urdf(path)
+    assert caught.value.field == "wheels"
+    everything = ["left_wheel", "right_roller", "rear_wheel"]
+    assert RoverModel.from_urdf(path, wheels=everything).wheel_names == everything
+
+
+@pytest.mark.parametrize(
+    "names", [{"wheels": ["nothing"]}, {"wheels": 3}, {"wheels": "left_wheel"}, {"steering": ["mast"]}]
+)
+def test_wrong_names_are_refused(tmp_path, names):
+    with pytest.raises(ModelError) as caught:
+        RoverModel.from_urdf(write(tmp_path, rover()), **names)
+    assert caught.value.field in names
+
+
+def test_a_wheel_of_a_mesh_has_the_meshs_radius(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    rim = trimesh.creation.cylinder(radius=150.0, height=80.0, sections=64)
+    (tmp_path / "meshes").mkdir()
+    rim.export(tmp_path / "meshes" / "rim.stl")
+    mesh = '<collision><origin rpy="1.5707963267948966 0 0"/><geometry><mesh filename="package://small/meshes/rim.stl" scale="0.001 0.001 0.001"/></geometry></collision>'
+    path = write(tmp_path, rover(wheel=mesh))
+    assert RoverModel.from_urdf(path).wheel_radii == pytest.approx([0.15] * 3, rel=1e-6)
+    (tmp_path / "meshes" / "rim.stl").unlink()
+    with pytest.raises(ModelError, match=r"rim\.stl.*wheels="):
+        RoverModel.from_urdf(path)
+
+
+def test_dry_friction_is_refused_unless_it_is_left_out_by_word(tmp_path):
+    path = write(tmp_path, changed(rover(), LIMIT, LIMIT + '<dynamics damping="0.5" friction="0.1"/>'))
+    with pytest.raises(ModelError, match=r'left_pivot.*friction.*ignore=\["friction"\].*0\.1'):
+        RoverModel.from_urdf(path)
+    model = RoverModel.from_urdf(path, ignore=["friction"])
+    assert any("friction" in entry for entry in model.import_report.left_out)
+    assert next(s for s in model.to_dict()["solids"] if s["name"] == "left_rocker")["damping"] == 0.5
+    for wrong in ("friction", ["rust"], [[]], 3):
+        with pytest.raises(ModelError, match="ignore"):
+            RoverModel.from_urdf(path, ignore=wrong)
+
+
+def test_what_is_not_simulated_is_listed(tmp_path):
+    extra = '<gazebo reference="chassis"><mu1>0.9</mu1></gazebo><sensor name="eye"/>'
+    model = RoverModel.from_urdf(
+        write(tmp_path, changed(rover(extra=extra), "<box size.*?/>", '<mesh filename="hull.dae"/>'))
+    )
+    listed = "\n".join(model.import_report.left_out)
+    for what in (
+        "<gazebo> of <robot>",
+        "<sensor> of <robot>",
+        "a mesh that touches",
+        "chassis",
+        "a limit of its speed",
+    ):
+        assert what in listed
+    assert listed in "\n".join(line.strip() for line in str(model.import_report).splitlines())
+
+
+LOOP = body("rod") + joint("first", "continuous", "chassis", "rod") + joint("second", "continuous", "left_fork", "rod")
+REFUSED = {
+    "no XML": ("<robot", "<robot <", "line 2"),
+    "half a file": ("(<robot.*)</robot>", r"\1", "is no XML"),
+    "another root": ("(?<=<|/)robot(?= name|>)", "machine", "is no XML|root element"),
+    "no number": ('mass value="50.0"', 'mass value="heavy"', r"link\[chassis\]\.inertial\.mass\.value: must be a number, got 'heavy'"),
+    "two numbers": ('xyz="0.01 0.02 0.03"', 'xyz="0.01 0.02"', "must be 3 numbers, got '0.01 0.02'"),
+    "not finite": ('ixx="0.2"', 'ixx="inf"', "must be finite, got 'inf'"),
+    "nan": ('mass value="50.0"', 'mass value="nan"', "must be finite, got 'nan'"),
+    "a missing attribute": (' izz="0.4"', "", "inertia.izz: is missing"),
+    "a missing element": (r'<mass value="50.0"/>', "", "inertial.mass: is missing"),
+    "an element twice": (r'<mass value="50.0"/>', '<mass value="50.0"/><mass value="5.0"/>', "is there twice"),
+    "a negative mass": ('mass value="50.0"', 'mass value="-1"', r"link\[chassis\].*must not be negative"),
+    "no mass": ('mass value="2.0"', 'mass value="0"', r"link\[left_wheel\].*must have a mass"),
+    "impossible inertia": ('izz="0.4"', 'izz="40"', r"link\[chassis\]\.inertia: no body has"),
+    "a huge mass": ('mass value="50.0"', 'mass value="1e30"', r"link\[chassis\]\.mass"),
+    "an unknown parent": ('parent link="left_fork"', 'parent link="left_spoon"', r"joint\[left_drive\]\.parent.*left_spoon"),
+    "a name twice": ('link name="left_fork"', 'link name="right_fork"', r"link\[right_fork\]\.name: is used twice"),
+    "an unknown kind": ('type="revolute"', 'type="screw"', r"joint\[left_pivot\]\.type.*'screw'"),
+    "planar": ('type="revolute"', 'type="planar"', r"joint\[left_pivot\]\.type.*'planar'"),
+    "no axis": ('(left_pivot.*?<axis) xyz="0 1 0"', r'\1 xyz="0 0 0"', r"joint\[left_pivot\]\.axis.*direction"),
+    "limits that cross": ('lower="-0.6" upper="0.5"', 'lower="0.6" upper="0.5"', r"joint\[left_pivot\]\.limit"),
+    "an unknown leader": ('mimic joint="left_pivot"', 'mimic joint="pivot"', r"mimic\.joint.*'pivot'"),
+    "a leader elsewhere": ('mimic joint="left_pivot"', 'mimic joint="left_drive"', r"link\[right_rocker\]\.coupled\.joint"),
+    "a loop": ("</robot>", LOOP + "</robot>", r"joint\[second\]\.child.*closed loop"),
+    "two roots": ("</robot>", body("island") + "</robot>", "'chassis', 'island'"),
+    "macros": ("<robot name", '<robot xmlns:xacro="http://x" name', "xacro"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_a_wrong_file_is_refused_with_file_element_and_value(tmp_path, what):
+    pattern, replacement, expected = REFUSED[what]
+    text = changed(rover(), pattern, replacement)
+    if what == "macros":
+        text = changed(text, "</robot>", '<xacro:wheel name="left"/></robot>')
+    path = write(tmp_path, text)
+    with pytest.raises(ModelError, match=expected) as caught:
+        RoverModel.from_urdf(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert caught.value.field
+
+
+def test_enormous_files_are_refused_before_they_are_read(tmp_path):
+    path = tmp_path / "huge.urdf"
+    with path.open("wb") as file:
+        file.truncate((16 << 20) + 1)
+    with pytest.raises(ModelError, match="bytes"):
+        RoverModel.from_urdf(path)
+    crowd = write(tmp_path, '<robot name="crowd">' + '<link name="a"/>' * 200_001 + "</robot>")
+    with pytest.raises(ModelError, match="elements"):
+        RoverModel.from_urdf(crowd)
+    bomb = '<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]><robot name="&b;"><link name="a"/></robot>'
+    with pytest.raises(ModelError):
+        RoverModel.from_urdf(write(tmp_path, bomb))
+    with pytest.raises(OSError, match="nothing"):
+        RoverModel.from_urdf(tmp_path / "nothing.urdf")
+    with pytest.raises(ModelError, match="path"):
+        RoverModel.from_urdf(3)

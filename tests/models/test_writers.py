@@ -1,0 +1,112 @@
+"""What `to_urdf` and `to_mjcf` write is read back as the same machine."""
+
+import numpy as np
+import pytest
+from models.robot_files import rover, write
+
+from rover_gym import ModelError, RoverModel
+
+KINDS = {"urdf": "yourdfpy", "mjcf": "mujoco"}
+
+
+def machine(**changes):
+    """A cart on a slide with a pendulum: what has no free base, no wheels and every passive element."""
+    solids = [
+        {"name": "cart", "joint": "prismatic", "position": [0.1, 0.2, 0.3], "axis": [1.0, 0.0, 0.2], "mass": 2.0, "damping": 0.3,
+         "limits": {"lower": -1.0, "upper": 2.0}, "shape": {"kind": "box", "size": [0.3, 0.2, 0.1]}},
+        {"name": "pendulum", "parent": "cart", "position": [0.0, 0.1, 0.0], "rotation": [0.4, -0.5, 0.6], "axis": [0.0, 0.3, 1.0],
+         "mass": 1.0, "shapes": [{"kind": "cylinder", "radius": 0.05, "height": 0.4, "position": [0.0, -0.2, 0.0], "rotation": [0.1, 0.2, 0.3]},
+                                 {"kind": "sphere", "radius": 0.1, "position": [0.0, -0.4, 0.0], "mass": 0.4}]},
+        {"name": "follower", "parent": "cart", "position": [0.0, -0.1, 0.0], "axis": [0.0, 0.0, 1.0], "mass": 0.5,
+         "shape": {"kind": "disc", "radius": 0.1}, "coupled": {"joint": "pendulum", "ratio": -0.5, "offset": 0.1}},
+        {"name": "locked", "parent": "pendulum", "position": [0.0, -0.4, 0.0], "axis": [1.0, 0.0, 0.0], "mass": 0.5, "locked": 0.7,
+         "centre_of_mass": [0.01, 0.02, 0.03], "inertia": [0.02, 0.03, 0.04, 0.001, 0.002, -0.003]},
+    ]  # fmt: skip
+    solids[1] |= changes
+    return RoverModel.from_dict({"name": "cart", "solids": solids})
+
+
+def assert_same_machine(model, back):
+    """Mass matrix, bias and poses agree at random states, whatever the order of the coordinates."""
+    order = [back.dof_names.index(name) for name in model.dof_names]
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        q, v = rng.normal(size=(2, model.nv))
+        other_q, other_v = np.empty(model.nv), np.empty(model.nv)
+        other_q[order], other_v[order] = q, v
+        M, other_M = model.mass_matrix(q), back.mass_matrix(other_q)[np.ix_(order, order)]
+        np.testing.assert_allclose(other_M, M, atol=1e-12 * np.abs(M).max())
+        bias, other_bias = model.bias(q, v), back.bias(other_q, other_v)[order]
+        np.testing.assert_allclose(other_bias, bias, atol=1e-12 * np.abs(bias).max())
+        for name, (origin, rotation) in model.poses(q).items():
+            np.testing.assert_allclose(back.poses(other_q)[name][0], origin, atol=1e-12)
+            np.testing.assert_allclose(back.poses(other_q)[name][1], rotation, atol=1e-12)
+
+
+def written_and_read(model, folder, kind, **options):
+    path = folder / f"robot.{kind}"
+    getattr(model, f"to_{kind}")(path)
+    return getattr(RoverModel, f"from_{kind}")(path, **options)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", RoverModel.names())
+def test_every_rover_of_the_gallery_comes_back(tmp_path, kind, name):
+    pytest.importorskip(KINDS[kind])
+    model = RoverModel.named(name)
+    back = written_and_read(model, tmp_path, kind)
+    assert_same_machine(model, back)
+    solids = [wheel["solid"] for wheel in model.to_dict()["wheels"]]
+    by_solid = {wheel["solid"]: wheel for wheel in back.to_dict()["wheels"]}
+    assert set(by_solid) == set(solids)
+    for wheel in model.to_dict()["wheels"]:
+        again = by_solid[wheel["solid"]]
+        for field in ("radius", "torque_limit", "steering"):
+            assert again.get(field) == wheel.get(field), field
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_machine_on_a_rail_comes_back_with_its_passive_elements(tmp_path, kind):
+    pytest.importorskip(KINDS[kind])
+    model = machine()
+    options = {"free_base": False} if kind == "urdf" else {}
+    back = written_and_read(model, tmp_path, kind, **options)
+    assert_same_machine(model, back)
+    solids = {solid["name"]: solid for solid in back.to_dict()["solids"]}
+    assert solids["cart"]["damping"] == 0.3
+    assert solids["cart"]["limits"] == {"lower": -1.0, "upper": 2.0}
+    assert solids["follower"]["coupled"] == {"joint": "pendulum", "ratio": -0.5, "offset": 0.1}
+
+
+def test_springs_and_rotors_pass_through_mjcf_and_are_refused_by_urdf(tmp_path):
+    model = machine(spring={"stiffness": 3.0, "rest": 0.2}, armature=0.01)
+    with pytest.raises(ModelError, match=r"solids\[1\]\.spring.*to_mjcf.*pendulum"):
+        model.to_urdf(tmp_path / "robot.urdf")
+    assert not (tmp_path / "robot.urdf").exists()
+    model.to_urdf(tmp_path / "robot.urdf", ignore=["springs", "armature"])
+    pytest.importorskip("mujoco")
+    pendulum = written_and_read(model, tmp_path, "mjcf").to_dict()["solids"][1]
+    assert pendulum["spring"] == {"stiffness": 3.0, "rest": 0.2}
+    assert pendulum["armature"] == 0.01
+
+
+def test_a_urdf_has_one_tree_and_no_ball_joints(tmp_path):
+    solids = machine().to_dict()["solids"]
+    ball = [
+        solids[0],
+        {key: solids[1][key] for key in ("name", "parent", "position", "mass", "shapes")} | {"joint": "spherical"},
+    ]
+    with pytest.raises(ModelError, match=r"solids\[1\]\.joint"):
+        RoverModel.from_dict({"name": "x", "solids": ball}).to_urdf(tmp_path / "x.urdf")
+    two = [solids[0], solids[0] | {"name": "other"}]
+    with pytest.raises(ModelError, match="one tree"):
+        RoverModel.from_dict({"name": "x", "solids": two}).to_urdf(tmp_path / "x.urdf")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_imported_rover_goes_through_both_formats(tmp_path):
+    for package in KINDS.values():
+        pytest.importorskip(package)
+    model = RoverModel.from_urdf(write(tmp_path, rover()))
+    assert_same_machine(model, written_and_read(model, tmp_path, "urdf"))
+    assert_same_machine(model, written_and_read(model, tmp_path, "mjcf"))
