@@ -86,6 +86,17 @@ impl Part {
         }
     }
 
+    /// Name of its material; empty for a joint at its stop.
+    #[must_use]
+    pub fn material(self, model: &Model) -> &str {
+        match self {
+            Self::Wheel(i) => &model.wheels()[i].material,
+            Self::Box(i) => &model.boxes()[i].material,
+            Self::Sphere(i) => &model.spheres()[i].material,
+            Self::Limit(..) => "",
+        }
+    }
+
     /// Centre in its body's frame, m.
     #[inline]
     #[must_use]

@@ -11,6 +11,7 @@
 //! four bytes a height, and a hundredth of that for the bounds of tiles.
 
 use std::cell::Cell;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
@@ -19,7 +20,7 @@ use super::plane::Plane;
 use super::sphere_field::MAX_SIZE;
 use super::surface::{Edge, Face, Hinge, MAX_SPOKES, Vertex};
 use super::tiles::{Tile, Tiles};
-use super::{Coverage, Primitive, Terrain};
+use super::{Coverage, GROUND, Primitive, Terrain};
 
 /// Pieces that belong to one corner.
 const PIECES: u32 = 6;
@@ -42,6 +43,8 @@ pub struct HeightField {
     /// x₀, z₀, m.
     origin: [f64; 2],
     tiles: Tiles,
+    /// Where it is not the default.
+    material: Option<Arc<str>>,
 }
 
 /// One of the two faces of a cell.
@@ -57,6 +60,13 @@ enum Half {
 type Place = [isize; 2];
 
 impl HeightField {
+    /// The same with another material of the surface; see [`is_name`](crate::law::materials::is_name).
+    #[must_use]
+    pub fn with_material(mut self, name: &str) -> Self {
+        self.material = Some(name.into());
+        self
+    }
+
     /// From heights (rows x columns, row by row, m), the spacing of columns and rows (dx, dz, m)
     /// and the place of the first height (x₀, z₀, m).
     ///
@@ -116,6 +126,7 @@ impl HeightField {
         }
         let tiles = Tiles::new(&heights, columns, rows);
         let field = Self {
+            material: None,
             heights,
             columns,
             rows,
@@ -434,6 +445,10 @@ impl Terrain for HeightField {
         let place = [narrow(corner % self.columns), narrow(corner / self.columns)];
         let piece = self.piece(place, id % PIECES);
         piece.unwrap_or_else(|| unreachable!("invariant: piece {id} was visited"))
+    }
+
+    fn material(&self, _id: u32) -> &str {
+        self.material.as_deref().unwrap_or(GROUND)
     }
 
     fn n_primitives(&self) -> u32 {

@@ -97,6 +97,11 @@ impl Terrain for Union {
         part.primitive(own)
     }
 
+    fn material(&self, id: u32) -> &str {
+        let (part, own) = self.owner(id);
+        part.material(own)
+    }
+
     fn n_primitives(&self) -> u32 {
         self.parts.iter().map(|part| part.n_primitives()).sum()
     }

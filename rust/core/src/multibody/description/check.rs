@@ -8,6 +8,7 @@ use super::check_shapes::check_shapes;
 use super::joint::{JointKind, Limits};
 use super::masses::mass_left;
 use super::{ModelDescription, SolidDescription, WheelDescription};
+use crate::law::materials::is_name;
 use crate::multibody::error::ModelError;
 use crate::multibody::model::{MAX_SHAPES, MAX_SOLIDS};
 
@@ -91,6 +92,17 @@ fn not_negative(field: &str, value: f64) -> Result<(), ModelError> {
             field: field.to_owned(),
             value,
         })
+    }
+}
+
+/// Checks the name of a material.
+pub(super) fn material(field: &str, name: Option<&String>) -> Result<(), ModelError> {
+    match name.filter(|name| !is_name(name)) {
+        Some(name) => Err(ModelError::MaterialName {
+            field: field.to_owned(),
+            name: name.clone(),
+        }),
+        None => Ok(()),
     }
 }
 
@@ -433,6 +445,7 @@ fn check_wheels(
             length(&at("contact_radius"), radius)?;
         }
         check_width(&at, wheel)?;
+        material(&at("material"), wheel.material.as_ref())?;
         if let Some(radius) = description.solids[solid].disc_radius(&wheel.axle)
             && (radius - wheel.radius).abs() > 1e-9 * radius
         {

@@ -110,6 +110,9 @@ pub struct SolidDescription {
     /// `shapes` each shape has its own flag.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub collides: bool,
+    /// Name of the material of that shape; `body` by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<String>,
     /// PD gains that hold the joint at a set-point.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hold: Option<Hold>,
@@ -159,6 +162,9 @@ pub struct WheelDescription {
     /// width for a torus.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rounding: Option<f64>,
+    /// Name of its material; `wheel` by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<String>,
     /// Largest driving torque, N m.
     pub torque_limit: f64,
     /// 1 or −1: joint torque of a positive (forward) command.

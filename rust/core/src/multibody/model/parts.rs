@@ -37,6 +37,8 @@ pub struct Wheel {
     pub width: f64,
     /// Radius of its edges, m: at most half the width.
     pub rounding: f64,
+    /// Name of its material.
+    pub material: String,
     /// Largest driving torque, N m.
     pub torque_limit: f64,
     /// 1 or −1: joint torque of a positive (forward) command.
@@ -79,6 +81,8 @@ pub struct CollisionBox {
     pub body: usize,
     /// Name of its solid.
     pub name: String,
+    /// Name of its material.
+    pub material: String,
     /// Centre in the body's frame, m.
     pub centre: Vector3<f64>,
     /// Rotation from the box's frame to the body's.
@@ -94,6 +98,8 @@ pub struct CollisionSphere {
     pub body: usize,
     /// Name of its solid.
     pub name: String,
+    /// Name of its material.
+    pub material: String,
     /// Centre in the body's frame, m.
     pub centre: Vector3<f64>,
     /// Radius, m.
