@@ -138,7 +138,7 @@ fn two_bodies_meet_by_the_law_of_their_materials() {
     let two = model(
         "name = \"balls\"\n[[solids]]\nname = \"a\"\nmass = 2.0\ncollides = true\n\
          shape = { kind = \"sphere\", radius = 0.1 }\n[[solids]]\nname = \"b\"\njoint = \"free\"\n\
-         position = [0.3, 0.0, 0.0]\nmass = 2.0\n\
+         mass = 2.0\n\
          shapes = [{ kind = \"sphere\", radius = 0.1, collides = true, material = \"steel\" }]\n",
     );
     let options = StepOptions {

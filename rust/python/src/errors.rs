@@ -221,6 +221,7 @@ impl From<ModelError> for BorderError {
             | ModelError::UnknownParent { name, .. }
             | ModelError::UnknownName { name, .. }
             | ModelError::NotADisc { solid: name, .. }
+            | ModelError::MaterialName { name, .. }
             | ModelError::SteeringNotAbove { name, .. } => Value::Text(name.clone()),
             ModelError::NotFinite { value, .. }
             | ModelError::NotPositive { value, .. }
@@ -314,8 +315,21 @@ impl From<TerrainError> for BorderError {
 
 impl From<OptionsError> for BorderError {
     fn from(e: OptionsError) -> Self {
-        let OptionsError::OutOfRange { field, value, .. } = e;
-        Self::option(field, e.to_string(), Value::Number(value))
+        let message = e.to_string();
+        match e {
+            OptionsError::OutOfRange { field, value, .. } => {
+                Self::option(field, message, Value::Number(value))
+            }
+            OptionsError::BetweenMaterials { value, .. } => {
+                Self::option("materials", message, Value::Number(value))
+            }
+            OptionsError::MaterialsTwice { materials } => {
+                Self::option("materials", message, Value::Text(materials.join(", ")))
+            }
+            OptionsError::MaterialName { name } => {
+                Self::option("materials", message, Value::Text(name))
+            }
+        }
     }
 }
 
