@@ -12,7 +12,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import OptionError, Plane, Simulation, SphereField, __version__
+from rover_gym.mechanics import OptionError, Plane, Simulation, SphereField, Terrain, TerrainError, __version__
 from rover_gym.record.trajectory_format import (
     FORMAT,
     FORMAT_VERSION,
@@ -129,8 +129,14 @@ def write_description(data: h5py.Dataset, unit: str, description: str, columns: 
         data.attrs.create("columns", names, dtype=import_h5py().string_dtype("utf-8", max(1, *map(len, names))))
 
 
-def write_terrain(group: h5py.Group, terrain: Plane | SphereField) -> None:
-    """Stores a terrain in an HDF5 group."""
+def write_terrain(group: h5py.Group, terrain: Terrain) -> None:
+    """Stores a plane or a field of spheres in an HDF5 group.
+
+    Raises:
+        TerrainError: It is another terrain, which has no place in a trajectory.
+    """
+    if not isinstance(terrain, Plane | SphereField):
+        refuse(TerrainError, "terrain", terrain, "must be a Plane or a SphereField to be recorded")
 
     def write(name: str, value: npt.ArrayLike, unit: str, description: str, columns: Sequence[str] = ()) -> None:
         values = np.asarray(value, dtype=np.float64)

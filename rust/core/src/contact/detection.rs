@@ -185,9 +185,14 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
     if let Coverage::Unknown(place) = terrain.coverage(&(base + centre), bound) {
         gate.unknown = Some(place);
     }
-    terrain.visit_near(
+    let floor = match &placed.shape {
+        PlacedShape::Box(solid) => base.y + solid.support(&-Vector3::y()).y - gate.reach,
+        PlacedShape::Disc(_) | PlacedShape::Roller(_) | PlacedShape::Sphere(_) => f64::NEG_INFINITY,
+    };
+    terrain.visit_above(
         &(base + centre),
         bound + gate.reach + motion,
+        floor,
         &mut |id, primitive| match primitive {
             Primitive::Plane(plane) => {
                 dispatch::visit_on_plane(&placed.shape, plane, base, gate.reach, |point| {
@@ -435,9 +440,10 @@ fn visit_nearer(
     let mut gap = f64::INFINITY;
     // A primitive that is not visited is further from the centre than `reach`, hence further
     // from the wheel than reach − R.
-    let mut reach = radius;
-    while reach < FAR && gap + radius > reach {
-        reach *= 2.0;
+    let is_surface = terrain.has_surface();
+    let mut ahead = if is_surface { CLOSE * radius } else { radius };
+    let mut reach = radius + ahead;
+    while reach < FAR {
         terrain.visit_near(&(base + centre), reach, &mut |id, primitive| {
             let mut take = |point: &SurfacePoint| {
                 if point.gap < gap {
@@ -459,8 +465,21 @@ fn visit_nearer(
                 }),
             }
         });
+        if gap + radius <= reach {
+            return;
+        }
+        if is_surface {
+            ahead *= 2.0;
+            reach = radius + ahead;
+        } else {
+            reach *= 2.0;
+        }
     }
 }
+
+/// How far beyond a wheel's rim a search on a surface looks first, in radii: its pieces are many,
+/// and most wheels stand.
+const CLOSE: f64 = 0.02;
 
 /// Search distance of a wheel for the nearest ground, m.
 const FAR: f64 = 1e4;

@@ -160,12 +160,9 @@ impl<T: Lane> Footing<T> {
                 }
             } else {
                 (self.from[lane], self.within[lane]) = (centre, within);
-                if let Some(found) = only_plane(terrain, &centre, disc.radius + within) {
+                if let Some(plane) = terrain.level_near(&centre, disc.radius + within) {
                     self.flat |= own;
-                    self.offset.set(lane, f64::INFINITY);
-                    if let Some(plane) = found {
-                        self.put(lane, &plane);
-                    }
+                    self.put(lane, &plane);
                     return true;
                 }
             }
@@ -198,18 +195,4 @@ impl<T: Lane> Footing<T> {
 /// The plane behind a point, along its normal by its gap; `base` as for the point.
 fn plane_at(point: &SurfacePoint, base: &Vector3<f64>) -> Plane {
     Plane::through(&(base + point.point - point.n * point.gap), point.n)
-}
-
-/// The plane that all pieces near a place lie in; None if they lie in several, `Some(None)` if
-/// there are none.
-fn only_plane(terrain: &dyn Terrain, centre: &Vector3<f64>, within: f64) -> Option<Option<Plane>> {
-    let mut only: Option<Plane> = None;
-    let mut is_one = true;
-    terrain.visit_near(centre, within, &mut |_, piece| match (piece, &only) {
-        (Primitive::Face(face), None) => only = Some(face.plane),
-        (Primitive::Face(face), Some(plane)) => is_one &= face.plane == *plane,
-        (Primitive::Sphere(_), _) => {} // measured by itself
-        _ => is_one = false,
-    });
-    is_one.then_some(only)
 }

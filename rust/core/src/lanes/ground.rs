@@ -514,11 +514,16 @@ fn over_surface(
     let shape = PlacedShape::Box(*solid);
     let reach = near.reach + ROUNDING;
     let mut touches = false;
-    field.visit_near(&solid.centre, bound + reach, &mut |id, piece| {
-        visit_on_surface(&shape, piece, &nowhere, reach, |point| {
-            touches |= is_on_surface(field, id, &nowhere, point);
-        });
-    });
+    field.visit_above(
+        &solid.centre,
+        bound + reach,
+        low - reach,
+        &mut |id, piece| {
+            visit_on_surface(&shape, piece, &nowhere, reach, |point| {
+                touches |= is_on_surface(field, id, &nowhere, point);
+            });
+        },
+    );
     (f64::NEG_INFINITY, touches)
 }
 

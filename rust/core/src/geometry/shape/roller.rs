@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::{Disc, SupportMap};
+use crate::scalar::elementary::hypot;
 
 /// A wheel with a width: two equal circles on one axle, their convex hull swept by a ball.
 ///
@@ -82,6 +83,6 @@ impl SupportMap for Roller {
     }
 
     fn bound(&self) -> f64 {
-        self.core.radius.hypot(self.half) + self.rounding
+        hypot(self.core.radius, self.half) + self.rounding
     }
 }

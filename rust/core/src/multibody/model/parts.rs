@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::multibody::motor::Motor;
+use crate::scalar::elementary::hypot;
 
 /// The frame of a solid, fixed to a moving body.
 #[derive(Clone, Debug)]
@@ -67,7 +68,8 @@ impl Wheel {
     #[must_use]
     pub fn bound(&self) -> f64 {
         if self.is_wide() {
-            (self.radius - self.rounding).hypot(0.5 * self.width - self.rounding) + self.rounding
+            let inner = self.radius - self.rounding;
+            hypot(inner, 0.5 * self.width - self.rounding) + self.rounding
         } else {
             self.radius
         }
