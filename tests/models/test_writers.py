@@ -110,3 +110,14 @@ def test_an_imported_rover_goes_through_both_formats(tmp_path):
     model = RoverModel.from_urdf(write(tmp_path, rover()))
     assert_same_machine(model, written_and_read(model, tmp_path, "urdf"))
     assert_same_machine(model, written_and_read(model, tmp_path, "mjcf"))
+
+
+def test_a_wide_wheel_is_written_as_wide_as_it_is(tmp_path):
+    description = RoverModel().to_dict()
+    for wheel in description["wheels"]:
+        wheel["width"] = 0.125
+    model = RoverModel.from_dict(description)
+    model.to_urdf(tmp_path / "wide.urdf")
+    assert (tmp_path / "wide.urdf").read_text().count('length="0.125"') == 6
+    model.to_mjcf(tmp_path / "wide.xml")
+    assert (tmp_path / "wide.xml").read_text().count(' 0.0625"') == 6

@@ -65,7 +65,7 @@ def _body(above: ET.Element, solid: WrittenSolid, wheel: dict[str, Any] | None) 
     if wheel is not None:
         x, y, z = wheel["axle"]
         radius = wheel.get("contact_radius") or wheel["radius"]
-        rim = {"kind": "cylinder", "radius": radius, "height": WHEEL_WIDTH * radius}
+        rim = {"kind": "cylinder", "radius": radius, "height": wheel.get("width") or WHEEL_WIDTH * radius}
         axle = np.array([x, -z, y]) / np.linalg.norm((x, y, z))
         _add_geom(body, rim, np.zeros(3), turn_z_to(axle), collides=True, visible=True)
     return body
