@@ -566,13 +566,15 @@ class RoverModel:
             OptionError: `coordinates` is neither of the two.
         """
     def resting_pose(self, terrain: _Terrain | _Terrains, position: Sequence[float], heading: float) -> _Array:
-        """The coordinates of the rover at rest on a plane.
+        """The coordinates of the rover at rest on a terrain.
 
-        The joints are at zero, the trunk is upright along the normal with its origin above the
-        position, and the lowest wheel has gap zero.
+        On a plane the joints are at zero, the trunk is upright along the normal with its origin
+        above the position, and the lowest wheel has gap zero. On any other terrain the height of
+        the trunk, its pitch and roll and the joints that carry wheels bring all wheels down to the
+        ground as far as they can; no wheel is in it.
 
         Args:
-            plane: The plane, which must not be vertical.
+            terrain: A terrain, or a list of several; a plane must not be vertical.
             position: x and z, (2,), m.
             heading: Heading, rad.
 
@@ -580,7 +582,8 @@ class RoverModel:
             Coordinates of the state, (nq,).
 
         Raises:
-            TerrainError: `plane` is no plane.
+            TerrainError: `terrain` is no terrain, or does not say what the ground is under the
+                trunk or a wheel.
             StateError: A number is not finite, or the plane is vertical.
         """
     def wheel_contact_points(
@@ -2221,11 +2224,13 @@ class EpisodeDistribution:
         rocks: Range of `difficulty`, and `abundance` and `max_radius` or None, by name; None for no
             rocks.
         slope_by_difficulty: Whether the slope follows from the difficulty of the rocks.
-        field: The ground of every episode, a field on a plane; None for a tilted plane.
+        ground: The ground of every episode, a terrain of any kind; None for a tilted plane.
+        hills: Fractal ground: root mean square of its slope, rise over run, or nan for one that
+            follows from the difficulty of the rocks; None for none. Not together with `ground`.
 
     Raises:
         OptionError: An argument is missing, no number, or out of its range.
-        TerrainError: `field` is no SphereField on a plane.
+        TerrainError: `ground` is no terrain.
     """
 
     def __new__(
@@ -2238,7 +2243,8 @@ class EpisodeDistribution:
         trunk_load_limit: float,
         rocks: Mapping[str, Any] | None = None,
         slope_by_difficulty: bool = False,
-        field: SphereField | None = None,
+        ground: _Terrain | _Terrains | None = None,
+        hills: float | None = None,
     ) -> EpisodeDistribution: ...
     def draw(
         self,
@@ -2324,7 +2330,7 @@ class DrawnEpisodes:
             OptionError: There is no such episode.
         """
     def plane(self, index: int) -> Plane:
-        """The plane of an episode, under rocks too.
+        """The plane of an episode, under rocks too; None where the ground has none.
 
         Args:
             index: Number of the episode.

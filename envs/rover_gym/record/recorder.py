@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import Plane, SphereField
+from rover_gym.mechanics import Terrain
 from rover_gym.record.channels import Channel
 from rover_gym.record.facts import storable, versions, write_attribute, write_description, write_terrain
 from rover_gym.record.steady_file import FileInUseError, SteadyFile
@@ -64,7 +64,7 @@ class Recorder:
         channels: Sequence[Channel],
         attributes: Mapping[str, Any] | None = None,
         *,
-        terrain: Plane | SphereField | None = None,
+        terrain: Terrain | None = None,
         rows_per_flush: int = 200,
     ) -> None:
         hdf5 = import_h5py()
@@ -87,9 +87,7 @@ class Recorder:
             self._release()
             raise
 
-    def _begin(
-        self, channels: Sequence[Channel], facts: Mapping[str, Any], terrain: Plane | SphereField | None
-    ) -> None:
+    def _begin(self, channels: Sequence[Channel], facts: Mapping[str, Any], terrain: Terrain | None) -> None:
         for key, value in facts.items():
             write_attribute(self._file, key, value)
         for channel in channels:
