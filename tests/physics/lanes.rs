@@ -39,3 +39,5 @@ fn spread<T: Lane, R>(token: T::Token, rovers: &[R], of: impl Fn(&R) -> Vec<f64>
     }
     out
 }
+#[path = "lanes/surfaces.rs"]
+mod surfaces;

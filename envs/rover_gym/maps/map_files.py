@@ -6,7 +6,7 @@ A file is checked before it is read into memory, and every error names it.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
@@ -140,15 +140,7 @@ def _read_npy(file: _File) -> Heights:
 
 def _read_png(file: _File, height_range: object) -> Heights:
     image = require("PIL.Image", "maps")
-    if file.scale is None:
-        if height_range is None:
-            refuse(TerrainError, "height_range", None, f"must be given for {file.path}, or scale")
-        try:
-            low, high = height_range  # type: ignore[misc]
-        except (TypeError, ValueError):
-            refuse(TerrainError, "height_range", height_range, "must be the heights of black and white")
-        low = number("height_range[0]", low, error=TerrainError)
-        high = number("height_range[1]", high, error=TerrainError)
+    low, high = (0.0, 0.0) if file.scale is not None else _range(file, height_range)
 
     def read() -> Any:
         with image.open(file.path, formats=["PNG"]) as opened:
@@ -162,6 +154,17 @@ def _read_png(file: _File, height_range: object) -> Heights:
     if file.scale is not None:
         return file.heights(values, file.scale, file.datum or 0.0)
     return file.heights(values, (high - low) / white, 0.0) + np.float32(low)
+
+
+def _range(file: _File, height_range: object) -> Pair:
+    """Heights of black and white, m."""
+    if height_range is None:
+        refuse(TerrainError, "height_range", None, f"must be given for {file.path}, or scale")
+    ends = list(height_range) if isinstance(height_range, Iterable) else []
+    if len(ends) != 2:
+        refuse(TerrainError, "height_range", height_range, "must be the heights of black and white")
+    low, high = (number(f"height_range[{k}]", x, error=TerrainError) for k, x in enumerate(ends))
+    return low, high
 
 
 def _read_geotiff(file: _File, band: object, spacing: Pair | None) -> tuple[Heights, Pair | None]:

@@ -1,5 +1,6 @@
 """Triangle meshes from files, by trimesh."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -37,10 +38,8 @@ def read_mesh(
     factor = number("scale", scale, above=0.0, error=TerrainError)
     if up not in ("y", "z"):
         refuse(TerrainError, "up", up, 'must be "y" or "z"')
-    try:
-        shift = np.array([number(f"position[{k}]", x, error=TerrainError) for k, x in enumerate(position)])  # type: ignore[call-overload]
-    except TypeError:
-        shift = np.empty(0)
+    places = list(position) if isinstance(position, Iterable) else []
+    shift = np.array([number(f"position[{k}]", x, error=TerrainError) for k, x in enumerate(places)])
     if shift.shape != (3,):
         refuse(TerrainError, "position", position, "must be three numbers")
     with place.open("rb") as file:

@@ -27,12 +27,14 @@ fn rocks(numbers: &mut Random) -> Arc<dyn Terrain> {
     Arc::new(SphereField::new(&centres, &radii, Some(Plane::ground())).unwrap())
 }
 
-/// A rover on its ground; every third among rocks.
+/// A rover on its ground: a plane, rocks, a flat map, hills, or hills with rocks.
 fn rover(i: usize, model: &Arc<Model>, numbers: &mut Random) -> RoverSimulation {
-    let terrain: Arc<dyn Terrain> = if i % 3 == 2 {
-        rocks(numbers)
-    } else {
-        Arc::new(Plane::ground())
+    let terrain: Arc<dyn Terrain> = match i % 6 {
+        1 => crate::surfaces::flat(0.25),
+        3 => crate::surfaces::hills(0.15, i as u64),
+        4 => crate::surfaces::hills_with_rocks(i as u64),
+        2 | 5 => rocks(numbers),
+        _ => Arc::new(Plane::ground()),
     };
     let options = StepOptions {
         friction_coefficient: 0.6 + 0.2 * numbers.next(),

@@ -8,7 +8,7 @@ use super::pair::{Contact, ContactKey, ON_SURFACE};
 use super::part::{Part, place_wheel};
 use crate::geometry::query::sweep::{DEEP, first_touch};
 use crate::geometry::query::{SurfacePoint, box_sphere, disc_sphere, dispatch, sphere_sphere};
-use crate::geometry::{Coverage, Disc, PlacedShape, Primitive, Sphere, Terrain};
+use crate::geometry::{Coverage, Disc, PlacedShape, Primitive, Sphere, SupportMap, Terrain};
 use crate::multibody::{Kinematics, Model};
 
 /// On a sphere: the nearest point.
@@ -180,9 +180,14 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
     if let Coverage::Unknown(place) = terrain.coverage(&(base + centre), bound) {
         gate.unknown = Some(place);
     }
-    terrain.visit_near(
+    let floor = match &placed.shape {
+        PlacedShape::Box(solid) => base.y + solid.support(&-Vector3::y()).y - gate.reach,
+        PlacedShape::Disc(_) | PlacedShape::Sphere(_) => f64::NEG_INFINITY,
+    };
+    terrain.visit_above(
         &(base + centre),
         bound + gate.reach + motion,
+        floor,
         &mut |id, primitive| match primitive {
             Primitive::Plane(plane) => {
                 dispatch::visit_on_plane(&placed.shape, plane, base, gate.reach, |point| {
@@ -210,7 +215,7 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
 
 /// Visits the points of a shape on a piece of a surface whose gap is at most `reach`, m.
 #[inline]
-fn visit_on_surface(
+pub(crate) fn visit_on_surface(
     shape: &PlacedShape,
     piece: &Primitive,
     base: &Vector3<f64>,
@@ -242,7 +247,7 @@ fn on_surface(point: &SurfacePoint) -> SurfacePoint {
 /// Whether a point on a piece of a surface is a contact: one behind the piece's plane must be in
 /// the ground, and not only beyond the far side of a ridge or a rock.
 #[inline]
-fn is_on_surface(
+pub(crate) fn is_on_surface(
     terrain: &dyn Terrain,
     id: u32,
     base: &Vector3<f64>,
@@ -396,7 +401,9 @@ fn visit_nearer(
     let mut gap = f64::INFINITY;
     // A primitive that is not visited is further from the centre than `reach`, hence further
     // from the wheel than reach − R.
-    let mut reach = 2.0 * radius;
+    let is_surface = terrain.has_surface();
+    let mut ahead = if is_surface { CLOSE * radius } else { radius };
+    let mut reach = radius + ahead;
     while reach < FAR && gap + radius > reach {
         terrain.visit_near(&(base + disc.centre), reach, &mut |id, primitive| {
             let mut take = |point: &SurfacePoint| {
@@ -419,9 +426,18 @@ fn visit_nearer(
                 }),
             }
         });
-        reach *= 2.0;
+        if is_surface {
+            ahead *= 2.0;
+            reach = radius + ahead;
+        } else {
+            reach *= 2.0;
+        }
     }
 }
+
+/// How far beyond a wheel's rim a search on a surface looks first, in radii: its pieces are many,
+/// and most wheels stand.
+const CLOSE: f64 = 0.02;
 
 /// Search distance of a wheel for the nearest ground, m.
 const FAR: f64 = 1e4;

@@ -40,7 +40,7 @@ pub struct ContactKey {
 pub const ON_SURFACE: usize = 0x100;
 
 /// Number of all surfaces in [`ContactKey::lasting`].
-const ANY_PIECE: u32 = u32::MAX;
+pub const ANY_PIECE: u32 = u32::MAX;
 
 impl ContactKey {
     /// The key by which the next step knows the contact: on a surface the same for all pieces, so

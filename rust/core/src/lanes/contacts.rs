@@ -18,6 +18,7 @@ use super::parts::{Parts, Twist};
 use super::poses::Poses;
 use super::problem::MAX_CONTACTS;
 use crate::contact::detection::touch_of_disc;
+use crate::contact::pair::{ANY_PIECE, ON_SURFACE};
 use crate::contact::{Contact, ContactFrame, ContactKey, Part};
 use crate::geometry::query::NEAREST;
 use crate::geometry::query::sweep::DEEP;
@@ -65,6 +66,8 @@ pub struct Listed {
     pub slots: [u8; MAX_CONTACTS],
     /// Number of the ground's primitive of each.
     pub primitives: [u32; MAX_CONTACTS],
+    /// Feature of each.
+    features: [usize; MAX_CONTACTS],
 }
 
 /// The contacts of a block.
@@ -210,7 +213,7 @@ impl<T: Lane> Contacts<T> {
     #[inline(always)]
     fn key(list: &Listed, place: usize) -> ContactKey {
         let wheel = Part::Wheel(Self::wheel(usize::from(list.slots[place])));
-        ContactKey::on_ground(wheel, NEAREST, list.primitives[place])
+        ContactKey::on_ground(wheel, list.features[place], list.primitives[place])
     }
 
     /// Fills `p` (3 n_c) with the impulses that a rover remembers of its contacts, N s, zero for
@@ -281,7 +284,7 @@ impl<T: Lane> Contacts<T> {
     fn look(&mut self, ground: &mut Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
         let Sight { middle, end, v, .. } = *sight;
         self.parts.find_twists(middle, v, &mut self.twists);
-        let mut declined = ground.on_surface;
+        let mut declined = ground.mixed;
         for b in 0..self.parts.boxes.len() {
             declined = declined | self.look_at_box(b, ground, sight);
         }
@@ -298,15 +301,21 @@ impl<T: Lane> Contacts<T> {
                 self.parts.wheels[w].axle(pose),
                 self.parts.wheels[w].centre(pose),
             );
+            let (mut plane, radius) = ((ground.normal, height_at_end), self.parts.wheels[w].radius);
+            if ground.has_surfaces() {
+                ground.follow_footing(w, (end.origin, centre, s), radius);
+                let (normal, offset) = ground.under_wheel(w);
+                plane = (normal, normal.dot(end.origin) + offset);
+            }
             for slot in first..first + SLOTS {
                 if self.slots[slot].active.any() {
                     self.used.push(slot);
-                    let flat = self.relocate(slot, ground, end, height_at_end, s, centre);
+                    let flat = self.relocate(slot, plane, end, s, centre);
                     declined = declined | flat;
                 }
             }
         }
-        declined | self.list_contacts()
+        declined | self.list_contacts(ground)
     }
 
     /// Whether a box may touch the ground.
@@ -329,7 +338,7 @@ impl<T: Lane> Contacts<T> {
         let half = Vec3::splat(self.token, solid.half_size);
         let drop = (local.x * half.x).abs() + (local.y * half.y).abs() + (local.z * half.z).abs();
         let near_plane = (sight.height + n.dot(centre) - drop).le(reach);
-        if !ground.has_spheres() {
+        if !ground.has_spheres() && !ground.has_surfaces() {
             return near_plane;
         }
         let at_end = &sight.end.bodies[solid.body];
@@ -345,11 +354,24 @@ impl<T: Lane> Contacts<T> {
     fn look_at_wheel(&mut self, w: usize, ground: &mut Ground<T>, sight: &Sight<'_, T>) -> T::Mask {
         let wheel = &self.parts.wheels[w];
         let pose = &sight.middle.bodies[wheel.body];
-        let (n, s, centre) = (ground.normal, wheel.axle(pose), wheel.centre(pose));
+        let (s, centre) = (wheel.axle(pose), wheel.centre(pose));
         let radius = T::splat(self.token, wheel.radius);
+        // The second and third point of the rim, and all that may come near.
+        let reach = (sight.forecast).reach(
+            #[inline(always)]
+            || wheel.speed(&self.twists[wheel.carrier], centre, sight.v),
+        );
+        let mut declined = T::mask(self.token, 0);
+        let (mut n, mut base) = (ground.normal, sight.height);
+        if ground.has_surfaces() {
+            let origin = sight.middle.origin;
+            declined = ground.find_footing(w, (origin, centre, s), wheel.radius, reach);
+            let (normal, offset) = ground.under_wheel(w);
+            (n, base) = (normal, normal.dot(origin) + offset);
+        }
         let (across, along) = (n.cross(s), n.dot(s));
         let length = across.norm();
-        let height = sight.height + n.dot(centre);
+        let height = base + n.dot(centre);
         let gap = height - radius * length;
         let twist = &self.twists[wheel.carrier];
         let u_N = if sight.forecast.needs_velocity(gap) {
@@ -359,13 +381,8 @@ impl<T: Lane> Contacts<T> {
             radius
         };
         let on_plane = sight.forecast.admits(gap, u_N);
-        // The second and third point of the rim.
-        let reach = (sight.forecast).reach(
-            #[inline(always)]
-            || wheel.speed(&self.twists[wheel.carrier], centre, sight.v),
-        );
         let half = radius.like(0.5);
-        let mut declined = (height + half * radius * length).le(reach);
+        declined = declined | (height + half * radius * length).le(reach);
         let none = T::mask(self.token, 0);
         let first = SLOTS * w;
         self.slots[first].active = on_plane;
@@ -489,14 +506,14 @@ impl<T: Lane> Contacts<T> {
     }
 
     /// Evaluates a slot at the end of the step, where the wheel has the axle `s` and the centre
-    /// `centre`. Returns where a frame is not defined.
+    /// `centre`, and the trunk's origin the given height (m) over the plane of the given normal
+    /// under the wheel. Returns where a frame is not defined.
     #[inline(always)]
     fn relocate(
         &mut self,
         slot: usize,
-        ground: &Ground<T>,
+        (n, height): (Vec3<T>, T),
         end: &Poses<T>,
-        height: T,
         s: Vec3<T>,
         centre: Vec3<T>,
     ) -> T::Mask {
@@ -506,7 +523,6 @@ impl<T: Lane> Contacts<T> {
         let parallel = radius.like(PARALLEL);
         let mut undefined = T::mask(self.token, 0);
         if (slot.active & !slot.on_sphere).any() {
-            let n = ground.normal;
             let across = n.cross(s);
             let length = across.norm();
             let t = across * (radius.like(1.0) / length);
@@ -550,7 +566,7 @@ impl<T: Lane> Contacts<T> {
 
     /// Lists the contacts of every lane. Returns the lanes with too many.
     #[inline(always)]
-    fn list_contacts(&mut self) -> T::Mask {
+    fn list_contacts(&mut self, ground: &Ground<T>) -> T::Mask {
         for list in &mut self.lists[..T::LANES] {
             list.n = 0;
         }
@@ -576,8 +592,13 @@ impl<T: Lane> Contacts<T> {
                 }
                 places[lane] = small(list.n);
                 list.slots[list.n] = small(slot);
+                list.features[list.n] = NEAREST;
                 list.primitives[list.n] = if on_sphere >> lane & 1 == 1 {
                     whole(numbers[lane])
+                } else if ground.is_surface(lane) {
+                    // Which piece was found depends on when a search was made.
+                    list.features[list.n] = NEAREST | ON_SURFACE;
+                    ANY_PIECE
                 } else {
                     PLANE
                 };
@@ -597,6 +618,7 @@ impl Listed {
         n: 0,
         slots: [0; MAX_CONTACTS],
         primitives: [0; MAX_CONTACTS],
+        features: [NEAREST; MAX_CONTACTS],
     };
 }
 

@@ -1,4 +1,4 @@
-//! The ground under the rovers of a block: a plane, spheres, or spheres on a plane.
+//! The ground under the rovers of a block: a plane, a surface, spheres, or spheres on one of them.
 //!
 //! A rover over a plane alone pays for the plane alone. Spheres are searched rover by rover, and
 //! seldom: a wheel keeps those near it until it has moved further than the search looked ahead, and
@@ -9,8 +9,10 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::footing::{Footing, Wheels};
+use crate::contact::detection::{is_on_surface, visit_on_surface};
 use crate::geometry::query::sweep::DEEP;
-use crate::geometry::{OrientedBox, Primitive, Sphere, Terrain};
+use crate::geometry::{Coverage, OrientedBox, PlacedShape, Primitive, Sphere, SupportMap, Terrain};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Mat3, Vec3};
 
 /// Most spheres near a wheel. A wheel near more is declined.
@@ -104,8 +106,12 @@ pub struct Ground<T: Lane> {
     /// Those that may have more than a plane.
     fields: Vec<Option<Arc<dyn Terrain>>>,
     has_spheres: bool,
-    /// Rovers on a surface.
-    pub(super) on_surface: T::Mask,
+    /// Those with a surface.
+    surfaces: Vec<Option<Arc<dyn Terrain>>>,
+    has_surfaces: bool,
+    /// Rovers on a surface and a plane, which have no ordinary step.
+    pub(super) mixed: T::Mask,
+    footings: Vec<Footing<T>>,
     wheels: Vec<Near<T>>,
     boxes: Vec<Around<T>>,
 }
@@ -143,7 +149,10 @@ impl<T: Lane> Ground<T> {
             terrains: vec![None; T::LANES],
             fields: vec![None; T::LANES],
             has_spheres: false,
-            on_surface: T::mask(token, 0),
+            surfaces: vec![None; T::LANES],
+            has_surfaces: false,
+            mixed: T::mask(token, 0),
+            footings: vec![Footing::new(token); n_wheels],
             wheels: vec![near; n_wheels],
             boxes: vec![around; n_boxes],
         }
@@ -167,15 +176,22 @@ impl<T: Lane> Ground<T> {
         self.fields[lane] = (!is_plane).then(|| Arc::clone(terrain));
         self.has_spheres = self.fields.iter().any(Option::is_some);
         let own = T::mask(self.offset.token(), 1 << lane);
-        self.on_surface = self.on_surface & !own;
-        if terrain.has_surface() {
-            self.on_surface = self.on_surface | own;
+        let has_surface = terrain.has_surface();
+        self.surfaces[lane] = has_surface.then(|| Arc::clone(terrain));
+        self.has_surfaces = self.surfaces.iter().any(Option::is_some);
+        self.mixed = self.mixed & !own;
+        if has_surface && plane.is_some() {
+            self.mixed = self.mixed | own;
         }
-        // A plane alone needs no search, and the first step on spheres makes one.
-        let known = if is_plane {
-            f64::INFINITY
-        } else {
+        for footing in &mut self.footings {
+            footing.set_lane(lane, normal, offset);
+        }
+        // Without spheres there is nothing to search, and the first step on spheres makes one.
+        let has_spheres = !is_plane && terrain.can_be_passed();
+        let known = if has_spheres {
             f64::NEG_INFINITY
+        } else {
+            f64::INFINITY
         };
         for near in &mut self.wheels {
             near.keep(lane, &[]);
@@ -184,7 +200,9 @@ impl<T: Lane> Ground<T> {
         }
         for around in &mut self.boxes {
             around.from.set(lane, [0.0; 3]);
-            around.clearance.set(lane, known);
+            let is_known = !has_spheres && !has_surface;
+            let clearance = if is_known { known } else { f64::NEG_INFINITY };
+            around.clearance.set(lane, clearance);
             around.kept[lane].within = f64::NEG_INFINITY;
         }
     }
@@ -193,6 +211,62 @@ impl<T: Lane> Ground<T> {
     #[inline(always)]
     pub(super) fn has_spheres(&self) -> bool {
         self.has_spheres
+    }
+
+    /// Whether any rover's ground has a surface.
+    #[inline(always)]
+    pub(super) fn has_surfaces(&self) -> bool {
+        self.has_surfaces
+    }
+
+    /// Finds what the rovers' wheel stands on where the ground is a surface: [`Footing::find`].
+    #[inline(always)]
+    pub(super) fn find_footing(
+        &mut self,
+        wheel: usize,
+        (base, centre, axle): (Vec3<T>, Vec3<T>, Vec3<T>),
+        radius: f64,
+        reach: T,
+    ) -> T::Mask {
+        let wheels = Wheels {
+            base,
+            centre,
+            axle,
+            radius,
+            surfaces: &self.surfaces,
+        };
+        self.footings[wheel].find(&wheels, reach)
+    }
+
+    /// Moves it to another instant: [`Footing::follow`].
+    #[inline(always)]
+    pub(super) fn follow_footing(
+        &mut self,
+        wheel: usize,
+        (base, centre, axle): (Vec3<T>, Vec3<T>, Vec3<T>),
+        radius: f64,
+    ) {
+        let wheels = Wheels {
+            base,
+            centre,
+            axle,
+            radius,
+            surfaces: &self.surfaces,
+        };
+        self.footings[wheel].follow(&wheels);
+    }
+
+    /// Normal and offset of the plane under a wheel.
+    #[inline(always)]
+    pub(super) fn under_wheel(&self, wheel: usize) -> (Vec3<T>, T) {
+        let footing = &self.footings[wheel];
+        (footing.normal, footing.offset)
+    }
+
+    /// Whether a rover's ground is a surface.
+    #[inline(always)]
+    pub(super) fn is_surface(&self, lane: usize) -> bool {
+        self.surfaces[lane].is_some()
     }
 
     /// Height of a point over the plane, m.
@@ -350,6 +424,11 @@ impl<T: Lane> Around<T> {
         } else {
             (clearance, is_near) = kept.search(field, solid, bound, near);
         }
+        if field.has_surface() {
+            let (own, is_near_surface) = over_surface(field, solid, bound, near);
+            clearance = clearance.min(own);
+            is_near |= is_near_surface;
+        }
         self.from.set(lane, solid.centre.into());
         self.R.x.set(lane, solid.axis(0).into());
         self.R.y.set(lane, solid.axis(1).into());
@@ -407,6 +486,45 @@ impl Kept {
         self.R = solid.R;
         (clearance, is_near)
     }
+}
+
+/// A distance (m) that no piece of a surface comes nearer to a box than, and whether one may touch
+/// it or its ground is unknown.
+#[cold]
+fn over_surface(
+    field: &dyn Terrain,
+    solid: &OrientedBox,
+    bound: f64,
+    near: Nearness,
+) -> (f64, bool) {
+    let nowhere = Vector3::zeros();
+    if field.coverage(&solid.centre, bound) != Coverage::Known {
+        return (f64::NEG_INFINITY, true);
+    }
+    let low = solid.support(&-Vector3::y()).y;
+    let is_covered = field.coverage(&solid.centre, bound + AHEAD_OF_BOX) == Coverage::Known;
+    if is_covered {
+        let highest = field.highest(&solid.centre, bound + AHEAD_OF_BOX);
+        let clearance = (low - highest).min(AHEAD_OF_BOX);
+        if clearance > near.reach + near.motion + ROUNDING {
+            return (clearance, false);
+        }
+    }
+    // Piece by piece, and again at the next step.
+    let shape = PlacedShape::Box(*solid);
+    let reach = near.reach + ROUNDING;
+    let mut touches = false;
+    field.visit_above(
+        &solid.centre,
+        bound + reach,
+        low - reach,
+        &mut |id, piece| {
+            visit_on_surface(&shape, piece, &nowhere, reach, |point| {
+                touches |= is_on_surface(field, id, &nowhere, point);
+            });
+        },
+    );
+    (f64::NEG_INFINITY, touches)
 }
 
 /// Distance of a sphere from a box, m; at least minus the radius.

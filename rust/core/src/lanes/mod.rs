@@ -8,7 +8,7 @@
 //! - [`admission`]: which rovers have ordinary steps; [`machine`]: what the rovers share;
 //!   [`inertias`]: what they need not; [`place`]: configurations;
 //! - [`poses`], [`mass_matrix`], [`bias`], [`energy`]: dynamics of the tree;
-//! - `parts`, [`ground`], [`forecast`], [`contacts`]: what touches what; [`rows`]: Jacobian and
+//! - `parts`, [`ground`], `footing`, [`forecast`], [`contacts`]: what touches what; [`rows`]: Jacobian and
 //!   Delassus operator;
 //! - [`problem`], [`modes`], [`equations`], `pivoting`, `visits`, `bench`, [`queue`]: the
 //!   friction-contact problems;
@@ -22,6 +22,7 @@ pub mod contacts;
 pub mod drives;
 pub mod energy;
 pub mod equations;
+mod footing;
 pub mod forecast;
 pub mod ground;
 pub mod inertias;

@@ -137,6 +137,12 @@ impl BallTree {
         });
     }
 
+    /// Visits all balls that come closer than `radius` to `centre`, seen from above, and some more.
+    pub fn visit_pillar(&self, centre: &Vector3<f64>, radius: f64, mut visit: impl FnMut(&Sphere)) {
+        let reach = [radius, f64::INFINITY, radius];
+        self.search(centre, &reach, |ball| visit(&ball.sphere));
+    }
+
     /// Visits the balls of all leaves that come closer than `reach` to `centre` along each axis.
     #[inline]
     fn search(&self, centre: &Vector3<f64>, reach: &[f64; 3], mut visit: impl FnMut(&Ball)) {

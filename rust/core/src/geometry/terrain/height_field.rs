@@ -10,6 +10,8 @@
 //! along z, 4 the diagonal, 5 the vertex. Faces are computed when they are needed, so the map costs
 //! four bytes a height, and a hundredth of that for the bounds of tiles.
 
+use std::cell::Cell;
+
 use nalgebra::Vector3;
 
 use super::error::TerrainError;
@@ -170,10 +172,17 @@ impl HeightField {
     /// Visits the corners (column, row) of the cells that a ball of radius `reach` (m) about
     /// `centre` (world, m) may touch, from above or from within the ground.
     #[inline]
-    pub fn visit_cells(
+    pub fn visit_cells(&self, centre: &Vector3<f64>, reach: f64, visit: impl FnMut(usize, usize)) {
+        self.visit_cells_above(centre, reach, f64::NEG_INFINITY, visit);
+    }
+
+    /// The same without cells below the height `floor`, m.
+    #[inline]
+    fn visit_cells_above(
         &self,
         centre: &Vector3<f64>,
         reach: f64,
+        floor: f64,
         mut visit: impl FnMut(usize, usize),
     ) {
         let along = |axis: usize, x: f64| (x - self.origin[axis]) / self.spacing[axis];
@@ -200,7 +209,7 @@ impl HeightField {
             if rest < 0.0 {
                 f64::INFINITY
             } else {
-                centre.y - rest.sqrt()
+                floor.max(centre.y - rest.sqrt())
             }
         };
         self.tiles.visit(
@@ -219,6 +228,22 @@ impl HeightField {
                 }
             },
         );
+    }
+
+    /// First and last columns and rows of the cells within `radius` of `centre`; of a place off the
+    /// map those at its border.
+    fn span(&self, centre: &Vector3<f64>, radius: f64) -> [[usize; 2]; 2] {
+        let along = |axis: usize, x: f64, n: usize| {
+            let local = (x - self.origin[axis]) / self.spacing[axis];
+            let half = radius / self.spacing[axis];
+            let last = (n - 2) as f64;
+            let within = |x: f64| index(x.floor().clamp(0.0, last));
+            [within(local - half), within(local + half)]
+        };
+        [
+            along(0, centre.x, self.columns),
+            along(1, centre.z, self.rows),
+        ]
     }
 
     /// Height of a corner, m; nan where there is none.
@@ -291,22 +316,32 @@ impl HeightField {
     }
 
     /// A face of a cell.
-    #[inline]
     fn face(&self, place: Place, half: Half) -> Option<Face> {
-        let n = self.normal(place, half)?;
-        let plane = Plane::through(&self.point(place), n);
         let [i, j] = place;
-        let (edges, sides) = match half {
-            Half::Low => ([(place, 2), ([i + 1, j], 3), (place, 4)], [1, 1, 0]),
-            Half::High => ([([i, j + 1], 2), (place, 3), (place, 4)], [0, 0, 1]),
-        };
-        let wall = |k: usize| {
-            let (corner, edge): (Place, u32) = edges[k];
-            self.hinge(corner, edge).map(|hinge| hinge.walls[sides[k]])
+        let edges = [
+            (place, 2),
+            (place, 3),
+            (place, 4),
+            ([i + 1, j], 3),
+            ([i, j + 1], 2),
+        ];
+        let hinges = edges.map(|(corner, k)| self.hinge(corner, k));
+        self.face_between(place, half, &hinges)
+    }
+
+    /// The same from the hinges at the cell's near edges along x and z, its diagonal, and its far
+    /// edges along z and x.
+    #[inline]
+    fn face_between(&self, place: Place, half: Half, hinges: &[Option<Hinge>; 5]) -> Option<Face> {
+        let n = self.normal(place, half)?;
+        let wall = |hinge: usize, side: usize| hinges[hinge].as_ref().map(|h| h.walls[side]);
+        let walls = match half {
+            Half::Low => [wall(0, 1)?, wall(3, 1)?, wall(2, 0)?],
+            Half::High => [wall(4, 0)?, wall(1, 0)?, wall(2, 1)?],
         };
         Some(Face {
-            plane,
-            walls: [wall(0)?, wall(1)?, wall(2)?],
+            plane: Plane::through(&self.point(place), n),
+            walls,
         })
     }
 
@@ -407,16 +442,52 @@ impl Terrain for HeightField {
         reach: f64,
         visit: &mut dyn FnMut(u32, &Primitive),
     ) {
+        self.visit_above(centre, reach, f64::NEG_INFINITY, visit);
+    }
+
+    fn visit_above(
+        &self,
+        centre: &Vector3<f64>,
+        reach: f64,
+        floor: f64,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
         let columns = self.columns;
-        self.visit_cells(centre, reach, |i, j| {
+        self.visit_cells_above(centre, reach, floor, |i, j| {
             let own = [narrow(i), narrow(j)];
             let first = number(j * columns + i);
-            for k in 0..PIECES {
-                if let Some(piece) = self.piece(own, k) {
-                    visit(first + k, &piece);
+            let (right, above) = ([own[0] + 1, own[1]], [own[0], own[1] + 1]);
+            let hinges = [(own, 2), (own, 3), (own, 4), (right, 3), (above, 2)]
+                .map(|(place, k)| self.hinge(place, k));
+            for (k, half) in [(0, Half::Low), (1, Half::High)] {
+                if let Some(face) = self.face_between(own, half, &hinges) {
+                    visit(first + k, &Primitive::Face(face));
                 }
             }
+            for (k, hinge) in (2..5).zip(&hinges) {
+                let is_convex = hinge.as_ref().is_some_and(|hinge| hinge.is_convex);
+                if let Some(edge) = is_convex.then(|| self.edge(own, k)).flatten() {
+                    visit(first + k, &Primitive::Edge(edge));
+                }
+            }
+            if let Some(vertex) = self.vertex(own) {
+                visit(first + 5, &Primitive::Vertex(vertex));
+            }
         });
+    }
+
+    fn level_near(&self, centre: &Vector3<f64>, radius: f64) -> Option<Plane> {
+        let [columns, rows] = self.span(centre, radius);
+        let first = self.heights[rows[0] * self.columns + columns[0]];
+        for j in rows[0]..=rows[1] + 1 {
+            let row = &self.heights[j * self.columns..][columns[0]..=columns[1] + 1];
+            if row.iter().any(|h| h.to_bits() != first.to_bits()) {
+                return None;
+            }
+        }
+        let normal = self.normal([columns[0], rows[0]].map(narrow), Half::Low)?;
+        let place = self.point([columns[0], rows[0]].map(narrow));
+        Some(Plane::through(&place, normal))
     }
 
     fn can_be_passed(&self) -> bool {
@@ -441,6 +512,23 @@ impl Terrain for HeightField {
     fn is_inside(&self, _id: u32, point: &Vector3<f64>) -> bool {
         let surface = self.height(point.x, point.z);
         surface.is_some_and(|y| point.y <= y + SURFACE)
+    }
+
+    fn highest(&self, centre: &Vector3<f64>, radius: f64) -> f64 {
+        let [columns, rows] = self.span(centre, radius);
+        let highest = Cell::new(f32::NEG_INFINITY);
+        self.tiles.visit(
+            columns,
+            rows,
+            |tile| tile.highest > highest.get(),
+            |[i, j]| {
+                let at = j * self.columns + i;
+                let corners = [at, at + 1, at + self.columns, at + self.columns + 1];
+                let own = corners.map(|k| self.heights[k]);
+                highest.set(own.into_iter().fold(highest.get(), f32::max));
+            },
+        );
+        f64::from(highest.get())
     }
 
     fn coverage(&self, centre: &Vector3<f64>, radius: f64) -> Coverage {

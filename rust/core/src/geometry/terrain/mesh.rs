@@ -357,6 +357,15 @@ impl Terrain for TriangleMesh {
         Coverage::Silent
     }
 
+    fn highest(&self, centre: &Vector3<f64>, radius: f64) -> f64 {
+        let place = Vector3::new(centre.x, 0.0, centre.z);
+        let mut highest = f64::NEG_INFINITY;
+        self.tree.visit_pillar(&place, radius, |ball| {
+            highest = highest.max(ball.centre.y + ball.radius);
+        });
+        highest
+    }
+
     fn height(&self, x: f64, z: f64) -> Option<f64> {
         let mut highest: Option<f64> = None;
         self.visit_crossings(x, z, |y, faces_up| {

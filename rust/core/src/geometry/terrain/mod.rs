@@ -59,6 +59,23 @@ pub trait Terrain: Send + Sync {
     /// must not depend on distant ones.
     fn visit_near(&self, centre: &Vector3<f64>, reach: f64, visit: &mut dyn FnMut(u32, &Primitive));
 
+    /// The same, but pieces of a surface that are below the height `floor` (m) may be left out.
+    fn visit_above(
+        &self,
+        centre: &Vector3<f64>,
+        reach: f64,
+        _floor: f64,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
+        self.visit_near(centre, reach, visit);
+    }
+
+    /// The plane of all pieces of a surface within `radius` (m) of `centre`, seen from above, if
+    /// the surface is level there and that is quickly told.
+    fn level_near(&self, _centre: &Vector3<f64>, _radius: f64) -> Option<Plane> {
+        None
+    }
+
     /// Whether a part can pass a primitive within one step: a ball, but not a half-space. Only then
     /// the motion within a step is examined.
     fn can_be_passed(&self) -> bool {
@@ -90,6 +107,11 @@ pub trait Terrain: Send + Sync {
     /// What is known of the ground within `radius` (m) of `centre`, seen from above.
     fn coverage(&self, _centre: &Vector3<f64>, _radius: f64) -> Coverage {
         Coverage::Known
+    }
+
+    /// A height (m) that no surface exceeds within `radius` (m) of `centre`, seen from above.
+    fn highest(&self, _centre: &Vector3<f64>, _radius: f64) -> f64 {
+        f64::INFINITY
     }
 
     /// Height y (m) of the visible surface at (x, z); `None` where there is none.

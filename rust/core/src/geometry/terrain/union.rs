@@ -80,6 +80,26 @@ impl Terrain for Union {
         }
     }
 
+    fn visit_above(
+        &self,
+        centre: &Vector3<f64>,
+        reach: f64,
+        floor: f64,
+        visit: &mut dyn FnMut(u32, &Primitive),
+    ) {
+        for (part, first) in self.parts.iter().zip(&self.first) {
+            part.visit_above(centre, reach, floor, &mut |id, primitive| {
+                visit(first + id, primitive);
+            });
+        }
+    }
+
+    fn level_near(&self, centre: &Vector3<f64>, radius: f64) -> Option<Plane> {
+        let mut surfaces = self.parts.iter().filter(|part| part.has_surface());
+        let only = surfaces.next().filter(|_| surfaces.next().is_none())?;
+        only.level_near(centre, radius)
+    }
+
     fn can_be_passed(&self) -> bool {
         self.parts.iter().any(|part| part.can_be_passed())
     }
@@ -117,6 +137,12 @@ impl Terrain for Union {
             }
         }
         coverage
+    }
+
+    fn highest(&self, centre: &Vector3<f64>, radius: f64) -> f64 {
+        let surfaces = self.parts.iter().filter(|part| part.has_surface());
+        let heights = surfaces.map(|part| part.highest(centre, radius));
+        heights.fold(f64::NEG_INFINITY, f64::max)
     }
 
     fn height(&self, x: f64, z: f64) -> Option<f64> {
