@@ -235,3 +235,13 @@ def test_enormous_files_are_refused_before_they_are_read(tmp_path):
         RoverModel.from_urdf(tmp_path / "nothing.urdf")
     with pytest.raises(ModelError, match="path"):
         RoverModel.from_urdf(3)
+
+
+def test_a_shape_that_no_urdf_has_is_refused_and_what_stands_beside_one_is_left_out(tmp_path):
+    """Yourdfpy takes the first child of a geometry for its shape and raises an error without a name for others."""
+    box = '<box size="1 0.6 0.2"/>'
+    with pytest.raises(ModelError, match=r"chassis.*geometry.*must hold one of box.*capsule"):
+        RoverModel.from_urdf(write(tmp_path, changed(rover(), box, '<capsule radius="1"/>')))
+    model = RoverModel.from_urdf(write(tmp_path, changed(rover(), box, f"<origin/>{box}")))
+    assert model.to_dict()["solids"][0]["shapes"][0]["kind"] == "box"
+    assert any("<origin> of <geometry>" in entry for entry in model.import_report.left_out)

@@ -45,6 +45,7 @@ ATTRIBUTES: dict[str, dict[str, Any]] = {
     "robot/transmission": {"name": str, "type": str},
     "transmission/joint": {"name!": str},
 }
+SHAPES = ("box", "cylinder", "sphere", "mesh")
 #: Elements whose content says nothing about the motion.
 APPEARANCE = ("material", "verbose", "contact_coefficients")
 #: Elements that their parent has at most once.
@@ -61,7 +62,7 @@ def parse(path: Path) -> tuple[Any, list[str]]:
     """Reads and checks a file.
 
     Returns:
-        The root element, and what the file holds besides the elements and attributes of a URDF.
+        The root element without what no URDF holds, and a list of that.
 
     Raises:
         ModelError: The file is no URDF; the message names file, line, element and value.
@@ -109,8 +110,9 @@ def _check(path: Path, element: Any, key: str, where: str, others: dict[str, int
         else:
             _check_numbers(path, at, value, kind)
     seen: dict[str, int] = {}
-    for child in element:
-        if not isinstance(child.tag, str):
+    for child in list(element):
+        if not isinstance(child.tag, str):  # a processing instruction
+            element.remove(child)
             continue
         seen[child.tag] = seen.get(child.tag, 0) + 1
         at = f"{where}.{child.tag}"
@@ -120,13 +122,16 @@ def _check(path: Path, element: Any, key: str, where: str, others: dict[str, int
         if below in ATTRIBUTES:
             name = child.get("name")
             _check(path, child, below, f"{child.tag}[{name}]" if name else at, others)
-        elif child.tag not in APPEARANCE and element.tag != "transmission":
-            others[f"<{child.tag}> of <{element.tag}>"] = others.get(f"<{child.tag}> of <{element.tag}>", 0) + 1
+        else:
+            if child.tag not in APPEARANCE and element.tag != "transmission":
+                others[f"<{child.tag}> of <{element.tag}>"] = others.get(f"<{child.tag}> of <{element.tag}>", 0) + 1
+            if child.tag != "gazebo":  # the reader looks into it for loops
+                element.remove(child)
     for name in REQUIRED.get(element.tag, ()) if key != "transmission/joint" else ():
         if name not in seen:
             refuse_in(path, f"line {element.sourceline}, {where}.{name}", None, "is missing")
-    if element.tag == "geometry" and sum(count for tag, count in seen.items() if tag not in APPEARANCE) != 1:
-        refuse_in(path, f"line {element.sourceline}, {where}", sorted(seen), "must hold one shape")
+    if element.tag == "geometry" and sum(seen.get(shape, 0) for shape in SHAPES) != 1:
+        refuse_in(path, f"line {element.sourceline}, {where}", sorted(seen), f"must hold one of {', '.join(SHAPES)}")
 
 
 def _check_numbers(path: Path, where: str, text: str, count: int | tuple[int, ...]) -> None:
