@@ -68,18 +68,21 @@ REFUSED = {
     "no gravity": ('name="arm"', 'name="arm" gravcomp="1"', "gravcomp"),
     "no XML": ("<mujoco", "<mujoco <", "MuJoCo: refuses the file"),
     "an unknown element": ("<freejoint/>", "<freejoint/><engine/>", "MuJoCo: refuses the file.*engine"),
+    "not a number": ('size="0.1"', 'size="nan"', "MuJoCo: (warns of|refuses) the file.*(?i:nan)"),
     "an unknown mesh": ('type="sphere" size="0.1"', 'type="mesh" mesh="m"', "MuJoCo: refuses the file"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("what", REFUSED)
-def test_what_cannot_be_simulated_is_refused(tmp_path, what):
+def test_what_cannot_be_simulated_is_refused(tmp_path, monkeypatch, what):
+    monkeypatch.chdir(tmp_path)
     old, new, expected = REFUSED[what]
     assert old in CART
     path = write(tmp_path, CART.replace(old, new, 1), "cart.xml")
     with pytest.raises(ModelError, match=expected) as caught:
         RoverModel.from_mjcf(path)
     assert str(caught.value).startswith(f"{path}: ")
+    assert [file.name for file in tmp_path.iterdir()] == ["cart.xml"], "MuJoCo's log is in the way"
 
 
 def test_what_is_ignored_by_word_is_listed(tmp_path):

@@ -34,11 +34,20 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
         refuse_in(path, "file", size, f"must have at most {MAX_BYTES} bytes")
     with path.open("rb"):  # an error of the system, where there is one, says more than MuJoCo's
         pass
+    warnings: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(warnings.append)  # else they go to a file in the current folder
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         refuse_in(path, "MuJoCo", path.name, f"refuses the file ({' '.join(str(error).split())})")
+    finally:
+        mujoco.set_mju_user_warning(before)
+    for warning in warnings:
+        if "nan" in warning.lower():
+            refuse_in(path, "MuJoCo", path.name, f"warns of the file ({' '.join(warning.split())})")
     reader = _Reader(mujoco, model, path, ignore)
+    reader.tree.left_out += [f"MuJoCo warns: {' '.join(warning.split())}" for warning in warnings]
     reader.check_options()
     reader.add_links()
     reader.add_couplings()
