@@ -95,3 +95,9 @@ def test_a_linear_coupling_becomes_exact(tmp_path):
     more = '<equality><joint joint1="roll_right" joint2="roll_left" polycoef="0 -1 0 0 0"/></equality>'
     model = RoverModel.from_mjcf(write(tmp_path, CART.replace("<!--more-->", more), "cart.xml"))
     assert "wheel_right" not in model.dof_names
+
+
+def test_a_urdf_is_pointed_to_its_reader(tmp_path):
+    path = write(tmp_path, '<robot name="small"><link name="a"/></robot>', "small.xml")
+    with pytest.raises(ModelError, match="from_urdf"):
+        RoverModel.from_mjcf(path)

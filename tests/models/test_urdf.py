@@ -228,6 +228,9 @@ def test_enormous_files_are_refused_before_they_are_read(tmp_path):
     crowd = write(tmp_path, '<robot name="crowd">' + '<link name="a"/>' * 200_001 + "</robot>")
     with pytest.raises(ModelError, match="elements"):
         RoverModel.from_urdf(crowd)
+    many = write(tmp_path, '<robot name="many">' + '<link name="a"/>' * 2001 + "</robot>")
+    with pytest.raises(ModelError, match="2000 links"):
+        RoverModel.from_urdf(many)
     bomb = '<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]><robot name="&b;"><link name="a"/></robot>'
     with pytest.raises(ModelError):
         RoverModel.from_urdf(write(tmp_path, bomb))
@@ -245,3 +248,13 @@ def test_a_shape_that_no_urdf_has_is_refused_and_what_stands_beside_one_is_left_
     model = RoverModel.from_urdf(write(tmp_path, changed(rover(), box, f"<origin/>{box}")))
     assert model.to_dict()["solids"][0]["shapes"][0]["kind"] == "box"
     assert any("<origin> of <geometry>" in entry for entry in model.import_report.left_out)
+
+
+def test_a_long_chain_of_links_is_read_or_refused_in_time(tmp_path):
+    chain = '<robot name="chain">' + body("link0")
+    for i in range(1, 1001):
+        chain += body(f"link{i}") + joint(f"joint{i}", "continuous", f"link{i - 1}", f"link{i}")
+    with pytest.raises(ModelError, match="at most 1000 solids"):
+        RoverModel.from_urdf(write(tmp_path, chain + "</robot>"))
+    shorter = chain[: chain.index('<link name="link200">')].rstrip()
+    assert RoverModel.from_urdf(write(tmp_path, shorter + "</robot>"), wheels=[]).nv == 6 + 199

@@ -9,6 +9,7 @@ refused, with the candidates.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -115,6 +116,7 @@ def _chosen(
         if not isinstance(wheels, Iterable):
             refuse(ModelError, "wheels", wheels, "must be names, or radii by name")
         return {resolve(tree, "wheels", name): None for name in wheels}
+    carriers = _moving_carriers(tree)
     candidates = [
         link
         for link in tree.links.values()
@@ -122,7 +124,7 @@ def _chosen(
         and link.joint.limits is None
         and link.joint.follows is None
         and abs(float(poses[link.name][0] @ link.joint.axis @ up)) < TILT
-        and not any(child.joint.kind != "fixed" for child in _below(tree, link.name))
+        and link.name not in carriers
     ]
     named = [one for one in candidates if NAMED.search(f"{one.name} {one.joint.name}")]
     named = [one for one in named if not NOT_NAMED.search(one.name)] or named
@@ -143,10 +145,12 @@ def _chosen(
     return dict.fromkeys(chosen)
 
 
-def _below(tree: RobotTree, name: str) -> list[FileLink]:
-    found = tree.children(name)
-    for child in list(found):
-        found += _below(tree, child.name)
+def _moving_carriers(tree: RobotTree) -> set[str]:
+    """The links that carry something that moves."""
+    found: set[str] = set()
+    for link in reversed(list(tree.links.values())):
+        if link.parent is not None and (link.joint.kind != "fixed" or link.name in found):
+            found.add(link.parent)
     return found
 
 
@@ -230,9 +234,10 @@ def _steering(tree: RobotTree, wheels: list[str], steering: Steering, upright: d
         refuse(ModelError, "steering", steering, "must be names, or joints by wheel")
     given = None if steering is None else [resolve(tree, "steering", name) for name in steering]
     found = {}
+    above = {wheel: _above(tree, wheel) for wheel in wheels}
+    n_carried = Counter(name for names in above.values() for name in names)
     for wheel in wheels:
-        for name in _above(tree, wheel):
-            others = [other for other in wheels if other != wheel and name in _above(tree, other)]
+        for name in above[wheel]:
             if given is not None:
                 if name in given:
                     found[wheel] = name
@@ -240,7 +245,7 @@ def _steering(tree: RobotTree, wheels: list[str], steering: Steering, upright: d
                 continue
             carrier = tree.links[name].joint
             is_upright = carrier.kind == "revolute" and upright[name] > 1.0 - TILT
-            if is_upright and not others and carrier.follows is None:
+            if is_upright and n_carried[name] == 1 and carrier.follows is None:
                 found[wheel] = name
                 break
     if given is not None and (unused := [name for name in given if name not in found.values()]):

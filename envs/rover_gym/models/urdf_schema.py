@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rover_gym.extras import require
-from rover_gym.models.robot_tree import refuse_in
+from rover_gym.models.robot_tree import MAX_LINKS, refuse_in
 
 #: Largest file, bytes, and largest number of elements.
 MAX_BYTES, MAX_ELEMENTS = 16 << 20, 200_000
@@ -87,6 +87,9 @@ def parse(path: Path) -> tuple[Any, list[str]]:
     n_elements = sum(1 for _ in root.iter())
     if n_elements > MAX_ELEMENTS:
         refuse_in(path, "file", n_elements, f"must have at most {MAX_ELEMENTS} elements")
+    n_links = len(root.findall("link"))
+    if n_links > MAX_LINKS:
+        refuse_in(path, "robot", n_links, f"must have at most {MAX_LINKS} links")
     others: dict[str, int] = {}
     _check(path, root, "robot", "robot", others)
     return root, [f"{what}, {count} times" if count > 1 else what for what, count in others.items()]
