@@ -258,3 +258,9 @@ def test_a_long_chain_of_links_is_read_or_refused_in_time(tmp_path):
         RoverModel.from_urdf(write(tmp_path, chain + "</robot>"))
     shorter = chain[: chain.index('<link name="link200">')].rstrip()
     assert RoverModel.from_urdf(write(tmp_path, shorter + "</robot>"), wheels=[]).nv == 6 + 199
+
+
+def test_a_declaration_of_no_version_of_xml_is_passed_over(tmp_path):
+    """Files of Bullet's examples begin so, and lxml refuses them."""
+    text = changed(rover(), 'xml version="1.0"', 'xml version="0.0"')
+    assert RoverModel.from_urdf(write(tmp_path, text)) == RoverModel.from_urdf(write(tmp_path, rover()))

@@ -6,6 +6,7 @@ The tables follow the XML specification of ROS's package urdf.
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,9 @@ from rover_gym.models.robot_tree import MAX_LINKS, refuse_in
 
 #: Largest file, bytes, and largest number of elements.
 MAX_BYTES, MAX_ELEMENTS = 16 << 20, 200_000
+
+#: A declaration of no version of XML, which some exporters write.
+UNVERSIONED = re.compile(rb'^<\?xml version="0\.0"[^>\n]*\?>')
 
 _POSE = {"xyz": 3, "rpy": 3}
 #: Attributes by parent's and own tag: how many numbers, or `str`. An exclamation mark: required.
@@ -73,7 +77,7 @@ def parse(path: Path) -> tuple[Any, list[str]]:
     size = path.stat().st_size
     if size > MAX_BYTES:
         refuse_in(path, "file", size, f"must have at most {MAX_BYTES} bytes")
-    data = path.read_bytes()
+    data = UNVERSIONED.sub(b"", path.read_bytes())
     try:
         root = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True))
     except etree.XMLSyntaxError as error:
