@@ -101,3 +101,31 @@ def test_a_urdf_is_pointed_to_its_reader(tmp_path):
     path = write(tmp_path, '<robot name="small"><link name="a"/></robot>', "small.xml")
     with pytest.raises(ModelError, match="from_urdf"):
         RoverModel.from_mjcf(path)
+
+
+def test_a_wheel_of_a_mesh_has_the_meshs_radius(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.cylinder(radius=0.25, height=0.1, sections=64).export(tmp_path / "rim.stl")
+    asset = '<asset><mesh name="rim" file="rim.stl"/></asset>'
+    text = CART.replace('type="cylinder" size="0.15 0.04"', 'type="mesh" mesh="rim"').replace("<!--more-->", asset)
+    model = RoverModel.from_mjcf(write(tmp_path, text, "cart.xml"))
+    assert model.wheel_radii == pytest.approx([0.25, 0.25], rel=1e-6)
+
+
+def test_a_written_rover_drives_forward_in_mujoco(tmp_path):
+    """Motors by `drive_sign`, servos that hold the steering, and the differential as an equality."""
+    rover = RoverModel.named("open-rover")
+    rover.to_mjcf(tmp_path / "rover.xml")
+    text = (tmp_path / "rover.xml").read_text(encoding="utf-8")
+    ground = '<worldbody><geom type="plane" size="5 5 1" pos="0 0 -0.245"/>'
+    model = mujoco.MjModel.from_xml_string(text.replace("<worldbody>", ground, 1))
+    model.opt.timestep, model.opt.integrator = 1e-3, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    data = mujoco.MjData(model)
+    for wheel in rover.wheel_names:
+        data.actuator(f"drive_wheel_{wheel}").ctrl[0] = 0.2
+    mujoco.mj_step(model, data, nstep=1000)
+    assert data.qpos[0] > 0.1
+    assert abs(data.qpos[1]) < 0.01
+    # The rockers turn oppositely, as far as MuJoCo's constraint is stiff.
+    left, right = (data.joint(f"{side}_rocker").qpos[0] for side in ("left", "right"))
+    assert abs(left + right) < 0.01

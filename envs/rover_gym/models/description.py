@@ -190,6 +190,8 @@ def _shapes(tree: RobotTree, link: FileLink, A: Array, anchor: Array, role: Whee
     touching = False
     for shape in link.shapes:
         where = f"link[{link.name}]: a {shape.kind}"
+        if shape.collides and role is not None:
+            tree.left_out.append(f"{where} of a wheel, which touches as a disc")
         if shape.kind not in ("box", "cylinder", "sphere"):
             if shape.collides and role is None:
                 tree.left_out.append(f"{where} that touches, since only boxes and spheres can")
