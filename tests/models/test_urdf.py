@@ -166,6 +166,7 @@ def test_what_is_not_simulated_is_listed(tmp_path):
     )
     listed = "\n".join(model.import_report.left_out)
     for what in (
+        "a cylinder of a wheel, which touches as a disc",
         "<gazebo> of <robot>",
         "<sensor> of <robot>",
         "a mesh that touches",
@@ -264,3 +265,24 @@ def test_a_declaration_of_no_version_of_xml_is_passed_over(tmp_path):
     """Files of Bullet's examples begin so, and lxml refuses them."""
     text = changed(rover(), 'xml version="1.0"', 'xml version="0.0"')
     assert RoverModel.from_urdf(write(tmp_path, text)) == RoverModel.from_urdf(write(tmp_path, rover()))
+
+
+def test_a_pivot_without_stops_is_a_caster_or_a_steering_joint_by_its_name(tmp_path):
+    """Held as a steering joint, a caster would drag its wheel sideways."""
+
+    def with_pivot(name, wheel):
+        text = rover().replace("left_steer", name).replace("left_fork", f"{name}_fork").replace("left_wheel", wheel)
+        return write(tmp_path, changed(text, rf'name="{name}" type="revolute"', f'name="{name}" type="continuous"'))
+
+    caster = RoverModel.from_urdf(with_pivot("caster_pivot", "caster_wheel"))
+    assert [index >= 0 for index in caster.steering_joint_indices] == [False, True, False]
+    assert caster.wheel_torque_limits[0] == 0.0 < caster.wheel_torque_limits[1]
+    assert not any(solid.get("hold") for solid in caster.to_dict()["solids"] if "caster" in solid["name"])
+    swerve = RoverModel.from_urdf(with_pivot("swerve_pivot", "left_wheel"))
+    assert swerve.steering_joint_indices[0] >= 0
+    doubtful = with_pivot("left_pin", "left_wheel")
+    with pytest.raises(ModelError, match=r"left_pin_fork.*turns freely above the wheel left_wheel") as caught:
+        RoverModel.from_urdf(doubtful)
+    assert caught.value.field == "steering"
+    given = RoverModel.from_urdf(doubtful, steering=["left_pin", "right_fork"])
+    assert [index >= 0 for index in given.steering_joint_indices] == [True, True, False]

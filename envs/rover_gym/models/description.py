@@ -159,6 +159,9 @@ def _add_control(
 def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, gains: Gains) -> dict[str, Any]:
     joint = tree.links[role.link].joint
     limit = gains.torque_limit if gains.torque_limit is not None else joint.torque_limit
+    if role.is_caster:
+        limit = 0.0
+        tree.assumed.append(f"wheel {role.link}: a caster, without a drive")
     if limit is None:
         limit = TORQUE_SHARE * weight * role.radius
         tree.assumed.append(

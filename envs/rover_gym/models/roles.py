@@ -2,8 +2,8 @@
 
 A candidate for a wheel is a link at the end of a branch that turns without limits about a level axis. Of the
 candidates those are wheels that have a round shape about their axis, or whose name says so. A wheel is steered by the
-nearest joint above it that turns about an upright axis and carries no other wheel. What is left open by this is
-refused, with the candidates.
+nearest joint above it that turns about an upright axis and carries no other wheel. A wheel is a caster, without drive
+and steering, if its names say so. What is left open by this is refused, with the candidates.
 """
 
 from __future__ import annotations
@@ -23,6 +23,9 @@ from rover_gym.validation import number, refuse
 
 NAMED = re.compile(r"wheel|tyre|tire", re.IGNORECASE)
 NOT_NAMED = re.compile(r"steer|hub|mount|fork|knuckle|arm|axle|motor|caster_base|support", re.IGNORECASE)
+
+STEERS = re.compile(r"steer|swerve|turn|rudder", re.IGNORECASE)
+CASTER = re.compile(r"cast[eo]r|swivel", re.IGNORECASE)
 
 #: Sine of the largest tilt of an axle from level and of a steering axis from upright.
 TILT = 0.1
@@ -45,6 +48,7 @@ class WheelRole:
         shift: Of its centre from the joint's origin along the axis, m.
         is_forward: Whether a positive joint velocity drives it forward.
         steering: The link whose joint steers it.
+        is_caster: Whether it runs freely.
     """
 
     link: str
@@ -52,6 +56,7 @@ class WheelRole:
     shift: float
     is_forward: bool
     steering: str | None = None
+    is_caster: bool = False
 
 
 def find_wheels(tree: RobotTree, up: Array, ahead: Array, wheels: Wheels, steering: Steering) -> list[WheelRole]:
@@ -84,6 +89,7 @@ def find_wheels(tree: RobotTree, up: Array, ahead: Array, wheels: Wheels, steeri
     steers = _steering(tree, names, steering, {name: abs(float(axis(link) @ up)) for name, link in tree.links.items()})
     for wheel in found:
         wheel.steering = steers.get(wheel.link)
+        wheel.is_caster = wheel.steering is None and _is_caster(tree, wheel.link)
     return found
 
 
@@ -246,11 +252,32 @@ def _steering(tree: RobotTree, wheels: list[str], steering: Steering, upright: d
             carrier = tree.links[name].joint
             is_upright = carrier.kind == "revolute" and upright[name] > 1.0 - TILT
             if is_upright and n_carried[name] == 1 and carrier.follows is None:
-                found[wheel] = name
+                if not CASTER.search(f"{name} {carrier.name} {wheel}"):
+                    _check_is_held(tree, name, wheel)
+                    found[wheel] = name
                 break
     if given is not None and (unused := [name for name in given if name not in found.values()]):
         refuse(ModelError, "steering", unused, f"carries none of the wheels {', '.join(wheels) or '(none)'}")
     return found
+
+
+def _check_is_held(tree: RobotTree, name: str, wheel: str) -> None:
+    """Refuses a pivot that may be a steering joint or a caster's: held or free are two motions."""
+    joint = tree.links[name].joint
+    is_free = joint.limits is None and joint.hold is None and not joint.is_driven
+    if is_free and not STEERS.search(f"{name} {joint.name}"):
+        give = f"give steering=[{name!r}, ...] if it steers, steering=[] if it is a caster"
+        refuse(ModelError, "steering", None, f"{name} of {tree.path} turns freely above the wheel {wheel}: {give}")
+
+
+def _is_caster(tree: RobotTree, wheel: str) -> bool:
+    """Whether the names of a wheel or of what carries it and nothing else say that it is a caster, without a drive."""
+    names = [wheel]
+    for name in _above(tree, wheel):
+        if len(tree.children(name)) > 1:
+            break
+        names.append(name)
+    return any(CASTER.search(f"{name} {tree.links[name].joint.name}") for name in names)
 
 
 def _above(tree: RobotTree, name: str) -> list[str]:
