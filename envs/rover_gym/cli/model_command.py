@@ -31,10 +31,10 @@ def import_model(
     picture: Annotated[Path | None, typer.Option(dir_okay=False, help="Picture; beside the model by default.")] = None,
     wheel: Annotated[
         list[str] | None,
-        typer.Option(help="A wheel's link or joint, or NAME=RADIUS in m; repeat for each, or say none."),
+        typer.Option(help="A wheel's link or joint, or NAME=RADIUS in m; repeat for each, or none."),
     ] = None,
     steering: Annotated[
-        list[str] | None, typer.Option(help="A steering link or joint, or WHEEL=JOINT; repeat for each, or say none.")
+        list[str] | None, typer.Option(help="A steering link or joint, or WHEEL=JOINT; repeat for each, or none.")
     ] = None,
     fixed_base: Annotated[bool, typer.Option("--fixed-base", help="Fix the root to the world.")] = False,
     forward: Annotated[str, typer.Option(help="The file's axis of driving: x, -x, y or -y.")] = "x",
