@@ -15,6 +15,8 @@ from typing_extensions import disjoint_base
 _Array: TypeAlias = npt.NDArray[np.float64]
 _Rows: TypeAlias = npt.NDArray[np.uint64]
 _Observation: TypeAlias = npt.NDArray[np.float32]
+_Terrain: TypeAlias = Plane | SphereField | HeightField | TriangleMesh | Union
+_Terrains: TypeAlias = Sequence[_Terrain]
 _Coordinates: TypeAlias = Literal["report", "state"]
 _Range: TypeAlias = tuple[float, float]
 
@@ -30,6 +32,7 @@ __all__ = [
     "EpisodeRules",
     "EpisodeRun",
     "FrictionContactSolution",
+    "HeightField",
     "Line",
     "MirroredRoverSimulation",
     "ModelError",
@@ -57,7 +60,9 @@ __all__ = [
     "StepError",
     "StepReport",
     "TerrainError",
+    "TriangleMesh",
     "TwoWheelRoverSimulation",
+    "Union",
     "__version__",
     "accuracy_options",
     "atan2",
@@ -542,12 +547,14 @@ class RoverModel:
             StateError: `q` has a wrong length or an entry that is not finite.
             OptionError: `coordinates` is neither of the two.
         """
-    def wheel_gaps(self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state") -> _Array:
+    def wheel_gaps(
+        self, q: npt.ArrayLike, terrain: _Terrain | _Terrains, coordinates: _Coordinates = "state"
+    ) -> _Array:
         """The distance of each wheel to the terrain.
 
         Args:
             q: Coordinates, (nq,).
-            terrain: A `Plane` or a `SphereField`.
+            terrain: A terrain, or a list of several.
             coordinates: "state" or "report".
 
         Returns:
@@ -558,7 +565,7 @@ class RoverModel:
             TerrainError: `terrain` is not a terrain.
             OptionError: `coordinates` is neither of the two.
         """
-    def resting_pose(self, plane: Plane, position: Sequence[float], heading: float) -> _Array:
+    def resting_pose(self, terrain: _Terrain | _Terrains, position: Sequence[float], heading: float) -> _Array:
         """The coordinates of the rover at rest on a plane.
 
         The joints are at zero, the trunk is upright along the normal with its origin above the
@@ -577,13 +584,13 @@ class RoverModel:
             StateError: A number is not finite, or the plane is vertical.
         """
     def wheel_contact_points(
-        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
+        self, q: npt.ArrayLike, terrain: _Terrain | _Terrains, coordinates: _Coordinates = "state"
     ) -> _Array:
         """The point of each wheel's rim that is nearest to the terrain.
 
         Args:
             q: Coordinates, (nq,).
-            terrain: A `Plane` or a `SphereField`.
+            terrain: A terrain, or a list of several.
             coordinates: "state" or "report".
 
         Returns:
@@ -595,13 +602,13 @@ class RoverModel:
             OptionError: `coordinates` is neither of the two.
         """
     def wheel_jacobians(
-        self, q: npt.ArrayLike, terrain: Plane | SphereField, coordinates: _Coordinates = "state"
+        self, q: npt.ArrayLike, terrain: _Terrain | _Terrains, coordinates: _Coordinates = "state"
     ) -> _Array:
         """The contact Jacobian of each wheel: u = J v is the velocity of its contact point.
 
         Args:
             q: Coordinates, (nq,).
-            terrain: A `Plane` or a `SphereField`.
+            terrain: A terrain, or a list of several.
             coordinates: "state" or "report".
 
         Returns:
@@ -742,7 +749,7 @@ class SphereField:
         max_diameter: float = 0.5,
         min_diameter: float = 0.05,
         burial: float | tuple[float, float] | None = None,
-        ground: Plane | None = None,
+        ground: _Terrain | _Terrains | None = None,
         clear: npt.ArrayLike | None = None,
     ) -> SphereField:
         """Rocks on a plane, with the size-frequency distribution of rocks on Mars.
@@ -756,7 +763,9 @@ class SphereField:
                 shrinks.
             burial: Fraction of its diameter that a rock is sunk into the ground, 0 to 0.5, or a
                 range from which it is drawn for each rock; 0.5 by default.
-            ground: The plane; flat ground at height 0 by default.
+            ground: What the rocks lie on; flat ground at height 0 by default. A plane is part of the
+                field. Rocks on any other terrain are raised by its height and the terrain is not
+                part of the field: combine them as `Union([terrain, rocks])`.
             clear: Circles x, z, radius that no rock reaches into, (n, 3), m; none by default.
 
         Returns:
@@ -790,6 +799,240 @@ class SphereField:
         """
     def __len__(self) -> int: ...
     def __reduce__(self) -> Any: ...
+
+@final
+class HeightField:
+    """A map of heights as ground: two triangles a cell, solid below. Immutable.
+
+    Row j and column i stand at z = origin[1] + j spacing[1] and x = origin[0] + i spacing[0]. Each
+    cell is cut along the diagonal from its corner (j, i) to (j + 1, i + 1). A height that is nan is
+    no data: a rover that comes near it, or to the border of the map, ends the call with a
+    `StepError` that names the place. Heights are kept in single precision.
+
+    Args:
+        heights: Heights y, (n_z, n_x), m; nan for no data.
+        spacing: Distance of columns and of rows, m: one number, or (dx, dz).
+        origin: Place (x, z) of the first height, m; by default such that the map's middle is at
+            the world's origin.
+
+    Raises:
+        TerrainError: The array has a wrong shape, a height is infinite or beyond 1e6 m, no cell
+            has data, or the spacing is not positive.
+    """
+
+    def __new__(
+        cls,
+        heights: npt.ArrayLike,
+        spacing: float | tuple[float, float],
+        origin: tuple[float, float] | None = None,
+    ) -> HeightField: ...
+    @staticmethod
+    def from_file(
+        path: str | PathLike[str],
+        *,
+        spacing: float | tuple[float, float] | None = None,
+        origin: tuple[float, float] | None = None,
+        height_range: tuple[float, float] | None = None,
+        scale: float | None = None,
+        datum: float | None = None,
+        band: int = 1,
+    ) -> HeightField:
+        """Reads a map from a GeoTIFF, a PNG or a .npy file.
+
+        Columns run along x and rows along z; of a map with north up, x is east and z south. A
+        GeoTIFF brings its spacing, its unit and its mark for no data.
+
+        Args:
+            path: Path of the file; its ending tells the format.
+            spacing: Distance of columns and of rows, m; needed unless the file gives it.
+            origin: Place (x, z) of the first height, m; by default such that the map's middle is
+                at the world's origin.
+            height_range: Of a PNG: heights of black and white, (2,), m.
+            scale: Factor from the file's numbers to m; of a GeoTIFF by default its own.
+            datum: Height of the file that becomes 0, in its own numbers; of a GeoTIFF by default its
+                lowest, otherwise 0.
+            band: Band of a GeoTIFF, from 1.
+
+        Returns:
+            The map.
+
+        Raises:
+            TerrainError: The file is no such map or does not say enough; the message names it.
+            OSError: The file cannot be read.
+            MissingExtraError: The extra `maps` is not installed.
+        """
+    @staticmethod
+    def fractal(
+        size: float | tuple[float, float],
+        spacing: float | tuple[float, float],
+        roughness: float,
+        *,
+        hurst: float = 0.7,
+        longest_wave: float | None = None,
+        craters: float = 0.0,
+        crater_diameter: tuple[float, float] = (0.5, 5.0),
+        ripple_height: float = 0.0,
+        ripple_length: float = 1.0,
+        seed: int = 0,
+        origin: tuple[float, float] | None = None,
+    ) -> HeightField:
+        """Rough ground made by a seed: a self-affine surface, with craters and ripples on demand.
+
+        The power of a wave of k cycles a metre falls as k^(-2 hurst - 2) from `longest_wave` to two
+        cells. Craters are bowls with a rim, a fifth as deep as wide; those as wide as D or wider
+        number D^-2. Ripples are waves across x, steeper on one side.
+
+        Args:
+            size: Extent along x and z, m: one number, or two.
+            spacing: Distance of columns and of rows, m.
+            roughness: Root mean square of the rough part's heights, m.
+            hurst: Hurst exponent, in (0, 1); 0.7 by default.
+            longest_wave: Longest wave, m; half the smaller extent by default.
+            craters: Expected number of craters in each m² of a diameter of 1 m or more; 0 by
+                default.
+            crater_diameter: Smallest and largest diameter of craters, m; (0.5, 5) by default.
+            ripple_height: Height of ripples from trough to crest, m; 0 by default.
+            ripple_length: Their wavelength, m.
+            seed: Seed of the random numbers; equal seeds give equal ground.
+            origin: Place (x, z) of the first height, m; by default such that the map's middle is
+                at the world's origin.
+
+        Returns:
+            The map.
+
+        Raises:
+            TerrainError: An argument is out of its range.
+
+        Source: Turcotte 1997 (spectral synthesis); Pike 1977 and McGetchin 1973 (craters).
+        """
+    @property
+    def grid(self) -> npt.NDArray[np.float32]:
+        """Heights, (n_z, n_x) float32, m; nan for no data."""
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of rows and columns."""
+    @property
+    def spacing(self) -> tuple[float, float]:
+        """Distance of columns and of rows, (dx, dz), m."""
+    @property
+    def origin(self) -> tuple[float, float]:
+        """Place (x, z) of the first height, m."""
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Corners x_min, z_min, x_max, z_max of the map, m."""
+    def heights(self, points: npt.ArrayLike) -> _Array:
+        """The height of the surface at places of the map.
+
+        Args:
+            points: Places (x, z), (m, 2), m.
+
+        Returns:
+            Heights y, (m,), m; nan off the map and where there is no data.
+
+        Raises:
+            TerrainError: `points` has a wrong shape.
+        """
+    def __reduce__(self) -> tuple[Any, ...]: ...
+
+@final
+class TriangleMesh:
+    """A mesh of triangles as ground: rocks, or anything else that stands still. Immutable.
+
+    Triangles turn counterclockwise, seen from outside. A closed mesh is solid; an open one is
+    solid below.
+
+    Args:
+        vertices: Corners, (n, 3), m.
+        triangles: Numbers of the three corners of each triangle, (m, 3).
+
+    Raises:
+        TerrainError: An array has a wrong shape, an entry is not finite, a triangle has no area or
+            names a corner that is not there, or two triangles turn opposite ways.
+    """
+
+    def __new__(cls, vertices: npt.ArrayLike, triangles: npt.ArrayLike) -> TriangleMesh: ...
+    @staticmethod
+    def from_file(
+        path: str | PathLike[str],
+        *,
+        scale: float = 1.0,
+        position: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        up: Literal["y", "z"] = "y",
+    ) -> TriangleMesh:
+        """Reads a mesh from a file: OBJ, PLY, STL, GLB and what else `trimesh` reads.
+
+        Equal corners are joined, and triangles without an area are left out.
+
+        Args:
+            path: Path of the file; its ending tells the format.
+            scale: Factor from the file's numbers to m.
+            position: Place of the file's origin, (3,), m; the world's origin by default.
+            up: Axis of the file that points up: "y" or "z".
+
+        Returns:
+            The mesh.
+
+        Raises:
+            TerrainError: The file holds no such mesh; the message names it.
+            OSError: The file cannot be read.
+            MissingExtraError: The extra `maps` is not installed.
+        """
+    @property
+    def vertices(self) -> _Array:
+        """Corners, (n, 3), m."""
+    @property
+    def triangles(self) -> npt.NDArray[np.uint32]:
+        """Numbers of the corners of each triangle, (m, 3)."""
+    @property
+    def is_closed(self) -> bool:
+        """Whether no triangle has a free border."""
+    def heights(self, points: npt.ArrayLike) -> _Array:
+        """The height of the highest triangle that faces up at places of the map.
+
+        Args:
+            points: Places (x, z), (m, 2), m.
+
+        Returns:
+            Heights y, (m,), m; nan where there is none.
+
+        Raises:
+            TerrainError: `points` has a wrong shape.
+        """
+    def __len__(self) -> int: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
+
+@final
+class Union:
+    """Several terrains as one ground: a map with rocks on it, say. Immutable.
+
+    A rover touches whatever of them it meets. Where a part has a plane, the ground is known
+    everywhere; otherwise it is known where a height field knows it.
+
+    Args:
+        parts: Terrains of any kind, at least one; at most one of them may have a plane.
+
+    Raises:
+        TerrainError: A part is no terrain, there is none, or two have a plane.
+    """
+
+    def __new__(cls, parts: _Terrains) -> Union: ...
+    @property
+    def parts(self) -> list[_Terrain]:
+        """The terrains, in the order they were given."""
+    def heights(self, points: npt.ArrayLike) -> _Array:
+        """The height of the visible surface at places of the map.
+
+        Args:
+            points: Places (x, z), (m, 2), m.
+
+        Returns:
+            Heights y, (m,), m; nan where there is no ground.
+
+        Raises:
+            TerrainError: `points` has a wrong shape.
+        """
+    def __len__(self) -> int: ...
+    def __reduce__(self) -> tuple[Any, ...]: ...
 
 @final
 class StepReport:
@@ -924,7 +1167,7 @@ class Simulation:
 
     Args:
         model: The machine; the built-in rover by default.
-        terrain: A `Plane` or a `SphereField`; flat ground at height 0 by default.
+        terrain: A terrain, or a list of several; flat ground at height 0 by default.
         gravity: Gravity, world frame, (3,), m/s²; (0, -9.81, 0) by default.
         friction: Coulomb's coefficient of every contact.
         restitution: Newton's coefficient of every contact, in [0, 1].
@@ -953,7 +1196,7 @@ class Simulation:
     def __new__(
         cls,
         model: RoverModel | None = None,
-        terrain: Plane | SphereField | None = None,
+        terrain: _Terrain | _Terrains | None = None,
         *,
         gravity: npt.ArrayLike | None = None,
         friction: float = 0.7,
@@ -973,7 +1216,7 @@ class Simulation:
     def model(self) -> RoverModel:
         """The machine."""
     @property
-    def terrain(self) -> Plane | SphereField:
+    def terrain(self) -> _Terrain:
         """The ground."""
     @property
     def time(self) -> float:

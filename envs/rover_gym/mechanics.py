@@ -5,6 +5,8 @@ Lengths are in m, masses in kg, times in s, angles in rad. The world has x forwa
 listed FL, FR, ML, BL, MR, BR.
 """
 
+from typing import TypeAlias
+
 from rover_gym._core import (
     BallSimulation,
     BusyError,
@@ -17,6 +19,7 @@ from rover_gym._core import (
     EpisodeRules,
     EpisodeRun,
     FrictionContactSolution,
+    HeightField,
     Line,
     MirroredRoverSimulation,
     ModelError,
@@ -44,7 +47,9 @@ from rover_gym._core import (
     StepError,
     StepReport,
     TerrainError,
+    TriangleMesh,
     TwoWheelRoverSimulation,
+    Union,
     __version__,
     accuracy_options,
     atan2,
@@ -55,6 +60,9 @@ from rover_gym._core import (
     solve_friction_contact,
     standard_normals,
 )
+
+#: Any ground; wherever one is taken, so is a list of several.
+Terrain: TypeAlias = Plane | SphereField | HeightField | TriangleMesh | Union
 
 __all__ = [
     "BallSimulation",
@@ -68,6 +76,7 @@ __all__ = [
     "EpisodeRules",
     "EpisodeRun",
     "FrictionContactSolution",
+    "HeightField",
     "Line",
     "MirroredRoverSimulation",
     "ModelError",
@@ -94,8 +103,11 @@ __all__ = [
     "StateError",
     "StepError",
     "StepReport",
+    "Terrain",
     "TerrainError",
+    "TriangleMesh",
     "TwoWheelRoverSimulation",
+    "Union",
     "__version__",
     "accuracy_options",
     "atan2",

@@ -4,11 +4,10 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::draw::{
-    Domain, DomainDistribution, DrawnGround, Fixed, FixedStart, Order, Pcg64, Range,
-    RockDistribution, RockDraw, SceneDistribution, Start, StartDistribution,
+    Domain, DomainDistribution, Fixed, FixedStart, GroundDistribution, HillDistribution, Order,
+    Pcg64, Range, RockDistribution, RockDraw, SceneDistribution, Start, StartDistribution,
 };
 use rover_core::episode::{Beginning, EpisodeBatch, EpisodeDistribution as CoreDistribution};
-use rover_core::geometry::Terrain;
 use rover_core::simulation::RoverSimulation;
 
 use crate::arguments::{Given, count, number, refused};
@@ -16,11 +15,11 @@ use crate::arrays::{fresh_table, vector};
 use crate::episode::{self, EpisodeRun};
 use crate::errors::{BorderError, Kind};
 use crate::generators::{generators, halves};
+use crate::ground::Ground;
 use crate::options::SolverWords;
 use crate::plane::Plane;
 use crate::shared::Watch;
 use crate::simulation::{Origin, Simulation};
-use crate::sphere_field::{Ground, SphereField};
 
 /// Positional and keyword arguments.
 type NewArguments<'py> = ((Bound<'py, PyAny>, Bound<'py, PyAny>), Bound<'py, PyDict>);
@@ -42,11 +41,13 @@ type NewArguments<'py> = ((Bound<'py, PyAny>, Bound<'py, PyAny>), Bound<'py, PyD
 ///     rocks: Range of `difficulty`, and `abundance` and `max_radius` or None, by name; None for no
 ///         rocks.
 ///     slope_by_difficulty: Whether the slope follows from the difficulty of the rocks.
-///     field: The ground of every episode, a field on a plane; None for a tilted plane.
+///     ground: The ground of every episode, a terrain of any kind; None for a tilted plane.
+///     hills: Fractal ground: root mean square of its slope, rise over run, or nan for one that
+///         follows from the difficulty of the rocks; None for none. Not together with `ground`.
 ///
 /// Raises:
 ///     OptionError: An argument is missing, no number, or out of its range.
-///     TerrainError: `field` is no SphereField on a plane.
+///     TerrainError: `ground` is no terrain.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct EpisodeDistribution {
     pub inner: CoreDistribution,
@@ -243,8 +244,8 @@ impl EpisodeDistribution {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
     #[pyo3(signature = (rules, simulation, *, start, domain, trunk_load_limit, rocks = None, slope_by_difficulty = Given::MISSING,
-        field = None),
-        text_signature = "(rules, simulation, *, start, domain, trunk_load_limit, rocks=None, slope_by_difficulty=False, field=None)")]
+        ground = None, hills = None),
+        text_signature = "(rules, simulation, *, start, domain, trunk_load_limit, rocks=None, slope_by_difficulty=False, ground=None, hills=None)")]
     fn new(
         rules: &Bound<'_, PyAny>,
         simulation: &Bound<'_, PyAny>,
@@ -253,7 +254,8 @@ impl EpisodeDistribution {
         trunk_load_limit: &Bound<'_, PyAny>,
         rocks: Option<&Bound<'_, PyAny>>,
         slope_by_difficulty: Given<'_>,
-        field: Option<&Bound<'_, PyAny>>,
+        ground: Option<&Bound<'_, PyAny>>,
+        hills: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let slope_by_difficulty =
             slope_by_difficulty.flag(false, Kind::Option, "slope_by_difficulty")?;
@@ -263,7 +265,8 @@ impl EpisodeDistribution {
             ("domain", Some(domain)),
             ("trunk_load_limit", Some(trunk_load_limit)),
             ("rocks", rocks),
-            ("field", field),
+            ("ground", ground),
+            ("hills", hills),
         ] {
             given.set_item(name, value)?;
         }
@@ -277,12 +280,12 @@ impl EpisodeDistribution {
         let rules = episode::rules(rules)?;
         let made = episode::simulation(simulation, "simulation")?.get();
         let rover = made.open()?;
-        let field = field.map(on_a_plane).transpose()?;
+        let ground = ground_distribution(ground, hills)?;
         let (start, domain) = (Named::of(start, "start")?, Named::of(domain, "domain")?);
         let scenes = SceneDistribution {
             rover: rover.scene().clone(),
             options: rover.options().clone(),
-            field: field.map(|field| field.inner),
+            ground,
             rocks: rocks.map(rock_distribution).transpose()?,
             slope_by_difficulty,
             start: StartDistribution {
@@ -355,12 +358,29 @@ impl EpisodeDistribution {
     }
 }
 
-/// A field on a plane.
-fn on_a_plane(given: &Bound<'_, PyAny>) -> PyResult<SphereField> {
-    let found = given.extract::<SphereField>();
-    let found = found.ok().filter(|field| field.inner.ground().is_some());
-    let what = "a SphereField on a plane";
-    found.ok_or_else(|| refused(given, Kind::Terrain, "field", what).into())
+/// The ground of episodes.
+fn ground_distribution(
+    ground: Option<&Bound<'_, PyAny>>,
+    hills: Option<&Bound<'_, PyAny>>,
+) -> PyResult<GroundDistribution> {
+    match (ground, hills) {
+        (None, None) => Ok(GroundDistribution::Tilted),
+        (Some(ground), None) => Ok(GroundDistribution::Given(Ground::parse(ground)?.drawn())),
+        (None, Some(hills)) => {
+            let what = "a number from 0 to 10, or nan";
+            let wrong = || refused(hills, Kind::Option, "hills", what);
+            let slope: f64 = hills.extract().map_err(|_| wrong())?;
+            if !(slope.is_nan() || (0.0..=10.0).contains(&slope)) {
+                return Err(wrong().into());
+            }
+            Ok(GroundDistribution::Hills(HillDistribution {
+                rms_slope: Some(slope).filter(|slope| !slope.is_nan()),
+            }))
+        }
+        (Some(_), Some(hills)) => {
+            Err(refused(hills, Kind::Option, "hills", "None beside a ground").into())
+        }
+    }
 }
 
 fn rock_distribution(given: &Bound<'_, PyAny>) -> PyResult<RockDistribution> {
@@ -378,16 +398,6 @@ impl DrawnEpisodes {
         let len = self.drawn.len();
         let found = self.drawn.get(i);
         found.ok_or_else(|| refused(index, Kind::Option, "index", &format!("below {len}")).into())
-    }
-}
-
-/// A ground as Python sees it.
-pub fn ground(drawn: &DrawnGround) -> Ground {
-    match drawn {
-        DrawnGround::Plane(plane) => Ground::Plane(Plane { inner: *plane }),
-        DrawnGround::Field(field) => Ground::Field(SphereField {
-            inner: field.clone(),
-        }),
     }
 }
 
@@ -489,19 +499,19 @@ impl DrawnEpisodes {
         py: Python<'py>,
         index: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        ground(&self.at(index)?.scene.ground).to_object(py)
+        Ground::of(&self.at(index)?.scene.ground).to_object(py)
     }
 
-    /// The plane of an episode, under rocks too.
+    /// The plane of an episode, under rocks too; None where the ground has none.
     ///
     /// Args:
     ///     index: Number of the episode.
     ///
     /// Raises:
     ///     OptionError: There is no such episode.
-    fn plane(&self, index: &Bound<'_, PyAny>) -> PyResult<Plane> {
-        let inner = self.at(index)?.scene.plane;
-        Ok(Plane { inner })
+    fn plane(&self, index: &Bound<'_, PyAny>) -> PyResult<Option<Plane>> {
+        let terrain = &self.at(index)?.scene.placement.scene.terrain;
+        Ok(terrain.ground().map(|plane| Plane { inner: *plane }))
     }
 
     /// A new simulation of the rover at the start of an episode.
@@ -516,7 +526,7 @@ impl DrawnEpisodes {
         let made = RoverSimulation::placed(one.scene.placement.clone());
         let made = made.map_err(BorderError::from)?;
         let origin = Origin {
-            terrain: ground(&one.scene.ground),
+            terrain: Ground::of(&one.scene.ground),
             words: self.words.clone(),
         };
         Ok(Simulation::of(made, origin))

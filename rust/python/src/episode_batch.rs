@@ -12,11 +12,12 @@ use crate::arguments::{Given, at_least_one, refused, whole};
 use crate::arrays::fresh_table;
 use crate::batch::{index, mask};
 use crate::draw::{
-    DrawnEpisodes, EpisodeDistribution, Request, domain_row, ground, range, rocks_row, start_row,
+    DrawnEpisodes, EpisodeDistribution, Request, domain_row, range, rocks_row, start_row,
 };
 use crate::episode::{actions, rules, simulation};
 use crate::errors::{BorderError, Kind};
 use crate::generators::halves;
+use crate::ground::Ground;
 use crate::infos::{Told, info, infos};
 use crate::options::SolverWords;
 use crate::shared::{Shared, Watch};
@@ -99,7 +100,7 @@ impl Inner {
     fn set_origin(&mut self, index: usize, words: &SolverWords) -> PyResult<()> {
         let origin = self.batch.origin(index).map_err(BorderError::from)?;
         self.origins[index] = Origin {
-            terrain: ground(&origin.ground),
+            terrain: Ground::of(&origin.ground),
             words: words.clone(),
         };
         Ok(())

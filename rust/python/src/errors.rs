@@ -5,7 +5,7 @@ use pyo3::exceptions::{PyException, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple, PyType};
-use rover_core::draw::DrawError;
+use rover_core::draw::{DrawError, PlacementError, Unsuitable};
 use rover_core::episode::EpisodeError;
 use rover_core::geometry::TerrainError;
 use rover_core::integrator::{OptionsError, StepError};
@@ -192,6 +192,18 @@ impl BorderError {
     }
 }
 
+impl BorderError {
+    /// A goal that does not suit the ground; the message is still to be written.
+    fn of_goal(x: f64, z: f64) -> Self {
+        Self {
+            kind: Kind::Terrain,
+            message: String::new(),
+            field: Some("goal".to_owned()),
+            value: Value::Numbers(vec![x, z]),
+        }
+    }
+}
+
 impl From<ModelError> for BorderError {
     fn from(e: ModelError) -> Self {
         let value = match &e {
@@ -273,7 +285,20 @@ impl From<TerrainError> for BorderError {
             } => (Some(index), Value::Number(*value)),
             TerrainError::MismatchedLengths { radii, .. } => (None, Value::Count(*radii)),
             TerrainError::TooMany { count, .. } => (None, Value::Count(*count)),
-            TerrainError::Empty => (None, Value::Count(0)),
+            TerrainError::Empty | TerrainError::NoTriangles | TerrainError::NoParts => {
+                (None, Value::Count(0))
+            }
+            TerrainError::BadHeight { value, .. } => (None, Value::Number(*value)),
+            TerrainError::WrongCount { count, .. } => (None, Value::Count(*count)),
+            TerrainError::NoSuchVertex { index, vertex, .. } => {
+                (Some(index), Value::Count(*vertex))
+            }
+            TerrainError::FlatTriangle { index }
+            | TerrainError::NotASurface { index, .. }
+            | TerrainError::SecondPlane { index } => (Some(index), Value::Count(*index)),
+            TerrainError::MapSize { .. } | TerrainError::NoData | TerrainError::TooManyPieces => {
+                (None, Value::Nothing)
+            }
         };
         Self {
             kind: Kind::Terrain,
@@ -370,6 +395,15 @@ impl From<DrawError> for BorderError {
                 field: Some("terrain".to_owned()),
                 value: Value::Number(overlap),
             },
+            DrawError::Unsuitable { why, attempts } => {
+                let message = format!("{why}, in the last of {attempts} scenes");
+                let own = match why {
+                    Unsuitable::Placement(why) => why.into(),
+                    Unsuitable::NoGoal { x, z } => Self::of_goal(x, z),
+                    Unsuitable::NoWay { to: [x, z], .. } => Self::of_goal(x, z),
+                };
+                Self { message, ..own }
+            }
             DrawError::Terrain(e) => e.into(),
             DrawError::Model(e) => e.into(),
             DrawError::State(e) => e.into(),
@@ -421,11 +455,31 @@ impl From<SnapshotError> for BorderError {
 
 impl From<StepError> for BorderError {
     fn from(e: StepError) -> Self {
+        let (field, value) = match &e {
+            StepError::NoGround { x, z, .. } => {
+                (Some("terrain".to_owned()), Value::Numbers(vec![*x, *z]))
+            }
+            _ => (None, Value::Nothing),
+        };
         Self {
             kind: Kind::Step,
             message: e.to_string(),
-            field: None,
-            value: Value::Nothing,
+            field,
+            value,
+        }
+    }
+}
+
+impl From<PlacementError> for BorderError {
+    fn from(e: PlacementError) -> Self {
+        match e {
+            PlacementError::State(e) => Self::from(e),
+            PlacementError::NoGround { x, z } => Self {
+                kind: Kind::Terrain,
+                message: e.to_string(),
+                field: Some("position".to_owned()),
+                value: Value::Numbers(vec![x, z]),
+            },
         }
     }
 }

@@ -15,6 +15,8 @@ mod errors;
 mod files;
 mod friction_contact;
 mod generators;
+mod ground;
+mod height_field;
 mod infos;
 mod model;
 mod model_files;
@@ -32,6 +34,7 @@ mod simulation;
 mod snapshot;
 mod sphere_field;
 mod stepping;
+mod triangle_mesh;
 
 use pyo3::prelude::*;
 
@@ -47,6 +50,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<motor::Motor>()?;
     module.add_class::<plane::Plane>()?;
     module.add_class::<sphere_field::SphereField>()?;
+    module.add_class::<height_field::HeightField>()?;
+    module.add_class::<triangle_mesh::TriangleMesh>()?;
+    module.add_class::<ground::Union>()?;
     module.add_class::<contacts::Contacts>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<batch::SimulationBatch>()?;

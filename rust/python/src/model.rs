@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping};
 use rover_core::contact::{Contact, detection::wheel_contacts};
-use rover_core::draw::{resting_pose, rocks::clear_radius};
+use rover_core::draw::{resting_on, resting_pose, rocks::clear_radius};
 use rover_core::multibody::bias::BiasScratch;
 use rover_core::multibody::{
     Configuration, Joint, Kinematics, MassMatrix, Model, ModelDescription, ModelError, bias,
@@ -19,9 +19,9 @@ use crate::arguments::{self, Given, number};
 use crate::arrays::{fresh, fresh_blocks, fresh_matrix, fresh_rows, triple, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::files::{self, in_file, read_text, write_text};
+use crate::ground::Ground;
 use crate::model_files;
 use crate::motor::{self, Motor};
-use crate::sphere_field::Ground;
 
 /// A pair of fresh vectors.
 pub type Pair<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
@@ -892,7 +892,7 @@ impl RoverModel {
     ///
     /// Args:
     ///     q: Coordinates, (nq,).
-    ///     terrain: A `Plane` or a `SphereField`.
+    ///     terrain: A terrain, or a list of several.
     ///     coordinates: "state" or "report".
     ///
     /// Returns:
@@ -914,13 +914,15 @@ impl RoverModel {
         Ok(PyArray1::from_iter(py, contacts.iter().map(|c| c.gap)))
     }
 
-    /// The coordinates of the rover at rest on a plane.
+    /// The coordinates of the rover at rest on a terrain.
     ///
-    /// The joints are at zero, the trunk is upright along the normal with its origin above the
-    /// position, and the lowest wheel has gap zero.
+    /// On a plane the joints are at zero, the trunk is upright along the normal with its origin
+    /// above the position, and the lowest wheel has gap zero. On any other terrain the height of
+    /// the trunk, its pitch and roll and the joints that carry wheels bring all wheels down to the
+    /// ground as far as they can; no wheel is in it.
     ///
     /// Args:
-    ///     plane: The plane, which must not be vertical.
+    ///     terrain: A terrain, or a list of several; a plane must not be vertical.
     ///     position: x and z, (2,), m.
     ///     heading: Heading, rad.
     ///
@@ -928,32 +930,37 @@ impl RoverModel {
     ///     Coordinates of the state, (nq,).
     ///
     /// Raises:
-    ///     TerrainError: `plane` is no plane.
+    ///     TerrainError: `terrain` is no terrain, or does not say what the ground is under the
+    ///         trunk or a wheel.
     ///     StateError: A number is not finite, or the plane is vertical.
     fn resting_pose<'py>(
         &self,
         py: Python<'py>,
-        plane: &Bound<'_, PyAny>,
+        terrain: &Bound<'_, PyAny>,
         position: &Bound<'_, PyAny>,
         heading: &Bound<'_, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let Ground::Plane(plane) = Ground::parse(plane)? else {
-            return Err(arguments::refused(plane, Kind::Terrain, "plane", "a Plane").into());
-        };
+        let ground = Ground::parse(terrain)?;
         let place = <[f64; 2]>::try_from(vector(position, Kind::State, "position")?);
         let what = "two numbers";
         let place =
             place.map_err(|_| arguments::refused(position, Kind::State, "position", what))?;
         let heading = number(heading, Kind::State, "heading")?;
-        let q = resting_pose(&self.inner, &plane.inner, place, heading);
-        Ok(fresh(py, &q.map_err(BorderError::from)?))
+        let q = if let Ground::Plane(plane) = &ground {
+            resting_pose(&self.inner, &plane.inner, place, heading).map_err(BorderError::from)?
+        } else {
+            let terrain = ground.terrain();
+            let q = py.detach(|| resting_on(&self.inner, &*terrain, place, heading));
+            q.map_err(BorderError::from)?
+        };
+        Ok(fresh(py, &q))
     }
 
     /// The point of each wheel's rim that is nearest to the terrain.
     ///
     /// Args:
     ///     q: Coordinates, (nq,).
-    ///     terrain: A `Plane` or a `SphereField`.
+    ///     terrain: A terrain, or a list of several.
     ///     coordinates: "state" or "report".
     ///
     /// Returns:
@@ -983,7 +990,7 @@ impl RoverModel {
     ///
     /// Args:
     ///     q: Coordinates, (nq,).
-    ///     terrain: A `Plane` or a `SphereField`.
+    ///     terrain: A terrain, or a list of several.
     ///     coordinates: "state" or "report".
     ///
     /// Returns:

@@ -17,6 +17,7 @@ use crate::arguments::{Given, number, texts};
 use crate::arrays::{fresh, fresh_matrix, fresh_rows, vector};
 use crate::contacts::Contacts;
 use crate::errors::{BorderError, Kind, Value};
+use crate::ground::Ground;
 use crate::model::{Coordinates, Pair, RoverModel, checked_gravity, poses, tags};
 use crate::options::{Options, SolverWords, settings};
 use crate::plane::Plane;
@@ -24,7 +25,6 @@ use crate::reading::{place, scan_points, slices};
 use crate::report::{Energy, StepReport};
 use crate::shared::{Shared, Watch};
 use crate::snapshot::{Snapshot, belonging};
-use crate::sphere_field::Ground;
 use crate::stepping::{Problem, problem, step};
 
 /// A rover on a terrain, stepped through time.
@@ -35,7 +35,7 @@ use crate::stepping::{Problem, problem, step};
 ///
 /// Args:
 ///     model: The machine; the built-in rover by default.
-///     terrain: A `Plane` or a `SphereField`; flat ground at height 0 by default.
+///     terrain: A terrain, or a list of several; flat ground at height 0 by default.
 ///     gravity: Gravity, world frame, (3,), m/s²; (0, -9.81, 0) by default.
 ///     friction: Coulomb's coefficient of every contact.
 ///     restitution: Newton's coefficient of every contact, in [0, 1].

@@ -1,15 +1,18 @@
-//! `SphereField`, and the terrain that a simulation takes: a plane or a field.
+//! `SphereField`.
 
 use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use rover_core::geometry::{Clearing, Rocks, SphereField as CoreField, Terrain};
+use rover_core::geometry::{
+    Clearing, Plane as CorePlane, Rocks, SphereField as CoreField, Terrain,
+};
 
-use crate::arguments::{Given, number, refused, shown, whole};
-use crate::arrays::{array, fresh, fresh_rows, vector};
+use crate::arguments::{Given, number, refused, whole};
+use crate::arrays::{array, fresh_rows, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::files::{self, in_file, read_text};
+use crate::ground::{Ground, heights};
 use crate::plane::Plane;
 
 /// Longest file of spheres, bytes.
@@ -31,51 +34,8 @@ pub struct SphereField {
     pub inner: Arc<CoreField>,
 }
 
-/// What a simulation stands on.
-#[derive(Clone, FromPyObject)]
-pub enum Ground {
-    /// A plane.
-    Plane(Plane),
-    /// A field of spheres.
-    Field(SphereField),
-}
-
-impl Ground {
-    /// The core's view of it.
-    pub fn terrain(&self) -> Arc<dyn Terrain> {
-        match self {
-            Self::Plane(plane) => Arc::new(plane.inner),
-            Self::Field(field) => field.inner.clone(),
-        }
-    }
-
-    /// Any object as ground, or a `TerrainError`.
-    pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<Self> {
-        given.extract::<Self>().map_err(|_| {
-            let shown = shown(given);
-            let message = format!("terrain: must be a Plane or a SphereField, is {shown}");
-            let (field, value) = (Some("terrain".to_owned()), Value::Text(shown));
-            BorderError {
-                kind: Kind::Terrain,
-                message,
-                field,
-                value,
-            }
-            .into()
-        })
-    }
-
-    /// Back to Python.
-    pub fn to_object<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        Ok(match self {
-            Self::Plane(plane) => plane.clone().into_pyobject(py)?.into_any(),
-            Self::Field(field) => field.clone().into_pyobject(py)?.into_any(),
-        })
-    }
-}
-
 /// (n, width) numbers.
-fn rows<const N: usize>(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<[f64; N]>> {
+pub fn rows<const N: usize>(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<[f64; N]>> {
     let given = array(value, Kind::Terrain, field)?;
     let view = given.as_array();
     let is_empty = view.is_empty();
@@ -234,7 +194,9 @@ impl SphereField {
     ///         shrinks.
     ///     burial: Fraction of its diameter that a rock is sunk into the ground, 0 to 0.5, or a
     ///         range from which it is drawn for each rock; 0.5 by default.
-    ///     ground: The plane; flat ground at height 0 by default.
+    ///     ground: What the rocks lie on; flat ground at height 0 by default. A plane is part of the
+    ///         field. Rocks on any other terrain are raised by its height and the terrain is not
+    ///         part of the field: combine them as `Union([terrain, rocks])`.
     ///     clear: Circles x, z, radius that no rock reaches into, (n, 3), m; none by default.
     ///
     /// Returns:
@@ -267,6 +229,11 @@ impl SphereField {
             return Err(refused(area, Kind::Terrain, "area", what).into());
         };
         let clear = clear.map_or_else(|| Ok(Vec::new()), |c| rows::<3>(c, "clear"))?;
+        let ground = ground.map(Ground::parse).transpose()?;
+        let plane = match &ground {
+            Some(Ground::Plane(plane)) => plane.inner,
+            _ => CorePlane::ground(),
+        };
         let rocks = Rocks {
             abundance: number(abundance, Kind::Terrain, "abundance")?,
             area: [x_max - x_min, z_max - z_min],
@@ -279,10 +246,12 @@ impl SphereField {
                 .iter()
                 .map(|&[x, z, radius]| Clearing { x, z, radius })
                 .collect(),
-            ground: plane(ground)?
-                .map_or_else(rover_core::geometry::Plane::ground, |plane| plane.inner),
+            ground: plane,
         };
-        let field = py.detach(|| CoreField::rocks(&rocks));
+        let field = py.detach(|| match ground {
+            None | Some(Ground::Plane(_)) => CoreField::rocks(&rocks),
+            Some(other) => CoreField::rocks_on(&rocks, &*other.terrain()),
+        });
         Ok(Self {
             inner: Arc::new(field.map_err(BorderError::from)?),
         })
@@ -322,12 +291,7 @@ impl SphereField {
         py: Python<'py>,
         points: &Bound<'_, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let points = rows::<2>(points, "points")?;
-        let heights: Vec<f64> = points
-            .iter()
-            .map(|&[x, z]| self.inner.height(x, z).unwrap_or(f64::NAN))
-            .collect();
-        Ok(fresh(py, &heights))
+        heights(&*self.inner, py, points)
     }
 
     fn __len__(&self) -> usize {

@@ -54,7 +54,7 @@ fn distribution(model: &Arc<Model>, i: usize) -> EpisodeDistribution {
         scenes: SceneDistribution {
             rover: RoverScene::new(model.clone(), Arc::new(Plane::ground())),
             options: StepOptions::default(),
-            field: None,
+            ground: rover_core::draw::GroundDistribution::Tilted,
             rocks: (i % 2 == 1).then_some(rocks),
             slope_by_difficulty: false,
             start: StartDistribution {

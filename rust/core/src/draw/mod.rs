@@ -2,13 +2,15 @@
 //!
 //! - [`pcg64`]: the generator of NumPy's `default_rng`, number for number; [`seed_sequence`]: its
 //!   state for a seed; [`normal`]: standard normal numbers;
-//! - [`start`]: slope, pose and goal; [`rocks`]: rocks by difficulty; [`domain`]: properties of
-//!   rover and world;
+//! - [`start`]: slope, pose and goal; [`rocks`]: rocks by difficulty; [`hills`]: fractal ground;
+//!   [`ground`]: the ground of all of them; [`way`]: whether a way leads to the goal; [`domain`]: properties of rover and world;
 //! - [`scene`]: all of these, and the rover in them; [`many`]: the next scenes of many rovers, on
 //!   several threads.
 
 pub mod domain;
 pub mod error;
+pub mod ground;
+pub mod hills;
 pub mod many;
 pub mod normal;
 mod normal_layers;
@@ -17,13 +19,16 @@ pub mod rocks;
 pub mod scene;
 pub mod seed_sequence;
 pub mod start;
+pub mod way;
 
 pub use domain::{Domain, DomainDistribution};
-pub use error::DrawError;
+pub use error::{DrawError, Unsuitable};
+pub use ground::{DrawnGround, GroundDistribution};
+pub use hills::{HillDistribution, HillDraw};
 pub use many::{Drawn, Order, draw_many};
 pub use pcg64::{Pcg64, Pcg64State};
 pub use rocks::{RockDistribution, RockDraw};
-pub use scene::{DrawnGround, DrawnScene, Fixed, SceneDistribution};
+pub use scene::{DrawnScene, Fixed, SceneDistribution};
 pub use start::{
     FixedStart, PlacementError, Range, Start, StartDistribution, resting_on, resting_pose,
     tilted_plane,

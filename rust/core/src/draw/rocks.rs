@@ -9,7 +9,7 @@
 use super::pcg64::Pcg64;
 use super::start::{Range, Start};
 use crate::contact::detection::wheel_contacts;
-use crate::geometry::{Clearing, Plane, Rocks, SphereField, TerrainError};
+use crate::geometry::{Clearing, Plane, Rocks, SphereField, Terrain, TerrainError};
 use crate::multibody::{Configuration, Kinematics, Model};
 
 /// Abundance at difficulty 1; landing sites on Mars have 0.03 to 0.2 (Golombek and Rapp 1997).
@@ -86,12 +86,38 @@ impl RockDraw {
         radius: f64,
         goal_tolerance: f64,
     ) -> Result<SphereField, TerrainError> {
+        SphereField::rocks(&Rocks {
+            ground: *ground,
+            ..self.rocks(model, start, radius, goal_tolerance)
+        })
+    }
+
+    /// The same on a ground of any shape, which is not part of the field; None if there is no rock.
+    ///
+    /// # Errors
+    /// As [`SphereField::rocks_on`].
+    pub fn lay_on(
+        &self,
+        model: &Model,
+        start: &Start,
+        ground: &dyn Terrain,
+        radius: f64,
+        goal_tolerance: f64,
+    ) -> Result<Option<SphereField>, TerrainError> {
+        let rocks = self.rocks(model, start, radius, goal_tolerance);
+        match SphereField::rocks_on(&rocks, ground) {
+            Err(TerrainError::Empty) => Ok(None),
+            other => other.map(Some),
+        }
+    }
+
+    fn rocks(&self, model: &Model, start: &Start, radius: f64, goal_tolerance: f64) -> Rocks {
         let ([x, z], [goal_x, goal_z]) = (start.position, start.goal);
         let along = [x.min(goal_x) - MARGIN, x.max(goal_x) + MARGIN];
         let across = [z.min(goal_z) - MARGIN, z.max(goal_z) + MARGIN];
         let wheels = model.wheels().iter().map(|wheel| wheel.radius);
         let clearing = |[x, z]: [f64; 2], radius| Clearing { x, z, radius };
-        SphereField::rocks(&Rocks {
+        Rocks {
             abundance: self.abundance,
             area: [along[1] - along[0], across[1] - across[0]],
             middle: [0.5 * (along[0] + along[1]), 0.5 * (across[0] + across[1])],
@@ -101,9 +127,8 @@ impl RockDraw {
                 clearing(start.position, radius),
                 clearing(start.goal, radius.max(goal_tolerance)),
             ],
-            ground: *ground,
             ..Rocks::default()
-        })
+        }
     }
 }
 

@@ -3,12 +3,16 @@
 use std::sync::Arc;
 
 use super::domain::{Domain, DomainDistribution};
-use super::error::DrawError;
+use super::error::{DrawError, Unsuitable};
+use super::ground::{DrawnGround, GroundDistribution};
 use super::pcg64::Pcg64;
 use super::rocks::{RockDistribution, RockDraw, clear_radius};
-use super::start::{FixedStart, Range, Start, StartDistribution, resting_pose, tilted_plane};
+use super::start::{
+    FixedStart, PlacementError, Range, Start, StartDistribution, resting_on, resting_pose,
+    tilted_plane,
+};
+use super::way;
 use crate::contact::detection::deepest_overlap;
-use crate::geometry::{Plane, SphereField, Terrain};
 use crate::integrator::StepOptions;
 use crate::multibody::{Kinematics, coordinates};
 use crate::simulation::{Placement, RoverScene};
@@ -23,9 +27,9 @@ pub struct SceneDistribution {
     pub rover: RoverScene,
     /// Options of its steps, before friction and gravity are drawn.
     pub options: StepOptions,
-    /// Given ground of every episode, which has a plane; none where the plane is tilted.
-    pub field: Option<Arc<SphereField>>,
-    /// Rocks on the tilted plane, if there are any.
+    /// Ground.
+    pub ground: GroundDistribution,
+    /// Rocks on the tilted plane or on the hills, if there are any.
     pub rocks: Option<RockDistribution>,
     /// Whether the slope follows from the difficulty of the rocks.
     pub slope_by_difficulty: bool,
@@ -48,33 +52,11 @@ pub struct Fixed {
     pub state: Option<(Vec<f64>, Option<Vec<f64>>)>,
 }
 
-/// The ground of an episode.
-#[derive(Clone, Debug)]
-pub enum DrawnGround {
-    /// A plane.
-    Plane(Plane),
-    /// Spheres on a plane.
-    Field(Arc<SphereField>),
-}
-
-impl DrawnGround {
-    /// As a simulation takes it.
-    #[must_use]
-    pub fn terrain(&self) -> Arc<dyn Terrain> {
-        match self {
-            Self::Plane(plane) => Arc::new(*plane),
-            Self::Field(field) => field.clone(),
-        }
-    }
-}
-
 /// A drawn scene, in which the rover has room.
 #[derive(Clone, Debug)]
 pub struct DrawnScene {
     /// Slope, pose and goal.
     pub start: Start,
-    /// The plane under everything.
-    pub plane: Plane,
     /// Difficulty and rocks, where there are any.
     pub rocks: Option<RockDraw>,
     /// Properties of rover and world.
@@ -99,15 +81,23 @@ impl SceneDistribution {
         fixed: &Fixed,
         attempts: usize,
     ) -> Result<DrawnScene, DrawError> {
-        let mut overlap = f64::NEG_INFINITY;
+        let mut last = None;
         for _ in 0..attempts {
-            let drawn = self.draw_once(random, difficulty, fixed)?;
-            overlap = drawn.deepest_overlap();
-            if overlap >= -START_OVERLAP {
-                return Ok(drawn);
+            match self.draw_once(random, difficulty, fixed)? {
+                Ok(drawn) => {
+                    let overlap = drawn.deepest_overlap();
+                    if overlap >= -START_OVERLAP {
+                        return Ok(drawn);
+                    }
+                    last = Some(DrawError::NoRoom { overlap, attempts });
+                }
+                Err(why) => last = Some(DrawError::Unsuitable { why, attempts }),
             }
         }
-        Err(DrawError::NoRoom { overlap, attempts })
+        Err(last.unwrap_or(DrawError::NoRoom {
+            overlap: f64::NEG_INFINITY,
+            attempts,
+        }))
     }
 
     /// Draws a scene, in which the rover may lack room. Every draw is made, whatever is fixed.
@@ -116,7 +106,7 @@ impl SceneDistribution {
         random: &mut Pcg64,
         difficulty: Option<Range>,
         fixed: &Fixed,
-    ) -> Result<DrawnScene, DrawError> {
+    ) -> Result<Result<DrawnScene, Unsuitable>, DrawError> {
         let rocks = self.rocks.as_ref();
         let rocks = rocks.map(|rocks| rocks.draw(random, difficulty, fixed.difficulty));
         let mut start = self.start.clone();
@@ -125,45 +115,44 @@ impl SceneDistribution {
         }
         let start = start.draw(random, &fixed.start);
         let domain = self.domain.draw(random);
-        let (plane, ground) = match (&self.field, rocks) {
-            (Some(field), _) => {
-                let plane = field.ground().copied().unwrap_or_else(Plane::ground);
-                (plane, DrawnGround::Field(field.clone()))
-            }
-            (None, rocks) => {
-                let plane = tilted_plane(start.slope, start.uphill)?;
-                let ground = match rocks {
-                    Some(rocks) => DrawnGround::Field(Arc::new(rocks.lay_out(
-                        &self.rover.model,
-                        &start,
-                        &plane,
-                        clear_radius(&self.rover.model),
-                        self.goal_tolerance,
-                    )?)),
-                    None => DrawnGround::Plane(plane),
-                };
-                (plane, ground)
-            }
-        };
+        let ground = self.lay_out(random, &start, rocks)?;
+        let terrain = ground.terrain();
         let scene = match domain.scaled(&self.rover.model)? {
-            Some(scaled) => RoverScene::new(Arc::new(scaled), ground.terrain()),
-            None => self.rover.on(ground.terrain()),
+            Some(scaled) => RoverScene::new(Arc::new(scaled), terrain),
+            None => self.rover.on(terrain),
         };
         let options = domain.options(&self.options);
         options.check()?;
-        let model = &*scene.model;
+        let (model, terrain) = (&*scene.model, &*scene.terrain);
+        // Over a plane every place is known, and every way leads uphill alike.
+        let plane = terrain.ground().filter(|_| !terrain.has_surface());
         let (q, v) = if let Some((q, v)) = &fixed.state {
             (q.clone(), v.clone())
-        } else {
-            let pose = resting_pose(model, &plane, start.position, start.heading)?;
+        } else if let Some(plane) = plane {
+            let pose = resting_pose(model, plane, start.position, start.heading)?;
             (pose, None)
+        } else {
+            match resting_on(model, terrain, start.position, start.heading) {
+                Ok(pose) => (pose, None),
+                Err(PlacementError::State(error)) => return Err(error.into()),
+                Err(why) => return Ok(Err(why.into())),
+            }
         };
+        if plane.is_none() {
+            let (from, to) = (start.position, start.goal);
+            let [x, z] = to;
+            if terrain.height(x, z).is_none() {
+                return Ok(Err(Unsuitable::NoGoal { x, z }));
+            }
+            if !way::leads(|x, z| ground.height(x, z), from, to) {
+                return Ok(Err(Unsuitable::NoWay { from, to }));
+            }
+        }
         let configuration = coordinates::from_public(model, &q)?;
         let v = v.unwrap_or_else(|| vec![0.0; model.nv()]);
         let v = coordinates::checked_velocity(model, &v)?;
-        Ok(DrawnScene {
+        Ok(Ok(DrawnScene {
             start,
-            plane,
             rocks,
             domain,
             placement: Placement {
@@ -173,7 +162,42 @@ impl SceneDistribution {
                 v,
             },
             ground,
-        })
+        }))
+    }
+
+    /// The ground of an episode.
+    fn lay_out(
+        &self,
+        random: &mut Pcg64,
+        start: &Start,
+        rocks: Option<RockDraw>,
+    ) -> Result<DrawnGround, DrawError> {
+        let model = &self.rover.model;
+        let (radius, tolerance) = (clear_radius(model), self.goal_tolerance);
+        match &self.ground {
+            GroundDistribution::Given(ground) => Ok(ground.clone()),
+            GroundDistribution::Tilted => {
+                let plane = tilted_plane(start.slope, start.uphill)?;
+                let Some(rocks) = rocks else {
+                    return Ok(DrawnGround::Plane(plane));
+                };
+                let field = rocks.lay_out(model, start, &plane, radius, tolerance)?;
+                Ok(DrawnGround::Field(Arc::new(field)))
+            }
+            GroundDistribution::Hills(hills) => {
+                let difficulty = rocks.map_or(0.0, |rocks| rocks.difficulty);
+                let map = hills.draw(random, difficulty).lay_out(start)?;
+                let field = match rocks {
+                    Some(rocks) => rocks.lay_on(model, start, &map, radius, tolerance)?,
+                    None => None,
+                };
+                let map = DrawnGround::Map(Arc::new(map));
+                Ok(match field {
+                    Some(field) => map.with(DrawnGround::Field(Arc::new(field)))?,
+                    None => map,
+                })
+            }
+        }
     }
 }
 

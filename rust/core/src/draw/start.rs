@@ -279,16 +279,13 @@ const RANK: f64 = 1e-3;
 /// Longest change of a coordinate in an iteration, rad or m.
 const LONGEST: f64 = 0.2;
 
-/// Public coordinates of joints that neither turn a wheel nor steer it nor hold themselves.
+/// Public coordinates of joints that neither turn a wheel nor steer it and have no drive.
 fn free_joints(model: &Model) -> Vec<usize> {
     let is_wheels = |j: usize| {
         let mut wheels = model.wheels().iter();
         wheels.any(|wheel| wheel.joint == Some(j) || wheel.steering == Some(j))
     };
-    let is_free = |j: &usize| {
-        let joint = &model.joints()[*j];
-        joint.hold.stiffness <= 0.0 && joint.drive.is_none() && !is_wheels(*j)
-    };
+    let is_free = |j: &usize| model.joints()[*j].drive.is_none() && !is_wheels(*j);
     (0..model.n_joints())
         .filter(is_free)
         .map(|j| FIRST_JOINT + j)

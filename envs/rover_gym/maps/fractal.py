@@ -1,0 +1,151 @@
+"""Rough ground made by a seed: a self-affine surface, craters and ripples.
+
+The surface is the sum of waves with random phases whose power falls as `k^(-2H - 2)` with the wave number k: its
+heights differ over a distance d by about `d^H`, with H the Hurst exponent (Turcotte 1997, *Fractals and chaos in
+geology and geophysics*, chapter 7).
+
+A simple crater of diameter D is a paraboloid `0.2 D` deep from rim to floor with a rim of `0.036 D` (Pike 1977), around
+it ejecta that fall off as `(r/R)^-3` (McGetchin, Settle and Head 1973).
+"""
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.mechanics import TerrainError
+from rover_gym.validation import number, refuse
+
+Heights: TypeAlias = npt.NDArray[np.float64]
+Pair: TypeAlias = tuple[float, float]
+
+#: Most heights of a map, and most craters.
+MOST_HEIGHTS = 10**8
+MOST_CRATERS = 10**6
+
+#: Depth from rim to floor and height of the rim, as shares of the diameter.
+CRATER_DEPTH = 0.2
+CRATER_RIM = 0.036
+
+#: Ejecta end at this many radii.
+EJECTA = 3.0
+
+
+def _pair(field: str, value: object, *, above: float | None = None) -> Pair:
+    """One number for both, or two."""
+    try:
+        first, second = value  # type: ignore[misc]
+    except TypeError:
+        first = second = value
+    except ValueError:
+        refuse(TerrainError, field, value, "must be one number or two")
+    return (
+        number(field, first, above=above, error=TerrainError),
+        number(field, second, above=above, error=TerrainError),
+    )
+
+
+def fractal_map(
+    size: object,
+    spacing: object,
+    roughness: object,
+    *,
+    hurst: object = 0.7,
+    longest_wave: object = None,
+    craters: object = 0.0,
+    crater_diameter: object = (0.5, 5.0),
+    ripple_height: object = 0.0,
+    ripple_length: object = 1.0,
+    seed: object = 0,
+    origin: object = None,
+) -> tuple[npt.NDArray[np.float32], Pair, Pair]:
+    """Makes a map; the arguments are those of `HeightField.fractal`.
+
+    Returns:
+        Heights `(n_z, n_x) float32`, spacing and origin, m.
+
+    Raises:
+        TerrainError: An argument is out of its range.
+    """
+    extent, step = _pair("size", size, above=0.0), _pair("spacing", spacing, above=0.0)
+    rms = number("roughness", roughness, at_least=0.0, error=TerrainError)
+    exponent = number("hurst", hurst, above=0.0, at_most=1.0, error=TerrainError)
+    counts = [extent[k] / step[k] for k in range(2)]
+    if max(counts) > MOST_HEIGHTS or (counts[0] + 2) * (counts[1] + 2) > MOST_HEIGHTS:
+        refuse(TerrainError, "size", size, f"makes more than {MOST_HEIGHTS} heights")
+    columns, rows = (max(2, math.floor(n + 0.5) + 1) for n in counts)
+    longest = (
+        0.5 * min(extent)
+        if longest_wave is None
+        else number("longest_wave", longest_wave, above=0.0, error=TerrainError)
+    )
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        refuse(TerrainError, "seed", seed, "must be a whole number that is not negative")
+    random = np.random.default_rng(int(seed))
+    place = (-0.5 * step[0] * (columns - 1), -0.5 * step[1] * (rows - 1)) if origin is None else _pair("origin", origin)
+
+    heights = _rough(random, (rows, columns), step, rms, exponent, longest)
+    density = number("craters", craters, at_least=0.0, error=TerrainError)
+    smallest, largest = _pair("crater_diameter", crater_diameter, above=0.0)
+    if largest < smallest:
+        refuse(TerrainError, "crater_diameter", crater_diameter, "must be the smallest and the largest")
+    if density > 0.0:
+        _add_craters(random, heights, step, density, smallest, largest)
+    ripple = number("ripple_height", ripple_height, at_least=0.0, error=TerrainError)
+    length = number("ripple_length", ripple_length, above=0.0, error=TerrainError)
+    if ripple > 0.0:
+        phase = 2.0 * np.pi * (np.arange(columns) * step[0] / length + random.random())
+        heights += 0.5 * ripple * np.sin(phase + 0.5 * np.sin(phase))
+    return heights.astype(np.float32), step, place
+
+
+def _rough(
+    random: np.random.Generator, shape: tuple[int, int], step: Pair, rms: float, hurst: float, longest: float
+) -> Heights:
+    """A self-affine surface with mean 0 and the given root mean square, m."""
+    rows, columns = shape
+    # Twice the map, since the waves repeat.
+    high, wide = 2 * rows, 2 * columns
+    k = np.hypot(np.fft.fftfreq(high, step[1])[:, None], np.fft.rfftfreq(wide, step[0])[None, :])
+    waves = random.standard_normal(k.shape) + 1j * random.standard_normal(k.shape)
+    with np.errstate(divide="ignore"):
+        waves *= np.where(k >= 1.0 / longest, k ** (-hurst - 1.0), 0.0)
+    heights: Heights = np.fft.irfft2(waves, (high, wide))[:rows, :columns]
+    heights -= heights.mean()
+    spread = math.sqrt(float((heights**2).mean()))
+    return heights * (rms / spread) if spread > 0.0 else np.zeros(shape)
+
+
+def _add_craters(
+    random: np.random.Generator, heights: Heights, step: Pair, density: float, smallest: float, largest: float
+) -> None:
+    """Adds craters with `density D^-2` of them a m² at least as wide as D, the largest first."""
+    rows, columns = heights.shape
+    margin = 0.5 * EJECTA * largest
+    extent = (step[0] * (columns - 1), step[1] * (rows - 1))
+    area = (extent[0] + 2.0 * margin) * (extent[1] + 2.0 * margin)
+    expected = density * (smallest**-2 - largest**-2) * area
+    if not expected < MOST_CRATERS:
+        refuse(TerrainError, "craters", density, f"makes more than {MOST_CRATERS} craters")
+    count = int(random.poisson(expected))
+    share = random.random(count)
+    diameters = np.sort((smallest**-2 - share * (smallest**-2 - largest**-2)) ** -0.5)[::-1]
+    places = random.random((count, 2)) * [extent[0] + 2.0 * margin, extent[1] + 2.0 * margin] - margin
+    for diameter, (x, z) in zip(diameters, places, strict=True):
+        radius = 0.5 * diameter
+        low = [max(0, math.floor((c - EJECTA * radius) / s)) for c, s in zip((x, z), step, strict=True)]
+        high = [
+            min(n, math.ceil((c + EJECTA * radius) / s) + 1)
+            for c, s, n in zip((x, z), step, (columns, rows), strict=True)
+        ]
+        if low[0] >= high[0] or low[1] >= high[1]:
+            continue
+        across = np.arange(low[0], high[0]) * step[0] - x
+        along = np.arange(low[1], high[1]) * step[1] - z
+        r = np.hypot(across[None, :], along[:, None]) / radius
+        depth, rim = CRATER_DEPTH * diameter, CRATER_RIM * diameter
+        bowl = rim - depth + depth * r**2
+        ejecta = rim * np.maximum(r, 1.0) ** -3 - rim * EJECTA**-3
+        part = heights[low[1] : high[1], low[0] : high[0]]
+        part += np.where(r < 1.0, bowl - rim * EJECTA**-3, np.where(r < EJECTA, ejecta, 0.0))

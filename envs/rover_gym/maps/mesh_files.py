@@ -1,0 +1,89 @@
+"""Triangle meshes from files, by trimesh."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.extras import require
+from rover_gym.mechanics import TerrainError
+from rover_gym.validation import number, refuse
+
+#: Longest file, bytes.
+MOST_BYTES = 2**30
+
+#: Endings of the formats that hold a mesh and nothing that would be run or fetched.
+ENDINGS = (".obj", ".ply", ".stl", ".off", ".glb")
+
+
+def read_mesh(
+    path: object, *, scale: object = 1.0, position: object = (0.0, 0.0, 0.0), up: object = "y"
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+    """Reads a mesh; the arguments are those of `TriangleMesh.from_file`.
+
+    Returns:
+        Vertices `(n, 3)`, m, and triangles `(m, 3)`.
+
+    Raises:
+        TerrainError: The file holds no such mesh.
+        OSError: The file cannot be read.
+        MissingExtraError: The extra `maps` is not installed.
+    """
+    try:
+        place = Path(path)  # type: ignore[arg-type]
+    except TypeError:
+        refuse(TerrainError, "path", path, "must be a path")
+    factor = number("scale", scale, above=0.0, error=TerrainError)
+    if up not in ("y", "z"):
+        refuse(TerrainError, "up", up, 'must be "y" or "z"')
+    try:
+        shift = np.array([number(f"position[{k}]", x, error=TerrainError) for k, x in enumerate(position)])  # type: ignore[call-overload]
+    except TypeError:
+        shift = np.empty(0)
+    if shift.shape != (3,):
+        refuse(TerrainError, "position", position, "must be three numbers")
+    with place.open("rb") as file:
+        size = file.seek(0, 2)
+    if place.suffix.lower() not in ENDINGS:
+        refuse(TerrainError, "path", str(place), f"{place}: a mesh's file ends in {', '.join(ENDINGS)}")
+    if size > MOST_BYTES:
+        refuse(TerrainError, "path", size, f"{place}: at most {MOST_BYTES} bytes are read")
+    trimesh = require("trimesh", "maps")
+    try:
+        with np.errstate(all="ignore"):
+            mesh: Any = trimesh.load_mesh(str(place), process=False, skip_materials=True)
+            vertices, triangles = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
+    except Exception as error:
+        refuse(
+            TerrainError, "path", str(place), f"{place}: is damaged or holds no mesh ({type(error).__name__}: {error})"
+        )
+    if vertices.ndim != 2 or vertices.shape[1:] != (3,) or triangles.ndim != 2 or triangles.shape[1:] != (3,):
+        refuse(TerrainError, "path", str(place), f"{place}: holds no triangles")
+    bad = ~np.isfinite(vertices).all(axis=1)
+    if bad.any():
+        k = int(np.flatnonzero(bad)[0])
+        refuse(TerrainError, "path", vertices[k].tolist(), f"{place}: vertex {k} is not finite")
+    if triangles.size and (triangles.min() < 0 or triangles.max() >= len(vertices)):
+        refuse(TerrainError, "path", str(place), f"{place}: a triangle names a vertex that is not there")
+    return _joined(place, _turned(vertices, str(up)) * factor + shift, triangles)
+
+
+def _turned(vertices: npt.NDArray[np.float64], up: str) -> npt.NDArray[np.float64]:
+    """Vertices with y up: of z up, x stays and y becomes -z."""
+    return vertices if up == "y" else np.stack([vertices[:, 0], vertices[:, 2], -vertices[:, 1]], axis=1)
+
+
+def _joined(
+    place: Path, vertices: npt.NDArray[np.float64], triangles: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+    """The mesh with equal vertices joined, and without triangles that have no area."""
+    vertices, same = np.unique(vertices, axis=0, return_inverse=True)
+    triangles = same.reshape(-1)[triangles]
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    longest = np.max([((b - a) ** 2).sum(1), ((c - a) ** 2).sum(1), ((c - b) ** 2).sum(1)], axis=0)
+    triangles = triangles[area > 1e-8 * longest]
+    if not len(triangles):
+        refuse(TerrainError, "path", str(place), f"{place}: holds no triangle that has an area")
+    return vertices, triangles

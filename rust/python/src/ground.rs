@@ -1,0 +1,207 @@
+//! What a simulation stands on: a terrain of any kind, or a list of several.
+
+use std::sync::Arc;
+
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::{PyList, PyTuple};
+use rover_core::draw::DrawnGround;
+use rover_core::geometry::{Terrain, Union as CoreUnion};
+
+use crate::arguments::{refused, shown};
+use crate::arrays::fresh;
+use crate::errors::{BorderError, Kind, Value};
+use crate::height_field::HeightField;
+use crate::plane::Plane;
+use crate::sphere_field::{SphereField, rows};
+use crate::triangle_mesh::TriangleMesh;
+
+/// Any terrain.
+#[derive(Clone, FromPyObject)]
+pub enum Ground {
+    /// A plane.
+    Plane(Plane),
+    /// A field of spheres.
+    Field(SphereField),
+    /// A map of heights.
+    Map(HeightField),
+    /// A mesh of triangles.
+    Mesh(TriangleMesh),
+    /// Several at once.
+    Union(Union),
+}
+
+impl Ground {
+    /// The core's view of it.
+    pub fn terrain(&self) -> Arc<dyn Terrain> {
+        match self {
+            Self::Plane(plane) => Arc::new(plane.inner),
+            Self::Field(field) => field.inner.clone(),
+            Self::Map(map) => map.inner.clone(),
+            Self::Mesh(mesh) => mesh.inner.clone(),
+            Self::Union(union) => union.inner.clone(),
+        }
+    }
+
+    /// What episodes are drawn on.
+    pub fn drawn(&self) -> DrawnGround {
+        match self {
+            Self::Plane(plane) => DrawnGround::Plane(plane.inner),
+            Self::Field(field) => DrawnGround::Field(field.inner.clone()),
+            Self::Map(map) => DrawnGround::Map(map.inner.clone()),
+            Self::Mesh(mesh) => DrawnGround::Mesh(mesh.inner.clone()),
+            Self::Union(union) => {
+                let parts = union.parts.iter().map(Self::drawn).collect();
+                DrawnGround::Union(union.inner.clone(), parts)
+            }
+        }
+    }
+
+    /// What an episode was drawn on.
+    pub fn of(drawn: &DrawnGround) -> Self {
+        match drawn {
+            DrawnGround::Plane(plane) => Self::Plane(Plane { inner: *plane }),
+            DrawnGround::Field(field) => Self::Field(SphereField {
+                inner: field.clone(),
+            }),
+            DrawnGround::Map(map) => Self::Map(HeightField { inner: map.clone() }),
+            DrawnGround::Mesh(mesh) => Self::Mesh(TriangleMesh {
+                inner: mesh.clone(),
+            }),
+            DrawnGround::Union(union, parts) => Self::Union(Union {
+                inner: union.clone(),
+                parts: parts.iter().map(Self::of).collect(),
+            }),
+        }
+    }
+
+    /// Any object as ground, a list or tuple as a union, or a `TerrainError`.
+    pub fn parse(given: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if given.is_instance_of::<PyList>() || given.is_instance_of::<PyTuple>() {
+            return Ok(Self::Union(Union::of(given)?));
+        }
+        given.extract::<Self>().map_err(|_| {
+            let shown = shown(given);
+            let message = format!(
+                "terrain: must be a Plane, SphereField, HeightField, TriangleMesh or Union, or a \
+                 list of them, is {shown}"
+            );
+            let (field, value) = (Some("terrain".to_owned()), Value::Text(shown));
+            BorderError {
+                kind: Kind::Terrain,
+                message,
+                field,
+                value,
+            }
+            .into()
+        })
+    }
+
+    /// Back to Python.
+    pub fn to_object<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(match self {
+            Self::Plane(plane) => plane.clone().into_pyobject(py)?.into_any(),
+            Self::Field(field) => field.clone().into_pyobject(py)?.into_any(),
+            Self::Map(map) => map.clone().into_pyobject(py)?.into_any(),
+            Self::Mesh(mesh) => mesh.clone().into_pyobject(py)?.into_any(),
+            Self::Union(union) => union.clone().into_pyobject(py)?.into_any(),
+        })
+    }
+}
+
+/// Heights of a terrain's visible surface at places (m, 2); nan where there is none.
+pub fn heights<'py>(
+    terrain: &dyn Terrain,
+    py: Python<'py>,
+    points: &Bound<'_, PyAny>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let points = rows::<2>(points, "points")?;
+    let heights: Vec<f64> = points
+        .iter()
+        .map(|&[x, z]| terrain.height(x, z).unwrap_or(f64::NAN))
+        .collect();
+    Ok(fresh(py, &heights))
+}
+
+/// Several terrains as one ground: a map with rocks on it, say. Immutable.
+///
+/// A rover touches whatever of them it meets. Where a part has a plane, the ground is known
+/// everywhere; otherwise it is known where a height field knows it.
+///
+/// Args:
+///     parts: Terrains of any kind, at least one; at most one of them may have a plane.
+///
+/// Raises:
+///     TerrainError: A part is no terrain, there is none, or two have a plane.
+#[pyclass(module = "rover_gym.mechanics", frozen, from_py_object)]
+#[derive(Clone)]
+pub struct Union {
+    pub inner: Arc<CoreUnion>,
+    parts: Vec<Ground>,
+}
+
+impl Union {
+    fn of(parts: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let listed = parts
+            .try_iter()
+            .map_err(|_| refused(parts, Kind::Terrain, "parts", "a list of terrains"))?;
+        let parts = listed
+            .map(|part| Ground::parse(&part?))
+            .collect::<PyResult<Vec<_>>>()?;
+        let terrains = parts.iter().map(Ground::terrain).collect();
+        let inner = Arc::new(CoreUnion::new(terrains).map_err(BorderError::from)?);
+        Ok(Self { inner, parts })
+    }
+}
+
+#[pymethods]
+impl Union {
+    #[new]
+    fn new(parts: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Self::of(parts)
+    }
+
+    /// The terrains, in the order they were given.
+    #[getter]
+    fn parts<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        self.parts.iter().map(|part| part.to_object(py)).collect()
+    }
+
+    /// The height of the visible surface at places of the map.
+    ///
+    /// Args:
+    ///     points: Places (x, z), (m, 2), m.
+    ///
+    /// Returns:
+    ///     Heights y, (m,), m; nan where there is no ground.
+    ///
+    /// Raises:
+    ///     TerrainError: `points` has a wrong shape.
+    fn heights<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'_, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        heights(&*self.inner, py, points)
+    }
+
+    fn __len__(&self) -> usize {
+        self.parts.len()
+    }
+
+    fn __repr__<'py>(&self, py: Python<'py>) -> PyResult<String> {
+        let parts = self.parts(py)?;
+        let shown = parts.iter().map(|part| Ok(part.repr()?.to_string()));
+        let shown = shown.collect::<PyResult<Vec<_>>>()?;
+        Ok(format!("Union([{}])", shown.join(", ")))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let py = slf.py();
+        let parts = (slf.get().parts(py)?,);
+        Ok((
+            slf.get_type().into_any(),
+            parts.into_pyobject(py)?.into_any(),
+        ))
+    }
+}

@@ -1,0 +1,282 @@
+"""Height fields, meshes and unions: from arrays and files, made by a seed, driven on; bad input is refused."""
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rover_gym.mechanics import (
+    HeightField,
+    Plane,
+    RoverModel,
+    Simulation,
+    SphereField,
+    StepError,
+    TerrainError,
+    TriangleMesh,
+    Union,
+)
+
+CUBE = (
+    [[x, y, z] for x in (-0.2, 0.2) for y in (-0.2, 0.2) for z in (-0.2, 0.2)],
+    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4]]
+    + [[1, 5, 7], [1, 7, 3]],
+)
+
+
+def hills() -> HeightField:
+    return HeightField.fractal(16.0, 0.2, 0.1, seed=4, craters=0.01)
+
+
+def test_a_map_has_the_heights_it_was_made_of() -> None:
+    heights = np.arange(12.0).reshape(3, 4)
+    field = HeightField(heights, (0.5, 2.0), origin=(1.0, -2.0))
+    assert field.shape == (3, 4)
+    assert field.spacing == (0.5, 2.0)
+    assert field.origin == (1.0, -2.0)
+    assert field.bounds == (1.0, -2.0, 2.5, 2.0)
+    np.testing.assert_array_equal(field.grid, heights)
+    np.testing.assert_allclose(field.heights([[1.5, 0.0], [1.75, 0.0], [0.9, 0.0]]), [5.0, 5.5, np.nan])
+    assert HeightField(heights, 1.0).bounds == (-1.5, -1.0, 1.5, 1.0)
+    np.testing.assert_array_equal(HeightField(heights.astype(np.int16), 1.0).grid, heights)
+
+
+def test_terrains_are_pickled_and_shown() -> None:
+    field, mesh = hills(), TriangleMesh(*CUBE)
+    both = Union([field, mesh, Plane(offset=3.0)])
+    again = pickle.loads(pickle.dumps(both))  # noqa: S301 - our own
+    points = np.random.default_rng(0).uniform(-5, 5, (50, 2))
+    np.testing.assert_array_equal(again.heights(points), both.heights(points))
+    assert repr(again) == repr(both)
+    assert "81 x 81" in repr(field)
+    assert len(mesh) == 12
+    assert mesh.is_closed
+    simulation = Simulation(terrain=[field, mesh])
+    assert [type(part) for part in simulation.terrain.parts] == [HeightField, TriangleMesh]
+    assert isinstance(pickle.loads(pickle.dumps(simulation)).terrain, Union)  # noqa: S301 - our own
+
+
+def test_the_rover_starts_on_all_wheels_and_drives_over_hills_and_rocks() -> None:
+    field = hills()
+    rocks = SphereField.rocks(0.05, (-6, -6, 6, 6), 1, ground=field, clear=[[0, 0, 1.5]])
+    assert rocks.ground is None
+    middles = rocks.centres
+    np.testing.assert_allclose(middles[:, 1], field.heights(middles[:, [0, 2]]), atol=1e-12)
+    model, terrain = RoverModel(), Union([field, rocks])
+    q = model.resting_pose(terrain, (0.3, -0.2), 0.7)
+    np.testing.assert_allclose(model.wheel_gaps(q, terrain), 0.0, atol=1e-6)
+    simulation = Simulation(model, terrain)
+    simulation.set_state(q)
+    simulation.set_wheel_torques([20.0] * 6)
+    for _ in range(10):
+        assert simulation.step(20).is_converged
+    assert np.hypot(*(simulation.q[[0, 2]] - q[[0, 2]])) > 0.1
+    assert simulation.q[1] > field.heights([simulation.q[[0, 2]]])[0]
+
+
+def test_off_the_map_and_over_holes_the_error_names_the_place() -> None:
+    heights = np.zeros((41, 41))
+    heights[:, 30:] = np.nan
+    field = HeightField(heights, 0.25)
+    model = RoverModel()
+    for place in [(2.4, 0.0), (40.0, 0.0), ((-4.9), 0.0)]:
+        with pytest.raises(TerrainError, match="no ground is known at") as caught:
+            model.resting_pose(field, place, 0.0)
+        assert caught.value.field == "position"
+    simulation = Simulation(model, field)
+    simulation.set_state(model.resting_pose(field, (1.0, 0.0), 0.0))
+    simulation.set_wheel_torques([20.0] * 6)
+    with pytest.raises(StepError, match=r"terrain: no ground is known at x = ") as failure:
+        simulation.step(5000)
+    assert failure.value.field == "terrain"
+    assert failure.value.value[0] == pytest.approx(2.5, abs=0.3)
+    assert np.isfinite(simulation.q).all()
+
+
+def test_fractal_ground_has_its_roughness_and_its_hurst_exponent() -> None:
+    field = HeightField.fractal((40.0, 30.0), 0.1, 0.25, hurst=0.8, seed=2)
+    grid = field.grid.astype(float)
+    assert field.shape == (301, 401)
+    assert np.sqrt(np.mean(grid**2)) == pytest.approx(0.25, rel=1e-4)
+    lags = np.array([2, 4, 8, 16])
+    rises = [np.sqrt(np.mean((grid[:, lag:] - grid[:, :-lag]) ** 2)) for lag in lags]
+    slope = np.polyfit(np.log(lags), np.log(rises), 1)[0]
+    assert slope == pytest.approx(0.8, abs=0.12)
+    again = HeightField.fractal((40.0, 30.0), 0.1, 0.25, hurst=0.8, seed=2)
+    np.testing.assert_array_equal(again.grid, field.grid)
+    assert not np.array_equal(HeightField.fractal((40, 30), 0.1, 0.25, hurst=0.8, seed=3).grid, field.grid)
+
+
+def test_craters_are_as_deep_as_the_law_says_and_ripples_as_high() -> None:
+    craters = HeightField.fractal(60.0, 0.1, 0.0, craters=100.0, crater_diameter=(4.0, 4.001), seed=1)
+    assert craters.grid.min() < -0.8 * (0.2 - 0.036) * 4.0
+    assert craters.grid.max() > 0.8 * 0.036 * 4.0
+    ripples = HeightField.fractal(10.0, 0.02, 0.0, ripple_height=0.1, ripple_length=0.8)
+    assert np.ptp(ripples.grid) == pytest.approx(0.1, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (([[0.0, 1.0], [2.0, 3.0, 4.0]], 1.0), "heights: must be an array of numbers"),
+        (([0.0, 1.0], 1.0), r"heights: needs shape \(n_z, n_x\)"),
+        (([[0.0, 1.0]], 1.0), "heights: needs from 2 x 2"),
+        ((np.full((3, 3), np.nan), 1.0), "heights: no cell has data"),
+        ((np.full((3, 3), np.inf), 1.0), r"heights\[0, 0\]: must be at most"),
+        ((np.full((3, 3), 1e300), 1.0), r"heights\[0, 0\]: must be at most"),
+        ((np.zeros((3, 3)), 0.0), "spacing: must be from 1e-4"),
+        ((np.zeros((3, 3)), (1.0, np.nan)), "spacing: must be"),
+        ((np.zeros((3, 3)), (1.0, 1.0, 1.0)), "spacing: must be one number or two"),
+        ((np.zeros((3, 3)), 1.0, (0.0, 1e9)), "origin: must be"),
+        ((np.zeros((3, 3), bool), 1.0), "heights: must be an array of numbers"),
+    ],
+)
+def test_bad_maps_are_refused(arguments: tuple[object, ...], message: str) -> None:
+    with pytest.raises(TerrainError, match=message):
+        HeightField(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        ({"hurst": 0.0}, "hurst"),
+        ({"hurst": 1.5}, "hurst"),
+        ({"seed": -1}, "seed"),
+        ({"seed": 1.5}, "seed"),
+        ({"craters": 1e12}, "craters"),
+        ({"crater_diameter": (3.0, 1.0)}, "crater_diameter"),
+        ({"ripple_length": 0.0}, "ripple_length"),
+        ({"longest_wave": "long"}, "longest_wave"),
+        ({"size": 1e9}, "size"),
+        ({"roughness": -1.0}, "roughness"),
+    ],
+)
+def test_bad_fractals_are_refused(options: dict[str, object], field: str) -> None:
+    with pytest.raises(TerrainError) as caught:
+        HeightField.fractal(**{"size": 10.0, "spacing": 0.1, "roughness": 0.1, **options})
+    assert caught.value.field == field
+
+
+def test_a_list_that_holds_no_terrain_is_refused() -> None:
+    with pytest.raises(TerrainError, match="terrain: must be a Plane, SphereField, HeightField"):
+        Simulation(terrain=[Plane(), 3])
+    with pytest.raises(TerrainError, match="parts: a union needs at least one"):
+        Simulation(terrain=[])
+    with pytest.raises(TerrainError, match="terrain: must be a Plane"):
+        Simulation(terrain=np.zeros((4, 4)))
+    with pytest.raises(TerrainError, match=r"parts\[1\]: a second plane"):
+        Union([Plane(), Plane()])
+
+
+def test_bad_meshes_are_refused() -> None:
+    vertices, triangles = CUBE
+    for bad, message in [
+        ([[0, 1, 9]], "names vertex 9"),
+        ([[0, 1, 1]], "has no area"),
+        ([[0, 1, 3], [0, 1, 2]], "its edge from vertex 0 to 1"),
+        ([[0, 1, 2.5]], "triangles: must be whole numbers"),
+        ([[0, 1, -1]], "triangles: must be whole numbers"),
+        ([], "triangles: a mesh needs"),
+    ]:
+        with pytest.raises(TerrainError, match=message):
+            TriangleMesh(vertices, bad)
+    with pytest.raises(TerrainError, match=r"vertices\[0\]: must be finite"):
+        TriangleMesh([[np.nan, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    assert len(TriangleMesh(vertices, triangles)) == 12
+
+
+def test_maps_are_read_from_npy_and_png(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    heights = np.linspace(0.0, 1.0, 12).reshape(3, 4)
+    np.save(tmp_path / "map.npy", heights)
+    field = HeightField.from_file(tmp_path / "map.npy", spacing=0.5, scale=2.0, datum=0.5)
+    np.testing.assert_allclose(field.grid, 2.0 * (heights - 0.5), atol=1e-6)
+    grey = np.array([[0, 65535], [32768, 100]], np.uint16)
+    image.fromarray(grey).save(tmp_path / "map.png")
+    field = HeightField.from_file(tmp_path / "map.png", spacing=1.0, height_range=(-1.0, 1.0))
+    np.testing.assert_allclose(field.grid, grey / 65535 * 2 - 1, atol=1e-6)
+    for options, name in [
+        ({}, "height_range"),
+        ({"height_range": (0, 1)}, "spacing"),
+        ({"height_range": 3}, "height_range"),
+    ]:
+        with pytest.raises(TerrainError) as caught:
+            HeightField.from_file(tmp_path / "map.png", **options)
+        assert caught.value.field == name
+
+
+def test_a_geotiff_brings_spacing_unit_and_holes(tmp_path: Path) -> None:
+    rasterio = pytest.importorskip("rasterio")
+    heights = np.array([[1000.0, 1003.0, -9999.0], [1001.0, 1004.0, 1010.0]], np.float32)
+
+    def save(**changes: object) -> Path:
+        profile = {
+            "driver": "GTiff",
+            "height": 2,
+            "width": 3,
+            "count": 1,
+            "dtype": "float32",
+            "nodata": -9999.0,
+            "crs": "EPSG:32633",
+            "transform": rasterio.Affine(2.0, 0.0, 4e5, 0.0, -3.0, 5e6),
+        }
+        path = tmp_path / "map.tif"
+        with rasterio.open(path, "w", **{**profile, **changes}) as file:
+            file.write(heights, 1)
+        return path
+
+    field = HeightField.from_file(save())
+    assert field.spacing == (2.0, 3.0)
+    np.testing.assert_allclose(field.grid, [[0.0, 3.0, np.nan], [1.0, 4.0, 10.0]])
+    assert HeightField.from_file(save(), datum=1000.0, scale=0.5).grid[1, 2] == 5.0
+    angles = save(crs="EPSG:4326")
+    with pytest.raises(TerrainError, match="its places are angles") as caught:
+        HeightField.from_file(angles)
+    assert str(angles) in str(caught.value)
+    assert HeightField.from_file(angles, spacing=5.0).spacing == (5.0, 5.0)
+    with pytest.raises(TerrainError, match="do not run east"):
+        HeightField.from_file(save(transform=rasterio.Affine(2.0, 1.0, 0.0, 1.0, -2.0, 0.0)))
+    with pytest.raises(TerrainError, match="band: must be"):
+        HeightField.from_file(save(), band=2)
+
+
+def test_meshes_are_read_from_files(tmp_path: Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.5)
+    for ending in ("obj", "ply", "stl", "glb"):
+        path = tmp_path / f"rock.{ending}"
+        ball.export(path)
+        mesh = TriangleMesh.from_file(path, scale=2.0, position=(1.0, 0.0, 2.0))
+        assert mesh.is_closed
+        assert mesh.heights([[1.0, 2.0]])[0] == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("ending", ["npy", "png", "tif", "obj", "stl", "ply", "glb"])
+def test_damaged_files_are_refused_by_name(tmp_path: Path, ending: str) -> None:
+    for module in ("PIL", "rasterio", "trimesh"):
+        pytest.importorskip(module)
+    path = tmp_path / f"bad.{ending}"
+    random = np.random.default_rng(1)
+
+    def read(path: Path) -> object:
+        if ending in ("npy", "png", "tif"):
+            return HeightField.from_file(path, spacing=1.0, height_range=(0.0, 1.0))
+        return TriangleMesh.from_file(path)
+
+    for size in (0, 3, 100, 5000):
+        path.write_bytes(random.bytes(size))
+        with pytest.raises(TerrainError) as caught:
+            read(path)
+        assert str(path) in str(caught.value)
+    with pytest.raises(FileNotFoundError):
+        HeightField.from_file(tmp_path / f"none.{ending}")
+
+
+def test_a_file_that_claims_to_be_enormous_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "huge.npy"
+    header = b"{'descr': '<f4', 'fortran_order': False, 'shape': (2000000, 2000000), }"
+    header = header.ljust(117) + b"\n"
+    path.write_bytes(b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + b"\0" * 64)
+    with pytest.raises(TerrainError, match=r"huge\.npy"):
+        HeightField.from_file(path, spacing=1.0)
