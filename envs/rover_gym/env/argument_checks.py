@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, get_args
 
 from rover_gym.env import rewards
+from rover_gym.maps.lookup import is_terrain_file, open_terrain
 from rover_gym.mechanics import ModelError, OptionError, RoverModel, Terrain, TerrainError, Union
 from rover_gym.models.lookup import open_model
 from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector
@@ -94,13 +95,20 @@ class Special:
 
 
 def check_terrain(field: str, value: object) -> str | Terrain:
-    """Checks the name of a terrain, or a terrain; a list of terrains is their union."""
+    """Checks the name of a terrain, or a terrain; a file is opened, and a list of terrains is their union."""
     if isinstance(value, str) and value in TERRAINS:
         return value
     if isinstance(value, (list, tuple)):
         return Union(value)
+    if is_terrain_file(value):
+        return open_terrain(value)  # type: ignore[arg-type]
     if not isinstance(value, get_args(Terrain)):
-        refuse(TerrainError, field, value, f"unknown; known are {', '.join(TERRAINS)} and any terrain")
+        refuse(
+            TerrainError,
+            field,
+            value,
+            f"unknown; known are {', '.join(TERRAINS)}, files of maps and meshes, and any terrain",
+        )
     terrain: Terrain = value
     return terrain
 

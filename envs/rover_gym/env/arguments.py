@@ -58,10 +58,10 @@ class RoverArguments(TypedDict, total=False):
     """The keyword arguments of `RoverEnv`."""
 
     terrain: Annotated[
-        str | Terrain | Sequence[Terrain],
+        str | PathLike[str] | Terrain | Sequence[Terrain],
         Argument(
             "plane",
-            Special('"plane", "sphere_field", "hills", a terrain or a list of terrains', check_terrain),
+            Special('"plane", "sphere_field", "hills", a terrain, its file or a list of terrains', check_terrain),
             "the ground",
         ),
     ]

@@ -101,7 +101,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | 48-53 | wheel_contact    | 1 where the gap is at most 1 mm, else 0                   |            | 1            |
     | 54-59 | normal_force     | ground or rock on wheel, along the contact's normal       | N          | m g / 6      |
     | 60-71 | tangential_force | the same, rolling then lateral, wheel by wheel            | N          | m g / 6      |
-    | 72-74 | ground_normal    | the normal of the ground plane in the trunk frame         |            | 1            |
+    | 72-74 | ground_normal    | the normal of the ground, over 1 m, in the trunk frame    |            | 1            |
     | 75-76 | goal             | goal ahead and to the right of the trunk, horizontal      | m          | 10           |
     | 77    | goal_distance    | horizontal distance from the trunk's origin to the goal   | m          | 10           |
     | 78-89 | previous_action  | the action before this observation, 0 at reset            |            | 1            |
