@@ -221,6 +221,7 @@ impl From<ModelError> for BorderError {
             | ModelError::UnknownParent { name, .. }
             | ModelError::UnknownName { name, .. }
             | ModelError::NotADisc { solid: name, .. }
+            | ModelError::UnknownModel { name, .. }
             | ModelError::SteeringNotAbove { name, .. } => Value::Text(name.clone()),
             ModelError::NotFinite { value, .. }
             | ModelError::NotPositive { value, .. }
@@ -232,7 +233,6 @@ impl From<ModelError> for BorderError {
             | ModelError::NotASign { value, .. } => Value::Number(*value),
             #[allow(clippy::cast_precision_loss)] // a number to show
             ModelError::UnknownFormat { format } => Value::Number(*format as f64),
-            ModelError::UnknownModel { name, .. } => Value::Text(name.clone()),
             ModelError::TooMany { count, .. } => Value::Count(*count),
             ModelError::NoDirection { value, .. } => Value::Numbers(value.to_vec()),
             ModelError::ImpossibleInertia { principal, .. } => Value::Numbers(principal.to_vec()),
