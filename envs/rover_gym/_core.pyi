@@ -19,6 +19,8 @@ _Terrain: TypeAlias = Plane | SphereField | HeightField | TriangleMesh | Union
 _Terrains: TypeAlias = Sequence[_Terrain]
 _Coordinates: TypeAlias = Literal["report", "state"]
 _Range: TypeAlias = tuple[float, float]
+_MaterialRow: TypeAlias = tuple[str, str, float, float]
+_Materials: TypeAlias = Mapping[tuple[str, str], tuple[float, float]] | Sequence[_MaterialRow]
 
 __all__ = [
     "BallSimulation",
@@ -712,14 +714,18 @@ class SphereField:
     Args:
         centres: Centres of the spheres, (n, 3), m.
         radii: Their radii, (n,), m.
-        ground: The plane under them; none by default.
+        ground: The plane under them; none by default. Its material is "ground".
+        material: Name of the spheres' material, for the laws of a `Simulation` by pair of
+            materials.
 
     Raises:
         TerrainError: An array has a wrong shape, an entry is not finite or out of its range, or
             there are no spheres or too many of them.
     """
 
-    def __new__(cls, centres: npt.ArrayLike, radii: npt.ArrayLike, ground: Plane | None = None) -> SphereField: ...
+    def __new__(
+        cls, centres: npt.ArrayLike, radii: npt.ArrayLike, ground: Plane | None = None, material: str = "rock"
+    ) -> SphereField: ...
     @staticmethod
     def from_file(path: str | PathLike[str], ground: Plane | None = None) -> SphereField:
         """Reads spheres from a CSV file with the header `x,y,z,radius`, in m.
@@ -780,6 +786,9 @@ class SphereField:
         Source: Golombek and Rapp 1997.
         """
     @property
+    def material(self) -> str:
+        """Name of the spheres' material."""
+    @property
     def centres(self) -> _Array:
         """Centres of the spheres, (n, 3), m."""
     @property
@@ -817,6 +826,7 @@ class HeightField:
         spacing: Distance of columns and of rows, m: one number, or (dx, dz).
         origin: Place (x, z) of the first height, m; by default such that the map's middle is at
             the world's origin.
+        material: Name of its material, for the laws of a `Simulation` by pair of materials.
 
     Raises:
         TerrainError: The array has a wrong shape, a height is infinite or beyond 1e6 m, no cell
@@ -828,6 +838,7 @@ class HeightField:
         heights: npt.ArrayLike,
         spacing: float | tuple[float, float],
         origin: tuple[float, float] | None = None,
+        material: str = "ground",
     ) -> HeightField: ...
     @staticmethod
     def from_file(
@@ -839,6 +850,7 @@ class HeightField:
         scale: float | None = None,
         datum: float | None = None,
         band: int = 1,
+        material: str = "ground",
     ) -> HeightField:
         """Reads a map from a GeoTIFF, a PNG or a .npy file.
 
@@ -855,6 +867,7 @@ class HeightField:
             datum: Height of the file that becomes 0, in its own numbers; of a GeoTIFF by default its
                 lowest, otherwise 0.
             band: Band of a GeoTIFF, from 1.
+            material: Name of its material.
 
         Returns:
             The map.
@@ -878,6 +891,7 @@ class HeightField:
         ripple_length: float = 1.0,
         seed: int = 0,
         origin: tuple[float, float] | None = None,
+        material: str = "ground",
     ) -> HeightField:
         """Rough ground made by a seed: a self-affine surface, with craters and ripples on demand.
 
@@ -899,6 +913,7 @@ class HeightField:
             seed: Seed of the random numbers; equal seeds give equal ground.
             origin: Place (x, z) of the first height, m; by default such that the map's middle is
                 at the world's origin.
+            material: Name of its material.
 
         Returns:
             The map.
@@ -908,6 +923,9 @@ class HeightField:
 
         Source: Turcotte 1997 (spectral synthesis); Pike 1977 and McGetchin 1973 (craters).
         """
+    @property
+    def material(self) -> str:
+        """Name of its material."""
     @property
     def grid(self) -> npt.NDArray[np.float32]:
         """Heights, (n_z, n_x) float32, m; nan for no data."""
@@ -947,13 +965,14 @@ class TriangleMesh:
     Args:
         vertices: Corners, (n, 3), m.
         triangles: Numbers of the three corners of each triangle, (m, 3).
+        material: Name of its material, for the laws of a `Simulation` by pair of materials.
 
     Raises:
         TerrainError: An array has a wrong shape, an entry is not finite, a triangle has no area or
             names a corner that is not there, or two triangles turn opposite ways.
     """
 
-    def __new__(cls, vertices: npt.ArrayLike, triangles: npt.ArrayLike) -> TriangleMesh: ...
+    def __new__(cls, vertices: npt.ArrayLike, triangles: npt.ArrayLike, material: str = "ground") -> TriangleMesh: ...
     @staticmethod
     def from_file(
         path: str | PathLike[str],
@@ -961,6 +980,7 @@ class TriangleMesh:
         scale: float = 1.0,
         position: tuple[float, float, float] = (0.0, 0.0, 0.0),
         up: Literal["y", "z"] = "y",
+        material: str = "ground",
     ) -> TriangleMesh:
         """Reads a mesh from a file: OBJ, PLY, STL, GLB and what else `trimesh` reads.
 
@@ -971,6 +991,7 @@ class TriangleMesh:
             scale: Factor from the file's numbers to m.
             position: Place of the file's origin, (3,), m; the world's origin by default.
             up: Axis of the file that points up: "y" or "z".
+            material: Name of its material.
 
         Returns:
             The mesh.
@@ -980,6 +1001,9 @@ class TriangleMesh:
             OSError: The file cannot be read.
             MissingExtraError: The extra `maps` is not installed.
         """
+    @property
+    def material(self) -> str:
+        """Name of its material."""
     @property
     def vertices(self) -> _Array:
         """Corners, (n, 3), m."""
@@ -1172,8 +1196,12 @@ class Simulation:
         model: The machine; the built-in rover by default.
         terrain: A terrain, or a list of several; flat ground at height 0 by default.
         gravity: Gravity, world frame, (3,), m/s²; (0, -9.81, 0) by default.
-        friction: Coulomb's coefficient of every contact.
-        restitution: Newton's coefficient of every contact, in [0, 1].
+        friction: Coulomb's coefficient of every contact whose pair is not in `materials`.
+        restitution: Newton's coefficient of every contact whose pair is not in `materials`, in
+            [0, 1].
+        materials: Friction and restitution by pair of materials, in any order, such as
+            `{("wheel", "rock"): (0.5, 0.1)}`; a list of rows (name, name, friction, restitution)
+            says the same. None by default.
         time_step: Time step, s, from 1e-9 to 1000; 0.005 by default.
         variant: "linearised" evaluates the forces once a step; "newton" solves for those at its
             end. "linearised" by default.
@@ -1204,6 +1232,7 @@ class Simulation:
         gravity: npt.ArrayLike | None = None,
         friction: float = 0.7,
         restitution: float = 0.0,
+        materials: _Materials | None = None,
         time_step: float | None = None,
         variant: Literal["linearised", "newton"] | None = None,
         theta: float = 0.5,
@@ -1232,10 +1261,13 @@ class Simulation:
         """Gravity, world frame, (3,), m/s²."""
     @property
     def friction(self) -> float:
-        """Coulomb's coefficient of every contact."""
+        """Coulomb's coefficient of every contact whose pair is not in `materials`."""
     @property
     def restitution(self) -> float:
-        """Newton's coefficient of every contact."""
+        """Newton's coefficient of every contact whose pair is not in `materials`."""
+    @property
+    def materials(self) -> dict[tuple[str, str], tuple[float, float]]:
+        """Friction and restitution by pair of materials, as given."""
     @property
     def settings(self) -> dict[str, Any]:
         """The keyword arguments that make a simulation with the same options."""

@@ -91,3 +91,13 @@ def test_bad_shapes_are_refused_by_name(field: str, rest: dict[str, Any]) -> Non
     with pytest.raises(ModelError) as caught:
         RoverModel.from_dict(described(**rest))
     assert caught.value.field == field
+
+
+def test_a_wheel_is_drawn_as_wide_as_it_is() -> None:
+    thin, wide = RoverModel(), RoverModel().to_dict()
+    for wheel in wide["wheels"]:
+        wheel["width"] = 0.123
+    radius = thin.wheel_radii[0]
+    for model, width in ((thin, 0.7 * radius), (RoverModel.from_dict(wide), 0.123)):
+        tyre = on("wheel_ML", model)[0]
+        assert (tyre.kind, tyre.size) == ("cylinder", pytest.approx((radius, width)))

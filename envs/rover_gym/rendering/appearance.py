@@ -40,7 +40,7 @@ TREAD_COLOUR: Colour = (0.40, 0.40, 0.43)
 HUB_COLOUR: Colour = (0.74, 0.75, 0.77)
 SPOKE_COLOUR: Colour = (0.25, 0.26, 0.29)
 
-# A wheel's contact is the rim of a thin disc; the drawn wheel has this width about that disc, in radii.
+# A wheel without a width touches as a thin disc; it is drawn with this width about that disc, in radii.
 WHEEL_WIDTH = 0.7
 TREAD_BARS = 4  # each spans the diameter and shows at both ends
 PLATE = 0.012  # m, thickness of what is laid on a surface, and of the forks' plates
@@ -211,10 +211,15 @@ def _rim(wheel: Mapping[str, Any]) -> float:
     return float(wheel.get("contact_radius", wheel["radius"]))
 
 
+def _width(wheel: Mapping[str, Any]) -> float:
+    """Width at which a wheel of a description is drawn, m: its own, unless it is a thin disc."""
+    return float(wheel.get("width") or WHEEL_WIDTH * _rim(wheel))
+
+
 def _wheel_parts(wheel: Mapping[str, Any]) -> Iterator[Part]:
     """Tyre with treads, hub, and spokes; one spoke has the colour of the nose, so that rotation is visible."""
     name, radius = wheel["solid"], _rim(wheel)
-    width = WHEEL_WIDTH * radius
+    width = _width(wheel)
     turn = _turn_to(np.array(wheel["axle"], dtype=np.float64))
     centre = (0.0, 0.0, 0.0)
     yield Part(name, "cylinder", (radius, width), centre, turn, TYRE_COLOUR)
@@ -247,7 +252,7 @@ def _fork_parts(solid: Mapping[str, Any], wheel: Mapping[str, Any]) -> Iterator[
         return
     side /= np.linalg.norm(side)
     rotation = np.column_stack((np.cross(up, side), up, side))
-    half = 0.5 * (WHEEL_WIDTH + 0.12) * radius + 0.5 * PLATE
+    half = 0.5 * (_width(wheel) + 0.12 * radius) + 0.5 * PLATE
     plate = length - clearance
     for sign in (-1.0, 1.0):
         centre = arm + rotation @ np.array([sign * half, plate / 2, 0.0])

@@ -222,6 +222,7 @@ impl From<ModelError> for BorderError {
             | ModelError::UnknownName { name, .. }
             | ModelError::NotADisc { solid: name, .. }
             | ModelError::UnknownModel { name, .. }
+            | ModelError::MaterialName { name, .. }
             | ModelError::SteeringNotAbove { name, .. } => Value::Text(name.clone()),
             ModelError::NotFinite { value, .. }
             | ModelError::NotPositive { value, .. }
@@ -284,12 +285,13 @@ impl From<TerrainError> for BorderError {
                 radius: value,
             } => (Some(index), Value::Number(*value)),
             TerrainError::MismatchedLengths { radii, .. } => (None, Value::Count(*radii)),
-            TerrainError::TooMany { count, .. } => (None, Value::Count(*count)),
+            TerrainError::TooMany { count, .. } | TerrainError::WrongCount { count, .. } => {
+                (None, Value::Count(*count))
+            }
             TerrainError::Empty | TerrainError::NoTriangles | TerrainError::NoParts => {
                 (None, Value::Count(0))
             }
             TerrainError::BadHeight { value, .. } => (None, Value::Number(*value)),
-            TerrainError::WrongCount { count, .. } => (None, Value::Count(*count)),
             TerrainError::NoSuchVertex { index, vertex, .. } => {
                 (Some(index), Value::Count(*vertex))
             }
@@ -314,8 +316,21 @@ impl From<TerrainError> for BorderError {
 
 impl From<OptionsError> for BorderError {
     fn from(e: OptionsError) -> Self {
-        let OptionsError::OutOfRange { field, value, .. } = e;
-        Self::option(field, e.to_string(), Value::Number(value))
+        let message = e.to_string();
+        match e {
+            OptionsError::OutOfRange { field, value, .. } => {
+                Self::option(field, message, Value::Number(value))
+            }
+            OptionsError::BetweenMaterials { value, .. } => {
+                Self::option("materials", message, Value::Number(value))
+            }
+            OptionsError::MaterialsTwice { materials } => {
+                Self::option("materials", message, Value::Text(materials.join(", ")))
+            }
+            OptionsError::MaterialName { name } => {
+                Self::option("materials", message, Value::Text(name))
+            }
+        }
     }
 }
 
@@ -399,8 +414,9 @@ impl From<DrawError> for BorderError {
                 let message = format!("{why}, in the last of {attempts} scenes");
                 let own = match why {
                     Unsuitable::Placement(why) => why.into(),
-                    Unsuitable::NoGoal { x, z } => Self::of_goal(x, z),
-                    Unsuitable::NoWay { to: [x, z], .. } => Self::of_goal(x, z),
+                    Unsuitable::NoGoal { x, z } | Unsuitable::NoWay { to: [x, z], .. } => {
+                        Self::of_goal(x, z)
+                    }
                 };
                 Self { message, ..own }
             }

@@ -5,12 +5,13 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::geometry::HeightField as CoreField;
+use rover_core::geometry::{HeightField as CoreField, Terrain};
 
 use crate::arguments::{Given, number, refused};
 use crate::arrays::vector;
 use crate::errors::{BorderError, Kind, Value};
 use crate::ground::heights;
+use crate::materials;
 
 /// A map of heights as ground: two triangles a cell, solid below. Immutable.
 ///
@@ -24,6 +25,7 @@ use crate::ground::heights;
 ///     spacing: Distance of columns and of rows, m: one number, or (dx, dz).
 ///     origin: Place (x, z) of the first height, m; by default such that the map's middle is at
 ///         the world's origin.
+///     material: Name of its material, for the laws of a `Simulation` by pair of materials.
 ///
 /// Raises:
 ///     TerrainError: The array has a wrong shape, a height is infinite or beyond 1e6 m, no cell
@@ -83,36 +85,43 @@ fn from_package<'py>(
     name: &str,
     arguments: impl pyo3::call::PyCallArgs<'py>,
     options: Option<&Bound<'py, PyDict>>,
+    material: Given<'py>,
 ) -> PyResult<HeightField> {
     let maps = py.import("rover_gym.maps")?;
     let made = maps.getattr(name)?.call(arguments, options)?;
     let (heights, spacing, origin) =
         made.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>, Bound<'_, PyAny>)>()?;
-    HeightField::new(py, &heights, &spacing, Some(&origin))
+    HeightField::new(py, &heights, &spacing, Some(&origin), material)
 }
 
 #[pymethods]
 impl HeightField {
     #[new]
-    #[pyo3(signature = (heights, spacing, origin = None))]
+    #[pyo3(signature = (heights, spacing, origin = None, material = Given::MISSING),
+        text_signature = "(heights, spacing, origin=None, material='ground')")]
     fn new(
         py: Python<'_>,
         heights: &Bound<'_, PyAny>,
         spacing: &Bound<'_, PyAny>,
         origin: Option<&Bound<'_, PyAny>>,
+        material: Given<'_>,
     ) -> PyResult<Self> {
+        let material = materials::name(material)?;
         let (heights, shape) = table(heights)?;
         let spacing = pair(spacing, "spacing")?;
-        let origin = match origin {
-            Some(origin) => pair(origin, "origin")?,
-            None => {
-                let middle = |n: usize, step: f64| -0.5 * step * (n.max(1) - 1) as f64;
-                [middle(shape[1], spacing[0]), middle(shape[0], spacing[1])]
-            }
+        let origin = if let Some(origin) = origin {
+            pair(origin, "origin")?
+        } else {
+            let middle = |n: usize, step: f64| -0.5 * step * (n.max(1) - 1) as f64;
+            [middle(shape[1], spacing[0]), middle(shape[0], spacing[1])]
         };
         let field = py.detach(|| CoreField::new(heights, shape, spacing, origin));
+        let mut field = field.map_err(BorderError::from)?;
+        if let Some(material) = material {
+            field = field.with_material(&material);
+        }
         Ok(Self {
-            inner: Arc::new(field.map_err(BorderError::from)?),
+            inner: Arc::new(field),
         })
     }
 
@@ -131,6 +140,7 @@ impl HeightField {
     ///     datum: Height of the file that becomes 0, in its own numbers; of a GeoTIFF by default its
     ///         lowest, otherwise 0.
     ///     band: Band of a GeoTIFF, from 1.
+    ///     material: Name of its material.
     ///
     /// Returns:
     ///     The map.
@@ -141,8 +151,8 @@ impl HeightField {
     ///     MissingExtraError: The extra `maps` is not installed.
     #[staticmethod]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
-    #[pyo3(signature = (path, *, spacing = None, origin = None, height_range = None, scale = None, datum = None, band = Given::MISSING),
-        text_signature = "(path, *, spacing=None, origin=None, height_range=None, scale=None, datum=None, band=1)")]
+    #[pyo3(signature = (path, *, spacing = None, origin = None, height_range = None, scale = None, datum = None, band = Given::MISSING, material = Given::MISSING),
+        text_signature = "(path, *, spacing=None, origin=None, height_range=None, scale=None, datum=None, band=1, material='ground')")]
     fn from_file<'py>(
         py: Python<'py>,
         path: &Bound<'py, PyAny>,
@@ -152,6 +162,7 @@ impl HeightField {
         scale: Option<&Bound<'py, PyAny>>,
         datum: Option<&Bound<'py, PyAny>>,
         band: Given<'py>,
+        material: Given<'py>,
     ) -> PyResult<Self> {
         let options = PyDict::new(py);
         options.set_item("spacing", spacing.map(|s| pair(s, "spacing")).transpose()?)?;
@@ -162,7 +173,7 @@ impl HeightField {
         if let Some(band) = band.given() {
             options.set_item("band", band)?;
         }
-        from_package(py, "read_map", (path,), Some(&options))
+        from_package(py, "read_map", (path,), Some(&options), material)
     }
 
     /// Rough ground made by a seed: a self-affine surface, with craters and ripples on demand.
@@ -185,6 +196,7 @@ impl HeightField {
     ///     seed: Seed of the random numbers; equal seeds give equal ground.
     ///     origin: Place (x, z) of the first height, m; by default such that the map's middle is
     ///         at the world's origin.
+    ///     material: Name of its material.
     ///
     /// Returns:
     ///     The map.
@@ -194,16 +206,29 @@ impl HeightField {
     ///
     /// Source: Turcotte 1997 (spectral synthesis); Pike 1977 and McGetchin 1973 (craters).
     #[staticmethod]
-    #[pyo3(signature = (size, spacing, roughness, **options),
-        text_signature = "(size, spacing, roughness, *, hurst=0.7, longest_wave=None, craters=0.0, crater_diameter=(0.5, 5.0), ripple_height=0.0, ripple_length=1.0, seed=0, origin=None)")]
+    #[pyo3(signature = (size, spacing, roughness, *, material = Given::MISSING, **options),
+        text_signature = "(size, spacing, roughness, *, hurst=0.7, longest_wave=None, craters=0.0, crater_diameter=(0.5, 5.0), ripple_height=0.0, ripple_length=1.0, seed=0, origin=None, material='ground')")]
     fn fractal<'py>(
         py: Python<'py>,
         size: &Bound<'py, PyAny>,
         spacing: &Bound<'py, PyAny>,
         roughness: &Bound<'py, PyAny>,
+        material: Given<'py>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Self> {
-        from_package(py, "fractal_map", (size, spacing, roughness), options)
+        from_package(
+            py,
+            "fractal_map",
+            (size, spacing, roughness),
+            options,
+            material,
+        )
+    }
+
+    /// Name of its material.
+    #[getter]
+    fn material(&self) -> &str {
+        self.inner.material(0)
     }
 
     /// Heights, (n_z, n_x) float32, m; nan for no data.
@@ -265,7 +290,7 @@ impl HeightField {
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let py = slf.py();
         let own = slf.get();
-        let arguments = (own.grid(py)?, own.spacing(), own.origin());
+        let arguments = (own.grid(py)?, own.spacing(), own.origin(), own.material());
         Ok((
             slf.get_type().into_any(),
             arguments.into_pyobject(py)?.into_any(),

@@ -18,6 +18,7 @@ mod generators;
 mod ground;
 mod height_field;
 mod infos;
+mod materials;
 mod model;
 mod model_files;
 mod motor;

@@ -8,6 +8,7 @@ use rover_core::integrator::{Stabilisation, StepOptions, Variant};
 use crate::arguments::{count, flag, number, text};
 use crate::errors::{BorderError, Kind, Value};
 use crate::friction_contact::{SIMULATION_SOLVERS, solver_options};
+use crate::materials;
 
 /// The value that a word stands for.
 pub fn choice<T: Copy>(field: &str, given: &str, choices: &[(&str, T)]) -> Result<T, BorderError> {
@@ -81,6 +82,7 @@ impl Options {
         match field {
             "friction" => step.friction_coefficient = number()?,
             "restitution" => step.restitution = number()?,
+            "materials" => step.materials = materials::parse(value)?,
             "time_step" => step.time_step = number()?,
             "variant" => step.variant = choice(field, &text()?, &VARIANTS)?,
             "theta" => step.theta = number()?,
@@ -119,6 +121,10 @@ pub fn settings<'py>(
     settings.set_item("gravity", gravity)?;
     settings.set_item("friction", options.friction_coefficient)?;
     settings.set_item("restitution", options.restitution)?;
+    if !options.materials.is_empty() {
+        let rows = materials::rows(settings.py(), &options.materials)?;
+        settings.set_item("materials", rows)?;
+    }
     settings.set_item("time_step", options.time_step)?;
     settings.set_item("variant", name_of(options.variant, &VARIANTS))?;
     settings.set_item("theta", options.theta)?;

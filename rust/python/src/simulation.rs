@@ -37,8 +37,12 @@ use crate::stepping::{Problem, problem, step};
 ///     model: The machine; the built-in rover by default.
 ///     terrain: A terrain, or a list of several; flat ground at height 0 by default.
 ///     gravity: Gravity, world frame, (3,), m/s²; (0, -9.81, 0) by default.
-///     friction: Coulomb's coefficient of every contact.
-///     restitution: Newton's coefficient of every contact, in [0, 1].
+///     friction: Coulomb's coefficient of every contact whose pair is not in `materials`.
+///     restitution: Newton's coefficient of every contact whose pair is not in `materials`, in
+///         [0, 1].
+///     materials: Friction and restitution by pair of materials, in any order, such as
+///         `{("wheel", "rock"): (0.5, 0.1)}`; a list of rows (name, name, friction, restitution)
+///         says the same. None by default.
 ///     time_step: Time step, s, from 1e-9 to 1000; 0.005 by default.
 ///     variant: "linearised" evaluates the forces once a step; "newton" solves for those at its
 ///         end. "linearised" by default.
@@ -105,16 +109,17 @@ impl Simulation {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
     #[pyo3(signature = (model = Given::MISSING, terrain = None, *, gravity = None, friction = Given::MISSING, restitution = Given::MISSING,
-        time_step = Given::MISSING, variant = Given::MISSING, theta = Given::MISSING, forecast = Given::MISSING,
+        materials = None, time_step = Given::MISSING, variant = Given::MISSING, theta = Given::MISSING, forecast = Given::MISSING,
         solver = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING,
         stabilisation = Given::MISSING, warm_start = Given::MISSING, accuracy = None),
-        text_signature = "(model=None, terrain=None, *, gravity=None, friction=0.7, restitution=0.0, time_step=None, variant=None, theta=0.5, forecast=0.5, solver='auto', tolerance=None, max_iterations=1000, stabilisation='projection', warm_start=True, accuracy=None)")]
+        text_signature = "(model=None, terrain=None, *, gravity=None, friction=0.7, restitution=0.0, materials=None, time_step=None, variant=None, theta=0.5, forecast=0.5, solver='auto', tolerance=None, max_iterations=1000, stabilisation='projection', warm_start=True, accuracy=None)")]
     fn new(
         model: Given<'_>,
         terrain: Option<&Bound<'_, PyAny>>,
         gravity: Option<&Bound<'_, PyAny>>,
         friction: Given<'_>,
         restitution: Given<'_>,
+        materials: Option<&Bound<'_, PyAny>>,
         time_step: Given<'_>,
         variant: Given<'_>,
         theta: Given<'_>,
@@ -135,6 +140,7 @@ impl Simulation {
         let given = [
             ("friction", friction.given()),
             ("restitution", restitution.given()),
+            ("materials", materials.cloned()),
             ("theta", theta.given()),
             ("forecast", forecast.given()),
             ("solver", solver.given()),
@@ -210,16 +216,30 @@ impl Simulation {
         fresh(py, self.options.gravity.as_slice())
     }
 
-    /// Coulomb's coefficient of every contact.
+    /// Coulomb's coefficient of every contact whose pair is not in `materials`.
     #[getter]
     fn friction(&self) -> f64 {
         self.options.friction_coefficient
     }
 
-    /// Newton's coefficient of every contact.
+    /// Newton's coefficient of every contact whose pair is not in `materials`.
     #[getter]
     fn restitution(&self) -> f64 {
         self.options.restitution
+    }
+
+    /// Friction and restitution by pair of materials, as given.
+    #[getter]
+    fn materials<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let laws = PyDict::new(py);
+        for pair in self.options.materials.pairs() {
+            let [first, second] = &pair.materials;
+            laws.set_item(
+                (first, second),
+                (pair.friction_coefficient, pair.restitution),
+            )?;
+        }
+        Ok(laws)
     }
 
     /// The keyword arguments that make a simulation with the same options.

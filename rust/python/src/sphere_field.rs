@@ -13,6 +13,7 @@ use crate::arrays::{array, fresh_rows, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::files::{self, in_file, read_text};
 use crate::ground::{Ground, heights};
+use crate::materials;
 use crate::plane::Plane;
 
 /// Longest file of spheres, bytes.
@@ -23,7 +24,9 @@ const MAX_FILE: usize = 1 << 28;
 /// Args:
 ///     centres: Centres of the spheres, (n, 3), m.
 ///     radii: Their radii, (n,), m.
-///     ground: The plane under them; none by default.
+///     ground: The plane under them; none by default. Its material is "ground".
+///     material: Name of the spheres' material, for the laws of a `Simulation` by pair of
+///         materials.
 ///
 /// Raises:
 ///     TerrainError: An array has a wrong shape, an entry is not finite or out of its range, or
@@ -92,16 +95,25 @@ fn range(given: &Bound<'_, PyAny>, field: &str) -> PyResult<[f64; 2]> {
 #[pymethods]
 impl SphereField {
     #[new]
-    #[pyo3(signature = (centres, radii, ground = None))]
+    #[pyo3(signature = (centres, radii, ground = None, material = Given::MISSING),
+        text_signature = "(centres, radii, ground=None, material='rock')")]
     fn new(
         py: Python<'_>,
         centres: &Bound<'_, PyAny>,
         radii: &Bound<'_, PyAny>,
         ground: Option<&Bound<'_, PyAny>>,
+        material: Given<'_>,
     ) -> PyResult<Self> {
+        let material = materials::name(material)?;
         let centres = rows::<3>(centres, "centres")?;
         let radii = vector(radii, Kind::Terrain, "radii")?;
-        Ok(build(py, &centres, &radii, plane(ground)?)?)
+        let field = build(py, &centres, &radii, plane(ground)?)?;
+        Ok(match material {
+            None => field,
+            Some(material) => Self {
+                inner: Arc::new(Arc::unwrap_or_clone(field.inner).with_material(&material)),
+            },
+        })
     }
 
     /// Reads spheres from a CSV file with the header `x,y,z,radius`, in m.
@@ -257,6 +269,12 @@ impl SphereField {
         })
     }
 
+    /// Name of the spheres' material.
+    #[getter]
+    fn material(&self) -> &str {
+        self.inner.material(1)
+    }
+
     /// Centres of the spheres, (n, 3), m.
     #[getter]
     fn centres<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
@@ -313,7 +331,12 @@ impl SphereField {
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let py = slf.py();
         let own = slf.get();
-        let arguments = (own.centres(py)?, own.radii(py), own.ground());
+        let arguments = (
+            own.centres(py)?,
+            own.radii(py),
+            own.ground(),
+            own.material(),
+        );
         Ok((
             slf.get_type().into_any(),
             arguments.into_pyobject(py)?.into_any(),

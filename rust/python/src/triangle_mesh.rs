@@ -5,12 +5,13 @@ use std::sync::Arc;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use rover_core::geometry::TriangleMesh as CoreMesh;
+use rover_core::geometry::{Terrain, TriangleMesh as CoreMesh};
 
-use crate::arguments::refused;
+use crate::arguments::{Given, refused};
 use crate::arrays::{array, fresh_rows};
 use crate::errors::{BorderError, Kind};
 use crate::ground::heights;
+use crate::materials;
 use crate::sphere_field::rows;
 
 /// A mesh of triangles as ground: rocks, or anything else that stands still. Immutable.
@@ -21,6 +22,7 @@ use crate::sphere_field::rows;
 /// Args:
 ///     vertices: Corners, (n, 3), m.
 ///     triangles: Numbers of the three corners of each triangle, (m, 3).
+///     material: Name of its material, for the laws of a `Simulation` by pair of materials.
 ///
 /// Raises:
 ///     TerrainError: An array has a wrong shape, an entry is not finite, a triangle has no area or
@@ -51,16 +53,24 @@ fn indices(value: &Bound<'_, PyAny>) -> PyResult<Vec<[usize; 3]>> {
 #[pymethods]
 impl TriangleMesh {
     #[new]
+    #[pyo3(signature = (vertices, triangles, material = Given::MISSING),
+        text_signature = "(vertices, triangles, material='ground')")]
     fn new(
         py: Python<'_>,
         vertices: &Bound<'_, PyAny>,
         triangles: &Bound<'_, PyAny>,
+        material: Given<'_>,
     ) -> PyResult<Self> {
+        let material = materials::name(material)?;
         let vertices = rows::<3>(vertices, "vertices")?;
         let triangles = indices(triangles)?;
         let mesh = py.detach(|| CoreMesh::new(&vertices, &triangles));
+        let mut mesh = mesh.map_err(BorderError::from)?;
+        if let Some(material) = material {
+            mesh = mesh.with_material(&material);
+        }
         Ok(Self {
-            inner: Arc::new(mesh.map_err(BorderError::from)?),
+            inner: Arc::new(mesh),
         })
     }
 
@@ -73,6 +83,7 @@ impl TriangleMesh {
     ///     scale: Factor from the file's numbers to m.
     ///     position: Place of the file's origin, (3,), m; the world's origin by default.
     ///     up: Axis of the file that points up: "y" or "z".
+    ///     material: Name of its material.
     ///
     /// Returns:
     ///     The mesh.
@@ -82,17 +93,24 @@ impl TriangleMesh {
     ///     OSError: The file cannot be read.
     ///     MissingExtraError: The extra `maps` is not installed.
     #[staticmethod]
-    #[pyo3(signature = (path, **options),
-        text_signature = "(path, *, scale=1.0, position=(0.0, 0.0, 0.0), up='y')")]
+    #[pyo3(signature = (path, *, material = Given::MISSING, **options),
+        text_signature = "(path, *, scale=1.0, position=(0.0, 0.0, 0.0), up='y', material='ground')")]
     fn from_file(
         py: Python<'_>,
         path: &Bound<'_, PyAny>,
+        material: Given<'_>,
         options: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let maps = py.import("rover_gym.maps")?;
         let made = maps.getattr("read_mesh")?.call((path,), options)?;
         let (vertices, triangles) = made.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>()?;
-        Self::new(py, &vertices, &triangles)
+        Self::new(py, &vertices, &triangles, material)
+    }
+
+    /// Name of its material.
+    #[getter]
+    fn material(&self) -> &str {
+        self.inner.material(0)
     }
 
     /// Corners, (n, 3), m.
@@ -145,7 +163,7 @@ impl TriangleMesh {
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let py = slf.py();
         let own = slf.get();
-        let arguments = (own.vertices(py)?, own.triangles(py)?);
+        let arguments = (own.vertices(py)?, own.triangles(py)?, own.material());
         Ok((
             slf.get_type().into_any(),
             arguments.into_pyobject(py)?.into_any(),

@@ -5,10 +5,14 @@ use nalgebra::Vector3;
 use super::activation::Activation;
 use super::frame::ContactFrame;
 use super::pair::{Contact, ContactKey, ON_SURFACE};
-use super::part::{Part, place_wheel};
+use super::part::{Part, wheel_shape};
 use crate::geometry::query::sweep::{DEEP, first_touch};
-use crate::geometry::query::{SurfacePoint, box_sphere, disc_sphere, dispatch, sphere_sphere};
-use crate::geometry::{Coverage, Disc, PlacedShape, Primitive, Sphere, SupportMap, Terrain};
+use crate::geometry::query::{
+    SurfacePoint, box_sphere, disc_sphere, dispatch, is_lowest, roller_sphere, sphere_sphere,
+};
+use crate::geometry::{
+    Coverage, Disc, PlacedShape, Primitive, Roller, Sphere, SupportMap, Terrain,
+};
 use crate::multibody::{Kinematics, Model};
 
 /// On a sphere: the nearest point.
@@ -162,6 +166,7 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
     };
     let (centre, bound) = match &placed.shape {
         PlacedShape::Disc(disc) => (disc.centre, disc.radius),
+        PlacedShape::Roller(roller) => (roller.core.centre, roller.bound()),
         PlacedShape::Box(solid) => (solid.centre, solid.half_size.norm()),
         PlacedShape::Sphere(sphere) => (sphere.centre, sphere.radius),
     };
@@ -171,7 +176,7 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
         let turning = match &placed.shape {
             // The sweep of a box includes its rotation; the other shapes are treated as round.
             PlacedShape::Box(_) => (end.R[body] - kinematics.R[body]).norm() * bound,
-            PlacedShape::Disc(_) | PlacedShape::Sphere(_) => 0.0,
+            PlacedShape::Disc(_) | PlacedShape::Roller(_) | PlacedShape::Sphere(_) => 0.0,
         };
         (half_way, half_way.norm() + turning)
     } else {
@@ -182,7 +187,7 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
     }
     let floor = match &placed.shape {
         PlacedShape::Box(solid) => base.y + solid.support(&-Vector3::y()).y - gate.reach,
-        PlacedShape::Disc(_) | PlacedShape::Sphere(_) => f64::NEG_INFINITY,
+        PlacedShape::Disc(_) | PlacedShape::Roller(_) | PlacedShape::Sphere(_) => f64::NEG_INFINITY,
     };
     terrain.visit_above(
         &(base + centre),
@@ -265,6 +270,10 @@ const SHALLOW: f64 = 1e-9;
 fn is_far(shape: &PlacedShape, between: &Vector3<f64>, within: f64) -> bool {
     match shape {
         PlacedShape::Disc(disc) => disc.axle.dot(between).abs() > within,
+        PlacedShape::Roller(roller) => {
+            let beside = roller.core.axle.dot(between).abs();
+            beside > within + roller.half + roller.rounding
+        }
         PlacedShape::Box(solid) => {
             let local = solid.R.tr_mul(between);
             let outside = (local.abs() - solid.half_size).map(|x| x.max(0.0));
@@ -286,6 +295,7 @@ fn touch(
 ) -> Option<Vector3<f64>> {
     match &placed.shape {
         PlacedShape::Disc(disc) => touch_of_disc(disc, ground, base, half_way),
+        PlacedShape::Roller(roller) => touch_of_roller(roller, ground, base, half_way),
         PlacedShape::Box(solid) => {
             let middle = solid.R.tr_mul(&(ground.centre - base - solid.centre));
             let PlacedShape::Box(at_end) = placed.part.place(model, end) else {
@@ -338,6 +348,25 @@ pub(crate) fn touch_of_disc(
     first_touch(distance, &middle, &(middle - half_way), ground.radius)
 }
 
+/// The same for a wheel with a width.
+fn touch_of_roller(
+    roller: &Roller,
+    ground: &Sphere,
+    base: &Vector3<f64>,
+    half_way: &Vector3<f64>,
+) -> Option<Vector3<f64>> {
+    let middle = ground.centre - base - roller.core.centre;
+    let distance = |x: &Vector3<f64>| {
+        let ball = Sphere {
+            centre: x + base + roller.core.centre,
+            radius: 0.0,
+        };
+        let near = roller_sphere::nearest_point(roller, &ball, base);
+        (near.n, near.gap)
+    };
+    first_touch(distance, &middle, &(middle - half_way), ground.radius)
+}
+
 /// Gap, nearest point (relative to the trunk origin) and frame of every wheel over a terrain, as
 /// [`wheel_contact`] gives them.
 #[must_use]
@@ -364,16 +393,20 @@ pub fn wheel_contact(
     i: usize,
 ) -> Contact {
     let part = Part::Wheel(i);
-    let (body, disc) = (
+    let (body, shape) = (
         part.body(model),
-        place_wheel(&model.wheels()[i], kinematics),
+        wheel_shape(&model.wheels()[i], kinematics),
     );
-    let mut best = SurfacePoint::of_normal(NEAREST, disc.centre, &Vector3::y(), f64::INFINITY);
+    let mut best = SurfacePoint::of_normal(NEAREST, shape.centre(), &Vector3::y(), f64::INFINITY);
     let mut primitive = 0;
-    visit_nearer(&disc, kinematics.origin(body), terrain, &mut |id, point| {
-        (best, primitive) = (*point, id);
-    });
-    let shape = PlacedShape::Disc(disc);
+    visit_nearer(
+        &shape,
+        kinematics.origin(body),
+        terrain,
+        &mut |id, point| {
+            (best, primitive) = (*point, id);
+        },
+    );
     Placed { part, body, shape }.contact(&best, primitive)
 }
 
@@ -381,31 +414,37 @@ pub fn wheel_contact(
 /// world).
 #[must_use]
 pub fn disc_gap(disc: &Disc, base: &Vector3<f64>, terrain: &dyn Terrain) -> f64 {
+    wheel_gap(&PlacedShape::Disc(*disc), base, terrain)
+}
+
+/// The same of a wheel's shape, with a width or without.
+#[must_use]
+pub fn wheel_gap(shape: &PlacedShape, base: &Vector3<f64>, terrain: &dyn Terrain) -> f64 {
     let mut gap = f64::INFINITY;
-    visit_nearer(disc, base, terrain, &mut |_, point| {
+    visit_nearer(shape, base, terrain, &mut |_, point| {
         gap = point.gap;
     });
     gap
 }
 
-/// Visits points of the ground near a disc, each nearer than those before; the last one is the
+/// Visits points of the ground near a wheel, each nearer than those before; the last one is the
 /// nearest. `base` as for [`disc_gap`].
 #[inline]
 fn visit_nearer(
-    disc: &Disc,
+    shape: &PlacedShape,
     base: &Vector3<f64>,
     terrain: &dyn Terrain,
     visit: &mut impl FnMut(u32, &SurfacePoint),
 ) {
-    let (shape, radius) = (PlacedShape::Disc(*disc), disc.radius);
+    let (centre, radius) = (shape.centre(), shape.bound());
     let mut gap = f64::INFINITY;
     // A primitive that is not visited is further from the centre than `reach`, hence further
     // from the wheel than reach − R.
     let is_surface = terrain.has_surface();
     let mut ahead = if is_surface { CLOSE * radius } else { radius };
     let mut reach = radius + ahead;
-    while reach < FAR && gap + radius > reach {
-        terrain.visit_near(&(base + disc.centre), reach, &mut |id, primitive| {
+    while reach < FAR {
+        terrain.visit_near(&(base + centre), reach, &mut |id, primitive| {
             let mut take = |point: &SurfacePoint| {
                 if point.gap < gap {
                     gap = point.gap;
@@ -414,18 +453,21 @@ fn visit_nearer(
             };
             match primitive {
                 Primitive::Plane(plane) => {
-                    take(&dispatch::point_on_plane(&shape, plane, base, NEAREST));
+                    take(&dispatch::lowest_on_plane(shape, plane, base));
                 }
                 Primitive::Sphere(sphere) => {
-                    take(&dispatch::point_on_sphere(&shape, sphere, base));
+                    take(&dispatch::point_on_sphere(shape, sphere, base));
                 }
-                piece => visit_on_surface(&shape, piece, base, f64::INFINITY, |point| {
-                    if point.feature == NEAREST && is_on_surface(terrain, id, base, point) {
+                piece => visit_on_surface(shape, piece, base, f64::INFINITY, |point| {
+                    if is_lowest(point.feature) && is_on_surface(terrain, id, base, point) {
                         take(&on_surface(point));
                     }
                 }),
             }
         });
+        if gap + radius <= reach {
+            return;
+        }
         if is_surface {
             ahead *= 2.0;
             reach = radius + ahead;

@@ -63,6 +63,9 @@ impl ContactFrame {
     pub fn on_ground(shape: &PlacedShape, point: &SurfacePoint) -> Self {
         match shape {
             PlacedShape::Disc(disc) => Self::of_wheel(&point.n, &disc.axle, &point.rolling),
+            PlacedShape::Roller(roller) => {
+                Self::of_wheel(&point.n, &roller.core.axle, &point.rolling)
+            }
             _ => Self::of_normal(&point.n),
         }
     }
@@ -70,8 +73,10 @@ impl ContactFrame {
     /// Frame of a shape, the second of its pair, in contact with another.
     #[must_use]
     pub fn of_pair(shape: &PlacedShape, point: &PairPoint) -> Self {
-        let PlacedShape::Disc(disc) = shape else {
-            return Self::of_normal(&point.n);
+        let disc = match shape {
+            PlacedShape::Disc(disc) => disc,
+            PlacedShape::Roller(roller) => &roller.core,
+            PlacedShape::Box(_) | PlacedShape::Sphere(_) => return Self::of_normal(&point.n),
         };
         // A disc in contact on its face rolls along its rim.
         let along_rim = disc.axle.cross(&(point.point - disc.centre));

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::{Disc, OrientedBox, PlacedShape, Sphere};
+use crate::geometry::{Disc, OrientedBox, PlacedShape, Roller, Sphere};
 use crate::multibody::{Kinematics, Model, Wheel};
 
 /// A part of the machine that can be in contact.
@@ -86,6 +86,17 @@ impl Part {
         }
     }
 
+    /// Name of its material; empty for a joint at its stop.
+    #[must_use]
+    pub fn material(self, model: &Model) -> &str {
+        match self {
+            Self::Wheel(i) => &model.wheels()[i].material,
+            Self::Box(i) => &model.boxes()[i].material,
+            Self::Sphere(i) => &model.spheres()[i].material,
+            Self::Limit(..) => "",
+        }
+    }
+
     /// Centre in its body's frame, m.
     #[inline]
     #[must_use]
@@ -102,7 +113,7 @@ impl Part {
     #[must_use]
     pub fn bound(self, model: &Model) -> f64 {
         match self {
-            Self::Wheel(i) => model.wheels()[i].radius,
+            Self::Wheel(i) => model.wheels()[i].bound(),
             Self::Box(i) => model.boxes()[i].half_size.norm(),
             Self::Sphere(i) => model.spheres()[i].radius,
             Self::Limit(..) => 0.0,
@@ -114,7 +125,7 @@ impl Part {
     #[must_use]
     pub fn place(self, model: &Model, kinematics: &Kinematics) -> PlacedShape {
         if let Self::Wheel(i) = self {
-            PlacedShape::Disc(place_wheel(&model.wheels()[i], kinematics))
+            wheel_shape(&model.wheels()[i], kinematics)
         } else {
             self.place_solid(model, kinematics)
         }
@@ -123,7 +134,7 @@ impl Part {
     /// The same for balls and boxes, kept separate so that the short code for wheels is inlined.
     fn place_solid(self, model: &Model, kinematics: &Kinematics) -> PlacedShape {
         match self {
-            Self::Wheel(i) => PlacedShape::Disc(place_wheel(&model.wheels()[i], kinematics)),
+            Self::Wheel(i) => wheel_shape(&model.wheels()[i], kinematics),
             Self::Box(i) => {
                 let solid = &model.boxes()[i];
                 PlacedShape::Box(OrientedBox {
@@ -147,7 +158,26 @@ impl Part {
     }
 }
 
-/// A wheel at the poses of `kinematics`, relative to the origin of its body's tree.
+/// A wheel's shape at the poses of `kinematics`, relative to the origin of its body's tree.
+#[inline]
+#[must_use]
+pub fn wheel_shape(wheel: &Wheel, kinematics: &Kinematics) -> PlacedShape {
+    shape_about(wheel, place_wheel(wheel, kinematics))
+}
+
+/// The shape of a wheel with this disc midway along its axle.
+#[inline]
+#[must_use]
+pub fn shape_about(wheel: &Wheel, disc: Disc) -> PlacedShape {
+    if wheel.is_wide() {
+        PlacedShape::Roller(Roller::new(disc, wheel.width, wheel.rounding))
+    } else {
+        PlacedShape::Disc(disc)
+    }
+}
+
+/// The disc midway along a wheel's axle at the poses of `kinematics`, relative to the origin of its
+/// body's tree.
 #[inline]
 #[must_use]
 pub fn place_wheel(wheel: &Wheel, kinematics: &Kinematics) -> Disc {

@@ -63,6 +63,7 @@ pub(super) fn place_pair(
     let mut shape = first.place(model, kinematics);
     match &mut shape {
         PlacedShape::Disc(disc) => disc.centre += shift,
+        PlacedShape::Roller(roller) => roller.core.centre += shift,
         PlacedShape::Box(solid) => solid.centre += shift,
         PlacedShape::Sphere(sphere) => sphere.centre += shift,
     }

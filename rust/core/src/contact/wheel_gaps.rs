@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::detection::disc_gap;
-use super::part::place_wheel;
+use super::detection::wheel_gap;
+use super::part::{shape_about, wheel_shape};
 use crate::geometry::{Disc, Plane, Terrain};
 use crate::multibody::joint::{Joint, JointAxis};
 use crate::multibody::{Configuration, Kinematics, Model};
@@ -69,7 +69,8 @@ impl WheelGaps {
                 spoke: vector(turned(&wheel.spoke)),
                 radius: wheel.radius,
             };
-            *gap = disc_gap(&disc, &configuration.position, terrain);
+            let shape = shape_about(wheel, disc);
+            *gap = wheel_gap(&shape, &configuration.position, terrain);
         }
     }
 
@@ -87,8 +88,8 @@ impl WheelGaps {
         let kinematics = (self.kinematics).get_or_insert_with(|| Kinematics::new(model));
         kinematics.update_for_step(model, configuration);
         for (gap, wheel) in gaps.iter_mut().zip(model.wheels()) {
-            let disc = place_wheel(wheel, kinematics);
-            *gap = disc_gap(&disc, kinematics.origin(wheel.body), terrain);
+            let shape = wheel_shape(wheel, kinematics);
+            *gap = wheel_gap(&shape, kinematics.origin(wheel.body), terrain);
         }
     }
 
@@ -162,8 +163,8 @@ impl WheelGaps {
         (&self.poses[pose.frame].R, pose.r)
     }
 
-    /// The gap of the lowest rim point of every wheel over a plane: see
-    /// [`crate::geometry::query::disc_plane`].
+    /// The gap of the lowest point of every wheel over a plane: see
+    /// [`crate::geometry::query::disc_plane`] and [`crate::geometry::query::roller_plane`].
     fn write_over_plane(
         &self,
         model: &Model,
@@ -180,7 +181,14 @@ impl WheelGaps {
             let centre = r + R.times_shared(wheel.centre.into());
             let axle = R.times_shared(wheel.axle.into());
             let w = n - axle * n.dot(axle);
-            *gap = base + n.dot(centre) - wheel.radius * w.norm();
+            let height = base + n.dot(centre);
+            *gap = if wheel.is_wide() {
+                let half = 0.5 * wheel.width - wheel.rounding;
+                let lean = n.dot(axle).abs();
+                height - (wheel.radius - wheel.rounding) * w.norm() - half * lean - wheel.rounding
+            } else {
+                height - wheel.radius * w.norm()
+            };
         }
     }
 }
@@ -218,16 +226,22 @@ mod tests {
     use crate::multibody::{JointKind, ModelDescription, SolidDescription, coordinates};
     use proptest::prelude::*;
 
-    /// The rover; the same with a joint about no coordinate axis; and with one that slides.
-    fn machines() -> [Model; 3] {
+    /// The rover; the same with wide wheels, with a joint about no coordinate axis, and with one
+    /// that slides.
+    fn machines() -> [Model; 4] {
         let changed = |change: fn(&mut SolidDescription)| {
             let mut rover = ModelDescription::rover();
             let carried = rover.solids.iter_mut().find(|s| s.parent.is_some());
             change(carried.unwrap());
             Model::from_description(rover).unwrap()
         };
+        let mut wide = ModelDescription::rover();
+        for wheel in &mut wide.wheels {
+            (wheel.width, wheel.rounding) = (Some(0.1), Some(0.02));
+        }
         [
             Model::rover(),
+            Model::from_description(wide).unwrap(),
             changed(|solid| solid.axis = Some([0.1, 0.2, 0.9])),
             changed(|solid| solid.joint = Some(JointKind::Prismatic)),
         ]

@@ -63,6 +63,12 @@ impl HillDraw {
     ///
     /// # Errors
     /// As [`HeightField::new`].
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_possible_wrap
+    )]
+    // Indices of a grid, small numbers.
     pub fn lay_out(&self, start: &Start) -> Result<HeightField, TerrainError> {
         let map = map();
         let ends = |k: usize| {
@@ -72,7 +78,6 @@ impl HillDraw {
             (first, (last - first) as usize + 1)
         };
         let [(x, columns), (z, rows)] = [ends(0), ends(1)];
-        // A place of the map: whole numbers far within the range of i64.
         let begin = |first: f64, offset: u64| (first as i64 + offset as i64).rem_euclid(N as i64);
         let (i, j) = (begin(x, self.offset[0]), begin(z, self.offset[1]));
         let at = |row: usize, column: usize| {
@@ -110,12 +115,15 @@ fn map() -> &'static [f64] {
             }
         }
         let scale = 1.0 / (squares / (N * N) as f64).sqrt();
-        heights.iter_mut().for_each(|height| *height *= scale);
+        for height in &mut heights {
+            *height *= scale;
+        }
         heights
     })
 }
 
 /// Adds gradient noise of a wavelength (m), with the amplitude of a surface of exponent H.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // indices, small numbers
 fn add_noise(octave: u64, wavelength: f64, heights: &mut [f64]) {
     let points = (PERIOD / wavelength) as usize;
     let step = N / points;

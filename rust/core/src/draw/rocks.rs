@@ -140,7 +140,7 @@ pub fn clear_radius(model: &Model) -> f64 {
     let wheels = wheel_contacts(model, &kinematics, &Plane::ground());
     let reach = wheels.iter().zip(model.wheels()).map(|(contact, wheel)| {
         let point = kinematics.origin(contact.body) + contact.point;
-        (point.x * point.x + point.z * point.z).sqrt() + wheel.radius
+        (point.x * point.x + point.z * point.z).sqrt() + wheel.bound()
     });
     reach.fold(0.0, f64::max) + CLEARANCE
 }

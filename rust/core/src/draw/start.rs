@@ -210,7 +210,7 @@ pub fn resting_on(
         let kinematics = Kinematics::of(model, &configuration);
         for wheel in model.wheels() {
             let centre = configuration.position + kinematics.point(wheel.body, &wheel.centre);
-            if let Coverage::Unknown([x, z]) = terrain.coverage(&centre, wheel.radius) {
+            if let Coverage::Unknown([x, z]) = terrain.coverage(&centre, wheel.bound()) {
                 return Err(PlacementError::NoGround { x, z });
             }
         }
@@ -221,7 +221,7 @@ pub fn resting_on(
     let lift = |mut q: Vec<f64>| -> Result<Vec<f64>, PlacementError> {
         for _ in 0..LIFTS {
             let lowest = gaps(&q)?.min();
-            if !(lowest.abs() > TOUCHING) || lowest.is_infinite() {
+            if lowest.abs() <= TOUCHING || !lowest.is_finite() {
                 break;
             }
             q[1] -= lowest;

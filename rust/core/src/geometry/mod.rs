@@ -11,7 +11,7 @@ pub mod shape;
 pub mod support;
 pub mod terrain;
 
-pub use shape::{Disc, OrientedBox, PlacedShape, Sphere, SupportMap};
+pub use shape::{Disc, OrientedBox, PlacedShape, Roller, Sphere, SupportMap};
 pub use support::{Facing, Support};
 pub use terrain::{
     Clearing, Coverage, HeightField, Plane, Primitive, Rocks, SphereField, Terrain, TerrainError,

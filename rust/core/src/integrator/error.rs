@@ -15,6 +15,33 @@ pub enum OptionsError {
         /// What was given.
         value: f64,
     },
+    /// A coefficient between two materials outside its interval.
+    #[error(
+        "materials: the {quantity} between {:?} and {:?} must be {range}, is {value}",
+        materials[0], materials[1]
+    )]
+    BetweenMaterials {
+        /// `friction` or `restitution`.
+        quantity: &'static str,
+        /// Names of the materials.
+        materials: [String; 2],
+        /// Admissible values, in words.
+        range: &'static str,
+        /// What was given.
+        value: f64,
+    },
+    /// A pair of materials that is listed twice.
+    #[error("materials: {:?} and {:?} are given twice", materials[0], materials[1])]
+    MaterialsTwice {
+        /// Names of the materials.
+        materials: [String; 2],
+    },
+    /// A text that names no material.
+    #[error("materials: a name has 1 to 100 characters, is {name:?}")]
+    MaterialName {
+        /// What was given.
+        name: String,
+    },
 }
 
 /// A step that failed. The state is unchanged.

@@ -457,9 +457,11 @@ pub(super) fn solve_contacts<S: MechanicalSystem>(
         let mut solved = solve_problem(system, options, ws);
         let inelastic;
         let mut law = options;
-        if !solved.is_converged() && options.restitution > 0.0 && system.solves_to_the_end() {
+        let is_elastic = options.restitution > 0.0 || options.materials.is_elastic();
+        if !solved.is_converged() && is_elastic && system.solves_to_the_end() {
             inelastic = StepOptions {
                 restitution: 0.0,
+                materials: options.materials.inelastic(),
                 ..options.clone()
             };
             add_shifts(system, law, ws, -1.0);

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::error::OptionsError;
+use crate::law::materials::{Materials, is_name};
 use crate::solver::SolverOptions;
 
 /// Which time-stepping scheme.
@@ -30,10 +31,13 @@ pub enum Stabilisation {
 pub struct StepOptions {
     /// Gravity, world, m/s². Default (0, −9.81, 0).
     pub gravity: Vector3<f64>,
-    /// Coulomb's μ of every contact. Default 0.7.
+    /// Coulomb's μ of every contact, but for those of `materials`. Default 0.7.
     pub friction_coefficient: f64,
-    /// Newton's e of every contact, in [0, 1]. Default 0.
+    /// Newton's e of every contact, but for those of `materials`, in [0, 1]. Default 0.
     pub restitution: f64,
+    /// Pairs of materials with a μ and an e of their own, for machines in three dimensions. Default
+    /// none.
+    pub materials: Materials,
     /// h, s. Default 0.005.
     pub time_step: f64,
     /// θ of the θ-method, in [½, 1]. Default ½: order 2.
@@ -65,6 +69,7 @@ impl Default for StepOptions {
             gravity: Vector3::new(0.0, -9.81, 0.0),
             friction_coefficient: 0.7,
             restitution: 0.0,
+            materials: Materials::default(),
             time_step: 0.005,
             theta: 0.5,
             forecast: 0.5,
@@ -108,6 +113,7 @@ impl StepOptions {
         let (mu, e, h) = (self.friction_coefficient, self.restitution, self.time_step);
         demand("friction", mu, mu >= 0.0, "finite and not negative")?;
         demand("restitution", e, (0.0..=1.0).contains(&e), "in [0, 1]")?;
+        check_materials(&self.materials)?;
         let is_step = (1e-9..=1e3).contains(&h);
         demand("time_step", h, is_step, "from 1e-9 to 1e3 s")?;
         demand(
@@ -144,4 +150,36 @@ impl StepOptions {
             "at least 1",
         )
     }
+}
+
+fn check_materials(materials: &Materials) -> Result<(), OptionsError> {
+    let pairs = materials.pairs();
+    for (k, pair) in pairs.iter().enumerate() {
+        let [first, second] = &pair.materials;
+        for name in [first, second] {
+            if !is_name(name) {
+                return Err(OptionsError::MaterialName { name: name.clone() });
+            }
+        }
+        let names = || pair.materials.clone();
+        if pairs[..k].iter().any(|other| other.is_of(first, second)) {
+            return Err(OptionsError::MaterialsTwice { materials: names() });
+        }
+        let (mu, e) = (pair.friction_coefficient, pair.restitution);
+        let is_friction = mu.is_finite() && mu >= 0.0;
+        for (quantity, value, is_in, range) in [
+            ("friction", mu, is_friction, "finite and not negative"),
+            ("restitution", e, (0.0..=1.0).contains(&e), "in [0, 1]"),
+        ] {
+            if !is_in {
+                return Err(OptionsError::BetweenMaterials {
+                    quantity,
+                    materials: names(),
+                    range,
+                    value,
+                });
+            }
+        }
+    }
+    Ok(())
 }

@@ -18,6 +18,9 @@ pub enum NeverOrdinary {
     /// Contacts bounce.
     #[error("the restitution is {0}, not 0")]
     Restitution(f64),
+    /// Pairs of materials have laws of their own.
+    #[error("pairs of materials have laws of their own")]
+    Materials,
     /// The solver does not start from the last impulses.
     #[error("the warm start is off")]
     WarmStart,
@@ -36,6 +39,8 @@ pub fn admit(options: &StepOptions) -> Result<(), NeverOrdinary> {
         Err(NeverOrdinary::Variant)
     } else if options.restitution != 0.0 {
         Err(NeverOrdinary::Restitution(options.restitution))
+    } else if !options.materials.is_empty() {
+        Err(NeverOrdinary::Materials)
     } else if !options.warm_start {
         Err(NeverOrdinary::WarmStart)
     } else if options.solver.method != Method::Auto {

@@ -38,6 +38,12 @@ pub enum NotOrdinary {
         /// Name of the body.
         body: String,
     },
+    /// A wheel has a width.
+    #[error("the wheel '{wheel}' has a width")]
+    WideWheel {
+        /// Name of the wheel.
+        wheel: String,
+    },
     /// It has balls that collide.
     #[error("the machine has balls that collide")]
     Balls,
@@ -345,6 +351,11 @@ fn check(model: &Model) -> Result<(), NotOrdinary> {
         if joint.limits.is_some() {
             return Err(NotOrdinary::LimitedJoint { body: body() });
         }
+    }
+    if let Some(wheel) = model.wheels().iter().find(|wheel| wheel.is_wide()) {
+        return Err(NotOrdinary::WideWheel {
+            wheel: wheel.name.clone(),
+        });
     }
     if !model.spheres().is_empty() {
         return Err(NotOrdinary::Balls);

@@ -213,6 +213,14 @@ pub enum ModelError {
         /// How many there may be.
         limit: usize,
     },
+    /// A text that names no material.
+    #[error("{field}: the name of a material has 1 to 100 characters, is {name:?}")]
+    MaterialName {
+        /// Path of the field.
+        field: String,
+        /// What was given.
+        name: String,
+    },
     /// A wheel of another radius than the disc that it is.
     #[error(
         "{field}: {value} m contradicts the shape of {solid:?}, a disc of {shape} m; a wheel that touches the ground at another radius has a contact_radius"
@@ -273,6 +281,7 @@ impl ModelError {
             | Self::HalfGiven { field }
             | Self::MassesContradict { field, .. }
             | Self::NoVolume { field }
+            | Self::MaterialName { field, .. }
             | Self::OutOfRange { field, .. }
             | Self::RadiusContradictsShape { field, .. }
             | Self::SteeringNotAbove { field, .. } => field,

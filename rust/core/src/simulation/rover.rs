@@ -134,12 +134,13 @@ impl Scene for RoverScene {
         }
     }
 
-    /// Most contacts on a plane: three rim points per wheel, four corners per box, one point per
-    /// ball, and both stops of a joint.
+    /// Most contacts on a plane: three rim points per wheel, or six if it has a width, four corners
+    /// per box, one point per ball, and both stops of a joint.
     fn contact_capacity(&self) -> usize {
         let model = &self.model;
         let stops = 2 * model.limited_joints().len();
-        3 * model.wheels().len() + 4 * model.boxes().len() + model.spheres().len() + stops
+        let rims = (model.wheels().iter()).map(|wheel| if wheel.is_wide() { 6 } else { 3 });
+        rims.sum::<usize>() + 4 * model.boxes().len() + model.spheres().len() + stops
     }
 
     #[inline]

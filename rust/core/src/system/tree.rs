@@ -18,6 +18,7 @@ use crate::geometry::Terrain;
 use crate::integrator::{
     MechanicalEnergy, MechanicalSystem, Start, StepOptions, UnilateralContact,
 };
+use crate::law::newton_impact::rebound;
 use crate::multibody::bias::{BiasScratch, bias};
 use crate::multibody::momentum::{body_momenta, energy_and_momentum};
 use crate::multibody::{
@@ -159,6 +160,21 @@ pub struct TreeSystem<'a> {
 }
 
 impl TreeSystem<'_> {
+    /// μ and e of a contact whose two materials have a law of their own.
+    #[inline]
+    fn between_materials(&self, options: &StepOptions, contact: &Contact) -> Option<[f64; 2]> {
+        if options.materials.is_empty() {
+            return None;
+        }
+        let own = contact.part.material(self.model);
+        let opposite = match (contact.key.opposite, contact.other) {
+            (Opposite::Ground(primitive), _) => self.terrain.material(primitive),
+            (Opposite::Part(_), Some(other)) => other.part.material(self.model),
+            (Opposite::Part(_), None) | (Opposite::Stop, _) => return None,
+        };
+        options.materials.between(own, opposite)
+    }
+
     /// Largest angular speed of a free base, rad/s.
     #[inline]
     fn turning_of_bases(&self, v: &[f64]) -> f64 {
@@ -307,8 +323,17 @@ impl MechanicalSystem for TreeSystem<'_> {
     fn friction_coefficient(&self, options: &StepOptions, contact: &Contact) -> f64 {
         match contact.key.opposite {
             Opposite::Stop => 0.0,
-            Opposite::Ground(_) | Opposite::Part(_) => options.friction_coefficient,
+            Opposite::Ground(_) | Opposite::Part(_) => {
+                let of_pair = self.between_materials(options, contact);
+                of_pair.map_or(options.friction_coefficient, |[mu, _]| mu)
+            }
         }
+    }
+
+    #[inline]
+    fn normal_shift(&self, options: &StepOptions, contact: &Contact, u_N_before: f64) -> f64 {
+        let of_pair = self.between_materials(options, contact);
+        rebound(of_pair.map_or(options.restitution, |[_, e]| e), u_N_before)
     }
 
     #[inline]

@@ -42,14 +42,23 @@ pub fn rim_points_over_face(
 #[inline]
 #[must_use]
 pub fn rim_point_at_edge(disc: &Disc, edge: &Edge, base: &Vector3<f64>) -> Option<SurfacePoint> {
+    let point = rim_point_between(disc, edge, base)?;
+    let place = (point.point - (edge.start - base)).dot(&edge.along);
+    edge.has(place, -point.gap).then_some(point)
+}
+
+/// The same anywhere along the edge's line.
+#[inline]
+#[must_use]
+pub(super) fn rim_point_between(
+    disc: &Disc,
+    edge: &Edge,
+    base: &Vector3<f64>,
+) -> Option<SurfacePoint> {
     let start = edge.start - base;
     let Slope { low, high } = Slope::at_ends(disc, edge, &start);
-    if low >= OVERLAP || high <= -OVERLAP {
-        return None;
-    }
-    let point = between(disc, edge, &start, low, high);
-    let place = (point.point - start).dot(&edge.along);
-    edge.has(place, -point.gap).then_some(point)
+    let is_between = low < OVERLAP && high > -OVERLAP;
+    is_between.then(|| between(disc, edge, &start, low, high))
 }
 
 /// The rim point that an edge pushes, with the admissible normal that separates most.

@@ -3,6 +3,7 @@
 //! | | plane | sphere of the ground | triangles | disc | box | sphere |
 //! |---|---|---|---|---|---|---|
 //! | disc | [`disc_plane`] | [`disc_sphere`] | [`disc_triangle`] | [`disc_disc`] | [`disc_box`] | [`disc_sphere`] |
+//! | wheel with a width | [`roller_plane`] | [`roller_sphere`] | [`roller_triangle`] | as a disc | as a disc | [`roller_sphere`] |
 //! | box | [`box_plane`] | [`box_sphere`] | [`box_triangle`] | | [`box_box`] | [`box_sphere`] |
 //! | sphere | [`sphere_plane`] | [`sphere_sphere`] | [`sphere_triangle`] | | | [`sphere_sphere`] |
 //!
@@ -10,6 +11,8 @@
 //! velocity of the two *material* points, exactly unless a module states the error. [`convex`]
 //! measures any two shapes by their support maps, for pairs without a formula of their own;
 //! [`sweep`] finds the normal for a part that passes a sphere within one step.
+//!
+//! Against boxes and other wheels a wheel with a width is the disc midway along its axle.
 //!
 //! Only [`dispatch`] knows all pairs.
 
@@ -24,6 +27,9 @@ pub mod disc_plane;
 pub mod disc_sphere;
 pub mod disc_triangle;
 pub mod dispatch;
+pub mod roller_plane;
+pub mod roller_sphere;
+pub mod roller_triangle;
 pub mod sphere_plane;
 pub mod sphere_sphere;
 pub mod sphere_triangle;
@@ -33,6 +39,14 @@ use nalgebra::Vector3;
 
 /// The feature number of a pair that is measured by its nearest points.
 pub const NEAREST: usize = 0;
+
+/// Whether a feature of a wheel is the lowest point of its rim, or of one of its circles, or on its
+/// tread.
+#[inline]
+#[must_use]
+pub fn is_lowest(feature: usize) -> bool {
+    feature.is_multiple_of(roller_plane::CIRCLE)
+}
 
 /// A point of a shape at a primitive of the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,12 +6,14 @@
 
 pub mod disc;
 pub mod oriented_box;
+pub mod roller;
 pub mod sphere;
 
 use nalgebra::Vector3;
 
 pub use disc::Disc;
 pub use oriented_box::OrientedBox;
+pub use roller::Roller;
 pub use sphere::Sphere;
 
 /// A convex body, represented by its support map.
@@ -29,8 +31,10 @@ pub trait SupportMap {
 /// The shape of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PlacedShape {
-    /// A wheel.
+    /// A wheel of zero width.
     Disc(Disc),
+    /// A wheel with a width.
+    Roller(Roller),
     /// A box.
     Box(OrientedBox),
     /// A ball.
@@ -41,6 +45,7 @@ impl SupportMap for PlacedShape {
     fn support(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         match self {
             Self::Disc(disc) => disc.support(direction),
+            Self::Roller(roller) => roller.support(direction),
             Self::Box(solid) => solid.support(direction),
             Self::Sphere(sphere) => sphere.support(direction),
         }
@@ -49,6 +54,7 @@ impl SupportMap for PlacedShape {
     fn centre(&self) -> Vector3<f64> {
         match self {
             Self::Disc(disc) => disc.centre,
+            Self::Roller(roller) => roller.core.centre,
             Self::Box(solid) => solid.centre,
             Self::Sphere(sphere) => sphere.centre,
         }
@@ -57,6 +63,7 @@ impl SupportMap for PlacedShape {
     fn bound(&self) -> f64 {
         match self {
             Self::Disc(disc) => disc.bound(),
+            Self::Roller(roller) => roller.bound(),
             Self::Box(solid) => solid.bound(),
             Self::Sphere(sphere) => sphere.bound(),
         }

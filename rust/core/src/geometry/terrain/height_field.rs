@@ -11,6 +11,7 @@
 //! four bytes a height, and a hundredth of that for the bounds of tiles.
 
 use std::cell::Cell;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
@@ -19,7 +20,7 @@ use super::plane::Plane;
 use super::sphere_field::MAX_SIZE;
 use super::surface::{Edge, Face, Hinge, MAX_SPOKES, Vertex};
 use super::tiles::{Tile, Tiles};
-use super::{Coverage, Primitive, Terrain};
+use super::{Coverage, GROUND, Primitive, Terrain};
 
 /// Pieces that belong to one corner.
 const PIECES: u32 = 6;
@@ -42,6 +43,8 @@ pub struct HeightField {
     /// x₀, z₀, m.
     origin: [f64; 2],
     tiles: Tiles,
+    /// Where it is not the default.
+    material: Option<Arc<str>>,
 }
 
 /// One of the two faces of a cell.
@@ -57,6 +60,13 @@ enum Half {
 type Place = [isize; 2];
 
 impl HeightField {
+    /// The same with another material of the surface; see [`is_name`](crate::law::materials::is_name).
+    #[must_use]
+    pub fn with_material(mut self, name: &str) -> Self {
+        self.material = Some(name.into());
+        self
+    }
+
     /// From heights (rows x columns, row by row, m), the spacing of columns and rows (dx, dz, m)
     /// and the place of the first height (x₀, z₀, m).
     ///
@@ -87,7 +97,7 @@ impl HeightField {
         }
         for (axis, n) in [columns, rows].into_iter().enumerate() {
             let (step, begin) = (spacing[axis], origin[axis]);
-            if !(step >= MIN_SPACING && step <= MAX_SIZE) {
+            if !(MIN_SPACING..=MAX_SIZE).contains(&step) {
                 return Err(TerrainError::OutOfRange {
                     field: "spacing",
                     range: "from 1e-4 to 1e6 m",
@@ -96,7 +106,7 @@ impl HeightField {
             }
             let end = begin + (n - 1) as f64 * step;
             for value in [begin, end] {
-                if !(value.abs() <= MAX_SIZE) {
+                if !(-MAX_SIZE..=MAX_SIZE).contains(&value) {
                     return Err(TerrainError::OutOfRange {
                         field: "origin",
                         range: "such that the map lies within 1e6 m of the world's origin",
@@ -116,6 +126,7 @@ impl HeightField {
         }
         let tiles = Tiles::new(&heights, columns, rows);
         let field = Self {
+            material: None,
             heights,
             columns,
             rows,
@@ -375,7 +386,9 @@ impl HeightField {
         let mut is_flat = true;
         for [di, dj] in &SPOKES[..3] {
             let mean = 0.5 * (self.corner([i + di, j + dj]) + self.corner([i - di, j - dj]));
-            if !(height >= mean) {
+            // Not convex where the height beside it is not known either.
+            let may_be_convex = height >= mean;
+            if !may_be_convex {
                 return None;
             }
             is_flat &= height <= mean;
@@ -503,6 +516,10 @@ impl Terrain for HeightField {
         let place = [narrow(corner % self.columns), narrow(corner / self.columns)];
         let piece = self.piece(place, id % PIECES);
         piece.unwrap_or_else(|| unreachable!("invariant: piece {id} was visited"))
+    }
+
+    fn material(&self, _id: u32) -> &str {
+        self.material.as_deref().unwrap_or(GROUND)
     }
 
     fn n_primitives(&self) -> u32 {

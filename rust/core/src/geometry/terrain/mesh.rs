@@ -4,6 +4,7 @@
 //! open one pushes outwards too, and what lies below it is inside.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
@@ -11,7 +12,7 @@ use super::error::TerrainError;
 use super::plane::Plane;
 use super::sphere_field::check_entry;
 use super::surface::{Edge, Face, Hinge, MAX_SPOKES, Vertex, Wall};
-use super::{Coverage, Primitive, Terrain};
+use super::{Coverage, GROUND, Primitive, Terrain};
 use crate::geometry::broad_phase::BallTree;
 use crate::geometry::shape::Sphere;
 use crate::scalar::elementary::sin_cos;
@@ -40,9 +41,18 @@ pub struct TriangleMesh {
     spokes: Vec<u32>,
     /// Bounding balls of the triangles.
     tree: BallTree,
+    /// Where it is not the default.
+    material: Option<Arc<str>>,
 }
 
 impl TriangleMesh {
+    /// The same with another material of the surface; see [`is_name`](crate::law::materials::is_name).
+    #[must_use]
+    pub fn with_material(mut self, name: &str) -> Self {
+        self.material = Some(name.into());
+        self
+    }
+
     /// From vertices (n, 3), m, and triangles (m, 3) of their numbers.
     ///
     /// # Errors
@@ -80,7 +90,7 @@ impl TriangleMesh {
                 .norm_squared()
                 .max(ac.norm_squared())
                 .max((c - b).norm_squared());
-            if !(area.norm() > 1e-9 * longest) {
+            if area.norm() <= 1e-9 * longest {
                 return Err(TerrainError::FlatTriangle { index });
             }
             normals.push(area.normalize());
@@ -95,6 +105,7 @@ impl TriangleMesh {
         let neighbours = find_neighbours(&own)?;
         let (owners, begins, spokes) = find_spokes(&own, vertices.len());
         Ok(Self {
+            material: None,
             vertices,
             triangles: own,
             normals,
@@ -338,6 +349,10 @@ impl Terrain for TriangleMesh {
         } else {
             Primitive::Vertex(self.vertex(id - 4 * m))
         }
+    }
+
+    fn material(&self, _id: u32) -> &str {
+        self.material.as_deref().unwrap_or(GROUND)
     }
 
     fn n_primitives(&self) -> u32 {

@@ -41,6 +41,12 @@ pub enum Primitive {
     Vertex(Vertex),
 }
 
+/// Material of planes, and of surfaces that name no other.
+pub const GROUND: &str = "ground";
+
+/// Material of spheres that name no other.
+pub const ROCK: &str = "rock";
+
 /// What a terrain knows of the ground under a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Coverage {
@@ -94,6 +100,11 @@ pub trait Terrain: Send + Sync {
 
     /// The primitive with a number from [`Self::visit_near`].
     fn primitive(&self, id: u32) -> Primitive;
+
+    /// Name of the material of a primitive.
+    fn material(&self, _id: u32) -> &str {
+        GROUND
+    }
 
     /// Numbers of primitives are below this.
     fn n_primitives(&self) -> u32;

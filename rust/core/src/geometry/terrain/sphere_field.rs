@@ -1,11 +1,13 @@
 //! Field of fixed spheres, with or without a plane under them.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use super::error::TerrainError;
 use super::plane::Plane;
 use super::rocks::Rocks;
-use super::{Coverage, Primitive, Terrain};
+use super::{Coverage, GROUND, Primitive, ROCK, Terrain};
 use crate::geometry::broad_phase::BallTree;
 use crate::geometry::shape::Sphere;
 use crate::scalar::elementary::{hypot, sin_cos};
@@ -24,9 +26,18 @@ pub struct SphereField {
     ground: Option<Plane>,
     /// The spheres, which are many: nothing else holds them.
     tree: BallTree,
+    /// Where it is not the default.
+    material: Option<Arc<str>>,
 }
 
 impl SphereField {
+    /// The same with another material of the spheres; see [`is_name`](crate::law::materials::is_name).
+    #[must_use]
+    pub fn with_material(mut self, name: &str) -> Self {
+        self.material = Some(name.into());
+        self
+    }
+
     /// From centres (n, 3) and radii (n), m.
     ///
     /// # Errors
@@ -61,7 +72,11 @@ impl SphereField {
             });
         }
         let tree = BallTree::new(&spheres);
-        Ok(Self { ground, tree })
+        Ok(Self {
+            ground,
+            tree,
+            material: None,
+        })
     }
 
     /// The rug of the report's Fig. 6.6: 50 x 25 spheres of radius 0.5 m at x = 0.6 i, z = 0.6 j,
@@ -80,6 +95,7 @@ impl SphereField {
             })
             .collect();
         Self {
+            material: None,
             tree: BallTree::new(&spheres),
             ground: None,
         }
@@ -96,6 +112,7 @@ impl SphereField {
         }
         let tree = BallTree::new(&spheres);
         Ok(Self {
+            material: None,
             ground: Some(rocks.ground),
             tree,
         })
@@ -125,7 +142,11 @@ impl SphereField {
             (sphere.centre.iter()).try_for_each(|&x| check_entry("centres", index, x))?;
         }
         let tree = BallTree::new(&spheres);
-        Ok(Self { ground: None, tree })
+        Ok(Self {
+            ground: None,
+            tree,
+            material: None,
+        })
     }
 
     /// The spheres in the order they were given.
@@ -197,6 +218,13 @@ impl Terrain for SphereField {
             (0, Some(plane)) => Primitive::Plane(plane),
             (id, _) => Primitive::Sphere(*self.tree.ball(id as usize - 1)),
         }
+    }
+
+    fn material(&self, id: u32) -> &str {
+        if id == 0 {
+            return GROUND;
+        }
+        self.material.as_deref().unwrap_or(ROCK)
     }
 
     #[allow(clippy::cast_possible_truncation)] // at most the limit of spheres

@@ -75,7 +75,7 @@ impl Terrain for Union {
     ) {
         for (part, first) in self.parts.iter().zip(&self.first) {
             part.visit_near(centre, reach, &mut |id, primitive| {
-                visit(first + id, primitive)
+                visit(first + id, primitive);
             });
         }
     }
@@ -115,6 +115,11 @@ impl Terrain for Union {
     fn primitive(&self, id: u32) -> Primitive {
         let (part, own) = self.owner(id);
         part.primitive(own)
+    }
+
+    fn material(&self, id: u32) -> &str {
+        let (part, own) = self.owner(id);
+        part.material(own)
     }
 
     fn n_primitives(&self) -> u32 {

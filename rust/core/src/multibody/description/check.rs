@@ -7,7 +7,8 @@ use nalgebra::{Unit, Vector3};
 use super::check_shapes::check_shapes;
 use super::joint::{JointKind, Limits};
 use super::masses::mass_left;
-use super::{ModelDescription, SolidDescription};
+use super::{ModelDescription, SolidDescription, WheelDescription};
+use crate::law::materials::is_name;
 use crate::multibody::error::ModelError;
 use crate::multibody::model::{MAX_SHAPES, MAX_SOLIDS};
 
@@ -91,6 +92,17 @@ fn not_negative(field: &str, value: f64) -> Result<(), ModelError> {
             field: field.to_owned(),
             value,
         })
+    }
+}
+
+/// Checks the name of a material.
+pub(super) fn material(field: &str, name: Option<&String>) -> Result<(), ModelError> {
+    match name.filter(|name| !is_name(name)) {
+        Some(name) => Err(ModelError::MaterialName {
+            field: field.to_owned(),
+            name: name.clone(),
+        }),
+        None => Ok(()),
     }
 }
 
@@ -373,6 +385,32 @@ fn check_tags(
     Ok(())
 }
 
+/// Checks width and rounding of a wheel; `at` gives the path of its fields.
+fn check_width(at: &impl Fn(&str) -> String, wheel: &WheelDescription) -> Result<(), ModelError> {
+    let (width, rounding) = (wheel.width.unwrap_or(0.0), wheel.rounding.unwrap_or(0.0));
+    if width != 0.0 {
+        not_negative(&at("width"), width)?;
+        length(&at("width"), width)?;
+    }
+    not_negative(&at("rounding"), rounding)?;
+    if rounding > 0.5 * width {
+        return Err(ModelError::OutOfRange {
+            field: at("rounding"),
+            range: "at most half the wheel's width",
+            value: rounding,
+        });
+    }
+    let radius = wheel.contact_radius.unwrap_or(wheel.radius);
+    if rounding >= radius {
+        return Err(ModelError::OutOfRange {
+            field: at("rounding"),
+            range: "smaller than the wheel's radius",
+            value: rounding,
+        });
+    }
+    Ok(())
+}
+
 fn check_wheels(
     description: &ModelDescription,
     solids: &HashMap<&str, usize>,
@@ -406,6 +444,8 @@ fn check_wheels(
         if let Some(radius) = wheel.contact_radius {
             length(&at("contact_radius"), radius)?;
         }
+        check_width(&at, wheel)?;
+        material(&at("material"), wheel.material.as_ref())?;
         if let Some(radius) = description.solids[solid].disc_radius(&wheel.axle)
             && (radius - wheel.radius).abs() > 1e-9 * radius
         {

@@ -1,6 +1,6 @@
 //! Checks of the shapes of a solid.
 
-use super::check::{in_range, length, place, positive};
+use super::check::{in_range, length, material, place, positive};
 use super::{Shape, ShapeDescription, SolidDescription};
 use crate::multibody::error::ModelError;
 
@@ -14,6 +14,7 @@ pub(super) fn check_shapes(i: usize, solid: &SolidDescription) -> Result<(), Mod
     for (is_given, what) in [
         (solid.shape.is_some(), "shape"),
         (solid.collides, "collides"),
+        (solid.material.is_some(), "material"),
     ] {
         if is_given && !solid.shapes.is_empty() {
             return Err(ModelError::NotWithShapes {
@@ -27,6 +28,7 @@ pub(super) fn check_shapes(i: usize, solid: &SolidDescription) -> Result<(), Mod
             field: at("collides"),
         });
     }
+    material(&at("material"), solid.material.as_ref())?;
     for (k, shape) in solid.shapes.iter().enumerate() {
         check_placed_shape(&at(&format!("shapes[{k}]")), shape)?;
     }
@@ -57,6 +59,7 @@ fn check_placed_shape(at: &str, shape: &ShapeDescription) -> Result<(), ModelErr
         positive(&field, mass)?;
         in_range(&field, mass, 1e12, "at most 1e12 kg")?;
     }
+    material(&format!("{at}.material"), shape.material.as_ref())?;
     if shape.collides && !collides(&shape.shape) {
         return Err(ModelError::CannotCollide {
             field: format!("{at}.collides"),

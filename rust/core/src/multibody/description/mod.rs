@@ -110,6 +110,9 @@ pub struct SolidDescription {
     /// `shapes` each shape has its own flag.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub collides: bool,
+    /// Name of the material of that shape; `body` by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<String>,
     /// PD gains that hold the joint at a set-point.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hold: Option<Hold>,
@@ -137,7 +140,7 @@ pub struct SolidDescription {
     pub locked: Option<f64>,
 }
 
-/// A wheel: a disc of zero width, fixed to a solid.
+/// A wheel, fixed to a solid: a thin disc, or a cylinder with rounded edges.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WheelDescription {
@@ -152,6 +155,16 @@ pub struct WheelDescription {
     /// Contact radius with the ground, m, if it differs from the disc's; `radius` by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact_radius: Option<f64>,
+    /// Width along the axle, m, with the solid's origin in its middle; 0, a thin disc, by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub width: Option<f64>,
+    /// Radius of the rounded edges of its rim, m, from 0 for a cylinder, the default, to half the
+    /// width for a torus.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rounding: Option<f64>,
+    /// Name of its material; `wheel` by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<String>,
     /// Largest driving torque, N m.
     pub torque_limit: f64,
     /// 1 or −1: joint torque of a positive (forward) command.

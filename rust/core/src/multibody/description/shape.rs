@@ -73,7 +73,7 @@ impl Shape {
 /// One of several shapes of a solid.
 ///
 /// Where shapes overlap, the overlap counts twice: in the mass, in the inertia and in the contacts.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShapeDescription {
     /// Its type and dimensions.
     #[serde(flatten)]
@@ -88,6 +88,9 @@ pub struct ShapeDescription {
     /// Whether it collides with the ground and with other bodies; only boxes and spheres can.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub collides: bool,
+    /// Name of its material; `body` by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<String>,
     /// Whether it is drawn.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub visible: bool,

@@ -293,13 +293,15 @@ impl Builder {
         lump.inertia +=
             about_centre + SymmetricMatrix3::point_mass(solid.mass, &centre).to_matrix();
         if let (true, Some(shape)) = (solid.collides, &solid.shape) {
-            self.touch_with(shape, &frame, centre, frame.rotation);
+            let material = named(solid.material.as_ref(), "body");
+            self.touch_with(shape, material, &frame, centre, frame.rotation);
         }
         for placed in solid.shapes.iter().filter(|placed| placed.collides) {
             let centre = frame.position + frame.rotation * placed.centre();
             let turn = placed.turn();
             let rotation = turn.map_or(frame.rotation, |turn| frame.rotation * turn);
-            self.touch_with(&placed.shape, &frame, centre, rotation);
+            let material = named(placed.material.as_ref(), "body");
+            self.touch_with(&placed.shape, material, &frame, centre, rotation);
         }
         self.frames.push(frame);
         Ok(())
@@ -309,6 +311,7 @@ impl Builder {
     fn touch_with(
         &mut self,
         shape: &Shape,
+        material: String,
         frame: &Frame,
         centre: Vector3<f64>,
         rotation: Matrix3<f64>,
@@ -318,6 +321,7 @@ impl Builder {
             Shape::Box { size } => self.boxes.push(CollisionBox {
                 body,
                 name,
+                material,
                 centre,
                 rotation,
                 half_size: Vector3::from(size) * 0.5,
@@ -325,6 +329,7 @@ impl Builder {
             Shape::Sphere { radius } => self.spheres.push(CollisionSphere {
                 body,
                 name,
+                material,
                 centre,
                 radius,
             }),
@@ -353,6 +358,11 @@ impl Builder {
             }
         }
     }
+}
+
+/// A material, or the default.
+fn named(material: Option<&String>, default: &str) -> String {
+    material.map_or_else(|| default.to_owned(), String::clone)
 }
 
 fn coupled_apart(i: usize, solid: &SolidDescription) -> ModelError {
@@ -411,6 +421,9 @@ fn wheels(
             axle,
             spoke: perpendicular(&axle),
             radius: wheel.contact_radius.unwrap_or(wheel.radius),
+            width: wheel.width.unwrap_or(0.0),
+            rounding: wheel.rounding.unwrap_or(0.0),
+            material: named(wheel.material.as_ref(), "wheel"),
             torque_limit: wheel.torque_limit,
             drive_sign: wheel.drive_sign,
             motor: wheel.motor,

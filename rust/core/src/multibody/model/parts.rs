@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::multibody::motor::Motor;
+use crate::scalar::elementary::hypot;
 
 /// The frame of a solid, fixed to a moving body.
 #[derive(Clone, Debug)]
@@ -17,7 +18,7 @@ pub struct Frame {
     pub rotation: Matrix3<f64>,
 }
 
-/// A wheel: a disc of radius `radius` and zero width, fixed to a body.
+/// A wheel fixed to a body: a thin disc, or a cylinder with rounded edges.
 #[derive(Clone, Debug)]
 pub struct Wheel {
     /// Short name, such as `FL`.
@@ -33,6 +34,12 @@ pub struct Wheel {
     pub spoke: Vector3<f64>,
     /// Contact radius, m.
     pub radius: f64,
+    /// Width of the tread with its rounded edges, m; 0 for a thin disc.
+    pub width: f64,
+    /// Radius of its edges, m: at most half the width.
+    pub rounding: f64,
+    /// Name of its material.
+    pub material: String,
     /// Largest driving torque, N m.
     pub torque_limit: f64,
     /// 1 or −1: joint torque of a positive (forward) command.
@@ -48,6 +55,27 @@ pub struct Wheel {
     pub steering_limit: f64,
 }
 
+impl Wheel {
+    /// Whether it is not a thin disc.
+    #[inline]
+    #[must_use]
+    pub fn is_wide(&self) -> bool {
+        self.width > 0.0
+    }
+
+    /// Radius of a bounding ball about the centre, m.
+    #[inline]
+    #[must_use]
+    pub fn bound(&self) -> f64 {
+        if self.is_wide() {
+            let inner = self.radius - self.rounding;
+            hypot(inner, 0.5 * self.width - self.rounding) + self.rounding
+        } else {
+            self.radius
+        }
+    }
+}
+
 /// A box that collides with the ground and with other bodies.
 #[derive(Clone, Debug)]
 pub struct CollisionBox {
@@ -55,6 +83,8 @@ pub struct CollisionBox {
     pub body: usize,
     /// Name of its solid.
     pub name: String,
+    /// Name of its material.
+    pub material: String,
     /// Centre in the body's frame, m.
     pub centre: Vector3<f64>,
     /// Rotation from the box's frame to the body's.
@@ -70,6 +100,8 @@ pub struct CollisionSphere {
     pub body: usize,
     /// Name of its solid.
     pub name: String,
+    /// Name of its material.
+    pub material: String,
     /// Centre in the body's frame, m.
     pub centre: Vector3<f64>,
     /// Radius, m.

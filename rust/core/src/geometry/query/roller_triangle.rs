@@ -1,0 +1,130 @@
+//! Wheel with a width on a triangulated surface.
+//!
+//! Over a face its points are those over a plane ([`super::roller_plane`]) that lie over the face.
+//! At a convex edge each circle touches like a disc's rim ([`super::disc_triangle`]), lowered along
+//! the normal by the rounding. Where the edge crosses the tread between the circles, it touches
+//! there too: the normal is `n ∝ s × e`, of axle and edge, and the gap `n · (c − a) − R` with a
+//! point a of the edge. A vertex is a ball of radius zero; one inside the wheel leaves it through
+//! the side that the surface lets it, the tread or a side face.
+//!
+//! Features at an edge are those of [`super::roller_plane`], and [`TREAD`].
+
+use nalgebra::Vector3;
+
+use super::roller_plane::{CIRCLE, rim_points, swept};
+use super::roller_sphere::{Seen, Side};
+use super::{SurfacePoint, disc_triangle};
+use crate::geometry::Roller;
+use crate::geometry::terrain::surface::{Edge, Face, Vertex};
+
+/// Feature of the tread at an edge.
+pub const TREAD: usize = 2 * CIRCLE;
+
+/// Sine of the angle between axle and edge below which they have no common normal.
+const PARALLEL: f64 = 1e-9;
+
+/// Points over a face whose gap is at most `reach`; `base` as in [`super::dispatch`].
+#[inline]
+pub fn rim_points_over_face(
+    roller: &Roller,
+    face: &Face,
+    base: &Vector3<f64>,
+    reach: f64,
+    mut visit: impl FnMut(&SurfacePoint),
+) {
+    rim_points(roller, &face.plane, base, reach, |point| {
+        if face.admits(&(base + point.point)) {
+            visit(point);
+        }
+    });
+}
+
+/// Visits the points at an edge whose gap is at most `reach`.
+pub fn points_at_edge(
+    roller: &Roller,
+    edge: &Edge,
+    base: &Vector3<f64>,
+    reach: f64,
+    mut visit: impl FnMut(&SurfacePoint),
+) {
+    let is_on = |point: &SurfacePoint| {
+        let place = (point.point - (edge.start - base)).dot(&edge.along);
+        point.gap <= reach && edge.has(place, -point.gap)
+    };
+    for k in 0..roller.n_circles() {
+        let point = disc_triangle::rim_point_between(&roller.circle(k), edge, base);
+        let point = point.map(|point| swept(roller, k, point));
+        if let Some(point) = point.filter(is_on) {
+            visit(&point);
+        }
+    }
+    if let Some((point, own)) = on_tread(roller, edge, base)
+        && own.abs() < roller.half
+        && edge.admits(&point.n)
+        && is_on(&point)
+    {
+        visit(&point);
+    }
+}
+
+/// The point of a feature at an edge, wherever it is.
+#[must_use]
+pub fn point_at_edge(
+    roller: &Roller,
+    edge: &Edge,
+    base: &Vector3<f64>,
+    feature: usize,
+) -> SurfacePoint {
+    let tread = || on_tread(roller, edge, base).filter(|_| feature == TREAD);
+    tread().map_or_else(
+        || {
+            let k = feature / CIRCLE % 2;
+            let point = disc_triangle::nearest_at_edge(&roller.circle(k), edge, base);
+            swept(roller, k, point)
+        },
+        |(point, _)| point,
+    )
+}
+
+/// The point where an edge crosses the tread, held between the circles, and its place along the
+/// axle from the middle before that, m.
+fn on_tread(roller: &Roller, edge: &Edge, base: &Vector3<f64>) -> Option<(SurfacePoint, f64)> {
+    let (s, e) = (&roller.core.axle, &edge.along);
+    let across = s.cross(e);
+    let sine = across.norm();
+    if sine <= PARALLEL {
+        return None;
+    }
+    let up = (edge.normals[0] + edge.normals[1]).dot(&across);
+    let n = across / if up < 0.0 { -sine } else { sine };
+    let low = roller.core.centre - n * roller.radius();
+    let between = low - (edge.start - base);
+    let gap = n.dot(&between);
+    // between + own s − place e = gap n
+    let rest = between - n * gap;
+    let own = (s.dot(e) * rest.dot(e) - rest.dot(s)) / (sine * sine);
+    let point = SurfacePoint {
+        feature: TREAD,
+        point: low + s * own.clamp(-roller.half, roller.half),
+        n,
+        rolling: roller.core.spoke,
+        gap,
+    };
+    Some((point, own))
+}
+
+/// The point that a vertex pushes, wherever it is.
+#[inline]
+#[must_use]
+pub fn nearest_at_vertex(roller: &Roller, vertex: &Vertex, base: &Vector3<f64>) -> SurfacePoint {
+    let seen = Seen::at(roller, &(vertex.place - base - roller.core.centre));
+    if !seen.is_inside() {
+        return seen.nearest();
+    }
+    let (tread, face) = (seen.through(Side::Tread), seen.through(Side::Face));
+    match (vertex.admits(&tread.n), vertex.admits(&face.n)) {
+        (true, false) => tread,
+        (false, true) => face,
+        _ => seen.nearest(),
+    }
+}

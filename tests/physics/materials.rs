@@ -1,0 +1,198 @@
+//! Friction and restitution by pair of materials.
+#![allow(clippy::unwrap_used)]
+
+#[path = "spheres/sphere_scenes.rs"]
+#[allow(dead_code)] // the tests of spheres use the rest
+mod sphere_scenes;
+#[path = "surfaces/surface_scenes.rs"]
+#[allow(dead_code)] // the tests of surfaces use the rest
+mod surface_scenes;
+
+use std::sync::Arc;
+
+use rover_core::geometry::{Plane, Terrain, Union};
+use rover_core::integrator::StepOptions;
+use rover_core::lanes::admission::NeverOrdinary;
+use rover_core::law::materials::{MaterialPair, Materials};
+use rover_core::multibody::{Configuration, Model, ModelDescription};
+use rover_core::nalgebra::{UnitQuaternion, Vector3};
+use rover_core::simulation::RoverSimulation;
+use sphere_scenes::{field, lone_wheel};
+use surface_scenes::map;
+
+fn pairs(listed: &[(&str, &str, f64, f64)]) -> Materials {
+    let pair = |&(a, b, friction_coefficient, restitution): &(&str, &str, f64, f64)| MaterialPair {
+        materials: [a.to_owned(), b.to_owned()],
+        friction_coefficient,
+        restitution,
+    };
+    Materials::new(listed.iter().map(pair).collect())
+}
+
+fn options(materials: Materials) -> StepOptions {
+    StepOptions {
+        materials,
+        ..StepOptions::default()
+    }
+}
+
+/// A simulation at a place with a velocity.
+fn moving(
+    model: Model,
+    terrain: Arc<dyn Terrain>,
+    options: StepOptions,
+    position: Vector3<f64>,
+    v: &[f64],
+) -> RoverSimulation {
+    let mut simulation = RoverSimulation::new(Arc::new(model), terrain, options).unwrap();
+    let mut start = Configuration::zero(simulation.model());
+    start.position = position;
+    // A disc lies flat.
+    start.attitude = UnitQuaternion::from_euler_angles(std::f64::consts::FRAC_PI_2, 0.0, 0.0);
+    simulation.set_state(start, v.to_vec());
+    simulation
+}
+
+fn model(text: &str) -> Model {
+    Model::from_description(ModelDescription::from_toml(text).unwrap()).unwrap()
+}
+
+/// A ball of 0.1 m.
+fn ball(material: &str) -> Model {
+    model(&format!(
+        "name = \"ball\"\n[[solids]]\nname = \"ball\"\nmass = 2.0\ncollides = true\n{material}\n\
+         shape = {{ kind = \"sphere\", radius = 0.1 }}\n"
+    ))
+}
+
+#[test]
+fn a_wheel_that_slides_is_slowed_by_the_friction_of_its_pair() {
+    let laws = pairs(&[("rock", "wheel", 0.3, 0.0), ("wheel", "ground", 0.6, 0.0)]);
+    let rock = map(10, 1.0, |_, _| 0.0).with_material("rock");
+    let sand = map(10, 1.0, |_, _| 0.0).with_material("sand");
+    let grounds: [(Arc<dyn Terrain>, f64); 4] = [
+        (Arc::new(Plane::ground()), 0.6),
+        (Arc::new(map(10, 1.0, |_, _| 0.0)), 0.6),
+        (Arc::new(rock), 0.3),
+        // It is not listed.
+        (Arc::new(sand), 0.7),
+    ];
+    for (ground, mu) in grounds {
+        let v = [1.5, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let mut wheel = moving(
+            lone_wheel(),
+            ground,
+            options(laws.clone()),
+            Vector3::zeros(),
+            &v,
+        );
+        wheel.step(20).unwrap();
+        let expected = 1.5 - mu * 9.81 * 0.1;
+        let speed = wheel.state().v[0];
+        assert!((speed - expected).abs() < 1e-9, "{mu}: {speed} {expected}");
+    }
+}
+
+#[test]
+fn a_ball_bounces_by_the_restitution_of_its_pair() {
+    let laws = pairs(&[
+        ("body", "rock", 0.0, 0.5),
+        ("body", "ground", 0.0, 0.8),
+        ("rubber", "rock", 0.0, 0.9),
+    ]);
+    let stone = || -> Arc<dyn Terrain> { Arc::new(field(&[[0.0, -1.0, 0.0, 1.0]])) };
+    let sand: Arc<dyn Terrain> = Arc::new(field(&[[0.0, -1.0, 0.0, 1.0]]).with_material("sand"));
+    let on_plane: Arc<dyn Terrain> = Arc::new(Plane::ground());
+    let both = Union::new(vec![
+        stone(),
+        Arc::new(Plane::new([0.0, 1.0, 0.0], 5.0).unwrap()),
+    ]);
+    for (material, ground, e) in [
+        ("", stone(), 0.5),
+        ("", on_plane, 0.8),
+        ("material = \"rubber\"", stone(), 0.9),
+        ("", Arc::new(both.unwrap()) as Arc<dyn Terrain>, 0.5),
+        // It is not listed: the restitution of every contact, 0.
+        ("", sand, 0.0),
+    ] {
+        let options = StepOptions {
+            gravity: Vector3::zeros(),
+            ..options(laws.clone())
+        };
+        let (place, v) = (
+            Vector3::new(0.0, 0.12, 0.0),
+            [0.0, -2.0, 0.0, 0.0, 0.0, 0.0],
+        );
+        let mut ball = moving(ball(material), ground, options, place, &v);
+        ball.step(8).unwrap();
+        let rebound = ball.state().v[1];
+        assert!(
+            (rebound - 2.0 * e).abs() < 1e-9,
+            "{material} {e}: {rebound}"
+        );
+    }
+}
+
+#[test]
+fn two_bodies_meet_by_the_law_of_their_materials() {
+    let two = model(
+        "name = \"balls\"\n[[solids]]\nname = \"a\"\nmass = 2.0\ncollides = true\n\
+         shape = { kind = \"sphere\", radius = 0.1 }\n[[solids]]\nname = \"b\"\njoint = \"free\"\n\
+         mass = 2.0\n\
+         shapes = [{ kind = \"sphere\", radius = 0.1, collides = true, material = \"steel\" }]\n",
+    );
+    let options = StepOptions {
+        gravity: Vector3::zeros(),
+        ..options(pairs(&[("steel", "body", 0.0, 0.6)]))
+    };
+    let mut balls =
+        RoverSimulation::new(Arc::new(two), Arc::new(Plane::ground()), options).unwrap();
+    let mut start = balls.state().configuration.clone();
+    start.position.y = 3.0;
+    start.others[0].position = Vector3::new(0.21, 3.0, 0.0);
+    let mut v = vec![0.0; 12];
+    v[0] = 1.0;
+    balls.set_state(start, v);
+    balls.step(10).unwrap();
+    let (a, b) = (balls.state().v[0], balls.state().v[6]);
+    assert!(
+        (b - a - 0.6).abs() < 1e-9 && (a + b - 1.0).abs() < 1e-9,
+        "{a} {b}"
+    );
+}
+
+#[test]
+fn pairs_are_checked_by_name_and_are_not_ordinary() {
+    let refused = |laws: &[(&str, &str, f64, f64)]| {
+        let error = options(pairs(laws)).check().unwrap_err();
+        error.to_string()
+    };
+    let between = "between \"wheel\" and \"rock\" must be";
+    assert!(refused(&[("wheel", "rock", -1.0, 0.0)]).contains(&format!("friction {between}")));
+    assert!(refused(&[("wheel", "rock", f64::NAN, 0.0)]).contains("is NaN"));
+    assert!(refused(&[("wheel", "rock", 1.0, 1.5)]).contains(&format!("restitution {between}")));
+    let twice = [("wheel", "rock", 1.0, 0.0), ("rock", "wheel", 1.0, 0.0)];
+    assert!(refused(&twice).contains("given twice"));
+    assert!(refused(&[("", "rock", 1.0, 0.0)]).contains("1 to 100 characters"));
+
+    let laws = options(pairs(&[("wheel", "rock", 0.5, 0.0)]));
+    let rover = RoverSimulation::new(Arc::new(Model::rover()), Arc::new(Plane::ground()), laws);
+    assert_eq!(
+        rover.unwrap().never_ordinary(),
+        Some(NeverOrdinary::Materials)
+    );
+    let none = RoverSimulation::new(
+        Arc::new(Model::rover()),
+        Arc::new(Plane::ground()),
+        options(pairs(&[])),
+    );
+    assert_eq!(none.unwrap().never_ordinary(), None);
+}
+
+#[test]
+fn a_material_without_a_name_is_refused_where_it_stands() {
+    let mut rover = ModelDescription::rover();
+    rover.wheels[1].material = Some(String::new());
+    let error = Model::from_description(rover).unwrap_err();
+    assert_eq!(error.field(), "wheels[1].material", "{error}");
+}
