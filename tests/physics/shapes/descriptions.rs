@@ -72,6 +72,7 @@ fn hubbed() -> ModelDescription {
         position,
         rotation: None,
         collides: false,
+        material: None,
         visible: true,
         mass: Some(solid.mass / 4.0),
     };
@@ -185,7 +186,7 @@ fn bad_shapes_are_refused_by_field() {
                 shape: Shape::Disc { radius: 0.1 },
                 mass: None,
                 collides: false,
-                ..*shape(d, 1)
+                ..shape(d, 1).clone()
             };
         }),
         ("solids[0].inertia", |d| {
@@ -195,7 +196,7 @@ fn bad_shapes_are_refused_by_field() {
             d.solids[0].inertia = Some([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
         }),
         ("solids", |d| {
-            let one = d.solids[0].shapes[0];
+            let one = d.solids[0].shapes[0].clone();
             d.solids[0].shapes = vec![one; MAX_SHAPES + 1];
         }),
     ];
