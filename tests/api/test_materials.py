@@ -51,6 +51,7 @@ def test_a_pair_decides_and_the_rest_keeps_the_common_coefficients() -> None:
     ]
     paths = []
     for sim in sims:
+        sim.set_state(sim.model.resting_pose(Plane(), (0.0, 0.0), 0.0))
         sim.set_steering([0.3, 0.3, 0.0, 0.0, 0.0, 0.0])
         sim.set_wheel_torques([30.0] * 6)
         sim.step(100)

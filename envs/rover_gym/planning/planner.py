@@ -127,7 +127,8 @@ def _ground(scene: Scene) -> tuple[Plane | SphereField, Decision]:
     if reach is not None:
         start = _start(scene)
         # Upper bound on the distance from the trunk's origin to any rim, in any pose.
-        own = float(np.linalg.norm(np.abs(_extent(scene.model)).max(axis=0)) + scene.model.wheel_radii.max())
+        wheels = scene.model.wheel_radii.max() + max(_widths(scene.model), default=0.0)
+        own = float(np.linalg.norm(np.abs(_extent(scene.model)).max(axis=0)) + wheels)
         near = np.hypot(centres[:, 0] - start[0], centres[:, 2] - start[2]) - radii <= reach + own
         far = int((shown & ~near).sum())
         shown &= near
@@ -143,7 +144,7 @@ def _ground(scene: Scene) -> tuple[Plane | SphereField, Decision]:
         return terrain, Decision("ground", f"{left} spheres in a ball tree", search)
     if left == 0:
         refuse(OptionError, "reach", scene.reach, "leaves the rover without any ground")
-    kept = SphereField(centres[shown], radii[shown], plane)
+    kept = SphereField(centres[shown], radii[shown], plane, terrain.material)
     return kept, Decision("ground", f"{left} spheres in a ball tree", f"of {len(radii)} spheres {dropped}")
 
 
@@ -152,6 +153,12 @@ def _extent(model: RoverModel) -> Array:
     origins = [origin for origin, _ in model.poses(np.zeros(model.nq), coordinates="state").values()]
     rims = model.wheel_contact_points(np.zeros(model.nq), Plane(), coordinates="state")
     return np.concatenate([np.array(origins), rims])
+
+
+def _widths(model: RoverModel) -> list[float]:
+    """Distance between the ends of each wheel's tread, m."""
+    wheels = model.to_dict()["wheels"]
+    return [wheel.get("width", 0.0) - 2.0 * wheel.get("rounding", 0.0) for wheel in wheels]
 
 
 def _steering(scene: Scene, terrain: Plane | SphereField, start: Array) -> tuple[bool, Decision]:
@@ -184,11 +191,11 @@ def _rests(scene: Scene, terrain: Plane, start: Array) -> bool:
 
 
 def _steering_offset(model: RoverModel) -> float:
-    """Largest offset of a wheel's centre or contact point from its steering axis, wheels straight ahead, m."""
+    """Largest offset of a wheel's centre or contact points from its steering axis, wheels straight ahead, m."""
     description = model.to_dict()
     axes = {solid["name"]: np.array(solid.get("axis", (0.0, 0.0, 0.0)), dtype=float) for solid in description["solids"]}
     poses = model.poses(np.zeros(model.nq), coordinates="state")
-    offsets = [0.0]
+    offsets = [0.0, *_widths(model)]
     for wheel in description["wheels"]:
         if (name := wheel.get("steering")) in model.dof_names:
             arm = poses[wheel["solid"]][0] - poses[name][0]
