@@ -27,7 +27,7 @@ from rover_gym.cli.console import (
 )
 from rover_gym.env.rewards import WEIGHTS
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.maps.lookup import is_terrain_file, open_terrain
+from rover_gym.maps.terrain_files import is_terrain_file, open_terrain
 from rover_gym.mechanics import OptionError
 from rover_gym.models import open_model
 from rover_gym.policy.episodes import Episode, Policy, run_episode

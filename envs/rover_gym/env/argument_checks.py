@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, get_args
 
 from rover_gym.env import rewards
-from rover_gym.maps.lookup import is_terrain_file, open_terrain
+from rover_gym.maps.terrain_files import is_terrain_file, open_terrain
 from rover_gym.mechanics import ModelError, OptionError, RoverModel, Terrain, TerrainError, Union
 from rover_gym.models.lookup import open_model
 from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector

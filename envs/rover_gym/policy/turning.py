@@ -9,7 +9,7 @@ wheel at `(x, z)` then needs
 
 where `v` is the speed of the point `(x_c, 0)`. If nothing steers, the two sides run at different speeds and the wheels
 skid. They then turn the rover less than they would by rolling, about a centre farther out, so that they are asked for
-`WIDENING` times the curvature (Mandow et al., "Experimental kinematics for wheeled skid-steer mobile robots", 2007).
+`WIDENING` times the curvature (Mandow et al. 2007).
 Each wheel of a side further pushes with the force `SCRUB` of its load against the sideways friction, and with one that
 brings the yaw rate to its wanted value.
 """

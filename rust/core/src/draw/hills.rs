@@ -13,6 +13,7 @@ use std::sync::OnceLock;
 
 use super::pcg64::Pcg64;
 use super::start::Start;
+use crate::geometry::terrain::rocks::Random;
 use crate::geometry::{HeightField, TerrainError};
 use crate::scalar::elementary::sin_cos;
 
@@ -129,10 +130,10 @@ fn add_noise(octave: u64, wavelength: f64, heights: &mut [f64]) {
     let step = N / points;
     // The wavelengths halve: their amplitudes are powers of a constant.
     let amplitude = (0..octave).fold(1.0, |product: f64, _| product * HALF_TO_THE_HURST);
+    let mut random = Random::new(octave);
     let gradients: Vec<[f64; 2]> = (0..points * points)
-        .map(|k| {
-            let turn = unit(octave << 32 | k as u64);
-            let (sine, cosine) = sin_cos(std::f64::consts::TAU * turn);
+        .map(|_| {
+            let (sine, cosine) = sin_cos(std::f64::consts::TAU * random.uniform());
             [cosine, sine]
         })
         .collect();
@@ -160,14 +161,6 @@ const HALF_TO_THE_HURST: f64 = 0.574_349_177_498_517_5;
 /// `6 t⁵ − 15 t⁴ + 10 t³`, whose first two derivatives vanish at 0 and 1.
 fn fade(t: f64) -> f64 {
     t * t * t * (t * (t * 6.0 - 15.0) + 10.0)
-}
-
-/// A number in [0, 1) from a counter, by the mixer of `SplitMix64` (Steele et al. 2014).
-fn unit(counter: u64) -> f64 {
-    let mut z = counter.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    ((z ^ (z >> 31)) >> 11) as f64 * f64::EPSILON * 0.5
 }
 
 #[cfg(test)]
