@@ -166,6 +166,15 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | max_rock_radius | 0.5 + 1.1 d          | radius of the largest rocks, in wheel radii      |
     | slope_deg       | uniform, 0 to 10 d   | slope of the plane                               |
 
+    ## Hills and maps
+
+    With `terrain="hills"`, as in `RoverHills-v0`, each reset cuts a piece from fractal ground (Hurst exponent 0.8,
+    waves of 1 to 32 m, cells of 0.25 m) whose slope has a root mean square of 0.2 d, rise over run, or that of
+    `hill_slope_deg`, and lays the rocks of difficulty d on it. Any other terrain, a map or mesh by its file, or a list of
+    terrains is the ground of every episode. The rover stands on the surface with all its wheels as far as its joints
+    allow. A scene is drawn again where the ground under start or goal is not known, or no way leads from one to the other
+    on ground that rises by at most 30 degrees. A rover that leaves the map ends its episode: `"step_failed"`.
+
     ## End
 
     `terminated`, with `info["termination"]`:
