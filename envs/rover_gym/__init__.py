@@ -5,6 +5,8 @@ The package consists of the subpackages below. Each one may import those above i
     mechanics      the compiled core: models, grounds, simulations, the contact solver
     validation     argument checks, with errors that name the field
     extras         optional packages
+    ground         what a terrain is made of
+    maps           grounds from files, and made by a seed
     models         models from and to URDF and MJCF files
     rendering      images of a rover: frames and video
     env            `Rover-v0`: its card, arguments and control period

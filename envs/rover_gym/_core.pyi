@@ -772,8 +772,8 @@ class SphereField:
                 shrinks.
             burial: Fraction of its diameter that a rock is sunk into the ground, 0 to 0.5, or a
                 range from which it is drawn for each rock; 0.5 by default.
-            ground: What the rocks lie on; flat ground at height 0 by default. A plane is part of the
-                field. Rocks on any other terrain are raised by its height and the terrain is not
+            ground: What the rocks lie on; flat ground at height 0 by default. A plane is part of
+                the field. Rocks on any other terrain are raised by its height and the terrain is not
                 part of the field: combine them as `Union([terrain, rocks])`.
             clear: Circles x, z, radius that no rock reaches into, (n, 3), m; none by default.
 
@@ -864,8 +864,8 @@ class HeightField:
                 at the world's origin.
             height_range: Of a PNG: heights of black and white, (2,), m.
             scale: Factor from the file's numbers to m; of a GeoTIFF by default its own.
-            datum: Height of the file that becomes 0, in its own numbers; of a GeoTIFF by default its
-                lowest, otherwise 0.
+            datum: Height of the file that becomes 0, in its own numbers; of a GeoTIFF by default
+                its lowest, otherwise 0.
             band: Band of a GeoTIFF, from 1.
             material: Name of its material.
 
@@ -921,7 +921,8 @@ class HeightField:
         Raises:
             TerrainError: An argument is out of its range.
 
-        Source: Turcotte 1997 (spectral synthesis); Pike 1977 and McGetchin 1973 (craters).
+        Source: Turcotte 1997 (spectral synthesis); Pike 1977 and McGetchin, Settle and Head
+        1973 (craters).
         """
     @property
     def material(self) -> str:
@@ -2275,7 +2276,8 @@ class EpisodeDistribution:
         trunk_load_limit: float,
         rocks: Mapping[str, Any] | None = None,
         slope_by_difficulty: bool = False,
-        field: SphereField | None = None,
+        ground: _Terrain | _Terrains | None = None,
+        hills: float | None = None,
     ) -> EpisodeDistribution: ...
     def draw(
         self,

@@ -31,6 +31,9 @@ ENVIRONMENTS: Mapping[str, Registration] = {
     "RoverRocks-v0": Registration(
         "rover_gym.env:RoverEnv", "rover_gym.vector:RoverVectorEnv", arguments={"terrain": "sphere_field"}
     ),
+    "RoverHills-v0": Registration(
+        "rover_gym.env:RoverEnv", "rover_gym.vector:RoverVectorEnv", arguments={"terrain": "hills"}
+    ),
 }
 
 

@@ -10,7 +10,10 @@ from rover_gym import _core, mechanics
 
 
 def test_it_offers_all_that_is_compiled() -> None:
-    assert set(mechanics.__all__) == {name for name in vars(_core) if not name.startswith("_")} | {"__version__"}
+    assert set(mechanics.__all__) == {name for name in vars(_core) if not name.startswith("_")} | {
+        "__version__",
+        "Terrain",
+    }
 
 
 @pytest.mark.parametrize("name", [name for name in mechanics.__all__ if isinstance(getattr(mechanics, name), type)])

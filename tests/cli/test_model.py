@@ -43,6 +43,12 @@ def test_an_import_writes_the_model_and_its_picture(tmp_path: Path) -> None:
     )
     assert given.exit_code == 0, given.output
     assert RoverModel.from_file(output).wheel_radii.tolist() == [0.3, 0.25]
+    bare = rover("import", str(file), "--output", str(output), "--wheel", "none", "--steering", "none", "--fixed-base")
+    assert bare.exit_code == 0, bare.output
+    assert RoverModel.from_file(output).wheel_names == []
+    wrong = rover("import", str(file), "--output", str(output), "--wheel", "mast_tail")
+    assert wrong.exit_code == 2
+    assert wrong.stderr.startswith("error: --wheel: there is no such link")
     shown = rover("show", str(output), "--picture", str(tmp_path / "small.svg"))
     assert shown.exit_code == 0, shown.output
     assert (tmp_path / "small.svg").stat().st_size > 1000

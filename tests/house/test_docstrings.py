@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rover_gym import _core
+from rover_gym import _core, extras
 
 ROOT = Path(__file__).parents[2]
 WRITER = runpy.run_path(str(ROOT / "rust" / "python" / "stub.py"))
@@ -109,7 +109,7 @@ def test_every_argument_is_documented(name: str) -> None:
 @pytest.mark.parametrize("name", CALLED)
 def test_every_error_that_a_docstring_names_exists(name: str) -> None:
     for error in sections(name).get("Raises", []):
-        found = getattr(_core, error, None) or getattr(builtins, error)
+        found = getattr(_core, error, None) or getattr(extras, error, None) or getattr(builtins, error)
         assert issubclass(found, Exception)
 
 

@@ -68,18 +68,21 @@ REFUSED = {
     "no gravity": ('name="arm"', 'name="arm" gravcomp="1"', "gravcomp"),
     "no XML": ("<mujoco", "<mujoco <", "MuJoCo: refuses the file"),
     "an unknown element": ("<freejoint/>", "<freejoint/><engine/>", "MuJoCo: refuses the file.*engine"),
+    "not a number": ('size="0.1"', 'size="nan"', "MuJoCo: (warns of|refuses) the file.*(?i:nan)"),
     "an unknown mesh": ('type="sphere" size="0.1"', 'type="mesh" mesh="m"', "MuJoCo: refuses the file"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("what", REFUSED)
-def test_what_cannot_be_simulated_is_refused(tmp_path, what):
+def test_what_cannot_be_simulated_is_refused(tmp_path, monkeypatch, what):
+    monkeypatch.chdir(tmp_path)
     old, new, expected = REFUSED[what]
     assert old in CART
     path = write(tmp_path, CART.replace(old, new, 1), "cart.xml")
     with pytest.raises(ModelError, match=expected) as caught:
         RoverModel.from_mjcf(path)
     assert str(caught.value).startswith(f"{path}: ")
+    assert [file.name for file in tmp_path.iterdir()] == ["cart.xml"], "MuJoCo's log is in the way"
 
 
 def test_what_is_ignored_by_word_is_listed(tmp_path):
@@ -92,3 +95,37 @@ def test_a_linear_coupling_becomes_exact(tmp_path):
     more = '<equality><joint joint1="roll_right" joint2="roll_left" polycoef="0 -1 0 0 0"/></equality>'
     model = RoverModel.from_mjcf(write(tmp_path, CART.replace("<!--more-->", more), "cart.xml"))
     assert "wheel_right" not in model.dof_names
+
+
+def test_a_urdf_is_pointed_to_its_reader(tmp_path):
+    path = write(tmp_path, '<robot name="small"><link name="a"/></robot>', "small.xml")
+    with pytest.raises(ModelError, match="from_urdf"):
+        RoverModel.from_mjcf(path)
+
+
+def test_a_wheel_of_a_mesh_has_the_meshs_radius(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.cylinder(radius=0.25, height=0.1, sections=64).export(tmp_path / "rim.stl")
+    asset = '<asset><mesh name="rim" file="rim.stl"/></asset>'
+    text = CART.replace('type="cylinder" size="0.15 0.04"', 'type="mesh" mesh="rim"').replace("<!--more-->", asset)
+    model = RoverModel.from_mjcf(write(tmp_path, text, "cart.xml"))
+    assert model.wheel_radii == pytest.approx([0.25, 0.25], rel=1e-6)
+
+
+def test_a_written_rover_drives_forward_in_mujoco(tmp_path):
+    """Motors by `drive_sign`, servos that hold the steering, and the differential as an equality."""
+    rover = RoverModel.named("open-rover")
+    rover.to_mjcf(tmp_path / "rover.xml")
+    text = (tmp_path / "rover.xml").read_text(encoding="utf-8")
+    ground = '<worldbody><geom type="plane" size="5 5 1" pos="0 0 -0.245"/>'
+    model = mujoco.MjModel.from_xml_string(text.replace("<worldbody>", ground, 1))
+    model.opt.timestep, model.opt.integrator = 1e-3, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    data = mujoco.MjData(model)
+    for wheel in rover.wheel_names:
+        data.actuator(f"drive_wheel_{wheel}").ctrl[0] = 0.2
+    mujoco.mj_step(model, data, nstep=1000)
+    assert data.qpos[0] > 0.1
+    assert abs(data.qpos[1]) < 0.01
+    # The rockers turn oppositely, as far as MuJoCo's constraint is stiff.
+    left, right = (data.joint(f"{side}_rocker").qpos[0] for side in ("left", "right"))
+    assert abs(left + right) < 0.01

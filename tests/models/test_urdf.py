@@ -166,6 +166,7 @@ def test_what_is_not_simulated_is_listed(tmp_path):
     )
     listed = "\n".join(model.import_report.left_out)
     for what in (
+        "a cylinder of a wheel, which touches as a disc",
         "<gazebo> of <robot>",
         "<sensor> of <robot>",
         "a mesh that touches",
@@ -228,6 +229,9 @@ def test_enormous_files_are_refused_before_they_are_read(tmp_path):
     crowd = write(tmp_path, '<robot name="crowd">' + '<link name="a"/>' * 200_001 + "</robot>")
     with pytest.raises(ModelError, match="elements"):
         RoverModel.from_urdf(crowd)
+    many = write(tmp_path, '<robot name="many">' + '<link name="a"/>' * 2001 + "</robot>")
+    with pytest.raises(ModelError, match="2000 links"):
+        RoverModel.from_urdf(many)
     bomb = '<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;">]><robot name="&b;"><link name="a"/></robot>'
     with pytest.raises(ModelError):
         RoverModel.from_urdf(write(tmp_path, bomb))
@@ -235,3 +239,50 @@ def test_enormous_files_are_refused_before_they_are_read(tmp_path):
         RoverModel.from_urdf(tmp_path / "nothing.urdf")
     with pytest.raises(ModelError, match="path"):
         RoverModel.from_urdf(3)
+
+
+def test_a_shape_that_no_urdf_has_is_refused_and_what_stands_beside_one_is_left_out(tmp_path):
+    """Yourdfpy takes the first child of a geometry for its shape and raises an error without a name for others."""
+    box = '<box size="1 0.6 0.2"/>'
+    with pytest.raises(ModelError, match=r"chassis.*geometry.*must hold one of box.*capsule"):
+        RoverModel.from_urdf(write(tmp_path, changed(rover(), box, '<capsule radius="1"/>')))
+    model = RoverModel.from_urdf(write(tmp_path, changed(rover(), box, f"<origin/>{box}")))
+    assert model.to_dict()["solids"][0]["shapes"][0]["kind"] == "box"
+    assert any("<origin> of <geometry>" in entry for entry in model.import_report.left_out)
+
+
+def test_a_long_chain_of_links_is_read_or_refused_in_time(tmp_path):
+    chain = '<robot name="chain">' + body("link0")
+    for i in range(1, 1001):
+        chain += body(f"link{i}") + joint(f"joint{i}", "continuous", f"link{i - 1}", f"link{i}")
+    with pytest.raises(ModelError, match="at most 1000 solids"):
+        RoverModel.from_urdf(write(tmp_path, chain + "</robot>"))
+    shorter = chain[: chain.index('<link name="link200">')].rstrip()
+    assert RoverModel.from_urdf(write(tmp_path, shorter + "</robot>"), wheels=[]).nv == 6 + 199
+
+
+def test_a_declaration_of_no_version_of_xml_is_passed_over(tmp_path):
+    """Files of Bullet's examples begin so, and lxml refuses them."""
+    text = changed(rover(), 'xml version="1.0"', 'xml version="0.0"')
+    assert RoverModel.from_urdf(write(tmp_path, text)) == RoverModel.from_urdf(write(tmp_path, rover()))
+
+
+def test_a_pivot_without_stops_is_a_caster_or_a_steering_joint_by_its_name(tmp_path):
+    """Held as a steering joint, a caster would drag its wheel sideways."""
+
+    def with_pivot(name, wheel):
+        text = rover().replace("left_steer", name).replace("left_fork", f"{name}_fork").replace("left_wheel", wheel)
+        return write(tmp_path, changed(text, rf'name="{name}" type="revolute"', f'name="{name}" type="continuous"'))
+
+    caster = RoverModel.from_urdf(with_pivot("caster_pivot", "caster_wheel"))
+    assert [index >= 0 for index in caster.steering_joint_indices] == [False, True, False]
+    assert caster.wheel_torque_limits[0] == 0.0 < caster.wheel_torque_limits[1]
+    assert not any(solid.get("hold") for solid in caster.to_dict()["solids"] if "caster" in solid["name"])
+    swerve = RoverModel.from_urdf(with_pivot("swerve_pivot", "left_wheel"))
+    assert swerve.steering_joint_indices[0] >= 0
+    doubtful = with_pivot("left_pin", "left_wheel")
+    with pytest.raises(ModelError, match=r"left_pin_fork.*turns freely above the wheel left_wheel") as caught:
+        RoverModel.from_urdf(doubtful)
+    assert caught.value.field == "steering"
+    given = RoverModel.from_urdf(doubtful, steering=["left_pin", "right_fork"])
+    assert [index >= 0 for index in given.steering_joint_indices] == [True, True, False]

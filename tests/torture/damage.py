@@ -193,7 +193,7 @@ def _robot(package: str) -> str:
 
 
 def robots(random: Random, ledger: Ledger) -> None:
-    """URDF and MJCF files changed as text and by elements, where their parsers are installed; what is read is driven."""
+    """URDF and MJCF files changed as text and by elements, where their parsers are installed; what is read moves."""
     packages = [name for name in ROBOT_FILES if importlib.util.find_spec(name) is not None]
     for turn in range(10 if packages else 0):
         package = packages[turn % len(packages)]

@@ -11,7 +11,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from rover_gym.cli.console import INTERRUPTED, LARGEST_SEED, MOST_EPISODES, console, plain_errors, progress_bar
-from rover_gym.policy.baseline import DIFFICULTIES, BaselineInterrupt, BaselineRow, measure_baseline
+from rover_gym.policy.baseline import DIFFICULTIES, ENVIRONMENTS, BaselineInterrupt, BaselineRow, measure_baseline
 
 CAUSES = {"time": "time limit", "high_centred": "high centred", "roll_over": "roll over", "step_failed": "step failed"}
 
@@ -32,9 +32,15 @@ def baseline(
             help="'pd' for the baseline, 'trained' for the trained policy of the package, or a trained policy's folder."
         ),
     ] = "pd",
+    terrain: Annotated[
+        str, typer.Option(help="The ground: 'sphere_field' for rocks on a plane, or 'hills'.")
+    ] = "sphere_field",
+    model: Annotated[
+        str | None, typer.Option(help="The rover: a name of the gallery, or a model's file. Default: the built-in one.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
 ) -> None:
-    """Drive RoverRocks-v0 with the PD baseline or a trained policy and print how often it reached the goal.
+    """Drive RoverRocks-v0 or RoverHills-v0 with a policy and print how often it reached the goal.
 
     The interval is Wilson's, 95%. Time is the mean of the episodes that reached the goal; energy the work through
     the wheel motors over the way driven. Ctrl-C ends the measurement: what is finished is printed.
@@ -49,6 +55,8 @@ def baseline(
                 episodes=episodes,
                 seed=seed,
                 policy=policy,
+                terrain=terrain,
+                model=model,
                 progress=lambda level, done: bar.update(
                     task, advance=1, state=f"difficulty {level:g}, {done} of {episodes}"
                 ),
@@ -65,20 +73,23 @@ def baseline(
             for row in rows
         ]
         typer.echo(
-            json.dumps({"environment": "RoverRocks-v0", "policy": policy, "seed": seed, "rows": plain}, indent=2)
+            json.dumps(
+                {"environment": ENVIRONMENTS[terrain], "model": model, "policy": policy, "seed": seed, "rows": plain},
+                indent=2,
+            )
         )
     elif rows:
-        console().print(_table(rows, seed, policy))
+        console().print(_table(rows, seed, policy, ENVIRONMENTS[terrain]))
     if interrupted:
         done = sum(row.episodes for row in rows)
         typer.echo(f"interrupted: {done} of {episodes * len(difficulties)} episodes are done", err=True)
         raise typer.Exit(INTERRUPTED)
 
 
-def _table(rows: Sequence[BaselineRow], seed: int, policy: str) -> Table:
+def _table(rows: Sequence[BaselineRow], seed: int, policy: str, environment: str) -> Table:
     last = seed + rows[0].episodes - 1
     name = "the PD baseline" if policy == "pd" else "a trained policy"
-    title = f"RoverRocks-v0 with {name}, {rows[0].episodes} episodes a row, seeds {seed} to {last}"
+    title = f"{environment} with {name}, {rows[0].episodes} episodes a row, seeds {seed} to {last}"
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     for heading in ("difficulty", "success", "95% interval", "time to goal", "energy"):
         table.add_column(heading, justify="right")

@@ -29,6 +29,7 @@ SET_BY = {
     "heading_deg": ("heading", "--heading"),
     "format": ("file_format", "--format"),
     "torques": ("torque", "--torque"),
+    "wheels": ("wheel", "--wheel"),
 }
 #: If set to any value, the commands show the traceback of an error.
 DEBUG = "ROVER_DEBUG"

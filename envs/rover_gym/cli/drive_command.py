@@ -27,7 +27,9 @@ from rover_gym.cli.console import (
 )
 from rover_gym.env.rewards import WEIGHTS
 from rover_gym.env.rover_env import RoverEnv
+from rover_gym.maps.terrain_files import is_terrain_file, open_terrain
 from rover_gym.mechanics import OptionError
+from rover_gym.models import open_model
 from rover_gym.policy.episodes import Episode, Policy, run_episode
 from rover_gym.policy.pd_policy import PDPolicy
 from rover_gym.policy.shipped import find_policy, policy_arguments
@@ -45,7 +47,16 @@ SHORTEST_STEP = 1e-5  # s: a shorter one makes no episode end
 @plain_errors
 def drive(
     *,
-    terrain: Annotated[str, typer.Option(help="The ground: 'plane', or 'sphere_field' for rocks.")] = "plane",
+    terrain: Annotated[
+        str,
+        typer.Option(help="The ground: 'plane', 'sphere_field' for rocks, 'hills', or the file of a map or a mesh."),
+    ] = "plane",
+    spacing: Annotated[
+        float | None, typer.Option(help="Distance of a map's columns and rows, m, where its file does not give it.")
+    ] = None,
+    model: Annotated[
+        str, typer.Option(help="The rover: a name of the gallery, or a model's file (TOML, URDF, MJCF).")
+    ] = "rover",
     difficulty: Annotated[
         float | None, typer.Option(help="Difficulty of the rocks, from 0 to 1. Default: 0.5.")
     ] = None,
@@ -57,6 +68,9 @@ def drive(
     ] = None,
     heading: Annotated[
         float | None, typer.Option(help="Start heading, degrees to the left of x. Default: random.")
+    ] = None,
+    start: Annotated[
+        tuple[float, float] | None, typer.Option(metavar="X Z", help="Start on the map, m. Default: 0 0.")
     ] = None,
     goal: Annotated[
         tuple[float, float] | None, typer.Option(metavar="X Z", help="Goal on the map, m. Default: random.")
@@ -98,9 +112,18 @@ def drive(
     arguments |= {} if slope is None else {"slope_deg": slope}
     arguments |= {} if uphill is None else {"uphill_deg": uphill}
     arguments |= {} if heading is None else {"heading_deg": heading}
-    options = {} if goal is None else {"goal": goal}
+    options = {name: place for name, place in (("position", start), ("goal", goal)) if place is not None}
+    told = arguments | ({} if model == "rover" else {"model": model})
+    if model != "rover":
+        arguments["model"] = open_model(model)
+    if is_terrain_file(terrain):
+        given = {} if spacing is None else {"spacing": spacing}
+        arguments["terrain"] = open_terrain(terrain, **given)
+    elif spacing is not None:
+        refuse(OptionError, "spacing", spacing, "needs a map's file as terrain")
     folder = find_policy(policy, terrain)
-    arguments |= {} if folder is None else policy_arguments(folder)
+    trained = {} if folder is None else policy_arguments(folder)
+    arguments, told = arguments | trained, told | trained
     filming: dict[str, Any] = {}
     if video is not None:
         filming = {"render_mode": "rgb_array", "render_options": {"antialiasing": True}}
@@ -118,7 +141,7 @@ def drive(
             for now in range(seed, seed + episodes):
                 path = None if output is None else output / f"episode-{now}.h5"
                 paths += [path] if path else []
-                results.append(_drive_one(env, driver, name, now, arguments, options, path, bar, film))
+                results.append(_drive_one(env, driver, name, now, told, options, path, bar, film))
         except KeyboardInterrupt:
             interrupted = True
 
@@ -127,7 +150,7 @@ def drive(
     if output is not None:
         summary = {
             "policy": policy,
-            "arguments": arguments | options,
+            "arguments": told | options,
             "episodes": [asdict(episode) for episode in results],
         }
         paths.append(output / "summary.json")

@@ -30,10 +30,11 @@ def import_model(
     output: Annotated[Path, typer.Option(dir_okay=False, help="Model file to write (TOML).")] = Path("rover.toml"),
     picture: Annotated[Path | None, typer.Option(dir_okay=False, help="Picture; beside the model by default.")] = None,
     wheel: Annotated[
-        list[str] | None, typer.Option(help="A wheel's link or joint, or NAME=RADIUS in m. Repeat for each wheel.")
+        list[str] | None,
+        typer.Option(help="A wheel's link or joint, or NAME=RADIUS in m; repeat for each, or none."),
     ] = None,
     steering: Annotated[
-        list[str] | None, typer.Option(help="A steering link or joint, or WHEEL=JOINT. Repeat for each.")
+        list[str] | None, typer.Option(help="A steering link or joint, or WHEEL=JOINT; repeat for each, or none.")
     ] = None,
     fixed_base: Annotated[bool, typer.Option("--fixed-base", help="Fix the root to the world.")] = False,
     forward: Annotated[str, typer.Option(help="The file's axis of driving: x, -x, y or -y.")] = "x",
@@ -138,6 +139,8 @@ def _radii(given: list[str] | None) -> list[str] | dict[str, float] | None:
 
 
 def _pairs(given: list[str] | None, option: str = "steering") -> list[str] | dict[str, str] | None:
+    if given == ["none"]:
+        return []
     if not given or not any("=" in entry for entry in given):
         return given or None
     if not all("=" in entry for entry in given):

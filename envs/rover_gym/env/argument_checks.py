@@ -5,16 +5,19 @@ package's errors. Its string form is what the card prints under "may be".
 """
 
 import math
+import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 from rover_gym.env import rewards
-from rover_gym.mechanics import ModelError, OptionError, RoverModel, SphereField, TerrainError
+from rover_gym.maps.terrain_files import is_terrain_file, open_terrain
+from rover_gym.mechanics import ModelError, OptionError, RoverModel, Terrain, TerrainError, Union
+from rover_gym.models.lookup import open_model
 from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector
 
-TERRAINS = ("plane", "sphere_field")
+TERRAINS = ("plane", "sphere_field", "hills")
 SOLVER_OPTIONS = (
     "variant",
     "theta",
@@ -27,6 +30,7 @@ SOLVER_OPTIONS = (
 )
 
 #: Largest slope; a wheel treats steeper ground as a wall.
+MAX_HILL_SLOPE_DEG = 30.0  # root mean square
 MAX_SLOPE_DEG = 60.0
 
 #: Ranges far beyond any real rover, within which all sums stay finite: distances in m, gravities in m/s2, and factors.
@@ -90,11 +94,23 @@ class Special:
         return self.words
 
 
-def check_terrain(field: str, value: object) -> str | SphereField:
-    """Checks the name of a terrain, or a field of spheres."""
-    if not (isinstance(value, SphereField) or (isinstance(value, str) and value in TERRAINS)):
-        refuse(TerrainError, field, value, f"unknown; known are {', '.join(TERRAINS)} and a SphereField")
-    return value
+def check_terrain(field: str, value: object) -> str | Terrain:
+    """Checks the name of a terrain, or a terrain; a file is opened, and a list of terrains is their union."""
+    if isinstance(value, str) and value in TERRAINS:
+        return value
+    if isinstance(value, (list, tuple)):
+        return Union(value)
+    if is_terrain_file(value):
+        return open_terrain(value)  # type: ignore[arg-type]
+    if not isinstance(value, get_args(Terrain)):
+        refuse(
+            TerrainError,
+            field,
+            value,
+            f"unknown; known are {', '.join(TERRAINS)}, files of maps and meshes, and any terrain",
+        )
+    terrain: Terrain = value
+    return terrain
 
 
 def check_gravity(field: str, value: object) -> tuple[float, ...]:
@@ -109,9 +125,11 @@ def check_gravity(field: str, value: object) -> tuple[float, ...]:
 
 
 def check_model(field: str, value: object) -> RoverModel:
-    """Checks a model: one free rover, with wheels whose joints move."""
+    """Checks a model, or opens one by its name or file: it must have wheels whose joints move."""
+    if isinstance(value, (str, os.PathLike)):
+        value = open_model(value)
     if not isinstance(value, RoverModel):
-        refuse(ModelError, field, value, "must be a RoverModel")
+        refuse(ModelError, field, value, "must be a RoverModel, a name of the gallery or a file")
     if not value.wheel_names:
         refuse(ModelError, f"{field}.wheels", [], "must have at least one wheel")
     indices = value.wheel_joint_indices

@@ -5,13 +5,15 @@
 """
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import Annotated, Any, TypedDict, TypeVar, get_args, get_type_hints
 
 from rover_gym.env.argument_checks import (
     MAX_DISTANCE,
     MAX_FRICTION,
+    MAX_HILL_SLOPE_DEG,
     MAX_SLOPE_DEG,
     MIN_STEERING_DEG,
     MIN_TIME_STEP,
@@ -27,7 +29,7 @@ from rover_gym.env.argument_checks import (
     shortest,
 )
 from rover_gym.env.rocks import MAX_ABUNDANCE, ROCK_RADII, check_scan
-from rover_gym.mechanics import RoverModel, SphereField
+from rover_gym.mechanics import RoverModel, Terrain
 from rover_gym.rendering.render_options import check_render_mode, check_render_options
 from rover_gym.validation import Range, flag, mapping
 
@@ -56,9 +58,11 @@ class RoverArguments(TypedDict, total=False):
     """The keyword arguments of `RoverEnv`."""
 
     terrain: Annotated[
-        str | SphereField,
+        str | PathLike[str] | Terrain | Sequence[Terrain],
         Argument(
-            "plane", Special('"plane", "sphere_field" or a `SphereField` on a plane', check_terrain), "the ground"
+            "plane",
+            Special('"plane", "sphere_field", "hills", a terrain, its file or a list of terrains', check_terrain),
+            "the ground",
         ),
     ]
     difficulty: Annotated[
@@ -79,6 +83,15 @@ class RoverArguments(TypedDict, total=False):
             Number(at_least=ROCK_RADII[0], at_most=ROCK_RADII[1]),
             "of the largest rocks; None: by the difficulty",
             "wheel radii",
+        ),
+    ]
+    hill_slope_deg: Annotated[
+        float | None,
+        Argument(
+            None,
+            Number(at_least=0.0, at_most=MAX_HILL_SLOPE_DEG),
+            "root mean square of the hills' slope; None: by the difficulty",
+            "deg",
         ),
     ]
     height_scan: Annotated[
@@ -171,8 +184,12 @@ class RoverArguments(TypedDict, total=False):
     ]
     time_step: Annotated[float, Argument(0.005, Number(at_least=MIN_TIME_STEP, at_most=1.0), "of the physics", "s")]
     model: Annotated[
-        RoverModel | None,
-        Argument(None, Special("a `RoverModel` with wheels that turn", check_model), "None: `RoverModel()`"),
+        RoverModel | str | PathLike[str] | None,
+        Argument(
+            None,
+            Special("a `RoverModel` with wheels that turn, a name of the gallery or a file", check_model),
+            "None: `RoverModel()`",
+        ),
     ]
     solver_options: Annotated[
         Mapping[str, Any] | None,

@@ -11,7 +11,8 @@ from rover_gym.env.randomisation import Domain
 from rover_gym.env.rocks import MAX_GOAL_DISTANCE, Rocks
 from rover_gym.env.start import Start
 from rover_gym.env.task import Task
-from rover_gym.mechanics import OptionError, Plane, SphereField, StateError, TerrainError
+from rover_gym.ground import plane_of
+from rover_gym.mechanics import OptionError, Plane, StateError, Terrain
 from rover_gym.validation import Range, known_keys, mapping, number, refuse, span, vector
 
 RESET_OPTIONS = ("difficulty", "slope_deg", "uphill_deg", "position", "heading_deg", "goal", "q", "v")
@@ -22,13 +23,17 @@ MAX_PLACE = 1e6
 
 @dataclass(frozen=True)
 class EpisodeScene:
-    """The start, ground plane, terrain (the plane or a field on it), rocks and properties of one episode."""
+    """The start, terrain, rocks and properties of one episode."""
 
     start: Start
-    plane: Plane
-    terrain: Plane | SphereField
+    terrain: Terrain
     rocks: Rocks | None
     domain: Domain
+
+    @property
+    def plane(self) -> Plane | None:
+        """The plane of the ground; None where it has none."""
+        return plane_of(self.terrain)
 
     @property
     def difficulty(self) -> float:
@@ -43,34 +48,23 @@ class ResetOptions:
     fixed: Mapping[str, Any] = field(default_factory=dict)
 
 
-def scene_of(
-    task: Task, start: Array, rocks: Array, rock_seed: int, domain: Array, terrain: Plane | SphereField
-) -> EpisodeScene:
+def scene_of(task: Task, start: Array, rocks: Array, rock_seed: int, domain: Array, terrain: Terrain) -> EpisodeScene:
     """The scene of one episode from rows of `DrawnEpisodes`: `starts`, `rocks`, `rock_seeds`, `domains`."""
     slope, uphill, x, z, heading, goal_x, goal_z = start.tolist()
     difficulty, abundance, max_radius = rocks.tolist()
     return EpisodeScene(
         start=Start(slope, uphill, (x, z), heading, (goal_x, goal_z)),
-        plane=terrain if isinstance(terrain, Plane) else _ground_of(terrain),
         terrain=terrain,
         rocks=None if task.rocks is None else Rocks(difficulty, abundance, max_radius, int(rock_seed)),
         domain=Domain(*domain.tolist()),
     )
 
 
-def _ground_of(terrain: SphereField) -> Plane:
-    """The plane under a field, which the fields of episodes have."""
-    ground = terrain.ground
-    if ground is None:
-        refuse(TerrainError, "terrain", terrain, "needs a ground plane to stand on")
-    return ground
-
-
 def check_difficulty(task: Task, difficulty: object) -> Range:
     """Checks a difficulty or a range of difficulties; the task must have rocks."""
     checked = span("difficulty", difficulty, at_least=0.0, at_most=1.0)
     if task.rocks is None:
-        refuse(OptionError, "difficulty", difficulty, "needs terrain 'sphere_field'")
+        refuse(OptionError, "difficulty", difficulty, "needs terrain 'sphere_field' or 'hills'")
     return checked
 
 
@@ -82,7 +76,7 @@ def check_reset_options(task: Task, options: Mapping[str, Any] | None) -> ResetO
     if "difficulty" in given:
         difficulty = fixed["difficulty"] = number("options.difficulty", given["difficulty"], at_least=0.0, at_most=1.0)
         if task.rocks is None:
-            refuse(OptionError, "options.difficulty", difficulty, "needs terrain 'sphere_field'")
+            refuse(OptionError, "options.difficulty", difficulty, "needs terrain 'sphere_field' or 'hills'")
     if "slope_deg" in given:
         fixed["slope"] = math.radians(
             number("options.slope_deg", given["slope_deg"], at_least=0.0, at_most=MAX_SLOPE_DEG)

@@ -127,7 +127,7 @@ def build_layout(model: RoverModel, gravity_magnitude: float, n_scan: int, n_act
         ("wheel_contact", "", [1.0] * n, (0.0, 1.0), "1 where the gap is at most 1 mm, else 0"),
         ("normal_force", "N", [wheel_load] * n, any_number, "ground or rock on wheel, along the contact's normal"),
         ("tangential_force", "N", [wheel_load] * 2 * n, any_number, "the same, rolling then lateral"),
-        ("ground_normal", "", [1.0] * 3, (-1.0, 1.0), "the normal of the ground plane in the trunk frame"),
+        ("ground_normal", "", [1.0] * 3, (-1.0, 1.0), "the normal of the ground, over 1 m, in the trunk frame"),
         ("goal", "m", [GOAL_SCALE] * 2, any_number, "goal ahead and to the right of the trunk, horizontal"),
         ("goal_distance", "m", [GOAL_SCALE], no_less, "horizontal distance to the goal"),
         ("previous_action", "", [1.0] * n_actions, (-1.0, 1.0), "the action before this observation"),

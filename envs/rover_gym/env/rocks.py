@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.start import Point
-from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField, sin_cos
+from rover_gym.mechanics import OptionError, RoverModel, sin_cos
 from rover_gym.validation import Range, number, refuse, vector
 
 DEFAULT_DIFFICULTY = 0.5
@@ -88,14 +88,6 @@ def scan_points(offsets: npt.NDArray[np.float64], position: Point, heading: floa
     s, c = sin_cos(heading)
     points: npt.NDArray[np.float64] = offsets @ np.array([[c, -s], [s, c]]) + position
     return points
-
-
-def heights(terrain: Plane | SphereField, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """`(n,)` height of the visible ground at (x, z), m."""
-    if isinstance(terrain, Plane):
-        n = terrain.normal
-        return np.asarray(-(points @ n[[0, 2]] + terrain.offset) / n[1])
-    return terrain.heights(points)
 
 
 def rock_distribution(difficulty: Range | None, abundance: float | None, max_radius: float | None) -> RockDistribution:

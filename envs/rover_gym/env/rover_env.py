@@ -101,7 +101,7 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | 48-53 | wheel_contact    | 1 where the gap is at most 1 mm, else 0                   |            | 1            |
     | 54-59 | normal_force     | ground or rock on wheel, along the contact's normal       | N          | m g / 6      |
     | 60-71 | tangential_force | the same, rolling then lateral, wheel by wheel            | N          | m g / 6      |
-    | 72-74 | ground_normal    | the normal of the ground plane in the trunk frame         |            | 1            |
+    | 72-74 | ground_normal    | the normal of the ground, over 1 m, in the trunk frame    |            | 1            |
     | 75-76 | goal             | goal ahead and to the right of the trunk, horizontal      | m          | 10           |
     | 77    | goal_distance    | horizontal distance from the trunk's origin to the goal   | m          | 10           |
     | 78-89 | previous_action  | the action before this observation, 0 at reset            |            | 1            |
@@ -165,6 +165,15 @@ class RoverEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     | rock_abundance  | 0.2 d                | fraction of the ground that rocks of all sizes cover |
     | max_rock_radius | 0.5 + 1.1 d          | radius of the largest rocks, in wheel radii      |
     | slope_deg       | uniform, 0 to 10 d   | slope of the plane                               |
+
+    ## Hills and maps
+
+    With `terrain="hills"`, as in `RoverHills-v0`, each reset cuts a piece from fractal ground (Hurst exponent 0.8,
+    waves of 1 to 32 m, cells of 0.25 m) whose slope has a root mean square of 0.2 d, rise over run, or that of
+    `hill_slope_deg`, and lays the rocks of difficulty d on it. Any other terrain, a map or mesh by its file, or a list of
+    terrains is the ground of every episode. The rover stands on the surface with all its wheels as far as its joints
+    allow. A scene is drawn again where the ground under start or goal is not known, or no way leads from one to the other
+    on ground that rises by at most 30 degrees. A rover that leaves the map ends its episode: `"step_failed"`.
 
     ## End
 

@@ -11,7 +11,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import Plane, RoverModel, SphereField, TerrainError, atan2
+from rover_gym.ground import plane_of
+from rover_gym.mechanics import Plane, RoverModel, SphereField, Terrain, TerrainError, atan2
 from rover_gym.validation import Range, refuse
 
 Point: TypeAlias = tuple[float, float]
@@ -44,15 +45,19 @@ def tilted_plane(slope: float, uphill: float) -> Plane:
     return Plane.tilted(slope, uphill)
 
 
-def slope_of(field: SphereField) -> tuple[float, float]:
-    """Slope and direction of steepest ascent of a field's ground plane, rad.
+def slope_of(terrain: Terrain | None) -> tuple[float, float]:
+    """Slope and direction of steepest ascent of a terrain's plane, rad; zero where it has none.
 
     Raises:
-        TerrainError: The field has no ground plane that faces up.
+        TerrainError: It has no plane that faces up, and nothing else to stand on.
     """
-    ground = field.ground
-    if ground is None or ground.normal[1] <= 0.0:
-        refuse(TerrainError, "terrain", field, "needs a ground plane to stand on, facing up")
+    ground = None if terrain is None else plane_of(terrain)
+    if ground is None:
+        if isinstance(terrain, SphereField):
+            refuse(TerrainError, "terrain", terrain, "needs a ground plane to stand on")
+        return 0.0, 0.0
+    if ground.normal[1] <= 0.0:
+        refuse(TerrainError, "terrain", terrain, "needs a ground plane to stand on, facing up")
     x, y, z = ground.normal
     return float(atan2(math.sqrt(x * x + z * z), y)), float(atan2(z, -x))
 

@@ -22,7 +22,7 @@ from rover_gym.mechanics import (
     Plane,
     RoverModel,
     Simulation,
-    SphereField,
+    Terrain,
     sin_cos,
 )
 from rover_gym.validation import Range, array, number, refuse, span
@@ -45,7 +45,7 @@ class Task:
         model: The rover, before its masses are scaled; its steering is welded where it is not steered.
         steering: The steering entries of an action; none where nothing steers.
         n_actions: Entries of an action: a torque for each wheel, then a set-point for each joint that steers.
-        field: The given field, which is the ground of every episode; None without one.
+        ground: The given terrain, which is the ground of every episode; None without one.
         rocks: Distribution of the rock fields; None without rocks.
         slope_by_difficulty: Whether the rocks' difficulty sets the slope of the ground.
         scan: `(n, 2)` points of the height scan in the heading frame, m; None without one.
@@ -65,7 +65,7 @@ class Task:
     model: RoverModel
     steering: Steering
     n_actions: int
-    field: SphereField | None
+    ground: Terrain | None
     rocks: RockDistribution | None
     slope_by_difficulty: bool
     scan: npt.NDArray[np.float64] | None
@@ -81,7 +81,7 @@ class Task:
     rules: EpisodeRules
     episodes: EpisodeDistribution
 
-    def simulate(self, terrain: Plane | SphereField, domain: Domain) -> Simulation:
+    def simulate(self, terrain: Terrain, domain: Domain) -> Simulation:
         """Creates a simulation of the rover on a terrain, at rest in the zero configuration."""
         model = self.model if domain.mass_scale == 1.0 else self.model.replace(mass_scale=domain.mass_scale)
         options = dict(self.simulation_options, friction=domain.friction)
@@ -103,9 +103,9 @@ def make_task(given: Mapping[str, Any]) -> Task:
         TerrainError: The field has no ground plane that faces up.
     """
     terrain, model, scan = given["terrain"], given["model"], given["height_scan"]
-    field = terrain if isinstance(terrain, SphereField) else None
+    ground = None if isinstance(terrain, str) else terrain
     rocks: RockDistribution | None = None
-    if terrain == "sphere_field":
+    if terrain in ("sphere_field", "hills"):
         rocks = rock_distribution(given["difficulty"], given["rock_abundance"], given["max_rock_radius"])
         nearest, farthest = given["goal_distance"]
         distance = nearest if nearest == farthest else (nearest, farthest)
@@ -114,8 +114,8 @@ def make_task(given: Mapping[str, Any]) -> Task:
     else:
         for name in ("difficulty", "rock_abundance", "max_rock_radius"):
             if given[name] is not None:
-                refuse(OptionError, name, given[name], "needs terrain 'sphere_field'")
-    slope_deg = given["slope_deg"]
+                refuse(OptionError, name, given[name], "needs terrain 'sphere_field' or 'hills'")
+    slope_deg, hills = given["slope_deg"], _hills(terrain, given["hill_slope_deg"])
     start = StartDistribution(
         slope=_radians((0.0, 0.0) if slope_deg is None else slope_deg),
         uphill=_radians(given["uphill_deg"]),
@@ -123,10 +123,10 @@ def make_task(given: Mapping[str, Any]) -> Task:
         goal_distance=given["goal_distance"],
         goal_bearing=_radians(given["goal_bearing_deg"]),
     )
-    if field is not None:
+    if terrain not in ("plane", "sphere_field"):
         if slope_deg is not None:
-            refuse(OptionError, "slope_deg", slope_deg, "is the given field's own")
-        slope, uphill = slope_of(field)
+            refuse(OptionError, "slope_deg", slope_deg, "is the ground's own")
+        slope, uphill = slope_of(ground)
         start = replace(start, slope=(slope, slope), uphill=(uphill, uphill))
     domain = DomainDistribution(
         mass_scale=given["mass_scale"],
@@ -167,7 +167,7 @@ def make_task(given: Mapping[str, Any]) -> Task:
         noise=domain.observation_noise * layout.unbounded if domain.observation_noise > 0.0 else None,
         scan=points,
     )
-    slope_by_difficulty = slope_deg is None and rocks is not None
+    slope_by_difficulty = slope_deg is None and terrain == "sphere_field"
     episodes = EpisodeDistribution(
         rules,
         simulation,
@@ -176,13 +176,14 @@ def make_task(given: Mapping[str, Any]) -> Task:
         trunk_load_limit=TRUNK_LOAD * (rover.mass * math.hypot(*gravity)),
         rocks=None if rocks is None else asdict(rocks),
         slope_by_difficulty=slope_by_difficulty,
-        field=field,
+        ground=ground,
+        hills=hills,
     )
     return Task(
         model=rover,
         steering=steering,
         n_actions=n_actions,
-        field=field,
+        ground=ground,
         rocks=rocks,
         slope_by_difficulty=slope_by_difficulty,
         scan=points,
@@ -198,6 +199,18 @@ def make_task(given: Mapping[str, Any]) -> Task:
         rules=rules,
         episodes=episodes,
     )
+
+
+def _hills(terrain: object, slope_deg: float | None) -> float | None:
+    """The hills as `EpisodeDistribution` takes them: nan where their slope follows from the difficulty."""
+    if terrain != "hills":
+        if slope_deg is not None:
+            refuse(OptionError, "hill_slope_deg", slope_deg, "needs terrain 'hills'")
+        return None
+    if slope_deg is None:
+        return math.nan
+    sine, cosine = sin_cos(math.radians(slope_deg))
+    return float(sine / cosine)
 
 
 def _substeps(frequency: float, step: float) -> int:

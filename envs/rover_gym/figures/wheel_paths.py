@@ -10,7 +10,8 @@ from rover_gym.extras import require
 from rover_gym.figures.derived_signals import Array
 from rover_gym.figures.style import title
 from rover_gym.figures.wheel_style import WheelStyle
-from rover_gym.mechanics import Plane, SphereField
+from rover_gym.ground import parts_of, plane_of, spheres_of, surfaces_of
+from rover_gym.mechanics import SphereField, Terrain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,7 +46,9 @@ def path_from_above(figure: Sheet, run: RoverRun) -> None:
     trunk, centres = trajectory["q"][:, :3], trajectory["wheel_centres"]
     _show_extent(axes, run)
     others: dict[str, dict[str, Any]] = {}
-    if isinstance(run.terrain, SphereField):
+    if surfaces_of(run.terrain):
+        _draw_heights(figure, axes, run.terrain)
+    if any(isinstance(part, SphereField) for part in parts_of(run.terrain)):
         _draw_spheres(figure, axes, run.terrain)
     wheels = WheelStyle.of(run.model)
     # Wide tracks for the back wheels, narrow ones for the front wheels on top.
@@ -67,9 +70,14 @@ def path_from_above(figure: Sheet, run: RoverRun) -> None:
     wheels.legend(figure, others)
 
 
-def footprints(field: SphereField) -> Footprints:
-    """The parts of a field's spheres above its ground."""
-    centres, radii, ground = field.centres, field.radii, field.ground
+def footprints(terrain: Terrain) -> Footprints:
+    """The parts of a terrain's spheres above its ground."""
+    (centres, radii), ground = spheres_of(terrain), plane_of(terrain)
+    surfaces = surfaces_of(terrain)
+    if ground is None and surfaces:
+        distance = centres[:, 1] - np.fmax.reduce([surface.heights(centres[:, [0, 2]]) for surface in surfaces])
+        at_ground = np.sqrt(np.maximum(radii**2 - np.minimum(np.nan_to_num(distance), 0.0) ** 2, 0.0))
+        return Footprints(centres[:, [0, 2]], at_ground, np.nan_to_num(distance) + radii)
     if ground is None:
         return Footprints(centres[:, [0, 2]], radii, centres[:, 1] + radii)
     distance = centres @ ground.normal + ground.offset  # of the centres from the ground
@@ -77,7 +85,19 @@ def footprints(field: SphereField) -> Footprints:
     return Footprints(centres[:, [0, 2]], at_ground, distance + radii)
 
 
-def _draw_spheres(figure: Sheet, axes: Axes, field: SphereField) -> None:
+def _draw_heights(figure: Sheet, axes: Axes, terrain: Terrain) -> None:
+    """The ground's height as filled contours."""
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    z, x = np.linspace(left, right, 150), np.linspace(bottom, top, 100)
+    grid_z, grid_x = np.meshgrid(z, x)
+    places = np.column_stack((grid_x.ravel(), grid_z.ravel()))
+    surfaces = surfaces_of(terrain)
+    heights = np.fmax.reduce([surface.heights(places) for surface in surfaces]).reshape(grid_x.shape)
+    filled = axes.contourf(z, x, np.ma.masked_invalid(heights), levels=20, cmap="copper", alpha=0.45, zorder=0)
+    figure.colorbar(filled, ax=axes, shrink=0.8, pad=0.02, label="height of the ground (m)")
+
+
+def _draw_spheres(figure: Sheet, axes: Axes, field: Terrain) -> None:
     collections = require("matplotlib.collections", "demo")
     prints = _within(axes, footprints(field))
     if len(prints.radii) == 0:
@@ -97,11 +117,12 @@ def _draw_spheres(figure: Sheet, axes: Axes, field: SphereField) -> None:
         zorder=1,
     )
     circles.set_array(prints.heights[upward])
-    low = 0.0 if field.ground is not None else float(prints.heights.min())
+    is_on_ground = plane_of(field) is not None or bool(surfaces_of(field))
+    low = 0.0 if is_on_ground else float(prints.heights.min())
     span = max(float(prints.heights.max()) - low, 1e-6)
     circles.set_clim(low - 0.1 * span, low + 2.2 * span)  # light greys only, so that the tracks stand out
     axes.add_collection(circles, autolim=False)
-    above = "the ground" if field.ground is not None else "y = 0"
+    above = "the ground" if is_on_ground else "y = 0"
     bar = figure.colorbar(circles, ax=axes, shrink=0.8, pad=0.02, label=f"top of the sphere above {above} (m)")
     bar.ax.set_ylim(low, low + span)
 
@@ -152,9 +173,9 @@ def _show_extent(axes: Axes, run: RoverRun) -> None:
     axes.set_autoscale_on(False)
 
 
-def _slope(terrain: Plane | SphereField) -> str:
+def _slope(terrain: Terrain) -> str:
     """The ground's slope, if it has one."""
-    ground = terrain if isinstance(terrain, Plane) else terrain.ground
+    ground = plane_of(terrain)
     if ground is None:
         return ""
     degrees = float(np.degrees(np.arccos(np.clip(ground.normal[1], -1.0, 1.0))))

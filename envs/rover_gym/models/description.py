@@ -159,6 +159,9 @@ def _add_control(
 def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, gains: Gains) -> dict[str, Any]:
     joint = tree.links[role.link].joint
     limit = gains.torque_limit if gains.torque_limit is not None else joint.torque_limit
+    if role.is_caster:
+        limit = 0.0
+        tree.assumed.append(f"wheel {role.link}: a caster, without a drive")
     if limit is None:
         limit = TORQUE_SHARE * weight * role.radius
         tree.assumed.append(
@@ -190,6 +193,8 @@ def _shapes(tree: RobotTree, link: FileLink, A: Array, anchor: Array, role: Whee
     touching = False
     for shape in link.shapes:
         where = f"link[{link.name}]: a {shape.kind}"
+        if shape.collides and role is not None:
+            tree.left_out.append(f"{where} of a wheel, which touches as a disc")
         if shape.kind not in ("box", "cylinder", "sphere"):
             if shape.collides and role is None:
                 tree.left_out.append(f"{where} that touches, since only boxes and spheres can")

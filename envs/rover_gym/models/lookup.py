@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rover_gym.mechanics import ModelError, RoverModel
+from rover_gym.models.robot_tree import is_urdf
 from rover_gym.validation import refuse
 
 #: Kinds of files by their endings.
@@ -33,7 +34,7 @@ def open_model(name: object, **options: Any) -> RoverModel:
     text = os.fsdecode(name)
     path = Path(text)
     kind = READERS.get(path.suffix.lower())
-    if kind == "from_mjcf" and _is_urdf(path):
+    if kind == "from_mjcf" and is_urdf(path):
         kind = "from_urdf"
     if options and kind not in ("from_urdf", "from_mjcf"):
         refuse(ModelError, "model", text, f"only URDF and MJCF take {', '.join(options)}")
@@ -44,10 +45,3 @@ def open_model(name: object, **options: Any) -> RoverModel:
         known = f"a name ({', '.join(RoverModel.names())}) or a file that ends in {', '.join(READERS)}"
         refuse(ModelError, "model", text, f"must be {known}")
     return RoverModel.named(text)
-
-
-def _is_urdf(path: Path) -> bool:
-    with path.open("rb") as file:
-        start = file.read(65536)
-    place = start.find(b"<robot")
-    return place >= 0 and b"<mujoco" not in start[:place]

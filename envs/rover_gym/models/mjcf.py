@@ -10,7 +10,7 @@ import numpy as np
 
 from rover_gym.extras import require
 from rover_gym.models.file_axes import from_quaternion
-from rover_gym.models.robot_tree import FileJoint, FileLink, FileShape, RobotTree, refuse_in
+from rover_gym.models.robot_tree import MAX_LINKS, FileJoint, FileLink, FileShape, RobotTree, is_urdf, refuse_in
 
 #: Largest file, bytes.
 MAX_BYTES = 16 << 20
@@ -32,13 +32,24 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
     size = path.stat().st_size
     if size > MAX_BYTES:
         refuse_in(path, "file", size, f"must have at most {MAX_BYTES} bytes")
-    with path.open("rb"):  # an error of the system, where there is one, says more than MuJoCo's
-        pass
+    if is_urdf(path):
+        refuse_in(path, "root", "robot", "is a URDF: read it with from_urdf")
+    warnings: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(warnings.append)  # else they go to a file in the current folder
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         refuse_in(path, "MuJoCo", path.name, f"refuses the file ({' '.join(str(error).split())})")
+    finally:
+        mujoco.set_mju_user_warning(before)
+    if model.nbody > MAX_LINKS:
+        refuse_in(path, "worldbody", int(model.nbody), f"must have at most {MAX_LINKS} bodies")
+    for warning in warnings:
+        if "nan" in warning.lower():
+            refuse_in(path, "MuJoCo", path.name, f"warns of the file ({' '.join(warning.split())})")
     reader = _Reader(mujoco, model, path, ignore)
+    reader.tree.left_out += [f"MuJoCo warns: {' '.join(warning.split())}" for warning in warnings]
     reader.check_options()
     reader.add_links()
     reader.add_couplings()

@@ -98,8 +98,10 @@ def _add_control(actuator: ET.Element, solid: WrittenSolid, wheel: dict[str, Any
     drive = solid.source.get("drive") if solid.kind == "revolute" else None
     limit = wheel["torque_limit"] if wheel is not None else (drive or {}).get("torque_limit")
     if solid.kind == "revolute" and limit:
-        span = text_of((-limit, limit))
-        ET.SubElement(actuator, "motor", name=f"drive_{solid.name}", joint=solid.name, ctrlrange=span)
+        motor = {"name": f"drive_{solid.name}", "joint": solid.name, "ctrlrange": text_of((-limit, limit))}
+        if wheel is not None:
+            motor["gear"] = text_of(wheel["drive_sign"])  # a positive command drives forward, as here
+        ET.SubElement(actuator, "motor", motor)
     hold = solid.source.get("hold")
     if is_steering and hold is not None and solid.kind == "revolute":
         gains = {"kp": text_of(hold["stiffness"]), "kv": text_of(hold["damping"])}

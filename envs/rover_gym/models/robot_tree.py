@@ -13,6 +13,8 @@ from rover_gym.mechanics import ModelError
 from rover_gym.models.file_axes import Array
 from rover_gym.validation import refuse, shown
 
+#: Most links of a file: a model has at most 1000 solids, and links without mass are joined to others.
+MAX_LINKS = 2000
 #: What would change the motion if it were left out, and is therefore refused unless `ignore` names it.
 IGNORABLE = ("friction", "actuators", "closed loops", "tendons", "springs", "fluid")
 
@@ -164,3 +166,15 @@ def refuse_in(path: Path, where: str, value: object, reason: str) -> NoReturn:
     error.field = where
     error.value = value
     raise error
+
+
+def is_urdf(path: Path) -> bool:
+    """Whether a file's root is that of a URDF, as far as its beginning tells.
+
+    Raises:
+        OSError: The file cannot be read.
+    """
+    with path.open("rb") as file:
+        start = file.read(1 << 16)
+    place = start.find(b"<robot")
+    return place >= 0 and b"<mujoco" not in start[:place]

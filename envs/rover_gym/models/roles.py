@@ -2,13 +2,14 @@
 
 A candidate for a wheel is a link at the end of a branch that turns without limits about a level axis. Of the
 candidates those are wheels that have a round shape about their axis, or whose name says so. A wheel is steered by the
-nearest joint above it that turns about an upright axis and carries no other wheel. What is left open by this is
-refused, with the candidates.
+nearest joint above it that turns about an upright axis and carries no other wheel. A wheel is a caster, without drive
+and steering, if its names say so. What is left open by this is refused, with the candidates.
 """
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -22,6 +23,9 @@ from rover_gym.validation import number, refuse
 
 NAMED = re.compile(r"wheel|tyre|tire", re.IGNORECASE)
 NOT_NAMED = re.compile(r"steer|hub|mount|fork|knuckle|arm|axle|motor|caster_base|support", re.IGNORECASE)
+
+STEERS = re.compile(r"steer|swerve|turn|rudder", re.IGNORECASE)
+CASTER = re.compile(r"cast[eo]r|swivel", re.IGNORECASE)
 
 #: Sine of the largest tilt of an axle from level and of a steering axis from upright.
 TILT = 0.1
@@ -44,6 +48,7 @@ class WheelRole:
         shift: Of its centre from the joint's origin along the axis, m.
         is_forward: Whether a positive joint velocity drives it forward.
         steering: The link whose joint steers it.
+        is_caster: Whether it runs freely.
     """
 
     link: str
@@ -51,6 +56,7 @@ class WheelRole:
     shift: float
     is_forward: bool
     steering: str | None = None
+    is_caster: bool = False
 
 
 def find_wheels(tree: RobotTree, up: Array, ahead: Array, wheels: Wheels, steering: Steering) -> list[WheelRole]:
@@ -83,6 +89,7 @@ def find_wheels(tree: RobotTree, up: Array, ahead: Array, wheels: Wheels, steeri
     steers = _steering(tree, names, steering, {name: abs(float(axis(link) @ up)) for name, link in tree.links.items()})
     for wheel in found:
         wheel.steering = steers.get(wheel.link)
+        wheel.is_caster = wheel.steering is None and _is_caster(tree, wheel.link)
     return found
 
 
@@ -115,6 +122,7 @@ def _chosen(
         if not isinstance(wheels, Iterable):
             refuse(ModelError, "wheels", wheels, "must be names, or radii by name")
         return {resolve(tree, "wheels", name): None for name in wheels}
+    carriers = _moving_carriers(tree)
     candidates = [
         link
         for link in tree.links.values()
@@ -122,7 +130,7 @@ def _chosen(
         and link.joint.limits is None
         and link.joint.follows is None
         and abs(float(poses[link.name][0] @ link.joint.axis @ up)) < TILT
-        and not any(child.joint.kind != "fixed" for child in _below(tree, link.name))
+        and link.name not in carriers
     ]
     named = [one for one in candidates if NAMED.search(f"{one.name} {one.joint.name}")]
     named = [one for one in named if not NOT_NAMED.search(one.name)] or named
@@ -143,10 +151,12 @@ def _chosen(
     return dict.fromkeys(chosen)
 
 
-def _below(tree: RobotTree, name: str) -> list[FileLink]:
-    found = tree.children(name)
-    for child in list(found):
-        found += _below(tree, child.name)
+def _moving_carriers(tree: RobotTree) -> set[str]:
+    """The links that carry something that moves."""
+    found: set[str] = set()
+    for link in reversed(list(tree.links.values())):
+        if link.parent is not None and (link.joint.kind != "fixed" or link.name in found):
+            found.add(link.parent)
     return found
 
 
@@ -230,9 +240,10 @@ def _steering(tree: RobotTree, wheels: list[str], steering: Steering, upright: d
         refuse(ModelError, "steering", steering, "must be names, or joints by wheel")
     given = None if steering is None else [resolve(tree, "steering", name) for name in steering]
     found = {}
+    above = {wheel: _above(tree, wheel) for wheel in wheels}
+    n_carried = Counter(name for names in above.values() for name in names)
     for wheel in wheels:
-        for name in _above(tree, wheel):
-            others = [other for other in wheels if other != wheel and name in _above(tree, other)]
+        for name in above[wheel]:
             if given is not None:
                 if name in given:
                     found[wheel] = name
@@ -240,12 +251,33 @@ def _steering(tree: RobotTree, wheels: list[str], steering: Steering, upright: d
                 continue
             carrier = tree.links[name].joint
             is_upright = carrier.kind == "revolute" and upright[name] > 1.0 - TILT
-            if is_upright and not others and carrier.follows is None:
-                found[wheel] = name
+            if is_upright and n_carried[name] == 1 and carrier.follows is None:
+                if not CASTER.search(f"{name} {carrier.name} {wheel}"):
+                    _check_is_held(tree, name, wheel)
+                    found[wheel] = name
                 break
     if given is not None and (unused := [name for name in given if name not in found.values()]):
         refuse(ModelError, "steering", unused, f"carries none of the wheels {', '.join(wheels) or '(none)'}")
     return found
+
+
+def _check_is_held(tree: RobotTree, name: str, wheel: str) -> None:
+    """Refuses a pivot that may be a steering joint or a caster's: held or free are two motions."""
+    joint = tree.links[name].joint
+    is_free = joint.limits is None and joint.hold is None and not joint.is_driven
+    if is_free and not STEERS.search(f"{name} {joint.name}"):
+        give = f"give steering=[{name!r}, ...] if it steers, steering=[] if it is a caster"
+        refuse(ModelError, "steering", None, f"{name} of {tree.path} turns freely above the wheel {wheel}: {give}")
+
+
+def _is_caster(tree: RobotTree, wheel: str) -> bool:
+    """Whether the names of a wheel or of what carries it and nothing else say that it is a caster, without a drive."""
+    names = [wheel]
+    for name in _above(tree, wheel):
+        if len(tree.children(name)) > 1:
+            break
+        names.append(name)
+    return any(CASTER.search(f"{name} {tree.links[name].joint.name}") for name in names)
 
 
 def _above(tree: RobotTree, name: str) -> list[str]:

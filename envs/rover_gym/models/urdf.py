@@ -32,10 +32,15 @@ def read_urdf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
     parser = require("yourdfpy", "models")
     root, others = parse(path)
     etree = require("lxml.etree", "models")
-    # Parsed anew from the checked tree: what could not be read strictly never gets here.
-    robot = parser.URDF.load(
-        io.BytesIO(etree.tostring(root)), build_scene_graph=False, load_meshes=False, mesh_dir=str(path.parent)
-    ).robot
+    # Parsed anew from the checked tree. What cannot be read strictly must not get there: yourdfpy would skip it.
+    text = etree.tostring(root)
+    try:
+        etree.fromstring(text)
+        robot = parser.URDF.load(
+            io.BytesIO(text), build_scene_graph=False, load_meshes=False, mesh_dir=str(path.parent)
+        ).robot
+    except Exception as error:  # what yourdfpy raises has no common class
+        refuse_in(path, "robot", path.name, f"cannot be read ({type(error).__name__}: {error})")
     tree = RobotTree(path, robot.name or path.stem, {}, left_out=others)
     _check_names(path, robot)
     for element in root.findall("gazebo"):

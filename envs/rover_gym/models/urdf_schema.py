@@ -6,14 +6,18 @@ The tables follow the XML specification of ROS's package urdf.
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
 from rover_gym.extras import require
-from rover_gym.models.robot_tree import refuse_in
+from rover_gym.models.robot_tree import MAX_LINKS, refuse_in
 
 #: Largest file, bytes, and largest number of elements.
 MAX_BYTES, MAX_ELEMENTS = 16 << 20, 200_000
+
+#: A declaration of no version of XML, which some exporters write.
+UNVERSIONED = re.compile(rb'^<\?xml version="0\.0"[^>\n]*\?>')
 
 _POSE = {"xyz": 3, "rpy": 3}
 #: Attributes by parent's and own tag: how many numbers, or `str`. An exclamation mark: required.
@@ -45,6 +49,7 @@ ATTRIBUTES: dict[str, dict[str, Any]] = {
     "robot/transmission": {"name": str, "type": str},
     "transmission/joint": {"name!": str},
 }
+SHAPES = ("box", "cylinder", "sphere", "mesh")
 #: Elements whose content says nothing about the motion.
 APPEARANCE = ("material", "verbose", "contact_coefficients")
 #: Elements that their parent has at most once.
@@ -61,7 +66,7 @@ def parse(path: Path) -> tuple[Any, list[str]]:
     """Reads and checks a file.
 
     Returns:
-        The root element, and what the file holds besides the elements and attributes of a URDF.
+        The root element without what no URDF holds, and a list of that.
 
     Raises:
         ModelError: The file is no URDF; the message names file, line, element and value.
@@ -72,7 +77,7 @@ def parse(path: Path) -> tuple[Any, list[str]]:
     size = path.stat().st_size
     if size > MAX_BYTES:
         refuse_in(path, "file", size, f"must have at most {MAX_BYTES} bytes")
-    data = path.read_bytes()
+    data = UNVERSIONED.sub(b"", path.read_bytes())
     try:
         root = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True))
     except etree.XMLSyntaxError as error:
@@ -86,6 +91,9 @@ def parse(path: Path) -> tuple[Any, list[str]]:
     n_elements = sum(1 for _ in root.iter())
     if n_elements > MAX_ELEMENTS:
         refuse_in(path, "file", n_elements, f"must have at most {MAX_ELEMENTS} elements")
+    n_links = len(root.findall("link"))
+    if n_links > MAX_LINKS:
+        refuse_in(path, "robot", n_links, f"must have at most {MAX_LINKS} links")
     others: dict[str, int] = {}
     _check(path, root, "robot", "robot", others)
     return root, [f"{what}, {count} times" if count > 1 else what for what, count in others.items()]
@@ -109,8 +117,9 @@ def _check(path: Path, element: Any, key: str, where: str, others: dict[str, int
         else:
             _check_numbers(path, at, value, kind)
     seen: dict[str, int] = {}
-    for child in element:
-        if not isinstance(child.tag, str):
+    for child in list(element):
+        if not isinstance(child.tag, str):  # a processing instruction
+            element.remove(child)
             continue
         seen[child.tag] = seen.get(child.tag, 0) + 1
         at = f"{where}.{child.tag}"
@@ -120,13 +129,16 @@ def _check(path: Path, element: Any, key: str, where: str, others: dict[str, int
         if below in ATTRIBUTES:
             name = child.get("name")
             _check(path, child, below, f"{child.tag}[{name}]" if name else at, others)
-        elif child.tag not in APPEARANCE and element.tag != "transmission":
-            others[f"<{child.tag}> of <{element.tag}>"] = others.get(f"<{child.tag}> of <{element.tag}>", 0) + 1
+        else:
+            if child.tag not in APPEARANCE and element.tag != "transmission":
+                others[f"<{child.tag}> of <{element.tag}>"] = others.get(f"<{child.tag}> of <{element.tag}>", 0) + 1
+            if child.tag != "gazebo":  # the reader looks into it for loops
+                element.remove(child)
     for name in REQUIRED.get(element.tag, ()) if key != "transmission/joint" else ():
         if name not in seen:
             refuse_in(path, f"line {element.sourceline}, {where}.{name}", None, "is missing")
-    if element.tag == "geometry" and sum(count for tag, count in seen.items() if tag not in APPEARANCE) != 1:
-        refuse_in(path, f"line {element.sourceline}, {where}", sorted(seen), "must hold one shape")
+    if element.tag == "geometry" and sum(seen.get(shape, 0) for shape in SHAPES) != 1:
+        refuse_in(path, f"line {element.sourceline}, {where}", sorted(seen), f"must hold one of {', '.join(SHAPES)}")
 
 
 def _check_numbers(path: Path, where: str, text: str, count: int | tuple[int, ...]) -> None:

@@ -55,32 +55,44 @@ class BaselineInterrupt(KeyboardInterrupt):
         self.rows = rows
 
 
+#: Environments with a difficulty, by their ground.
+ENVIRONMENTS = {"sphere_field": "RoverRocks-v0", "hills": "RoverHills-v0"}
+
+
 def measure_baseline(
     difficulties: Sequence[float] = DIFFICULTIES,
     *,
     episodes: int = 200,
     seed: int = 0,
     policy: str = "pd",
+    terrain: str = "sphere_field",
+    model: str | None = None,
     progress: Callable[[float, int], None] = lambda _difficulty, _done: None,
 ) -> list[BaselineRow]:
-    """Drives `RoverRocks-v0` with the PD baseline or another policy, with the same seeds at every difficulty.
+    """Drives `RoverRocks-v0` or `RoverHills-v0` with a policy, with the same seeds at every difficulty.
 
     Args:
         difficulties: The difficulties, each in [0, 1].
         episodes: Episodes per difficulty.
         seed: Seed of the first episode; the seed increases by one per episode.
         policy: "pd", "trained" for the shipped policy, or the folder of a trained policy.
+        terrain: "sphere_field" or "hills".
+        model: The rover: a name of the gallery or a file; None for the built-in one.
         progress: Called after each episode with the difficulty and the number of episodes done.
 
     Raises:
-        OptionError: A difficulty is out of range, there is no such policy, or `episodes` or `seed` is no whole number
-            or out of range.
+        OptionError: A difficulty is out of range, there is no such policy or terrain, or `episodes` or `seed` is no
+            whole number or out of range.
         BaselineInterrupt: The user interrupted the measurement; the exception holds the results so far.
     """
     episodes, seed = whole("episodes", episodes, at_least=1), whole("seed", seed)
     difficulties = tuple(number("difficulty", level, at_least=0.0, at_most=1.0) for level in difficulties)
-    folder = find_policy(policy, "sphere_field")
-    env = gym.make("RoverRocks-v0", **({} if folder is None else policy_arguments(folder)))
+    if terrain not in ENVIRONMENTS:
+        refuse(OptionError, "terrain", terrain, f"must be one of {', '.join(ENVIRONMENTS)}")
+    folder = find_policy(policy, terrain)
+    arguments = {} if folder is None else policy_arguments(folder)
+    arguments |= {} if model is None else {"model": model}
+    env = gym.make(ENVIRONMENTS[terrain], **arguments)
     driver: Policy = PDPolicy(env) if folder is None else TrainedPolicy.load(env, folder)
     rows: list[BaselineRow] = []
     results: list[Episode] = []

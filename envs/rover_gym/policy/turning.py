@@ -9,7 +9,7 @@ wheel at `(x, z)` then needs
 
 where `v` is the speed of the point `(x_c, 0)`. If nothing steers, the two sides run at different speeds and the wheels
 skid. They then turn the rover less than they would by rolling, about a centre farther out, so that they are asked for
-`WIDENING` times the curvature (Mandow et al., "Experimental kinematics for wheeled skid-steer mobile robots", 2007).
+`WIDENING` times the curvature (Mandow et al. 2007).
 Each wheel of a side further pushes with the force `SCRUB` of its load against the sideways friction, and with one that
 brings the yaw rate to its wanted value.
 """
@@ -25,14 +25,15 @@ from rover_gym.mechanics import RoverModel, sin_cos
 #: Curvature that wheels which skid are asked for, over that of the path.
 WIDENING = 1.5
 
-#: Sideways friction that a rover overcomes when it turns by skidding, over its weight.
-SCRUB = 0.5
+#: Sideways friction that a rover overcomes when it turns by skidding, over its weight: more than flat ground needs,
+#: since on rough ground two wheels carry most of it.
+SCRUB = 1.2
 
 #: Yaw rate from which on all of this friction is expected, rad/s.
 SCRUB_RATE = 0.2
 
 #: Time constant of the yaw rate of a rover that skids, s.
-YAW_RESPONSE = 0.2
+YAW_RESPONSE = 0.1
 
 #: Distance below which two lengths of a rover count as equal, m.
 TINY = 1e-6

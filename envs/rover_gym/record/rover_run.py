@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import Plane, RoverModel, SphereField
+from rover_gym.mechanics import RoverModel, Terrain
 from rover_gym.record.channels import RoverSampler
 from rover_gym.record.trajectory import Trajectory, read_trajectory
 from rover_gym.record.trajectory_format import RecordingError, sound
@@ -43,7 +43,7 @@ class RoverRun:
 
     trajectory: Trajectory
     model: RoverModel
-    terrain: Plane | SphereField
+    terrain: Terrain
     goal: tuple[float, float] | None
     title: str
 

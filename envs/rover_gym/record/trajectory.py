@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import stat
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import Plane, RoverGymError, SphereField
+from rover_gym.mechanics import HeightField, Plane, RoverGymError, SphereField, Terrain, TriangleMesh, Union
 from rover_gym.record.steady_file import FileInUseError, lock
 from rover_gym.record.trajectory_format import (
     FORMAT,
@@ -52,7 +54,7 @@ class Trajectory:
     data: Mapping[str, npt.NDArray[np.float64]]
     units: Mapping[str, str]
     attributes: Mapping[str, Any]
-    terrain: Plane | SphereField | None = None
+    terrain: Terrain | None = None
 
     def __getitem__(self, name: str) -> npt.NDArray[np.float64]:
         """The data set of a name.
@@ -200,27 +202,51 @@ class _Reader:
             refuse_field(self._path, key, value[:40], "must be a JSON object, beginning with")
         return value
 
-    def _terrain(self, group: h5py.Group) -> Plane | SphereField:
-        names = ("plane_normal", "plane_offset", "sphere_centres", "sphere_radii")
+    def _terrain(self, group: h5py.Group) -> Terrain:
         given = {}
-        for name in names:
-            if name in group:
+        for name in group:
+            if name in PLAIN_GROUND or SURFACE.fullmatch(name):
                 data = self._item(group, name)
                 if not isinstance(data, self._h5py.Dataset):
                     refuse_field(self._path, f"{TERRAIN}/{name}", "a group", "must be an array of float64")
                 self._check(f"{TERRAIN}/{name}", data)
                 given[name] = np.asarray(data[()], dtype=np.float64)
         try:
-            plane = None
-            if "plane_normal" in given:
-                plane = Plane(given["plane_normal"], given["plane_offset"].item())
-            if "sphere_centres" in given:
-                return SphereField(given["sphere_centres"], given["sphere_radii"], plane)
-        except (RoverGymError, ValueError, TypeError, KeyError) as error:
+            parts = _parts(given)
+            if len(parts) > 1:
+                return Union(parts)
+        except (RoverGymError, ValueError, TypeError, KeyError, IndexError) as error:
             refuse_field(self._path, TERRAIN, sorted(given), f"is no ground ({error}), from")
-        if plane is None:
-            refuse_field(self._path, TERRAIN, sorted(given), "holds neither a plane nor spheres")
-        return plane
+        if not parts:
+            refuse_field(self._path, TERRAIN, sorted(given), "holds neither a plane nor spheres nor a surface")
+        return parts[0]
+
+
+#: Data sets of a plane and of spheres, and those of surfaces.
+PLAIN_GROUND = ("plane_normal", "plane_offset", "sphere_centres", "sphere_radii")
+SURFACE = re.compile(r"surface_(\d{1,4})_(heights|spacing|origin|vertices|triangles)")
+
+
+def _parts(given: Mapping[str, npt.NDArray[np.float64]]) -> list[Terrain]:
+    """The terrains that data sets describe."""
+    parts: list[Terrain] = []
+    plane = None
+    if "plane_normal" in given:
+        plane = Plane(given["plane_normal"], given["plane_offset"].item())
+    if "sphere_centres" in given:
+        parts.append(SphereField(given["sphere_centres"], given["sphere_radii"], plane))
+    elif plane is not None:
+        parts.append(plane)
+    found = (SURFACE.fullmatch(name) for name in given)
+    for k in sorted({int(match.group(1)) for match in found if match is not None}):
+        name = f"surface_{k}"
+        if f"{name}_heights" in given:
+            heights, spacing, origin = (given[f"{name}_{what}"] for what in ("heights", "spacing", "origin"))
+            parts.append(HeightField(heights, tuple(spacing.tolist()), tuple(origin.tolist())))
+        else:
+            triangles = given[f"{name}_triangles"].astype(np.int64)
+            parts.append(TriangleMesh(given[f"{name}_vertices"], triangles))
+    return parts
 
 
 def _check_bytes(path: Path) -> int:

@@ -17,11 +17,23 @@ from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkFiltersSources import vtkArrowSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkRenderer, vtkRenderWindow
 
-from rover_gym.mechanics import Plane, RoverModel, Simulation, SphereField
+from rover_gym.ground import plane_of, spheres_of, surfaces_of
+from rover_gym.mechanics import RoverModel, Simulation, Terrain
 from rover_gym.rendering import appearance as look
 from rover_gym.rendering.meshes import Array, Faces, actor_of, actor_with, level, mesh, set_points, set_pose
 from rover_gym.rendering.render_options import Camera, check_render_options
-from rover_gym.rendering.scenery_actors import FAR, Goal, GroundActors, RockActors, flag, headlight, shadow_of, sky, sun
+from rover_gym.rendering.scenery_actors import (
+    FAR,
+    Goal,
+    GroundActors,
+    RockActors,
+    SurfaceActor,
+    flag,
+    headlight,
+    shadow_of,
+    sky,
+    sun,
+)
 
 FORCE_LENGTH = 0.45  # m, arrow length for a wheel's mean share of the weight
 
@@ -58,7 +70,7 @@ class FrameRenderer:
     def __init__(
         self,
         model: RoverModel,
-        terrain: Plane | SphereField,
+        terrain: Terrain,
         *,
         width: int = 640,
         height: int = 480,
@@ -99,24 +111,26 @@ class FrameRenderer:
         set_points(self._arrows, np.zeros((0, 3)))
         self._overlay.AddActor(_arrow_actor(self._arrows))
         self._pixels = vtkUnsignedCharArray()
-        self._terrain: Plane | SphereField | None = None
+        self._terrain: Terrain | None = None
         self._goal: tuple[Goal | None, float] = (None, 0.0)
         self._stage: list[vtkActor] = []
         self.set_scene(terrain, goal=goal, goal_tolerance=goal_tolerance)
 
-    def set_scene(self, terrain: Plane | SphereField, *, goal: Goal | None = None, goal_tolerance: float = 0.5) -> None:
+    def set_scene(self, terrain: Terrain, *, goal: Goal | None = None, goal_tolerance: float = 0.5) -> None:
         """Sets ground and goal, as at the reset of an episode; free of cost if they are the same objects."""
         if terrain is self._terrain and (goal, goal_tolerance) == self._goal:
             return
         self._terrain, self._goal = terrain, (goal, goal_tolerance)
         for actor in self._stage:
             self._scene.RemoveActor(actor)
-        plane = terrain if isinstance(terrain, Plane) else terrain.ground
+        plane, (centres, radii) = plane_of(terrain), spheres_of(terrain)
         self._plane = plane
         self._ground = None if plane is None else GroundActors(plane)
-        self._rocks = RockActors(terrain, self._ground) if isinstance(terrain, SphereField) else None
+        self._rocks = RockActors(centres, radii, self._ground) if len(radii) else None
+        self._surfaces = [SurfaceActor(surface) for surface in surfaces_of(terrain)]
         self._shadows: dict[str, vtkActor] = {}
-        self._stage = [] if self._rocks is None else list(self._rocks.actors)
+        self._stage = [surface.actor for surface in self._surfaces]
+        self._stage += [] if self._rocks is None else self._rocks.actors
         if self._ground is not None:
             self._shadows = {solid: shadow_of(actor, self._ground) for solid, actor in self._solids.items()}
             self._stage += [self._ground.actor, *self._shadows.values()]
@@ -132,6 +146,8 @@ class FrameRenderer:
         position = simulation.q[:3]
         if self._ground is not None:
             self._ground.follow(position)
+        for surface in self._surfaces:
+            surface.follow(position)
         if self._rocks is not None:
             self._rocks.follow(position)
         if self.options.show_forces:

@@ -8,7 +8,8 @@ from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkFiltersSources import vtkSphereSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkLight, vtkPolyDataMapper
 
-from rover_gym.mechanics import Plane, SphereField
+from rover_gym.ground import heights_of, plane_of, triangles_of
+from rover_gym.mechanics import HeightField, Plane, Terrain, TriangleMesh
 from rover_gym.rendering import appearance as look
 from rover_gym.rendering.meshes import (
     Array,
@@ -36,6 +37,9 @@ HAZE = 12.0, 60.0  # m, where the haze begins and where the ground has the horiz
 SPHERE_RANGES = ((40.0, 4.0, 18, True), (250.0, 12.0, 8, True), (math.inf, math.inf, 6, False))
 
 Goal = tuple[float, float]
+
+#: A height field is drawn this far around the rover, m, with at most so many heights, and anew after so long a way, m.
+SURFACE_REACH, MOST_HEIGHTS, SURFACE_STEP = 60.0, 90_000, 8.0
 
 
 def sun(intensity: float) -> vtkLight:
@@ -127,15 +131,49 @@ class GroundActors:
         return actor_of(mesh(vertices, faces, colours, smooth=False), lit=False)
 
 
+class SurfaceActor:
+    """A height field or a mesh: the piece around the rover, with checkers that show its shape.
+
+    Attributes:
+        actor: What VTK draws.
+    """
+
+    def __init__(self, surface: HeightField | TriangleMesh) -> None:
+        self._surface = surface
+        self._place: tuple[float, ...] | None = None
+        self._mapper = vtkPolyDataMapper()
+        self.actor = actor_with(self._mapper)
+
+    def follow(self, position: Array) -> None:
+        """Draws the piece around a position anew when it has moved far."""
+        place = tuple(np.round(position[[0, 2]] / SURFACE_STEP).tolist())
+        if place == self._place:
+            return
+        is_new = self._place is None
+        self._place = place
+        if isinstance(self._surface, TriangleMesh) and not is_new:
+            return
+        middle = SURFACE_STEP * np.array(place)
+        low, high = middle - SURFACE_REACH, middle + SURFACE_REACH
+        vertices, triangles = triangles_of(self._surface, low, high, MOST_HEIGHTS)
+        if isinstance(self._surface, TriangleMesh):
+            colours = np.broadcast_to(np.array(look.ROCK_COLOUR), vertices.shape)
+        else:
+            light, dark = np.array(look.GROUND_COLOUR), np.array(look.GROUND_COLOUR_2)
+            odd = np.floor(vertices[:, [0, 2]] / TILE).sum(axis=1) % 2.0 == 1.0
+            colours = np.where(odd[:, None], dark, light)
+        self._mapper.SetInputData(mesh(vertices, triangles, colours))
+
+
 class RockActors:
-    """All spheres of a terrain, finer near the rover, with their shadows on the ground.
+    """All spheres of a terrain, `(n, 3)` and `(n,)`, finer near the rover, with their shadows on the ground.
 
     Attributes:
         actors: What VTK draws.
     """
 
-    def __init__(self, terrain: SphereField, ground: GroundActors | None) -> None:
-        self._centres, self._radii = terrain.centres, terrain.radii
+    def __init__(self, centres: Array, radii: Array, ground: GroundActors | None) -> None:
+        self._centres, self._radii = centres, radii
         # Each rock has its own shade: the golden ratio spreads the shades evenly.
         shade = 0.86 + 0.28 * (np.arange(len(self._radii)) * 0.6180339887 % 1.0)
         self._colours = shade[:, None] * np.array(look.ROCK_COLOUR)
@@ -174,10 +212,10 @@ def shadow_of(actor: vtkActor, ground: GroundActors) -> vtkActor:
     return _shadow(actor_with(mapper), ground)
 
 
-def flag(goal: Goal, tolerance: float, terrain: Plane | SphereField, ground: GroundActors | None) -> list[vtkActor]:
+def flag(goal: Goal, tolerance: float, terrain: Terrain, ground: GroundActors | None) -> list[vtkActor]:
     """A pole with a pennant and, on a plane, the ring within which the goal counts as reached."""
     x, z = goal
-    height = terrain.height(x, z) if isinstance(terrain, Plane) else float(terrain.heights([[x, z]])[0])
+    height = float(heights_of(terrain, [[x, z]])[0])
     foot = np.array([x, 0.0 if math.isnan(height) else height, z])
     pole = look.Part("", "cylinder", (0.022, 1.5), (0.0, 0.75, 0.0), np.eye(3), look.COLUMN_COLOUR)
     vertices, triangles = look.part_mesh(pole)
@@ -190,7 +228,7 @@ def flag(goal: Goal, tolerance: float, terrain: Plane | SphereField, ground: Gro
         np.vstack((np.broadcast_to(look.COLUMN_COLOUR, vertices.shape), np.broadcast_to(look.GOAL_COLOUR, (6, 3)))),
     )
     standing = actor_of(surface)
-    plane = terrain if isinstance(terrain, Plane) else terrain.ground
+    plane = plane_of(terrain)
     if plane is None or ground is None:
         return [standing]
     return [standing, shadow_of(standing, ground), _ring(foot, tolerance, plane)]

@@ -16,7 +16,7 @@ from rover_gym.extras import require
 from rover_gym.mechanics import __version__
 from rover_gym.rendering.appearance import GROUND_COLOUR, GROUND_COLOUR_2, ROCK_COLOUR, Colour, Part, sphere_mesh
 from rover_gym.replay.rotation import continuous, quaternions
-from rover_gym.replay.scenery import coloured_meshes, goal_parts, ground_tiles, parts_by_solid, spheres
+from rover_gym.replay.scenery import coloured_meshes, goal_parts, ground_tiles, parts_by_solid, spheres, surfaces
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -46,6 +46,9 @@ def write_gltf(run: RoverRun, path: str | Path) -> Path:
         writer.add_node(
             "ground", writer.add_mesh("ground", ((GROUND_COLOUR, vertices, light), (GROUND_COLOUR_2, vertices, dark)))
         )
+    for k, (vertices, faces) in enumerate(surfaces(run)):
+        painted = [(colour, vertices, triangles) for colour, triangles in faces if len(triangles)]
+        writer.add_node(f"surface_{k}", writer.add_mesh(f"surface_{k}", painted))
     writer.add_node("goal", writer.add_parts("goal", goal_parts(run)))
     centres, radii = spheres(run)
     if len(radii):

@@ -20,6 +20,7 @@ from rover_gym.replay.scenery import (
     identifiers,
     parts_by_solid,
     spheres,
+    surfaces,
     trunk_path,
 )
 
@@ -85,6 +86,9 @@ def _build(run: RoverRun, scene: Any) -> tuple[Any, list[Any]]:
         vertices, light, dark = tiles
         squares = ((GROUND_COLOUR, vertices, light), (GROUND_COLOUR_2, vertices, dark))
         add_meshes(scene, "/world/ground", squares, cast_shadow=False)
+    for k, (vertices, faces) in enumerate(surfaces(run)):
+        painted = [(colour, vertices, triangles) for colour, triangles in faces if len(triangles)]
+        add_meshes(scene, f"/world/surface_{k}", painted, cast_shadow=False)
     add_meshes(scene, "/world/goal", coloured_meshes(goal_parts(run)))
     centres, radii = spheres(run)
     for name, rings, chosen in (

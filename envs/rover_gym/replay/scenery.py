@@ -9,8 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import Plane, SphereField
-from rover_gym.rendering.appearance import GOAL_COLOUR, Colour, Part, part_mesh, rover_parts
+from rover_gym.ground import plane_of, spheres_of, surfaces_of, triangles_of
+from rover_gym.mechanics import Plane, TriangleMesh
+from rover_gym.rendering.appearance import (
+    GOAL_COLOUR,
+    GROUND_COLOUR,
+    GROUND_COLOUR_2,
+    ROCK_COLOUR,
+    Colour,
+    Part,
+    part_mesh,
+    rover_parts,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -19,6 +29,8 @@ if TYPE_CHECKING:
 
 TILE = 0.5  # m, edge of the ground's squares, doubled until their number is acceptable
 MOST_TILES = 20_000
+SQUARE = 1.0  # m, edge of the squares that are painted on a height field
+MOST_HEIGHTS = 40_000  # shown of a height field
 MARGIN = 5.0  # m of ground around the path
 LONGEST_NAME = 60
 GOAL_POLE = 0.8  # m, height
@@ -67,14 +79,31 @@ def trunk_path(run: RoverRun) -> Array:
 
 def ground_plane(run: RoverRun) -> Plane | None:
     """The plane of the ground, if there is one."""
-    return run.terrain if isinstance(run.terrain, Plane) else run.terrain.ground
+    return plane_of(run.terrain)
 
 
 def spheres(run: RoverRun) -> tuple[Array, Array]:
     """Centres (n, 3) and radii (n,) of the ground's spheres, m."""
-    if isinstance(run.terrain, SphereField):
-        return run.terrain.centres, run.terrain.radii
-    return np.empty((0, 3)), np.empty(0)
+    return spheres_of(run.terrain)
+
+
+def surfaces(run: RoverRun) -> list[tuple[Array, list[tuple[Colour, Triangles]]]]:
+    """Height fields around the path, in squares of two colours, and meshes: vertices (n, 3), m, triangles by colour."""
+    places = trunk_path(run)[:, [0, 2]]
+    if run.goal is not None:
+        places = np.vstack((places, run.goal))
+    low, high = places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN
+    pieces: list[tuple[Array, list[tuple[Colour, Triangles]]]] = []
+    for surface in surfaces_of(run.terrain):
+        vertices, faces = triangles_of(surface, low, high, MOST_HEIGHTS)
+        triangles = faces.astype(np.int32)
+        if isinstance(surface, TriangleMesh):
+            pieces.append((vertices, [(ROCK_COLOUR, triangles)]))
+            continue
+        middles = vertices[triangles][:, :, [0, 2]].mean(axis=1)
+        dark = np.floor(middles / SQUARE).sum(axis=1) % 2.0 == 1.0
+        pieces.append((vertices, [(GROUND_COLOUR, triangles[~dark]), (GROUND_COLOUR_2, triangles[dark])]))
+    return pieces
 
 
 def ground_tiles(run: RoverRun) -> tuple[Array, Triangles, Triangles] | None:

@@ -22,7 +22,15 @@ from rover_gym.rendering.appearance import (
     Part,
 )
 from rover_gym.replay.rotation import axis_angles, continuous, quaternions
-from rover_gym.replay.scenery import first_view, goal_parts, ground_tiles, identifiers, parts_by_solid, spheres
+from rover_gym.replay.scenery import (
+    first_view,
+    goal_parts,
+    ground_tiles,
+    identifiers,
+    parts_by_solid,
+    spheres,
+    surfaces,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -108,6 +116,14 @@ def _ground(run: RoverRun) -> Iterator[str]:
             f" colorPerVertex FALSE coord Coordinate {{ point [ {points} ] }} coordIndex [ {corners} ]"
             f" color Color {{ color [ {colours} ] }} colorIndex [ {indices} ] }} }}"
         )
+    for vertices, faces in surfaces(run):
+        points = ", ".join(_numbers(vertex) for vertex in vertices)
+        for colour, triangles in faces:
+            corners = ", ".join(f"{a} {b} {c} -1" for a, b, c in triangles)
+            yield (
+                f"Shape {{ appearance {_appearance(colour)} geometry IndexedFaceSet {{ solid FALSE"
+                f" coord Coordinate {{ point [ {points} ] }} coordIndex [ {corners} ] }} }}"
+            )
     centres, radii = spheres(run)
     if len(radii):
         yield "DEF Spheres Group { children ["

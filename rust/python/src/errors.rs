@@ -221,6 +221,7 @@ impl From<ModelError> for BorderError {
             | ModelError::UnknownParent { name, .. }
             | ModelError::UnknownName { name, .. }
             | ModelError::NotADisc { solid: name, .. }
+            | ModelError::UnknownModel { name, .. }
             | ModelError::MaterialName { name, .. }
             | ModelError::SteeringNotAbove { name, .. } => Value::Text(name.clone()),
             ModelError::NotFinite { value, .. }
@@ -233,7 +234,6 @@ impl From<ModelError> for BorderError {
             | ModelError::NotASign { value, .. } => Value::Number(*value),
             #[allow(clippy::cast_precision_loss)] // a number to show
             ModelError::UnknownFormat { format } => Value::Number(*format as f64),
-            ModelError::UnknownModel { name, .. } => Value::Text(name.clone()),
             ModelError::TooMany { count, .. } => Value::Count(*count),
             ModelError::NoDirection { value, .. } => Value::Numbers(value.to_vec()),
             ModelError::ImpossibleInertia { principal, .. } => Value::Numbers(principal.to_vec()),
@@ -285,12 +285,13 @@ impl From<TerrainError> for BorderError {
                 radius: value,
             } => (Some(index), Value::Number(*value)),
             TerrainError::MismatchedLengths { radii, .. } => (None, Value::Count(*radii)),
-            TerrainError::TooMany { count, .. } => (None, Value::Count(*count)),
+            TerrainError::TooMany { count, .. } | TerrainError::WrongCount { count, .. } => {
+                (None, Value::Count(*count))
+            }
             TerrainError::Empty | TerrainError::NoTriangles | TerrainError::NoParts => {
                 (None, Value::Count(0))
             }
             TerrainError::BadHeight { value, .. } => (None, Value::Number(*value)),
-            TerrainError::WrongCount { count, .. } => (None, Value::Count(*count)),
             TerrainError::NoSuchVertex { index, vertex, .. } => {
                 (Some(index), Value::Count(*vertex))
             }
@@ -413,8 +414,9 @@ impl From<DrawError> for BorderError {
                 let message = format!("{why}, in the last of {attempts} scenes");
                 let own = match why {
                     Unsuitable::Placement(why) => why.into(),
-                    Unsuitable::NoGoal { x, z } => Self::of_goal(x, z),
-                    Unsuitable::NoWay { to: [x, z], .. } => Self::of_goal(x, z),
+                    Unsuitable::NoGoal { x, z } | Unsuitable::NoWay { to: [x, z], .. } => {
+                        Self::of_goal(x, z)
+                    }
                 };
                 Self { message, ..own }
             }

@@ -189,7 +189,7 @@ impl Union {
         self.parts.len()
     }
 
-    fn __repr__<'py>(&self, py: Python<'py>) -> PyResult<String> {
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let parts = self.parts(py)?;
         let shown = parts.iter().map(|part| Ok(part.repr()?.to_string()));
         let shown = shown.collect::<PyResult<Vec<_>>>()?;

@@ -109,12 +109,11 @@ impl HeightField {
         let material = materials::name(material)?;
         let (heights, shape) = table(heights)?;
         let spacing = pair(spacing, "spacing")?;
-        let origin = match origin {
-            Some(origin) => pair(origin, "origin")?,
-            None => {
-                let middle = |n: usize, step: f64| -0.5 * step * (n.max(1) - 1) as f64;
-                [middle(shape[1], spacing[0]), middle(shape[0], spacing[1])]
-            }
+        let origin = if let Some(origin) = origin {
+            pair(origin, "origin")?
+        } else {
+            let middle = |n: usize, step: f64| -0.5 * step * (n.max(1) - 1) as f64;
+            [middle(shape[1], spacing[0]), middle(shape[0], spacing[1])]
         };
         let field = py.detach(|| CoreField::new(heights, shape, spacing, origin));
         let mut field = field.map_err(BorderError::from)?;
@@ -138,8 +137,8 @@ impl HeightField {
     ///         at the world's origin.
     ///     height_range: Of a PNG: heights of black and white, (2,), m.
     ///     scale: Factor from the file's numbers to m; of a GeoTIFF by default its own.
-    ///     datum: Height of the file that becomes 0, in its own numbers; of a GeoTIFF by default its
-    ///         lowest, otherwise 0.
+    ///     datum: Height of the file that becomes 0, in its own numbers; of a GeoTIFF by default
+    ///         its lowest, otherwise 0.
     ///     band: Band of a GeoTIFF, from 1.
     ///     material: Name of its material.
     ///
@@ -205,7 +204,8 @@ impl HeightField {
     /// Raises:
     ///     TerrainError: An argument is out of its range.
     ///
-    /// Source: Turcotte 1997 (spectral synthesis); Pike 1977 and McGetchin 1973 (craters).
+    /// Source: Turcotte 1997 (spectral synthesis); Pike 1977 and McGetchin, Settle and Head
+    /// 1973 (craters).
     #[staticmethod]
     #[pyo3(signature = (size, spacing, roughness, *, material = Given::MISSING, **options),
         text_signature = "(size, spacing, roughness, *, hurst=0.7, longest_wave=None, craters=0.0, crater_diameter=(0.5, 5.0), ripple_height=0.0, ripple_length=1.0, seed=0, origin=None, material='ground')")]

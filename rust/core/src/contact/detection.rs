@@ -420,6 +420,15 @@ pub fn disc_gap(disc: &Disc, base: &Vector3<f64>, terrain: &dyn Terrain) -> f64 
 /// The same of a wheel's shape, with a width or without.
 #[must_use]
 pub fn wheel_gap(shape: &PlacedShape, base: &Vector3<f64>, terrain: &dyn Terrain) -> f64 {
+    if terrain.has_surface() {
+        let (centre, radius) = (base + shape.centre(), shape.bound());
+        if let Some(plane) = terrain.level_near(&centre, 2.0 * radius) {
+            let low = dispatch::lowest_on_plane(shape, &plane, base);
+            if low.gap <= radius {
+                return low.gap;
+            }
+        }
+    }
     let mut gap = f64::INFINITY;
     visit_nearer(shape, base, terrain, &mut |_, point| {
         gap = point.gap;

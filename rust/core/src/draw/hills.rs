@@ -13,6 +13,7 @@ use std::sync::OnceLock;
 
 use super::pcg64::Pcg64;
 use super::start::Start;
+use crate::geometry::terrain::rocks::Random;
 use crate::geometry::{HeightField, TerrainError};
 use crate::scalar::elementary::sin_cos;
 
@@ -63,6 +64,12 @@ impl HillDraw {
     ///
     /// # Errors
     /// As [`HeightField::new`].
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_possible_wrap
+    )]
+    // Indices of a grid, small numbers.
     pub fn lay_out(&self, start: &Start) -> Result<HeightField, TerrainError> {
         let map = map();
         let ends = |k: usize| {
@@ -72,7 +79,6 @@ impl HillDraw {
             (first, (last - first) as usize + 1)
         };
         let [(x, columns), (z, rows)] = [ends(0), ends(1)];
-        // A place of the map: whole numbers far within the range of i64.
         let begin = |first: f64, offset: u64| (first as i64 + offset as i64).rem_euclid(N as i64);
         let (i, j) = (begin(x, self.offset[0]), begin(z, self.offset[1]));
         let at = |row: usize, column: usize| {
@@ -110,21 +116,24 @@ fn map() -> &'static [f64] {
             }
         }
         let scale = 1.0 / (squares / (N * N) as f64).sqrt();
-        heights.iter_mut().for_each(|height| *height *= scale);
+        for height in &mut heights {
+            *height *= scale;
+        }
         heights
     })
 }
 
 /// Adds gradient noise of a wavelength (m), with the amplitude of a surface of exponent H.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // indices, small numbers
 fn add_noise(octave: u64, wavelength: f64, heights: &mut [f64]) {
     let points = (PERIOD / wavelength) as usize;
     let step = N / points;
     // The wavelengths halve: their amplitudes are powers of a constant.
     let amplitude = (0..octave).fold(1.0, |product: f64, _| product * HALF_TO_THE_HURST);
+    let mut random = Random::new(octave);
     let gradients: Vec<[f64; 2]> = (0..points * points)
-        .map(|k| {
-            let turn = unit(octave << 32 | k as u64);
-            let (sine, cosine) = sin_cos(std::f64::consts::TAU * turn);
+        .map(|_| {
+            let (sine, cosine) = sin_cos(std::f64::consts::TAU * random.uniform());
             [cosine, sine]
         })
         .collect();
@@ -152,14 +161,6 @@ const HALF_TO_THE_HURST: f64 = 0.574_349_177_498_517_5;
 /// `6 t⁵ − 15 t⁴ + 10 t³`, whose first two derivatives vanish at 0 and 1.
 fn fade(t: f64) -> f64 {
     t * t * t * (t * (t * 6.0 - 15.0) + 10.0)
-}
-
-/// A number in [0, 1) from a counter, by the mixer of `SplitMix64` (Steele et al. 2014).
-fn unit(counter: u64) -> f64 {
-    let mut z = counter.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    ((z ^ (z >> 31)) >> 11) as f64 * f64::EPSILON * 0.5
 }
 
 #[cfg(test)]

@@ -221,7 +221,7 @@ pub fn resting_on(
     let lift = |mut q: Vec<f64>| -> Result<Vec<f64>, PlacementError> {
         for _ in 0..LIFTS {
             let lowest = gaps(&q)?.min();
-            if !(lowest.abs() > TOUCHING) || lowest.is_infinite() {
+            if lowest.abs() <= TOUCHING || !lowest.is_finite() {
                 break;
             }
             q[1] -= lowest;
@@ -241,7 +241,7 @@ pub fn resting_on(
             beside[k] += DIFFERENCE;
             column.copy_from(&((gaps(&beside)? - &now) / DIFFERENCE));
         }
-        let Ok(step) = slopes.svd(true, true).solve(&now, RANK) else {
+        let Some(step) = smallest_step(&slopes, &now) else {
             break;
         };
         let shorten = (LONGEST / step.amax().max(LONGEST)).min(1.0);
@@ -273,11 +273,22 @@ const TOUCHING: f64 = 1e-9;
 /// Change of a coordinate for a difference quotient, rad or m.
 const DIFFERENCE: f64 = 1e-6;
 
-/// Share below which a direction does not move the wheels.
+/// Share of the mean slope below which a direction does not move the wheels.
 const RANK: f64 = 1e-3;
 
 /// Longest change of a coordinate in an iteration, rad or m.
 const LONGEST: f64 = 0.2;
+
+/// The smallest change with `S x = gaps` but for damping: `Sᵀ (S Sᵀ + ε 1)⁻¹ gaps`.
+fn smallest_step(slopes: &DMatrix<f64>, gaps: &DVector<f64>) -> Option<DVector<f64>> {
+    let mut square = slopes * slopes.transpose();
+    let mean = square.trace() / gaps.len() as f64;
+    for k in 0..gaps.len() {
+        square[(k, k)] += RANK * RANK * mean;
+    }
+    let factor = square.cholesky()?;
+    Some(slopes.transpose() * factor.solve(gaps))
+}
 
 /// Public coordinates of joints that neither turn a wheel nor steer it and have no drive.
 fn free_joints(model: &Model) -> Vec<usize> {

@@ -13,6 +13,7 @@ const MOST: f64 = 400.0;
 
 /// Whether a way leads from one place (x, z, m) to another on which the ground rises and falls by
 /// at most [`STEEPEST`]. `height`: of the ground, m; None where it is not known.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // indices of the grid
 pub fn leads(height: impl Fn(f64, f64) -> Option<f64>, from: [f64; 2], to: [f64; 2]) -> bool {
     let low = [0, 1].map(|k| from[k].min(to[k]) - MARGIN);
     let size = [0, 1].map(|k| (from[k] - to[k]).abs() + 2.0 * MARGIN);

@@ -154,17 +154,15 @@ impl<T: Lane> Footing<T> {
         if !is_known {
             let within = reach + AHEAD;
             self.within[lane] = f64::NEG_INFINITY;
-            if terrain.coverage(&centre, disc.radius + within) != Coverage::Known {
-                if terrain.coverage(&centre, disc.radius) != Coverage::Known {
-                    return false;
-                }
-            } else {
+            if terrain.coverage(&centre, disc.radius + within) == Coverage::Known {
                 (self.from[lane], self.within[lane]) = (centre, within);
                 if let Some(plane) = terrain.level_near(&centre, disc.radius + within) {
                     self.flat |= own;
                     self.put(lane, &plane);
                     return true;
                 }
+            } else if terrain.coverage(&centre, disc.radius) != Coverage::Known {
+                return false;
             }
         }
         let shape = PlacedShape::Disc(disc);

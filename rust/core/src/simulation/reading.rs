@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use super::rover::RoverSimulation;
 use super::rover_contacts::WheelForces;
 use crate::contact::{Part, WheelGaps};
+use crate::geometry::Terrain;
 use crate::integrator::StepStatus;
 use crate::multibody::{Model, coordinates};
 use crate::scalar::elementary::{hypot, sin_cos};
@@ -17,6 +18,25 @@ pub const SLIP_SPEED: f64 = 0.05;
 
 /// A wheel touches when its gap is at most this, m. Resting wheels show gaps below a micrometre.
 pub const CONTACT_GAP: f64 = 1e-3;
+
+/// Distance over which the slope of a surface is read, m: about as wide as the rover stands.
+pub const FOOTPRINT: f64 = 1.0;
+
+/// Normal of the ground plane, or of a surface about a place (x, z, m).
+fn ground_normal(terrain: &dyn Terrain, x: f64, z: f64) -> Option<Vector3<f64>> {
+    if let Some(plane) = terrain.ground() {
+        return Some(*plane.normal());
+    }
+    if !terrain.has_surface() {
+        return None;
+    }
+    let half = 0.5 * FOOTPRINT;
+    let rise = |dx: f64, dz: f64| {
+        let ahead = terrain.height(x + dx, z + dz)?;
+        Some((ahead - terrain.height(x - dx, z - dz)?) / FOOTPRINT)
+    };
+    Some(Vector3::new(-rise(half, 0.0)?, 1.0, -rise(0.0, half)?).normalize())
+}
 
 /// Request for a reading.
 #[derive(Clone, Copy, Debug, Default)]
@@ -39,7 +59,7 @@ pub struct Look<'a> {
 /// | `wheel_contacts` | n | 1 where the gap is at most [`CONTACT_GAP`], else 0 |
 /// | `normal_forces` | n | mean of the last step, N |
 /// | `tangential_forces` | 2 n | rolling, lateral, wheel by wheel, N |
-/// | `ground_normal` | 3 | in the trunk's frame; zero where there is no ground plane |
+/// | `ground_normal` | 3 | in the trunk's frame: of the ground plane, or of a surface over [`FOOTPRINT`] about the trunk's origin; zero where there is none |
 /// | `target` | 3 | a place on the map: ahead and to the right of the trunk's origin, and how far; horizontal |
 /// | `cos_tilt` | 1 | between the trunk's y axis and up, against gravity |
 /// | `speed` | 1 | of the trunk's origin, horizontal |
@@ -191,8 +211,8 @@ impl RoverSimulation {
         let forces = &scratch.forces.along;
         row.put(forces.iter().map(|force| force[0]));
         row.put(forces.iter().flat_map(|force| [force[1], force[2]]));
-        let normal = self.terrain().ground().map(|plane| *plane.normal());
-        let normal = R_WB.inverse() * normal.unwrap_or_default();
+        let normal = ground_normal(&**self.terrain(), x, z).unwrap_or_default();
+        let normal = R_WB.inverse() * normal;
         row.put(normal.iter().copied());
 
         let heading = if is_free { pose[4] } else { 0.0 };

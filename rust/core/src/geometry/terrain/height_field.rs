@@ -97,7 +97,7 @@ impl HeightField {
         }
         for (axis, n) in [columns, rows].into_iter().enumerate() {
             let (step, begin) = (spacing[axis], origin[axis]);
-            if !(step >= MIN_SPACING && step <= MAX_SIZE) {
+            if !(MIN_SPACING..=MAX_SIZE).contains(&step) {
                 return Err(TerrainError::OutOfRange {
                     field: "spacing",
                     range: "from 1e-4 to 1e6 m",
@@ -106,7 +106,7 @@ impl HeightField {
             }
             let end = begin + (n - 1) as f64 * step;
             for value in [begin, end] {
-                if !(value.abs() <= MAX_SIZE) {
+                if !(-MAX_SIZE..=MAX_SIZE).contains(&value) {
                     return Err(TerrainError::OutOfRange {
                         field: "origin",
                         range: "such that the map lies within 1e6 m of the world's origin",
@@ -386,7 +386,9 @@ impl HeightField {
         let mut is_flat = true;
         for [di, dj] in &SPOKES[..3] {
             let mean = 0.5 * (self.corner([i + di, j + dj]) + self.corner([i - di, j - dj]));
-            if !(height >= mean) {
+            // Not convex where the height beside it is not known either.
+            let may_be_convex = height >= mean;
+            if !may_be_convex {
                 return None;
             }
             is_flat &= height <= mean;

@@ -90,7 +90,7 @@ impl TriangleMesh {
                 .norm_squared()
                 .max(ac.norm_squared())
                 .max((c - b).norm_squared());
-            if !(area.norm() > 1e-9 * longest) {
+            if area.norm() <= 1e-9 * longest {
                 return Err(TerrainError::FlatTriangle { index });
             }
             normals.push(area.normalize());

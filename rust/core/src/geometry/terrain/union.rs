@@ -75,7 +75,7 @@ impl Terrain for Union {
     ) {
         for (part, first) in self.parts.iter().zip(&self.first) {
             part.visit_near(centre, reach, &mut |id, primitive| {
-                visit(first + id, primitive)
+                visit(first + id, primitive);
             });
         }
     }

@@ -1,0 +1,101 @@
+"""Drives on maps from the command line: recorded, plotted, replayed and written for other programs."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pygltflib
+import pytest
+from typer.testing import CliRunner, Result
+
+from rover_gym import HeightField, RoverModel, Simulation, SphereField, TriangleMesh, Union
+from rover_gym.cli import app
+from rover_gym.ground import parts_of, surfaces_of, triangles_of
+from rover_gym.record import Recorder, RoverSampler, describe, read_run
+
+
+def rover(*arguments: str) -> Result:
+    return CliRunner(env={"COLUMNS": "160", "NO_COLOR": "1"}).invoke(app, list(arguments))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A map, and a drive of two seconds on it with a rover of the gallery."""
+    folder = tmp_path_factory.mktemp("maps")
+    np.save(folder / "map.npy", HeightField.fractal(40.0, 0.5, 0.05, seed=2).grid)
+    place = ("--start", "-3", "2", "--goal", "5", "1", "--heading", "0")
+    drive = ("drive", "--terrain", str(folder / "map.npy"), "--spacing", "0.5", "--model", "four-steered", *place)
+    result = rover(*drive, "--time-limit", "2", "--output", str(folder / "run"))
+    assert result.exit_code == 0, result.output
+    return folder
+
+
+def test_a_drive_on_a_map_is_recorded_with_its_ground(folder: Path) -> None:
+    run = read_run(folder / "run" / "episode-0.h5")
+    (surface,) = surfaces_of(run.terrain)
+    assert isinstance(surface, HeightField)
+    np.testing.assert_array_equal(surface.grid, np.load(folder / "map.npy"))
+    assert run.model.name == RoverModel.named("four-steered").name
+    assert run.goal == (5.0, 1.0)
+    np.testing.assert_allclose(run.trajectory["q"][0, [0, 2]], (-3.0, 2.0))
+    arguments = json.loads((folder / "run" / "summary.json").read_text(encoding="utf-8"))["arguments"]
+    assert arguments["terrain"].endswith("map.npy")
+    assert arguments["model"] == "four-steered"
+
+
+def test_it_is_plotted_and_replayed(folder: Path) -> None:
+    recording = str(folder / "run" / "episode-0.h5")
+    assert rover("plot", recording, "--output", str(folder / "plots")).exit_code == 0
+    assert (folder / "plots" / "path.png").stat().st_size > 10_000
+    for kind, name in (("--gltf", "run.glb"), ("--vrml", "run.wrl"), ("--html", "run.html")):
+        result = rover("replay", recording, kind, str(folder / name))
+        assert result.exit_code == 0, result.output
+    nodes = [node.name for node in pygltflib.GLTF2().load(str(folder / "run.glb")).nodes]
+    assert "surface_0" in nodes
+    assert "IndexedFaceSet" in (folder / "run.wrl").read_text(encoding="utf-8")
+
+
+def test_all_parts_of_a_ground_survive_a_recording(tmp_path: Path) -> None:
+    heights = np.zeros((21, 31))
+    heights[3, 4] = np.nan
+    field = HeightField(heights, (0.5, 0.25), (-7.0, -2.0))
+    spheres = SphereField([[9.0, 0.0, 9.0]], [0.3])
+    mesh = TriangleMesh(
+        [[5.0, -1.0, -1.0], [7.0, -1.0, -1.0], [6.0, -1.0, 1.0], [6.0, 1.5, 0.0]],
+        [[0, 2, 3], [2, 1, 3], [1, 0, 3], [0, 1, 2]],
+    )
+    simulation = Simulation(RoverModel(), [field, spheres, mesh])
+    sampler = RoverSampler(simulation.model)
+    with Recorder(
+        tmp_path / "run.h5", sampler.channels, describe(simulation, "parts"), terrain=simulation.terrain
+    ) as tape:
+        tape.append(sampler.row(simulation, residual=0.0, iterations=0))
+    terrain = read_run(tmp_path / "run.h5").terrain
+    assert isinstance(terrain, Union)
+    kinds = {type(part): part for part in parts_of(terrain)}
+    np.testing.assert_array_equal(kinds[HeightField].grid, field.grid)
+    assert (kinds[HeightField].spacing, kinds[HeightField].origin) == (field.spacing, field.origin)
+    np.testing.assert_array_equal(kinds[SphereField].centres, spheres.centres)
+    np.testing.assert_array_equal(kinds[TriangleMesh].vertices, mesh.vertices)
+    np.testing.assert_array_equal(kinds[TriangleMesh].triangles, mesh.triangles)
+
+
+def test_a_piece_of_a_map_has_its_heights_and_no_triangles_over_holes() -> None:
+    x, z = np.meshgrid(np.arange(11.0), np.arange(7.0))
+    heights = 0.1 * x + 0.2 * z
+    heights[5, 5] = np.nan
+    field = HeightField(heights, 1.0, (0.0, 0.0))
+    vertices, triangles = triangles_of(field, (2.2, 1.4), (7.5, 9.0), 10_000)
+    assert vertices[:, [0, 2]].min(axis=0).tolist() == [2.0, 1.0]
+    assert vertices[:, [0, 2]].max(axis=0).tolist() == [8.0, 6.0]
+    used = vertices[np.unique(triangles)]
+    np.testing.assert_allclose(used[:, 1], 0.1 * used[:, 0] + 0.2 * used[:, 2], atol=1e-6)
+    assert len(triangles) == 2 * 6 * 5 - 6
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    assert (np.cross(b - a, c - a)[:, 1] > 0.0).all()  # counter-clockwise from above
+
+
+def test_spacing_belongs_to_a_map() -> None:
+    result = rover("drive", "--spacing", "1")
+    assert result.exit_code != 0
+    assert "spacing" in result.output
