@@ -773,8 +773,8 @@ class SphereField:
             burial: Fraction of its diameter that a rock is sunk into the ground, 0 to 0.5, or a
                 range from which it is drawn for each rock; 0.5 by default.
             ground: What the rocks lie on; flat ground at height 0 by default. A plane is part of
-                the field. Rocks on any other terrain are raised by its height and the terrain is not
-                part of the field: combine them as `Union([terrain, rocks])`.
+                the field. Rocks on any other terrain are raised by its height, and the terrain is
+                not part of the field: combine them as `Union([terrain, rocks])`.
             clear: Circles x, z, radius that no rock reaches into, (n, 3), m; none by default.
 
         Returns:

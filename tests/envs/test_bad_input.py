@@ -61,7 +61,7 @@ NAN, INF = float("nan"), float("inf")
         ({"time_step": 0.0}, OptionError, "time_step"),
         ({"time_step": -0.005}, OptionError, "time_step"),
         ({"time_step": 0.007}, OptionError, "control_frequency"),
-        ({"model": "rover.toml"}, ModelError, "model"),
+        ({"model": "lunokhod"}, ModelError, "model"),
         ({"solver_options": {"colour": 1}}, OptionError, "solver_options.colour"),
         ({"solver_options": 3}, OptionError, "solver_options"),
         ({"solver_options": {"tolerance": -1.0}}, OptionError, "tolerance"),

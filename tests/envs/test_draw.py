@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rover_gym import OptionError, RoverEnv
+from rover_gym import OptionError, Plane, RoverEnv
 from rover_gym.env.generators import fresh_seed, generator_at, row_of, seeded_rows
 from rover_gym.mechanics import (
     CommandError,
@@ -274,7 +274,9 @@ def test_a_bad_distribution_is_refused_by_name() -> None:
         ({"start": {**good["start"], "slope": (1.0, 0.0)}}, "start.slope"),
         ({"trunk_load_limit": "much"}, "trunk_load_limit"),
         ({"rocks": {"abundance": 0.1}}, "rocks"),
-        ({"field": 3}, "field"),
+        ({"ground": 3}, "terrain"),
+        ({"hills": -1.0}, "hills"),
+        ({"ground": Plane(), "hills": 0.1}, "hills"),
     ):
         with pytest.raises(ValueError, match="must") as caught:
             EpisodeDistribution(rules, Simulation(), **{**good, **change})
@@ -290,7 +292,7 @@ import hashlib, numpy as np
 from rover_gym import RoverEnv
 seen = hashlib.sha256()
 rocks = {"terrain": "sphere_field", "height_scan": True, "observation_noise": 0.1}
-for arguments in ({"slope_deg": (0.0, 20.0)}, rocks):
+for arguments in ({"slope_deg": (0.0, 20.0)}, rocks, {"terrain": "hills"}):
     env = RoverEnv(**arguments)
     for seed in range(40):
         seen.update(env.reset(seed=seed)[0].tobytes() + env.simulation.q.tobytes())

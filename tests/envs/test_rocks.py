@@ -16,7 +16,8 @@ from gymnasium.utils.env_checker import check_env
 
 from rover_gym import OptionError, PDPolicy, Plane, RoverEnv, RoverGymError, SphereField, TerrainError
 from rover_gym.env import HeightScan
-from rover_gym.env.rocks import clear_radius, heights, scan_points
+from rover_gym.env.rocks import clear_radius, scan_points
+from rover_gym.ground import heights_of
 from rover_gym.policy import measure_baseline, wilson_interval
 from rover_gym.policy.baseline import ENDS
 
@@ -262,7 +263,7 @@ def test_height_scan_works_on_the_plane() -> None:
     np.testing.assert_allclose(values, rise - env.simulation.q[1], atol=1e-6)
     plane = Plane((0.1, 1.0, -0.2), 0.3)
     points = np.array([[1.0, 2.0], [-3.0, 0.5]])
-    np.testing.assert_allclose(heights(plane, points), [plane.height(*point) for point in points])
+    np.testing.assert_allclose(heights_of(plane, points), [plane.height(*point) for point in points])
 
 
 @pytest.mark.parametrize(

@@ -29,8 +29,9 @@ pub struct ContactKey {
     /// [`Part::code`] of the part.
     pub part: u16,
     /// On the ground, the rim point or corner, with [`ON_SURFACE`] on a surface; on a sphere of the
-    /// ground, 0 for the nearest point and 1 for a part that passes the sphere within one step. Between bodies, the feature of
-    /// [`crate::geometry::query::PairPoint`]. For a joint, 0 is the lower stop and 1 the upper.
+    /// ground, 0 for the nearest point and 1 for a part that passes the sphere within one step.
+    /// Between bodies, the feature of [`crate::geometry::query::PairPoint`]. For a joint, 0 is the
+    /// lower stop and 1 the upper.
     pub feature: u16,
     /// The other side.
     pub opposite: Opposite,

@@ -281,13 +281,25 @@ const LONGEST: f64 = 0.2;
 
 /// The smallest change with `S x = gaps` but for damping: `Sᵀ (S Sᵀ + ε 1)⁻¹ gaps`.
 fn smallest_step(slopes: &DMatrix<f64>, gaps: &DVector<f64>) -> Option<DVector<f64>> {
-    let mut square = slopes * slopes.transpose();
-    let mean = square.trace() / gaps.len() as f64;
-    for k in 0..gaps.len() {
+    let n = gaps.len();
+    // Sums written out: nalgebra's product of large matrices has other bits on other processors.
+    let sum = |terms: &mut dyn Iterator<Item = f64>| terms.fold(0.0, |sum, term| sum + term);
+    let mut square = DMatrix::from_fn(n, n, |i, j| {
+        let columns = slopes.column_iter();
+        sum(&mut columns.map(|column| column[i] * column[j]))
+    });
+    let mean = square.trace() / n as f64;
+    for k in 0..n {
         square[(k, k)] += RANK * RANK * mean;
     }
-    let factor = square.cholesky()?;
-    Some(slopes.transpose() * factor.solve(gaps))
+    let loads = square.cholesky()?.solve(gaps);
+    let step = (slopes.column_iter()).map(|column| {
+        sum(&mut column
+            .iter()
+            .zip(loads.iter())
+            .map(|(slope, load)| slope * load))
+    });
+    Some(DVector::from_iterator(slopes.ncols(), step))
 }
 
 /// Public coordinates of joints that neither turn a wheel nor steer it and have no drive.

@@ -1,9 +1,10 @@
 //! Disc on a triangulated surface.
 //!
 //! Against a face the disc's points are those over a plane ([`super::disc_plane`]) that lie over
-//! the face. Against a convex edge with the start a and the unit direction e the contact normal is the
-//! one between the faces' that separates most, `max n · (E(n) − a)` with the lowest rim point E(n)
-//! over the plane of normal n. There the rim point lies over the edge: `(n × e) · (E(n) − a) = 0`,
+//! the face. Against a convex edge with the start a and the unit direction e the contact normal is
+//! the one between the faces' that separates most, `max n · (E(n) − a)` with the lowest rim point
+//! E(n) over the plane of normal n. There the rim point lies over the edge:
+//! `(n × e) · (E(n) − a) = 0`,
 //! found by a safeguarded secant iteration on `n ∝ (1 − τ) n₁ + τ n₂`. If the lowest point for a
 //! face's own normal is over that face, the face touches and the edge does not, so contacts hand
 //! over from face to edge with gap, point and normal continuous. A vertex is a ball of radius
