@@ -420,7 +420,8 @@ pub fn disc_gap(disc: &Disc, base: &Vector3<f64>, terrain: &dyn Terrain) -> f64 
 /// The same of a wheel's shape, with a width or without.
 #[must_use]
 pub fn wheel_gap(shape: &PlacedShape, base: &Vector3<f64>, terrain: &dyn Terrain) -> f64 {
-    if terrain.has_surface() {
+    // Only a surface, and no sphere or plane that may be nearer.
+    if terrain.has_surface() && !terrain.can_be_passed() && terrain.ground().is_none() {
         let (centre, radius) = (base + shape.centre(), shape.bound());
         if let Some(plane) = terrain.level_near(&centre, 2.0 * radius) {
             let low = dispatch::lowest_on_plane(shape, &plane, base);

@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::footing::{Footing, Wheels};
 use crate::contact::detection::{is_on_surface, visit_on_surface};
 use crate::geometry::query::sweep::DEEP;
-use crate::geometry::{Coverage, OrientedBox, PlacedShape, Primitive, Sphere, SupportMap, Terrain};
+use crate::geometry::{Coverage, OrientedBox, PlacedShape, Sphere, SupportMap, Terrain};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Mat3, Vec3};
 
 /// Most spheres near a wheel. A wheel near more is declined.
@@ -549,13 +549,9 @@ fn visit_spheres(
     within: f64,
     mut visit: impl FnMut(u32, &Sphere),
 ) {
-    field.visit_near(centre, within, &mut |number, primitive| match primitive {
-        // A plane is the ground's own, measured by itself.
-        Primitive::Plane(_) | Primitive::Face(_) | Primitive::Edge(_) | Primitive::Vertex(_) => {}
-        Primitive::Sphere(sphere) => {
-            if sphere.distance(centre) <= within {
-                visit(number, sphere);
-            }
+    field.visit_spheres(centre, within, &mut |number, sphere| {
+        if sphere.distance(centre) <= within {
+            visit(number, sphere);
         }
     });
 }

@@ -21,6 +21,7 @@ use super::sphere_field::MAX_SIZE;
 use super::surface::{Edge, Face, Hinge, MAX_SPOKES, Vertex};
 use super::tiles::{Tile, Tiles};
 use super::{Coverage, GROUND, Primitive, Terrain};
+use crate::geometry::shape::Sphere;
 
 /// Pieces that belong to one corner.
 const PIECES: u32 = 6;
@@ -449,6 +450,8 @@ fn index(x: f64) -> usize {
 }
 
 impl Terrain for HeightField {
+    fn visit_spheres(&self, _: &Vector3<f64>, _: f64, _: &mut dyn FnMut(u32, &Sphere)) {}
+
     fn visit_near(
         &self,
         centre: &Vector3<f64>,

@@ -306,6 +306,8 @@ fn find_spokes(triangles: &[[u32; 3]], n: usize) -> (Vec<u32>, Vec<u32>, Vec<u32
 }
 
 impl Terrain for TriangleMesh {
+    fn visit_spheres(&self, _: &Vector3<f64>, _: f64, _: &mut dyn FnMut(u32, &Sphere)) {}
+
     fn visit_near(
         &self,
         centre: &Vector3<f64>,

@@ -76,6 +76,20 @@ pub trait Terrain: Send + Sync {
         self.visit_near(centre, reach, visit);
     }
 
+    /// The same of spheres alone.
+    fn visit_spheres(
+        &self,
+        centre: &Vector3<f64>,
+        reach: f64,
+        visit: &mut dyn FnMut(u32, &Sphere),
+    ) {
+        self.visit_near(centre, reach, &mut |id, primitive| {
+            if let Primitive::Sphere(sphere) = primitive {
+                visit(id, sphere);
+            }
+        });
+    }
+
     /// The plane of all pieces of a surface within `radius` (m) of `centre`, seen from above, if
     /// the surface is level there and that is quickly told.
     fn level_near(&self, _centre: &Vector3<f64>, _radius: f64) -> Option<Plane> {

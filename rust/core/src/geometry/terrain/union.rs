@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 use super::error::TerrainError;
 use super::plane::Plane;
 use super::{Coverage, Primitive, Terrain};
+use crate::geometry::shape::Sphere;
 
 /// Everything that any of several terrains has. Immutable.
 ///
@@ -91,6 +92,17 @@ impl Terrain for Union {
             part.visit_above(centre, reach, floor, &mut |id, primitive| {
                 visit(first + id, primitive);
             });
+        }
+    }
+
+    fn visit_spheres(
+        &self,
+        centre: &Vector3<f64>,
+        reach: f64,
+        visit: &mut dyn FnMut(u32, &Sphere),
+    ) {
+        for (part, first) in self.parts.iter().zip(&self.first) {
+            part.visit_spheres(centre, reach, &mut |id, sphere| visit(first + id, sphere));
         }
     }
 
