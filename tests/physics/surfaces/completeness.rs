@@ -73,7 +73,8 @@ proptest! {
         // The rim was sampled: the lift is too small by the rim's arc or the slope's rise there.
         let coarse = 2e-4;
         prop_assert!(gap < coarse, "{gap}");
-        prop_assert!(gap > -depth - coarse, "{gap} {depth}");
+        // At a vertex the nearest rim point is taken, which may not be the one that separates most.
+        prop_assert!(gap > -1.1 * depth - coarse, "{gap} {depth}");
         if depth > 1e-3 {
             // A slope of at most about 80 degrees takes this share of the depth.
             prop_assert!(gap < -0.05 * depth + coarse, "{gap} {depth}");
