@@ -7,7 +7,9 @@ documented from its stub, which has the types beside the module's own docstrings
 import __future__
 
 import inspect
+import operator
 import sys
+from functools import reduce
 from pathlib import Path
 from types import ModuleType
 
@@ -53,6 +55,8 @@ def _use_stub() -> None:
     # A stub may name a class before it is there, so its annotations stay unevaluated.
     code = compile(text, source, "exec", __future__.annotations.compiler_flag)
     exec(code, stub.__dict__)  # noqa: S102 - our own stub
+    kinds = (stub.Plane, stub.SphereField, stub.HeightField, stub.TriangleMesh, stub.Union)  # type: ignore[attr-defined]
+    stub.Terrain = reduce(operator.or_, kinds)  # type: ignore[attr-defined]
     sys.modules[name] = rover_gym.mechanics = stub
 
 

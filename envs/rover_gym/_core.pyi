@@ -15,7 +15,7 @@ from typing_extensions import disjoint_base
 _Array: TypeAlias = npt.NDArray[np.float64]
 _Rows: TypeAlias = npt.NDArray[np.uint64]
 _Observation: TypeAlias = npt.NDArray[np.float32]
-_Terrain: TypeAlias = Plane | SphereField | HeightField | TriangleMesh | Union
+_Terrain: TypeAlias = "Plane | SphereField | HeightField | TriangleMesh | Union"
 _Terrains: TypeAlias = Sequence[_Terrain]
 _Coordinates: TypeAlias = Literal["report", "state"]
 _Range: TypeAlias = tuple[float, float]
