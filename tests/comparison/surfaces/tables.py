@@ -1,0 +1,86 @@
+"""The tables of `docs/comparison.md`, made from `surfaces.json`."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from comparison.output import between
+from comparison.tables import number
+
+BEGIN, END = "<!-- surfaces: made by `make chart`, not by hand -->", "<!-- end of surfaces -->"
+Row = dict[str, Any]
+
+
+def millimetres(length: float) -> str:
+    """Two digits, in mm; less than a nanometre is 0."""
+    return "0" if length < 1e-9 else number(1e3 * length)
+
+
+def false_impulse(share: float) -> str:
+    """Of the weight's; less than 1e-9 of it counts as none."""
+    return "0" if share < 1e-9 else f"{share:.1g}" if share < 0.1 else f"{share:.2g}"
+
+
+def _edge(row: Row) -> str:
+    return f"{millimetres(row['error'])}, {false_impulse(row['impulse'])}, {number(row['cpu_ms_per_s'])}"
+
+
+def _wave(row: Row) -> str:
+    return f"{millimetres(row['error'])}, {millimetres(row['from_sine'])}, {number(row['cpu_ms_per_s'])}"
+
+
+def _level(row: Row) -> str:
+    cost = number(row["cpu_ms_per_s"])
+    return cost if row["spacing"] is None else f"{millimetres(row['error'])}, {cost}" if "error" in row else f"-, {cost}"
+
+
+def _hills(row: Row) -> str:
+    return f"{millimetres(row['error'])} ({millimetres(max(row['errors']))}), {number(row['cpu_ms_per_s'])}"
+
+
+def _table(points: list[Row], column: str, heads: dict[Any, str], cell: Callable[[Row], str]) -> list[str]:
+    """A line an engine and a column a value of `column`; then what is left out, and why."""
+    lines = ["| engine | " + " | ".join(heads.values()) + " |", "|---" * (len(heads) + 1) + "|"]
+    reasons: dict[str, str] = {}
+    for key in dict.fromkeys((p["engine"], p["variant"]) for p in points):
+        rows = {p[column]: p for p in points if (p["engine"], p["variant"]) == key}
+        cells = ["-" if "failure" in row else cell(row) for row in (rows[value] for value in heads)]
+        lines.append(f"| {', '.join(key)} | " + " | ".join(cells) + " |")
+        reasons |= {f"{', '.join(key)}, {heads[v]}": r["failure"] for v, r in rows.items() if "failure" in r}
+    if reasons:
+        lines += ["", "Left out: " + "; ".join(f"{what}: {why}" for what, why in reasons.items()) + "."]
+    return [*lines, ""]
+
+
+def tables(data: dict[str, Any]) -> str:
+    """Markdown of errors, false impulses and costs."""
+    points = data["points"]
+    steps = sorted({p["step"] for p in points}, reverse=True)
+    lines: list[str] = []
+    captions = {
+        "edges": ("a ball over inner edges", "RMS error of the path, mm; largest false impulse over m g h", _edge),
+        "sine": ("a ball on a sine", "RMS distance from the path on the facets, mm; from that on the sine, mm", _wave),
+        "level": ("the rover on level ground", "RMS distance from the same engine's path on its plane, mm", _level),
+    }
+    for scene, (title, what, cell) in captions.items():
+        for step in dict.fromkeys((steps[0], steps[-1])):
+            own = [p for p in points if (p["scene"], p["step"]) == (scene, step)]
+            spacings = dict.fromkeys(p["spacing"] for p in own)
+            heads = {s: "plane" if s is None else f"cells of {s:g} m" for s in spacings}
+            lines += [f"**{title}, steps of {1e3 * step:g} ms**: {what}; CPU time, ms per simulated second", ""]
+            lines += _table(own, "spacing", heads, cell)
+    own = [p for p in points if p["scene"] == "hills"]
+    lines += ["**the rover over hills**: RMS error of the path, mm, median (worst); CPU time, ms per simulated second", ""]
+    lines += _table(own, "step", {s: f"{1e3 * s:g} ms" for s in steps}, _hills)
+    meta = data["meta"]
+    changes = ", ".join(millimetres(change) for change in meta["changes_of_references_m"])
+    lines += [f"The references of the hills change by {changes} mm when their step is halved.", ""]
+    lines += [f"Left out, not installed: {name}." for name in meta["missing"]]
+    packages = ", ".join(f"{name} {version}" for name, version in meta["packages"].items())
+    lines.append(f"Measured with `make chart` on {meta['processor']}, shared with other work; {packages}.")
+    return "\n".join(lines)
+
+
+def fill(output: Path, data: dict[str, Any]) -> None:
+    """Puts the tables between their marks."""
+    between(output, BEGIN, END, tables(data))
