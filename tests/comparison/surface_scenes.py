@@ -1,6 +1,6 @@
 """Drives over maps, ours beside the peers: `python -m comparison.surface_scenes [--quick]`.
 
-A ball over the inner edges of a flat map and over a sine, whose true paths are known in closed form, and the rover over
+A ball over the inner edges of a flat map and over a sine, and a box at rest, whose true paths are known; the rover over
 level ground and hills. Writes `docs/comparison/surfaces.json`, `surfaces.png` and the tables of `docs/comparison.md`
 between their marks.
 """
@@ -17,15 +17,15 @@ from rich.console import Console
 
 from comparison.machine import processor, versions
 from comparison.output import CHART, QUICK
-from comparison.surfaces.balls import measure_edges, measure_wave
+from comparison.surfaces.bodies import measure_edges, measure_rest, measure_wave
 from comparison.surfaces.drives import SEEDS, hill_references, measure_hills, measure_level
 from comparison.surfaces.tables import fill
 
 STEPS = (5e-3, 2e-3, 1e-3)
-#: One file an engine, each with `BALLS`, `ROVERS` and perhaps `ROVERS_ON_BALLS`; ImportError without its engine.
+#: One file an engine, each with `BODIES`, `ROVERS` and perhaps `ROVERS_ON_BALLS`; ImportError without its engine.
 ENGINES = ("our_surfaces", "mujoco_surfaces", "bullet_surfaces", "drake_surfaces")
-#: Of the ball over the edges, the ball on the sine, the rover on level ground and on hills, s; and of a quick run.
-DURATIONS, SHORT = (3.0, 5.0, 4.0, 3.0), (1.0, 1.0, 1.0, 0.5)
+#: Of the ball over the edges, the ball on the sine, the rover on level ground and on hills, the box, s; of a quick run.
+DURATIONS, SHORT = (3.0, 4.0, 4.0, 3.0, 2.0), (1.0, 1.0, 1.0, 0.5, 0.5)
 
 
 def engines(console: Console) -> tuple[list[ModuleType], list[str]]:
@@ -62,9 +62,10 @@ def measure(steps: tuple[float, ...], durations: tuple[float, ...], cap: float, 
     references = hill_references(durations[3], SEEDS if durations is DURATIONS else SEEDS[:1])
     for step in steps:
         for module in found:
-            for key, make in module.BALLS.items():
-                keep("edges", key, step, measure_edges(make, step, durations[0]))
-                keep("sine", key, step, measure_wave(make, step, durations[1]))
+            for key, make in module.BODIES.items():
+                keep("edges", key, step, measure_edges(make, step, durations[0], cap))
+                keep("rest", key, step, measure_rest(make, step, durations[4], cap))
+                keep("sine", key, step, measure_wave(make, step, durations[1], cap))
             for variant in module.ROVERS:
                 keep("level", (variant.engine, variant.name), step, measure_level(variant, step, durations[2], cap))
             for variant in getattr(module, "ROVERS_ON_BALLS", module.ROVERS):
@@ -86,7 +87,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Drives over maps.")
     parser.add_argument("--quick", action="store_true", help=f"one step and short scenes, under {QUICK}")
     parser.add_argument("--draw", action="store_true", help="only draw what surfaces.json has")
-    parser.add_argument("--cap", type=float, default=8.0, help="CPU time that a run of the rover may take, s")
+    parser.add_argument("--cap", type=float, default=8.0, help="CPU time that a run may take, s")
     arguments = parser.parse_args()
     output = QUICK if arguments.quick else CHART
     output.mkdir(parents=True, exist_ok=True)

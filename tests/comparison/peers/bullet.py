@@ -14,7 +14,7 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
 from comparison.peers.base import Variant, bodies, held, quaternion_of, rotation_of
-from comparison.peers.grid import corners, middle, rows_to_the_left, triangles, wavefront
+from comparison.peers.grid import corners, middle, triangles, wavefront
 from comparison.scene import Array, Phase, RoverScene
 from rover_gym import HeightField
 
@@ -55,14 +55,18 @@ def description(scene: RoverScene) -> str:
 
 
 def add_map(c: BulletClient, field: HeightField, *, as_mesh: bool) -> int:
-    """A map as Bullet's height field, or as a triangle mesh that knows its inner edges; the body."""
+    """A map as Bullet's height field, or as a triangle mesh that knows its inner edges; the body.
+
+    Bullet's rows run along its y, and it cuts a cell from (j + 1, i) to (j, i + 1). With its y along the world's -z the
+    surface is the one of `HeightField`.
+    """
     if as_mesh:
         with tempfile.NamedTemporaryFile("w", suffix=".obj", encoding="utf-8") as file:  # a new name: Bullet caches
             file.write(wavefront(corners(field), triangles(field).tolist()))
             file.flush()
             flags = pybullet.GEOM_FORCE_CONCAVE_TRIMESH | pybullet.GEOM_CONCAVE_INTERNAL_EDGE
             return int(c.createMultiBody(0, c.createCollisionShape(c.GEOM_MESH, fileName=file.name, flags=flags)))
-    rows = rows_to_the_left(field)
+    rows = field.grid[::-1].astype(float)
     shape = c.createCollisionShape(
         c.GEOM_HEIGHTFIELD,
         meshScale=[*field.spacing, 1.0],

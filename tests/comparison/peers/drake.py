@@ -48,8 +48,8 @@ GROUND = 500.0  # m, edge of the box that is the plane: a half-space with many s
 
 #: A sphere's pressure field: tetrahedra of this share of its radius, and a modulus.
 TETRAHEDRON, MODULUS = 0.1, 1e8  # 1, Pa
-#: Registering prisms takes time with the square of their number: half a minute for twice as many.
-MOST_PRISMS = 1500
+#: Registering prisms takes time with the square of their number: these take ten seconds.
+MOST_PRISMS = 2000
 DEPTH = 1.0  # m, of a prism
 
 

@@ -1,4 +1,4 @@
-"""A map of heights as the engines want it: corners and triangles, or rows along an axis of their own."""
+"""A map of heights as engines want it that take triangles."""
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,10 @@ def corners(field: HeightField) -> Array:
 
 
 def triangles(field: HeightField) -> npt.NDArray[np.int64]:
-    """(2 cells, 3) indices into `corners`, counterclockwise from above: `HeightField` cuts from (j, i) to (j+1, i+1)."""
+    """(2 cells, 3) indices into `corners`, counterclockwise from above.
+
+    A cell is cut from its corner (j, i) to (j + 1, i + 1), as `HeightField` does.
+    """
     n_z, n_x = field.shape
     index = np.arange(n_z * n_x).reshape(n_z, n_x)
     a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]))
@@ -28,15 +31,6 @@ def middle(field: HeightField) -> tuple[float, float]:
     """Place (x, z) of the map's middle, m."""
     x_min, z_min, x_max, z_max = field.bounds
     return 0.5 * (x_min + x_max), 0.5 * (z_min + z_max)
-
-
-def rows_to_the_left(field: HeightField) -> Array:
-    """(n_z, n_x) heights with rows along -z, m.
-
-    MuJoCo and Bullet put z up and rows along y, and cut a cell from (j + 1, i) to (j, i + 1). With their y along the
-    world's -z the surface is the one that `HeightField` has.
-    """
-    return np.ascontiguousarray(field.grid[::-1].astype(float))
 
 
 def wavefront(places: Array, faces: list[tuple[int, ...]]) -> str:

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from comparison.peers.base import Variant, bodies, held, quaternion_of, rotation_of
-from comparison.peers.grid import middle, rows_to_the_left
+from comparison.peers.grid import middle
 from comparison.scene import Array, Phase, RoverScene
 from rover_gym import HeightField
 from rover_gym.vector.mujoco_rover import rover_xml
@@ -20,6 +20,9 @@ from rover_gym.vector.mujoco_rover import rover_xml
 def model_on(text: str, field: HeightField | None, solref: float | None = None) -> mujoco.MjModel:
     """Compiles a model, with a map as MuJoCo's height field where one is given.
 
+    MuJoCo's rows run along its y, and it cuts a cell from (j, i) to (j + 1, i + 1). With its x along the world's z and
+    its y along the world's x the surface is the one of `HeightField`, whose columns are MuJoCo's rows.
+
     Args:
         text: The model.
         field: The map, which touches what has bit 2 in `contype` or bit 1 in `conaffinity`.
@@ -27,7 +30,7 @@ def model_on(text: str, field: HeightField | None, solref: float | None = None) 
     """
     root = ElementTree.fromstring(text)  # noqa: S314 - our own text
     if field is not None:
-        rows = rows_to_the_left(field)
+        rows = field.grid.T.astype(float)
         low, high = float(rows.min()), float(rows.max())
         x_min, z_min, x_max, z_max = field.bounds
         x, z = middle(field)
@@ -38,9 +41,9 @@ def model_on(text: str, field: HeightField | None, solref: float | None = None) 
             name="map",
             nrow=str(rows.shape[0]),
             ncol=str(rows.shape[1]),
-            size=f"{(x_max - x_min) / 2!r} {(z_max - z_min) / 2!r} {rise!r} 1",
+            size=f"{(z_max - z_min) / 2!r} {(x_max - x_min) / 2!r} {rise!r} 1",
         )
-        place = {"pos": f"{x!r} {low!r} {z!r}", "xyaxes": "1 0 0 0 0 -1", "contype": "1", "conaffinity": "2"}
+        place = {"pos": f"{x!r} {low!r} {z!r}", "xyaxes": "0 0 1 1 0 0", "contype": "1", "conaffinity": "2"}
         world = root.find("worldbody")
         assert world is not None
         ElementTree.SubElement(world, "geom", place, name="ground", type="hfield", hfield="map")

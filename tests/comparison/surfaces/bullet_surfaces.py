@@ -13,15 +13,15 @@ from pybullet_utils.bullet_client import BulletClient
 from comparison.peers.base import Variant
 from comparison.peers.bullet import CONTACT_THRESHOLD, BulletRunner, add_map
 from comparison.scene import Array
-from comparison.surfaces.scene import BallScene, G
+from comparison.surfaces.scene import BodyScene, G
 
 SHORT = 0.001  # m
 
 
-class BulletBall:
+class BulletBody:
     """`stepSimulation` with 50 iterations, damping off."""
 
-    def __init__(self, scene: BallScene, time_step: float, *, as_mesh: bool, contact_threshold: float) -> None:
+    def __init__(self, scene: BodyScene, time_step: float, *, as_mesh: bool, contact_threshold: float) -> None:
         self.client = c = BulletClient(pybullet.DIRECT)
         c.setGravity(0.0, -G, 0.0)
         c.setPhysicsEngineParameter(
@@ -36,17 +36,27 @@ class BulletBall:
             ground = c.createMultiBody(0, c.createCollisionShape(c.GEOM_PLANE, planeNormal=[0, 1, 0]))
         else:
             ground = add_map(c, scene.field, as_mesh=as_mesh)
-        shape = c.createCollisionShape(c.GEOM_SPHERE, radius=scene.radius)
-        self.ball = c.createMultiBody(scene.mass, shape, basePosition=scene.centre.tolist(), useMaximalCoordinates=True)
-        for body, friction in ((ground, 1.0), (self.ball, scene.friction)):  # Bullet multiplies the two
+        if scene.half is None:
+            shape = c.createCollisionShape(c.GEOM_SPHERE, radius=scene.radius)
+        else:
+            shape = c.createCollisionShape(c.GEOM_BOX, halfExtents=scene.half.tolist())
+        turn = c.getQuaternionFromEuler([0.0, scene.heading, 0.0])
+        self.body = c.createMultiBody(
+            scene.mass,
+            shape,
+            basePosition=scene.centre.tolist(),
+            baseOrientation=turn,
+            useMaximalCoordinates=True,
+        )
+        for body, friction in ((ground, 1.0), (self.body, scene.friction)):  # Bullet multiplies the two
             c.changeDynamics(body, -1, restitution=0.0)
             c.changeDynamics(body, -1, lateralFriction=friction)
             c.changeDynamics(body, -1, linearDamping=0.0, angularDamping=0.0)
         self.velocity, self.spin = scene.velocity.tolist(), scene.spin.tolist()
 
     def launch(self, centre: Array) -> None:
-        self.client.resetBasePositionAndOrientation(self.ball, centre.tolist(), [0.0, 0.0, 0.0, 1.0])
-        self.client.resetBaseVelocity(self.ball, self.velocity, self.spin)
+        self.client.resetBasePositionAndOrientation(self.body, centre.tolist(), [0.0, 0.0, 0.0, 1.0])
+        self.client.resetBaseVelocity(self.body, self.velocity, self.spin)
 
     def advance(self, steps: int) -> None:
         for _ in range(steps):
@@ -54,14 +64,17 @@ class BulletBall:
 
     def state(self) -> tuple[Array, Array]:
         c = self.client
-        return np.array(c.getBasePositionAndOrientation(self.ball)[0]), np.array(c.getBaseVelocity(self.ball)[0])
+        return np.array(c.getBasePositionAndOrientation(self.body)[0]), np.array(c.getBaseVelocity(self.body)[0])
+
+    def contacts(self) -> int:
+        return len(self.client.getContactPoints(self.body))
 
 
 HEIGHT_FIELD = {"as_mesh": False, "contact_threshold": CONTACT_THRESHOLD}
 MESH = {"as_mesh": True, "contact_threshold": SHORT}
-BALLS = {
-    ("Bullet", "height field"): partial(BulletBall, **HEIGHT_FIELD),
-    ("Bullet", "mesh, inner edges, 1 mm"): partial(BulletBall, **MESH),
+BODIES = {
+    ("Bullet", "height field"): partial(BulletBody, **HEIGHT_FIELD),
+    ("Bullet", "mesh, inner edges, 1 mm"): partial(BulletBody, **MESH),
 }
 ROVERS = (
     Variant("Bullet", "height field", partial(BulletRunner, iterations=50, **HEIGHT_FIELD), "", ""),

@@ -47,40 +47,37 @@ def _curves(axes: Axes, points: list[dict[str, Any]], x: str, y: str, least: flo
 
 
 def draw(data: dict[str, Any], path: Path) -> None:
-    """Two rows of two panels and a common legend."""
+    """Two rows of three panels and a common legend."""
     finest = min(p["step"] for p in data["points"])
-    figure, panels = plt.subplots(2, 2, figsize=(11.0, 9.4), dpi=90)
+    at_finest, cost = f"steps of {1e3 * finest:g} ms", "CPU time, ms per simulated second"
+    figure, panels = plt.subplots(2, 3, figsize=(15.0, 9.4), dpi=80)
 
-    def scene(name: str) -> list[dict[str, Any]]:
-        return [p for p in data["points"] if p["scene"] == name]
+    def scene(name: str, **fixed: float) -> list[dict[str, Any]]:
+        own = [p for p in data["points"] if p["scene"] == name and p.get("spacing", 1.0)]
+        return [p for p in own if all(p[key] == value for key, value in fixed.items())]
 
-    axes = panels[0, 0]
-    rows = [p for p in scene("edges") if p["step"] == finest and p["spacing"]]
-    _curves(axes, rows, "spacing", "impulse", LEAST_IMPULSE)
-    axes.set_title(f"ball over a flat map, steps of {1e3 * finest:g} ms", fontsize=11, loc="left")
-    axes.set_xlabel("size of the cells, m")
-    axes.set_ylabel(f"largest false impulse / (m g h) (rounding drawn at {LEAST_IMPULSE:g})")
+    def panel(axes: Axes, title: str, x: str, y: str) -> None:
+        axes.set_title(title, fontsize=11, loc="left")
+        axes.set_xlabel(x)
+        axes.set_ylabel(y)
 
-    axes = panels[0, 1]
-    rows = [p for p in scene("edges") if p["spacing"] == SPACING]
-    _curves(axes, rows, "cpu_ms_per_s", "error", LEAST_ERROR)
-    axes.set_title(f"ball over a flat map, cells of {SPACING:g} m", fontsize=11, loc="left")
-    axes.set_xlabel("CPU time, ms per simulated second")
-    axes.set_ylabel(f"RMS error of the path, m (rounding drawn at {LEAST_ERROR:g})")
+    cells, rounding = "size of the cells, m", f"(rounding drawn at {LEAST_IMPULSE:g})"
+    _curves(panels[0, 0], scene("edges", step=finest), "spacing", "impulse", LEAST_IMPULSE)
+    panel(panels[0, 0], f"ball over a flat map, {at_finest}", cells, f"largest false impulse / (m g h) {rounding}")
+    rounding = f"(rounding drawn at {LEAST_ERROR:g})"
+    _curves(panels[0, 1], scene("edges", spacing=SPACING), "cpu_ms_per_s", "error", LEAST_ERROR)
+    panel(panels[0, 1], f"ball over a flat map, cells of {SPACING:g} m", cost, f"RMS error of the path, m {rounding}")
+    _curves(panels[0, 2], scene("rest", step=finest), "spacing", "error", LEAST_ERROR)
+    panel(panels[0, 2], f"box at rest on a flat map, {at_finest}", cells, f"largest way of its centre, m {rounding}")
+    _curves(panels[1, 0], scene("sine", step=finest), "spacing", "from_sine", LEAST_ERROR)
+    panel(panels[1, 0], f"ball on a sine as a map, {at_finest}", cells, "RMS distance from the path on the sine, m")
+    _curves(panels[1, 1], scene("level", spacing=SPACING), "cpu_ms_per_s", "error", LEAST_ERROR)
+    title = f"rover over a flat map, cells of {SPACING:g} m"
+    panel(panels[1, 1], title, cost, f"RMS distance from the own plane's path, m {rounding}")
+    _curves(panels[1, 2], scene("hills"), "cpu_ms_per_s", "error", LEAST_ERROR)
+    panel(panels[1, 2], "rover over hills, cells of 0.25 m", cost, "median of the paths' RMS errors, m")
 
-    axes = panels[1, 0]
-    _curves(axes, [p for p in scene("sine") if p["step"] == finest], "spacing", "from_sine", LEAST_ERROR)
-    axes.set_title(f"ball on a sine given as a map, steps of {1e3 * finest:g} ms", fontsize=11, loc="left")
-    axes.set_xlabel("size of the cells, m")
-    axes.set_ylabel("RMS distance from the path on the sine, m")
-
-    axes = panels[1, 1]
-    _curves(axes, scene("hills"), "cpu_ms_per_s", "error", LEAST_ERROR)
-    axes.set_title("rover over hills, 5, 2 and 1 ms", fontsize=11, loc="left")
-    axes.set_xlabel("CPU time, ms per simulated second")
-    axes.set_ylabel("median of the paths' RMS errors, m")
-
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="lower center", ncols=4, frameon=False, fontsize=9.5)
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="lower center", ncols=4, frameon=False, fontsize=10)
     figure.tight_layout(rect=(0, 0.06, 1, 1))
     figure.savefig(path)
     plt.close(figure)

@@ -93,9 +93,10 @@ def measure_level(variant: Variant, step: float, duration: float, cap: float) ->
         driven = trace.positions[steps_in(REST, SAMPLE) :]
         driven = driven - driven[0]
         on_plane = driven if spacing is None else on_plane
-        if on_plane is not None:
-            row["error"] = distance(driven, on_plane)
-        row |= {"end": driven[-1].tolist(), "cpu_ms_per_s": 1e3 * trace.cpu / trace.simulated}
+        if on_plane is None:
+            row["failure"] = "not run on the plane"
+            continue
+        row |= {"error": distance(driven, on_plane), "cpu_ms_per_s": 1e3 * trace.cpu / trace.simulated}
     return rows
 
 

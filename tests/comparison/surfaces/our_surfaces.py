@@ -7,23 +7,21 @@ import numpy as np
 from comparison.peers.base import Variant, bodies
 from comparison.peers.ours import DIFFERS, OurRunner, ground
 from comparison.scene import Array, Phase, RoverScene
-from comparison.surfaces.scene import BallScene
+from comparison.surfaces.scene import BodyScene
 from rover_gym import RoverModel, Simulation
 
 
-class OurBall:
+class OurBody:
     """`Simulation` of one body."""
 
-    def __init__(self, scene: BallScene, time_step: float) -> None:
-        ball = {
-            "name": "ball",
-            "mass": scene.mass,
-            "shape": {"kind": "sphere", "radius": scene.radius},
-            "collides": True,
-        }
-        model = RoverModel.from_dict({"name": "ball", "solids": [ball]})
+    def __init__(self, scene: BodyScene, time_step: float) -> None:
+        shape: dict[str, Any] = {"kind": "sphere", "radius": scene.radius}
+        if scene.half is not None:
+            shape = {"kind": "box", "size": (2.0 * scene.half).tolist()}
+        solid = {"name": "body", "mass": scene.mass, "shape": shape, "collides": True}
+        model = RoverModel.from_dict({"name": "body", "solids": [solid]})
         self.simulation = Simulation(model, scene.field, friction=scene.friction, time_step=time_step)
-        self.simulation.set_state([*scene.centre, 0.0, 0.0, 0.0])
+        self.simulation.set_state([*scene.centre, 0.0, scene.heading, 0.0])
         self.velocity = np.concatenate([scene.velocity, scene.spin])
 
     def launch(self, centre: Array) -> None:
@@ -34,6 +32,9 @@ class OurBall:
 
     def state(self) -> tuple[Array, Array]:
         return self.simulation.q[:3], self.simulation.v[:3]
+
+    def contacts(self) -> int:
+        return len(self.simulation.contacts)
 
 
 def on_balls(machine: dict[str, Any]) -> RoverModel:
@@ -73,6 +74,6 @@ class RoverOnBalls(OurRunner):
         self.simulation.set_joint_torques(torques)
 
 
-BALLS = {("rover-gym", "linearised"): OurBall}
+BODIES = {("rover-gym", "linearised"): OurBody}
 ROVERS = (Variant("rover-gym", "linearised", OurRunner, "defaults", DIFFERS),)
 ROVERS_ON_BALLS = (Variant("rover-gym", "linearised", RoverOnBalls, "defaults, balls for wheels", DIFFERS),)

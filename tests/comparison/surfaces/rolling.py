@@ -20,7 +20,7 @@ def over_curve(x: Array, height: Array, slope: Array, radius: float) -> Array:
     return np.column_stack([x - radius * slope / norm, height + radius / norm])
 
 
-def over_facets(x: Array, height: Array, radius: float, per_piece: int = 200) -> tuple[Array, Array]:
+def over_facets(x: Array, height: Array, radius: float, per_piece: int = 50) -> tuple[Array, Array]:
     """Path of the centre of a ball on straight facets between corners (n,): points, and their turns.
 
     Returns:
@@ -31,20 +31,23 @@ def over_facets(x: Array, height: Array, radius: float, per_piece: int = 200) ->
     along = np.diff(ends, axis=0)
     angle = np.arctan2(along[:, 1], along[:, 0])
     up = np.column_stack([-np.sin(angle), np.cos(angle)])
-    points, turns = [ends[0] + radius * up[0]], [0.0]
-    for k in range(1, len(along)):
-        turn = angle[k] - angle[k - 1]
+    pieces, turns, start = [], [], ends[0] + radius * up[0]
+    for k in range(1, len(ends)):
+        turn = angle[k] - angle[k - 1] if k < len(along) else 0.0
         if turn > 0.0:  # a hollow
-            corner = [ends[k] + radius * (up[k - 1] + up[k]) / (1.0 + np.cos(turn))]
+            corner = ends[k] + radius * (up[k - 1] + up[k]) / (1.0 + np.cos(turn))
         else:
-            swept = np.linspace(angle[k - 1], angle[k], per_piece)
-            corner = list(ends[k] + radius * np.column_stack([-np.sin(swept), np.cos(swept)]))
-        start = points[-1]
-        points += [start + share * (corner[0] - start) for share in np.linspace(0.0, 1.0, per_piece)[1:-1]]
-        turns += [0.0] * (per_piece - 2)
-        points += corner
-        turns += [max(turn, 0.0)] + [0.0] * (len(corner) - 1)
-    return np.array(points), np.array(turns)
+            corner = ends[k] + radius * up[k - 1]
+        pieces.append(np.linspace(start, corner, per_piece, endpoint=False))
+        turns.append(np.zeros(per_piece))
+        turns[-1][0] = max(angle[k - 1] - angle[k - 2], 0.0) if k > 1 else 0.0
+        start = corner
+        if turn < 0.0:  # about a convex corner
+            swept = np.linspace(angle[k - 1], angle[k], per_piece, endpoint=False)
+            pieces.append(ends[k] + radius * np.column_stack([-np.sin(swept), np.cos(swept)]))
+            turns.append(np.zeros(per_piece))
+            start = ends[k] + radius * up[k]
+    return np.concatenate([*pieces, start[None]]), np.concatenate([*turns, [0.0]])
 
 
 def rolled(path: Array, turns: Array, start: float, speed: float, times: Array) -> Array:
@@ -55,18 +58,21 @@ def rolled(path: Array, turns: Array, start: float, speed: float, times: Array) 
     """
     first = int(np.argmin(np.abs(path[:, 0] - start)))
     path, turns = path[first:], turns[first:]
-    # Between turns v² falls linearly with the height, so each piece needs its own constant.
-    square, factor = np.empty(len(path)), ((np.cos(turns) + GYRATION) / (1.0 + GYRATION)) ** 2
-    square[0] = speed**2
-    passed = [0.0]
-    for k in range(1, len(path)):
-        before = square[k - 1]
-        after = before - 2.0 * G / (1.0 + GYRATION) * (path[k, 1] - path[k - 1, 1])
-        if after <= 0.0:
+    lengths, time, square = np.linalg.norm(np.diff(path, axis=0), axis=1), [np.zeros(1)], speed**2
+    ends = [*np.flatnonzero(turns[1:]) + 1, len(path) - 1]
+    begin = 0
+    for end in dict.fromkeys(ends):
+        # Until the next turn v² falls linearly with the height, and the time over a short piece is exact but in arcs.
+        squares = square - 2.0 * G / (1.0 + GYRATION) * (path[begin : end + 1, 1] - path[begin, 1])
+        reached = int(np.argmax(squares <= 0.0)) if np.any(squares <= 0.0) else len(squares)
+        speeds = np.sqrt(squares[:reached])
+        pieces = 2.0 * lengths[begin : begin + reached - 1] / (speeds[:-1] + speeds[1:])
+        time.append(time[-1][-1] + np.cumsum(pieces))
+        if reached < len(squares):
             break
-        passed.append(passed[-1] + 2.0 * float(np.hypot(*(path[k] - path[k - 1]))) / (before**0.5 + after**0.5))
-        square[k] = after * factor[k]
+        square = squares[-1] * ((np.cos(turns[end]) + GYRATION) / (1.0 + GYRATION)) ** 2
+        begin = end
+    passed = np.concatenate([part for part in time if len(part)])
     if passed[-1] < times[-1]:
         raise ValueError(f"the ball stops or leaves the curve after {passed[-1]:g} s")
-    n = len(passed)
-    return np.column_stack([np.interp(times, passed, path[:n, axis]) for axis in (0, 1)])
+    return np.column_stack([np.interp(times, passed, path[: len(passed), axis]) for axis in (0, 1)])

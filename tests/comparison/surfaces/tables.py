@@ -22,7 +22,13 @@ def false_impulse(share: float) -> str:
 
 
 def _edge(row: Row) -> str:
-    return f"{millimetres(row['error'])}, {false_impulse(row['impulse'])}, {number(row['cpu_ms_per_s'])}"
+    error = f"{millimetres(row['error'])} ({millimetres(row['from_plane'])})"
+    return f"{error}, {false_impulse(row['impulse'])}, {number(row['cpu_ms_per_s'])}"
+
+
+def _rest(row: Row) -> str:
+    cost = number(row["cpu_ms_per_s"])
+    return f"{millimetres(row['error'])}, {false_impulse(row['impulse'])}, {cost}, {row['contacts']}"
 
 
 def _wave(row: Row) -> str:
@@ -30,8 +36,7 @@ def _wave(row: Row) -> str:
 
 
 def _level(row: Row) -> str:
-    cost = number(row["cpu_ms_per_s"])
-    return cost if row["spacing"] is None else f"{millimetres(row['error'])}, {cost}" if "error" in row else f"-, {cost}"
+    return ("" if row["spacing"] is None else f"{millimetres(row['error'])}, ") + number(row["cpu_ms_per_s"])
 
 
 def _hills(row: Row) -> str:
@@ -44,7 +49,7 @@ def _table(points: list[Row], column: str, heads: dict[Any, str], cell: Callable
     reasons: dict[str, str] = {}
     for key in dict.fromkeys((p["engine"], p["variant"]) for p in points):
         rows = {p[column]: p for p in points if (p["engine"], p["variant"]) == key}
-        cells = ["-" if "failure" in row else cell(row) for row in (rows[value] for value in heads)]
+        cells = ["-" if "failure" in rows[value] else cell(rows[value]) for value in heads]
         lines.append(f"| {', '.join(key)} | " + " | ".join(cells) + " |")
         reasons |= {f"{', '.join(key)}, {heads[v]}": r["failure"] for v, r in rows.items() if "failure" in r}
     if reasons:
@@ -57,20 +62,39 @@ def tables(data: dict[str, Any]) -> str:
     points = data["points"]
     steps = sorted({p["step"] for p in points}, reverse=True)
     lines: list[str] = []
-    captions = {
-        "edges": ("a ball over inner edges", "RMS error of the path, mm; largest false impulse over m g h", _edge),
-        "sine": ("a ball on a sine", "RMS distance from the path on the facets, mm; from that on the sine, mm", _wave),
-        "level": ("the rover on level ground", "RMS distance from the same engine's path on its plane, mm", _level),
+    cost = "CPU time, ms per simulated second"
+    captions: dict[str, tuple[str, str, Callable[[Row], str]]] = {
+        "edges": (
+            "a ball over inner edges",
+            "RMS error of the path, mm (and its distance from the engine's own path on its plane); largest false "
+            f"impulse over m g h; {cost}",
+            _edge,
+        ),
+        "rest": (
+            "a box at rest on a flat map",
+            f"largest way of its centre, mm; largest false impulse over m g h; {cost}; most contacts",
+            _rest,
+        ),
+        "sine": (
+            "a ball on a sine",
+            f"RMS distance from the path on the facets, mm; from that on the sine, mm; {cost}",
+            _wave,
+        ),
+        "level": (
+            "the rover on level ground",
+            f"RMS distance from the engine's own path on its plane, mm; {cost}",
+            _level,
+        ),
     }
     for scene, (title, what, cell) in captions.items():
         for step in dict.fromkeys((steps[0], steps[-1])):
             own = [p for p in points if (p["scene"], p["step"]) == (scene, step)]
-            spacings = dict.fromkeys(p["spacing"] for p in own)
-            heads = {s: "plane" if s is None else f"cells of {s:g} m" for s in spacings}
-            lines += [f"**{title}, steps of {1e3 * step:g} ms**: {what}; CPU time, ms per simulated second", ""]
-            lines += _table(own, "spacing", heads, cell)
+            heads = {p["spacing"]: f"cells of {p['spacing']:g} m" if p["spacing"] else "plane" for p in own}
+            if own:
+                lines += [f"**{title}, steps of {1e3 * step:g} ms**: {what}", ""]
+                lines += _table(own, "spacing", heads, cell)
     own = [p for p in points if p["scene"] == "hills"]
-    lines += ["**the rover over hills**: RMS error of the path, mm, median (worst); CPU time, ms per simulated second", ""]
+    lines += [f"**the rover over hills**: RMS error of the path, mm, median (worst); {cost}", ""]
     lines += _table(own, "step", {s: f"{1e3 * s:g} ms" for s in steps}, _hills)
     meta = data["meta"]
     changes = ", ".join(millimetres(change) for change in meta["changes_of_references_m"])
