@@ -8,12 +8,13 @@ import matplotlib as mpl
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.ticker import NullFormatter, NullLocator
 
 COLOURS = {"rover-gym": "#d1361f", "Drake": "#2f6db3", "MuJoCo": "#3f8f4f", "Bullet": "#8a5fb0"}
 #: The first variant of an engine is drawn with the first.
 STYLES = ("-", "--")
 #: What is smaller is drawn here: it is rounding.
-LEAST_IMPULSE, LEAST_ERROR = 1e-6, 1e-5  # 1, m
+LEAST_IMPULSE, LEAST_ERROR = 1e-6, 1e-7  # 1, m
 #: Map over whose edges errors are drawn against costs.
 SPACING = 0.05  # m
 
@@ -40,6 +41,13 @@ def _curves(axes: Axes, points: list[dict[str, Any]], x: str, y: str, least: flo
             )
     axes.set_xscale("log")
     axes.set_yscale("log")
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    if x == "spacing":
+        sizes = sorted({p[x] for p in points})
+        axes.set_xticks(sizes, [f"{size:g}" for size in sizes])
+        axes.xaxis.set_minor_locator(NullLocator())
+    if any(p.get(y, least) < least for p in points):
+        axes.annotate("0 to rounding", (0.98, 0.02), xycoords="axes fraction", ha="right", color="#777777", fontsize=9)
     axes.margins(0.12)
     axes.grid(which="major", color="#dddddd", linewidth=0.7)
     for side in ("top", "right"):
@@ -61,19 +69,18 @@ def draw(data: dict[str, Any], path: Path) -> None:
         axes.set_xlabel(x)
         axes.set_ylabel(y)
 
-    cells, rounding = "size of the cells, m", f"(rounding drawn at {LEAST_IMPULSE:g})"
+    cells = "size of the cells, m"
     _curves(panels[0, 0], scene("edges", step=finest), "spacing", "impulse", LEAST_IMPULSE)
-    panel(panels[0, 0], f"ball over a flat map, {at_finest}", cells, f"largest false impulse / (m g h) {rounding}")
-    rounding = f"(rounding drawn at {LEAST_ERROR:g})"
+    panel(panels[0, 0], f"ball over a flat map, {at_finest}", cells, "largest false impulse / (m g h)")
     _curves(panels[0, 1], scene("edges", spacing=SPACING), "cpu_ms_per_s", "error", LEAST_ERROR)
-    panel(panels[0, 1], f"ball over a flat map, cells of {SPACING:g} m", cost, f"RMS error of the path, m {rounding}")
+    panel(panels[0, 1], f"ball over a flat map, cells of {SPACING:g} m", cost, "RMS error of the path, m")
     _curves(panels[0, 2], scene("rest", step=finest), "spacing", "error", LEAST_ERROR)
-    panel(panels[0, 2], f"box at rest on a flat map, {at_finest}", cells, f"largest way of its centre, m {rounding}")
+    panel(panels[0, 2], f"box at rest on a flat map, {at_finest}", cells, "largest way of its centre, m")
     _curves(panels[1, 0], scene("sine", step=finest), "spacing", "from_sine", LEAST_ERROR)
     panel(panels[1, 0], f"ball on a sine as a map, {at_finest}", cells, "RMS distance from the path on the sine, m")
     _curves(panels[1, 1], scene("level", spacing=SPACING), "cpu_ms_per_s", "error", LEAST_ERROR)
     title = f"rover over a flat map, cells of {SPACING:g} m"
-    panel(panels[1, 1], title, cost, f"RMS distance from the own plane's path, m {rounding}")
+    panel(panels[1, 1], title, cost, "RMS distance from the own plane's path, m")
     _curves(panels[1, 2], scene("hills"), "cpu_ms_per_s", "error", LEAST_ERROR)
     panel(panels[1, 2], "rover over hills, cells of 0.25 m", cost, "median of the paths' RMS errors, m")
 

@@ -18,7 +18,7 @@ def millimetres(length: float) -> str:
 
 def false_impulse(share: float) -> str:
     """Of the weight's; less than 1e-9 of it counts as none."""
-    return "0" if share < 1e-9 else f"{share:.1g}" if share < 0.1 else f"{share:.2g}"
+    return "0" if share < 1e-9 else f"{share:.1g}" if share < 0.1 else number(share)
 
 
 def _edge(row: Row) -> str:
