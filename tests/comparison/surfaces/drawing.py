@@ -47,7 +47,9 @@ def _curves(axes: Axes, points: list[dict[str, Any]], x: str, y: str, least: flo
         axes.set_xticks(sizes, [f"{size:g}" for size in sizes])
         axes.xaxis.set_minor_locator(NullLocator())
     if any(p.get(y, least) < least for p in points):
-        axes.annotate("0 to rounding", (0.98, 0.02), xycoords="axes fraction", ha="right", color="#777777", fontsize=9)
+        axes.annotate(
+            "bottom: 0 to rounding", (0.98, 0.02), xycoords="axes fraction", ha="right", color="#777777", fontsize=9
+        )
     axes.margins(0.12)
     axes.grid(which="major", color="#dddddd", linewidth=0.7)
     for side in ("top", "right"):
@@ -78,6 +80,7 @@ def draw(data: dict[str, Any], path: Path) -> None:
     panel(panels[0, 2], f"box at rest on a flat map, {at_finest}", cells, "largest way of its centre, m")
     _curves(panels[1, 0], scene("sine", step=finest), "spacing", "from_sine", LEAST_ERROR)
     panel(panels[1, 0], f"ball on a sine as a map, {at_finest}", cells, "RMS distance from the path on the sine, m")
+    panels[1, 0].set_ylim(1e-2, 1.0)
     _curves(panels[1, 1], scene("level", spacing=SPACING), "cpu_ms_per_s", "error", LEAST_ERROR)
     title = f"rover over a flat map, cells of {SPACING:g} m"
     panel(panels[1, 1], title, cost, "RMS distance from the own plane's path, m")
