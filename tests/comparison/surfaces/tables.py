@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from comparison.output import between
+from comparison.surfaces.bodies import inner_edges
 from comparison.tables import number
 
 BEGIN, END = "<!-- surfaces: made by `make chart`, not by hand -->", "<!-- end of surfaces -->"
@@ -90,6 +91,9 @@ def tables(data: dict[str, Any]) -> str:
         for step in dict.fromkeys((steps[0], steps[-1])):
             own = [p for p in points if (p["scene"], p["step"]) == (scene, step)]
             heads = {p["spacing"]: f"cells of {p['spacing']:g} m" if p["spacing"] else "plane" for p in own}
+            if scene == "edges":
+                duration = data["meta"]["durations_s"][0]
+                heads |= {s: f"{head}, {inner_edges(s, duration)} edges" for s, head in heads.items() if s}
             if own:
                 lines += [f"**{title}, steps of {1e3 * step:g} ms**: {what}", ""]
                 lines += _table(own, "spacing", heads, cell)
