@@ -293,7 +293,7 @@ impl<T: Lane> Contacts<T> {
         for w in 0..self.parts.wheels.len() {
             declined = declined | self.look_at_wheel(w, ground, sight);
             let first = SLOTS * w;
-            if !self.slots[first].active.any() {
+            if !self.slots[first].active.any() && !self.slots[first + 1].active.any() {
                 continue;
             }
             let pose = &end.bodies[self.parts.wheels[w].body];
@@ -301,15 +301,19 @@ impl<T: Lane> Contacts<T> {
                 self.parts.wheels[w].axle(pose),
                 self.parts.wheels[w].centre(pose),
             );
-            let (mut plane, radius) = ((ground.normal, height_at_end), self.parts.wheels[w].radius);
+            let radius = self.parts.wheels[w].radius;
             if ground.has_surfaces() {
                 ground.follow_footing(w, (end.origin, centre, s), radius);
-                let (normal, offset) = ground.under_wheel(w);
-                plane = (normal, normal.dot(end.origin) + offset);
             }
-            for slot in first..first + SLOTS {
+            for k in 0..SLOTS {
+                let slot = first + k;
                 if self.slots[slot].active.any() {
                     self.used.push(slot);
+                    let plane = if ground.has_surfaces() {
+                        ground.under_wheel(w, k, end.origin)
+                    } else {
+                        (ground.normal, height_at_end)
+                    };
                     let flat = self.relocate(slot, plane, end, s, centre);
                     declined = declined | flat;
                 }
@@ -355,20 +359,54 @@ impl<T: Lane> Contacts<T> {
         let wheel = &self.parts.wheels[w];
         let pose = &sight.middle.bodies[wheel.body];
         let (s, centre) = (wheel.axle(pose), wheel.centre(pose));
-        let radius = T::splat(self.token, wheel.radius);
         // The second and third point of the rim, and all that may come near.
         let reach = (sight.forecast).reach(
             #[inline(always)]
             || wheel.speed(&self.twists[wheel.carrier], centre, sight.v),
         );
         let mut declined = T::mask(self.token, 0);
-        let (mut n, mut base) = (ground.normal, sight.height);
+        let first = SLOTS * w;
+        let mut plane = (ground.normal, sight.height);
+        let mut has_second = false;
         if ground.has_surfaces() {
             let origin = sight.middle.origin;
             declined = ground.find_footing(w, (origin, centre, s), wheel.radius, reach);
-            let (normal, offset) = ground.under_wheel(w);
-            (n, base) = (normal, normal.dot(origin) + offset);
+            plane = ground.under_wheel(w, 0, origin);
+            has_second = ground.has_second_plane(w);
         }
+        let none = T::mask(self.token, 0);
+        for slot in &mut self.slots[first..first + SLOTS] {
+            (slot.active, slot.on_sphere) = (none, none);
+        }
+        let (admitted, lies) = self.stands(w, plane, sight, (s, centre), reach);
+        self.slots[first].active = admitted;
+        declined = declined | lies;
+        if has_second {
+            let plane = ground.under_wheel(w, 1, sight.middle.origin);
+            let (admitted, lies) = self.stands(w, plane, sight, (s, centre), reach);
+            self.slots[first + 1].active = admitted;
+            declined = declined | lies;
+        }
+        if ground.has_spheres() {
+            declined = declined | self.look_at_spheres(w, ground, sight, s, centre, reach);
+        }
+        declined
+    }
+
+    /// Where a wheel with the axle `s` and the centre `centre` touches a plane of normal n at the
+    /// midpoint, the trunk's origin being at the given height (m) over it, and where it lies so
+    /// flat that more than one point does.
+    #[inline(always)]
+    fn stands(
+        &self,
+        w: usize,
+        (n, base): (Vec3<T>, T),
+        sight: &Sight<'_, T>,
+        (s, centre): (Vec3<T>, Vec3<T>),
+        reach: T,
+    ) -> (T::Mask, T::Mask) {
+        let wheel = &self.parts.wheels[w];
+        let radius = T::splat(self.token, wheel.radius);
         let (across, along) = (n.cross(s), n.dot(s));
         let length = across.norm();
         let height = base + n.dot(centre);
@@ -380,19 +418,9 @@ impl<T: Lane> Contacts<T> {
         } else {
             radius
         };
-        let on_plane = sight.forecast.admits(gap, u_N);
         let half = radius.like(0.5);
-        declined = declined | (height + half * radius * length).le(reach);
-        let none = T::mask(self.token, 0);
-        let first = SLOTS * w;
-        self.slots[first].active = on_plane;
-        self.slots[first].on_sphere = none;
-        self.slots[first + 1].active = none;
-        self.slots[first + 1].on_sphere = none;
-        if ground.has_spheres() {
-            declined = declined | self.look_at_spheres(w, ground, sight, s, centre, reach);
-        }
-        declined
+        let lies = (height + half * radius * length).le(reach);
+        (sight.forecast.admits(gap, u_N), lies)
     }
 
     /// Adds the contacts of a wheel with spheres at the midpoint; it has the axle `s` and the

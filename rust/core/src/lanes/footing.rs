@@ -1,16 +1,18 @@
-//! What a wheel stands on where the ground is a surface: one plane for each rover.
+//! What a wheel stands on where the ground is a surface: at most two planes for each rover.
 //!
-//! The plane is that of the face under the wheel, or the one through a convex edge or vertex with
-//! the contact's normal. Where all pieces near a wheel lie in one plane the wheel keeps it until it
-//! has moved further than the search looked ahead, and costs what a wheel on a plane costs.
-//! Elsewhere the pieces are searched at every step, rover by rover. A wheel that two pieces could
-//! touch is declined.
+//! A plane is that of a face under the wheel, or the one through a convex edge or vertex with the
+//! contact's normal. Where all pieces near a wheel lie in one plane the wheel keeps it until it has
+//! moved further than the search looked ahead, and costs what a wheel on a plane costs. Elsewhere
+//! it keeps the numbers of the pieces that it may soon touch, and these are examined at every step,
+//! rover by rover. A wheel that three pieces could touch is declined.
 
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use super::contacts::SLOTS;
 use crate::contact::detection::visit_on_surface;
+use crate::geometry::query::disc_clearance::{TURNING, clearance};
 use crate::geometry::query::dispatch::{point_at_edge, point_at_vertex};
 use crate::geometry::query::{NEAREST, SurfacePoint};
 use crate::geometry::{Coverage, Disc, PlacedShape, Plane, Primitive, Terrain};
@@ -20,25 +22,105 @@ use crate::scalar::{Lane, MAX_LANES, Vec3};
 /// pieces and searches half as often.
 const AHEAD: f64 = 0.1;
 
+/// The same of a search for pieces, m.
+const AHEAD_FOR_PIECES: f64 = 0.02;
+
+/// Most pieces near a wheel that are kept. With more they are searched at every step.
+const MAX_PIECES: usize = 24;
+
 /// Covers the rounding of distances, m.
 const ROUNDING: f64 = 1e-6;
 
-/// The planes under a wheel.
-#[derive(Clone, Debug)]
-pub struct Footing<T> {
+/// A plane under a wheel.
+#[derive(Clone, Copy, Debug)]
+pub struct Underfoot<T> {
     /// Unit normal.
     pub normal: Vec3<T>,
     /// m; ∞ where there is nothing.
     pub offset: T,
     /// Number of the edge or vertex in the terrain.
     pieces: [u32; MAX_LANES],
+    /// Lanes with an edge or a vertex.
+    bent: u32,
+}
+
+/// The planes under a wheel.
+#[derive(Clone, Debug)]
+pub struct Footing<T> {
+    /// One for each slot of the wheel.
+    pub planes: [Underfoot<T>; SLOTS],
     /// Place of the wheel's centre at the last search for a plane, world, m.
     from: [Vector3<f64>; MAX_LANES],
     /// Its result holds as far from there as this, m.
     within: [f64; MAX_LANES],
-    /// Lanes where it found a plane, and those with an edge or a vertex.
+    /// Lanes where it found a plane.
     flat: u32,
-    bent: u32,
+    /// Lanes with a second plane.
+    double: u32,
+    nearby: [Nearby; MAX_LANES],
+}
+
+/// The pieces that a rover's wheel may soon touch.
+#[derive(Clone, Debug)]
+struct Nearby {
+    /// The wheel when they were searched: its centre, world, m, and its axle.
+    from: Vector3<f64>,
+    axle: Vector3<f64>,
+    /// They are all with a clearance of at most this, m.
+    within: f64,
+    /// Their numbers in the terrain and clearances, m, in the order of the terrain.
+    pieces: [(u32, f64); MAX_PIECES],
+    n: usize,
+}
+
+impl Nearby {
+    const NOTHING: Self = Self {
+        from: Vector3::new(0.0, 0.0, 0.0),
+        axle: Vector3::new(0.0, 0.0, 0.0),
+        within: f64::NEG_INFINITY,
+        pieces: [(0, 0.0); MAX_PIECES],
+        n: 0,
+    };
+
+    /// Visits all pieces that the wheel may touch with a gap of at most `reach`, m, and others.
+    fn visit(
+        &mut self,
+        terrain: &dyn Terrain,
+        disc: &Disc,
+        base: &Vector3<f64>,
+        reach: f64,
+        mut visit: impl FnMut(u32, &Primitive),
+    ) {
+        let centre = base + disc.centre;
+        let turn = (disc.axle - self.axle).norm() * disc.radius * TURNING;
+        let need = (centre - self.from).norm() + turn + reach + ROUNDING;
+        if need <= self.within {
+            for &(id, clearance) in &self.pieces[..self.n] {
+                if clearance <= need {
+                    visit(id, &terrain.primitive(id));
+                }
+            }
+            return;
+        }
+        (self.from, self.axle, self.n) = (centre, disc.axle, 0);
+        self.within = reach + ROUNDING + AHEAD_FOR_PIECES;
+        terrain.visit_near(&centre, disc.radius + self.within, &mut |id, piece| {
+            let clearance = clearance(disc, piece, base);
+            if clearance > self.within {
+                return;
+            }
+            match self.pieces.get_mut(self.n) {
+                Some(place) => {
+                    *place = (id, clearance);
+                    self.n += 1;
+                }
+                None => self.within = f64::NEG_INFINITY,
+            }
+            if clearance <= reach + ROUNDING {
+                visit(id, piece);
+            }
+        });
+    }
 }
 
 /// The wheels of a block at one instant, lane by lane; coordinates relative to `base`.
@@ -73,23 +155,31 @@ impl<T: Lane> Footing<T> {
     /// Nothing anywhere.
     pub fn new(token: T::Token) -> Self {
         Self {
-            normal: Vec3::splat(token, [0.0, 1.0, 0.0]),
-            offset: T::splat(token, f64::INFINITY),
-            pieces: [0; MAX_LANES],
+            planes: [Underfoot {
+                normal: Vec3::splat(token, [0.0, 1.0, 0.0]),
+                offset: T::splat(token, f64::INFINITY),
+                pieces: [0; MAX_LANES],
+                bent: 0,
+            }; SLOTS],
             from: [Vector3::zeros(); MAX_LANES],
             within: [f64::NEG_INFINITY; MAX_LANES],
             flat: 0,
-            bent: 0,
+            double: 0,
+            nearby: [Nearby::NOTHING; MAX_LANES],
         }
     }
 
     /// Forgets what is known of a lane's ground and puts its wheel on a plane.
     pub fn set_lane(&mut self, lane: usize, normal: [f64; 3], offset: f64) {
-        self.normal.set(lane, normal);
-        self.offset.set(lane, offset);
+        for plane in &mut self.planes {
+            plane.clear(lane);
+        }
+        self.planes[0].normal.set(lane, normal);
+        self.planes[0].offset.set(lane, offset);
         self.within[lane] = f64::NEG_INFINITY;
         self.flat &= !(1 << lane);
-        self.bent &= !(1 << lane);
+        self.double &= !(1 << lane);
+        self.nearby[lane].within = f64::NEG_INFINITY;
     }
 
     /// Finds the planes of all lanes on a surface; `reach` (m) as for a plane. Returns the lanes
@@ -115,26 +205,9 @@ impl<T: Lane> Footing<T> {
     /// Moves the planes of edges and vertices to the wheels of another instant.
     #[inline(always)]
     pub fn follow(&mut self, wheels: &Wheels<'_, T>) {
-        let mut lanes = self.bent;
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
-            if let Some(terrain) = &wheels.surfaces[lane] {
-                let (disc, base) = wheels.disc(lane);
-                let shape = PlacedShape::Disc(disc);
-                let point = match terrain.primitive(self.pieces[lane]) {
-                    Primitive::Edge(edge) => point_at_edge(&shape, &edge, &base, NEAREST),
-                    Primitive::Vertex(vertex) => point_at_vertex(&shape, &vertex, &base),
-                    Primitive::Face(_) | Primitive::Plane(_) | Primitive::Sphere(_) => continue,
-                };
-                self.put(lane, &plane_at(&point, &base));
-            }
+        for plane in &mut self.planes {
+            plane.follow(wheels);
         }
-    }
-
-    fn put(&mut self, lane: usize, plane: &Plane) {
-        self.normal.set(lane, (*plane.normal()).into());
-        self.offset.set(lane, plane.offset());
     }
 
     /// Searches the ground of one lane. False where it is unknown or more than a plane.
@@ -150,7 +223,11 @@ impl<T: Lane> Footing<T> {
         let own = 1 << lane;
         let (disc, base) = wheels.disc(lane);
         let centre = base + disc.centre;
-        (self.flat, self.bent) = (self.flat & !own, self.bent & !own);
+        self.flat &= !own;
+        self.double &= !own;
+        for plane in &mut self.planes {
+            plane.clear(lane);
+        }
         if !is_known {
             let within = reach + AHEAD;
             self.within[lane] = f64::NEG_INFINITY;
@@ -158,7 +235,7 @@ impl<T: Lane> Footing<T> {
                 (self.from[lane], self.within[lane]) = (centre, within);
                 if let Some(plane) = terrain.level_near(&centre, disc.radius + within) {
                     self.flat |= own;
-                    self.put(lane, &plane);
+                    self.planes[0].put(lane, &plane);
                     return true;
                 }
             } else if terrain.coverage(&centre, disc.radius) != Coverage::Known {
@@ -166,25 +243,75 @@ impl<T: Lane> Footing<T> {
             }
         }
         let shape = PlacedShape::Disc(disc);
-        let mut found = None;
+        let Self { planes, nearby, .. } = self;
         let mut count = 0;
-        terrain.visit_near(&centre, disc.radius + reach, &mut |id, piece| {
+        nearby[lane].visit(terrain, &disc, &base, reach, |id, piece| {
             visit_on_surface(&shape, (terrain, id, piece), &base, reach, |point| {
+                if let Some(own) = planes.get_mut(count) {
+                    own.stand_on(lane, id, piece, point, &base);
+                }
                 count += 1;
-                let (plane, is_bent) = match piece {
-                    Primitive::Face(face) => (face.plane, false),
-                    _ => (plane_at(point, &base), true),
-                };
-                found = Some((id, plane, is_bent));
             });
         });
+        self.double |= u32::from(count > 1) << lane;
+        count <= SLOTS
+    }
+
+    /// Whether any lane has a second plane.
+    #[inline(always)]
+    pub fn has_second(&self) -> bool {
+        self.double != 0
+    }
+}
+
+impl<T: Lane> Underfoot<T> {
+    /// Nothing there.
+    fn clear(&mut self, lane: usize) {
         self.offset.set(lane, f64::INFINITY);
-        if let Some((id, plane, is_bent)) = found {
+        self.bent &= !(1 << lane);
+    }
+
+    fn put(&mut self, lane: usize, plane: &Plane) {
+        self.normal.set(lane, (*plane.normal()).into());
+        self.offset.set(lane, plane.offset());
+    }
+
+    /// The plane of a piece with this point of the wheel.
+    fn stand_on(
+        &mut self,
+        lane: usize,
+        id: u32,
+        piece: &Primitive,
+        point: &SurfacePoint,
+        base: &Vector3<f64>,
+    ) {
+        if let Primitive::Face(face) = piece {
+            self.put(lane, &face.plane);
+        } else {
+            self.put(lane, &plane_at(point, base));
             self.pieces[lane] = id;
-            self.put(lane, &plane);
-            self.bent |= u32::from(is_bent) << lane;
+            self.bent |= 1 << lane;
         }
-        count <= 1
+    }
+
+    /// Moves it to the wheels of another instant, where it is that of an edge or a vertex.
+    #[inline(always)]
+    fn follow(&mut self, wheels: &Wheels<'_, T>) {
+        let mut lanes = self.bent;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            if let Some(terrain) = &wheels.surfaces[lane] {
+                let (disc, base) = wheels.disc(lane);
+                let shape = PlacedShape::Disc(disc);
+                let point = match terrain.primitive(self.pieces[lane]) {
+                    Primitive::Edge(edge) => point_at_edge(&shape, &edge, &base, NEAREST),
+                    Primitive::Vertex(vertex) => point_at_vertex(&shape, &vertex, &base),
+                    Primitive::Face(_) | Primitive::Plane(_) | Primitive::Sphere(_) => continue,
+                };
+                self.put(lane, &plane_at(&point, &base));
+            }
+        }
     }
 }
 

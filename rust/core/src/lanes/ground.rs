@@ -259,11 +259,17 @@ impl<T: Lane> Ground<T> {
         self.footings[wheel].follow(&wheels);
     }
 
-    /// Normal and offset of the plane under a wheel.
+    /// Normal of the plane under a slot of a wheel and the height of a point over it, m.
     #[inline(always)]
-    pub(super) fn under_wheel(&self, wheel: usize) -> (Vec3<T>, T) {
-        let footing = &self.footings[wheel];
-        (footing.normal, footing.offset)
+    pub(super) fn under_wheel(&self, wheel: usize, slot: usize, x: Vec3<T>) -> (Vec3<T>, T) {
+        let plane = &self.footings[wheel].planes[slot];
+        (plane.normal, plane.normal.dot(x) + plane.offset)
+    }
+
+    /// Whether any rover's wheel has a second one.
+    #[inline(always)]
+    pub(super) fn has_second_plane(&self, wheel: usize) -> bool {
+        self.footings[wheel].has_second()
     }
 
     /// Whether a rover's ground is a surface.

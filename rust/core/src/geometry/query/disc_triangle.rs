@@ -113,8 +113,8 @@ pub fn nearest_at_vertex(disc: &Disc, vertex: &Vertex, base: &Vector3<f64>) -> S
     }
 }
 
-/// Normals at an edge, from one to another, and the derivatives of the gap at both, up to a positive
-/// factor and with the sign reversed.
+/// Normals at an edge, from one to another, and the derivatives of the gap at both, up to a
+/// positive factor and with the sign reversed.
 struct Bracket {
     ends: [Vector3<f64>; 2],
     low: f64,
@@ -141,9 +141,11 @@ impl Bracket {
     /// quarter turn, and only an edge sharper than that has use for this.
     #[inline]
     fn at_crossing(disc: &Disc, edge: &Edge, start: &Vector3<f64>) -> Option<Self> {
-        let [first, second] = &edge.normals;
-        let is_sharp = first.dot(second) < SHARP;
-        is_sharp.then(|| Self::search(disc, edge, start)).flatten()
+        if edge.is_sharp() {
+            Self::search(disc, edge, start)
+        } else {
+            None
+        }
     }
 
     #[cold]
@@ -176,9 +178,6 @@ impl Bracket {
         None
     }
 }
-
-/// Cosine of the angle between the normals of an edge that is sharp.
-const SHARP: f64 = 0.2;
 
 #[inline]
 fn slope(disc: &Disc, edge: &Edge, start: &Vector3<f64>, n: &Vector3<f64>) -> (f64, SurfacePoint) {

@@ -300,56 +300,79 @@ impl HeightField {
             .then(|| Vector3::new(-x, 1.0, -z) / square.sqrt())
     }
 
-    /// The edge k = 2, 3, 4 of a corner: its end, and its two faces in the order of [`Hinge`].
+    /// Normals of a cell's faces and of those beyond its sides.
     #[inline]
-    fn ends_and_faces([i, j]: Place, k: u32) -> (Place, [(Place, Half); 2]) {
-        match k {
-            2 => ([i + 1, j], [([i, j - 1], Half::High), ([i, j], Half::Low)]),
-            3 => ([i, j + 1], [([i, j], Half::High), ([i - 1, j], Half::Low)]),
-            _ => ([i + 1, j + 1], [([i, j], Half::Low), ([i, j], Half::High)]),
+    fn normals_around(&self, [i, j]: Place) -> Around {
+        Around {
+            low: self.normal([i, j], Half::Low),
+            high: self.normal([i, j], Half::High),
+            before: self.normal([i, j - 1], Half::High),
+            left: self.normal([i - 1, j], Half::Low),
+            right: self.normal([i + 1, j], Half::High),
+            behind: self.normal([i, j + 1], Half::Low),
         }
     }
 
-    /// The hinge at an edge of a face; a face without a neighbour there is bounded as if the
-    /// surface went on flat.
+    /// End of the edge k = 2, 3, 4 of a corner.
     #[inline]
-    fn hinge(&self, place: Place, k: u32) -> Option<Hinge> {
-        let (end, [first, second]) = Self::ends_and_faces(place, k);
-        let (first, second) = (
-            self.normal(first.0, first.1),
-            self.normal(second.0, second.1),
-        );
-        let normals = match (&first, &second) {
-            (Some(first), Some(second)) => [first, second],
-            (Some(own), None) | (None, Some(own)) => [own, own],
-            (None, None) => return None,
-        };
-        Some(Hinge::new(&self.point(place), &self.point(end), normals))
+    fn end([i, j]: Place, k: u32) -> Place {
+        match k {
+            2 => [i + 1, j],
+            3 => [i, j + 1],
+            _ => [i + 1, j + 1],
+        }
     }
 
-    /// A face of a cell.
-    fn face(&self, place: Place, half: Half) -> Option<Face> {
-        let [i, j] = place;
+    /// The hinge at an edge of a face, from the normals of its two faces in the order of [`Hinge`];
+    /// a face without a neighbour there is bounded as if the surface went on flat.
+    #[inline]
+    fn hinge(&self, (place, k): (Place, u32), normals: Normals) -> Option<Hinge> {
+        let normals = match &normals {
+            [Some(first), Some(second)] => [first, second],
+            [Some(own), None] | [None, Some(own)] => [own, own],
+            [None, None] => return None,
+        };
+        Some(Hinge::new(
+            &self.point(place),
+            &self.point(Self::end(place, k)),
+            normals,
+        ))
+    }
+
+    /// The hinges at the cell's near edges along x and z, its diagonal, and its far edges along z
+    /// and x.
+    #[inline]
+    fn hinges(&self, [i, j]: Place, around: &Around) -> [Option<Hinge>; 5] {
         let edges = [
-            (place, 2),
-            (place, 3),
-            (place, 4),
+            ([i, j], 2),
+            ([i, j], 3),
+            ([i, j], 4),
             ([i + 1, j], 3),
             ([i, j + 1], 2),
         ];
-        let hinges = edges.map(|(corner, k)| self.hinge(corner, k));
-        self.face_between(place, half, &hinges)
+        let faces = [
+            [around.before, around.low],
+            [around.high, around.left],
+            [around.low, around.high],
+            [around.right, around.low],
+            [around.high, around.behind],
+        ];
+        std::array::from_fn(|k| self.hinge(edges[k], faces[k]))
     }
 
-    /// The same from the hinges at the cell's near edges along x and z, its diagonal, and its far
-    /// edges along z and x.
+    /// A face of a cell.
     #[inline]
-    fn face_between(&self, place: Place, half: Half, hinges: &[Option<Hinge>; 5]) -> Option<Face> {
-        let n = self.normal(place, half)?;
+    fn face(
+        &self,
+        place: Place,
+        half: Half,
+        around: &Around,
+        hinges: &[Option<Hinge>; 5],
+    ) -> Option<Face> {
         let wall = |hinge: usize, side: usize| hinges[hinge].as_ref().map(|h| h.walls[side]);
-        let walls = match half {
-            Half::Low => [wall(0, 1)?, wall(3, 1)?, wall(2, 0)?],
-            Half::High => [wall(4, 0)?, wall(1, 0)?, wall(2, 1)?],
+        let (n, walls) = match half {
+            Half::Low => (around.low?, [wall(0, 1)?, wall(3, 1)?, wall(2, 0)?]),
+            Half::High => (around.high?, [wall(4, 0)?, wall(1, 0)?, wall(2, 1)?]),
         };
         Some(Face {
             plane: Plane::through(&self.point(place), n),
@@ -357,15 +380,15 @@ impl HeightField {
         })
     }
 
-    /// A convex edge.
+    /// The edge k = 2, 3, 4 of a corner, if it is convex.
     #[inline]
-    fn edge(&self, place: Place, k: u32) -> Option<Edge> {
-        let (end, [first, second]) = Self::ends_and_faces(place, k);
-        let normals = [
-            self.normal(first.0, first.1)?,
-            self.normal(second.0, second.1)?,
-        ];
-        let (start, end) = (self.point(place), self.point(end));
+    fn edge(&self, place: Place, k: u32, around: &Around) -> Option<Edge> {
+        let normals = match k {
+            2 => [around.before?, around.low?],
+            3 => [around.high?, around.left?],
+            _ => [around.low?, around.high?],
+        };
+        let (start, end) = (self.point(place), self.point(Self::end(place, k)));
         let hinge = Hinge::new(&start, &end, [&normals[0], &normals[1]]);
         if !hinge.is_convex {
             return None;
@@ -412,10 +435,18 @@ impl HeightField {
     /// A piece of a corner.
     fn piece(&self, place: Place, k: u32) -> Option<Primitive> {
         match k {
-            0 => self.face(place, Half::Low).map(Primitive::Face),
-            1 => self.face(place, Half::High).map(Primitive::Face),
+            0 | 1 => {
+                let half = if k == 0 { Half::Low } else { Half::High };
+                let around = self.normals_around(place);
+                let hinges = self.hinges(place, &around);
+                self.face(place, half, &around, &hinges)
+                    .map(Primitive::Face)
+            }
             5 => self.vertex(place).map(Primitive::Vertex),
-            _ => self.edge(place, k).map(Primitive::Edge),
+            _ => {
+                let around = self.normals_around(place);
+                self.edge(place, k, &around).map(Primitive::Edge)
+            }
         }
     }
 
@@ -433,6 +464,20 @@ impl HeightField {
         let ((i, u), (j, v)) = (cell(0, x, self.columns)?, cell(1, z, self.rows)?);
         Some(([i, j], [u, v]))
     }
+}
+
+/// Unit normals of two faces; None off the map or in a hole.
+type Normals = [Option<Vector3<f64>>; 2];
+
+/// Unit normals of a cell's two faces and of the four beside it, which lie before and behind it
+/// along z, and left and right of it along x.
+struct Around {
+    low: Option<Vector3<f64>>,
+    high: Option<Vector3<f64>>,
+    before: Option<Vector3<f64>>,
+    behind: Option<Vector3<f64>>,
+    left: Option<Vector3<f64>>,
+    right: Option<Vector3<f64>>,
 }
 
 /// Smallest spacing, m.
@@ -472,17 +517,16 @@ impl Terrain for HeightField {
         self.visit_cells_above(centre, reach, floor, |i, j| {
             let own = [narrow(i), narrow(j)];
             let first = number(j * columns + i);
-            let (right, above) = ([own[0] + 1, own[1]], [own[0], own[1] + 1]);
-            let hinges = [(own, 2), (own, 3), (own, 4), (right, 3), (above, 2)]
-                .map(|(place, k)| self.hinge(place, k));
+            let around = self.normals_around(own);
+            let hinges = self.hinges(own, &around);
             for (k, half) in [(0, Half::Low), (1, Half::High)] {
-                if let Some(face) = self.face_between(own, half, &hinges) {
+                if let Some(face) = self.face(own, half, &around, &hinges) {
                     visit(first + k, &Primitive::Face(face));
                 }
             }
             for (k, hinge) in (2..5).zip(&hinges) {
                 let is_convex = hinge.as_ref().is_some_and(|hinge| hinge.is_convex);
-                if let Some(edge) = is_convex.then(|| self.edge(own, k)).flatten() {
+                if let Some(edge) = is_convex.then(|| self.edge(own, k, &around)).flatten() {
                     visit(first + k, &Primitive::Edge(edge));
                 }
             }

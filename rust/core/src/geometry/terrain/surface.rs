@@ -46,6 +46,14 @@ impl Wall {
     pub fn admits(&self, x: &Vector3<f64>) -> bool {
         (self.normal.dot(x) >= self.offset) != self.is_open
     }
+
+    /// How far a point (world, m) is beyond this side, m; negative on it.
+    #[inline]
+    #[must_use]
+    pub fn beyond(&self, x: &Vector3<f64>) -> f64 {
+        let past = (self.normal.dot(x) - self.offset) / self.normal.norm();
+        if self.is_open { past } else { -past }
+    }
 }
 
 /// A triangle of the surface.
@@ -88,6 +96,15 @@ impl Edge {
         n.cross(&self.along).dot(x)
     }
 
+    /// Whether its faces meet at such an angle that a rim which touches it may have more than one
+    /// place where the gap is greatest among the admissible normals.
+    #[inline]
+    #[must_use]
+    pub fn is_sharp(&self) -> bool {
+        let [first, second] = &self.normals;
+        first.dot(second) < SHARP
+    }
+
     /// Whether a unit normal lies strictly between those of the faces.
     #[inline]
     #[must_use]
@@ -122,6 +139,9 @@ impl Edge {
     }
 }
 
+/// Cosine of the angle between the normals of a sharp edge.
+const SHARP: f64 = 0.2;
+
 /// How far within a sharp edge's faces its place is, in depths.
 const WITHIN: f64 = 0.01;
 
@@ -146,6 +166,14 @@ impl Vertex {
         let spokes = self.spokes[..self.n].iter();
         let sum: Vector3<f64> = spokes.map(|spoke| spoke.normalize()).sum();
         sum.try_normalize(FLAT).unwrap_or_default()
+    }
+
+    /// Sine of the angle by which the steepest of its edges rises over the plane with a unit normal.
+    #[must_use]
+    pub fn steepest(&self, n: &Vector3<f64>) -> f64 {
+        let spokes = self.spokes[..self.n].iter();
+        let rises = spokes.map(|spoke| n.dot(spoke) / spoke.norm());
+        rises.fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// Whether the surface lies below the plane with this unit normal on all sides, or in it but
