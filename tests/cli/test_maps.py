@@ -95,7 +95,36 @@ def test_a_piece_of_a_map_has_its_heights_and_no_triangles_over_holes() -> None:
     assert (np.cross(b - a, c - a)[:, 1] > 0.0).all()  # counter-clockwise from above
 
 
-def test_spacing_belongs_to_a_map() -> None:
-    result = rover("drive", "--spacing", "1")
-    assert result.exit_code != 0
-    assert "spacing" in result.output
+@pytest.mark.parametrize("command", ["drive", "scene"])
+def test_spacing_and_heights_belong_to_a_map(command: str) -> None:
+    for given in (("--spacing", "1"), ("--terrain", "rock.obj", "--spacing", "1"), ("--height-range", "0", "1")):
+        result = rover(command, *given)
+        assert result.exit_code == 2, result.output
+        assert result.stderr.startswith(f"error: {next(word for word in given[::-1] if word.startswith('--'))}:")
+
+
+def test_a_scene_on_a_map_has_a_plan(folder: Path) -> None:
+    place = ("--terrain", str(folder / "map.npy"), "--spacing", "0.5", "--start", "-3", "2")
+    result = rover("scene", *place, "--model", "four-steered", "--straight", "--json")
+    assert result.exit_code == 0, result.output
+    parts = {row["part"]: row for row in json.loads(result.stdout)["parts"]}
+    assert parts["ground"]["built"] == "map of 81 x 81 heights"
+    assert "face" in parts["steering"]["reason"]
+    assert "not the same left and right" in parts["base"]["reason"]
+    assert "4 joints" in parts["steering"]["built"]
+    for given, named in (
+        (("--slope", "3"), "--slope"),
+        (("--start", "90", "0"), "--start"),
+        (("--model", "nobody"), "--model"),
+    ):
+        result = rover("scene", *place, *given)
+        assert result.exit_code == 2, result.output
+        assert result.stderr.startswith(f"error: {named}: ")
+
+
+def test_a_drive_off_the_map_names_its_option(folder: Path) -> None:
+    place = ("--terrain", str(folder / "map.npy"), "--spacing", "0.5")
+    for option in ("--start", "--goal"):
+        result = rover("drive", *place, option, "90", "0")
+        assert result.exit_code == 2, result.output
+        assert result.stderr.startswith(f"error: {option}: no ground is known at x = 90 m")
