@@ -12,6 +12,7 @@ from rover_gym import HeightField, RoverModel, Simulation, SphereField, Triangle
 from rover_gym.cli import app
 from rover_gym.ground import parts_of, surfaces_of, triangles_of
 from rover_gym.record import Recorder, RoverSampler, describe, read_run
+from rover_gym.replay.scenery import first_view, goal_parts, spheres, surfaces
 
 
 def rover(*arguments: str) -> Result:
@@ -78,6 +79,26 @@ def test_all_parts_of_a_ground_survive_a_recording(tmp_path: Path) -> None:
     np.testing.assert_array_equal(kinds[SphereField].centres, spheres.centres)
     np.testing.assert_array_equal(kinds[TriangleMesh].vertices, mesh.vertices)
     np.testing.assert_array_equal(kinds[TriangleMesh].triangles, mesh.triangles)
+
+
+def test_a_replay_shows_the_goal_on_the_ground_and_no_rock_beside_the_map_that_it_shows(tmp_path: Path) -> None:
+    field = HeightField(np.full((81, 81), 2.0), 0.5)
+    rocks = SphereField([[1.0, 2.0, 1.0], [15.0, 2.0, 15.0]], [0.1, 0.2])
+    simulation = Simulation(RoverModel.named("open-rover"), [field, rocks])
+    simulation.set_state(simulation.model.resting_pose(field, (0.0, 0.0), 0.0))
+    sampler, scene = RoverSampler(simulation.model), {"goal": (3.0, -1.0)}
+    with Recorder(
+        tmp_path / "run.h5", sampler.channels, describe(simulation, "goal", scene), terrain=simulation.terrain
+    ) as tape:
+        tape.append(sampler.row(simulation, residual=0.0, iterations=0))
+    run = read_run(tmp_path / "run.h5")
+    pole, _ = goal_parts(run)
+    assert pole.position[1] - 0.5 * pole.size[1] == pytest.approx(2.0)
+    np.testing.assert_array_equal(spheres(run)[1], [0.1])
+    ((vertices, _),) = surfaces(run)
+    assert (np.abs(vertices[:, [0, 2]]) < 9.0).all()
+    view = first_view(run)
+    assert np.linalg.norm(view.eye - view.target) < 2.5  # a small rover is seen from near
 
 
 def test_a_piece_of_a_map_has_its_heights_and_no_triangles_over_holes() -> None:

@@ -135,9 +135,9 @@ def _ground(terrain: str, model: RoverModel, slope: float, seed: int) -> Plane |
     if terrain == "rocks":
         clear = np.array(((0.0, 0.0, CLEARING + clear_radius(model)),))
         return SphereField.rocks(0.1, (-4.0, -4.0, 26.0, 4.0), seed, max_diameter=0.2, ground=plane, clear=clear)
-    if terrain == "rug":
-        return SphereField.rug()
-    refuse(OptionError, "terrain", terrain, f"must be {', '.join(GROUNDS)}, or the file of a map or a mesh")
+    if terrain != "rug":
+        refuse(OptionError, "terrain", terrain, f"must be {', '.join(GROUNDS)}, or the file of a map or a mesh")
+    return SphereField.rug()
 
 
 def _start(

@@ -168,7 +168,8 @@ class PlannedRover:
         """Sets the steering set-points `(n_wheels,)`, rad.
 
         Raises:
-            CommandError: The set-points are not a finite number for each wheel, or not zero in a scene planned without steering.
+            CommandError: The set-points are not a finite number for each wheel, or not zero where the scene was
+                planned without steering.
         """
         if self.plan.kind == "full" and isinstance(self.simulation, Simulation):
             self.simulation.set_steering(set_points)
