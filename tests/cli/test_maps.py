@@ -3,15 +3,16 @@
 import json
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pygltflib
 import pytest
 from typer.testing import CliRunner, Result
 
-from rover_gym import HeightField, RoverModel, Simulation, SphereField, TriangleMesh, Union
+from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, TriangleMesh, Union
 from rover_gym.cli import app
 from rover_gym.ground import parts_of, surfaces_of, triangles_of
-from rover_gym.record import Recorder, RoverSampler, describe, read_run
+from rover_gym.record import Channel, Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
 from rover_gym.replay.scenery import first_view, goal_parts, spheres, surfaces
 
 
@@ -79,6 +80,73 @@ def test_all_parts_of_a_ground_survive_a_recording(tmp_path: Path) -> None:
     np.testing.assert_array_equal(kinds[SphereField].centres, spheres.centres)
     np.testing.assert_array_equal(kinds[TriangleMesh].vertices, mesh.vertices)
     np.testing.assert_array_equal(kinds[TriangleMesh].triangles, mesh.triangles)
+
+
+@pytest.mark.parametrize("kind", ["map", "mesh", "spheres"])
+def test_a_recorded_drive_replays_with_its_materials(kind: str, tmp_path: Path) -> None:
+    """The file alone makes the simulation again: the ground with its materials, and the laws of their pairs."""
+    box = [[x, y, z] for x in (-9.0, 9.0) for y in (-1.0, 0.0) for z in (-9.0, 9.0)]
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = [(a, b, c) for a, b, c, _ in sides] + [(a, c, d) for a, _, c, d in sides]
+    pebbles = SphereField([[0.5, 0.0, 0.3], [0.9, 0.0, -0.3]], [0.05, 0.04], Plane(), material="chalk")
+    grounds = {
+        "map": HeightField(np.zeros((31, 31)), 1.0, material="ice"),
+        "mesh": TriangleMesh(box, faces, material="ice"),
+        "spheres": [pebbles, SphereField([[5.0, -1.0, 5.0]], [1.0], material="ice")],
+    }
+    laws = {("wheel", "ice"): (0.02, 0.0), ("wheel", "chalk"): (0.1, 0.0), ("wheel", "ground"): (0.9, 0.0)}
+    simulation = Simulation(RoverModel.named("skid-steered"), grounds[kind], materials=laws)
+    simulation.set_state(simulation.model.resting_pose(simulation.terrain, (0.0, 0.0), 0.0))
+    sampler, torques = RoverSampler(simulation.model), np.full(4, 12.0)
+    simulation.set_wheel_torques(torques)
+    with Recorder(
+        tmp_path / "run.h5", sampler.channels, describe(simulation, "slippery"), terrain=simulation.terrain
+    ) as tape:
+        for _ in range(20):
+            simulation.step(10)
+            tape.append(sampler.row(simulation, residual=0.0, iterations=0))
+    run = read_run(tmp_path / "run.h5")
+    assert [part.material for part in parts_of(run.terrain)] == [part.material for part in parts_of(simulation.terrain)]
+    scene = run.trajectory.attributes["scene"]
+    again = Simulation(run.model, run.terrain, **run.trajectory.attributes["solver"])
+    again.set_state(scene["q"])
+    again.set_wheel_torques(scene["wheel_torques"])
+    plain = Simulation(run.model, run.terrain)
+    plain.set_state(scene["q"])
+    plain.set_wheel_torques(scene["wheel_torques"])
+    for q in run.trajectory["q"]:
+        again.step(10)
+        plain.step(10)
+        np.testing.assert_array_equal(again.q, q)
+    assert np.abs(plain.q - q).max() > 1e-3
+
+
+def test_damaged_materials_are_refused(tmp_path: Path) -> None:
+    for name, key, value in (
+        ("surface_0_heights", "material", 3),
+        ("sphere_centres", "counts", [1, 5]),
+        ("sphere_centres", "counts", [-1, 2]),
+        ("sphere_centres", "materials", np.bytes_(b"rock")),
+    ):
+        field = HeightField(np.zeros((5, 5)), 1.0)
+        simulation = Simulation(RoverModel(), [field, SphereField([[0.0, 0.0, 0.0]], [0.1])])
+        sampler, path = RoverSampler(simulation.model), tmp_path / "damaged.h5"
+        with Recorder(path, sampler.channels, describe(simulation, "x"), terrain=simulation.terrain) as tape:
+            tape.append(sampler.row(simulation, residual=0.0, iterations=0))
+        with h5py.File(path, "r+") as file:
+            file["terrain"][name].attrs[key] = value
+        with pytest.raises(RecordingError, match=r"damaged\.h5: terrain: is no ground"):
+            read_run(path)
+
+
+def test_a_flat_map_is_not_taken_for_a_trap(tmp_path: Path) -> None:
+    """Flat maps shrink by more than the reader of a recording takes a file for sound."""
+    flat = HeightField(np.zeros((2000, 2000)), 0.5)
+    with Recorder(tmp_path / "flat.h5", [Channel("time", "s", "time")], terrain=flat, rows_per_flush=1) as tape:
+        tape.append({"time": 0.0})
+    terrain = read_trajectory(tmp_path / "flat.h5").terrain
+    assert isinstance(terrain, HeightField)
+    assert terrain.shape == flat.shape
 
 
 def test_a_replay_shows_the_goal_on_the_ground_and_no_rock_beside_the_map_that_it_shows(tmp_path: Path) -> None:
