@@ -68,7 +68,8 @@ def _drive(ledger: Ledger, what: str, ground: Any) -> None:
 
 def _read(path: Path) -> Any:
     if path.suffix in (".npy", ".png", ".tif"):
-        return HeightField.from_file(path, spacing=0.25, height_range=(-0.2, 0.2))
+        options = {"height_range": (-0.2, 0.2)} if path.suffix == ".png" else {}
+        return HeightField.from_file(path, spacing=0.25, **options)
     return TriangleMesh.from_file(path)
 
 

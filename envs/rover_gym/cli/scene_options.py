@@ -4,7 +4,8 @@ from typing import Annotated, Any
 
 import typer
 
-from rover_gym.maps.terrain_files import MAPS, is_terrain_file, open_terrain
+from rover_gym.maps.map_files import ENDINGS
+from rover_gym.maps.terrain_files import is_terrain_file, open_terrain
 from rover_gym.mechanics import HeightField, OptionError, RoverModel, TriangleMesh
 from rover_gym.models import open_model
 from rover_gym.validation import refuse
@@ -43,7 +44,7 @@ def named_ground(
     """
     given: dict[str, Any] = {"spacing": spacing, "height_range": height_range}
     given = {name: value for name, value in given.items() if value is not None}
-    if not terrain.lower().endswith(MAPS):
+    if not terrain.lower().endswith(ENDINGS):
         for name, value in given.items():
             refuse(OptionError, name, value, "needs a map's file as terrain")
     return open_terrain(terrain, **given) if is_terrain_file(terrain) else None

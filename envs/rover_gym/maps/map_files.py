@@ -1,12 +1,14 @@
 """Maps of heights from GeoTIFF, PNG and .npy files.
 
-A file is checked before it is read into memory, and every error names it.
+A file's size is checked before it is read into memory, and every error names the file. Beside the numbers of the file
+there is never more than the map itself: they are converted some rows at a time, and in place where they are float32.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
@@ -20,8 +22,20 @@ from rover_gym.validation import number, refuse
 Heights: TypeAlias = npt.NDArray[np.float32]
 Pair: TypeAlias = tuple[float, float]
 
-#: Most heights of a file: a terrain takes seven times as many, a machine of 8 GB this many.
+#: Endings of the formats.
+ENDINGS = (".tif", ".tiff", ".png", ".npy")
+
+#: Most heights of a file, 400 MB as a terrain.
 MOST_HEIGHTS = 10**8
+
+#: Largest height of a terrain, m, and how many heights are converted at a time.
+HIGHEST, CHUNK = 1e6, 2**20
+
+#: Numbers of a GeoTIFF beyond this are no data: some mark it with the smallest number of their type and do not say so.
+NUMBERS_END = 1e30
+
+#: Range of the distance of columns and rows, m.
+SPACINGS = (1e-4, 1e6)
 
 #: Units of height that a GeoTIFF names, m.
 UNITS = {
@@ -56,14 +70,60 @@ class _File:
         if shape[0] * shape[1] > MOST_HEIGHTS:
             self.refuse(f"at most {MOST_HEIGHTS} heights are read, the file has {shape[0]} x {shape[1]}", shape)
 
-    def heights(self, values: npt.NDArray[Any], scale: float, datum: float) -> Heights:
-        """Values of the file as heights, m."""
-        heights = np.asarray(values, dtype=np.float64)
-        infinite = np.isinf(heights)
-        if infinite.any():
-            row, column = np.argwhere(infinite)[0]
-            self.refuse(f"height [{row}, {column}] is infinite", float(heights[row, column]))
-        return ((heights - datum) * scale).astype(np.float32)
+    def heights(self, numbers: _Numbers, scale: float, datum: float) -> Heights:
+        """The file's numbers as heights, m."""
+        values = numbers.values
+        reuses = values.dtype == np.float32 and values.flags.writeable
+        heights = values if reuses else np.empty(values.shape, np.float32)
+        for rows in numbers.chunks():
+            metres = (numbers.at(rows) - datum) * scale
+            wrong = ~(np.abs(metres) <= HIGHEST) & ~np.isnan(metres)
+            if wrong.any():
+                row, column = (int(k) for k in np.argwhere(wrong)[0])
+                height = float(metres[row, column])
+                reason = (
+                    f"height [{rows.start + row}, {column}] must be at most {HIGHEST:g} m in size or nan for no data"
+                )
+                self.refuse(reason, height)
+            heights[rows] = metres
+        return heights
+
+
+@dataclass(frozen=True)
+class _Numbers:
+    """The numbers of a file, of any type; what they mean is `factor` times a number plus `offset`.
+
+    Attributes:
+        values: `(rows, columns)`.
+        missing: `(rows, columns)` bool, where there is no data; None if there is everywhere.
+        factor: As above.
+        offset: As above.
+        end: A larger meaning is no data.
+    """
+
+    values: npt.NDArray[Any]
+    missing: npt.NDArray[np.bool_] | None = None
+    factor: float = 1.0
+    offset: float = 0.0
+    end: float = np.inf
+
+    def chunks(self) -> Iterator[slice]:
+        """Rows, some at a time."""
+        rows, columns = self.values.shape
+        step = max(1, CHUNK // columns)
+        return (slice(first, min(first + step, rows)) for first in range(0, rows, step))
+
+    def at(self, rows: slice) -> npt.NDArray[np.float64]:
+        """What the numbers of some rows mean; nan for no data."""
+        meaning = self.values[rows].astype(np.float64) * self.factor + self.offset
+        if self.missing is not None:
+            meaning[self.missing[rows]] = np.nan
+        meaning[np.abs(meaning) > self.end] = np.nan
+        return meaning
+
+    def lowest(self) -> float:
+        """The least meaning; nan if there is no data at all."""
+        return float(np.fmin.reduce([np.fmin.reduce(self.at(rows), axis=None) for rows in self.chunks()]))
 
 
 def read_map(
@@ -93,10 +153,13 @@ def read_map(
     plain = [
         None if x is None else number(name, x, error=TerrainError) for name, x in [("scale", scale), ("datum", datum)]
     ]
+    if plain[0] == 0.0:
+        refuse(TerrainError, "scale", scale, "must not be 0")
     file = _File(place, plain[0], plain[1])
     with place.open("rb"):
         pass  # an OSError that Python words itself
     ending = place.suffix.lower()
+    _check_suited(ending, height_range=height_range, scale=scale, datum=datum, band=band)
     if ending in (".tif", ".tiff"):
         heights, own = _read_geotiff(file, band, spacing)
     elif ending == ".npy":
@@ -104,7 +167,7 @@ def read_map(
     elif ending == ".png":
         heights, own = _read_png(file, height_range), spacing
     else:
-        file.refuse("a map's file ends in .tif, .tiff, .png or .npy")
+        file.refuse(f"a map's file ends in {', '.join(ENDINGS)}")
     step = own if spacing is None else spacing
     if step is None:
         refuse(TerrainError, "spacing", spacing, f"must be given, {place} does not say it")
@@ -116,15 +179,27 @@ def read_map(
     return heights, step, origin
 
 
+def _check_suited(ending: str, *, height_range: object, scale: object, datum: object, band: object) -> None:
+    """Refuses arguments that say nothing about a file of this kind, or two things at once."""
+    if height_range is not None and ending != ".png":
+        refuse(TerrainError, "height_range", height_range, f"is of PNG files only, not of {ending} files")
+    if height_range is not None and (scale is not None or datum is not None):
+        refuse(TerrainError, "height_range", height_range, "must come without scale and datum, which say the same")
+    if ending not in (".tif", ".tiff") and band != 1:
+        refuse(TerrainError, "band", band, f"is of GeoTIFF files only, not of {ending} files")
+
+
 def _guarded(file: _File, read: Callable[[], Any], *wrong: type[Exception]) -> Any:
+    """What a reader returns, its exceptions turned into ours."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             return read()
+    except TerrainError:
+        raise
     except wrong as error:
-        file.refuse(
-            f"is damaged or no such file ({str(error).splitlines()[0] if str(error) else type(error).__name__})"
-        )
+        why = (str(error).splitlines() or [type(error).__name__])[0]
+        file.refuse(f"is damaged or no {file.path.suffix} file ({why})")
 
 
 def _read_npy(file: _File) -> Heights:
@@ -135,7 +210,7 @@ def _read_npy(file: _File) -> Heights:
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
         file.refuse("must hold an array of numbers")
     file.check_shape(values.shape)
-    return file.heights(values, 1.0 if file.scale is None else file.scale, file.datum or 0.0)
+    return file.heights(_Numbers(values), 1.0 if file.scale is None else file.scale, file.datum or 0.0)
 
 
 def _read_png(file: _File, height_range: object) -> Heights:
@@ -152,8 +227,8 @@ def _read_png(file: _File, height_range: object) -> Heights:
     wrong = (OSError, ValueError, SyntaxError, EOFError, image.DecompressionBombError, MemoryError, OverflowError)
     values, white = _guarded(file, read, *wrong)
     if file.scale is not None:
-        return file.heights(values, file.scale, file.datum or 0.0)
-    return file.heights(values, (high - low) / white, 0.0) + np.float32(low)
+        return file.heights(_Numbers(values), file.scale, file.datum or 0.0)
+    return file.heights(_Numbers(values, factor=(high - low) / white, offset=low), 1.0, 0.0)
 
 
 def _range(file: _File, height_range: object) -> Pair:
@@ -180,21 +255,21 @@ def _read_geotiff(file: _File, band: object, spacing: Pair | None) -> tuple[Heig
             if np.dtype(opened.dtypes[k]).kind not in "fiu":
                 file.refuse(f"band {k + 1} must hold real numbers, holds {opened.dtypes[k]}")
             values = opened.read(k + 1, masked=True)
-            scale, offset, unit = opened.scales[k], opened.offsets[k], opened.units[k]
-            return values, scale, offset, unit, opened.transform, opened.crs
+            missing = np.ma.getmaskarray(values)
+            numbers = _Numbers(
+                values.data, missing if missing.any() else None, opened.scales[k], opened.offsets[k], NUMBERS_END
+            )
+            return numbers, opened.units[k], opened.transform, opened.crs
 
     wrong = (rasterio.errors.RasterioError, ValueError, MemoryError, OverflowError, UnicodeError)
-    values, factor, offset, unit, transform, crs = _guarded(file, read, *wrong)
+    numbers, unit, transform, crs = _guarded(file, read, *wrong)
     if unit and unit.lower() not in UNITS and file.scale is None:
         file.refuse(f"the unit of its heights, {unit!r}, is not known: give scale", unit)
-    raw = np.ma.filled(values.astype(np.float64), np.nan) * factor + offset
-    # Some maps mark missing data with the smallest number of their type and do not say so.
-    raw[np.abs(raw) > 1e30] = np.nan
-    if np.isnan(raw).all():
+    lowest = numbers.lowest()
+    if np.isnan(lowest):
         file.refuse("has no data at all")
     scale = UNITS.get((unit or "m").lower(), 1.0) if file.scale is None else file.scale
-    datum = float(np.nanmin(raw)) if file.datum is None else file.datum
-    heights = file.heights(raw, scale, datum)
+    heights = file.heights(numbers, scale, lowest if file.datum is None else file.datum)
     return heights, _spacing(file, transform, crs) if spacing is None else spacing
 
 
@@ -209,4 +284,8 @@ def _spacing(file: _File, transform: Any, crs: Any) -> Pair | None:
     if transform.a <= 0.0 or transform.e >= 0.0:
         file.refuse("its columns must run east and its rows south: warp the map first")
     metres = crs.linear_units_factor[1] if crs is not None and crs.is_projected else 1.0
-    return float(transform.a * metres), float(-transform.e * metres)
+    step = float(transform.a * metres), float(-transform.e * metres)
+    for value in step:
+        if not SPACINGS[0] <= value <= SPACINGS[1]:
+            file.refuse("the distance of its columns and rows must be from {:g} to {:g} m".format(*SPACINGS), value)
+    return step

@@ -1,5 +1,7 @@
 """Triangle meshes from files, by trimesh."""
 
+import json
+import struct
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -11,8 +13,11 @@ from rover_gym.extras import require
 from rover_gym.mechanics import TerrainError
 from rover_gym.validation import number, refuse
 
-#: Longest file, bytes.
-MOST_BYTES = 2**30
+#: Longest file, bytes: reading text takes some ten times as many.
+MOST_BYTES = 2**28
+
+#: Largest coordinate of a terrain, m.
+FARTHEST = 1e6
 
 #: Endings of the formats that hold a mesh and nothing that would be run or fetched.
 ENDINGS = (".obj", ".ply", ".stl", ".off", ".glb")
@@ -50,6 +55,8 @@ def read_mesh(
         refuse(TerrainError, "path", size, f"{place}: at most {MOST_BYTES} bytes are read")
     trimesh = require("trimesh", "maps")
     try:
+        if place.suffix.lower() == ".glb":
+            _check_counts(place, size)
         with np.errstate(all="ignore"):
             mesh: Any = trimesh.load_mesh(str(place), process=False, skip_materials=True)
             vertices, triangles = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
@@ -65,7 +72,26 @@ def read_mesh(
         refuse(TerrainError, "path", vertices[k].tolist(), f"{place}: vertex {k} is not finite")
     if triangles.size and (triangles.min() < 0 or triangles.max() >= len(vertices)):
         refuse(TerrainError, "path", str(place), f"{place}: a triangle names a vertex that is not there")
-    return _joined(place, _turned(vertices, str(up)) * factor + shift, triangles)
+    placed = _turned(vertices, str(up)) * factor + shift
+    far = (np.abs(placed) > FARTHEST).any(axis=1)
+    if far.any():
+        k = int(np.flatnonzero(far)[0])
+        refuse(TerrainError, "path", placed[k].tolist(), f"{place}: vertex {k} must be within {FARTHEST:g} m")
+    return _joined(place, placed, triangles)
+
+
+def _check_counts(place: Path, size: int) -> None:
+    """Refuses a GLB that states more entries than it has bytes: those without data would be made, as zeros.
+
+    Raises:
+        ValueError: It does, or it is no GLB.
+    """
+    with place.open("rb") as file:
+        _, _, _, length, _ = struct.unpack("<5I", file.read(20))
+        described = json.loads(file.read(min(length, size)))
+    stated = sum(accessor["count"] for accessor in described.get("accessors", ()))
+    if stated > size:
+        raise ValueError(f"its accessors state {stated} entries, more than the file's {size} bytes")
 
 
 def _turned(vertices: npt.NDArray[np.float64], up: str) -> npt.NDArray[np.float64]:
