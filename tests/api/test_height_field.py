@@ -153,6 +153,8 @@ def test_bad_maps_are_refused(arguments: tuple[object, ...], message: str) -> No
         ({"crater_diameter": (3.0, 1.0)}, "crater_diameter"),
         ({"ripple_length": 0.0}, "ripple_length"),
         ({"longest_wave": "long"}, "longest_wave"),
+        ({"longest_wave": 0.1}, "longest_wave"),  # two cells are 0.2 m: there would be no wave at all
+        ({"crater_diameter": 1e-300}, "crater_diameter"),
         ({"size": 1e9}, "size"),
         ({"roughness": -1.0}, "roughness"),
     ],
