@@ -29,7 +29,10 @@ ENDINGS = (".tif", ".tiff", ".png", ".npy")
 MOST_HEIGHTS = 10**8
 
 #: Largest height of a terrain, m, and how many heights are converted at a time.
-HIGHEST, CHUNK = 1e6, 2**20
+HIGHEST, CHUNK = 1e6, 2**18
+
+#: Memory in which GDAL keeps what it has read, MB.
+CACHE = 16
 
 #: Numbers of a GeoTIFF beyond this are no data: some mark it with the smallest number of their type and do not say so.
 NUMBERS_END = 1e30
@@ -247,18 +250,15 @@ def _read_geotiff(file: _File, band: object, spacing: Pair | None) -> tuple[Heig
     index = number("band", band, at_least=1, error=TerrainError)
 
     def read() -> Any:
-        with rasterio.open(file.path, driver="GTiff") as opened:
+        with rasterio.Env(GDAL_CACHEMAX=CACHE), rasterio.open(file.path, driver="GTiff") as opened:
             file.check_shape((opened.height, opened.width))
             if index != int(index) or index > opened.count:
                 refuse(TerrainError, "band", band, f"must be a whole number, from 1 to {opened.count} in {file.path}")
             k = int(index) - 1
             if np.dtype(opened.dtypes[k]).kind not in "fiu":
                 file.refuse(f"band {k + 1} must hold real numbers, holds {opened.dtypes[k]}")
-            values = opened.read(k + 1, masked=True)
-            missing = np.ma.getmaskarray(values)
-            numbers = _Numbers(
-                values.data, missing if missing.any() else None, opened.scales[k], opened.offsets[k], NUMBERS_END
-            )
+            values, missing = _band(opened, k + 1)
+            numbers = _Numbers(values, missing, opened.scales[k], opened.offsets[k], NUMBERS_END)
             return numbers, opened.units[k], opened.transform, opened.crs
 
     wrong = (rasterio.errors.RasterioError, ValueError, MemoryError, OverflowError, UnicodeError)
@@ -271,6 +271,24 @@ def _read_geotiff(file: _File, band: object, spacing: Pair | None) -> tuple[Heig
     scale = UNITS.get((unit or "m").lower(), 1.0) if file.scale is None else file.scale
     heights = file.heights(numbers, scale, lowest if file.datum is None else file.datum)
     return heights, _spacing(file, transform, crs) if spacing is None else spacing
+
+
+def _band(opened: Any, band: int) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool_] | None]:
+    """The numbers of a band, and where there are none if some are missing; read some rows at a time, by whole blocks.
+
+    Of the whole band at once GDAL keeps a copy, and its mask another.
+    """
+    shape = opened.height, opened.width
+    values = np.empty(shape, opened.dtypes[band - 1])
+    missing = np.zeros(shape, np.bool_)
+    block = opened.block_shapes[band - 1][0]
+    step = block * max(1, CHUNK // (block * opened.width))
+    for first in range(0, opened.height, step):
+        rows = slice(first, min(first + step, opened.height))
+        window = ((rows.start, rows.stop), (0, opened.width))
+        opened.read(band, window=window, out=values[rows])
+        np.equal(opened.read_masks(band, window=window), 0, out=missing[rows])
+    return values, missing if missing.any() else None
 
 
 def _spacing(file: _File, transform: Any, crs: Any) -> Pair | None:
