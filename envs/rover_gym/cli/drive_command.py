@@ -108,14 +108,14 @@ def drive(
     arguments |= {} if heading is None else {"heading_deg": heading}
     options = {name: place for name, place in (("position", start), ("goal", goal)) if place is not None}
     named = {"model": model, "spacing": spacing, "height_range": height_range}
-    told = arguments | {name: value for name, value in named.items() if value not in (None, BUILT_IN)}
+    as_given = arguments | {name: value for name, value in named.items() if value not in (None, BUILT_IN)}
     if (rover := named_model(model)) is not None:
         arguments["model"] = rover
     if (ground := named_ground(terrain, spacing, height_range)) is not None:
         arguments["terrain"] = ground
     folder = find_policy(policy, terrain)
     trained = {} if folder is None else policy_arguments(folder)
-    arguments, told = arguments | trained, told | trained
+    arguments, as_given = arguments | trained, as_given | trained
     filming: dict[str, Any] = {}
     if video is not None:
         filming = {"render_mode": "rgb_array", "render_options": {"antialiasing": True}}
@@ -133,7 +133,7 @@ def drive(
             for now in range(seed, seed + episodes):
                 path = None if output is None else output / f"episode-{now}.h5"
                 paths += [path] if path else []
-                results.append(_drive_one(env, driver, name, now, told, options, path, bar, film))
+                results.append(_drive_one(env, driver, name, now, as_given, options, path, bar, film))
         except KeyboardInterrupt:
             interrupted = True
 
@@ -142,7 +142,7 @@ def drive(
     if output is not None:
         summary = {
             "policy": policy,
-            "arguments": told | options,
+            "arguments": as_given | options,
             "episodes": [asdict(episode) for episode in results],
         }
         paths.append(output / "summary.json")

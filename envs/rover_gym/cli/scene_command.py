@@ -14,7 +14,6 @@ from rich.table import Table
 
 from rover_gym.cli.console import LARGEST_SEED, console, plain_errors, progress_bar
 from rover_gym.cli.scene_options import BUILT_IN, HeightRange, ModelName, Spacing, Start, named_ground, named_model
-from rover_gym.env.rocks import clear_radius
 from rover_gym.env.start import tilted_plane
 from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField, Terrain
 from rover_gym.planning.economy import Economy, measure_economies
@@ -133,7 +132,7 @@ def _ground(terrain: str, model: RoverModel, slope: float, seed: int) -> Plane |
     if terrain == "plane":
         return plane
     if terrain == "rocks":
-        clear = np.array(((0.0, 0.0, CLEARING + clear_radius(model)),))
+        clear = np.array(((0.0, 0.0, CLEARING + model.clear_radius),))
         return SphereField.rocks(0.1, (-4.0, -4.0, 26.0, 4.0), seed, max_diameter=0.2, ground=plane, clear=clear)
     if terrain != "rug":
         refuse(OptionError, "terrain", terrain, f"must be {', '.join(GROUNDS)}, or the file of a map or a mesh")

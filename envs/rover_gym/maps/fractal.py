@@ -20,8 +20,8 @@ from rover_gym.validation import number, refuse, whole
 Heights: TypeAlias = npt.NDArray[np.float64]
 Pair: TypeAlias = tuple[float, float]
 
-#: Most heights of a map, and most craters.
-MOST_HEIGHTS = 10**8
+#: Most heights of a map, whose waves take 110 bytes a height, and most craters.
+MOST_HEIGHTS = 4 * 10**7
 MOST_CRATERS = 10**6
 
 #: Smallest diameter of a crater, m.

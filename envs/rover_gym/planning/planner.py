@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.env.start import resting_pose
 from rover_gym.ground import parts_of, plane_of, surfaces_of
 from rover_gym.mechanics import (
     HeightField,
@@ -111,12 +110,10 @@ def _start(scene: Scene) -> Array:
     if scene.start is not None:
         return np.array(vector("start", scene.start, model.nq, error=StateError))
     heading = number("heading", scene.heading)
-    if surfaces_of(scene.terrain):
-        return model.resting_pose(scene.terrain, (0.0, 0.0), heading)
-    plane = plane_of(scene.terrain)
-    if plane is None or plane.normal[1] <= 0.0:
+    ground: Terrain | None = scene.terrain if surfaces_of(scene.terrain) else plane_of(scene.terrain)
+    if ground is None or (isinstance(ground, Plane) and ground.normal[1] <= 0.0):
         refuse(TerrainError, "terrain", scene.terrain, "has no plane to stand on: give a start")
-    return resting_pose(model, plane, (0.0, 0.0), heading)
+    return model.resting_pose(ground, (0.0, 0.0), heading)
 
 
 def _ground(scene: Scene) -> tuple[Terrain, Decision]:
