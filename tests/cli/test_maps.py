@@ -9,7 +9,7 @@ import pygltflib
 import pytest
 from typer.testing import CliRunner, Result
 
-from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, TriangleMesh, Union
+from rover_gym import HeightField, Plane, RoverEnv, RoverModel, Simulation, SphereField, TriangleMesh, Union
 from rover_gym.cli import app
 from rover_gym.ground import parts_of, surfaces_of, triangles_of
 from rover_gym.record import Channel, Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
@@ -55,6 +55,26 @@ def test_it_is_plotted_and_replayed(folder: Path) -> None:
     nodes = [node.name for node in pygltflib.GLTF2().load(str(folder / "run.glb")).nodes]
     assert "surface_0" in nodes
     assert "IndexedFaceSet" in (folder / "run.wrl").read_text(encoding="utf-8")
+
+
+def test_a_drive_off_the_map_is_recorded_plotted_and_replayed(tmp_path: Path) -> None:
+    """Its last step has no residual, and the axes of the figure had no end."""
+    env = RoverEnv(terrain=HeightField(np.zeros((21, 21)), 0.5), goal_distance=(2.0, 3.0))
+    env.reset(seed=0)
+    sampler, info = RoverSampler(env.model), {"termination": ""}
+    with Recorder(
+        tmp_path / "run.h5", sampler.channels, describe(env.simulation, "off"), terrain=env.simulation.terrain
+    ) as tape:
+        while not info["termination"]:
+            *_, info = env.step(np.float32([1.0] * 6 + [0.0] * 6))
+            solver = info["solver"]
+            tape.append(sampler.row(env.simulation, residual=solver["residual"], iterations=solver["iterations"]))
+    assert info["termination"] == "step_failed"
+    assert "no ground is known" in solver["message"]
+    for command in (("plot", "--output", "plots"), ("replay", "--vrml", "run.wrl")):
+        result = rover(command[0], str(tmp_path / "run.h5"), command[1], str(tmp_path / command[2]))
+        assert result.exit_code == 0, result.output
+    assert (tmp_path / "plots" / "contact-solver.png").stat().st_size > 10_000
 
 
 def test_all_parts_of_a_ground_survive_a_recording(tmp_path: Path) -> None:
