@@ -61,7 +61,7 @@ def check_scene(scene: Scene) -> None:
     if not isinstance(scene, Scene):
         refuse(OptionError, "scene", scene, "must be a Scene")
     if not isinstance(scene.terrain, get_args(Terrain)):
-        refuse(TerrainError, "terrain", scene.terrain, "must be a terrain")
+        refuse(TerrainError, "terrain", scene.terrain, "must be a terrain; several make a Union")
     if not isinstance(scene.model, RoverModel):
         refuse(ModelError, "model", scene.model, "must be a RoverModel")
     for name in ("steered", "equal_torques", "held", "tumbles"):
