@@ -204,6 +204,14 @@ def test_a_piece_of_a_map_has_its_heights_and_no_triangles_over_holes() -> None:
     assert (np.cross(b - a, c - a)[:, 1] > 0.0).all()  # counter-clockwise from above
 
 
+def test_a_thinned_map_keeps_its_border() -> None:
+    for shape in ((2, 9000), (300, 301)):
+        field = HeightField(np.zeros(shape), 1.0, (0.0, 0.0))
+        vertices, triangles = triangles_of(field, (0.0, 0.0), (1e5, 1e5), 1000)
+        assert vertices[:, [2, 0]].max(axis=0).tolist() == [shape[0] - 1.0, shape[1] - 1.0]
+        assert len(triangles) > 100
+
+
 @pytest.mark.parametrize("command", ["drive", "scene"])
 def test_spacing_and_heights_belong_to_a_map(command: str) -> None:
     for given in (("--spacing", "1"), ("--terrain", "rock.obj", "--spacing", "1"), ("--height-range", "0", "1")):
