@@ -14,13 +14,17 @@ import typer
 from gymnasium.wrappers import RecordVideo
 
 from rover_gym.cli.console import plain_errors, say_path
+from rover_gym.cli.scene_options import BUILT_IN, ModelName
 from rover_gym.policy import TrainedPolicy, policy_arguments, run_episode
 
 
 @plain_errors
 def enjoy(
     policy: Annotated[Path, typer.Argument(exists=True, help="Folder of a run or of a policy.")],
-    terrain: Annotated[str, typer.Option(help="'plane' or 'sphere_field'.")] = "sphere_field",
+    terrain: Annotated[
+        str, typer.Option(help="'plane', 'sphere_field', 'hills', or the file of a map or a mesh.")
+    ] = "sphere_field",
+    model: ModelName = BUILT_IN,
     difficulty: Annotated[float | None, typer.Option(help="Of the rocks, from 0 to 1.")] = None,
     episodes: Annotated[int, typer.Option(min=1, help="How many.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="Of the first episode; the next ones count up.")] = 1_000_000,
@@ -30,6 +34,7 @@ def enjoy(
     """Drive episodes and say what they came to."""
     folder = policy if (policy / "policy.npz").exists() else policy / "policy"
     arguments: dict[str, Any] = {"terrain": terrain, **policy_arguments(folder)}
+    arguments |= {} if model == BUILT_IN else {"model": model}
     arguments |= {} if difficulty is None else {"difficulty": difficulty}
     arguments |= {"render_mode": "human"} if human else {"render_mode": "rgb_array"} if video else {}
     env: gym.Env[Any, Any] = gym.make("Rover-v0", **arguments)

@@ -22,6 +22,7 @@ from rich.progress import Progress, TaskID
 
 from rover_gym import PDPolicy
 from rover_gym.cli.console import plain_errors, progress_bar, say_path
+from rover_gym.cli.scene_options import BUILT_IN, ModelName
 from rover_gym.policy import (
     EvaluatedEpisode,
     IntervalEstimate,
@@ -40,7 +41,10 @@ COLUMNS = ("policy", "success", "95% interval", "time to goal, s", "energy, J/m"
 @plain_errors
 def evaluate(
     policies: Annotated[list[Path], typer.Argument(exists=True, help="Folders of runs or of policies.")],
-    terrain: Annotated[str, typer.Option(help="'plane' or 'sphere_field'.")] = "sphere_field",
+    terrain: Annotated[
+        str, typer.Option(help="'plane', 'sphere_field', 'hills', or the file of a map or a mesh.")
+    ] = "sphere_field",
+    model: ModelName = BUILT_IN,
     difficulty: Annotated[float | None, typer.Option(help="Of the rocks, from 0 to 1.")] = None,
     slope: Annotated[float | None, typer.Option(help="Of the plane, degrees.")] = None,
     episodes: Annotated[int, typer.Option(min=1, help="Of each policy.")] = 500,
@@ -55,6 +59,7 @@ def evaluate(
 ) -> None:
     """Drive every policy and the baseline over the same fields."""
     arguments: dict[str, Any] = {"terrain": terrain}
+    arguments |= {} if model == BUILT_IN else {"model": model}
     arguments |= {} if difficulty is None else {"difficulty": difficulty}
     arguments |= {} if slope is None else {"slope_deg": slope}
     seeds = range(seed, seed + episodes)

@@ -51,6 +51,13 @@ def heights_of(terrain: Terrain, points: npt.ArrayLike) -> Array:
     return np.asarray(terrain.heights(places))
 
 
+def surface_heights(terrain: Terrain, points: npt.ArrayLike) -> Array:
+    """`(n,)` height of the highest height field or mesh of a terrain at (x, z), m; nan where there is none."""
+    places = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    found = [surface.heights(places) for surface in surfaces_of(terrain)]
+    return np.asarray(np.fmax.reduce(found)) if found else np.full(len(places), np.nan)
+
+
 def triangles_of(
     surface: HeightField | TriangleMesh, low: npt.ArrayLike, high: npt.ArrayLike, most: int
 ) -> tuple[Array, npt.NDArray[np.int64]]:
@@ -60,14 +67,14 @@ def triangles_of(
         surface: A height field or a mesh.
         low: Least x and z of the piece of a height field, m; a mesh is whole.
         high: Largest x and z of the piece, m.
-        most: Most heights of the piece: beyond, every second, third, ... row and column are shown.
+        most: Most heights of the piece: beyond, every second, third, ... row and column are shown, and the last ones.
     """
     if isinstance(surface, TriangleMesh):
         return np.asarray(surface.vertices), surface.triangles.astype(np.int64)
-    rows, columns = surface.grid.shape
+    rows, columns = surface.shape
     places = [_lines(low, high, surface, axis, count) for axis, count in ((0, columns), (1, rows))]
     step = max(1, int(np.ceil(np.sqrt(len(places[0]) * len(places[1]) / most))))
-    i, j = places[0][::step], places[1][::step]
+    i, j = (np.union1d(lines[::step], lines[-1]) for lines in places)
     heights = surface.grid[np.ix_(j, i)].astype(np.float64)
     x = surface.origin[0] + i * surface.spacing[0]
     z = surface.origin[1] + j * surface.spacing[1]

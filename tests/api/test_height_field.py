@@ -1,11 +1,16 @@
 """Height fields, meshes and unions: from arrays and files, made by a seed, driven on; bad input is refused."""
 
+import json
 import pickle
+import struct
+import tracemalloc
+import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rover_gym.maps import read_map
 from rover_gym.mechanics import (
     HeightField,
     Plane,
@@ -148,6 +153,8 @@ def test_bad_maps_are_refused(arguments: tuple[object, ...], message: str) -> No
         ({"crater_diameter": (3.0, 1.0)}, "crater_diameter"),
         ({"ripple_length": 0.0}, "ripple_length"),
         ({"longest_wave": "long"}, "longest_wave"),
+        ({"longest_wave": 0.1}, "longest_wave"),  # two cells are 0.2 m: there would be no wave at all
+        ({"crater_diameter": 1e-300}, "crater_diameter"),
         ({"size": 1e9}, "size"),
         ({"roughness": -1.0}, "roughness"),
     ],
@@ -261,7 +268,7 @@ def test_damaged_files_are_refused_by_name(tmp_path: Path, ending: str) -> None:
 
     def read(path: Path) -> object:
         if ending in ("npy", "png", "tif"):
-            return HeightField.from_file(path, spacing=1.0, height_range=(0.0, 1.0))
+            return HeightField.from_file(path, spacing=1.0, **({"height_range": (0.0, 1.0)} if ending == "png" else {}))
         return TriangleMesh.from_file(path)
 
     for size in (0, 3, 100, 5000):
@@ -280,3 +287,104 @@ def test_a_file_that_claims_to_be_enormous_is_refused_before_it_is_read(tmp_path
     path.write_bytes(b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + b"\0" * 64)
     with pytest.raises(TerrainError, match=r"huge\.npy"):
         HeightField.from_file(path, spacing=1.0)
+
+
+def a_png(columns: int, rows: int) -> bytes:
+    """A PNG of 8 bits that claims a size and holds little."""
+    chunks = [
+        (b"IHDR", struct.pack(">IIBBBBB", columns, rows, 8, 0, 0, 0, 0)),
+        (b"IDAT", zlib.compress(b"\0" * 10_000)),
+    ]
+    parts = [
+        struct.pack(">I", len(d)) + t + d + struct.pack(">I", zlib.crc32(t + d)) for t, d in [*chunks, (b"IEND", b"")]
+    ]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
+
+
+def a_glb(count: int) -> bytes:
+    """A GLB whose vertices are stated, and not there."""
+    described = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"componentType": 5126, "count": count, "type": "VEC3"}],
+    }
+    text = json.dumps(described).encode()
+    text += b" " * (-len(text) % 4)
+    return struct.pack("<5I", 0x46546C67, 2, 20 + len(text), len(text), 0x4E4F534A) + text
+
+
+def test_pictures_and_meshes_that_claim_to_be_enormous_are_refused(tmp_path: Path) -> None:
+    pytest.importorskip("PIL")
+    pytest.importorskip("trimesh")
+    for name, content, read in (
+        ("huge.png", a_png(60_000, 60_000), lambda path: HeightField.from_file(path, spacing=1.0, scale=1.0)),
+        ("wide.png", a_png(12_000, 12_000), lambda path: HeightField.from_file(path, spacing=1.0, scale=1.0)),
+        ("huge.glb", a_glb(10**9), TriangleMesh.from_file),
+    ):
+        (tmp_path / name).write_bytes(content)
+        tracemalloc.start()
+        with pytest.raises(TerrainError, match=name):
+            read(tmp_path / name)
+        assert tracemalloc.get_traced_memory()[1] < 50e6
+        tracemalloc.stop()
+
+
+def test_a_refusal_names_file_and_element(tmp_path: Path) -> None:
+    heights = np.zeros((4, 5))
+    heights[2, 3] = 1e300
+    np.save(tmp_path / "high.npy", heights)
+    (tmp_path / "far.obj").write_text("v 0 0 0\nv 0 0 1\nv 1e9 0 0\nf 1 2 3\n", encoding="utf-8")
+    (tmp_path / "nan.obj").write_text("v 0 0 0\nv 0 nan 1\nv 1 0 0\nf 1 2 3\n", encoding="utf-8")
+    pytest.importorskip("trimesh")
+    for name, element, read in (
+        ("high.npy", r"height \[2, 3\] .* got 1e\+300", lambda path: HeightField.from_file(path, spacing=1.0)),
+        ("far.obj", r"vertex 2 .* got \[1000000000.0, 0.0, 0.0\]", TriangleMesh.from_file),
+        ("nan.obj", r"vertex 1 .* got \[0.0, nan, 1.0\]", TriangleMesh.from_file),
+    ):
+        with pytest.raises(TerrainError, match=rf"{name}: {element}"):
+            read(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        ({"height_range": (0.0, 1.0)}, "height_range"),
+        ({"band": 2}, "band"),
+        ({"scale": 0.0}, "scale"),
+    ],
+)
+def test_options_that_say_nothing_about_a_file_are_refused(
+    options: dict[str, object], field: str, tmp_path: Path
+) -> None:
+    np.save(tmp_path / "map.npy", np.zeros((3, 3)))
+    with pytest.raises(TerrainError) as caught:
+        HeightField.from_file(tmp_path / "map.npy", spacing=1.0, **options)
+    assert caught.value.field == field
+    (tmp_path / "map.png").write_bytes(a_png(3, 3))
+    with pytest.raises(TerrainError, match="height_range: must come without scale"):
+        HeightField.from_file(tmp_path / "map.png", spacing=1.0, height_range=(0, 1), scale=2.0)
+
+
+@pytest.mark.parametrize(("ending", "most"), [("npy", 1.5), ("tif", 1.7), ("png", 2.2)])
+def test_reading_a_map_takes_little_more_than_the_map(ending: str, most: float, tmp_path: Path) -> None:
+    """Beside the file's own numbers, of half the map's size for a PNG, there is the map and no more copies."""
+    path, grid = tmp_path / f"map.{ending}", np.random.default_rng(1).normal(size=(2048, 2048)).astype(np.float32)
+    if ending == "npy":
+        np.save(path, grid)
+    elif ending == "png":
+        pytest.importorskip("PIL.Image").fromarray((1000 * (grid + 10.0)).astype(np.uint16)).save(path)
+    else:
+        rasterio = pytest.importorskip("rasterio")
+        profile = {"driver": "GTiff", "height": 2048, "width": 2048, "count": 1, "dtype": "float32"}
+        with rasterio.open(path, "w", transform=rasterio.Affine(1, 0, 0, 0, -1, 9), crs="EPSG:32633", **profile) as out:
+            out.write(grid, 1)
+    options = {"spacing": (1.0, 1.0), "scale": 1e-3 if ending == "png" else 1.0}
+    read_map(path, **options)  # loads the reader's package
+    tracemalloc.start()
+    heights, *_ = read_map(path, **options)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert heights.dtype == np.float32
+    assert peak < most * heights.nbytes + 40e6

@@ -9,6 +9,7 @@ import pytest
 
 from rover_gym import (
     CommandError,
+    HeightField,
     OptionError,
     Plane,
     RoverModel,
@@ -17,6 +18,7 @@ from rover_gym import (
     StateError,
     StepError,
     TerrainError,
+    Union,
 )
 from rover_gym.env import resting_pose, tilted_plane
 from rover_gym.mechanics import SimulationBatch
@@ -74,6 +76,28 @@ def test_only_what_is_excluded_is_left_out(facts: dict[str, object], kind: str) 
     simulation = made.simulation()
     assert isinstance(simulation, MirroredRoverSimulation) == (kind == "planar")
     assert len(simulation.v) == {"full": 21, "welded": 15, "planar": 7}[kind]
+
+
+def test_any_ground_is_planned() -> None:
+    hills = HeightField.fractal(12.0, 0.25, 0.05, seed=1)
+    rocks = SphereField.rocks(0.05, hills.bounds, 1, ground=hills, clear=[[0.0, 0.0, 2.0]])
+    for terrain, built in (
+        (hills, "map of 49 x 49 heights"),
+        (Union([hills, rocks]), f"map of 49 x 49 heights and {len(rocks)} spheres in a ball tree"),
+    ):
+        made = plan(Scene(terrain, steered=False, equal_torques=True))
+        assert made.kind == "full"
+        assert made.decisions[0].built == built
+        assert made.decisions[-1].built == "RoverVectorEnv with this terrain"
+        gaps = made.model.wheel_gaps(made.start, terrain)
+        assert gaps.min() > -1e-9
+        assert made.rover().step(20).is_converged
+
+
+def test_a_rover_that_cannot_steer_is_not_said_to() -> None:
+    made = plan(Scene(model=RoverModel.named("skid-steered"), steered=False, equal_torques=True))
+    assert made.kind == "full"
+    assert "no mirror image" in made.decisions[2].reason
 
 
 def test_nothing_is_welded_where_wheels_may_turn_by_themselves() -> None:

@@ -17,7 +17,7 @@ from selenium import webdriver
 from selenium.common.exceptions import TimeoutException, WebDriverException
 from selenium.webdriver.common.by import By
 
-from rover_gym import Plane, RoverModel, Simulation, SphereField
+from rover_gym import HeightField, Plane, RoverModel, Simulation, SphereField, Terrain, Union
 from rover_gym.record import Recorder, RoverRun, RoverSampler, describe, read_run
 from rover_gym.rendering.appearance import GROUND_COLOUR, TRUNK_COLOUR
 from rover_gym.replay import write_page, write_soil_page
@@ -79,11 +79,13 @@ def start_browser(profile: Path) -> webdriver.Chrome:
     return webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
 
 
-def drive(path: Path) -> RoverRun:
-    """Two seconds over a few rocks, at 10 frames a second."""
-    sim = Simulation(RoverModel(), ROCKS)
+def drive(path: Path, terrain: Terrain = ROCKS) -> RoverRun:
+    """Two seconds over a few rocks, or over another ground, at 10 frames a second."""
+    sim = Simulation(RoverModel(), terrain)
     q = np.zeros(sim.model.nq)
     q[1] = 0.4
+    if terrain is not ROCKS:
+        q = sim.model.resting_pose(terrain, (0.0, 0.0), 0.0)
     sim.set_state(q)
     sim.set_wheel_torques(np.full(6, 20.0))
     sampler = RoverSampler(sim.model)
@@ -214,6 +216,22 @@ def test_the_scene_shows_rover_rocks_and_ground_the_right_way_up(shown: Shown) -
     # Its wheels and its shadow are dark, and below it.
     dark = image.max(axis=-1) < 90.0
     assert dark[round(rows.mean()) :].mean() > 0.005
+
+
+def test_a_map_lies_under_the_rover_and_no_rock_floats_in_the_sky(tmp_path: Path) -> None:
+    """Rocks beyond the piece of the map that is shown stood in the air."""
+    field = HeightField.fractal(60.0, 0.25, 0.1, hurst=0.8, craters=0.02, crater_diameter=(1.0, 4.0), seed=3)
+    rocks = SphereField.rocks(0.05, field.bounds, 1, ground=field, clear=[[0.0, 0.0, 1.5]])
+    page = write_page(drive(tmp_path / "run.h5", Union([field, rocks])), tmp_path / "replay.html")
+    with opened(page, tmp_path / "profile") as browser:
+        go_to(browser, 1.0)
+        image = picture(browser)
+        severe = [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
+    assert severe == []
+    red, _, blue = np.moveaxis(image, -1, 0)
+    height = len(image)
+    assert (red > blue + 20.0)[height // 2 :].mean() > 0.5  # the ground
+    assert (red > blue)[: height // 8].mean() < 0.02  # the sky; a fifth of it was rocks
 
 
 def test_the_timeline_moves_the_rover(shown: Shown) -> None:

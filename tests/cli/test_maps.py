@@ -3,15 +3,17 @@
 import json
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pygltflib
 import pytest
 from typer.testing import CliRunner, Result
 
-from rover_gym import HeightField, RoverModel, Simulation, SphereField, TriangleMesh, Union
+from rover_gym import HeightField, Plane, RoverEnv, RoverModel, Simulation, SphereField, TriangleMesh, Union
 from rover_gym.cli import app
 from rover_gym.ground import parts_of, surfaces_of, triangles_of
-from rover_gym.record import Recorder, RoverSampler, describe, read_run
+from rover_gym.record import Channel, Recorder, RecordingError, RoverSampler, describe, read_run, read_trajectory
+from rover_gym.replay.scenery import first_view, goal_parts, spheres, surfaces
 
 
 def rover(*arguments: str) -> Result:
@@ -55,6 +57,26 @@ def test_it_is_plotted_and_replayed(folder: Path) -> None:
     assert "IndexedFaceSet" in (folder / "run.wrl").read_text(encoding="utf-8")
 
 
+def test_a_drive_off_the_map_is_recorded_plotted_and_replayed(tmp_path: Path) -> None:
+    """Its last step has no residual, and the axes of the figure had no end."""
+    env = RoverEnv(terrain=HeightField(np.zeros((21, 21)), 0.5), goal_distance=(2.0, 3.0))
+    env.reset(seed=0)
+    sampler, info = RoverSampler(env.model), {"termination": ""}
+    with Recorder(
+        tmp_path / "run.h5", sampler.channels, describe(env.simulation, "off"), terrain=env.simulation.terrain
+    ) as tape:
+        while not info["termination"]:
+            *_, info = env.step(np.float32([1.0] * 6 + [0.0] * 6))
+            solver = info["solver"]
+            tape.append(sampler.row(env.simulation, residual=solver["residual"], iterations=solver["iterations"]))
+    assert info["termination"] == "step_failed"
+    assert "no ground is known" in solver["message"]
+    for command in (("plot", "--output", "plots"), ("replay", "--vrml", "run.wrl")):
+        result = rover(command[0], str(tmp_path / "run.h5"), command[1], str(tmp_path / command[2]))
+        assert result.exit_code == 0, result.output
+    assert (tmp_path / "plots" / "contact-solver.png").stat().st_size > 10_000
+
+
 def test_all_parts_of_a_ground_survive_a_recording(tmp_path: Path) -> None:
     heights = np.zeros((21, 31))
     heights[3, 4] = np.nan
@@ -80,6 +102,93 @@ def test_all_parts_of_a_ground_survive_a_recording(tmp_path: Path) -> None:
     np.testing.assert_array_equal(kinds[TriangleMesh].triangles, mesh.triangles)
 
 
+@pytest.mark.parametrize("kind", ["map", "mesh", "spheres"])
+def test_a_recorded_drive_replays_with_its_materials(kind: str, tmp_path: Path) -> None:
+    """The file alone makes the simulation again: the ground with its materials, and the laws of their pairs."""
+    box = [[x, y, z] for x in (-9.0, 9.0) for y in (-1.0, 0.0) for z in (-9.0, 9.0)]
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = [(a, b, c) for a, b, c, _ in sides] + [(a, c, d) for a, _, c, d in sides]
+    pebbles = SphereField([[0.5, 0.0, 0.3], [0.9, 0.0, -0.3]], [0.05, 0.04], Plane(), material="chalk")
+    grounds = {
+        "map": HeightField(np.zeros((31, 31)), 1.0, material="ice"),
+        "mesh": TriangleMesh(box, faces, material="ice"),
+        "spheres": [pebbles, SphereField([[5.0, -1.0, 5.0]], [1.0], material="ice")],
+    }
+    laws = {("wheel", "ice"): (0.02, 0.0), ("wheel", "chalk"): (0.1, 0.0), ("wheel", "ground"): (0.9, 0.0)}
+    simulation = Simulation(RoverModel.named("skid-steered"), grounds[kind], materials=laws)
+    simulation.set_state(simulation.model.resting_pose(simulation.terrain, (0.0, 0.0), 0.0))
+    sampler, torques = RoverSampler(simulation.model), np.full(4, 12.0)
+    simulation.set_wheel_torques(torques)
+    with Recorder(
+        tmp_path / "run.h5", sampler.channels, describe(simulation, "slippery"), terrain=simulation.terrain
+    ) as tape:
+        for _ in range(20):
+            simulation.step(10)
+            tape.append(sampler.row(simulation, residual=0.0, iterations=0))
+    run = read_run(tmp_path / "run.h5")
+    assert [part.material for part in parts_of(run.terrain)] == [part.material for part in parts_of(simulation.terrain)]
+    scene = run.trajectory.attributes["scene"]
+    again = Simulation(run.model, run.terrain, **run.trajectory.attributes["solver"])
+    again.set_state(scene["q"])
+    again.set_wheel_torques(scene["wheel_torques"])
+    plain = Simulation(run.model, run.terrain)
+    plain.set_state(scene["q"])
+    plain.set_wheel_torques(scene["wheel_torques"])
+    for q in run.trajectory["q"]:
+        again.step(10)
+        plain.step(10)
+        np.testing.assert_array_equal(again.q, q)
+    assert np.abs(plain.q - q).max() > 1e-3
+
+
+def test_damaged_materials_are_refused(tmp_path: Path) -> None:
+    for name, key, value in (
+        ("surface_0_heights", "material", 3),
+        ("sphere_centres", "counts", [1, 5]),
+        ("sphere_centres", "counts", [-1, 2]),
+        ("sphere_centres", "materials", np.bytes_(b"rock")),
+    ):
+        field = HeightField(np.zeros((5, 5)), 1.0)
+        simulation = Simulation(RoverModel(), [field, SphereField([[0.0, 0.0, 0.0]], [0.1])])
+        sampler, path = RoverSampler(simulation.model), tmp_path / "damaged.h5"
+        with Recorder(path, sampler.channels, describe(simulation, "x"), terrain=simulation.terrain) as tape:
+            tape.append(sampler.row(simulation, residual=0.0, iterations=0))
+        with h5py.File(path, "r+") as file:
+            file["terrain"][name].attrs[key] = value
+        with pytest.raises(RecordingError, match=r"damaged\.h5: terrain: is no ground"):
+            read_run(path)
+
+
+def test_a_flat_map_is_not_taken_for_a_trap(tmp_path: Path) -> None:
+    """Flat maps shrink by more than the reader of a recording takes a file for sound."""
+    flat = HeightField(np.zeros((2000, 2000)), 0.5)
+    with Recorder(tmp_path / "flat.h5", [Channel("time", "s", "time")], terrain=flat, rows_per_flush=1) as tape:
+        tape.append({"time": 0.0})
+    terrain = read_trajectory(tmp_path / "flat.h5").terrain
+    assert isinstance(terrain, HeightField)
+    assert terrain.shape == flat.shape
+
+
+def test_a_replay_shows_the_goal_on_the_ground_and_no_rock_beside_the_map_that_it_shows(tmp_path: Path) -> None:
+    field = HeightField(np.full((81, 81), 2.0), 0.5)
+    rocks = SphereField([[1.0, 2.0, 1.0], [15.0, 2.0, 15.0]], [0.1, 0.2])
+    simulation = Simulation(RoverModel.named("open-rover"), [field, rocks])
+    simulation.set_state(simulation.model.resting_pose(field, (0.0, 0.0), 0.0))
+    sampler, scene = RoverSampler(simulation.model), {"goal": (3.0, -1.0)}
+    with Recorder(
+        tmp_path / "run.h5", sampler.channels, describe(simulation, "goal", scene), terrain=simulation.terrain
+    ) as tape:
+        tape.append(sampler.row(simulation, residual=0.0, iterations=0))
+    run = read_run(tmp_path / "run.h5")
+    pole, _ = goal_parts(run)
+    assert pole.position[1] - 0.5 * pole.size[1] == pytest.approx(2.0)
+    np.testing.assert_array_equal(spheres(run)[1], [0.1])
+    ((vertices, _),) = surfaces(run)
+    assert (np.abs(vertices[:, [0, 2]]) < 9.0).all()
+    view = first_view(run)
+    assert np.linalg.norm(view.eye - view.target) < 2.5  # a small rover is seen from near
+
+
 def test_a_piece_of_a_map_has_its_heights_and_no_triangles_over_holes() -> None:
     x, z = np.meshgrid(np.arange(11.0), np.arange(7.0))
     heights = 0.1 * x + 0.2 * z
@@ -95,7 +204,44 @@ def test_a_piece_of_a_map_has_its_heights_and_no_triangles_over_holes() -> None:
     assert (np.cross(b - a, c - a)[:, 1] > 0.0).all()  # counter-clockwise from above
 
 
-def test_spacing_belongs_to_a_map() -> None:
-    result = rover("drive", "--spacing", "1")
-    assert result.exit_code != 0
-    assert "spacing" in result.output
+def test_a_thinned_map_keeps_its_border() -> None:
+    for shape in ((2, 9000), (300, 301)):
+        field = HeightField(np.zeros(shape), 1.0, (0.0, 0.0))
+        vertices, triangles = triangles_of(field, (0.0, 0.0), (1e5, 1e5), 1000)
+        assert vertices[:, [2, 0]].max(axis=0).tolist() == [shape[0] - 1.0, shape[1] - 1.0]
+        assert len(triangles) > 100
+
+
+@pytest.mark.parametrize("command", ["drive", "scene"])
+def test_spacing_and_heights_belong_to_a_map(command: str) -> None:
+    for given in (("--spacing", "1"), ("--terrain", "rock.obj", "--spacing", "1"), ("--height-range", "0", "1")):
+        result = rover(command, *given)
+        assert result.exit_code == 2, result.output
+        assert result.stderr.startswith(f"error: {next(word for word in given[::-1] if word.startswith('--'))}:")
+
+
+def test_a_scene_on_a_map_has_a_plan(folder: Path) -> None:
+    place = ("--terrain", str(folder / "map.npy"), "--spacing", "0.5", "--start", "-3", "2")
+    result = rover("scene", *place, "--model", "four-steered", "--straight", "--json")
+    assert result.exit_code == 0, result.output
+    parts = {row["part"]: row for row in json.loads(result.stdout)["parts"]}
+    assert parts["ground"]["built"] == "map of 81 x 81 heights"
+    assert "face" in parts["steering"]["reason"]
+    assert "not the same left and right" in parts["base"]["reason"]
+    assert "4 joints" in parts["steering"]["built"]
+    for given, named in (
+        (("--slope", "3"), "--slope"),
+        (("--start", "90", "0"), "--start"),
+        (("--model", "nobody"), "--model"),
+    ):
+        result = rover("scene", *place, *given)
+        assert result.exit_code == 2, result.output
+        assert result.stderr.startswith(f"error: {named}: ")
+
+
+def test_a_drive_off_the_map_names_its_option(folder: Path) -> None:
+    place = ("--terrain", str(folder / "map.npy"), "--spacing", "0.5")
+    for option in ("--start", "--goal"):
+        result = rover("drive", *place, option, "90", "0")
+        assert result.exit_code == 2, result.output
+        assert result.stderr.startswith(f"error: {option}: no ground is known at x = 90 m")

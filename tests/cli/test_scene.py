@@ -54,6 +54,8 @@ def test_bad_input_is_one_line() -> None:
         (("--accuracy", "best"), "accuracy"),
         (("--slope", "90"), "slope"),
         (("--terrain", "rug", "--slope", "5"), "slope"),
+        (("--terrain", "rug", "--start", "1", "1"), "start"),
+        (("--terrain", "moon"), "terrain"),
         (("--reach", "0"), "reach"),
         (("--torque", "nan"), "torque"),
     ):

@@ -16,7 +16,7 @@ from gymnasium.utils.env_checker import check_env
 
 from rover_gym import OptionError, PDPolicy, Plane, RoverEnv, RoverGymError, SphereField, TerrainError
 from rover_gym.env import HeightScan
-from rover_gym.env.rocks import clear_radius, scan_points
+from rover_gym.env.rocks import scan_points
 from rover_gym.ground import heights_of
 from rover_gym.policy import measure_baseline, wilson_interval
 from rover_gym.policy.baseline import ENDS
@@ -195,7 +195,7 @@ def test_start_and_goal_are_clear(rocks: RoverEnv, seed: int) -> None:
     on_the_map = field.centres[:, [0, 2]]
     for place in (rocks.start.position, rocks.goal):
         distance = np.linalg.norm(on_the_map - place, axis=1) - field.radii
-        assert distance.min() >= clear_radius(rocks.model) - 1e-9
+        assert distance.min() >= rocks.model.clear_radius - 1e-9
 
 
 def test_rover_rests_on_the_ground_as_on_the_plane(rocks: RoverEnv, env: RoverEnv) -> None:

@@ -129,3 +129,36 @@ def test_a_written_rover_drives_forward_in_mujoco(tmp_path):
     # The rockers turn oppositely, as far as MuJoCo's constraint is stiff.
     left, right = (data.joint(f"{side}_rocker").qpos[0] for side in ("left", "right"))
     assert abs(left + right) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("inside", "message"),
+    [
+        (
+            '<worldbody><replicate count="100000000"><geom size="1"/></replicate></worldbody>',
+            "replicate.count.*100000000",
+        ),
+        (
+            '<worldbody><replicate count="+300"><replicate count="1e2"><geom size="1"/></replicate></replicate></worldbody>',
+            "replicate.count.*30000",
+        ),
+        ('<asset><hfield name="h" nrow="100000" ncol="100000" size="1 1 1 1"/></asset>', r"hfield.nrow.*10000000000"),
+        (
+            '<asset><texture type="2d" builtin="flat" width="99999" height="99999"/></asset>',
+            "texture.width.*9999800001",
+        ),
+        (
+            '<worldbody><body><composite count="300 300 300" type="grid"/></body></worldbody>',
+            "composite.count.*27000000",
+        ),
+    ],
+)
+def test_few_words_that_become_enormous_are_refused_before_they_do(inside, message, tmp_path):
+    """MuJoCo took minutes for the first, and asked for 40 GB for the third."""
+    for included in (False, True):
+        text = f"<mujoco>{inside}</mujoco>"
+        if included:
+            write(tmp_path, text, "inside.xml")
+            text = '<mujoco><include file="inside.xml"/></mujoco>'
+        with pytest.raises(ModelError, match=rf"(robot|inside)\.xml: line 1, {message}"):
+            RoverModel.from_mjcf(write(tmp_path, text, "robot.xml"))

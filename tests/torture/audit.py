@@ -42,9 +42,12 @@ class Audit:
         self.sim, self.ledger, self._deep = sim, ledger, deep
         self.joint_torques: Array = np.zeros(sim.model.nv - 6)
         model, description = sim.model, sim.model.to_dict()
-        self._stiffness = _gains(model, description, "stiffness")
-        self._steering = np.array(model.steering_joint_indices)
-        self._signs = model.actuation_matrix()[:, :6]
+        indices = np.array(model.steering_joint_indices)
+        # The wheels that stand for the joints that steer: several may share one, and some do not steer.
+        joints, wheels = np.unique(indices, return_index=True)
+        self._steering, self._steered = joints[joints >= 0], wheels[joints >= 0]
+        self._stiffness = _gains(model, description, self._steering)
+        self._signs = model.actuation_matrix()[:, : len(indices)]
         self._weight = model.mass * float(np.linalg.norm(sim.gravity))
         self._twin: Simulation | None = None
 
@@ -64,7 +67,9 @@ class Audit:
             with self.ledger.timed():
                 report = self.sim.step()
         except StepError as error:
-            if self.sim.snapshot() != self._start:
+            # A snapshot also holds the contacts of the last call, and a refused call has none.
+            kept = (self.sim.q == self._q).all() and (self.sim.v == self._v).all() and self.sim.time == self._time
+            if not kept:
                 self.ledger.find("a refused step changed the state")
             return self.end(1, "failed", str(error))
         return self.end(1, report.status, f"residual {report.residual:.1e}, {report.n_contacts} contacts")
@@ -73,6 +78,7 @@ class Audit:
         """Before steps that somebody else takes, after the commands are given."""
         sim = self.sim
         self._start, self._q, self._v, self._before = sim.snapshot(), sim.q, sim.v, sim.energy()
+        self._time = sim.time
 
     def end(self, steps: int, status: str, what: str = "") -> bool:
         """After them: enters what they came to.
@@ -138,7 +144,7 @@ class Audit:
         return sim.energy().total + self._stored(sim.q)
 
     def _stored(self, q: Array) -> float:
-        off = q[self._steering] - self.sim.steering
+        off = q[self._steering] - self.sim.steering[self._steered]
         return 0.5 * float(self._stiffness @ (off * off))
 
     def _work(self, turned: Array) -> float:
@@ -171,8 +177,7 @@ class Audit:
         return lifted
 
 
-def _gains(model: RoverModel, description: dict[str, Any], name: str) -> Array:
-    """(6,) stiffness, N m/rad, or damping, N m s/rad, with which the steering joints are held."""
+def _gains(model: RoverModel, description: dict[str, Any], joints: npt.NDArray[np.intp]) -> Array:
+    """Stiffness with which joints are held, N m/rad."""
     solids = {solid["name"]: solid for solid in description["solids"]}
-    names = model.dof_names
-    return np.array([solids[names[i]]["hold"][name] for i in model.steering_joint_indices])
+    return np.array([solids[model.dof_names[i]]["hold"]["stiffness"] for i in joints])

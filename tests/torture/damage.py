@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from rover_gym import (
+    HeightField,
     Plane,
     RoverEnv,
     RoverGymError,
@@ -23,6 +24,7 @@ from rover_gym import (
     Snapshot,
     SphereField,
     StepError,
+    TriangleMesh,
     solve_friction_contact,
 )
 from rover_gym.planar import BallSimulation, Line, PlanarSnapshot, Polyline, Sine, Spline, TwoWheelRoverSimulation
@@ -54,9 +56,15 @@ def _folder() -> Path:
 
 
 @cache
-def _sound_run() -> bytes:
-    """A recorded run of the rover, 25 rows."""
-    sim = Simulation(RoverModel())
+def _sound_run(kind: str) -> bytes:
+    """A recorded run of the rover, 25 rows, on a plane or on a map with rocks and a boulder."""
+    corners = [[3.0, -1.0, -1.0], [5.0, -1.0, -1.0], [4.0, -1.0, 1.0], [4.0, 0.5, 0.0]]
+    parts = [
+        HeightField.fractal(12.0, 0.5, 0.1, seed=1),
+        SphereField([[2.0, 0.0, 2.0]], [0.2]),
+        TriangleMesh(corners, [[0, 2, 3], [2, 1, 3], [1, 0, 3], [0, 1, 2]]),
+    ]
+    sim = Simulation(RoverModel(), Plane() if kind == "plane" else parts)
     sampler = RoverSampler(sim.model)
     path = _folder() / "sound.h5"
     with Recorder(path, sampler.channels, describe(sim, "a drop"), terrain=sim.terrain, rows_per_flush=10) as recorder:
@@ -117,9 +125,9 @@ def use(ledger: Ledger, what: str, sim: Any) -> None:
 def runs(random: Random, ledger: Ledger) -> None:
     """Recorded runs with bytes, data sets, attributes and links changed."""
     path = _folder() / "run.h5"
-    for _ in range(15):
+    for turn in range(16):
         path.unlink(missing_ok=True)
-        path.write_bytes(_sound_run())
+        path.write_bytes(_sound_run("map" if turn % 2 else "plane"))
         mutate_hdf5(random, path, _elsewhere())
         run = attempt(ledger, "read_run", lambda: read_run(path))
         if run is None:
@@ -307,6 +315,34 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "clear": [[0.0, 0.0, 0.5]],
         },
     ),
+    "HeightField": (
+        HeightField,
+        {"heights": np.zeros((9, 9)), "spacing": 0.5, "origin": (-2.0, -2.0), "material": "ground"},
+    ),
+    "HeightField.fractal": (
+        HeightField.fractal,
+        {
+            "size": 6.0,
+            "spacing": 0.5,
+            "roughness": 0.05,
+            "hurst": 0.7,
+            "longest_wave": 3.0,
+            "craters": 0.1,
+            "crater_diameter": (0.5, 2.0),
+            "ripple_height": 0.05,
+            "ripple_length": 1.0,
+            "seed": 1,
+            "origin": (-3.0, -3.0),
+        },
+    ),
+    "TriangleMesh": (
+        TriangleMesh,
+        {
+            "vertices": [[-3.0, 0.0, -3.0], [3.0, 0.0, -3.0], [0.0, 0.0, 3.0]],
+            "triangles": [[0, 2, 1]],
+            "material": "rock",
+        },
+    ),
     "Simulation": (
         Simulation,
         {
@@ -423,7 +459,7 @@ def _use_all(ledger: Ledger, what: str, made: Any) -> None:
     """Steps what can be stepped, stands a machine on what is ground, resets what is an environment."""
     if isinstance(made, Simulation | BallSimulation | TwoWheelRoverSimulation):
         use(ledger, what, made)
-    elif isinstance(made, Plane | SphereField):
+    elif isinstance(made, Plane | SphereField | HeightField | TriangleMesh):
         attempt(ledger, what, lambda: use(ledger, what, Simulation(terrain=made)))
     elif isinstance(made, RoverEnv):
         attempt(ledger, what, lambda: made.reset(seed=1))

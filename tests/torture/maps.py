@@ -1,4 +1,4 @@
-"""Damaged maps and meshes, and arrays of all kinds as ground: refused with an error of ours, or driven on."""
+"""Maps and meshes as ground: damaged ones are refused with an error of ours, others are driven on by any rover."""
 
 from __future__ import annotations
 
@@ -10,16 +10,23 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym import HeightField, RoverModel, Simulation, TriangleMesh, Union
+from rover_gym import HeightField, RoverEnv, RoverModel, Simulation, SphereField, TriangleMesh, Union
+from torture.audit import Audit
 from torture.damage import INPUTS, _folder, attempt, use
+from torture.drives import log_uniform, variant
 from torture.ledger import Ledger
 from torture.mutate import mutate_array, mutate_bytes, mutate_value
-from torture.regime import Regime
+from torture.regime import Bounds, Regime
 
 Random = np.random.Generator
 
 #: Packages that read the formats.
-READERS = {"npy": "numpy", "png": "PIL", "tif": "rasterio", "obj": "trimesh", "ply": "trimesh", "stl": "trimesh"}
+READERS = {"npy": "numpy", "png": "PIL", "tif": "rasterio"} | dict.fromkeys(
+    ("obj", "ply", "stl", "off", "glb"), "trimesh"
+)
+
+#: Bytes of a file in which its size and kind are said.
+HEAD = 600
 
 
 @cache
@@ -68,17 +75,19 @@ def _drive(ledger: Ledger, what: str, ground: Any) -> None:
 
 def _read(path: Path) -> Any:
     if path.suffix in (".npy", ".png", ".tif"):
-        return HeightField.from_file(path, spacing=0.25, height_range=(-0.2, 0.2))
+        options = {"height_range": (-0.2, 0.2)} if path.suffix == ".png" else {}
+        return HeightField.from_file(path, spacing=0.25, **options)
     return TriangleMesh.from_file(path)
 
 
 def files(random: Random, ledger: Ledger) -> None:
-    """Files of every format with bytes changed, cut off, doubled and moved."""
+    """Files of every format with bytes changed, cut off, doubled and moved, anywhere or at their beginning."""
     endings = [name for name, package in READERS.items() if importlib.util.find_spec(package) is not None]
-    for turn in range(12):
+    for turn in range(16):
         ending = endings[turn % len(endings)]
-        path = _folder() / f"ground.{ending}"
-        path.write_bytes(mutate_bytes(random, _sound(ending)))
+        path, sound = _folder() / f"ground.{ending}", _sound(ending)
+        kept = 0 if turn < len(endings) else HEAD
+        path.write_bytes(mutate_bytes(random, sound[: kept or None]) + sound[kept or len(sound) :])
         found = attempt(ledger, f"a damaged .{ending}", lambda path=path: _read(path))
         if isinstance(found, HeightField):
             _drive(ledger, f"a damaged .{ending}", found)
@@ -105,7 +114,132 @@ def arrays(random: Random, ledger: Ledger) -> None:
             _drive(ledger, "a changed mesh", [field, mesh])
 
 
+def _rover(random: Random) -> RoverModel:
+    """One of the gallery."""
+    return RoverModel.named(str(random.choice(RoverModel.names())))
+
+
+def _terrain(random: Random, model: RoverModel, size: float) -> Any:
+    """A made map around the origin that suits a rover, with or without rocks and a boulder of triangles on it.
+
+    Args:
+        random: Draws it.
+        model: The rover, whose wheels give the measure of cells and waves.
+        size: Of the map, m.
+    """
+    wheel = float(model.wheel_radii.max())
+    field = HeightField.fractal(
+        size,
+        max(log_uniform(random, 0.2, 4.0) * wheel, size / 400),
+        random.uniform(0.0, 1.0) * wheel,
+        hurst=random.uniform(0.5, 1.0),
+        craters=float(random.choice([0.0, 0.02])),
+        crater_diameter=(4.0 * wheel, 20.0 * wheel),
+        ripple_height=float(random.choice([0.0, 0.3 * wheel])),
+        ripple_length=5.0 * wheel,
+        seed=int(random.integers(2**31)),
+    )
+    parts: list[Any] = [field]
+    start = [[0.0, 0.0, model.clear_radius]]
+    if random.uniform() < 0.5:
+        area, seed = np.array(field.bounds) * 0.9, int(random.integers(2**31))
+        rocks = {"min_diameter": 0.3 * wheel, "max_diameter": 1.5 * wheel, "clear": start, "ground": field}
+        parts.append(SphereField.rocks(random.uniform(0.01, 0.1), area, seed, **rocks))
+    if random.uniform() < 0.3:
+        corners = np.array([(0, 2, 0), (2, 0, 0), (0, 0, 2), (-2, 0, 0), (0, 0, -2), (0, -2, 0)]) * wheel
+        faces = [(0, 2, 1), (0, 3, 2), (0, 4, 3), (0, 1, 4), (5, 1, 2), (5, 2, 3), (5, 3, 4), (5, 4, 1)]
+        angle = random.uniform(-np.pi, np.pi)
+        x, z = (model.clear_radius + 3.0 * wheel) * np.array([np.cos(angle), np.sin(angle)])
+        parts.append(TriangleMesh(corners + np.array([x, field.heights([[x, z]])[0], z]), faces))
+    return parts
+
+
+def _commanded(random: Random, audit: Audit, periods: int, steps: int) -> None:
+    """Random torques and steering angles within the limits of any rover."""
+    sim = audit.sim
+    model = sim.model
+    for _ in range(periods):
+        n = len(model.wheel_names)
+        sim.set_wheel_torques(np.array(model.wheel_torque_limits) * random.uniform(-1.0, 1.0, n))
+        steers = np.array(model.steering_joint_indices) >= 0
+        sim.set_steering(steers * model.steering_limit * random.uniform(-1.0, 1.0, n))
+        if not audit.run(steps):
+            return
+
+
+def hills(random: Random, ledger: Ledger) -> None:
+    """Any rover of the gallery on made maps with rocks and boulders, at steps of 1 to 10 ms."""
+    model = _rover(random)
+    ground = _terrain(random, model, 60.0 * model.clear_radius)
+    step, mu = log_uniform(random, 1e-3, 1e-2), random.uniform(0.2, 1.2)
+    sim = Simulation(model, ground, variant=variant(random), time_step=step, friction=mu)
+    sim.set_state(model.resting_pose(ground, (0.0, 0.0), random.uniform(-np.pi, np.pi)))
+    _commanded(random, Audit(sim, ledger), 30, 20)
+
+
+def dropped(random: Random, ledger: Ledger) -> None:
+    """Any rover of the gallery dropped onto made maps, in any attitude."""
+    model = _rover(random)
+    ground = _terrain(random, model, 60.0 * model.clear_radius)
+    sim = Simulation(model, ground, variant=variant(random), time_step=log_uniform(random, 1e-3, 1e-2))
+    q = model.resting_pose(ground, (0.0, 0.0), random.uniform(-np.pi, np.pi))
+    q[1] += random.uniform(1.0, 2.0) * model.clear_radius
+    q[3], q[5] = random.uniform(-np.pi, np.pi), random.uniform(-np.pi, np.pi)
+    sim.set_state(q)
+    _commanded(random, Audit(sim, ledger), 20, 20)
+
+
+def edges(random: Random, ledger: Ledger) -> None:
+    """Driven off a map or into a hole: the step is refused and changes nothing, ever again."""
+    model = _rover(random)
+    size = 8.0 * model.clear_radius
+    field = HeightField.fractal(size, size / 40, 0.1 * float(model.wheel_radii.max()), seed=int(random.integers(2**31)))
+    heights = field.grid
+    if random.uniform() < 0.5:
+        heights[:, 32:] = np.nan
+    ground = HeightField(heights, field.spacing)
+    sim = Simulation(model, ground)
+    sim.set_state(model.resting_pose(ground, (0.0, 0.0), random.uniform(-np.pi, np.pi)))
+    sim.set_wheel_torques(0.5 * np.array(model.wheel_torque_limits))
+    audit = Audit(sim, ledger)
+    for _ in range(2):
+        audit.run(1500)
+    if ledger.refused != 2:
+        ledger.find(f"{model.name} was refused {ledger.refused} of 2 times at the edge of its map")
+
+
+def episodes(random: Random, ledger: Ledger) -> None:
+    """Environments on hills and on maps, with any rover, under random actions, through several episodes."""
+    model = _rover(random)
+    ground = "hills" if random.uniform() < 0.5 else HeightField.fractal(60.0, 0.25, 0.1, seed=int(random.integers(99)))
+    env = RoverEnv(
+        terrain=ground,
+        model=model,
+        difficulty=(0.0, 1.0) if ground == "hills" else None,
+        friction=(0.2, 1.2),
+        height_scan=bool(random.uniform() < 0.5),
+        steered=bool(random.uniform() < 0.8),
+    )
+    n = env.action_space.shape[0]
+    for _ in range(2):
+        env.reset(seed=int(random.integers(2**31)))
+        audit = Audit(env.simulation, ledger)
+        for _ in range(100):
+            audit.begin()
+            with ledger.timed():
+                observation, reward, terminated, _, info = env.step(random.uniform(-1.0, 1.0, n).astype(np.float32))
+            ledger.raise_to("reward", abs(reward))
+            if not np.isfinite(observation).all():
+                ledger.find("an observation is not finite")
+            if not audit.end(env.task.substeps, info["solver"]["status"]) or terminated:
+                break
+
+
 REGIMES = [
     Regime("damaged maps and meshes", files, 10, INPUTS),
     Regime("changed maps and meshes", arrays, 10, INPUTS),
+    Regime("maps, any rover", hills, 30),
+    Regime("maps, any rover, dropped", dropped, 30),
+    Regime("off the map and into holes", edges, 10, Bounds(refused=1.0)),
+    Regime("environments on maps, any rover", episodes, 10, Bounds(slowest=2.0)),
 ]

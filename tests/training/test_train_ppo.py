@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from typer.testing import CliRunner
 
 pytest.importorskip("stable_baselines3", reason="the extra train is not installed")
 
@@ -16,9 +17,11 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
+from rover_gym.cli import app
 from rover_gym.learning.build import build_env
 from rover_gym.learning.training_config import read_config
 from rover_gym.policy import Network, TrainedPolicy
+from rover_gym.record import read_run
 
 Script = Callable[..., Any]
 
@@ -169,6 +172,37 @@ def test_enjoy_drives(run: Path, enjoy: Script) -> None:
     result = enjoy(run, "--terrain", terrain, "--seed", 5)
     assert result.exit_code == 0, result.output
     assert "seed 5: " in result.output
+
+
+def test_a_policy_for_another_rover_trains_drives_and_is_replayed(
+    train: Script, evaluate: Script, enjoy: Script, tmp_path: Path
+) -> None:
+    config = yaml.safe_load(a_config(tmp_path, "plane").read_text(encoding="utf-8"))
+    config["environment"]["model"] = "skid-steered"
+    config |= {"total_steps": 256, "max_episode_steps": 40, "evaluation": {"every": 256, "episodes": 2}}
+    config["ppo"] |= {"n_steps": 32, "batch_size": 64}
+    path = tmp_path / "skid.yaml"
+    path.write_text(yaml.safe_dump(config), encoding="utf-8")
+    result = train("--config", path, "--output", tmp_path / "run", "--no-progress")
+    assert result.exit_code == 0, result.output
+    policy = tmp_path / "run" / "policy"
+    card = json.loads((policy / "policy.json").read_text(encoding="utf-8"))
+    assert card["source"]["model"] == "skid-steered"
+
+    ground = ("--terrain", "plane", "--model", "skid-steered")
+    result = evaluate(policy, *ground, "--episodes", 2, "--output", tmp_path / "evaluation")
+    assert result.exit_code == 0, result.output
+    assert enjoy(policy, *ground, "--seed", 5).exit_code == 0
+    result = evaluate(policy, "--terrain", "plane", "--episodes", 1, "--output", tmp_path / "wrong")
+    assert result.exit_code == 2
+    assert "for a model like 'skid-steered'" in result.stderr
+
+    drive = ["drive", "--policy", policy, "--model", "skid-steered", "--time-limit", 1, "--output", tmp_path / "drive"]
+    replay = ["replay", tmp_path / "drive" / "episode-0.h5", "--vrml", tmp_path / "run.wrl"]
+    for command in (drive, replay):
+        result = CliRunner().invoke(app, [str(entry) for entry in command])
+        assert result.exit_code == 0, result.output
+    assert read_run(tmp_path / "drive" / "episode-0.h5").model.name == "skid-steered"
 
 
 def test_a_wrong_configuration_is_one_line(train: Script, tmp_path: Path) -> None:

@@ -30,6 +30,9 @@ SET_BY = {
     "format": ("file_format", "--format"),
     "torques": ("torque", "--torque"),
     "wheels": ("wheel", "--wheel"),
+    "position": ("start", "--start"),
+    "options.position": ("start", "--start"),
+    "options.goal": ("goal", "--goal"),
 }
 #: If set to any value, the commands show the traceback of an error.
 DEBUG = "ROVER_DEBUG"

@@ -25,11 +25,10 @@ from rover_gym.cli.console import (
     progress_bar,
     say_path,
 )
+from rover_gym.cli.scene_options import BUILT_IN, HeightRange, ModelName, Spacing, Start, named_ground, named_model
 from rover_gym.env.rewards import WEIGHTS
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.maps.terrain_files import is_terrain_file, open_terrain
 from rover_gym.mechanics import OptionError
-from rover_gym.models import open_model
 from rover_gym.policy.episodes import Episode, Policy, run_episode
 from rover_gym.policy.pd_policy import PDPolicy
 from rover_gym.policy.shipped import find_policy, policy_arguments
@@ -51,12 +50,9 @@ def drive(
         str,
         typer.Option(help="The ground: 'plane', 'sphere_field' for rocks, 'hills', or the file of a map or a mesh."),
     ] = "plane",
-    spacing: Annotated[
-        float | None, typer.Option(help="Distance of a map's columns and rows, m, where its file does not give it.")
-    ] = None,
-    model: Annotated[
-        str, typer.Option(help="The rover: a name of the gallery, or a model's file (TOML, URDF, MJCF).")
-    ] = "rover",
+    spacing: Spacing = None,
+    height_range: HeightRange = None,
+    model: ModelName = BUILT_IN,
     difficulty: Annotated[
         float | None, typer.Option(help="Difficulty of the rocks, from 0 to 1. Default: 0.5.")
     ] = None,
@@ -69,9 +65,7 @@ def drive(
     heading: Annotated[
         float | None, typer.Option(help="Start heading, degrees to the left of x. Default: random.")
     ] = None,
-    start: Annotated[
-        tuple[float, float] | None, typer.Option(metavar="X Z", help="Start on the map, m. Default: 0 0.")
-    ] = None,
+    start: Start = None,
     goal: Annotated[
         tuple[float, float] | None, typer.Option(metavar="X Z", help="Goal on the map, m. Default: random.")
     ] = None,
@@ -113,17 +107,15 @@ def drive(
     arguments |= {} if uphill is None else {"uphill_deg": uphill}
     arguments |= {} if heading is None else {"heading_deg": heading}
     options = {name: place for name, place in (("position", start), ("goal", goal)) if place is not None}
-    told = arguments | ({} if model == "rover" else {"model": model})
-    if model != "rover":
-        arguments["model"] = open_model(model)
-    if is_terrain_file(terrain):
-        given = {} if spacing is None else {"spacing": spacing}
-        arguments["terrain"] = open_terrain(terrain, **given)
-    elif spacing is not None:
-        refuse(OptionError, "spacing", spacing, "needs a map's file as terrain")
+    named = {"model": model, "spacing": spacing, "height_range": height_range}
+    as_given = arguments | {name: value for name, value in named.items() if value not in (None, BUILT_IN)}
+    if (rover := named_model(model)) is not None:
+        arguments["model"] = rover
+    if (ground := named_ground(terrain, spacing, height_range)) is not None:
+        arguments["terrain"] = ground
     folder = find_policy(policy, terrain)
     trained = {} if folder is None else policy_arguments(folder)
-    arguments, told = arguments | trained, told | trained
+    arguments, as_given = arguments | trained, as_given | trained
     filming: dict[str, Any] = {}
     if video is not None:
         filming = {"render_mode": "rgb_array", "render_options": {"antialiasing": True}}
@@ -141,7 +133,7 @@ def drive(
             for now in range(seed, seed + episodes):
                 path = None if output is None else output / f"episode-{now}.h5"
                 paths += [path] if path else []
-                results.append(_drive_one(env, driver, name, now, told, options, path, bar, film))
+                results.append(_drive_one(env, driver, name, now, as_given, options, path, bar, film))
         except KeyboardInterrupt:
             interrupted = True
 
@@ -150,7 +142,7 @@ def drive(
     if output is not None:
         summary = {
             "policy": policy,
-            "arguments": told | options,
+            "arguments": as_given | options,
             "episodes": [asdict(episode) for episode in results],
         }
         paths.append(output / "summary.json")

@@ -4,18 +4,18 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
-from enum import StrEnum
 from typing import Annotated
 
 import numpy as np
+import numpy.typing as npt
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from rover_gym.cli.console import LARGEST_SEED, console, plain_errors, progress_bar
-from rover_gym.env.rocks import clear_radius
+from rover_gym.cli.scene_options import BUILT_IN, HeightRange, ModelName, Spacing, Start, named_ground, named_model
 from rover_gym.env.start import tilted_plane
-from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField
+from rover_gym.mechanics import OptionError, Plane, RoverModel, SphereField, Terrain
 from rover_gym.planning.economy import Economy, measure_economies
 from rover_gym.planning.planner import plan
 from rover_gym.planning.scene import Accuracy, Scene
@@ -27,18 +27,20 @@ from rover_gym.validation import number, refuse
 CLEARING = 3.0
 
 
-class SceneTerrain(StrEnum):
-    """Grounds that can be chosen by name."""
-
-    plane = "plane"
-    rocks = "rocks"
-    rug = "rug"
+#: Grounds that can be chosen by name.
+GROUNDS = ("plane", "rocks", "rug")
 
 
 @plain_errors
 def scene(
     *,
-    terrain: Annotated[SceneTerrain, typer.Option(help="The ground.")] = SceneTerrain.plane,
+    terrain: Annotated[
+        str, typer.Option(help="The ground: 'plane', 'rocks', 'rug', or the file of a map or a mesh.")
+    ] = "plane",
+    spacing: Spacing = None,
+    height_range: HeightRange = None,
+    model: ModelName = BUILT_IN,
+    start: Start = None,
     slope: Annotated[float, typer.Option(help="Slope of the plane or rocks, degrees, rising along x.")] = 0.0,
     heading: Annotated[float, typer.Option(help="Start heading, degrees to the left of x.")] = 0.0,
     straight: Annotated[
@@ -66,9 +68,24 @@ def scene(
     and --measure one line is printed.
     """
     number("torque", torque)
-    made = plan(
-        _scene(terrain, slope, heading, straight, held, tumbles, reach, seed), _accuracy(accuracy), planar=planar
+    rover = named_model(model) or RoverModel()
+    ground: Terrain | None = named_ground(terrain, spacing, height_range)
+    if slope and (ground is not None or terrain == "rug"):
+        refuse(OptionError, "slope", slope, "is the ground's own")
+    if ground is None:
+        ground = _ground(terrain, rover, slope, seed)
+    described = Scene(
+        ground,
+        rover,
+        _start(terrain, ground, rover, start, heading),
+        math.radians(heading),
+        steered=not straight,
+        equal_torques=straight,
+        held=held,
+        tumbles=tumbles,
+        reach=reach,
     )
+    made = plan(described, _accuracy(accuracy), planar=planar)
     economies: list[Economy] = []
     if measure:
         with progress_bar() as bar:
@@ -108,44 +125,33 @@ def _accuracy(text: str) -> Accuracy:
     return number("accuracy", metres, above=0.0)
 
 
-def _scene(
-    terrain: SceneTerrain,
-    slope: float,
-    heading: float,
-    straight: bool,
-    held: bool,
-    tumbles: bool,
-    reach: float | None,
-    seed: int,
-) -> Scene:
+def _ground(terrain: str, model: RoverModel, slope: float, seed: int) -> Plane | SphereField:
+    """The ground of a name."""
     steepness = math.radians(number("slope", slope, at_least=-60.0, at_most=60.0))
     plane = tilted_plane(steepness, 0.0) if steepness else Plane()
-    model = RoverModel()
-    ground: Plane | SphereField = plane
-    start = None
-    if terrain is SceneTerrain.rocks:
-        clear = ((0.0, 0.0, CLEARING + clear_radius(model)),)
-        ground = SphereField.rocks(
-            0.1, (-4.0, -4.0, 26.0, 4.0), seed, max_diameter=0.2, ground=plane, clear=np.array(clear)
-        )
-    elif terrain is SceneTerrain.rug:
-        if slope:
-            refuse(OptionError, "slope", slope, "the rug has no slope to choose")
-        ground = SphereField.rug()
+    if terrain == "plane":
+        return plane
+    if terrain == "rocks":
+        clear = np.array(((0.0, 0.0, CLEARING + model.clear_radius),))
+        return SphereField.rocks(0.1, (-4.0, -4.0, 26.0, 4.0), seed, max_diameter=0.2, ground=plane, clear=clear)
+    if terrain != "rug":
+        refuse(OptionError, "terrain", terrain, f"must be {', '.join(GROUNDS)}, or the file of a map or a mesh")
+    return SphereField.rug()
+
+
+def _start(
+    terrain: str, ground: Terrain, model: RoverModel, place: tuple[float, float] | None, heading: float
+) -> npt.NDArray[np.float64] | None:
+    """The start: above the rug, else at rest at a place; None for the place that a scene takes by itself."""
+    turned = math.radians(number("heading", heading))
+    if terrain == "rug":
+        if place is not None:
+            refuse(OptionError, "start", place, "is above the middle of the rug's edge")
         start = np.zeros(model.nq)
         start[:3] = START
-        start[4] = math.radians(number("heading", heading))
-    return Scene(
-        ground,
-        model,
-        start,
-        math.radians(number("heading", heading)),
-        steered=not straight,
-        equal_torques=straight,
-        held=held,
-        tumbles=tumbles,
-        reach=reach,
-    )
+        start[4] = turned
+        return start
+    return None if place is None else model.resting_pose(ground, place, turned)
 
 
 def _explained(made: ScenePlan) -> Table:

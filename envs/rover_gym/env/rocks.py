@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.start import Point
-from rover_gym.mechanics import OptionError, RoverModel, sin_cos
+from rover_gym.mechanics import OptionError, sin_cos
 from rover_gym.validation import Range, number, refuse, vector
 
 DEFAULT_DIFFICULTY = 0.5
@@ -54,11 +54,6 @@ class Rocks:
     abundance: float
     max_radius: float
     seed: int
-
-
-def clear_radius(model: RoverModel) -> float:
-    """Radius of the clearings, m: the wheels' largest reach from the trunk's origin plus 0.1 m."""
-    return model.clear_radius
 
 
 @dataclass(frozen=True)

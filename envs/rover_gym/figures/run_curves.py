@@ -173,12 +173,19 @@ def contact_solver(figure: Sheet, run: RoverRun) -> None:
     above, below = figure.subplots(2, 1, sharex=True)
     residual = run.trajectory["solver_residual"]
     tolerance = run.trajectory.attributes.get("solver", {}).get("tolerance")
-    values = residual[residual > 0.0]  # without a contact there is nothing to solve
+    failed = ~np.isfinite(residual)  # a step that could not be taken
+    values = residual[(residual > 0.0) & ~failed]  # without a contact there is nothing to solve
     values = np.append(values, [1e-15] if tolerance is None else [tolerance, 1e-3 * tolerance])
     above.set_yscale("log")
     above.set_ylim(values.min() / 3.0, 3.0 * values.max())
     dots: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 3.0, "color": QUANTITY_COLOURS[0]}
-    above.plot(run.time, np.where(residual > 0.0, residual, np.nan), label="worst residual since the last row", **dots)
+    shown = np.where((residual > 0.0) & ~failed, residual, np.nan)
+    above.plot(run.time, shown, label="worst residual since the last row", **dots)
+    if failed.any():
+        cross = {"linestyle": "none", "marker": "x", "color": DARK}
+        above.plot(
+            run.time[failed], np.full(failed.sum(), values.max()), label="a step that could not be taken", **cross
+        )
     if tolerance is not None:
         above.axhline(tolerance, color=QUANTITY_COLOURS[1], linewidth=1.0, label=f"tolerance, {tolerance:g}")
     above.set(ylabel="residual (1)")

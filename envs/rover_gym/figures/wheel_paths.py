@@ -10,7 +10,7 @@ from rover_gym.extras import require
 from rover_gym.figures.derived_signals import Array
 from rover_gym.figures.style import title
 from rover_gym.figures.wheel_style import WheelStyle
-from rover_gym.ground import parts_of, plane_of, spheres_of, surfaces_of
+from rover_gym.ground import parts_of, plane_of, spheres_of, surface_heights, surfaces_of
 from rover_gym.mechanics import SphereField, Terrain
 
 if TYPE_CHECKING:
@@ -73,14 +73,13 @@ def path_from_above(figure: Sheet, run: RoverRun) -> None:
 def footprints(terrain: Terrain) -> Footprints:
     """The parts of a terrain's spheres above its ground."""
     (centres, radii), ground = spheres_of(terrain), plane_of(terrain)
-    surfaces = surfaces_of(terrain)
-    if ground is None and surfaces:
-        distance = centres[:, 1] - np.fmax.reduce([surface.heights(centres[:, [0, 2]]) for surface in surfaces])
-        at_ground = np.sqrt(np.maximum(radii**2 - np.minimum(np.nan_to_num(distance), 0.0) ** 2, 0.0))
-        return Footprints(centres[:, [0, 2]], at_ground, np.nan_to_num(distance) + radii)
-    if ground is None:
+    # Distance of the centres from the ground.
+    if ground is not None:
+        distance = centres @ ground.normal + ground.offset
+    elif surfaces_of(terrain):
+        distance = np.nan_to_num(centres[:, 1] - surface_heights(terrain, centres[:, [0, 2]]))
+    else:
         return Footprints(centres[:, [0, 2]], radii, centres[:, 1] + radii)
-    distance = centres @ ground.normal + ground.offset  # of the centres from the ground
     at_ground = np.sqrt(np.maximum(radii**2 - np.minimum(distance, 0.0) ** 2, 0.0))
     return Footprints(centres[:, [0, 2]], at_ground, distance + radii)
 
@@ -91,8 +90,7 @@ def _draw_heights(figure: Sheet, axes: Axes, terrain: Terrain) -> None:
     z, x = np.linspace(left, right, 150), np.linspace(bottom, top, 100)
     grid_z, grid_x = np.meshgrid(z, x)
     places = np.column_stack((grid_x.ravel(), grid_z.ravel()))
-    surfaces = surfaces_of(terrain)
-    heights = np.fmax.reduce([surface.heights(places) for surface in surfaces]).reshape(grid_x.shape)
+    heights = surface_heights(terrain, places).reshape(grid_x.shape)
     filled = axes.contourf(z, x, np.ma.masked_invalid(heights), levels=20, cmap="copper", alpha=0.45, zorder=0)
     figure.colorbar(filled, ax=axes, shrink=0.8, pad=0.02, label="height of the ground (m)")
 

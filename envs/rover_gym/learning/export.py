@@ -42,12 +42,13 @@ def export(
     folder.mkdir(parents=True, exist_ok=True)
     network_of(model, normalisation).save(folder / "policy.npz")
     seen = {name: value for name, value in config.environment.items() if name == "height_scan"}
+    driven = rover(config.environment)
     card = PolicyCard(
         environment=seen,
         pool=config.pool,
-        hold=config.repeat * rover(config.environment).dt,
+        hold=config.repeat * driven.dt,
         command=config.command,
         guided=config.guided,
-        source=source,
+        source={**source, "model": driven.model.name},
     )
     card.save(folder / "policy.json")

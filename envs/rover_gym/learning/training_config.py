@@ -139,8 +139,8 @@ class TrainingConfig:
     def __post_init__(self) -> None:
         for name in ("total_steps", "num_envs", "threads", "max_episode_steps", "repeat", "pool", "checkpoint_every"):
             number(name, getattr(self, name), at_least=1)
-        if self.curriculum is not None and self.environment.get("terrain") != "sphere_field":
-            refuse(OptionError, "curriculum", self.curriculum, "needs environment.terrain 'sphere_field'")
+        if self.curriculum is not None and self.environment.get("terrain") not in ("sphere_field", "hills"):
+            refuse(OptionError, "curriculum", self.curriculum, "needs environment.terrain 'sphere_field' or 'hills'")
         for arguments in (self.environment, {**self.environment, **self.evaluation.environment}):
             Features(rover(arguments), self.pool)
 

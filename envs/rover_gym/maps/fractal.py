@@ -15,14 +15,17 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import TerrainError
-from rover_gym.validation import number, refuse
+from rover_gym.validation import number, refuse, whole
 
 Heights: TypeAlias = npt.NDArray[np.float64]
 Pair: TypeAlias = tuple[float, float]
 
-#: Most heights of a map, and most craters.
-MOST_HEIGHTS = 10**8
+#: Most heights of a map, whose waves take 110 bytes a height, and most craters.
+MOST_HEIGHTS = 4 * 10**7
 MOST_CRATERS = 10**6
+
+#: Smallest diameter of a crater, m.
+LEAST_DIAMETER = 1e-3
 
 #: Depth from rim to floor and height of the rim, as shares of the diameter.
 CRATER_DEPTH = 0.2
@@ -75,19 +78,16 @@ def fractal_map(
     if max(counts) > MOST_HEIGHTS or (counts[0] + 2) * (counts[1] + 2) > MOST_HEIGHTS:
         refuse(TerrainError, "size", size, f"makes more than {MOST_HEIGHTS} heights")
     columns, rows = (max(2, math.floor(n + 0.5) + 1) for n in counts)
-    longest = (
-        0.5 * min(extent)
-        if longest_wave is None
-        else number("longest_wave", longest_wave, above=0.0, error=TerrainError)
-    )
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        refuse(TerrainError, "seed", seed, "must be a whole number that is not negative")
-    random = np.random.default_rng(int(seed))
+    longest = 0.5 * min(extent)
+    if longest_wave is not None:
+        longest = number("longest_wave", longest_wave, at_least=2.0 * max(step), error=TerrainError)
+    random = np.random.default_rng(whole("seed", seed, error=TerrainError))
     place = (-0.5 * step[0] * (columns - 1), -0.5 * step[1] * (rows - 1)) if origin is None else _pair("origin", origin)
 
     heights = _rough(random, (rows, columns), step, rms, exponent, longest)
     density = number("craters", craters, at_least=0.0, error=TerrainError)
     smallest, largest = _pair("crater_diameter", crater_diameter, above=0.0)
+    number("crater_diameter", smallest, at_least=LEAST_DIAMETER, error=TerrainError)
     if largest < smallest:
         refuse(TerrainError, "crater_diameter", crater_diameter, "must be the smallest and the largest")
     if density > 0.0:

@@ -1,27 +1,44 @@
 """Maps of heights from GeoTIFF, PNG and .npy files.
 
-A file is checked before it is read into memory, and every error names it.
+A file's size is checked before it is read into memory, and every error names the file. Beside the numbers of the file
+there is never more than the map itself: they are converted some rows at a time, and in place where they are float32.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable
-from pathlib import Path
-from typing import Any, NoReturn, TypeAlias
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.extras import require
+from rover_gym.maps.ground_file import GroundFile
 from rover_gym.mechanics import TerrainError
 from rover_gym.validation import number, refuse
 
 Heights: TypeAlias = npt.NDArray[np.float32]
 Pair: TypeAlias = tuple[float, float]
 
-#: Most heights of a file: a terrain takes seven times as many, a machine of 8 GB this many.
+#: Endings of the formats.
+ENDINGS = (".tif", ".tiff", ".png", ".npy")
+
+#: Most heights of a file, 400 MB as a terrain.
 MOST_HEIGHTS = 10**8
+
+#: Largest height of a terrain, m, and how many heights are converted at a time.
+HIGHEST, CHUNK = 1e6, 2**18
+
+#: Memory in which GDAL keeps what it has read, MB.
+CACHE = 16
+
+#: Numbers of a GeoTIFF beyond this are no data: some mark it with the smallest number of their type and do not say so.
+NUMBERS_END = 1e30
+
+#: Range of the distance of columns and rows, m.
+SPACINGS = (1e-4, 1e6)
 
 #: Units of height that a GeoTIFF names, m.
 UNITS = {
@@ -41,29 +58,65 @@ UNITS = {
 }
 
 
-class _File:
-    """A map's file and what the caller has said of it."""
+@dataclass(frozen=True)
+class _Numbers:
+    """The numbers of a file, of any type; what they mean is `factor` times a number plus `offset`.
 
-    def __init__(self, path: Path, scale: float | None, datum: float | None) -> None:
-        self.path, self.scale, self.datum = path, scale, datum
+    Attributes:
+        values: `(rows, columns)`.
+        missing: `(rows, columns)` bool, where there is no data; None if there is everywhere.
+        factor: As above.
+        offset: As above.
+        end: A larger meaning is no data.
+    """
 
-    def refuse(self, reason: str, value: object = None) -> NoReturn:
-        refuse(TerrainError, "path", str(self.path) if value is None else value, f"{self.path}: {reason}")
+    values: npt.NDArray[Any]
+    missing: npt.NDArray[np.bool_] | None = None
+    factor: float = 1.0
+    offset: float = 0.0
+    end: float = np.inf
 
-    def check_shape(self, shape: tuple[int, ...]) -> None:
-        if len(shape) != 2 or min(shape) < 2:
-            self.refuse(f"a map needs rows and columns, at least 2 x 2, the file has shape {shape}", shape)
-        if shape[0] * shape[1] > MOST_HEIGHTS:
-            self.refuse(f"at most {MOST_HEIGHTS} heights are read, the file has {shape[0]} x {shape[1]}", shape)
+    def chunks(self) -> Iterator[slice]:
+        """Rows, some at a time."""
+        rows, columns = self.values.shape
+        step = max(1, CHUNK // columns)
+        return (slice(first, min(first + step, rows)) for first in range(0, rows, step))
 
-    def heights(self, values: npt.NDArray[Any], scale: float, datum: float) -> Heights:
-        """Values of the file as heights, m."""
-        heights = np.asarray(values, dtype=np.float64)
-        infinite = np.isinf(heights)
-        if infinite.any():
-            row, column = np.argwhere(infinite)[0]
-            self.refuse(f"height [{row}, {column}] is infinite", float(heights[row, column]))
-        return ((heights - datum) * scale).astype(np.float32)
+    def at(self, rows: slice) -> npt.NDArray[np.float64]:
+        """What the numbers of some rows mean; nan for no data."""
+        meaning = self.values[rows].astype(np.float64) * self.factor + self.offset
+        if self.missing is not None:
+            meaning[self.missing[rows]] = np.nan
+        meaning[np.abs(meaning) > self.end] = np.nan
+        return meaning
+
+    def lowest(self) -> float:
+        """The least meaning; nan if there is no data at all."""
+        return float(np.fmin.reduce([np.fmin.reduce(self.at(rows), axis=None) for rows in self.chunks()]))
+
+
+def _check_shape(file: GroundFile, shape: tuple[int, ...]) -> None:
+    """Refuses what is no map, and one that is too large to be read."""
+    if len(shape) != 2 or min(shape) < 2:
+        file.refuse(f"a map needs rows and columns, at least 2 x 2, the file has shape {shape}", shape)
+    if shape[0] * shape[1] > MOST_HEIGHTS:
+        file.refuse(f"at most {MOST_HEIGHTS} heights are read, the file has {shape[0]} x {shape[1]}", shape)
+
+
+def _heights(file: GroundFile, numbers: _Numbers, scale: float = 1.0, datum: float = 0.0) -> Heights:
+    """The file's numbers as heights, m: `scale` times what they mean beyond `datum`."""
+    values = numbers.values
+    reuses = values.dtype == np.float32 and values.flags.writeable
+    heights = values if reuses else np.empty(values.shape, np.float32)
+    for rows in numbers.chunks():
+        metres = (numbers.at(rows) - datum) * scale
+        wrong = ~(np.abs(metres) <= HIGHEST) & ~np.isnan(metres)
+        if wrong.any():
+            row, column = (int(k) for k in np.argwhere(wrong)[0])
+            reason = f"height [{rows.start + row}, {column}] must be at most {HIGHEST:g} m in size or nan for no data"
+            file.refuse(reason, float(metres[row, column]))
+        heights[rows] = metres
+    return heights
 
 
 def read_map(
@@ -86,28 +139,25 @@ def read_map(
         OSError: The file cannot be read.
         MissingExtraError: The extra `maps` is not installed.
     """
-    try:
-        place = Path(path)  # type: ignore[arg-type]
-    except TypeError:
-        refuse(TerrainError, "path", path, "must be a path")
-    plain = [
-        None if x is None else number(name, x, error=TerrainError) for name, x in [("scale", scale), ("datum", datum)]
-    ]
-    file = _File(place, plain[0], plain[1])
-    with place.open("rb"):
-        pass  # an OSError that Python words itself
-    ending = place.suffix.lower()
-    if ending in (".tif", ".tiff"):
-        heights, own = _read_geotiff(file, band, spacing)
-    elif ending == ".npy":
-        heights, own = _read_npy(file), spacing
-    elif ending == ".png":
-        heights, own = _read_png(file, height_range), spacing
+    factor, zero = (
+        None if value is None else number(name, value, error=TerrainError)
+        for name, value in (("scale", scale), ("datum", datum))
+    )
+    if factor == 0.0:
+        refuse(TerrainError, "scale", scale, "must not be 0")
+    file = GroundFile.at(path)
+    if file.ending not in ENDINGS:
+        file.refuse(f"a map's file ends in {', '.join(ENDINGS)}")
+    _check_suited(file, height_range=height_range, scale=scale, datum=datum, band=band)
+    if file.ending == ".npy":
+        heights, own = _read_npy(file, factor, zero), None
+    elif file.ending == ".png":
+        heights, own = _read_png(file, height_range, factor, zero), None
     else:
-        file.refuse("a map's file ends in .tif, .tiff, .png or .npy")
-    step = own if spacing is None else spacing
+        heights, own = _read_geotiff(file, band, factor, zero, knows_spacing=spacing is not None)
+    step = spacing or own
     if step is None:
-        refuse(TerrainError, "spacing", spacing, f"must be given, {place} does not say it")
+        refuse(TerrainError, "spacing", spacing, f"must be given, {file.path} does not say it")
     if not np.isfinite(heights).any():
         file.refuse("has no data at all")
     if origin is None:
@@ -116,47 +166,59 @@ def read_map(
     return heights, step, origin
 
 
-def _guarded(file: _File, read: Callable[[], Any], *wrong: type[Exception]) -> Any:
+def _check_suited(file: GroundFile, *, height_range: object, scale: object, datum: object, band: object) -> None:
+    """Refuses arguments that say nothing about a file of this kind, or two things at once."""
+    if height_range is not None and file.ending != ".png":
+        refuse(TerrainError, "height_range", height_range, f"is of PNG files only, not of {file.path}")
+    if height_range is not None and (scale is not None or datum is not None):
+        refuse(TerrainError, "height_range", height_range, "must come without scale and datum, which say the same")
+    if file.ending in (".npy", ".png") and band != 1:
+        refuse(TerrainError, "band", band, f"is of GeoTIFF files only, not of {file.path}")
+
+
+def _guarded(file: GroundFile, read: Callable[[], Any], *wrong: type[Exception]) -> Any:
+    """What a reader returns, its exceptions turned into ours."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             return read()
+    except TerrainError:
+        raise
     except wrong as error:
-        file.refuse(
-            f"is damaged or no such file ({str(error).splitlines()[0] if str(error) else type(error).__name__})"
-        )
+        why = (str(error).splitlines() or [type(error).__name__])[0]
+        file.refuse(f"is damaged or no {file.ending} file ({why})")
 
 
-def _read_npy(file: _File) -> Heights:
+def _read_npy(file: GroundFile, scale: float | None, datum: float | None) -> Heights:
     def read() -> Any:
         return np.load(file.path, mmap_mode="r", allow_pickle=False)
 
-    values = _guarded(file, read, ValueError, EOFError, OSError, OverflowError, TypeError, SyntaxError, MemoryError)
+    values = _guarded(file, read, Exception)  # the header is parsed as Python, whose tokenizer has errors of its own
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
         file.refuse("must hold an array of numbers")
-    file.check_shape(values.shape)
-    return file.heights(values, 1.0 if file.scale is None else file.scale, file.datum or 0.0)
+    _check_shape(file, values.shape)
+    return _heights(file, _Numbers(values), 1.0 if scale is None else scale, datum or 0.0)
 
 
-def _read_png(file: _File, height_range: object) -> Heights:
+def _read_png(file: GroundFile, height_range: object, scale: float | None, datum: float | None) -> Heights:
     image = require("PIL.Image", "maps")
-    low, high = (0.0, 0.0) if file.scale is not None else _range(file, height_range)
+    low, high = (0.0, 0.0) if scale is not None else _range(file, height_range)
 
     def read() -> Any:
         with image.open(file.path, formats=["PNG"]) as opened:
-            file.check_shape((opened.height, opened.width))
+            _check_shape(file, (opened.height, opened.width))
             if opened.mode not in ("L", "I", "I;16", "I;16B", "1"):
                 file.refuse(f"must be a grey image, its mode is {opened.mode}")
             return np.asarray(opened), 255 if opened.mode == "L" else 1 if opened.mode == "1" else 65535
 
     wrong = (OSError, ValueError, SyntaxError, EOFError, image.DecompressionBombError, MemoryError, OverflowError)
     values, white = _guarded(file, read, *wrong)
-    if file.scale is not None:
-        return file.heights(values, file.scale, file.datum or 0.0)
-    return file.heights(values, (high - low) / white, 0.0) + np.float32(low)
+    if scale is not None:
+        return _heights(file, _Numbers(values), scale, datum or 0.0)
+    return _heights(file, _Numbers(values, factor=(high - low) / white, offset=low))
 
 
-def _range(file: _File, height_range: object) -> Pair:
+def _range(file: GroundFile, height_range: object) -> Pair:
     """Heights of black and white, m."""
     if height_range is None:
         refuse(TerrainError, "height_range", None, f"must be given for {file.path}, or scale")
@@ -167,38 +229,56 @@ def _range(file: _File, height_range: object) -> Pair:
     return low, high
 
 
-def _read_geotiff(file: _File, band: object, spacing: Pair | None) -> tuple[Heights, Pair | None]:
+def _read_geotiff(
+    file: GroundFile, band: object, scale: float | None, datum: float | None, *, knows_spacing: bool
+) -> tuple[Heights, Pair | None]:
+    """Heights, and the spacing that the file says unless the caller knows it."""
     rasterio = require("rasterio", "maps")
     index = number("band", band, at_least=1, error=TerrainError)
 
     def read() -> Any:
-        with rasterio.open(file.path, driver="GTiff") as opened:
-            file.check_shape((opened.height, opened.width))
+        with rasterio.Env(GDAL_CACHEMAX=CACHE), rasterio.open(file.path, driver="GTiff") as opened:
+            _check_shape(file, (opened.height, opened.width))
             if index != int(index) or index > opened.count:
                 refuse(TerrainError, "band", band, f"must be a whole number, from 1 to {opened.count} in {file.path}")
             k = int(index) - 1
             if np.dtype(opened.dtypes[k]).kind not in "fiu":
                 file.refuse(f"band {k + 1} must hold real numbers, holds {opened.dtypes[k]}")
-            values = opened.read(k + 1, masked=True)
-            scale, offset, unit = opened.scales[k], opened.offsets[k], opened.units[k]
-            return values, scale, offset, unit, opened.transform, opened.crs
+            values, missing = _band(opened, k + 1)
+            numbers = _Numbers(values, missing, opened.scales[k], opened.offsets[k], NUMBERS_END)
+            return numbers, opened.units[k], opened.transform, opened.crs
 
     wrong = (rasterio.errors.RasterioError, ValueError, MemoryError, OverflowError, UnicodeError)
-    values, factor, offset, unit, transform, crs = _guarded(file, read, *wrong)
-    if unit and unit.lower() not in UNITS and file.scale is None:
+    numbers, unit, transform, crs = _guarded(file, read, *wrong)
+    if unit and unit.lower() not in UNITS and scale is None:
         file.refuse(f"the unit of its heights, {unit!r}, is not known: give scale", unit)
-    raw = np.ma.filled(values.astype(np.float64), np.nan) * factor + offset
-    # Some maps mark missing data with the smallest number of their type and do not say so.
-    raw[np.abs(raw) > 1e30] = np.nan
-    if np.isnan(raw).all():
+    lowest = numbers.lowest()
+    if np.isnan(lowest):
         file.refuse("has no data at all")
-    scale = UNITS.get((unit or "m").lower(), 1.0) if file.scale is None else file.scale
-    datum = float(np.nanmin(raw)) if file.datum is None else file.datum
-    heights = file.heights(raw, scale, datum)
-    return heights, _spacing(file, transform, crs) if spacing is None else spacing
+    metres = UNITS.get((unit or "m").lower(), 1.0) if scale is None else scale
+    heights = _heights(file, numbers, metres, lowest if datum is None else datum)
+    return heights, None if knows_spacing else _spacing(file, transform, crs)
 
 
-def _spacing(file: _File, transform: Any, crs: Any) -> Pair | None:
+def _band(opened: Any, band: int) -> tuple[npt.NDArray[Any], npt.NDArray[np.bool_] | None]:
+    """The numbers of a band, and where there are none if some are missing; read some rows at a time, by whole blocks.
+
+    Of the whole band at once GDAL keeps a copy, and its mask another.
+    """
+    shape = opened.height, opened.width
+    values = np.empty(shape, opened.dtypes[band - 1])
+    missing = np.zeros(shape, np.bool_)
+    block = opened.block_shapes[band - 1][0]
+    step = block * max(1, CHUNK // (block * opened.width))
+    for first in range(0, opened.height, step):
+        rows = slice(first, min(first + step, opened.height))
+        window = ((rows.start, rows.stop), (0, opened.width))
+        opened.read(band, window=window, out=values[rows])
+        np.equal(opened.read_masks(band, window=window), 0, out=missing[rows])
+    return values, missing if missing.any() else None
+
+
+def _spacing(file: GroundFile, transform: Any, crs: Any) -> Pair | None:
     """Spacing that a GeoTIFF's transform says, m; None if it has none."""
     if transform.is_identity:
         return None
@@ -209,4 +289,8 @@ def _spacing(file: _File, transform: Any, crs: Any) -> Pair | None:
     if transform.a <= 0.0 or transform.e >= 0.0:
         file.refuse("its columns must run east and its rows south: warp the map first")
     metres = crs.linear_units_factor[1] if crs is not None and crs.is_projected else 1.0
-    return float(transform.a * metres), float(-transform.e * metres)
+    step = float(transform.a * metres), float(-transform.e * metres)
+    for value in step:
+        if not SPACINGS[0] <= value <= SPACINGS[1]:
+            file.refuse("the distance of its columns and rows must be from {:g} to {:g} m".format(*SPACINGS), value)
+    return step

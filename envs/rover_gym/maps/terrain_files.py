@@ -4,12 +4,10 @@ import os
 from pathlib import Path
 from typing import Any
 
+from rover_gym.maps.map_files import ENDINGS as MAPS
+from rover_gym.maps.mesh_files import ENDINGS as MESHES
 from rover_gym.mechanics import HeightField, TerrainError, TriangleMesh
 from rover_gym.validation import refuse
-
-#: Endings of files of maps and of meshes.
-MAPS = (".tif", ".tiff", ".png", ".npy")
-MESHES = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off")
 
 
 def is_terrain_file(name: object) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 
 from rover_gym.extras import require
 from rover_gym.models.file_axes import from_quaternion
+from rover_gym.models.mjcf_sizes import check_sizes
 from rover_gym.models.robot_tree import MAX_LINKS, FileJoint, FileLink, FileShape, RobotTree, is_urdf, refuse_in
 
 #: Largest file, bytes.
@@ -34,6 +35,7 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
         refuse_in(path, "file", size, f"must have at most {MAX_BYTES} bytes")
     if is_urdf(path):
         refuse_in(path, "root", "robot", "is a URDF: read it with from_urdf")
+    check_sizes(path)
     warnings: list[str] = []
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(warnings.append)  # else they go to a file in the current folder

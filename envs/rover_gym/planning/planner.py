@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from rover_gym.env.start import resting_pose
+from rover_gym.ground import parts_of, plane_of, surfaces_of
 from rover_gym.mechanics import (
+    HeightField,
     Line,
     MirroredRoverSimulation,
     ModelError,
@@ -17,7 +18,9 @@ from rover_gym.mechanics import (
     SimulationBatch,
     SphereField,
     StateError,
+    Terrain,
     TerrainError,
+    TriangleMesh,
     accuracy_options,
 )
 from rover_gym.planning.scene import Accuracy, Array, Scene, check_scene, gravity_of, steering_joints
@@ -51,7 +54,7 @@ def plan(scene: Scene, accuracy: Accuracy = "balanced", *, planar: bool = True) 
     Raises:
         OptionError: The accuracy, reach or heading is out of range, or `scene` is no scene or contradicts itself.
         StateError: The start has a wrong shape or an entry that is not finite.
-        TerrainError: No start was given, and the terrain has no plane to stand on.
+        TerrainError: No start was given, and the terrain cannot be stood on.
     """
     check_scene(scene)
     planar = flag("planar", planar)
@@ -61,7 +64,7 @@ def plan(scene: Scene, accuracy: Accuracy = "balanced", *, planar: bool = True) 
     weld, weld_decision = _steering(scene, terrain, start)
     obstacle = None if planar else "not wanted"
     if obstacle is None:
-        obstacle = _obstacle(scene, terrain, start, welded=weld)
+        obstacle = _obstacle(scene, terrain, start, steers=not weld and bool(steering_joints(scene.model)))
     kind: Kind = "full"
     model = scene.model
     if weld:
@@ -107,17 +110,20 @@ def _start(scene: Scene) -> Array:
     if scene.start is not None:
         return np.array(vector("start", scene.start, model.nq, error=StateError))
     heading = number("heading", scene.heading)
-    plane = scene.terrain if isinstance(scene.terrain, Plane) else scene.terrain.ground
-    if plane is None or plane.normal[1] <= 0.0:
+    ground: Terrain | None = scene.terrain if surfaces_of(scene.terrain) else plane_of(scene.terrain)
+    if ground is None or (isinstance(ground, Plane) and ground.normal[1] <= 0.0):
         refuse(TerrainError, "terrain", scene.terrain, "has no plane to stand on: give a start")
-    return resting_pose(model, plane, (0.0, 0.0), heading)
+    return model.resting_pose(ground, (0.0, 0.0), heading)
 
 
-def _ground(scene: Scene) -> tuple[Plane | SphereField, Decision]:
+def _ground(scene: Scene) -> tuple[Terrain, Decision]:
     reach = None if scene.reach is None else number("reach", scene.reach, above=0.0)
     terrain = scene.terrain
     if isinstance(terrain, Plane):
         return terrain, Decision("ground", "plane, no search", "there are no spheres")
+    if not isinstance(terrain, SphereField):
+        why = "the faces near the rover are searched, however large the ground is"
+        return terrain, Decision("ground", _words(terrain), why)
     centres, radii, plane = terrain.centres, terrain.radii, terrain.ground
     shown = np.ones(len(radii), dtype=bool)
     if plane is not None:
@@ -148,6 +154,20 @@ def _ground(scene: Scene) -> tuple[Plane | SphereField, Decision]:
     return kept, Decision("ground", f"{left} spheres in a ball tree", f"of {len(radii)} spheres {dropped}")
 
 
+def _words(terrain: Terrain) -> str:
+    """The parts of a ground in words."""
+    words = []
+    for part in parts_of(terrain):
+        if isinstance(part, HeightField):
+            rows, columns = part.shape
+            words.append(f"map of {columns} x {rows} heights")
+        elif isinstance(part, TriangleMesh):
+            words.append(f"mesh of {len(part.triangles)} triangles")
+        else:
+            words.append("plane" if isinstance(part, Plane) else f"{len(part)} spheres in a ball tree")
+    return " and ".join(words)
+
+
 def _extent(model: RoverModel) -> Array:
     """`(n, 3)` origins of the solids and lowest points of the wheels relative to the trunk, joints at zero, m."""
     origins = [origin for origin, _ in model.poses(np.zeros(model.nq), coordinates="state").values()]
@@ -161,7 +181,7 @@ def _widths(model: RoverModel) -> list[float]:
     return [wheel.get("width", 0.0) - 2.0 * wheel.get("rounding", 0.0) for wheel in wheels]
 
 
-def _steering(scene: Scene, terrain: Plane | SphereField, start: Array) -> tuple[bool, Decision]:
+def _steering(scene: Scene, terrain: Terrain, start: Array) -> tuple[bool, Decision]:
     joints = steering_joints(scene.model)
     held = f"{len(joints)} joints held by the PD"
     if not joints:
@@ -171,8 +191,9 @@ def _steering(scene: Scene, terrain: Plane | SphereField, start: Array) -> tuple
         return False, Decision("steering", held, "steering may be commanded")
     if np.any(angles):
         refuse(OptionError, "steered", scene.steered, "the start has turned wheels, which no set-point keeps turned")
-    if isinstance(terrain, SphereField):
-        why = "not commanded, but on spheres the PD gives way enough to change which sphere a wheel climbs"
+    if not isinstance(terrain, Plane):
+        climbed = "sphere" if isinstance(terrain, SphereField) else "face"
+        why = f"not commanded, but on {climbed}s the PD gives way enough to change which {climbed} a wheel climbs"
         return False, Decision("steering", held, why)
     if not _rests(scene, terrain, start):
         why = "not commanded, but in a landing wheels strike at an angle and turn"
@@ -206,11 +227,12 @@ def _steering_offset(model: RoverModel) -> float:
     return max(offsets)
 
 
-def _obstacle(scene: Scene, terrain: Plane | SphereField, start: Array, *, welded: bool) -> str | None:
+def _obstacle(scene: Scene, terrain: Terrain, start: Array, *, steers: bool) -> str | None:
     """The reason why a planar model is impossible; None if it is possible."""
-    if isinstance(terrain, SphereField):
-        return "spheres are not the same left and right"
-    if not welded:
+    if not isinstance(terrain, Plane):
+        ground = "spheres are" if isinstance(terrain, SphereField) else "the ground is"
+        return f"{ground} not the same left and right"
+    if steers:
         return "steering is free"
     if not scene.equal_torques:
         return "torques may differ from left to right"
@@ -247,11 +269,11 @@ def _steps(simulation: Simulation, kind: Kind) -> Decision:
     return Decision(
         "steps",
         f"ordinary: in lanes, {register} ({SimulationBatch([simulation]).instruction_set})",
-        "wheels on plane or spheres, inelastic; a step that is not ordinary, as when the trunk touches, is general",
+        "wheels on fixed ground, inelastic; a step that is not ordinary, as when the trunk touches, is general",
     )
 
 
-def _batch(terrain: Plane | SphereField, *, welded: bool) -> Decision:
+def _batch(terrain: Terrain, *, welded: bool) -> Decision:
     """The vector environment of such rovers, and what it saves."""
     arguments = []
     why = "steering may move"
@@ -260,9 +282,12 @@ def _batch(terrain: Plane | SphereField, *, welded: bool) -> Decision:
         why = f"welded steering takes {BATCH_WELDED:g} of the time"
     if isinstance(terrain, Plane):
         why += f"; no rock is met, and a field of them would take {BATCH_UNMET:g} of the time"
-    else:
+    elif isinstance(terrain, SphereField):
         arguments.append("terrain 'sphere_field'")
         why += "; rocks may be met"
+    else:
+        arguments.append("this terrain")
+        why += "; every start is on this ground"
     return Decision("in a batch", f"RoverVectorEnv with {' and '.join(arguments) or 'its defaults'}", why)
 
 

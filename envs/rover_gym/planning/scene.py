@@ -1,12 +1,12 @@
 """The user's description of a scene: the rover, its terrain, and the commands that will not occur."""
 
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import ModelError, OptionError, Plane, RoverModel, SphereField, TerrainError
+from rover_gym.mechanics import ModelError, OptionError, Plane, RoverModel, Terrain, TerrainError
 from rover_gym.validation import flag, known_keys, refuse, vector
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -33,7 +33,8 @@ class Scene:
     Attributes:
         terrain: The ground.
         model: The rover.
-        start: `(nq,)` public coordinates; None starts at rest on the terrain's plane at x = z = 0.
+        start: `(nq,)` public coordinates; None starts at rest on the terrain at x = z = 0: on a map or a mesh with all
+            wheels, elsewhere on the plane with joints at zero.
         heading: Heading of the default start, rad.
         steered: Whether a non-zero steering set-point may occur.
         equal_torques: Whether the two wheels of each axle always get the same torque.
@@ -43,7 +44,7 @@ class Scene:
         options: Keyword arguments of `Simulation` that describe the scene: gravity, friction, restitution.
     """
 
-    terrain: Plane | SphereField = field(default_factory=Plane)
+    terrain: Terrain = field(default_factory=Plane)
     model: RoverModel = field(default_factory=RoverModel)
     start: npt.ArrayLike | None = None
     heading: float = 0.0
@@ -59,8 +60,8 @@ def check_scene(scene: Scene) -> None:
     """Checks the types of a scene's parts and the names of its options."""
     if not isinstance(scene, Scene):
         refuse(OptionError, "scene", scene, "must be a Scene")
-    if not isinstance(scene.terrain, (Plane, SphereField)):
-        refuse(TerrainError, "terrain", scene.terrain, "must be a Plane or a SphereField")
+    if not isinstance(scene.terrain, get_args(Terrain)):
+        refuse(TerrainError, "terrain", scene.terrain, "must be a terrain; several make a Union")
     if not isinstance(scene.model, RoverModel):
         refuse(ModelError, "model", scene.model, "must be a RoverModel")
     for name in ("steered", "equal_torques", "held", "tumbles"):

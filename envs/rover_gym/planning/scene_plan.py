@@ -14,9 +14,9 @@ from rover_gym.mechanics import (
     Plane,
     RoverModel,
     Simulation,
-    SphereField,
     StepError,
     StepReport,
+    Terrain,
 )
 from rover_gym.planning.scene import Array, Scene, gravity_of
 from rover_gym.validation import refuse, vector
@@ -55,7 +55,7 @@ class ScenePlan:
         kind: The kind of model: the full tree, the tree with welded steering, or its planar image.
         model: The model to simulate; for the planar image, the tree it is derived from.
         terrain: The ground to simulate.
-        start: `(21,)` public coordinates of the full model.
+        start: `(nq,)` public coordinates of the full model.
         options: Keyword arguments of the simulation.
         decisions: The decision about every part.
     """
@@ -63,7 +63,7 @@ class ScenePlan:
     scene: Scene
     kind: Kind
     model: RoverModel
-    terrain: Plane | SphereField
+    terrain: Terrain
     start: Array
     options: dict[str, Any]
     decisions: tuple[Decision, ...]
@@ -138,7 +138,7 @@ class PlannedRover:
 
     @property
     def q(self) -> Array:
-        """`(21,)` public coordinates of the full model."""
+        """`(nq,)` public coordinates of the full model."""
         q = self.plan.start.copy()
         own = self.simulation.q
         for value, places in zip(own, self._places, strict=True):
@@ -150,10 +150,10 @@ class PlannedRover:
         return q
 
     def set_wheel_torques(self, torques: npt.ArrayLike) -> None:
-        """Sets the wheel torques `(6,)`, N m; positive drives forward.
+        """Sets the wheel torques `(n_wheels,)`, N m; positive drives forward.
 
         Raises:
-            CommandError: The torques are not six finite numbers, or differ on an axle of a planar model.
+            CommandError: The torques are not a finite number for each wheel, or differ on an axle of a planar model.
         """
         if isinstance(self.simulation, Simulation):
             self.simulation.set_wheel_torques(torques)
@@ -165,10 +165,11 @@ class PlannedRover:
         self.simulation.set_torques([values[pair[0]] for pair in self._pairs])
 
     def set_steering(self, set_points: npt.ArrayLike) -> None:
-        """Sets the steering set-points `(6,)`, rad.
+        """Sets the steering set-points `(n_wheels,)`, rad.
 
         Raises:
-            CommandError: The set-points are not six finite numbers, or not zero in a scene planned without steering.
+            CommandError: The set-points are not a finite number for each wheel, or not zero where the scene was
+                planned without steering.
         """
         if self.plan.kind == "full" and isinstance(self.simulation, Simulation):
             self.simulation.set_steering(set_points)

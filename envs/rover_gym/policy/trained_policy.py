@@ -44,7 +44,8 @@ class TrainedPolicy:
         self._repeat = max(1, round(card.hold / rover.dt))
         inputs, outputs = network.weights[0].shape[1], network.weights[-1].shape[0]
         if inputs != self._features.size:
-            reason = f"needs an environment made with {dict(card.environment)}: {inputs} features"
+            model = f", for a model like {card.source['model']!r}" if "model" in card.source else ""
+            reason = f"needs an environment made with {dict(card.environment)}{model}: {inputs} features"
             refuse(PolicyError, "policy", self._features.size, reason)
         if outputs != N_COMMANDS:
             refuse(PolicyError, "policy", outputs, f"must have {N_COMMANDS} outputs")

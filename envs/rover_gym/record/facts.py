@@ -1,4 +1,4 @@
-"""The metadata of a recording: scene, ground, seed, solver settings and versions."""
+"""The metadata of a recording: scene, seed, solver settings and versions."""
 
 from __future__ import annotations
 
@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
-import numpy.typing as npt
 
-from rover_gym.ground import parts_of, plane_of, spheres_of, surfaces_of
-from rover_gym.mechanics import HeightField, OptionError, Simulation, SphereField, Terrain, __version__
+from rover_gym.mechanics import OptionError, Simulation, __version__
 from rover_gym.record.trajectory_format import (
     FORMAT,
     FORMAT_VERSION,
@@ -126,48 +124,13 @@ def write_description(data: h5py.Dataset, unit: str, description: str, columns: 
     write_attribute(data, "unit", unit)
     write_attribute(data, "description", description)
     if columns:
-        names = [name.encode() for name in columns]
-        data.attrs.create("columns", names, dtype=import_h5py().string_dtype("utf-8", max(1, *map(len, names))))
+        write_texts(data, "columns", columns)
 
 
-#: Numbers from which on a data set of a terrain is compressed.
-PACKED = 10_000
-
-
-def write_terrain(group: h5py.Group, terrain: Terrain) -> None:
-    """Stores a terrain in an HDF5 group."""
-
-    def write(name: str, value: npt.ArrayLike, unit: str, description: str, columns: Sequence[str] = ()) -> None:
-        values = np.asarray(value, dtype=np.float64)
-        options: dict[str, Any] = {"fletcher32": True} if values.size and values.ndim else {}
-        if values.size > PACKED:
-            options |= {"compression": "gzip", "shuffle": True}
-        data = group.create_dataset(name, data=values, **options)
-        write_description(data, unit, description, columns)
-
-    plane, (centres, radii), surfaces = plane_of(terrain), spheres_of(terrain), surfaces_of(terrain)
-    write_attribute(group, "kind", "surface" if surfaces else "sphere_field" if len(radii) else "plane")
-    write_attribute(
-        group,
-        "description",
-        "the ground, fixed; free is what lies outside all spheres and above the plane and all surfaces",
-    )
-    axes = ("x", "y", "z")
-    if plane is not None:
-        write("plane_normal", plane.normal, "1", "unit normal n of the plane, to the free side, world", axes)
-        write("plane_offset", plane.offset, "m", "d of the plane n.x + d = 0")
-    if any(isinstance(part, SphereField) for part in parts_of(terrain)):
-        write("sphere_centres", centres, "m", "centres of the spheres, world", axes)
-        write("sphere_radii", radii, "m", "radii of the spheres")
-    for k, surface in enumerate(surfaces):
-        name = f"surface_{k}"
-        if isinstance(surface, HeightField):
-            write(f"{name}_heights", surface.grid, "m", "heights, a row for each z, nan for no data")
-            write(f"{name}_spacing", surface.spacing, "m", "distance of columns and of rows", ("x", "z"))
-            write(f"{name}_origin", surface.origin, "m", "place of the first height", ("x", "z"))
-        else:
-            write(f"{name}_vertices", surface.vertices, "m", "vertices of the mesh, world", axes)
-            write(f"{name}_triangles", surface.triangles, "1", "triangles, by the numbers of their vertices")
+def write_texts(item: Any, key: str, texts: Sequence[str]) -> None:
+    """Stores several texts in an attribute."""
+    encoded = [text.encode() for text in texts]
+    item.attrs.create(key, encoded, dtype=import_h5py().string_dtype("utf-8", max(1, *map(len, encoded))))
 
 
 def _to_plain(value: Any) -> Any:

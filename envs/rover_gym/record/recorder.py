@@ -19,8 +19,9 @@ import numpy.typing as npt
 
 from rover_gym.mechanics import Terrain
 from rover_gym.record.channels import Channel
-from rover_gym.record.facts import storable, versions, write_attribute, write_description, write_terrain
+from rover_gym.record.facts import storable, versions, write_attribute, write_description
 from rover_gym.record.steady_file import FileInUseError, SteadyFile
+from rover_gym.record.stored_terrain import write_terrain
 from rover_gym.record.trajectory import read_trajectory
 from rover_gym.record.trajectory_format import (
     LIBRARY,

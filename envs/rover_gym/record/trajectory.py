@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import HeightField, Plane, RoverGymError, SphereField, Terrain, TriangleMesh, Union
+from rover_gym.mechanics import RoverGymError, Terrain, Union
 from rover_gym.record.steady_file import FileInUseError, lock
+from rover_gym.record.stored_terrain import MATERIALS, Stored, is_stored, stored_parts
 from rover_gym.record.trajectory_format import (
     FORMAT,
     FORMAT_VERSION,
@@ -135,20 +135,22 @@ class _Reader:
             refuse_field(self._path, field, kind, "must be in the file itself")
         return item
 
-    def _check(self, field: str, data: h5py.Dataset, *, least_dimensions: int = 0) -> None:
-        """Checks that a data set is an array of float64 no larger than the file can hold."""
-        if data.shape is None or data.dtype.kind != "f" or data.dtype.itemsize != 8:
-            refuse_field(self._path, field, str(data.dtype), "must be an array of float64")
+    def _check(self, field: str, data: h5py.Dataset, *, least_dimensions: int = 0, single: bool = False) -> None:
+        """Checks that a data set is an array of float64, or float32 if `single`, no larger than the file can hold."""
+        sizes, words = ((4, 8), "float32 or float64") if single else ((8,), "float64")
+        size = data.dtype.itemsize
+        if data.shape is None or data.dtype.kind != "f" or size not in sizes:
+            refuse_field(self._path, field, str(data.dtype), f"must be an array of {words}")
         if not least_dimensions <= len(data.shape) <= 3:
             refuse_field(self._path, field, data.shape, f"must have {least_dimensions} to 3 dimensions")
-        self._take(field, data.shape, 8)
+        self._take(field, data.shape, size)
         if data.chunks is not None:
-            self._take(f"{field}, one chunk", data.chunks, 8)
+            self._take(f"{field}, one chunk", data.chunks, size)
             self._check_chunks(field, data)
 
     def _check_chunks(self, field: str, data: h5py.Dataset) -> None:
         """Refuses chunks of impossible offset or size: HDF5 reads a checksum even from a chunk too short for one."""
-        whole = math.prod(data.chunks) * 8 + 4 * data.fletcher32
+        whole = math.prod(data.chunks) * data.dtype.itemsize + 4 * data.fletcher32
         packed = data.compression is not None
         wrong: list[int] = []
 
@@ -205,14 +207,15 @@ class _Reader:
     def _terrain(self, group: h5py.Group) -> Terrain:
         given = {}
         for name in group:
-            if name in PLAIN_GROUND or SURFACE.fullmatch(name):
+            if is_stored(name):
                 data = self._item(group, name)
                 if not isinstance(data, self._h5py.Dataset):
-                    refuse_field(self._path, f"{TERRAIN}/{name}", "a group", "must be an array of float64")
-                self._check(f"{TERRAIN}/{name}", data)
-                given[name] = np.asarray(data[()], dtype=np.float64)
+                    refuse_field(self._path, f"{TERRAIN}/{name}", "a group", "must be an array of floats")
+                self._check(f"{TERRAIN}/{name}", data, single=name.endswith("_heights"))
+                values = np.asarray(data[()], dtype=f"f{data.dtype.itemsize}")
+                given[name] = Stored(values, {key: self._attribute(data, key) for key in MATERIALS})
         try:
-            parts = _parts(given)
+            parts = stored_parts(given)
             if len(parts) > 1:
                 return Union(parts)
         except (RoverGymError, ValueError, TypeError, KeyError, IndexError) as error:
@@ -220,33 +223,6 @@ class _Reader:
         if not parts:
             refuse_field(self._path, TERRAIN, sorted(given), "holds neither a plane nor spheres nor a surface")
         return parts[0]
-
-
-#: Data sets of a plane and of spheres, and those of surfaces.
-PLAIN_GROUND = ("plane_normal", "plane_offset", "sphere_centres", "sphere_radii")
-SURFACE = re.compile(r"surface_(\d{1,4})_(heights|spacing|origin|vertices|triangles)")
-
-
-def _parts(given: Mapping[str, npt.NDArray[np.float64]]) -> list[Terrain]:
-    """The terrains that data sets describe."""
-    parts: list[Terrain] = []
-    plane = None
-    if "plane_normal" in given:
-        plane = Plane(given["plane_normal"], given["plane_offset"].item())
-    if "sphere_centres" in given:
-        parts.append(SphereField(given["sphere_centres"], given["sphere_radii"], plane))
-    elif plane is not None:
-        parts.append(plane)
-    found = (SURFACE.fullmatch(name) for name in given)
-    for k in sorted({int(match.group(1)) for match in found if match is not None}):
-        name = f"surface_{k}"
-        if f"{name}_heights" in given:
-            heights, spacing, origin = (given[f"{name}_{what}"] for what in ("heights", "spacing", "origin"))
-            parts.append(HeightField(heights, tuple(spacing.tolist()), tuple(origin.tolist())))
-        else:
-            triangles = given[f"{name}_triangles"].astype(np.int64)
-            parts.append(TriangleMesh(given[f"{name}_vertices"], triangles))
-    return parts
 
 
 def _check_bytes(path: Path) -> int:

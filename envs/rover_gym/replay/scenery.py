@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.ground import plane_of, spheres_of, surfaces_of, triangles_of
-from rover_gym.mechanics import Plane, TriangleMesh
+from rover_gym.ground import heights_of, plane_of, spheres_of, surfaces_of, triangles_of
+from rover_gym.mechanics import HeightField, Plane, TriangleMesh
 from rover_gym.rendering.appearance import (
     GOAL_COLOUR,
     GROUND_COLOUR,
@@ -34,6 +34,7 @@ MOST_HEIGHTS = 40_000  # shown of a height field
 MARGIN = 5.0  # m of ground around the path
 LONGEST_NAME = 60
 GOAL_POLE = 0.8  # m, height
+NEARNESS = 3.7  # of the eye, in radii of the circle that the rover stands in
 
 Array = npt.NDArray[np.float64]
 Triangles = npt.NDArray[np.int32]
@@ -83,16 +84,27 @@ def ground_plane(run: RoverRun) -> Plane | None:
 
 
 def spheres(run: RoverRun) -> tuple[Array, Array]:
-    """Centres (n, 3) and radii (n,) of the ground's spheres, m."""
-    return spheres_of(run.terrain)
+    """Centres (n, 3) and radii (n,) of the ground's spheres, m: on a map those of the piece that is shown."""
+    centres, radii = spheres_of(run.terrain)
+    if ground_plane(run) is None and any(isinstance(surface, HeightField) for surface in surfaces_of(run.terrain)):
+        low, high = _surroundings(run)
+        places = centres[:, [0, 2]]
+        near = ((low <= places) & (places <= high)).all(axis=1)
+        return centres[near], radii[near]
+    return centres, radii
+
+
+def _surroundings(run: RoverRun) -> tuple[Array, Array]:
+    """Least and largest x and z of the ground around path and goal, m."""
+    places = trunk_path(run)[:, [0, 2]]
+    if run.goal is not None:
+        places = np.vstack((places, run.goal))
+    return places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN
 
 
 def surfaces(run: RoverRun) -> list[tuple[Array, list[tuple[Colour, Triangles]]]]:
     """Height fields around the path, in squares of two colours, and meshes: vertices (n, 3), m, triangles by colour."""
-    places = trunk_path(run)[:, [0, 2]]
-    if run.goal is not None:
-        places = np.vstack((places, run.goal))
-    low, high = places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN
+    low, high = _surroundings(run)
     pieces: list[tuple[Array, list[tuple[Colour, Triangles]]]] = []
     for surface in surfaces_of(run.terrain):
         vertices, faces = triangles_of(surface, low, high, MOST_HEIGHTS)
@@ -143,8 +155,7 @@ def goal_parts(run: RoverRun) -> tuple[Part, ...]:
     if run.goal is None:
         return ()
     x, z = run.goal
-    plane = ground_plane(run)
-    y = 0.0 if plane is None else plane.height(x, z)
+    y = float(np.nan_to_num(heights_of(run.terrain, [run.goal])[0]))
     upright = np.eye(3)
     pole = Part("", "cylinder", (0.02, GOAL_POLE), (x, y + GOAL_POLE / 2, z), upright, GOAL_COLOUR)
     knob = Part("", "cylinder", (0.09, 0.18), (x, y + GOAL_POLE, z), upright, GOAL_COLOUR)
@@ -170,9 +181,9 @@ def parts_by_solid(run: RoverRun) -> dict[str, tuple[Part, ...]]:
     return {name: tuple(part for part in parts if part.solid == name) for name in run.model.solid_names}
 
 
-def first_view(run: RoverRun, distance: float = 4.0) -> View:
+def first_view(run: RoverRun) -> View:
     """From beside and a little behind the rover at its start, so that it drives away from the eye."""
-    path = trunk_path(run)
+    path, distance = trunk_path(run), NEARNESS * run.model.clear_radius
     way = (path[-1] - path[0])[[0, 2]]
     if np.linalg.norm(way) < 0.1:  # it stands still: look at its nose
         heading = run.trajectory["q"][0, 4]

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rover_gym.env.rover_env import RoverEnv
-from rover_gym.env.start import resting_pose, tilted_plane
+from rover_gym.env.start import tilted_plane
 from rover_gym.mechanics import Simulation, SimulationBatch
 from rover_gym.vector.mujoco_rover import rover_xml
 
@@ -126,7 +126,7 @@ def _rover(env: RoverEnv, seed: int) -> Simulation:
     place, plane = start.position, tilted_plane(start.slope, start.uphill)
     if env.rocks is not None:
         place = (0.5 * (place[0] + env.goal[0]), 0.5 * (place[1] + env.goal[1]))
-    q = resting_pose(env.model, plane, place, start.heading)
+    q = env.model.resting_pose(plane, place, start.heading)
     simulation = Simulation(env.model, terrain, time_step=TIME_STEP)
     simulation.set_state(q)
     while simulation.deepest_overlap < -LIFT:
