@@ -46,6 +46,9 @@ def test_an_import_writes_the_model_and_its_picture(tmp_path: Path) -> None:
     bare = rover("import", str(file), "--output", str(output), "--wheel", "none", "--steering", "none", "--fixed-base")
     assert bare.exit_code == 0, bare.output
     assert RoverModel.from_file(output).wheel_names == []
+    thin = rover("import", str(file), "--output", str(output), "--wheel-width", "0")
+    assert thin.exit_code == 0, thin.output
+    assert "width" not in RoverModel.from_file(output).to_dict()["wheels"][0]
     wrong = rover("import", str(file), "--output", str(output), "--wheel", "mast_tail")
     assert wrong.exit_code == 2
     assert wrong.stderr.startswith("error: --wheel: there is no such link")

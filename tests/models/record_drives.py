@@ -101,8 +101,8 @@ class InPinocchio:
     def _torques(self, commanded: np.ndarray) -> np.ndarray:
         """Generalized forces of the motors; positive commands drive forward."""
         found = np.zeros(self.pin.nv)
-        for wheel, i, torque in zip(self.wheels, self.speeds, commanded, strict=True):
-            sign, motor = wheel["drive_sign"], wheel.get("motor")
+        for wheel, i, command in zip(self.wheels, self.speeds, commanded, strict=True):
+            torque, sign, motor = command, wheel["drive_sign"], wheel.get("motor")
             if motor is not None:
                 stall, share = motor["stall_torque"], sign * self.v[i] / motor["no_load_speed"]
                 torque = np.clip(torque, max(-stall, -stall * (1.0 + share)), min(stall, stall * (1.0 - share)))

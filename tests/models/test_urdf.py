@@ -1,10 +1,13 @@
 """URDF files as models: axes, roles, what is welded, left out or refused."""
 
+import re
+
 import numpy as np
 import pytest
-from models.robot_files import LIMIT, body, changed, joint, rover, write
+from models.robot_files import LIMIT, WHEEL, body, changed, joint, rover, write
 
 from rover_gym import ModelError, RoverModel, Simulation
+from rover_gym.models import read_urdf
 
 pytest.importorskip("yourdfpy")
 
@@ -166,7 +169,6 @@ def test_what_is_not_simulated_is_listed(tmp_path):
     )
     listed = "\n".join(model.import_report.left_out)
     for what in (
-        "a cylinder of a wheel, which touches as a disc",
         "<gazebo> of <robot>",
         "<sensor> of <robot>",
         "a mesh that touches",
@@ -286,3 +288,29 @@ def test_a_pivot_without_stops_is_a_caster_or_a_steering_joint_by_its_name(tmp_p
     assert caught.value.field == "steering"
     given = RoverModel.from_urdf(doubtful, steering=["left_pin", "right_fork"])
     assert [index >= 0 for index in given.steering_joint_indices] == [True, True, False]
+
+
+def test_a_wheel_is_as_wide_as_the_cylinder_that_touches_for_it(tmp_path):
+    path = write(tmp_path, rover())
+    model = RoverModel.from_urdf(path)
+    assert [wheel["width"] for wheel in model.to_dict()["wheels"]] == [0.1] * 3
+    assert "0.1 m wide" in str(model.import_report)
+    thin, report = read_urdf(path, wheel_width=0.0)
+    assert not any("width" in wheel for wheel in thin.to_dict()["wheels"])
+    assert "a cylinder of a wheel, which touches as a thin disc" in "\n".join(report.left_out)
+    wide, _ = read_urdf(path, wheel_width=0.3)
+    assert [wheel["width"] for wheel in wide.to_dict()["wheels"]] == [0.3] * 3
+    for wrong in (-0.1, float("nan"), "file"):
+        with pytest.raises(ModelError, match="wheel_width"):
+            read_urdf(path, wheel_width=wrong)
+
+
+@pytest.mark.parametrize("shape", ['<sphere radius="0.2"/>', None])
+def test_a_wheel_without_a_cylinder_that_touches_is_a_thin_disc(tmp_path, shape):
+    text = rover(wheel=WHEEL.replace("collision", "visual"))
+    if shape is not None:
+        text = rover(wheel=re.sub("<cylinder.*?/>", shape, WHEEL))
+    model = RoverModel.from_urdf(write(tmp_path, text))
+    assert not any("width" in wheel for wheel in model.to_dict()["wheels"])
+    is_listed = "a sphere of a wheel, which touches as a thin disc" in str(model.import_report)
+    assert is_listed == (shape is not None)

@@ -13,7 +13,7 @@ from rover_gym.extras import require
 from rover_gym.figures.model_drawing import write_model_picture
 from rover_gym.figures.saving import check_format
 from rover_gym.mechanics import OptionError, RoverModel
-from rover_gym.models import check_statics, open_model, solid_rows
+from rover_gym.models import check_statics, open_model, read_robot, solid_rows
 from rover_gym.validation import refuse
 
 model = typer.Typer(help="Models: read URDF and MJCF, show and check any model.", no_args_is_help=True)
@@ -39,6 +39,9 @@ def import_model(
     fixed_base: Annotated[bool, typer.Option("--fixed-base", help="Fix the root to the world.")] = False,
     forward: Annotated[str, typer.Option(help="The file's axis of driving: x, -x, y or -y.")] = "x",
     torque_limit: Annotated[float | None, typer.Option(help="Largest torque of a wheel, N m.")] = None,
+    wheel_width: Annotated[
+        float | None, typer.Option(help="Width of every wheel, m; 0 for thin discs. By default the file's.")
+    ] = None,
     ignore: Annotated[
         list[str] | None, typer.Option(help="What to leave out although it changes the motion, such as friction.")
     ] = None,
@@ -51,13 +54,13 @@ def import_model(
         if path.exists() and file.exists() and path.samefile(file):
             refuse(OptionError, option, str(path), "would replace the file that is read")
         check_file(option, path)
-    options: dict[str, object] = {"forward": forward, "torque_limit": torque_limit, "ignore": ignore or ()}
+    options: dict[str, object] = {"forward": forward, "ignore": ignore or ()}
+    options |= {"torque_limit": torque_limit, "wheel_width": wheel_width}
     options |= {"wheels": _radii(wheel), "steering": _pairs(steering)}
     if fixed_base:
         options["free_base"] = False
-    read = open_model(file, **options)
+    read, report = read_robot(file, **options)
     _print_solids(read)
-    report = read.import_report
     for title, entries in (("assumed", report.assumed), ("not simulated", report.left_out)):
         for entry in entries:
             console().print(f"{title}: {entry}", markup=False)

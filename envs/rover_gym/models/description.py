@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from rover_gym.models.file_axes import Z_UP_TO_Y_UP, Array, rotation_vector, turn_z_to
-from rover_gym.models.robot_tree import FileJoint, FileLink, FileShape, RobotTree
+from rover_gym.models.robot_tree import THIN_DISC, FileJoint, FileLink, FileShape, RobotTree
 from rover_gym.models.roles import WheelRole
 
 GRAVITY = 9.81
@@ -30,12 +30,14 @@ class Gains:
         steering_stiffness: N m/rad.
         steering_damping: N m s/rad.
         steering_limit: rad.
+        wheel_width: Of a wheel, m.
     """
 
     torque_limit: float | None = None
     steering_stiffness: float | None = None
     steering_damping: float | None = None
     steering_limit: float | None = None
+    wheel_width: float | None = None
 
 
 def describe(tree: RobotTree, roles: list[WheelRole], P: Array, gains: Gains) -> dict[str, Any]:
@@ -50,6 +52,8 @@ def describe(tree: RobotTree, roles: list[WheelRole], P: Array, gains: Gains) ->
     Raises:
         ModelError: The file holds what has no place in a description.
     """
+    if gains.wheel_width is not None:
+        roles = [replace(role, width=gains.wheel_width) for role in roles]
     wheels = {role.link: role for role in roles}
     _turn_steering_axes_up(tree, {role.steering for role in roles if role.steering}, P)
     _move_limits_to_followed_joints(tree)
@@ -175,6 +179,8 @@ def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, gains: Gai
         "torque_limit": float(limit),
         "drive_sign": 1.0 if role.is_forward else -1.0,
     }
+    if role.width > 0.0:
+        wheel["width"] = float(role.width)
     if role.steering is not None:
         stops = tree.links[role.steering].joint.limits
         reach = STEERING_LIMIT if stops is None else min(abs(stop) for stop in stops) or max(abs(s) for s in stops)
@@ -187,14 +193,17 @@ def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, gains: Gai
 
 
 def _shapes(tree: RobotTree, link: FileLink, A: Array, anchor: Array, role: WheelRole | None) -> list[dict[str, Any]]:
-    """A wheel touches as a disc, everything else as the boxes and spheres of the file."""
+    """A wheel touches by its radius and width, everything else by the boxes and spheres of the file."""
     found: list[dict[str, Any]] = []
     is_drawn = any(shape.visible and shape.mesh is None for shape in link.shapes)
     touching = False
     for shape in link.shapes:
         where = f"link[{link.name}]: a {shape.kind}"
-        if shape.collides and role is not None:
-            tree.left_out.append(f"{where} of a wheel, which touches as a disc")
+        if role is not None and shape.name.endswith(THIN_DISC):
+            continue  # the disc below stands for it
+        if shape.collides and role is not None and shape.size != (role.radius, role.width):
+            rim = f"cylinder {role.width:g} m wide" if role.width else "thin disc"
+            tree.left_out.append(f"{where} of a wheel, which touches as a {rim}")
         if shape.kind not in ("box", "cylinder", "sphere"):
             if shape.collides and role is None:
                 tree.left_out.append(f"{where} that touches, since only boxes and spheres can")

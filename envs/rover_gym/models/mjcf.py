@@ -225,7 +225,8 @@ class _Reader:
         R, p = from_quaternion(m.geom_quat[geom]), np.array(m.geom_pos[geom])
         size = [float(x) for x in m.geom_size[geom]]
         collides = bool(m.geom_contype[geom] or m.geom_conaffinity[geom])
-        made = FileShape("mesh", (), p, R, collides, bool(m.geom_rgba[geom, 3] > 0.0))
+        name = self.mujoco.mj_id2name(m, self.mujoco.mjtObj.mjOBJ_GEOM, geom) or ""
+        made = FileShape("mesh", (), p, R, collides, bool(m.geom_rgba[geom, 3] > 0.0), name)
         match int(m.geom_type[geom]):
             case kinds.mjGEOM_BOX:
                 made.kind, made.size = "box", (2.0 * size[0], 2.0 * size[1], 2.0 * size[2])

@@ -44,6 +44,7 @@ def _read(
     steering_stiffness: float | None = None,
     steering_damping: float | None = None,
     steering_limit: float | None = None,
+    wheel_width: float | None = None,
     ignore: Collection[str] = (),
 ) -> tuple[RoverModel, ImportReport]:
     if not isinstance(path, (str, os.PathLike)):
@@ -57,6 +58,7 @@ def _read(
         "steering_stiffness": steering_stiffness,
         "steering_damping": steering_damping,
         "steering_limit": steering_limit,
+        "wheel_width": wheel_width,
     }
     gains = Gains(
         **{

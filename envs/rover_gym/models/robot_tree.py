@@ -17,6 +17,8 @@ from rover_gym.validation import refuse, shown
 MAX_LINKS = 2000
 #: What would change the motion if it were left out, and is therefore refused unless `ignore` names it.
 IGNORABLE = ("friction", "actuators", "closed loops", "tendons", "springs", "fluid")
+#: How the name of a cylinder ends that stands for a wheel without width.
+THIN_DISC = "thin_disc"
 
 
 @dataclass
@@ -30,6 +32,7 @@ class FileShape:
         rotation: From the shape's axes to the link's frame (3, 3). A cylinder is about its z.
         collides: Whether the file lets it touch others.
         visible: Whether the file draws it.
+        name: Its name in the file, or "".
         mesh: The mesh's file, or its vertices (n, 3) in the shape's axes, m.
         scale: Factors of the mesh's coordinates.
     """
@@ -40,6 +43,7 @@ class FileShape:
     rotation: Array
     collides: bool
     visible: bool
+    name: str = ""
     mesh: Path | Array | None = None
     scale: Array | None = None
 

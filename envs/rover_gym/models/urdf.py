@@ -155,7 +155,7 @@ def _add_body(path: Path, source: Any, link: FileLink) -> None:
 def _shape(path: Path, source: Any, *, collides: bool) -> FileShape:
     R, p = _pose(source.origin)
     geometry = source.geometry
-    made = FileShape("mesh", (), p, R, collides, not collides)
+    made = FileShape("mesh", (), p, R, collides, not collides, source.name or "")
     if geometry.box is not None:
         made.kind, made.size = "box", tuple(float(s) for s in geometry.box.size)
     elif geometry.cylinder is not None:
