@@ -209,30 +209,48 @@ fn candidates(part: Part, end: &Kinematics, terrain: &dyn Terrain, gate: &mut Ga
                     touch(&placed, end, model, sphere, base, &half_way)
                 });
             }
-            piece => visit_on_surface(&placed.shape, piece, base, gate.reach, |point| {
-                if is_on_surface(terrain, id, base, point) {
+            piece => {
+                let piece = (terrain, id, piece);
+                visit_on_surface(&placed.shape, piece, base, gate.reach, |point| {
                     gate.offer(&placed, &on_surface(point), id);
-                }
-            }),
+                });
+            }
         },
     );
 }
 
 /// Visits the points of a shape on a piece of a surface whose gap is at most `reach`, m.
+///
+/// One behind the piece's plane must be in the ground, and not only beyond the far side of a ridge
+/// or a rock.
 #[inline]
 pub(crate) fn visit_on_surface(
     shape: &PlacedShape,
-    piece: &Primitive,
+    (terrain, id, piece): (&dyn Terrain, u32, &Primitive),
     base: &Vector3<f64>,
     reach: f64,
     mut visit: impl FnMut(&SurfacePoint),
 ) {
+    let shallow = SHALLOW * shape.bound();
+    let is_inside = |point: &SurfacePoint, place: &Vector3<f64>| {
+        point.gap >= -shallow || terrain.is_inside(id, &(base + place))
+    };
     match piece {
-        Primitive::Face(face) => dispatch::visit_on_face(shape, face, base, reach, visit),
-        Primitive::Edge(edge) => dispatch::visit_at_edge(shape, edge, base, reach, visit),
+        Primitive::Face(face) => dispatch::visit_on_face(shape, face, base, reach, |point| {
+            if is_inside(point, &point.point) {
+                visit(point);
+            }
+        }),
+        Primitive::Edge(edge) => dispatch::visit_at_edge(shape, edge, base, reach, |point| {
+            if is_inside(point, &(point.point + edge.into_wedge(&point.n, point.gap))) {
+                visit(point);
+            }
+        }),
         Primitive::Vertex(vertex) => {
             let near = dispatch::point_at_vertex(shape, vertex, base);
-            if near.gap <= reach && vertex.admits(&near.n) {
+            let is_near = near.gap <= reach && vertex.admits(&near.n);
+            let inward = || vertex.place - base - vertex.inward() * near.gap;
+            if is_near && (is_inside(&near, &near.point) || is_inside(&near, &inward())) {
                 visit(&near);
             }
         }
@@ -249,20 +267,9 @@ fn on_surface(point: &SurfacePoint) -> SurfacePoint {
     }
 }
 
-/// Whether a point on a piece of a surface is a contact: one behind the piece's plane must be in
-/// the ground, and not only beyond the far side of a ridge or a rock.
-#[inline]
-pub(crate) fn is_on_surface(
-    terrain: &dyn Terrain,
-    id: u32,
-    base: &Vector3<f64>,
-    point: &SurfacePoint,
-) -> bool {
-    point.gap >= -SHALLOW || terrain.is_inside(id, &(base + point.point))
-}
-
-/// Depth up to which a point is taken to be in the ground, m.
-const SHALLOW: f64 = 1e-9;
+/// Depth, in bounding radii of the shape, up to which a point is taken to be in the ground. Ground
+/// that is thinner, as near a sharp ridge, is pierced and still pushes.
+const SHALLOW: f64 = 1e-3;
 
 /// Whether a sphere's centre, relative to a shape's centre, is further than `within` from the
 /// shape, by an inexpensive bound.
@@ -468,11 +475,14 @@ fn visit_nearer(
                 Primitive::Sphere(sphere) => {
                     take(&dispatch::point_on_sphere(shape, sphere, base));
                 }
-                piece => visit_on_surface(shape, piece, base, f64::INFINITY, |point| {
-                    if is_lowest(point.feature) && is_on_surface(terrain, id, base, point) {
-                        take(&on_surface(point));
-                    }
-                }),
+                piece => {
+                    let piece = (terrain, id, piece);
+                    visit_on_surface(shape, piece, base, f64::INFINITY, |point| {
+                        if is_lowest(point.feature) {
+                            take(&on_surface(point));
+                        }
+                    });
+                }
             }
         });
         if gap + radius <= reach {

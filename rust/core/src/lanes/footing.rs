@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use crate::contact::detection::{is_on_surface, visit_on_surface};
+use crate::contact::detection::visit_on_surface;
 use crate::geometry::query::dispatch::{point_at_edge, point_at_vertex};
 use crate::geometry::query::{NEAREST, SurfacePoint};
 use crate::geometry::{Coverage, Disc, PlacedShape, Plane, Primitive, Terrain};
@@ -169,15 +169,13 @@ impl<T: Lane> Footing<T> {
         let mut found = None;
         let mut count = 0;
         terrain.visit_near(&centre, disc.radius + reach, &mut |id, piece| {
-            visit_on_surface(&shape, piece, &base, reach, |point| {
-                if is_on_surface(terrain, id, &base, point) {
-                    count += 1;
-                    let (plane, is_bent) = match piece {
-                        Primitive::Face(face) => (face.plane, false),
-                        _ => (plane_at(point, &base), true),
-                    };
-                    found = Some((id, plane, is_bent));
-                }
+            visit_on_surface(&shape, (terrain, id, piece), &base, reach, |point| {
+                count += 1;
+                let (plane, is_bent) = match piece {
+                    Primitive::Face(face) => (face.plane, false),
+                    _ => (plane_at(point, &base), true),
+                };
+                found = Some((id, plane, is_bent));
             });
         });
         self.offset.set(lane, f64::INFINITY);

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Vector3};
 
 use super::footing::{Footing, Wheels};
-use crate::contact::detection::{is_on_surface, visit_on_surface};
+use crate::contact::detection::visit_on_surface;
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::{Coverage, OrientedBox, PlacedShape, Sphere, SupportMap, Terrain};
 use crate::scalar::{Lane, LaneMask, MAX_LANES, Mat3, Vec3};
@@ -519,8 +519,8 @@ fn over_surface(
         bound + reach,
         low - reach,
         &mut |id, piece| {
-            visit_on_surface(&shape, piece, &nowhere, reach, |point| {
-                touches |= is_on_surface(field, id, &nowhere, point);
+            visit_on_surface(&shape, (field, id, piece), &nowhere, reach, |_| {
+                touches = true
             });
         },
     );

@@ -8,7 +8,8 @@
 //! found by a safeguarded secant iteration on `n ∝ (1 − τ) n₁ + τ n₂`. If the lowest point for a
 //! face's own normal is over that face, the face touches and the edge does not, so contacts hand
 //! over from face to edge with gap, point and normal continuous. A vertex is a ball of radius
-//! zero.
+//! zero: the rim never reaches into it, since it is the edges that lift a rim with a vertex above
+//! it, but a vertex may be beyond the face of the disc.
 //!
 //! Each gap is a maximum over normals, so its gradient is nᵀ times the Jacobian of the material
 //! point (envelope theorem).
@@ -57,9 +58,12 @@ pub(super) fn rim_point_between(
     base: &Vector3<f64>,
 ) -> Option<SurfacePoint> {
     let start = edge.start - base;
-    let Slope { low, high } = Slope::at_ends(disc, edge, &start);
-    let is_between = low < OVERLAP && high > -OVERLAP;
-    is_between.then(|| between(disc, edge, &start, low, high))
+    if let Some(part) = Bracket::at_crossing(disc, edge, &start) {
+        return Some(over_edge(disc, edge, &start, &part));
+    }
+    let whole = Bracket::whole(disc, edge, &start);
+    let is_between = whole.low < OVERLAP && whole.high > -OVERLAP;
+    is_between.then(|| between(disc, edge, &start, &whole))
 }
 
 /// The rim point that an edge pushes, with the admissible normal that separates most.
@@ -67,23 +71,26 @@ pub(super) fn rim_point_between(
 #[must_use]
 pub fn nearest_at_edge(disc: &Disc, edge: &Edge, base: &Vector3<f64>) -> SurfacePoint {
     let start = edge.start - base;
-    let Slope { low, high } = Slope::at_ends(disc, edge, &start);
-    between(disc, edge, &start, low, high)
-}
-
-#[inline]
-fn between(disc: &Disc, edge: &Edge, start: &Vector3<f64>, low: f64, high: f64) -> SurfacePoint {
-    let [first, second] = &edge.normals;
-    if low >= 0.0 {
-        rim_point_over(disc, first, start, NEAREST)
-    } else if high <= 0.0 {
-        rim_point_over(disc, second, start, NEAREST)
-    } else {
-        over_edge(disc, edge, start, low, high)
+    match Bracket::at_crossing(disc, edge, &start) {
+        Some(part) => over_edge(disc, edge, &start, &part),
+        None => between(disc, edge, &start, &Bracket::whole(disc, edge, &start)),
     }
 }
 
-/// The rim point that a vertex pushes, wherever it is.
+#[inline]
+fn between(disc: &Disc, edge: &Edge, start: &Vector3<f64>, whole: &Bracket) -> SurfacePoint {
+    let [first, second] = &edge.normals;
+    if whole.low >= 0.0 {
+        rim_point_over(disc, first, start, NEAREST)
+    } else if whole.high <= 0.0 {
+        rim_point_over(disc, second, start, NEAREST)
+    } else {
+        over_edge(disc, edge, start, whole)
+    }
+}
+
+/// The point that a vertex pushes, wherever it is: of the face, along the axle and with a sign, if
+/// the vertex may push that way and is abreast of the face; of the rim otherwise.
 #[inline]
 #[must_use]
 pub fn nearest_at_vertex(disc: &Disc, vertex: &Vertex, base: &Vector3<f64>) -> SurfacePoint {
@@ -91,23 +98,87 @@ pub fn nearest_at_vertex(disc: &Disc, vertex: &Vertex, base: &Vector3<f64>) -> S
         centre: vertex.place,
         radius: 0.0,
     };
-    disc_sphere::nearest_point(disc, &point, base)
+    let near = disc_sphere::nearest_point(disc, &point, base);
+    let offset = vertex.place - base - disc.centre;
+    let abreast = offset - disc.axle * offset.dot(&disc.axle);
+    let is_on_face = abreast.norm_squared() < disc.radius * disc.radius;
+    let mut sides = [disc.axle, -disc.axle].into_iter();
+    match sides.find(|n| is_on_face && vertex.admits(n)) {
+        Some(n) => SurfacePoint {
+            n,
+            gap: -n.dot(&offset),
+            ..near
+        },
+        None => near,
+    }
 }
 
-/// Derivative of the gap at the two ends of an edge's normals, up to a positive factor and with the
-/// sign reversed.
-struct Slope {
+/// Normals at an edge, from one to another, and the derivatives of the gap at both, up to a positive
+/// factor and with the sign reversed.
+struct Bracket {
+    ends: [Vector3<f64>; 2],
     low: f64,
     high: f64,
 }
 
-impl Slope {
+impl Bracket {
     #[inline]
-    fn at_ends(disc: &Disc, edge: &Edge, start: &Vector3<f64>) -> Self {
-        let [low, high] = edge.normals.map(|n| slope(disc, edge, start, &n).0);
-        Self { low, high }
+    fn between(disc: &Disc, edge: &Edge, start: &Vector3<f64>, ends: [Vector3<f64>; 2]) -> Self {
+        let [low, high] = ends.map(|n| slope(disc, edge, start, &n).0);
+        Self { ends, low, high }
+    }
+
+    /// From the normal of one face to that of the other.
+    #[inline]
+    fn whole(disc: &Disc, edge: &Edge, start: &Vector3<f64>) -> Self {
+        Self::between(disc, edge, start, edge.normals)
+    }
+
+    /// About the normal of a rim that just touches the edge where this crosses the disc's plane.
+    ///
+    /// Along the normals n(θ) of an edge the gap is f = n · w − R |n × s|, with the axle s, and
+    /// f'' + f ≤ 0. So where a rim just touches (f = 0) the gap has no second maximum within a
+    /// quarter turn, and only an edge sharper than that has use for this.
+    #[inline]
+    fn at_crossing(disc: &Disc, edge: &Edge, start: &Vector3<f64>) -> Option<Self> {
+        let [first, second] = &edge.normals;
+        let is_sharp = first.dot(second) < SHARP;
+        is_sharp.then(|| Self::search(disc, edge, start)).flatten()
+    }
+
+    #[cold]
+    fn search(disc: &Disc, edge: &Edge, start: &Vector3<f64>) -> Option<Self> {
+        let s = &disc.axle;
+        let across = s.dot(&edge.along);
+        let outward = start - disc.centre;
+        // Times `across`, so that an edge along the disc's plane divides by nothing.
+        let outward = (outward * across - edge.along * s.dot(&outward)) * across.signum();
+        let n = s.cross(&outward).cross(&edge.along);
+        let [first, second] = edge.normals;
+        let middle = [n, -n].into_iter().find(|n| edge.admits(n))?.normalize();
+        let lean = slope(disc, edge, start, &middle).0;
+        // From the normal at touch towards where the gap grows, in doubled steps.
+        let end = if lean < 0.0 { second } else { first };
+        let mut inner = middle;
+        let mut part = 1.0 / 64.0;
+        while part <= 1.0 {
+            let outer = (middle * (1.0 - part) + end * part).normalize();
+            let own = slope(disc, edge, start, &outer).0;
+            if lean < 0.0 && own > 0.0 {
+                return Some(Self::between(disc, edge, start, [inner, outer]));
+            }
+            if lean >= 0.0 && own < 0.0 {
+                return Some(Self::between(disc, edge, start, [outer, inner]));
+            }
+            inner = outer;
+            part *= 2.0;
+        }
+        None
     }
 }
+
+/// Cosine of the angle between the normals of an edge that is sharp.
+const SHARP: f64 = 0.2;
 
 #[inline]
 fn slope(disc: &Disc, edge: &Edge, start: &Vector3<f64>, n: &Vector3<f64>) -> (f64, SurfacePoint) {
@@ -116,9 +187,9 @@ fn slope(disc: &Disc, edge: &Edge, start: &Vector3<f64>, n: &Vector3<f64>) -> (f
 }
 
 /// The rim point over an edge, between normals where the slope is below and above zero.
-fn over_edge(disc: &Disc, edge: &Edge, start: &Vector3<f64>, low: f64, high: f64) -> SurfacePoint {
-    let [first, second] = &edge.normals;
-    let (mut a, mut fa, mut b, mut fb) = (0.0, low, 1.0, high);
+fn over_edge(disc: &Disc, edge: &Edge, start: &Vector3<f64>, bracket: &Bracket) -> SurfacePoint {
+    let [first, second] = &bracket.ends;
+    let (mut a, mut fa, mut b, mut fb) = (0.0, bracket.low, 1.0, bracket.high);
     let mut point = rim_point_over(disc, first, start, NEAREST);
     for k in 0..MAX_ITERATIONS {
         // Illinois' rule keeps both ends moving; every third step halves.

@@ -96,6 +96,22 @@ impl Edge {
         self.lean(first, n) < 0.0 && self.lean(second, n) > 0.0
     }
 
+    /// From a point behind the edge along an admissible unit normal n, by its `gap` (m), to a place
+    /// about as deep between the two faces, m. Zero but at an edge sharper than a right angle,
+    /// where −n may lead out through the face on the far side.
+    #[inline]
+    #[must_use]
+    pub fn into_wedge(&self, n: &Vector3<f64>, gap: f64) -> Vector3<f64> {
+        let [first, second] = &self.normals;
+        let outside = first.dot(n).min(second.dot(n));
+        if outside >= 0.0 {
+            return Vector3::zeros();
+        }
+        let far = if first.dot(n) < 0.0 { first } else { second };
+        let bisector = (first + second).normalize();
+        (bisector * WITHIN - far * outside) * gap
+    }
+
     /// Whether a place along the edge (m from its start) belongs to it, for a part that is `depth`
     /// (m) in the ground there: it leans off a vertex by no more than it is deep.
     #[inline]
@@ -105,6 +121,9 @@ impl Edge {
         place >= -over && place < self.length + over
     }
 }
+
+/// How far within a sharp edge's faces its place is, in depths.
+const WITHIN: f64 = 0.01;
 
 /// Most edges that bound a vertex.
 pub const MAX_SPOKES: usize = 12;
@@ -121,6 +140,14 @@ pub struct Vertex {
 }
 
 impl Vertex {
+    /// Unit direction into the ground, away from all faces alike: the mean of its edges'.
+    #[must_use]
+    pub fn inward(&self) -> Vector3<f64> {
+        let spokes = self.spokes[..self.n].iter();
+        let sum: Vector3<f64> = spokes.map(|spoke| spoke.normalize()).sum();
+        sum.try_normalize(FLAT).unwrap_or_default()
+    }
+
     /// Whether the surface lies below the plane with this unit normal on all sides, or in it but
     /// for one.
     #[inline]
