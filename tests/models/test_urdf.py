@@ -185,7 +185,7 @@ REFUSED = {
     "half a file": ("(<robot.*)</robot>", r"\1", "is no XML"),
     "another root": ("(?<=<|/)robot(?= name|>)", "machine", "is no XML|root element"),
     "no number": ('mass value="50.0"', 'mass value="heavy"', r"link\[chassis\]\.inertial\.mass\.value: must be a number, got 'heavy'"),
-    "two numbers": ('xyz="0.01 0.02 0.03"', 'xyz="0.01 0.02"', "must be 3 numbers, got '0.01 0.02'"),
+    "two numbers": ('xyz="0.01 0.02 0.03"', 'xyz="0.01 0.02"', "must be 3 numbers with spaces between them, got '0.01 0.02'"),
     "not finite": ('ixx="0.2"', 'ixx="inf"', "must be finite, got 'inf'"),
     "nan": ('mass value="50.0"', 'mass value="nan"', "must be finite, got 'nan'"),
     "a missing attribute": (' izz="0.4"', "", "inertia.izz: is missing"),
@@ -314,3 +314,22 @@ def test_a_wheel_without_a_cylinder_that_touches_is_a_thin_disc(tmp_path, shape)
     assert not any("width" in wheel for wheel in model.to_dict()["wheels"])
     is_listed = "a sphere of a wheel, which touches as a thin disc" in str(model.import_report)
     assert is_listed == (shape is not None)
+
+
+def test_substitutions_of_ros_have_their_defaults(tmp_path):
+    text = changed(rover(), '"0.3 0.1 0.5"', '"$(optenv MAST_XYZ 0.3 0.1 0.5)"')
+    text = changed(text, "<box size.*?/>", '<mesh filename="$(find small)/hull.dae"/>')
+    model = RoverModel.from_urdf(write(tmp_path, text))
+    assert model.to_dict()["tags"][0]["position"] == [0.3, 0.5, -0.1]
+    assert "'0.3 0.1 0.5', the default of MAST_XYZ: line" in str(model.import_report)
+    assert "mast].origin.xyz" in str(model.import_report)
+
+
+@pytest.mark.parametrize("value", ["$(optenv MAST_XYZ)", "$(arg xyz)", "${x} 0 0", "$(eval 1 + 2) 0 0"])
+def test_substitutions_without_a_value_are_refused(tmp_path, value):
+    text = changed(rover(), '"0.3 0.1 0.5"', f'"{value}"')
+    with pytest.raises(
+        ModelError, match=r"joint\[mast\]\.origin\.xyz: holds what xacro or roslaunch replaces"
+    ) as raised:
+        RoverModel.from_urdf(write(tmp_path, text))
+    assert raised.value.value == value

@@ -30,10 +30,10 @@ def read_urdf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
         OSError: The file cannot be read.
     """
     parser = require("yourdfpy", "models")
-    root, others = parse(path)
+    checked = parse(path)
     etree = require("lxml.etree", "models")
     # Parsed anew from the checked tree. What cannot be read strictly must not get there: yourdfpy would skip it.
-    text = etree.tostring(root)
+    text = etree.tostring(checked.root)
     try:
         etree.fromstring(text)
         robot = parser.URDF.load(
@@ -41,9 +41,9 @@ def read_urdf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
         ).robot
     except Exception as error:  # what yourdfpy raises has no common class
         refuse_in(path, "robot", path.name, f"cannot be read ({type(error).__name__}: {error})")
-    tree = RobotTree(path, robot.name or path.stem, {}, left_out=others)
+    tree = RobotTree(path, robot.name or path.stem, {}, left_out=checked.left_out(), assumed=checked.assumed)
     _check_names(path, robot)
-    for element in root.findall("gazebo"):
+    for element in checked.root.findall("gazebo"):
         if any("joint" in str(one.tag) for one in element.iter()):
             tree.leave_out("closed loops", "gazebo", element.get("reference"), "closes a loop by a joint", ignore)
     carriers = {joint.child: joint for joint in robot.joints}
