@@ -333,3 +333,19 @@ def test_substitutions_without_a_value_are_refused(tmp_path, value):
     ) as raised:
         RoverModel.from_urdf(write(tmp_path, text))
     assert raised.value.value == value
+
+
+def test_a_wheel_that_is_fixed_to_a_link_that_turns_is_refused(tmp_path):
+    tyre = body("tyre", mass=1.0, shapes=WHEEL) + joint("glue", "fixed", "rear_hub", "tyre")
+    text = rover(extra=tyre).replace("rear_wheel", "rear_hub")
+    text = changed(text, r'(name="rear_hub".*?)<collision>.*?</collision>', r"\1")
+    with pytest.raises(ModelError, match=r"link\[tyre\]\.joint: this wheel is fixed to rear_hub, which turns"):
+        RoverModel.from_urdf(write(tmp_path, text))
+    told = {"left_wheel": 0.2, "right_wheel": 0.2, "rear_hub": 0.2}
+    assert RoverModel.from_urdf(tmp_path / "robot.urdf", wheels=told).wheel_names == list(told)
+
+
+def test_a_motor_with_a_leg_is_no_wheel(tmp_path):
+    leg = body("leg", mass=1.0) + joint("knee", "fixed", "rear_motor", "leg")
+    text = rover(extra=leg, names=("left_motor", "right_motor")).replace("rear_wheel", "rear_motor")
+    assert RoverModel.from_urdf(write(tmp_path, text)).wheel_names == ["left_motor", "right_motor"]

@@ -136,8 +136,14 @@ def _chosen(
     ]
     named = [one for one in candidates if NAMED.search(f"{one.name} {one.joint.name}")]
     named = [one for one in named if not NOT_NAMED.search(one.name)] or named
-    round_ones = {one.name: shape.size[0] for one in candidates if (shape := _round_shape(one)) is not None}
+    # What carries a link that is fixed to it, such as a motor with its leg, is a wheel only if its name says so.
+    round_ones = {
+        one.name: shape.size[0]
+        for one in candidates
+        if (one in named or not tree.children(one.name)) and (shape := _round_shape(one)) is not None
+    }
     chosen = [one.name for one in named] or list(round_ones)
+    _refuse_fixed_wheels(tree, candidates, chosen)
     doubtful = [name for name in round_ones if name not in chosen]
     lowest = {name: float(up @ poses[name][1]) - radius for name, radius in round_ones.items()}
     floor = min((lowest[name] for name in chosen if name in lowest), default=None)
@@ -151,6 +157,16 @@ def _chosen(
                 f"{', '.join(doubtful)} may be wheels of {tree.path} like {', '.join(chosen)}: say which are",
             )
     return dict.fromkeys(chosen)
+
+
+def _refuse_fixed_wheels(tree: RobotTree, candidates: list[FileLink], chosen: list[str]) -> None:
+    """Refuses a wheel by its name that is fixed to a link that turns: only that link can be the wheel."""
+    for carrier in candidates:
+        for link in tree.children(carrier.name) if carrier.name not in chosen else ():
+            is_round = any(shape.collides and shape.kind in ("cylinder", "sphere") for shape in link.shapes)
+            if is_round and NAMED.search(link.name) and not NOT_NAMED.search(link.name):
+                reason = f"this wheel is fixed to {carrier.name}, which turns: join the two links in the file"
+                tree.refuse(f"link[{link.name}].joint", link.joint.kind, f"{reason}, or say which links are wheels")
 
 
 def _moving_carriers(tree: RobotTree) -> set[str]:

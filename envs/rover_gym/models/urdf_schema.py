@@ -122,7 +122,7 @@ def parse(path: Path) -> CheckedUrdf:
 
 
 def _check(checked: CheckedUrdf, element: Any, key: str, where: str) -> None:
-    """Checks an element, whose entry in `ATTRIBUTES` is `key` and whose place in words is `where`, and what it holds."""
+    """Checks an element and what it holds. `key` is its entry in `ATTRIBUTES`, `where` its place in the file."""
     path, line = checked.path, f"line {element.sourceline}"
     spec = {name.rstrip("!"): kind for name, kind in ATTRIBUTES[key].items()}
     for name in element.attrib:
