@@ -15,6 +15,8 @@ from rover_gym.validation import refuse, shown
 
 #: Most links of a file: a model has at most 1000 solids, and links without mass are joined to others.
 MAX_LINKS = 2000
+#: Largest file, bytes.
+MAX_BYTES = 16 << 20
 #: What would change the motion if it were left out, and is therefore refused unless `ignore` names it.
 IGNORABLE = ("friction", "actuators", "closed loops", "tendons", "springs", "fluid")
 #: How the name of a cylinder ends that stands for a wheel without width.
@@ -58,6 +60,10 @@ class FileJoint:
         anchor: Its point in the link's frame (3,), m.
         axis: Unit axis in the link's frame (3,).
         limits: Stops, rad or m.
+        damping: Viscous damping, N m s/rad or N s/m.
+        armature: Inertia of its rotor, kg m² or kg.
+        stiffness: Of its spring, N m/rad or N/m.
+        rest: Coordinate at which its spring is relaxed, rad or m.
         follows: Name of the joint that it follows, ratio and offset.
         torque_limit: Largest torque that the file states, N m.
         hold: Gains of a position controller: stiffness and damping.
@@ -120,12 +126,15 @@ class RobotTree:
         path: The file.
         name: Name of the robot.
         links: By name.
-        notes: What was decided in reading, and what the file holds that is not simulated.
+        ignore: Kinds, of `IGNORABLE`, of what changes the motion and is left out all the same.
+        left_out: What the file holds and the model does not simulate.
+        assumed: What the file does not state and was chosen.
     """
 
     path: Path
     name: str
     links: dict[str, FileLink]
+    ignore: Collection[str] = ()
     left_out: list[str] = field(default_factory=list)
     assumed: list[str] = field(default_factory=list)
 
@@ -133,9 +142,9 @@ class RobotTree:
         """Raises a `ModelError` that names the file, the element and the value."""
         refuse_in(self.path, where, value, reason)
 
-    def leave_out(self, kind: str, where: str, value: object, reason: str, ignore: Collection[str]) -> None:
+    def leave_out(self, kind: str, where: str, value: object, reason: str) -> None:
         """Lists what changes the motion if `ignore` names its kind, and refuses it otherwise."""
-        if kind not in ignore:
+        if kind not in self.ignore:
             self.refuse(where, value, f'{reason}; ignore=["{kind}"] leaves it out')
         self.left_out.append(f"{where}: {reason} (left out as told)")
 
@@ -170,6 +179,18 @@ def refuse_in(path: Path, where: str, value: object, reason: str) -> NoReturn:
     error.field = where
     error.value = value
     raise error
+
+
+def check_size(path: Path) -> None:
+    """Refuses a file of more than `MAX_BYTES` before it is read.
+
+    Raises:
+        ModelError: The file is too large.
+        OSError: There is no such file.
+    """
+    size = path.stat().st_size
+    if size > MAX_BYTES:
+        refuse_in(path, "file", size, f"must have at most {MAX_BYTES} bytes")
 
 
 def is_urdf(path: Path) -> bool:

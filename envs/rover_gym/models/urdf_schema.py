@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from rover_gym.extras import require
-from rover_gym.models.robot_tree import MAX_LINKS, refuse_in
+from rover_gym.models.robot_tree import MAX_LINKS, check_size, refuse_in
 
-#: Largest file, bytes, and largest number of elements.
-MAX_BYTES, MAX_ELEMENTS = 16 << 20, 200_000
+#: Largest number of elements.
+MAX_ELEMENTS = 200_000
 
 #: A substitution of ROS: its kind and its arguments.
 SUBSTITUTION = re.compile(r"\$\((\w+)\s+([^()]*)\)")
@@ -96,9 +96,7 @@ def parse(path: Path) -> CheckedUrdf:
         OSError: The file cannot be read.
     """
     etree = require("lxml.etree", "models")
-    size = path.stat().st_size
-    if size > MAX_BYTES:
-        refuse_in(path, "file", size, f"must have at most {MAX_BYTES} bytes")
+    check_size(path)
     data = UNVERSIONED.sub(b"", path.read_bytes())
     try:
         root = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True))
