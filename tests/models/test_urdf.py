@@ -349,3 +349,18 @@ def test_a_motor_with_a_leg_is_no_wheel(tmp_path):
     leg = body("leg", mass=1.0) + joint("knee", "fixed", "rear_motor", "leg")
     text = rover(extra=leg, names=("left_motor", "right_motor")).replace("rear_wheel", "rear_motor")
     assert RoverModel.from_urdf(write(tmp_path, text)).wheel_names == ["left_motor", "right_motor"]
+
+
+@pytest.mark.parametrize("ratio", [1.0, -0.5])
+def test_a_steering_joint_that_follows_another_still_does_when_its_axis_is_reversed(tmp_path, ratio):
+    given = ["left_fork", "right_fork"]
+    wheels = []
+    for axis in ("0 0 1", "0 0 -1"):
+        mimic = f'name="right_steer" type="revolute"><mimic joint="left_steer" multiplier="{ratio}" offset="0.1"/>'
+        text = rover(steer_axis=axis).replace('name="right_steer" type="revolute">', mimic)
+        model = RoverModel.from_urdf(write(tmp_path, text), steering=given)
+        q = np.zeros(model.nv)
+        q[model.dof_names.index("left_fork")] = 0.3 if axis == "0 0 1" else -0.3  # the file's angle is 0.3
+        wheels.append(model.poses(q)["right_wheel"][1])
+    turned = wheels[0] @ wheels[1]  # by opposite angles about one axis
+    np.testing.assert_allclose(turned, np.eye(3), atol=1e-12)

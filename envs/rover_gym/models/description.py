@@ -22,7 +22,7 @@ UNLIMITED = 1e9  # N m, the torque limit of a motor for which the file states no
 
 
 @dataclass(frozen=True)
-class Gains:
+class WheelOptions:
     """What a user gives for all wheels and steering joints; None: as the file states, otherwise assumed.
 
     Attributes:
@@ -40,23 +40,21 @@ class Gains:
     wheel_width: float | None = None
 
 
-def describe(tree: RobotTree, roles: list[WheelRole], P: Array, gains: Gains) -> dict[str, Any]:
+def describe(tree: RobotTree, roles: list[WheelRole], P: Array, options: WheelOptions) -> dict[str, Any]:
     """The description of a robot.
 
     Args:
-        tree: The robot, links without mass joined.
+        tree: The robot, links without mass joined and joints as `joint_conventions` wants them.
         roles: Its wheels.
         P: Rotation from the file's axes to those of this package, (3, 3).
-        gains: What the user gave.
+        options: What the user gave.
 
     Raises:
         ModelError: The file holds what has no place in a description.
     """
-    if gains.wheel_width is not None:
-        roles = [replace(role, width=gains.wheel_width) for role in roles]
+    if options.wheel_width is not None:
+        roles = [replace(role, width=options.wheel_width) for role in roles]
     wheels = {role.link: role for role in roles}
-    _turn_steering_axes_up(tree, {role.steering for role in roles if role.steering}, P)
-    _move_limits_to_followed_joints(tree)
     anchors = {}
     for link in tree.links.values():
         shift = wheels[link.name].shift if link.name in wheels else 0.0
@@ -68,12 +66,12 @@ def describe(tree: RobotTree, roles: list[WheelRole], P: Array, gains: Gains) ->
     solids, tags = [], []
     for link in _followed_first(tree):
         solids.append(_solid(tree, link, anchors, axes, P, wheels.get(link.name)))
-        _add_control(tree, link, solids[-1], steering.get(link.name), weight, gains, is_wheel=link.name in wheels)
+        _add_control(tree, link, solids[-1], steering.get(link.name), weight, options, is_wheel=link.name in wheels)
         for name, point in link.points:
             place = _numbers(axes[link.name] @ (point - anchors[link.name]))
             tags.append({"name": name, "solid": link.name, "position": place})
     description: dict[str, Any] = {"name": tree.name, "solids": solids}
-    description["wheels"] = [_wheel(tree, role, axes[role.link], weight, gains) for role in roles]
+    description["wheels"] = [_wheel(tree, role, axes[role.link], weight, options) for role in roles]
     if tags:
         description["tags"] = tags
     return description
@@ -127,7 +125,7 @@ def _add_control(
     solid: dict[str, Any],
     steered: WheelRole | None,
     weight: float,
-    gains: Gains,
+    options: WheelOptions,
     *,
     is_wheel: bool,
 ) -> None:
@@ -137,17 +135,8 @@ def _add_control(
             tree.left_out.append(f"joint[{joint.name}]: its motor, since a {joint.kind} or coupled joint has none")
         return
     if steered is not None:
-        stiffness = (joint.hold or (0.0, 0.0))[0] or STEERING_STIFFNESS * weight * steered.radius
-        if gains.steering_stiffness is not None:
-            stiffness = gains.steering_stiffness
-        elif joint.hold is None:
-            tree.assumed.append(f"steering {link.name}: stiffness {stiffness:.4g} N m/rad")
-        damping = (joint.hold or (0.0, 0.0))[1] or STEERING_TIME * stiffness
-        if gains.steering_damping is not None:
-            damping = gains.steering_damping
-        elif joint.hold is None:
-            tree.assumed.append(f"steering {link.name}: damping {damping:.4g} N m s/rad")
-        solid["hold"] = {"stiffness": float(stiffness), "damping": float(damping)}
+        stiffness, damping = _steering_gains(tree, link, steered, weight, options)
+        solid["hold"] = {"stiffness": stiffness, "damping": damping}
         return
     if joint.hold is not None:
         solid["hold"] = {"stiffness": float(joint.hold[0]), "damping": float(joint.hold[1])}
@@ -160,9 +149,26 @@ def _add_control(
                 tree.assumed.append(f"joint {joint.name}: torque limit {UNLIMITED:g} N m, since the file states none")
 
 
-def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, gains: Gains) -> dict[str, Any]:
+def _steering_gains(
+    tree: RobotTree, link: FileLink, steered: WheelRole, weight: float, options: WheelOptions
+) -> tuple[float, float]:
+    """Stiffness, N m/rad, and damping, N m s/rad: as given, otherwise the file's, otherwise assumed."""
+    stated_stiffness, stated_damping = link.joint.hold or (0.0, 0.0)
+
+    def chosen(what: str, given: float | None, stated: float, usual: float, unit: str) -> float:
+        if given is None and not stated:
+            tree.assumed.append(f"steering {link.name}: {what} {usual:.4g} {unit}")
+        return float(given if given is not None else stated or usual)
+
+    usual = STEERING_STIFFNESS * weight * steered.radius
+    stiffness = chosen("stiffness", options.steering_stiffness, stated_stiffness, usual, "N m/rad")
+    usual = STEERING_TIME * stiffness
+    return stiffness, chosen("damping", options.steering_damping, stated_damping, usual, "N m s/rad")
+
+
+def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, options: WheelOptions) -> dict[str, Any]:
     joint = tree.links[role.link].joint
-    limit = gains.torque_limit if gains.torque_limit is not None else joint.torque_limit
+    limit = options.torque_limit if options.torque_limit is not None else joint.torque_limit
     if role.is_caster:
         limit = 0.0
         tree.assumed.append(f"wheel {role.link}: a caster, without a drive")
@@ -184,8 +190,8 @@ def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, gains: Gai
     if role.steering is not None:
         stops = tree.links[role.steering].joint.limits
         reach = STEERING_LIMIT if stops is None else min(abs(stop) for stop in stops) or max(abs(s) for s in stops)
-        if gains.steering_limit is not None:
-            reach = gains.steering_limit
+        if options.steering_limit is not None:
+            reach = options.steering_limit
         elif stops is None:
             tree.assumed.append(f"steering {role.steering}: set-points up to {reach:g} rad")
         wheel |= {"steering": role.steering, "steering_limit": float(reach)}
@@ -246,46 +252,6 @@ def _shape(shape: FileShape, A: Array, anchor: Array, *, collides: bool, visible
     if not visible:
         made["visible"] = False
     return made
-
-
-def _turn_steering_axes_up(tree: RobotTree, steering: set[str], P: Array) -> None:
-    """Reverses steering joints whose axis points down, so that a positive angle turns to the left everywhere."""
-    poses, up = tree.poses(), P.T @ (0.0, 1.0, 0.0)
-    for name in sorted(steering):
-        link = tree.links[name]
-        if float(poses[name][0] @ link.joint.axis @ up) > 0.0:
-            continue
-        joint = link.joint
-        joint.axis, joint.rest = -joint.axis, -joint.rest
-        if joint.limits is not None:
-            joint.limits = (-joint.limits[1], -joint.limits[0])
-        for other in tree.links.values():
-            if other.joint.follows is not None and other.joint.follows[0] == joint.name:
-                followed, ratio, offset = other.joint.follows
-                other.joint.follows = (followed, -ratio, offset)
-        tree.assumed.append(f"steering {name}: its axis points down and is reversed: positive turns to the left")
-
-
-def _move_limits_to_followed_joints(tree: RobotTree) -> None:
-    """The stops of a joint that follows another become stops of the other."""
-    by_joint = {link.joint.name: link for link in tree.links.values()}
-    for link in tree.links.values():
-        if link.joint.follows is None:
-            continue
-        name, ratio, offset = link.joint.follows
-        at = f"joint[{link.joint.name}].mimic"
-        if name not in by_joint:
-            tree.refuse(f"{at}.joint", name, "this joint does not move")
-        if link.joint.limits is not None and ratio != 0.0:
-            lower, upper = sorted((limit - offset) / ratio for limit in link.joint.limits)
-            followed = by_joint[name].joint
-            own = followed.limits or (-np.inf, np.inf)
-            followed.limits = (max(own[0], lower), min(own[1], upper))
-            if not followed.limits[0] < followed.limits[1]:
-                tree.refuse(
-                    f"{at}", list(followed.limits), "its limits and those of the followed joint exclude each other"
-                )
-        link.joint.limits = None
 
 
 def _followed_first(tree: RobotTree) -> list[FileLink]:
