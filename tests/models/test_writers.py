@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from models.robot_files import rover, write
 
-from rover_gym import ModelError, RoverModel
+from rover_gym import ModelError, Motor, RoverModel
 
 KINDS = {"urdf": "yourdfpy", "mjcf": "mujoco"}
 
@@ -125,3 +125,19 @@ def test_wide_wheels_come_back_as_wide_and_thin_ones_as_thin(tmp_path, kind):
         assert [wheel.get("width", 0.0) for wheel in read.to_dict()["wheels"]] == [0.125, 0.0, 0.0177, 1.0]
         kinds = [[shape["kind"] for shape in solid["shapes"]] for solid in read.to_dict()["solids"][1:]]
         assert kinds == [["cylinder", "disc"], ["disc"], ["cylinder", "disc"], ["cylinder", "disc"]]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_motor_without_a_largest_speed_is_written(tmp_path, kind):
+    pytest.importorskip(KINDS[kind])
+    model = RoverModel.named("skid-steered").replace(motor=Motor(50.0, float("inf")))
+    assert_same_machine(model, written_and_read(model, tmp_path, kind))
+
+
+@pytest.mark.parametrize("path", [3, None, b"robot.urdf"])
+def test_what_is_no_path_is_refused(tmp_path, monkeypatch, path):
+    monkeypatch.chdir(tmp_path)
+    for write_to in (RoverModel().to_urdf, RoverModel().to_mjcf):
+        with pytest.raises(ModelError, match="path: must be a path"):
+            write_to(path)
+    assert not list(tmp_path.iterdir())

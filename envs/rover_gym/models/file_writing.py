@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any, NoReturn
 from xml.etree import ElementTree as ET
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.file_axes import Z_UP_TO_Y_UP, Array, rotation_matrix, turn_z_to
-from rover_gym.models.robot_tree import THIN_DISC, FileShape
+from rover_gym.models.robot_tree import THIN_DISC, FileShape, checked_path
 from rover_gym.validation import refuse
 
 #: Width of the cylinder that stands for a thin disc, as a share of its radius.
@@ -165,7 +164,12 @@ def text_of(values: Iterable[float] | float) -> str:
 
 
 def write_xml(root: ET.Element, path: object) -> None:
-    """Writes an indented file."""
+    """Writes an indented file.
+
+    Raises:
+        ModelError: `path` is no path.
+        OSError: The file cannot be written.
+    """
     ET.indent(root)
     text = '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
-    Path(str(path)).write_text(text, encoding="utf-8")
+    checked_path(path).write_text(text, encoding="utf-8")

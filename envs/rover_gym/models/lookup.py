@@ -9,7 +9,7 @@ from typing import Any
 from rover_gym.mechanics import ModelError, RoverModel
 from rover_gym.models.import_report import ImportReport
 from rover_gym.models.reading import read_mjcf, read_urdf
-from rover_gym.models.robot_tree import is_urdf
+from rover_gym.models.robot_tree import checked_path, is_urdf
 from rover_gym.validation import refuse
 
 #: Kinds of files by their endings.
@@ -30,7 +30,9 @@ def open_model(name: object) -> RoverModel:
         ModelError: There is no such model, or the file is none.
         OSError: The file cannot be read.
     """
-    path = _path("model", name)
+    if not isinstance(name, (str, os.PathLike)):
+        refuse(ModelError, "model", name, "must be a name or a path")
+    path = Path(os.fsdecode(name))
     match _kind(path):
         case "URDF":
             return RoverModel.from_urdf(path)
@@ -58,17 +60,11 @@ def read_robot(path: object, **options: Any) -> tuple[RoverModel, ImportReport]:
         ModelError: The file is of another kind, or cannot be read as a robot.
         OSError: The file cannot be read.
     """
-    place = _path("path", path)
+    place = checked_path(path)
     kind = _kind(place)
     if kind not in ("URDF", "MJCF"):
         refuse(ModelError, "path", str(place), "must end in .urdf, .xml or .mjcf: only URDF and MJCF are imported")
     return read_urdf(place, **options) if kind == "URDF" else read_mjcf(place, **options)
-
-
-def _path(field: str, given: object) -> Path:
-    if not isinstance(given, (str, os.PathLike)):
-        refuse(ModelError, field, given, "must be a path" if field == "path" else "must be a name or a path")
-    return Path(os.fsdecode(given))
 
 
 def _kind(path: Path) -> str | None:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Collection
-from pathlib import Path
 from typing import Any
 
 from rover_gym.mechanics import ModelError, RoverModel
@@ -15,7 +13,7 @@ from rover_gym.models.import_report import ImportReport, solid_rows, together
 from rover_gym.models.joint_conventions import move_limits_to_followed_joints, turn_steering_axes_up
 from rover_gym.models.massless_links import join_massless_links
 from rover_gym.models.mjcf import read_mjcf_tree
-from rover_gym.models.robot_tree import IGNORABLE, RobotTree, check_kinds
+from rover_gym.models.robot_tree import IGNORABLE, RobotTree, check_kinds, checked_path
 from rover_gym.models.roles import Steering, Wheels, find_wheels
 from rover_gym.models.urdf import read_urdf_tree
 from rover_gym.validation import number, refuse
@@ -48,8 +46,7 @@ def _read(
     wheel_width: float | None = None,
     ignore: Collection[str] = (),
 ) -> tuple[RoverModel, ImportReport]:
-    if not isinstance(path, (str, os.PathLike)):
-        refuse(ModelError, "path", path, "must be a path")
+    place = checked_path(path)
     if free_base is not None and not isinstance(free_base, bool):
         refuse(ModelError, "free_base", free_base, "must be True or False")
     P = axes_of(forward)
@@ -67,7 +64,6 @@ def _read(
             for name, value in given.items()
         }
     )
-    place = Path(os.fsdecode(path))
     tree = reader(place, ignore=ignored)
     join_massless_links(tree, free_base=bool(free_base))
     for link in tree.links.values():

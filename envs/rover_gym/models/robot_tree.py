@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -179,6 +180,17 @@ def refuse_in(path: Path, where: str, value: object, reason: str) -> NoReturn:
     error.field = where
     error.value = value
     raise error
+
+
+def checked_path(path: object) -> Path:
+    """The path that a user gave.
+
+    Raises:
+        ModelError: It is no path.
+    """
+    if not isinstance(path, (str, os.PathLike)):
+        refuse(ModelError, "path", path, "must be a path")
+    return Path(os.fsdecode(path))
 
 
 def check_size(path: Path) -> None:

@@ -13,7 +13,7 @@ from rover_gym.models.robot_tree import FileShape, check_kinds
 
 #: What URDF cannot express and `ignore` may name.
 IGNORABLE = ("springs", "armature")
-FAST = 1e3  # rad/s, the velocity limit where there is no motor: URDF wants one
+FAST = 1e3  # rad/s, the velocity limit of a joint whose speed no motor limits: URDF wants one
 WORLD = "world"
 
 
@@ -108,7 +108,7 @@ def _joint(solid: WrittenSolid, wheel: dict[str, Any] | None, drive: float | Non
     ET.SubElement(joint, "axis", xyz=text_of(solid.axis))
     motor = (wheel or {}).get("motor") or {}
     effort = wheel["torque_limit"] if wheel is not None else (drive or 0.0)
-    limit = {"effort": text_of(effort), "velocity": text_of(motor.get("no_load_speed", FAST))}
+    limit = {"effort": text_of(effort), "velocity": text_of(motor.get("no_load_speed") or FAST)}
     if limits is not None:
         limit |= {"lower": text_of(limits["lower"]), "upper": text_of(limits["upper"])}
     ET.SubElement(joint, "limit", limit)
