@@ -129,3 +129,9 @@ def test_a_written_rover_drives_forward_in_mujoco(tmp_path):
     # The rockers turn oppositely, as far as MuJoCo's constraint is stiff.
     left, right = (data.joint(f"{side}_rocker").qpos[0] for side in ("left", "right"))
     assert abs(left + right) < 0.01
+
+
+def test_numbers_that_mujoco_passes_on_are_refused_by_body(tmp_path):
+    text = '<mujoco><worldbody><body name="box" quat="1e-300 0 0 0"><freejoint/><geom size="1"/></body></worldbody></mujoco>'
+    with pytest.raises(ModelError, match=r"body\[box\]\.quat: must be finite and, if a quaternion, not zero"):
+        RoverModel.from_mjcf(write(tmp_path, text, "box.xml"))

@@ -54,6 +54,7 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
             refuse_in(path, "MuJoCo", path.name, f"warns of the file ({' '.join(warning.split())})")
     reader = _Reader(mujoco, model, path, ignore)
     reader.tree.left_out += [f"MuJoCo warns: {' '.join(warning.split())}" for warning in warnings]
+    reader.check_numbers()
     reader.check_options()
     reader.add_links()
     reader.add_couplings()
@@ -69,6 +70,20 @@ class _Reader:
         self.mujoco, self.model = mujoco, model
         self.tree = RobotTree(path, self._text(0) or path.stem, {}, ignore)
         self.joints: dict[int, FileJoint] = {}
+
+    def check_numbers(self) -> None:
+        """Refuses masses, places and quaternions that are no numbers, which MuJoCo passes on from some files."""
+        m = self.model
+        for kind, fields in (("body", ("mass", "inertia", "pos", "quat", "ipos", "iquat")), ("geom", ("pos", "quat"))):
+            for field in fields:
+                rows = np.reshape(getattr(m, f"{kind}_{field}"), (m.nbody if kind == "body" else m.ngeom, -1))
+                is_sound = np.isfinite(rows).all(axis=1)
+                if field.endswith("quat"):
+                    is_sound &= np.linalg.norm(rows, axis=1) > 0.0
+                for index in map(int, np.flatnonzero(~is_sound)):
+                    body = index if kind == "body" else int(m.geom_bodyid[index])
+                    at = f"body[{self._body(body)}].{'' if kind == 'body' else 'geom.'}{field}"
+                    self.tree.refuse(at, rows[index].tolist(), "must be finite and, if a quaternion, not zero")
 
     def check_options(self) -> None:
         """Refuses what acts on the whole scene and is not simulated."""
