@@ -28,6 +28,9 @@ const AHEAD: [f64; 3] = [0.1, 0.02, 0.0];
 const AHEAD_OF_BOX: f64 = 0.5;
 const KEPT_BY_BOX: f64 = 0.15;
 
+/// The same where a plane between a box and a surface is not level, m.
+const AHEAD_TILTED: f64 = 0.1;
+
 /// Covers the rounding of distances, m, for coordinates up to the size of a terrain.
 const ROUNDING: f64 = 1e-6;
 
@@ -501,16 +504,30 @@ fn over_surface(
     if field.coverage(&solid.centre, bound) != Coverage::Known {
         return (f64::NEG_INFINITY, true);
     }
-    let low = solid.support(&-Vector3::y()).y;
-    let is_covered = field.coverage(&solid.centre, bound + AHEAD_OF_BOX) == Coverage::Known;
-    if is_covered {
-        let highest = field.highest(&solid.centre, bound + AHEAD_OF_BOX);
-        let clearance = (low - highest).min(AHEAD_OF_BOX);
-        if clearance > near.reach + near.motion + ROUNDING {
+    // A plane between the box and the surface: level, or along the box, or along the slope.
+    let need = near.reach + near.motion + ROUNDING;
+    let over = |n: &Vector3<f64>, ahead: f64| {
+        let from = n.dot(&solid.support(&-n));
+        (from - field.furthest(n, &solid.centre, bound + ahead)).min(ahead)
+    };
+    if field.coverage(&solid.centre, bound + AHEAD_OF_BOX) == Coverage::Known {
+        let clearance = over(&Vector3::y(), AHEAD_OF_BOX);
+        if clearance > need {
+            return (clearance, false);
+        }
+        let upright = solid.axis((0..3).fold(0, |best, k| {
+            let rises = |k: usize| solid.R[(1, k)].abs();
+            if rises(k) > rises(best) { k } else { best }
+        }));
+        let slope = slope_under(field, &solid.centre, bound);
+        let tilted = [Some(upright * upright.y.signum()), slope];
+        let best = (tilted.iter().flatten().map(|n| over(n, AHEAD_TILTED))).reduce(f64::max);
+        if let Some(clearance) = best.filter(|clearance| *clearance > need) {
             return (clearance, false);
         }
     }
     // Piece by piece, and again at the next step.
+    let low = solid.support(&-Vector3::y()).y;
     let shape = PlacedShape::Box(*solid);
     let reach = near.reach + ROUNDING;
     let mut touches = false;
@@ -525,6 +542,14 @@ fn over_surface(
         },
     );
     (f64::NEG_INFINITY, touches)
+}
+
+/// Unit normal of the mean slope of a surface within `radius` (m) of `centre`, seen from above.
+fn slope_under(field: &dyn Terrain, centre: &Vector3<f64>, radius: f64) -> Option<Vector3<f64>> {
+    let height = |x: f64, z: f64| field.height(centre.x + x, centre.z + z);
+    let along = height(radius, 0.0)? - height(-radius, 0.0)?;
+    let across = height(0.0, radius)? - height(0.0, -radius)?;
+    Some(Vector3::new(-along, 2.0 * radius, -across).normalize())
 }
 
 /// Distance of a sphere from a box, m; at least minus the radius.

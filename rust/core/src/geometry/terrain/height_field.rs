@@ -534,21 +534,36 @@ impl Terrain for HeightField {
         surface.is_some_and(|y| point.y <= y + SURFACE)
     }
 
-    fn highest(&self, centre: &Vector3<f64>, radius: f64) -> f64 {
+    fn furthest(&self, n: &Vector3<f64>, centre: &Vector3<f64>, radius: f64) -> f64 {
         let [columns, rows] = self.span(centre, radius);
-        let highest = Cell::new(f32::NEG_INFINITY);
+        let start = n.x * self.origin[0] + n.z * self.origin[1];
+        let [along, across] = [n.x * self.spacing[0], n.z * self.spacing[1]];
+        let level = |i: usize, j: usize| start + along * i as f64 + across * j as f64;
+        let furthest = Cell::new(f64::NEG_INFINITY);
         self.tiles.visit(
             columns,
             rows,
-            |tile| tile.highest > highest.get(),
+            |tile| {
+                let [w, h] = tile.size.map(|size| size as f64);
+                let rise = (along * w).max(0.0) + (across * h).max(0.0);
+                let [i, j] = tile.first;
+                level(i, j) + rise + n.y * f64::from(tile.highest) > furthest.get()
+            },
             |[i, j]| {
                 let at = j * self.columns + i;
-                let corners = [at, at + 1, at + self.columns, at + self.columns + 1];
-                let own = corners.map(|k| self.heights[k]);
-                highest.set(own.into_iter().fold(highest.get(), f32::max));
+                let here = level(i, j);
+                let corners = [
+                    (0, 0.0),
+                    (1, along),
+                    (self.columns, across),
+                    (self.columns + 1, along + across),
+                ];
+                let own =
+                    corners.map(|(k, rise)| here + rise + n.y * f64::from(self.heights[at + k]));
+                furthest.set(own.into_iter().fold(furthest.get(), f64::max));
             },
         );
-        f64::from(highest.get())
+        furthest.get()
     }
 
     fn coverage(&self, centre: &Vector3<f64>, radius: f64) -> Coverage {

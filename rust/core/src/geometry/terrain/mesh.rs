@@ -374,13 +374,13 @@ impl Terrain for TriangleMesh {
         Coverage::Silent
     }
 
-    fn highest(&self, centre: &Vector3<f64>, radius: f64) -> f64 {
+    fn furthest(&self, n: &Vector3<f64>, centre: &Vector3<f64>, radius: f64) -> f64 {
         let place = Vector3::new(centre.x, 0.0, centre.z);
-        let mut highest = f64::NEG_INFINITY;
+        let mut furthest = f64::NEG_INFINITY;
         self.tree.visit_pillar(&place, radius, |ball| {
-            highest = highest.max(ball.centre.y + ball.radius);
+            furthest = furthest.max(n.dot(&ball.centre) + ball.radius);
         });
-        highest
+        furthest
     }
 
     fn height(&self, x: f64, z: f64) -> Option<f64> {

@@ -134,8 +134,9 @@ pub trait Terrain: Send + Sync {
         Coverage::Known
     }
 
-    /// A height (m) that no surface exceeds within `radius` (m) of `centre`, seen from above.
-    fn highest(&self, _centre: &Vector3<f64>, _radius: f64) -> f64 {
+    /// A distance (m) along a unit vector n, which points up, that no place of a surface exceeds
+    /// within `radius` (m) of `centre`, seen from above.
+    fn furthest(&self, _n: &Vector3<f64>, _centre: &Vector3<f64>, _radius: f64) -> f64 {
         f64::INFINITY
     }
 

@@ -156,10 +156,10 @@ impl Terrain for Union {
         coverage
     }
 
-    fn highest(&self, centre: &Vector3<f64>, radius: f64) -> f64 {
+    fn furthest(&self, n: &Vector3<f64>, centre: &Vector3<f64>, radius: f64) -> f64 {
         let surfaces = self.parts.iter().filter(|part| part.has_surface());
-        let heights = surfaces.map(|part| part.highest(centre, radius));
-        heights.fold(f64::NEG_INFINITY, f64::max)
+        let distances = surfaces.map(|part| part.furthest(n, centre, radius));
+        distances.fold(f64::NEG_INFINITY, f64::max)
     }
 
     fn height(&self, x: f64, z: f64) -> Option<f64> {
