@@ -135,3 +135,9 @@ def test_numbers_that_mujoco_passes_on_are_refused_by_body(tmp_path):
     text = '<mujoco><worldbody><body name="box" quat="1e-300 0 0 0"><freejoint/><geom size="1"/></body></worldbody></mujoco>'
     with pytest.raises(ModelError, match=r"body\[box\]\.quat: must be finite and, if a quaternion, not zero"):
         RoverModel.from_mjcf(write(tmp_path, text, "box.xml"))
+
+
+def test_a_machine_without_shapes_is_read(tmp_path):
+    inertial = '<inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>'
+    text = f"<mujoco><worldbody><body name='bare'><freejoint/>{inertial}</body></worldbody></mujoco>"
+    assert RoverModel.from_mjcf(write(tmp_path, text, "bare.xml")).mass == 2.0

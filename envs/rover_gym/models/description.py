@@ -18,6 +18,8 @@ TORQUE_SHARE = 1.0
 #: of the weight times its radius, 1/rad, and damping over stiffness, s.
 STEERING_STIFFNESS, STEERING_TIME = 10.0, 0.0133
 STEERING_LIMIT = 0.7  # rad, where the file states none
+#: Kinds of shapes that touch the ground; cylinders touch as wheels only.
+TOUCHING = ("box", "sphere")
 UNLIMITED = 1e9  # N m, the torque limit of a motor for which the file states none
 
 
@@ -199,37 +201,34 @@ def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, options: W
 
 
 def _shapes(tree: RobotTree, link: FileLink, A: Array, anchor: Array, role: WheelRole | None) -> list[dict[str, Any]]:
-    """A wheel touches by its radius and width, everything else by the boxes and spheres of the file."""
+    """The shapes of a link. Boxes and spheres touch, cylinders are drawn; a wheel touches by disc and width alone."""
     found: list[dict[str, Any]] = []
     is_drawn = any(shape.visible and shape.mesh is None for shape in link.shapes)
-    touching = False
     for shape in link.shapes:
-        where = f"link[{link.name}]: a {shape.kind}"
         if role is not None and shape.name.endswith(THIN_DISC):
             continue  # the disc below stands for it
-        if shape.collides and role is not None and shape.size != (role.radius, role.width):
-            rim = f"cylinder {role.width:g} m wide" if role.width else "thin disc"
-            tree.left_out.append(f"{where} of a wheel, which touches as a {rim}")
-        if shape.kind not in ("box", "cylinder", "sphere"):
-            if shape.collides and role is None:
-                tree.left_out.append(f"{where} that touches, since only boxes and spheres can")
-            elif shape.visible:
-                tree.left_out.append(f"{where} that is drawn")
-            continue
-        can_touch = shape.kind != "cylinder" and role is None
-        if shape.collides and not can_touch and role is None:
-            tree.left_out.append(f"{where} that touches, since only boxes and spheres can; it is drawn")
-        collides = shape.collides and can_touch
+        if reason := _left_out(shape, role):
+            tree.left_out.append(f"link[{link.name}]: a {shape.kind} {reason}")
+        collides = shape.collides and shape.kind in TOUCHING and role is None
         visible = shape.visible or not is_drawn
-        if not collides and not visible:
-            continue
-        touching |= collides
-        found.append(_shape(shape, A, anchor, collides=collides, visible=visible))
+        if shape.kind in (*TOUCHING, "cylinder") and (collides or visible):
+            found.append(_shape(shape, A, anchor, collides=collides, visible=visible))
     if role is not None:
         turn = rotation_vector(turn_z_to(A @ link.joint.axis))
         disc: dict[str, Any] = {"kind": "disc", "radius": float(role.radius)}
         found.append(disc | ({"rotation": _numbers(turn)} if np.any(turn) else {}))
     return found
+
+
+def _left_out(shape: FileShape, role: WheelRole | None) -> str | None:
+    """What of a shape is not simulated, in words, or None."""
+    if shape.collides and role is not None:
+        rim = f"cylinder {role.width:g} m wide" if role.width else "thin disc"
+        return None if shape.size == (role.radius, role.width) else f"of a wheel, which touches as a {rim}"
+    if shape.collides and shape.kind not in TOUCHING:
+        is_drawn = "; it is drawn" if shape.kind == "cylinder" else ""
+        return f"that touches, since only boxes and spheres can{is_drawn}"
+    return "that is drawn" if shape.visible and shape.kind not in (*TOUCHING, "cylinder") else None
 
 
 def _shape(shape: FileShape, A: Array, anchor: Array, *, collides: bool, visible: bool) -> dict[str, Any]:

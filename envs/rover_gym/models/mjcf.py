@@ -76,7 +76,8 @@ class _Reader:
         m = self.model
         for kind, fields in (("body", ("mass", "inertia", "pos", "quat", "ipos", "iquat")), ("geom", ("pos", "quat"))):
             for field in fields:
-                rows = np.reshape(getattr(m, f"{kind}_{field}"), (m.nbody if kind == "body" else m.ngeom, -1))
+                values = getattr(m, f"{kind}_{field}")
+                rows = values[:, None] if values.ndim == 1 else values
                 is_sound = np.isfinite(rows).all(axis=1)
                 if field.endswith("quat"):
                     is_sound &= np.linalg.norm(rows, axis=1) > 0.0

@@ -113,6 +113,7 @@ def resolve(tree: RobotTree, field: str, name: object) -> str:
 def _chosen(
     tree: RobotTree, poses: dict[str, tuple[Array, Array]], up: Array, wheels: Wheels
 ) -> dict[str, float | None]:
+    """The wheels' links and the radii that are given for them, m."""
     if isinstance(wheels, str):
         refuse(ModelError, "wheels", wheels, "must be names, or radii by name")
     if isinstance(wheels, Mapping):
@@ -124,6 +125,11 @@ def _chosen(
         if not isinstance(wheels, Iterable):
             refuse(ModelError, "wheels", wheels, "must be names, or radii by name")
         return {resolve(tree, "wheels", name): None for name in wheels}
+    return dict.fromkeys(_found(tree, poses, up))
+
+
+def _found(tree: RobotTree, poses: dict[str, tuple[Array, Array]], up: Array) -> list[str]:
+    """The links that are wheels by their names, or by their shapes where no name says so."""
     carriers = _moving_carriers(tree)
     candidates = [
         link
@@ -156,7 +162,7 @@ def _chosen(
                 None,
                 f"{', '.join(doubtful)} may be wheels of {tree.path} like {', '.join(chosen)}: say which are",
             )
-    return dict.fromkeys(chosen)
+    return chosen
 
 
 def _refuse_fixed_wheels(tree: RobotTree, candidates: list[FileLink], chosen: list[str]) -> None:
@@ -224,6 +230,7 @@ def _width(link: FileLink) -> float:
 
 
 def _mesh_size(link: FileLink, meshes: list[FileShape]) -> tuple[tuple[float, float] | None, str]:
+    """Radius and shift of a wheel, m, from the vertices of its mesh; or None, and what the wheel is instead."""
     for shape in sorted(meshes, key=lambda shape: not shape.collides):
         points: Array
         if isinstance(shape.mesh, np.ndarray):
