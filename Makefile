@@ -84,11 +84,12 @@ train-rllib: ## train Rover-v0 on a local Ray with 1 and with 2 workers; Ray wan
 # One thread for every engine, and the package of comparisons on the path.
 COMPARE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python -m comparison
 
-chart: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CPU time beside other engines: docs/comparison/ (half an hour; CHART=--quick is shorter and goes to runs/)
+chart: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## error against CPU time beside other engines: docs/comparison/ (40 minutes; CHART=--quick is shorter and goes to runs/)
 	$(COMPARE).chart $(CHART)
 	$(COMPARE).presets $(filter --quick,$(CHART))
 	$(COMPARE).sphere_scenes $(filter --quick,$(CHART))
 	$(COMPARE).exploring_chart $(filter --quick,$(CHART))
+	$(COMPARE).surface_scenes $(filter --quick,$(CHART))
 
 stability: $(STAMPS)/core $(STAMPS)/peers $(STAMPS)/debian-peers ## the scenes where methods fail, ours and other engines': docs/stability.md (5 minutes)
 	$(COMPARE).stability

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym import HeightField
+
 Array = npt.NDArray[np.float64]
 
 #: The chart's steps, s. All divide the sampling interval.
@@ -44,6 +46,7 @@ class RoverScene:
         phases: Commands, one after the other.
         normal: Of the plane through the origin, or None where there is none.
         spheres: (n, 4) centre and radius, m.
+        heights: A map as ground, or None.
         friction: Coulomb's coefficient of every contact.
         gravity: m/s².
         brake: Whether the wheels are held where they are by the model's gains.
@@ -59,6 +62,7 @@ class RoverScene:
     phases: tuple[Phase, ...]
     normal: tuple[float, float, float] | None = (0.0, 1.0, 0.0)
     spheres: Array = field(default_factory=lambda: np.zeros((0, 4)))
+    heights: HeightField | None = None
     friction: float = 0.7
     gravity: tuple[float, float, float] = (0.0, -9.81, 0.0)
     brake: bool = False

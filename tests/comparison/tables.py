@@ -22,7 +22,7 @@ def cost_of(points: list[tuple[float, float]], target: float) -> float | None:
 
 def number(value: float) -> str:
     """Two digits, or a whole number."""
-    return f"{value:.2g}" if value < 100.0 else f"{value:.0f}"
+    return f"{value:.2g}" if value < 99.5 else f"{value:.0f}"
 
 
 def reach(data: dict[str, Any], scene: str) -> str:

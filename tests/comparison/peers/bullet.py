@@ -14,10 +14,14 @@ import pybullet
 from pybullet_utils.bullet_client import BulletClient
 
 from comparison.peers.base import Variant, bodies, held, quaternion_of, rotation_of
+from comparison.peers.grid import corners, middle, triangles, wavefront
 from comparison.scene import Array, Phase, RoverScene
+from rover_gym import HeightField
 
 HALF_WIDTH = 0.002  # m, where a wheel must not be a sphere
 SERVO_TORQUE = 1e6  # N m
+#: Distance at which Bullet drops a contact of the last step, its default; the last world that sets it sets it for all.
+CONTACT_THRESHOLD = 0.02  # m
 
 
 def _text(values: Array) -> str:
@@ -50,10 +54,44 @@ def description(scene: RoverScene) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
+def add_map(c: BulletClient, field: HeightField, *, as_mesh: bool) -> int:
+    """A map as Bullet's height field, or as a triangle mesh that knows its inner edges; the body.
+
+    Bullet's rows run along its y, and it cuts a cell from (j + 1, i) to (j, i + 1). With its y along the world's -z the
+    surface is the one of `HeightField`.
+    """
+    if as_mesh:
+        with tempfile.NamedTemporaryFile("w", suffix=".obj", encoding="utf-8") as file:  # a new name: Bullet caches
+            file.write(wavefront(corners(field), triangles(field).tolist()))
+            file.flush()
+            flags = pybullet.GEOM_FORCE_CONCAVE_TRIMESH | pybullet.GEOM_CONCAVE_INTERNAL_EDGE
+            return int(c.createMultiBody(0, c.createCollisionShape(c.GEOM_MESH, fileName=file.name, flags=flags)))
+    rows = field.grid[::-1].astype(float)
+    shape = c.createCollisionShape(
+        c.GEOM_HEIGHTFIELD,
+        meshScale=[*field.spacing, 1.0],
+        heightfieldData=rows.ravel().tolist(),
+        numHeightfieldRows=rows.shape[1],
+        numHeightfieldColumns=rows.shape[0],
+    )
+    x, z = middle(field)
+    place = [x, 0.5 * float(rows.min() + rows.max()), z]
+    turn = c.getQuaternionFromEuler([-0.5 * np.pi, 0.0, 0.0])
+    return int(c.createMultiBody(0, shape, basePosition=place, baseOrientation=turn))
+
+
 class BulletRunner:
     """`stepSimulation` behind the common interface."""
 
-    def __init__(self, scene: RoverScene, time_step: float, *, iterations: int) -> None:
+    def __init__(
+        self,
+        scene: RoverScene,
+        time_step: float,
+        *,
+        iterations: int,
+        as_mesh: bool = False,
+        contact_threshold: float = CONTACT_THRESHOLD,
+    ) -> None:
         self.client = BulletClient(pybullet.DIRECT)
         c = self.client
         c.setGravity(*scene.gravity)
@@ -63,12 +101,15 @@ class BulletRunner:
             numSubSteps=0,
             solverResidualThreshold=0.0,
             restitutionVelocityThreshold=0.0,
+            contactBreakingThreshold=contact_threshold,
         )
         grounds = []
         if scene.normal is not None:
             n = np.array(scene.normal) / np.linalg.norm(scene.normal)
             shape = c.createCollisionShape(c.GEOM_PLANE, planeNormal=list(n))
             grounds.append(c.createMultiBody(0, shape))
+        if scene.heights is not None:
+            grounds.append(add_map(c, scene.heights, as_mesh=as_mesh))
         for x, y, z, r in scene.spheres:
             shape = c.createCollisionShape(c.GEOM_SPHERE, radius=float(r))
             grounds.append(c.createMultiBody(0, shape, basePosition=[x, y, z]))

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from comparison.peers.base import LeftOut
 from comparison.scene import Array, RoverScene
 
 Contact = tuple[int, Array, Array, float]
@@ -20,6 +21,8 @@ def contacts(
     scene: RoverScene, centres: list[Array], axles: list[Array], radii: list[float], reach: float
 ) -> list[Contact]:
     """Wheel, point (m), frame (rows t, b, n) and gap (m) of every contact nearer than `reach` (m)."""
+    if scene.heights is not None:
+        raise LeftOut("no contacts of discs with a map")
     found: list[Contact] = []
     for wheel, (c, s, R) in enumerate(zip(centres, axles, radii, strict=True)):
         if scene.normal is not None:

@@ -3,12 +3,19 @@
 from functools import partial
 
 import numpy as np
+from pydrake.common import MemoryFile
 from pydrake.geometry import (
+    AddCompliantHydroelasticProperties,
     AddContactMaterial,
+    AddRigidHydroelasticProperties,
     Box,
     CollisionFilterDeclaration,
+    Convex,
     Cylinder,
     GeometrySet,
+    HalfSpace,
+    InMemoryMesh,
+    Mesh,
     ProximityProperties,
     Sphere,
 )
@@ -18,6 +25,7 @@ from pydrake.multibody.plant import (
     ContactModel,
     CoulombFriction,
     DiscreteContactApproximation,
+    MultibodyPlant,
 )
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
@@ -29,11 +37,73 @@ from pydrake.multibody.tree import (
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from comparison.peers.base import Variant, bodies, held, rotation_of, turn_z_to
+from comparison.peers.base import LeftOut, Variant, bodies, held, rotation_of, turn_z_to
+from comparison.peers.grid import corners, triangles, wavefront
 from comparison.scene import Array, Phase, RoverScene
+from rover_gym import HeightField
 
 HALF_WIDTH = 0.002  # m, where a wheel must not be a sphere
 GROUND = 500.0  # m, edge of the box that is the plane: a half-space with many spheres beside it crashed
+
+
+#: A sphere's pressure field: tetrahedra of this share of its radius, and a modulus.
+TETRAHEDRON, MODULUS = 0.1, 1e8  # 1, Pa
+#: Registering prisms takes time with the square of their number: these take ten seconds.
+MOST_PRISMS = 2000
+DEPTH = 1.0  # m, of a prism
+
+
+def material(friction: float, stiffness: float | None, dissipation: float) -> ProximityProperties:
+    """Of point contact."""
+    properties = ProximityProperties()
+    AddContactMaterial(
+        dissipation=dissipation,
+        point_stiffness=stiffness,
+        friction=CoulombFriction(friction, friction),
+        properties=properties,
+    )
+    return properties
+
+
+def hydroelastic(friction: float, radius: float | None = None) -> ProximityProperties:
+    """Of hydroelastic contact: a compliant sphere, or rigid ground. Dissipation is 0, as it would resist rolling."""
+    properties = material(friction, None, 0.0)
+    if radius is None:
+        AddRigidHydroelasticProperties(properties)
+    else:
+        AddCompliantHydroelasticProperties(TETRAHEDRON * radius, MODULUS, properties)
+    return properties
+
+
+def add_plane(plant: MultibodyPlant, normal: Array, properties: ProximityProperties, *, is_hydroelastic: bool) -> None:
+    """The plane through the origin: a half-space, or in point contact a large box."""
+    turn = RotationMatrix(turn_z_to(normal))
+    pose, shape = RigidTransform(turn, -5.0 * normal), Box(GROUND, GROUND, 10.0)
+    if is_hydroelastic:
+        pose, shape = RigidTransform(turn, np.zeros(3)), HalfSpace()
+    plant.RegisterCollisionGeometry(plant.world_body(), pose, shape, "ground", properties)
+
+
+def add_map(
+    plant: MultibodyPlant, field: HeightField, properties: ProximityProperties, *, is_hydroelastic: bool
+) -> None:
+    """A map as one mesh in hydroelastic contact; in point contact, where a mesh counts as its hull, as prisms."""
+    places, faces, world = corners(field), triangles(field), plant.world_body()
+    if is_hydroelastic:
+        file = MemoryFile(wavefront(places, faces.tolist()), ".obj", "map")
+        plant.RegisterCollisionGeometry(
+            world, RigidTransform(), Mesh(InMemoryMesh(mesh_file=file)), "ground", properties
+        )
+        return
+    if len(faces) > MOST_PRISMS:
+        raise LeftOut(f"{len(faces)} prisms")
+    sides = [(0, 1, 2), (5, 4, 3), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)]
+    for k, face in enumerate(faces):
+        top = places[face]
+        centre = top.mean(axis=0)
+        text = wavefront(np.concatenate([top, top - [0.0, DEPTH, 0.0]]) - centre, sides)
+        prism = Convex(InMemoryMesh(mesh_file=MemoryFile(text, ".obj", "prism")))
+        plant.RegisterCollisionGeometry(world, RigidTransform(centre), prism, f"prism{k}", properties)
 
 
 class DrakeRunner:
@@ -47,25 +117,23 @@ class DrakeRunner:
         approximation: DiscreteContactApproximation,
         stiffness: float | None,
         dissipation: float = 50.0,
+        is_hydroelastic: bool = False,
     ) -> None:
         self.h = time_step
         builder = DiagramBuilder()
         plant, graph = AddMultibodyPlantSceneGraph(builder, time_step)
-        plant.set_contact_model(ContactModel.kPoint)
+        plant.set_contact_model(ContactModel.kHydroelastic if is_hydroelastic else ContactModel.kPoint)
         plant.set_discrete_contact_approximation(approximation)
         plant.mutable_gravity_field().set_gravity_vector(np.array(scene.gravity))
-        properties = ProximityProperties()
-        AddContactMaterial(
-            dissipation=dissipation,
-            point_stiffness=stiffness,
-            friction=CoulombFriction(scene.friction, scene.friction),
-            properties=properties,
-        )
+        properties = of_ground = material(scene.friction, stiffness, dissipation)
+        if is_hydroelastic:
+            of_ground = hydroelastic(scene.friction)
         world = plant.world_body()
         if scene.normal is not None:
             n = np.array(scene.normal) / np.linalg.norm(scene.normal)
-            pose = RigidTransform(RotationMatrix(turn_z_to(n)), -5.0 * n)
-            plant.RegisterCollisionGeometry(world, pose, Box(GROUND, GROUND, 10.0), "ground", properties)
+            add_plane(plant, n, of_ground, is_hydroelastic=is_hydroelastic)
+        if scene.heights is not None:
+            add_map(plant, scene.heights, of_ground, is_hydroelastic=is_hydroelastic)
         for k, (x, y, z, r) in enumerate(scene.spheres):
             plant.RegisterCollisionGeometry(world, RigidTransform([x, y, z]), Sphere(r), f"rock{k}", properties)
         self.bodies = bodies(scene.machine)
@@ -85,7 +153,8 @@ class DrakeRunner:
                 self.joints[i] = joint
             if body.wheel >= 0:
                 shape = Cylinder(body.radius, 2.0 * HALF_WIDTH) if scene.thin_wheels else Sphere(body.radius)
-                plant.RegisterCollisionGeometry(solid, RigidTransform(), shape, f"tyre_{body.name}", properties)
+                own = hydroelastic(scene.friction, body.radius) if is_hydroelastic else properties
+                plant.RegisterCollisionGeometry(solid, RigidTransform(), shape, f"tyre_{body.name}", own)
             if held(scene, body) or body.wheel >= 0:
                 actuator = plant.AddJointActuator(body.name, self.joints[i])
                 if held(scene, body):
@@ -93,8 +162,8 @@ class DrakeRunner:
                 self.actuators.append((i, actuator))
         plant.Finalize()
         manager = graph.collision_filter_manager()
-        own = GeometrySet([g for s in solids for g in plant.GetCollisionGeometriesForBody(s)])
-        manager.Apply(CollisionFilterDeclaration().ExcludeWithin(own))
+        rover = GeometrySet([g for s in solids for g in plant.GetCollisionGeometriesForBody(s)])
+        manager.Apply(CollisionFilterDeclaration().ExcludeWithin(rover))
         diagram = builder.Build()
         self.plant = plant
         self.simulator = Simulator(diagram)

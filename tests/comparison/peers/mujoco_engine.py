@@ -5,20 +5,68 @@ solve; at its defaults (integrator "implicitfast" instead of "Euler", which a st
 """
 
 from functools import partial
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 
 from comparison.peers.base import Variant, bodies, held, quaternion_of, rotation_of
+from comparison.peers.grid import middle
 from comparison.scene import Array, Phase, RoverScene
+from rover_gym import HeightField
 from rover_gym.vector.mujoco_rover import rover_xml
+
+
+def model_on(text: str, field: HeightField | None, solref: float | None = None) -> mujoco.MjModel:
+    """Compiles a model, with a map as MuJoCo's height field where one is given.
+
+    MuJoCo's rows run along its y, and it cuts a cell from (j, i) to (j + 1, i + 1). With its x along the world's z and
+    its y along the world's x the surface is the one of `HeightField`, whose columns are MuJoCo's rows.
+
+    Args:
+        text: The model.
+        field: The map, which touches what has bit 2 in `contype` or bit 1 in `conaffinity`.
+        solref: Time constant of all contacts, s; MuJoCo's default where None.
+    """
+    root = ElementTree.fromstring(text)  # noqa: S314 - our own text
+    if field is not None:
+        rows = field.grid.T.astype(float)
+        low, high = float(rows.min()), float(rows.max())
+        x_min, z_min, x_max, z_max = field.bounds
+        x, z = middle(field)
+        rise = high - low or 1.0
+        ElementTree.SubElement(
+            ElementTree.SubElement(root, "asset"),
+            "hfield",
+            name="map",
+            nrow=str(rows.shape[0]),
+            ncol=str(rows.shape[1]),
+            size=f"{(z_max - z_min) / 2!r} {(x_max - x_min) / 2!r} {rise!r} 1",
+        )
+        place = {"pos": f"{x!r} {low!r} {z!r}", "xyaxes": "0 0 1 1 0 0", "contype": "1", "conaffinity": "2"}
+        world = root.find("worldbody")
+        assert world is not None
+        ElementTree.SubElement(world, "geom", place, name="ground", type="hfield", hfield="map")
+    model = mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
+    if field is not None:
+        model.hfield_data[:] = ((rows - low) / rise).ravel()
+    if solref is not None:
+        model.geom_solref[:] = [solref, 1.0]
+    return model
 
 
 class MuJoCoRunner:
     """`mj_step` behind the common interface."""
 
     def __init__(
-        self, scene: RoverScene, time_step: float, *, integrator: str, cone: str = "pyramidal", impratio: float = 1.0
+        self,
+        scene: RoverScene,
+        time_step: float,
+        *,
+        integrator: str,
+        cone: str = "pyramidal",
+        impratio: float = 1.0,
+        solref_steps: float | None = None,
     ) -> None:
         text = rover_xml(
             scene.machine,
@@ -33,7 +81,7 @@ class MuJoCoRunner:
             cone=cone,
             impratio=impratio,
         )
-        self.model = mujoco.MjModel.from_xml_string(text)
+        self.model = model_on(text, scene.heights, solref_steps and solref_steps * time_step)
         self.data = mujoco.MjData(self.model)
         self.bodies = bodies(scene.machine)
         self.data.qpos[:3] = scene.q[:3]

@@ -7,7 +7,15 @@ import numpy as np
 
 from comparison.peers.base import Variant
 from comparison.scene import Array, Phase, RoverScene
-from rover_gym import Plane, RoverModel, Simulation, SphereField
+from rover_gym import Plane, RoverModel, Simulation, SphereField, Terrain
+
+
+def ground(scene: RoverScene) -> Terrain | None:
+    """Map, spheres or plane of a scene."""
+    if scene.heights is not None:
+        return scene.heights
+    plane = None if scene.normal is None else Plane(scene.normal)
+    return SphereField(scene.spheres[:, :3], scene.spheres[:, 3], plane) if len(scene.spheres) else plane
 
 
 class OurRunner:
@@ -15,11 +23,9 @@ class OurRunner:
 
     def __init__(self, scene: RoverScene, time_step: float, **options: Any) -> None:
         model = RoverModel.from_dict(scene.machine).replace(motor=None)
-        plane = None if scene.normal is None else Plane(scene.normal)
-        terrain = SphereField(scene.spheres[:, :3], scene.spheres[:, 3], plane) if len(scene.spheres) else plane
         self.simulation = Simulation(
             model,
-            terrain,
+            ground(scene),
             gravity=scene.gravity,
             friction=scene.friction,
             restitution=0.0,
