@@ -253,6 +253,7 @@ class RoverModel:
         steering_stiffness: float | None = None,
         steering_damping: float | None = None,
         steering_limit: float | None = None,
+        wheel_width: float | None = None,
         ignore: Collection[str] = (),
     ) -> RoverModel:
         """Reads a URDF file.
@@ -272,6 +273,8 @@ class RoverModel:
             steering_stiffness: Stiffness of every steering controller, N m/rad.
             steering_damping: Damping of every steering controller, N m s/rad.
             steering_limit: Largest steering set-point, rad; by default the joint's stop.
+            wheel_width: Width of every wheel, m, 0 for thin discs, which cost less to simulate; by
+                default that of the cylinder that touches for it in the file, or 0.
             ignore: Kinds of what changes the motion and is left out all the same: "friction",
                 "actuators", "closed loops", "tendons", "springs", "fluid".
 
@@ -296,6 +299,7 @@ class RoverModel:
         steering_stiffness: float | None = None,
         steering_damping: float | None = None,
         steering_limit: float | None = None,
+        wheel_width: float | None = None,
         ignore: Collection[str] = (),
     ) -> RoverModel:
         """Reads an MJCF file, which MuJoCo compiles.
@@ -315,6 +319,8 @@ class RoverModel:
             steering_stiffness: Stiffness of every steering controller, N m/rad.
             steering_damping: Damping of every steering controller, N m s/rad.
             steering_limit: Largest steering set-point, rad; by default the joint's stop.
+            wheel_width: Width of every wheel, m, 0 for thin discs, which cost less to simulate; by
+                default that of the cylinder that touches for it in the file, or 0.
             ignore: Kinds of what changes the motion and is left out all the same: "friction",
                 "actuators", "closed loops", "tendons", "springs", "fluid".
 
@@ -337,7 +343,7 @@ class RoverModel:
     def to_urdf(self, path: str | Any, *, ignore: Collection[str] = ()) -> None:
         """Writes a URDF file, for other programs: x forward, y left, z up.
 
-        Wheels are written as cylinders, a tenth of their radius wide.
+        Wheels are written as cylinders; a thin disc is a tenth of its radius wide and named so.
 
         Args:
             path: Path of the file.
@@ -352,9 +358,9 @@ class RoverModel:
     def to_mjcf(self, path: str | Any) -> None:
         """Writes an MJCF file, for MuJoCo: x forward, y left, z up.
 
-        Wheels are written as cylinders, a tenth of their radius wide, their drives as motors, held
-        steering as position servos, and coupled joints as equality constraints, which MuJoCo
-        satisfies approximately.
+        Wheels are written as cylinders, of which a thin disc is a tenth of its radius wide and named
+        so, their drives as motors, held steering as position servos, and coupled joints as equality
+        constraints, which MuJoCo satisfies approximately.
 
         Args:
             path: Path of the file.

@@ -46,6 +46,9 @@ def test_an_import_writes_the_model_and_its_picture(tmp_path: Path) -> None:
     bare = rover("import", str(file), "--output", str(output), "--wheel", "none", "--steering", "none", "--fixed-base")
     assert bare.exit_code == 0, bare.output
     assert RoverModel.from_file(output).wheel_names == []
+    thin = rover("import", str(file), "--output", str(output), "--wheel-width", "0")
+    assert thin.exit_code == 0, thin.output
+    assert "width" not in RoverModel.from_file(output).to_dict()["wheels"][0]
     wrong = rover("import", str(file), "--output", str(output), "--wheel", "mast_tail")
     assert wrong.exit_code == 2
     assert wrong.stderr.startswith("error: --wheel: there is no such link")
@@ -86,3 +89,14 @@ def test_a_model_without_wheels_stands_on_nothing(tmp_path: Path) -> None:
     result = rover("check", str(tmp_path / "arm.toml"))
     assert result.exit_code == 2
     assert "wheels" in result.stderr
+
+
+def test_a_refused_import_recommends_options_of_the_command(tmp_path: Path) -> None:
+    pytest.importorskip("yourdfpy")
+    pytest.importorskip("matplotlib")
+    rough = robot_text().replace("<limit", '<dynamics friction="0.1"/><limit', 1)
+    result = rover("import", str(write(tmp_path, rough)), "--output", str(tmp_path / "out.toml"))
+    assert result.exit_code == 2
+    assert '--ignore "friction" leaves it out' in result.stderr
+    told = rover("import", str(write(tmp_path, rough)), "--output", str(tmp_path / "out.toml"), "--ignore", "friction")
+    assert told.exit_code == 0, told.output

@@ -1,7 +1,6 @@
 """Public files of wheeled robots, arms and pendulums that ship in packages, with the options that they are read with."""
 
 import importlib.util
-import re
 from pathlib import Path
 
 #: By package and path: options of `RoverModel.from_urdf`.
@@ -19,21 +18,11 @@ MJCF = {
 }
 
 
-def place(name: str, folder: Path) -> Path | None:
-    """The file, or None where its package is not installed.
-
-    The Husky's has left two substitutions of its macros undone; a copy of it in `folder` has their defaults.
-    """
+def place(name: str) -> Path | None:
+    """The file, or None where its package is not installed."""
     package, _, path = name.partition("/")
     found = importlib.util.find_spec(package)
     if found is None or found.origin is None:
         return None
     file = Path(found.origin).parent / path
-    if not file.is_file():
-        return None
-    text = file.read_text(encoding="utf-8")
-    if "$(optenv" not in text:
-        return file
-    copy = folder / file.name
-    copy.write_text(re.sub(r"\$\(optenv \w+ ([^)]*)\)", r"\1", text), encoding="utf-8")
-    return copy
+    return file if file.is_file() else None

@@ -192,14 +192,24 @@ def main():
     for files, engine_of, read in ((URDF, InPinocchio, RoverModel.from_urdf), (MJCF, InMuJoCo, RoverModel.from_mjcf)):
         for name, options in files.items():
             with tempfile.TemporaryDirectory() as folder:
-                path = place(name, Path(folder))
+                path = place(name)
                 model = read(path, **options)
                 is_free = model.dof_names[0] == "x"
-                engine = engine_of(path, is_free=is_free)
+                engine = engine_of(with_defaults(path, Path(folder)), is_free=is_free)
                 joints = joints_of(path, engine)
                 found[name] = record(model, engine, joints.get)
     OUT.write_text(json.dumps(found, separators=(",", ":")).replace('},"', '},\n"') + "\n", encoding="utf-8")
     print(f"{OUT}: {OUT.stat().st_size} bytes")  # noqa: T201 - it tells what it wrote
+
+
+def with_defaults(path, folder):
+    """The file, or a copy in which the defaults of ROS's substitutions stand: Pinocchio does not make them."""
+    text = path.read_text(encoding="utf-8")
+    if "$(optenv" not in text:
+        return path
+    copy = folder / path.name
+    copy.write_text(re.sub(r"\$\(optenv \w+ ([^)]*)\)", r"\1", text), encoding="utf-8")
+    return copy
 
 
 def joints_of(path, engine):

@@ -162,3 +162,15 @@ def test_few_words_that_become_enormous_are_refused_before_they_do(inside, messa
             text = '<mujoco><include file="inside.xml"/></mujoco>'
         with pytest.raises(ModelError, match=rf"(robot|inside)\.xml: line 1, {message}"):
             RoverModel.from_mjcf(write(tmp_path, text, "robot.xml"))
+
+
+def test_numbers_that_mujoco_passes_on_are_refused_by_body(tmp_path):
+    text = '<mujoco><worldbody><body name="box" quat="1e-300 0 0 0"><freejoint/><geom size="1"/></body></worldbody></mujoco>'
+    with pytest.raises(ModelError, match=r"body\[box\]\.quat: must be finite and, if a quaternion, not zero"):
+        RoverModel.from_mjcf(write(tmp_path, text, "box.xml"))
+
+
+def test_a_machine_without_shapes_is_read(tmp_path):
+    inertial = '<inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>'
+    text = f"<mujoco><worldbody><body name='bare'><freejoint/>{inertial}</body></worldbody></mujoco>"
+    assert RoverModel.from_mjcf(write(tmp_path, text, "bare.xml")).mass == 2.0

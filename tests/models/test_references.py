@@ -45,9 +45,9 @@ def test_the_gallery_has_the_dynamics_of_other_engines(name, engine):
 
 
 @pytest.mark.parametrize("name", [*URDF, *MJCF])
-def test_public_files_have_the_dynamics_of_other_engines(tmp_path, name):
+def test_public_files_have_the_dynamics_of_other_engines(name):
     pytest.importorskip("yourdfpy" if name in URDF else "mujoco")
-    path = place(name, tmp_path)
+    path = place(name)
     if path is None:
         pytest.skip(f"{name} is not installed")
     read = RoverModel.from_urdf if name in URDF else RoverModel.from_mjcf

@@ -1,10 +1,13 @@
 """URDF files as models: axes, roles, what is welded, left out or refused."""
 
+import re
+
 import numpy as np
 import pytest
-from models.robot_files import LIMIT, body, changed, joint, rover, write
+from models.robot_files import LIMIT, WHEEL, body, changed, joint, rover, write
 
 from rover_gym import ModelError, RoverModel, Simulation
+from rover_gym.models import read_urdf
 
 pytest.importorskip("yourdfpy")
 
@@ -166,7 +169,6 @@ def test_what_is_not_simulated_is_listed(tmp_path):
     )
     listed = "\n".join(model.import_report.left_out)
     for what in (
-        "a cylinder of a wheel, which touches as a disc",
         "<gazebo> of <robot>",
         "<sensor> of <robot>",
         "a mesh that touches",
@@ -183,7 +185,7 @@ REFUSED = {
     "half a file": ("(<robot.*)</robot>", r"\1", "is no XML"),
     "another root": ("(?<=<|/)robot(?= name|>)", "machine", "is no XML|root element"),
     "no number": ('mass value="50.0"', 'mass value="heavy"', r"link\[chassis\]\.inertial\.mass\.value: must be a number, got 'heavy'"),
-    "two numbers": ('xyz="0.01 0.02 0.03"', 'xyz="0.01 0.02"', "must be 3 numbers, got '0.01 0.02'"),
+    "two numbers": ('xyz="0.01 0.02 0.03"', 'xyz="0.01 0.02"', "must be 3 numbers with spaces between them, got '0.01 0.02'"),
     "not finite": ('ixx="0.2"', 'ixx="inf"', "must be finite, got 'inf'"),
     "nan": ('mass value="50.0"', 'mass value="nan"', "must be finite, got 'nan'"),
     "a missing attribute": (' izz="0.4"', "", "inertia.izz: is missing"),
@@ -286,3 +288,80 @@ def test_a_pivot_without_stops_is_a_caster_or_a_steering_joint_by_its_name(tmp_p
     assert caught.value.field == "steering"
     given = RoverModel.from_urdf(doubtful, steering=["left_pin", "right_fork"])
     assert [index >= 0 for index in given.steering_joint_indices] == [True, True, False]
+
+
+def test_a_wheel_is_as_wide_as_the_cylinder_that_touches_for_it(tmp_path):
+    path = write(tmp_path, rover())
+    model = RoverModel.from_urdf(path)
+    assert [wheel["width"] for wheel in model.to_dict()["wheels"]] == [0.1] * 3
+    assert "0.1 m wide" in str(model.import_report)
+    thin, report = read_urdf(path, wheel_width=0.0)
+    assert not any("width" in wheel for wheel in thin.to_dict()["wheels"])
+    assert "a cylinder of a wheel, which touches as a thin disc" in "\n".join(report.left_out)
+    assert RoverModel.from_urdf(path, wheel_width=0.0) == thin
+    wide, _ = read_urdf(path, wheel_width=0.3)
+    assert [wheel["width"] for wheel in wide.to_dict()["wheels"]] == [0.3] * 3
+    for wrong in (-0.1, float("nan"), "file"):
+        with pytest.raises(ModelError, match="wheel_width"):
+            read_urdf(path, wheel_width=wrong)
+
+
+@pytest.mark.parametrize("shape", ['<sphere radius="0.2"/>', None])
+def test_a_wheel_without_a_cylinder_that_touches_is_a_thin_disc(tmp_path, shape):
+    text = rover(wheel=WHEEL.replace("collision", "visual"))
+    if shape is not None:
+        text = rover(wheel=re.sub("<cylinder.*?/>", shape, WHEEL))
+    model = RoverModel.from_urdf(write(tmp_path, text))
+    assert not any("width" in wheel for wheel in model.to_dict()["wheels"])
+    is_listed = "a sphere of a wheel, which touches as a thin disc" in str(model.import_report)
+    assert is_listed == (shape is not None)
+
+
+def test_substitutions_of_ros_have_their_defaults(tmp_path):
+    text = changed(rover(), '"0.3 0.1 0.5"', '"$(optenv MAST_XYZ 0.3 0.1 0.5)"')
+    text = changed(text, "<box size.*?/>", '<mesh filename="$(find small)/hull.dae"/>')
+    model = RoverModel.from_urdf(write(tmp_path, text))
+    assert model.to_dict()["tags"][0]["position"] == [0.3, 0.5, -0.1]
+    assert "'0.3 0.1 0.5', the default of MAST_XYZ: line" in str(model.import_report)
+    assert "mast].origin.xyz" in str(model.import_report)
+
+
+@pytest.mark.parametrize("value", ["$(optenv MAST_XYZ)", "$(arg xyz)", "${x} 0 0", "$(eval 1 + 2) 0 0"])
+def test_substitutions_without_a_value_are_refused(tmp_path, value):
+    text = changed(rover(), '"0.3 0.1 0.5"', f'"{value}"')
+    with pytest.raises(
+        ModelError, match=r"joint\[mast\]\.origin\.xyz: holds what xacro or roslaunch replaces"
+    ) as raised:
+        RoverModel.from_urdf(write(tmp_path, text))
+    assert raised.value.value == value
+
+
+def test_a_wheel_that_is_fixed_to_a_link_that_turns_is_refused(tmp_path):
+    tyre = body("tyre", mass=1.0, shapes=WHEEL) + joint("glue", "fixed", "rear_hub", "tyre")
+    text = rover(extra=tyre).replace("rear_wheel", "rear_hub")
+    text = changed(text, r'(name="rear_hub".*?)<collision>.*?</collision>', r"\1")
+    with pytest.raises(ModelError, match=r"link\[tyre\]\.joint: this wheel is fixed to rear_hub, which turns"):
+        RoverModel.from_urdf(write(tmp_path, text))
+    told = {"left_wheel": 0.2, "right_wheel": 0.2, "rear_hub": 0.2}
+    assert RoverModel.from_urdf(tmp_path / "robot.urdf", wheels=told).wheel_names == list(told)
+
+
+def test_a_motor_with_a_leg_is_no_wheel(tmp_path):
+    leg = body("leg", mass=1.0) + joint("knee", "fixed", "rear_motor", "leg")
+    text = rover(extra=leg, names=("left_motor", "right_motor")).replace("rear_wheel", "rear_motor")
+    assert RoverModel.from_urdf(write(tmp_path, text)).wheel_names == ["left_motor", "right_motor"]
+
+
+@pytest.mark.parametrize("ratio", [1.0, -0.5])
+def test_a_steering_joint_that_follows_another_still_does_when_its_axis_is_reversed(tmp_path, ratio):
+    given = ["left_fork", "right_fork"]
+    wheels = []
+    for axis in ("0 0 1", "0 0 -1"):
+        mimic = f'name="right_steer" type="revolute"><mimic joint="left_steer" multiplier="{ratio}" offset="0.1"/>'
+        text = rover(steer_axis=axis).replace('name="right_steer" type="revolute">', mimic)
+        model = RoverModel.from_urdf(write(tmp_path, text), steering=given)
+        q = np.zeros(model.nv)
+        q[model.dof_names.index("left_fork")] = 0.3 if axis == "0 0 1" else -0.3  # the file's angle is 0.3
+        wheels.append(model.poses(q)["right_wheel"][1])
+    turned = wheels[0] @ wheels[1]  # by opposite angles about one axis
+    np.testing.assert_allclose(turned, np.eye(3), atol=1e-12)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from models.robot_files import rover, write
 
-from rover_gym import ModelError, RoverModel
+from rover_gym import ModelError, Motor, RoverModel
 
 KINDS = {"urdf": "yourdfpy", "mjcf": "mujoco"}
 
@@ -61,7 +61,7 @@ def test_every_rover_of_the_gallery_comes_back(tmp_path, kind, name):
     assert set(by_solid) == set(solids)
     for wheel in model.to_dict()["wheels"]:
         again = by_solid[wheel["solid"]]
-        for field in ("radius", "torque_limit", "steering"):
+        for field in ("radius", "width", "torque_limit", "steering"):
             assert again.get(field) == wheel.get(field), field
 
 
@@ -112,12 +112,32 @@ def test_an_imported_rover_goes_through_both_formats(tmp_path):
     assert_same_machine(model, written_and_read(model, tmp_path, "mjcf"))
 
 
-def test_a_wide_wheel_is_written_as_wide_as_it_is(tmp_path):
-    description = RoverModel().to_dict()
-    for wheel in description["wheels"]:
-        wheel["width"] = 0.125
+@pytest.mark.parametrize("kind", KINDS)
+def test_wide_wheels_come_back_as_wide_and_thin_ones_as_thin(tmp_path, kind):
+    pytest.importorskip(KINDS[kind])
+    description = RoverModel.named("skid-steered").to_dict()
+    for wheel, width in zip(description["wheels"], (0.125, 0.0, 0.0177, 1.0), strict=True):
+        wheel["width"] = width
     model = RoverModel.from_dict(description)
-    model.to_urdf(tmp_path / "wide.urdf")
-    assert (tmp_path / "wide.urdf").read_text().count('length="0.125"') == 6
-    model.to_mjcf(tmp_path / "wide.xml")
-    assert (tmp_path / "wide.xml").read_text().count(' 0.0625"') == 6
+    back = written_and_read(model, tmp_path, kind)
+    again = written_and_read(back, tmp_path, kind)
+    for read in (back, again):
+        assert [wheel.get("width", 0.0) for wheel in read.to_dict()["wheels"]] == [0.125, 0.0, 0.0177, 1.0]
+        kinds = [[shape["kind"] for shape in solid["shapes"]] for solid in read.to_dict()["solids"][1:]]
+        assert kinds == [["cylinder", "disc"], ["disc"], ["cylinder", "disc"], ["cylinder", "disc"]]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_motor_without_a_largest_speed_is_written(tmp_path, kind):
+    pytest.importorskip(KINDS[kind])
+    model = RoverModel.named("skid-steered").replace(motor=Motor(50.0, float("inf")))
+    assert_same_machine(model, written_and_read(model, tmp_path, kind))
+
+
+@pytest.mark.parametrize("path", [3, None, b"robot.urdf"])
+def test_what_is_no_path_is_refused(tmp_path, monkeypatch, path):
+    monkeypatch.chdir(tmp_path)
+    for write_to in (RoverModel().to_urdf, RoverModel().to_mjcf):
+        with pytest.raises(ModelError, match="path: must be a path"):
+            write_to(path)
+    assert not list(tmp_path.iterdir())

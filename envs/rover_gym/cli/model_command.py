@@ -1,6 +1,7 @@
 """`rover model import|show|check`: models from files of other programs, and what they are."""
 
 import math
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -12,14 +13,23 @@ from rover_gym.cli.console import check_file, console, plain_errors, say_path
 from rover_gym.extras import require
 from rover_gym.figures.model_drawing import write_model_picture
 from rover_gym.figures.saving import check_format
-from rover_gym.mechanics import OptionError, RoverModel
-from rover_gym.models import check_statics, open_model, solid_rows
+from rover_gym.mechanics import ModelError, OptionError, RoverModel
+from rover_gym.models import ImportReport, check_statics, open_model, read_robot, solid_rows
 from rover_gym.validation import refuse
 
 model = typer.Typer(help="Models: read URDF and MJCF, show and check any model.", no_args_is_help=True)
 
 Named = Annotated[str, typer.Argument(metavar="FILE_OR_NAME", help="A name of the gallery, or a model's file.")]
 Picture = Annotated[Path | None, typer.Option(dir_okay=False, help="Picture to write: .png, .svg or .pdf.")]
+
+#: What errors recommend as arguments, and the same as options of `rover model import`.
+AS_OPTIONS = (
+    (r'ignore=\["([\w ]+)"\]', r'--ignore "\1"'),
+    (r"free_base=False", "--fixed-base"),
+    (r"steering=\[\]", "--steering none"),
+    (r"steering=\['([^']+)', \.\.\.\]", r"--steering \1"),
+    (r"wheels=\{'([^']+)': radius\}", r"--wheel \1=RADIUS"),
+)
 
 
 @model.command("import")
@@ -39,6 +49,9 @@ def import_model(
     fixed_base: Annotated[bool, typer.Option("--fixed-base", help="Fix the root to the world.")] = False,
     forward: Annotated[str, typer.Option(help="The file's axis of driving: x, -x, y or -y.")] = "x",
     torque_limit: Annotated[float | None, typer.Option(help="Largest torque of a wheel, N m.")] = None,
+    wheel_width: Annotated[
+        float | None, typer.Option(help="Width of every wheel, m; 0 for thin discs. By default the file's.")
+    ] = None,
     ignore: Annotated[
         list[str] | None, typer.Option(help="What to leave out although it changes the motion, such as friction.")
     ] = None,
@@ -51,13 +64,13 @@ def import_model(
         if path.exists() and file.exists() and path.samefile(file):
             refuse(OptionError, option, str(path), "would replace the file that is read")
         check_file(option, path)
-    options: dict[str, object] = {"forward": forward, "torque_limit": torque_limit, "ignore": ignore or ()}
+    options: dict[str, object] = {"forward": forward, "ignore": ignore or ()}
+    options |= {"torque_limit": torque_limit, "wheel_width": wheel_width}
     options |= {"wheels": _radii(wheel), "steering": _pairs(steering)}
     if fixed_base:
         options["free_base"] = False
-    read = open_model(file, **options)
+    read, report = _read(file, options)
     _print_solids(read)
-    report = read.import_report
     for title, entries in (("assumed", report.assumed), ("not simulated", report.left_out)):
         for entry in entries:
             console().print(f"{title}: {entry}", markup=False)
@@ -112,6 +125,19 @@ def check(
     ]
     for line in lines:
         console().print(line, markup=False)
+
+
+def _read(file: Path, options: dict[str, object]) -> tuple[RoverModel, ImportReport]:
+    """Reads a robot; an error recommends the options of the command, not the arguments of the function."""
+    try:
+        return read_robot(file, **options)
+    except ModelError as error:
+        text = str(error)
+        for argument, option in AS_OPTIONS:
+            text = re.sub(argument, option, text)
+        told = ModelError(text)
+        told.field, told.value = error.field, error.value
+        raise told from None
 
 
 def _print_solids(found: RoverModel) -> None:

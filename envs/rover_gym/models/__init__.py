@@ -4,7 +4,7 @@
 """
 
 from rover_gym.models.import_report import ImportReport, solid_rows
-from rover_gym.models.lookup import open_model
+from rover_gym.models.lookup import open_model, read_robot
 from rover_gym.models.mjcf_writer import write_mjcf
 from rover_gym.models.reading import read_mjcf, read_urdf
 from rover_gym.models.statics import Statics, check_statics
@@ -16,6 +16,7 @@ __all__ = [
     "check_statics",
     "open_model",
     "read_mjcf",
+    "read_robot",
     "read_urdf",
     "solid_rows",
     "write_mjcf",

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from rover_gym.models.file_axes import Z_UP_TO_Y_UP, Array, rotation_vector, turn_z_to
-from rover_gym.models.robot_tree import FileJoint, FileLink, FileShape, RobotTree
+from rover_gym.models.robot_tree import THIN_DISC, FileJoint, FileLink, FileShape, RobotTree
 from rover_gym.models.roles import WheelRole
 
 GRAVITY = 9.81
@@ -18,11 +18,13 @@ TORQUE_SHARE = 1.0
 #: of the weight times its radius, 1/rad, and damping over stiffness, s.
 STEERING_STIFFNESS, STEERING_TIME = 10.0, 0.0133
 STEERING_LIMIT = 0.7  # rad, where the file states none
+#: Kinds of shapes that touch the ground; cylinders touch as wheels only.
+TOUCHING = ("box", "sphere")
 UNLIMITED = 1e9  # N m, the torque limit of a motor for which the file states none
 
 
 @dataclass(frozen=True)
-class Gains:
+class WheelOptions:
     """What a user gives for all wheels and steering joints; None: as the file states, otherwise assumed.
 
     Attributes:
@@ -30,29 +32,31 @@ class Gains:
         steering_stiffness: N m/rad.
         steering_damping: N m s/rad.
         steering_limit: rad.
+        wheel_width: Of a wheel, m.
     """
 
     torque_limit: float | None = None
     steering_stiffness: float | None = None
     steering_damping: float | None = None
     steering_limit: float | None = None
+    wheel_width: float | None = None
 
 
-def describe(tree: RobotTree, roles: list[WheelRole], P: Array, gains: Gains) -> dict[str, Any]:
+def describe(tree: RobotTree, roles: list[WheelRole], P: Array, options: WheelOptions) -> dict[str, Any]:
     """The description of a robot.
 
     Args:
-        tree: The robot, links without mass joined.
+        tree: The robot, links without mass joined and joints as `joint_conventions` wants them.
         roles: Its wheels.
         P: Rotation from the file's axes to those of this package, (3, 3).
-        gains: What the user gave.
+        options: What the user gave.
 
     Raises:
         ModelError: The file holds what has no place in a description.
     """
+    if options.wheel_width is not None:
+        roles = [replace(role, width=options.wheel_width) for role in roles]
     wheels = {role.link: role for role in roles}
-    _turn_steering_axes_up(tree, {role.steering for role in roles if role.steering}, P)
-    _move_limits_to_followed_joints(tree)
     anchors = {}
     for link in tree.links.values():
         shift = wheels[link.name].shift if link.name in wheels else 0.0
@@ -64,12 +68,12 @@ def describe(tree: RobotTree, roles: list[WheelRole], P: Array, gains: Gains) ->
     solids, tags = [], []
     for link in _followed_first(tree):
         solids.append(_solid(tree, link, anchors, axes, P, wheels.get(link.name)))
-        _add_control(tree, link, solids[-1], steering.get(link.name), weight, gains, is_wheel=link.name in wheels)
+        _add_control(tree, link, solids[-1], steering.get(link.name), weight, options, is_wheel=link.name in wheels)
         for name, point in link.points:
             place = _numbers(axes[link.name] @ (point - anchors[link.name]))
             tags.append({"name": name, "solid": link.name, "position": place})
     description: dict[str, Any] = {"name": tree.name, "solids": solids}
-    description["wheels"] = [_wheel(tree, role, axes[role.link], weight, gains) for role in roles]
+    description["wheels"] = [_wheel(tree, role, axes[role.link], weight, options) for role in roles]
     if tags:
         description["tags"] = tags
     return description
@@ -123,7 +127,7 @@ def _add_control(
     solid: dict[str, Any],
     steered: WheelRole | None,
     weight: float,
-    gains: Gains,
+    options: WheelOptions,
     *,
     is_wheel: bool,
 ) -> None:
@@ -133,17 +137,8 @@ def _add_control(
             tree.left_out.append(f"joint[{joint.name}]: its motor, since a {joint.kind} or coupled joint has none")
         return
     if steered is not None:
-        stiffness = (joint.hold or (0.0, 0.0))[0] or STEERING_STIFFNESS * weight * steered.radius
-        if gains.steering_stiffness is not None:
-            stiffness = gains.steering_stiffness
-        elif joint.hold is None:
-            tree.assumed.append(f"steering {link.name}: stiffness {stiffness:.4g} N m/rad")
-        damping = (joint.hold or (0.0, 0.0))[1] or STEERING_TIME * stiffness
-        if gains.steering_damping is not None:
-            damping = gains.steering_damping
-        elif joint.hold is None:
-            tree.assumed.append(f"steering {link.name}: damping {damping:.4g} N m s/rad")
-        solid["hold"] = {"stiffness": float(stiffness), "damping": float(damping)}
+        stiffness, damping = _steering_gains(tree, link, steered, weight, options)
+        solid["hold"] = {"stiffness": stiffness, "damping": damping}
         return
     if joint.hold is not None:
         solid["hold"] = {"stiffness": float(joint.hold[0]), "damping": float(joint.hold[1])}
@@ -156,9 +151,26 @@ def _add_control(
                 tree.assumed.append(f"joint {joint.name}: torque limit {UNLIMITED:g} N m, since the file states none")
 
 
-def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, gains: Gains) -> dict[str, Any]:
+def _steering_gains(
+    tree: RobotTree, link: FileLink, steered: WheelRole, weight: float, options: WheelOptions
+) -> tuple[float, float]:
+    """Stiffness, N m/rad, and damping, N m s/rad: as given, otherwise the file's, otherwise assumed."""
+    stated_stiffness, stated_damping = link.joint.hold or (0.0, 0.0)
+
+    def chosen(what: str, given: float | None, stated: float, usual: float, unit: str) -> float:
+        if given is None and not stated:
+            tree.assumed.append(f"steering {link.name}: {what} {usual:.4g} {unit}")
+        return float(given if given is not None else stated or usual)
+
+    usual = STEERING_STIFFNESS * weight * steered.radius
+    stiffness = chosen("stiffness", options.steering_stiffness, stated_stiffness, usual, "N m/rad")
+    usual = STEERING_TIME * stiffness
+    return stiffness, chosen("damping", options.steering_damping, stated_damping, usual, "N m s/rad")
+
+
+def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, options: WheelOptions) -> dict[str, Any]:
     joint = tree.links[role.link].joint
-    limit = gains.torque_limit if gains.torque_limit is not None else joint.torque_limit
+    limit = options.torque_limit if options.torque_limit is not None else joint.torque_limit
     if role.is_caster:
         limit = 0.0
         tree.assumed.append(f"wheel {role.link}: a caster, without a drive")
@@ -175,11 +187,13 @@ def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, gains: Gai
         "torque_limit": float(limit),
         "drive_sign": 1.0 if role.is_forward else -1.0,
     }
+    if role.width > 0.0:
+        wheel["width"] = float(role.width)
     if role.steering is not None:
         stops = tree.links[role.steering].joint.limits
         reach = STEERING_LIMIT if stops is None else min(abs(stop) for stop in stops) or max(abs(s) for s in stops)
-        if gains.steering_limit is not None:
-            reach = gains.steering_limit
+        if options.steering_limit is not None:
+            reach = options.steering_limit
         elif stops is None:
             tree.assumed.append(f"steering {role.steering}: set-points up to {reach:g} rad")
         wheel |= {"steering": role.steering, "steering_limit": float(reach)}
@@ -187,34 +201,34 @@ def _wheel(tree: RobotTree, role: WheelRole, A: Array, weight: float, gains: Gai
 
 
 def _shapes(tree: RobotTree, link: FileLink, A: Array, anchor: Array, role: WheelRole | None) -> list[dict[str, Any]]:
-    """A wheel touches as a disc, everything else as the boxes and spheres of the file."""
+    """The shapes of a link. Boxes and spheres touch, cylinders are drawn; a wheel touches by disc and width alone."""
     found: list[dict[str, Any]] = []
     is_drawn = any(shape.visible and shape.mesh is None for shape in link.shapes)
-    touching = False
     for shape in link.shapes:
-        where = f"link[{link.name}]: a {shape.kind}"
-        if shape.collides and role is not None:
-            tree.left_out.append(f"{where} of a wheel, which touches as a disc")
-        if shape.kind not in ("box", "cylinder", "sphere"):
-            if shape.collides and role is None:
-                tree.left_out.append(f"{where} that touches, since only boxes and spheres can")
-            elif shape.visible:
-                tree.left_out.append(f"{where} that is drawn")
-            continue
-        can_touch = shape.kind != "cylinder" and role is None
-        if shape.collides and not can_touch and role is None:
-            tree.left_out.append(f"{where} that touches, since only boxes and spheres can; it is drawn")
-        collides = shape.collides and can_touch
+        if role is not None and shape.name.endswith(THIN_DISC):
+            continue  # the disc below stands for it
+        if reason := _left_out(shape, role):
+            tree.left_out.append(f"link[{link.name}]: a {shape.kind} {reason}")
+        collides = shape.collides and shape.kind in TOUCHING and role is None
         visible = shape.visible or not is_drawn
-        if not collides and not visible:
-            continue
-        touching |= collides
-        found.append(_shape(shape, A, anchor, collides=collides, visible=visible))
+        if shape.kind in (*TOUCHING, "cylinder") and (collides or visible):
+            found.append(_shape(shape, A, anchor, collides=collides, visible=visible))
     if role is not None:
         turn = rotation_vector(turn_z_to(A @ link.joint.axis))
         disc: dict[str, Any] = {"kind": "disc", "radius": float(role.radius)}
         found.append(disc | ({"rotation": _numbers(turn)} if np.any(turn) else {}))
     return found
+
+
+def _left_out(shape: FileShape, role: WheelRole | None) -> str | None:
+    """What of a shape is not simulated, in words, or None."""
+    if shape.collides and role is not None:
+        rim = f"cylinder {role.width:g} m wide" if role.width else "thin disc"
+        return None if shape.size == (role.radius, role.width) else f"of a wheel, which touches as a {rim}"
+    if shape.collides and shape.kind not in TOUCHING:
+        is_drawn = "; it is drawn" if shape.kind == "cylinder" else ""
+        return f"that touches, since only boxes and spheres can{is_drawn}"
+    return "that is drawn" if shape.visible and shape.kind not in (*TOUCHING, "cylinder") else None
 
 
 def _shape(shape: FileShape, A: Array, anchor: Array, *, collides: bool, visible: bool) -> dict[str, Any]:
@@ -237,46 +251,6 @@ def _shape(shape: FileShape, A: Array, anchor: Array, *, collides: bool, visible
     if not visible:
         made["visible"] = False
     return made
-
-
-def _turn_steering_axes_up(tree: RobotTree, steering: set[str], P: Array) -> None:
-    """Reverses steering joints whose axis points down, so that a positive angle turns to the left everywhere."""
-    poses, up = tree.poses(), P.T @ (0.0, 1.0, 0.0)
-    for name in sorted(steering):
-        link = tree.links[name]
-        if float(poses[name][0] @ link.joint.axis @ up) > 0.0:
-            continue
-        joint = link.joint
-        joint.axis, joint.rest = -joint.axis, -joint.rest
-        if joint.limits is not None:
-            joint.limits = (-joint.limits[1], -joint.limits[0])
-        for other in tree.links.values():
-            if other.joint.follows is not None and other.joint.follows[0] == joint.name:
-                followed, ratio, offset = other.joint.follows
-                other.joint.follows = (followed, -ratio, offset)
-        tree.assumed.append(f"steering {name}: its axis points down and is reversed: positive turns to the left")
-
-
-def _move_limits_to_followed_joints(tree: RobotTree) -> None:
-    """The stops of a joint that follows another become stops of the other."""
-    by_joint = {link.joint.name: link for link in tree.links.values()}
-    for link in tree.links.values():
-        if link.joint.follows is None:
-            continue
-        name, ratio, offset = link.joint.follows
-        at = f"joint[{link.joint.name}].mimic"
-        if name not in by_joint:
-            tree.refuse(f"{at}.joint", name, "this joint does not move")
-        if link.joint.limits is not None and ratio != 0.0:
-            lower, upper = sorted((limit - offset) / ratio for limit in link.joint.limits)
-            followed = by_joint[name].joint
-            own = followed.limits or (-np.inf, np.inf)
-            followed.limits = (max(own[0], lower), min(own[1], upper))
-            if not followed.limits[0] < followed.limits[1]:
-                tree.refuse(
-                    f"{at}", list(followed.limits), "its limits and those of the followed joint exclude each other"
-                )
-        link.joint.limits = None
 
 
 def _followed_first(tree: RobotTree) -> list[FileLink]:

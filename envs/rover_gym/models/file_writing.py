@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any, NoReturn
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from rover_gym.mechanics import ModelError, RoverModel
-from rover_gym.models.file_axes import Z_UP_TO_Y_UP, Array, rotation_matrix
+from rover_gym.models.file_axes import Z_UP_TO_Y_UP, Array, rotation_matrix, turn_z_to
+from rover_gym.models.robot_tree import THIN_DISC, FileShape, checked_path
 from rover_gym.validation import refuse
 
-#: Width of the cylinder that stands for a wheel, as a share of its radius.
-WHEEL_WIDTH = 0.1
+#: Width of the cylinder that stands for a thin disc, as a share of its radius.
+DISC_WIDTH = 0.1
+
+_TO_FILE: Array = Z_UP_TO_Y_UP.T
 
 
 class WrittenSolid:
@@ -35,7 +37,7 @@ class WrittenSolid:
     """
 
     def __init__(self, index: int, source: dict[str, Any]) -> None:
-        Q = Z_UP_TO_Y_UP.T
+        Q = _TO_FILE
         self.index, self.source, self.name = index, source, str(source["name"])
         self.parent: str | None = source.get("parent")
         self.kind: str = source.get("joint") or ("revolute" if self.parent else "free")
@@ -56,15 +58,25 @@ class WrittenSolid:
                 self.position = self.position + self.rotation @ (locked * self.axis)
             self.kind = "fixed"
 
-    def shapes(self) -> Iterable[tuple[dict[str, Any], Array, Array, bool, bool]]:
-        """Shapes with centre (3,), m, rotation from z-up axes (3, 3), and whether they collide and are drawn."""
-        Q = Z_UP_TO_Y_UP.T
+    def shapes(self, wheel: dict[str, Any] | None) -> list[FileShape]:
+        """Its shapes as boxes, cylinders and spheres. A wheel's disc becomes the cylinder that touches for it.
+
+        Args:
+            wheel: The description of the wheel that it is, or None.
+        """
+        sources = list(self.source.get("shapes") or ())
         if (shape := self.source.get("shape")) is not None:
-            yield shape, self.centre, np.eye(3), bool(self.source.get("collides")), True
-        for shape in self.source.get("shapes") or ():
-            centre = Q @ np.array(shape.get("position") or (0.0, 0.0, 0.0))
-            R = Q @ rotation_matrix(np.array(shape.get("rotation") or (0.0, 0.0, 0.0))) @ Q.T
-            yield shape, centre, R, bool(shape.get("collides")), bool(shape.get("visible", True))
+            centre = _TO_FILE.T @ self.centre
+            sources.append(shape | {"collides": bool(self.source.get("collides")), "position": centre})
+        if wheel is None:
+            return [_written(shape) for shape in sources]
+        found = [_written(shape) for shape in sources if shape["kind"] != "disc"]
+        axle = _TO_FILE @ np.array(wheel["axle"]) / np.linalg.norm(wheel["axle"])
+        radius, width = wheel.get("contact_radius") or wheel["radius"], wheel.get("width") or 0.0
+        is_drawn = any(shape.visible for shape in found)
+        name = "" if width else f"{self.name}_{THIN_DISC}"
+        size = (radius, width or DISC_WIDTH * radius)
+        return [*found, FileShape("cylinder", size, np.zeros(3), turn_z_to(axle), True, not is_drawn, name)]
 
     def refuse(self, field: str, value: object, reason: str) -> NoReturn:
         """Raises a `ModelError` that names the solid's field."""
@@ -74,6 +86,25 @@ class WrittenSolid:
 def written_solids(model: RoverModel) -> list[WrittenSolid]:
     """The solids of a model."""
     return [WrittenSolid(i, solid) for i, solid in enumerate(model.to_dict()["solids"])]
+
+
+def _written(source: dict[str, Any]) -> FileShape:
+    """A shape in the axes of robot files."""
+    centre = np.zeros(3) if source.get("position") is None else _TO_FILE @ np.array(source["position"])
+    R = _TO_FILE @ rotation_matrix(np.array(source.get("rotation") or (0.0, 0.0, 0.0))) @ _TO_FILE.T
+    made = FileShape("cylinder", (), centre, R, bool(source.get("collides")), bool(source.get("visible", True)))
+    match source["kind"]:
+        case "box":
+            x, y, z = source["size"]
+            made.kind, made.size = "box", (x, z, y)
+        case "sphere":
+            made.kind, made.size = "sphere", (source["radius"],)
+        case "cylinder":
+            made.size = (source["radius"], source["height"])
+        case _:  # a disc about our z, which is the file's -y
+            made.size = (source["radius"], DISC_WIDTH * source["radius"])
+            made.rotation = R @ turn_z_to(np.array([0.0, -1.0, 0.0]))
+    return made
 
 
 def principal(shape: dict[str, Any], mass: float) -> Array:
@@ -133,7 +164,12 @@ def text_of(values: Iterable[float] | float) -> str:
 
 
 def write_xml(root: ET.Element, path: object) -> None:
-    """Writes an indented file."""
+    """Writes an indented file.
+
+    Raises:
+        ModelError: `path` is no path.
+        OSError: The file cannot be written.
+    """
     ET.indent(root)
     text = '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
-    Path(str(path)).write_text(text, encoding="utf-8")
+    checked_path(path).write_text(text, encoding="utf-8")

@@ -56,9 +56,9 @@ def solid_rows(model: RoverModel) -> tuple[tuple[str, str, str, float, str], ...
         role = ""
         if solid["name"] in wheels:
             wheel = wheels[solid["name"]]
-            role = (
-                f"wheel of radius {wheel.get('contact_radius') or wheel['radius']:g} m, {wheel['torque_limit']:.4g} N m"
-            )
+            width = f", {wheel['width']:g} m wide" if wheel.get("width") else ""
+            radius = wheel.get("contact_radius") or wheel["radius"]
+            role = f"wheel of radius {radius:g} m{width}, {wheel['torque_limit']:.4g} N m"
         elif solid["name"] in steered:
             role = f"steers {', '.join(steered[solid['name']])}"
         elif solid.get("drive"):

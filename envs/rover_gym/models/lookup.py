@@ -7,41 +7,66 @@ from pathlib import Path
 from typing import Any
 
 from rover_gym.mechanics import ModelError, RoverModel
-from rover_gym.models.robot_tree import is_urdf
+from rover_gym.models.import_report import ImportReport
+from rover_gym.models.reading import read_mjcf, read_urdf
+from rover_gym.models.robot_tree import checked_path, is_urdf
 from rover_gym.validation import refuse
 
 #: Kinds of files by their endings.
-READERS = {".toml": "from_file", ".urdf": "from_urdf", ".xml": "from_mjcf", ".mjcf": "from_mjcf"}
+KINDS = {".toml": "TOML", ".urdf": "URDF", ".xml": "MJCF", ".mjcf": "MJCF"}
 
 
-def open_model(name: object, **options: Any) -> RoverModel:
+def open_model(name: object) -> RoverModel:
     """The model of the gallery with this name, or the one in this file.
 
     Args:
         name: A name of `RoverModel.names`, or a path that ends in .toml, .urdf, .xml or .mjcf. An .xml whose root is
             <robot> is a URDF.
-        **options: Those of `RoverModel.from_urdf` or `RoverModel.from_mjcf`.
 
     Returns:
         The model.
 
     Raises:
-        ModelError: There is no such model, the file is none, or options are given for what takes none.
+        ModelError: There is no such model, or the file is none.
         OSError: The file cannot be read.
     """
     if not isinstance(name, (str, os.PathLike)):
         refuse(ModelError, "model", name, "must be a name or a path")
-    text = os.fsdecode(name)
-    path = Path(text)
-    kind = READERS.get(path.suffix.lower())
-    if kind == "from_mjcf" and is_urdf(path):
-        kind = "from_urdf"
-    if options and kind not in ("from_urdf", "from_mjcf"):
-        refuse(ModelError, "model", text, f"only URDF and MJCF take {', '.join(options)}")
-    if kind is not None:
-        model: RoverModel = getattr(RoverModel, kind)(path, **options)
-        return model
-    if text not in RoverModel.names():
-        known = f"a name ({', '.join(RoverModel.names())}) or a file that ends in {', '.join(READERS)}"
-        refuse(ModelError, "model", text, f"must be {known}")
-    return RoverModel.named(text)
+    path = Path(os.fsdecode(name))
+    match _kind(path):
+        case "URDF":
+            return RoverModel.from_urdf(path)
+        case "MJCF":
+            return RoverModel.from_mjcf(path)
+        case "TOML":
+            return RoverModel.from_file(path)
+    if str(path) not in RoverModel.names():
+        known = f"a name ({', '.join(RoverModel.names())}) or a file that ends in {', '.join(KINDS)}"
+        refuse(ModelError, "model", str(path), f"must be {known}")
+    return RoverModel.named(str(path))
+
+
+def read_robot(path: object, **options: Any) -> tuple[RoverModel, ImportReport]:
+    """Reads a URDF or an MJCF, whichever the file is.
+
+    Args:
+        path: A path that ends in .urdf, .xml or .mjcf. An .xml whose root is <robot> is a URDF.
+        **options: Those of `read_urdf` or `read_mjcf`.
+
+    Returns:
+        The model and what was understood, assumed and left out.
+
+    Raises:
+        ModelError: The file is of another kind, or cannot be read as a robot.
+        OSError: The file cannot be read.
+    """
+    place = checked_path(path)
+    kind = _kind(place)
+    if kind not in ("URDF", "MJCF"):
+        refuse(ModelError, "path", str(place), "must end in .urdf, .xml or .mjcf: only URDF and MJCF are imported")
+    return read_urdf(place, **options) if kind == "URDF" else read_mjcf(place, **options)
+
+
+def _kind(path: Path) -> str | None:
+    kind = KINDS.get(path.suffix.lower())
+    return "URDF" if kind == "MJCF" and is_urdf(path) else kind

@@ -11,10 +11,16 @@ import numpy as np
 from rover_gym.extras import require
 from rover_gym.models.file_axes import from_quaternion
 from rover_gym.models.mjcf_sizes import check_sizes
-from rover_gym.models.robot_tree import MAX_LINKS, FileJoint, FileLink, FileShape, RobotTree, is_urdf, refuse_in
-
-#: Largest file, bytes.
-MAX_BYTES = 16 << 20
+from rover_gym.models.robot_tree import (
+    MAX_LINKS,
+    FileJoint,
+    FileLink,
+    FileShape,
+    RobotTree,
+    check_size,
+    is_urdf,
+    refuse_in,
+)
 
 
 def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
@@ -30,9 +36,7 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
         OSError: The file cannot be read.
     """
     mujoco = require("mujoco", "models")
-    size = path.stat().st_size
-    if size > MAX_BYTES:
-        refuse_in(path, "file", size, f"must have at most {MAX_BYTES} bytes")
+    check_size(path)
     if is_urdf(path):
         refuse_in(path, "root", "robot", "is a URDF: read it with from_urdf")
     check_sizes(path)
@@ -52,6 +56,7 @@ def read_mjcf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
             refuse_in(path, "MuJoCo", path.name, f"warns of the file ({' '.join(warning.split())})")
     reader = _Reader(mujoco, model, path, ignore)
     reader.tree.left_out += [f"MuJoCo warns: {' '.join(warning.split())}" for warning in warnings]
+    reader.check_numbers()
     reader.check_options()
     reader.add_links()
     reader.add_couplings()
@@ -64,9 +69,24 @@ class _Reader:
     """One compiled model on its way into a tree."""
 
     def __init__(self, mujoco: Any, model: Any, path: Path, ignore: Collection[str]) -> None:
-        self.mujoco, self.model, self.ignore = mujoco, model, ignore
-        self.tree = RobotTree(path, self._text(0) or path.stem, {})
+        self.mujoco, self.model = mujoco, model
+        self.tree = RobotTree(path, self._text(0) or path.stem, {}, ignore)
         self.joints: dict[int, FileJoint] = {}
+
+    def check_numbers(self) -> None:
+        """Refuses masses, places and quaternions that are no numbers, which MuJoCo passes on from some files."""
+        m = self.model
+        for kind, fields in (("body", ("mass", "inertia", "pos", "quat", "ipos", "iquat")), ("geom", ("pos", "quat"))):
+            for field in fields:
+                values = getattr(m, f"{kind}_{field}")
+                rows = values[:, None] if values.ndim == 1 else values
+                is_sound = np.isfinite(rows).all(axis=1)
+                if field.endswith("quat"):
+                    is_sound &= np.linalg.norm(rows, axis=1) > 0.0
+                for index in map(int, np.flatnonzero(~is_sound)):
+                    body = index if kind == "body" else int(m.geom_bodyid[index])
+                    at = f"body[{self._body(body)}].{'' if kind == 'body' else 'geom.'}{field}"
+                    self.tree.refuse(at, rows[index].tolist(), "must be finite and, if a quaternion, not zero")
 
     def check_options(self) -> None:
         """Refuses what acts on the whole scene and is not simulated."""
@@ -74,7 +94,7 @@ class _Reader:
         option = m.opt
         if option.density != 0.0 or option.viscosity != 0.0:
             value = [float(option.density), float(option.viscosity)]
-            self._leave_out("fluid", "option.density", value, "forces of a fluid are not simulated")
+            self.tree.leave_out("fluid", "option.density", value, "forces of a fluid are not simulated")
         for count, where in ((m.nflex, "flex"), (m.nplugin, "plugin"), (m.nmocap, "mocap")):
             if count:
                 self.tree.refuse(where, int(count), "is not simulated")
@@ -127,7 +147,7 @@ class _Reader:
             terms = [float(x) for x in m.eq_data[eq, :5]]
             if m.eq_type[eq] != kinds.mjEQ_JOINT or second < 0 or any(terms[2:]):
                 reason = "only linear couplings of two joints are simulated"
-                self._leave_out("closed loops", where, kinds(int(m.eq_type[eq])).name, reason)
+                self.tree.leave_out("closed loops", where, kinds(int(m.eq_type[eq])).name, reason)
                 continue
             joint = self.joints[first]
             if joint.follows is not None:
@@ -140,7 +160,7 @@ class _Reader:
         for tendon in range(m.ntendon):
             if np.any(m.tendon_stiffness[tendon]) or np.any(m.tendon_damping[tendon]) or m.tendon_limited[tendon]:
                 name = self._name(self.mujoco.mjtObj.mjOBJ_TENDON, tendon)
-                self._leave_out("tendons", f"tendon[{name}]", name, "tendons are not simulated")
+                self.tree.leave_out("tendons", f"tendon[{name}]", name, "tendons are not simulated")
 
     def add_actuators(self) -> None:
         """Motors become torque limits and position servos become gains; others are refused."""
@@ -154,7 +174,7 @@ class _Reader:
             is_plain = is_plain and m.actuator_gaintype[actuator] == mj.mjtGain.mjGAIN_FIXED
             is_plain = is_plain and not np.any(getattr(m, "actuator_dampingpoly", np.zeros((m.nu, 1)))[actuator])
             if int(m.actuator_trntype[actuator]) not in joint_kinds or not is_plain or target not in self.joints:
-                self._leave_out("actuators", where, name, "only motors and position servos of joints are simulated")
+                self.tree.leave_out("actuators", where, name, "only motors and position servos of joints are simulated")
                 continue
             joint, gear = self.joints[target], float(m.actuator_gear[actuator, 0])
             gain, bias = float(m.actuator_gainprm[actuator, 0]), [float(x) for x in m.actuator_biasprm[actuator, :3]]
@@ -169,7 +189,7 @@ class _Reader:
             elif m.actuator_biastype[actuator] == mj.mjtBias.mjBIAS_AFFINE and bias[0] == 0.0 and bias[1] == -gain:
                 joint.hold = (gain * gear**2, -bias[2] * gear**2)
             else:
-                self._leave_out("actuators", where, [gain, *bias], "only motors and position servos are simulated")
+                self.tree.leave_out("actuators", where, [gain, *bias], "only motors and position servos are simulated")
 
     def _joint(self, body: int) -> FileJoint:
         m, kinds = self.model, self.mujoco.mjtJoint
@@ -186,19 +206,19 @@ class _Reader:
         at = f"joint[{name}]"
         if np.any(m.dof_frictionloss[dofs]):
             value = float(m.dof_frictionloss[dofs].max())
-            self._leave_out("friction", f"{at}.frictionloss", value, "dry friction is not simulated")
+            self.tree.leave_out("friction", f"{at}.frictionloss", value, "dry friction is not simulated")
         damping, armature = np.array(m.dof_damping[dofs]), np.array(m.dof_armature[dofs])
         stiffness = float(np.ravel(m.jnt_stiffness[index])[0])
         for field in ("dof_dampingpoly", "jnt_stiffnesspoly"):
             if np.any(getattr(m, field, np.zeros((m.nv + 1, 1)))[dof if "dof" in field else index]):
-                self._leave_out("springs", f"{at}.{field[4:]}", None, "springs and dampers must be linear")
+                self.tree.leave_out("springs", f"{at}.{field[4:]}", None, "springs and dampers must be linear")
         if n_dofs > 1:
             if np.any(damping) or np.any(armature):
                 values = [float(damping.max()), float(armature.max())]
                 reason = "damping and armature of free and ball joints are not simulated"
-                self._leave_out("friction", at, values, reason)
+                self.tree.leave_out("friction", at, values, reason)
             if stiffness != 0.0:
-                self._leave_out("springs", f"{at}.stiffness", stiffness, "springs of ball joints are not simulated")
+                self.tree.leave_out("springs", f"{at}.stiffness", stiffness, "springs of ball joints are not simulated")
             if m.jnt_limited[index]:
                 self.tree.refuse(f"{at}.range", m.jnt_range[index].tolist(), "a ball joint has no limits here")
             joint = FileJoint(name, "free" if n_dofs == 6 else "spherical", np.array(m.jnt_pos[index]))
@@ -227,7 +247,8 @@ class _Reader:
         R, p = from_quaternion(m.geom_quat[geom]), np.array(m.geom_pos[geom])
         size = [float(x) for x in m.geom_size[geom]]
         collides = bool(m.geom_contype[geom] or m.geom_conaffinity[geom])
-        made = FileShape("mesh", (), p, R, collides, bool(m.geom_rgba[geom, 3] > 0.0))
+        name = self.mujoco.mj_id2name(m, self.mujoco.mjtObj.mjOBJ_GEOM, geom) or ""
+        made = FileShape("mesh", (), p, R, collides, bool(m.geom_rgba[geom, 3] > 0.0), name)
         match int(m.geom_type[geom]):
             case kinds.mjGEOM_BOX:
                 made.kind, made.size = "box", (2.0 * size[0], 2.0 * size[1], 2.0 * size[2])
@@ -242,9 +263,6 @@ class _Reader:
             case other:
                 made.kind = kinds(other).name.removeprefix("mjGEOM_").lower()
         return made
-
-    def _leave_out(self, kind: str, where: str, value: object, reason: str) -> None:
-        self.tree.leave_out(kind, where, value, reason, self.ignore)
 
     def _name(self, kind: Any, index: int) -> str:
         return self.mujoco.mj_id2name(self.model, kind, index) or str(index)

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 from xml.etree import ElementTree as ET
 
-import numpy as np
-
 from rover_gym.mechanics import RoverModel
-from rover_gym.models.file_axes import Array, quaternion, turn_z_to
-from rover_gym.models.file_writing import WHEEL_WIDTH, WrittenSolid, text_of, write_xml, written_solids
+from rover_gym.models.file_axes import Array, quaternion
+from rover_gym.models.file_writing import WrittenSolid, text_of, write_xml, written_solids
+from rover_gym.models.robot_tree import FileShape
 
 JOINTS = {"revolute": "hinge", "prismatic": "slide", "spherical": "ball"}
 
@@ -59,36 +58,26 @@ def _body(above: ET.Element, solid: WrittenSolid, wheel: dict[str, Any] | None) 
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = solid.inertia
     inertia = text_of((xx, yy, zz, xy, xz, yz))
     ET.SubElement(body, "inertial", pos=text_of(solid.centre), mass=text_of(solid.mass), fullinertia=inertia)
-    for shape, centre, R, collides, visible in solid.shapes():
-        if shape["kind"] != "disc" or wheel is None:
-            _add_geom(body, shape, centre, R, collides=collides, visible=visible)
-    if wheel is not None:
-        x, y, z = wheel["axle"]
-        radius = wheel.get("contact_radius") or wheel["radius"]
-        rim = {"kind": "cylinder", "radius": radius, "height": wheel.get("width") or WHEEL_WIDTH * radius}
-        axle = np.array([x, -z, y]) / np.linalg.norm((x, y, z))
-        _add_geom(body, rim, np.zeros(3), turn_z_to(axle), collides=True, visible=True)
+    for shape in solid.shapes(wheel):
+        _add_geom(body, shape)
     return body
 
 
-def _add_geom(
-    body: ET.Element, shape: dict[str, Any], centre: Array, R: Array, *, collides: bool, visible: bool
-) -> None:
-    if shape["kind"] == "disc":  # about our z, which is the file's -y
-        R = R @ turn_z_to(np.array([0.0, -1.0, 0.0]))
-    geom = {"pos": text_of(centre), "quat": _quaternion(R), "mass": "0"}
-    match shape["kind"]:
+def _add_geom(body: ET.Element, shape: FileShape) -> None:
+    geom = {"name": shape.name} if shape.name else {}
+    geom |= {"type": shape.kind, "pos": text_of(shape.position), "quat": _quaternion(shape.rotation), "mass": "0"}
+    match shape.kind:
         case "box":
-            x, y, z = shape["size"]
-            geom |= {"type": "box", "size": text_of((x / 2.0, z / 2.0, y / 2.0))}
-        case "sphere":
-            geom |= {"type": "sphere", "size": text_of(shape["radius"])}
+            x, y, z = shape.size
+            geom["size"] = text_of((x / 2.0, y / 2.0, z / 2.0))
+        case "cylinder":
+            radius, length = shape.size
+            geom["size"] = text_of((radius, length / 2.0))
         case _:
-            length = shape.get("height") or WHEEL_WIDTH * shape["radius"]
-            geom |= {"type": "cylinder", "size": text_of((shape["radius"], length / 2.0))}
-    if not collides:
+            geom["size"] = text_of(shape.size)
+    if not shape.collides:
         geom |= {"contype": "0", "conaffinity": "0"}
-    if not visible:
+    if not shape.visible:
         geom["rgba"] = "0 0 0 0"
     ET.SubElement(body, "geom", geom)
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Collection
-from pathlib import Path
 from typing import Any
 
 from rover_gym.mechanics import ModelError, RoverModel
-from rover_gym.models.description import Gains, describe
+from rover_gym.models.description import WheelOptions, describe
 from rover_gym.models.file_axes import axes_of
 from rover_gym.models.import_report import ImportReport, solid_rows, together
+from rover_gym.models.joint_conventions import move_limits_to_followed_joints, turn_steering_axes_up
 from rover_gym.models.massless_links import join_massless_links
 from rover_gym.models.mjcf import read_mjcf_tree
-from rover_gym.models.robot_tree import IGNORABLE, RobotTree, check_kinds
+from rover_gym.models.robot_tree import IGNORABLE, RobotTree, check_kinds, checked_path
 from rover_gym.models.roles import Steering, Wheels, find_wheels
 from rover_gym.models.urdf import read_urdf_tree
 from rover_gym.validation import number, refuse
@@ -44,10 +43,10 @@ def _read(
     steering_stiffness: float | None = None,
     steering_damping: float | None = None,
     steering_limit: float | None = None,
+    wheel_width: float | None = None,
     ignore: Collection[str] = (),
 ) -> tuple[RoverModel, ImportReport]:
-    if not isinstance(path, (str, os.PathLike)):
-        refuse(ModelError, "path", path, "must be a path")
+    place = checked_path(path)
     if free_base is not None and not isinstance(free_base, bool):
         refuse(ModelError, "free_base", free_base, "must be True or False")
     P = axes_of(forward)
@@ -57,14 +56,14 @@ def _read(
         "steering_stiffness": steering_stiffness,
         "steering_damping": steering_damping,
         "steering_limit": steering_limit,
+        "wheel_width": wheel_width,
     }
-    gains = Gains(
+    options = WheelOptions(
         **{
             name: None if value is None else number(name, value, at_least=0.0, error=ModelError)
             for name, value in given.items()
         }
     )
-    place = Path(os.fsdecode(path))
     tree = reader(place, ignore=ignored)
     join_massless_links(tree, free_base=bool(free_base))
     for link in tree.links.values():
@@ -73,7 +72,9 @@ def _read(
         elif link.parent is not None and link.joint.kind == "free":
             tree.refuse(f"joint[{link.joint.name}]", "floating", "only a root can float freely")
     roles = find_wheels(tree, P.T @ (0.0, 1.0, 0.0), P.T @ (1.0, 0.0, 0.0), wheels, steering)
-    description = describe(tree, roles, P, gains)
+    turn_steering_axes_up(tree, {role.steering for role in roles if role.steering}, P)
+    move_limits_to_followed_joints(tree)
+    description = describe(tree, roles, P, options)
     try:
         model = RoverModel.from_dict(description)
     except ModelError as error:

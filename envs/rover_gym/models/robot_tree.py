@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,8 +16,12 @@ from rover_gym.validation import refuse, shown
 
 #: Most links of a file: a model has at most 1000 solids, and links without mass are joined to others.
 MAX_LINKS = 2000
+#: Largest file, bytes.
+MAX_BYTES = 16 << 20
 #: What would change the motion if it were left out, and is therefore refused unless `ignore` names it.
 IGNORABLE = ("friction", "actuators", "closed loops", "tendons", "springs", "fluid")
+#: How the name of a cylinder ends that stands for a wheel without width.
+THIN_DISC = "thin_disc"
 
 
 @dataclass
@@ -30,6 +35,7 @@ class FileShape:
         rotation: From the shape's axes to the link's frame (3, 3). A cylinder is about its z.
         collides: Whether the file lets it touch others.
         visible: Whether the file draws it.
+        name: Its name in the file, or "".
         mesh: The mesh's file, or its vertices (n, 3) in the shape's axes, m.
         scale: Factors of the mesh's coordinates.
     """
@@ -40,6 +46,7 @@ class FileShape:
     rotation: Array
     collides: bool
     visible: bool
+    name: str = ""
     mesh: Path | Array | None = None
     scale: Array | None = None
 
@@ -54,6 +61,10 @@ class FileJoint:
         anchor: Its point in the link's frame (3,), m.
         axis: Unit axis in the link's frame (3,).
         limits: Stops, rad or m.
+        damping: Viscous damping, N m s/rad or N s/m.
+        armature: Inertia of its rotor, kg m² or kg.
+        stiffness: Of its spring, N m/rad or N/m.
+        rest: Coordinate at which its spring is relaxed, rad or m.
         follows: Name of the joint that it follows, ratio and offset.
         torque_limit: Largest torque that the file states, N m.
         hold: Gains of a position controller: stiffness and damping.
@@ -116,12 +127,15 @@ class RobotTree:
         path: The file.
         name: Name of the robot.
         links: By name.
-        notes: What was decided in reading, and what the file holds that is not simulated.
+        ignore: Kinds, of `IGNORABLE`, of what changes the motion and is left out all the same.
+        left_out: What the file holds and the model does not simulate.
+        assumed: What the file does not state and was chosen.
     """
 
     path: Path
     name: str
     links: dict[str, FileLink]
+    ignore: Collection[str] = ()
     left_out: list[str] = field(default_factory=list)
     assumed: list[str] = field(default_factory=list)
 
@@ -129,9 +143,9 @@ class RobotTree:
         """Raises a `ModelError` that names the file, the element and the value."""
         refuse_in(self.path, where, value, reason)
 
-    def leave_out(self, kind: str, where: str, value: object, reason: str, ignore: Collection[str]) -> None:
+    def leave_out(self, kind: str, where: str, value: object, reason: str) -> None:
         """Lists what changes the motion if `ignore` names its kind, and refuses it otherwise."""
-        if kind not in ignore:
+        if kind not in self.ignore:
             self.refuse(where, value, f'{reason}; ignore=["{kind}"] leaves it out')
         self.left_out.append(f"{where}: {reason} (left out as told)")
 
@@ -166,6 +180,29 @@ def refuse_in(path: Path, where: str, value: object, reason: str) -> NoReturn:
     error.field = where
     error.value = value
     raise error
+
+
+def checked_path(path: object) -> Path:
+    """The path that a user gave.
+
+    Raises:
+        ModelError: It is no path.
+    """
+    if not isinstance(path, (str, os.PathLike)):
+        refuse(ModelError, "path", path, "must be a path")
+    return Path(os.fsdecode(path))
+
+
+def check_size(path: Path) -> None:
+    """Refuses a file of more than `MAX_BYTES` before it is read.
+
+    Raises:
+        ModelError: The file is too large.
+        OSError: There is no such file.
+    """
+    size = path.stat().st_size
+    if size > MAX_BYTES:
+        refuse_in(path, "file", size, f"must have at most {MAX_BYTES} bytes")
 
 
 def is_urdf(path: Path) -> bool:

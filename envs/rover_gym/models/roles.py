@@ -18,7 +18,7 @@ import numpy as np
 from rover_gym.extras import MissingExtraError, require
 from rover_gym.mechanics import ModelError
 from rover_gym.models.file_axes import Array
-from rover_gym.models.robot_tree import FileLink, FileShape, RobotTree
+from rover_gym.models.robot_tree import THIN_DISC, FileLink, FileShape, RobotTree
 from rover_gym.validation import number, refuse
 
 NAMED = re.compile(r"wheel|tyre|tire", re.IGNORECASE)
@@ -47,6 +47,7 @@ class WheelRole:
         radius: Radius, m.
         shift: Of its centre from the joint's origin along the axis, m.
         is_forward: Whether a positive joint velocity drives it forward.
+        width: Width, m; 0 for a thin disc.
         steering: The link whose joint steers it.
         is_caster: Whether it runs freely.
     """
@@ -55,6 +56,7 @@ class WheelRole:
     radius: float
     shift: float
     is_forward: bool
+    width: float = 0.0
     steering: str | None = None
     is_caster: bool = False
 
@@ -84,7 +86,7 @@ def find_wheels(tree: RobotTree, up: Array, ahead: Array, wheels: Wheels, steeri
         if link.joint.kind != "revolute":
             tree.refuse(f"link[{name}].joint", link.joint.kind, "the joint of a wheel must be revolute")
         measured, shift = _size(tree, link, radius)
-        found.append(WheelRole(name, measured, shift, bool(axis(link) @ left > 0.0)))
+        found.append(WheelRole(name, measured, shift, bool(axis(link) @ left > 0.0), _width(link)))
     names = [wheel.link for wheel in found]
     steers = _steering(tree, names, steering, {name: abs(float(axis(link) @ up)) for name, link in tree.links.items()})
     for wheel in found:
@@ -111,6 +113,7 @@ def resolve(tree: RobotTree, field: str, name: object) -> str:
 def _chosen(
     tree: RobotTree, poses: dict[str, tuple[Array, Array]], up: Array, wheels: Wheels
 ) -> dict[str, float | None]:
+    """The wheels' links and the radii that are given for them, m."""
     if isinstance(wheels, str):
         refuse(ModelError, "wheels", wheels, "must be names, or radii by name")
     if isinstance(wheels, Mapping):
@@ -122,6 +125,11 @@ def _chosen(
         if not isinstance(wheels, Iterable):
             refuse(ModelError, "wheels", wheels, "must be names, or radii by name")
         return {resolve(tree, "wheels", name): None for name in wheels}
+    return dict.fromkeys(_found(tree, poses, up))
+
+
+def _found(tree: RobotTree, poses: dict[str, tuple[Array, Array]], up: Array) -> list[str]:
+    """The links that are wheels by their names, or by their shapes where no name says so."""
     carriers = _moving_carriers(tree)
     candidates = [
         link
@@ -134,13 +142,19 @@ def _chosen(
     ]
     named = [one for one in candidates if NAMED.search(f"{one.name} {one.joint.name}")]
     named = [one for one in named if not NOT_NAMED.search(one.name)] or named
-    round_ones = {one.name: size for one in candidates if (size := _round_shape(one)) is not None}
+    # What carries a link that is fixed to it, such as a motor with its leg, is a wheel only if its name says so.
+    round_ones = {
+        one.name: shape.size[0]
+        for one in candidates
+        if (one in named or not tree.children(one.name)) and (shape := _round_shape(one)) is not None
+    }
     chosen = [one.name for one in named] or list(round_ones)
+    _refuse_fixed_wheels(tree, candidates, chosen)
     doubtful = [name for name in round_ones if name not in chosen]
-    lowest = {name: float(up @ poses[name][1]) - size[0] for name, size in round_ones.items()}
+    lowest = {name: float(up @ poses[name][1]) - radius for name, radius in round_ones.items()}
     floor = min((lowest[name] for name in chosen if name in lowest), default=None)
     if floor is not None:
-        doubtful = [name for name in doubtful if lowest[name] < floor + LEVEL * round_ones[name][0]]
+        doubtful = [name for name in doubtful if lowest[name] < floor + LEVEL * round_ones[name]]
         if doubtful:
             refuse(
                 ModelError,
@@ -148,7 +162,17 @@ def _chosen(
                 None,
                 f"{', '.join(doubtful)} may be wheels of {tree.path} like {', '.join(chosen)}: say which are",
             )
-    return dict.fromkeys(chosen)
+    return chosen
+
+
+def _refuse_fixed_wheels(tree: RobotTree, candidates: list[FileLink], chosen: list[str]) -> None:
+    """Refuses a wheel by its name that is fixed to a link that turns: only that link can be the wheel."""
+    for carrier in candidates:
+        for link in tree.children(carrier.name) if carrier.name not in chosen else ():
+            is_round = any(shape.collides and shape.kind in ("cylinder", "sphere") for shape in link.shapes)
+            if is_round and NAMED.search(link.name) and not NOT_NAMED.search(link.name):
+                reason = f"this wheel is fixed to {carrier.name}, which turns: join the two links in the file"
+                tree.refuse(f"link[{link.name}].joint", link.joint.kind, f"{reason}, or say which links are wheels")
 
 
 def _moving_carriers(tree: RobotTree) -> set[str]:
@@ -162,9 +186,9 @@ def _moving_carriers(tree: RobotTree) -> set[str]:
 
 def _size(tree: RobotTree, link: FileLink, radius: float | None) -> tuple[float, float]:
     """Radius of a wheel and shift of its centre along the axis, m."""
-    size = _round_shape(link)
-    if size is not None:
-        return (size[0] if radius is None else radius), size[1]
+    shape = _round_shape(link)
+    if shape is not None:
+        return (shape.size[0] if radius is None else radius), _along(link, shape)
     meshes = [shape for shape in link.shapes if shape.mesh is not None]
     reason = "has no cylinder or sphere about its axis"
     if meshes:
@@ -178,23 +202,35 @@ def _size(tree: RobotTree, link: FileLink, radius: float | None) -> tuple[float,
     return radius, 0.0
 
 
-def _round_shape(link: FileLink) -> tuple[float, float] | None:
-    """Radius of the largest cylinder, disc or sphere about a link's axis, and its place along the axis, m."""
-    best: tuple[float, float] | None = None
+def _round_shape(link: FileLink) -> FileShape | None:
+    """The largest cylinder or sphere about a link's axis, of those that touch if there are any."""
+    best: FileShape | None = None
     for shape in sorted(link.shapes, key=lambda shape: not shape.collides):
         if shape.kind not in ("cylinder", "sphere") or (best is not None and not shape.collides):
             continue
-        off = shape.position - link.joint.anchor
-        along = float(off @ link.joint.axis)
-        radius = shape.size[0]
+        off = shape.position - link.joint.anchor - _along(link, shape) * link.joint.axis
         is_coaxial = shape.kind == "sphere" or abs(float(shape.rotation[:, 2] @ link.joint.axis)) > 1.0 - 1e-6
-        is_centred = np.linalg.norm(off - along * link.joint.axis) <= ECCENTRIC * radius
-        if is_coaxial and is_centred and (best is None or radius > best[0]):
-            best = (radius, along)
+        is_centred = np.linalg.norm(off) <= ECCENTRIC * shape.size[0]
+        if is_coaxial and is_centred and (best is None or shape.size[0] > best.size[0]):
+            best = shape
     return best
 
 
+def _along(link: FileLink, shape: FileShape) -> float:
+    """Place of a shape along its link's axis, m."""
+    return float((shape.position - link.joint.anchor) @ link.joint.axis)
+
+
+def _width(link: FileLink) -> float:
+    """Width of the cylinder that touches for a wheel, m; 0 where it stands for a thin disc or there is none."""
+    shape = _round_shape(link)
+    if shape is None or shape.kind != "cylinder" or not shape.collides or shape.name.endswith(THIN_DISC):
+        return 0.0
+    return shape.size[1]
+
+
 def _mesh_size(link: FileLink, meshes: list[FileShape]) -> tuple[tuple[float, float] | None, str]:
+    """Radius and shift of a wheel, m, from the vertices of its mesh; or None, and what the wheel is instead."""
     for shape in sorted(meshes, key=lambda shape: not shape.collides):
         points: Array
         if isinstance(shape.mesh, np.ndarray):

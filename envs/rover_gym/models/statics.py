@@ -16,15 +16,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rover_gym.mechanics import ModelError, Plane, RoverModel, Simulation
-from rover_gym.models.file_axes import rotation_matrix
+from rover_gym.models.file_axes import Array, rotation_matrix
 from rover_gym.validation import number, refuse
-
-Array = npt.NDArray[np.float64]
 
 #: The rover has settled when nothing moves faster than this, m/s and rad/s.
 AT_REST = 1e-7
@@ -174,9 +173,10 @@ def _clearance(model: RoverModel, sim: Simulation) -> float:
     return lowest
 
 
-def _lowest(shape: dict[str, object], origin: Array, rotation: Array) -> float:
+def _lowest(shape: dict[str, Any], origin: Array, rotation: Array) -> float:
+    """Height of the lowest point of a box or sphere of a solid at a pose, m."""
     centre = origin + rotation @ np.array(shape.get("position") or (0.0, 0.0, 0.0))
     if shape["kind"] == "sphere":
-        return float(centre[1]) - float(str(shape["radius"]))
+        return float(centre[1] - shape["radius"])
     turn = rotation @ rotation_matrix(np.array(shape.get("rotation") or (0.0, 0.0, 0.0)))
     return float(centre[1] - np.abs(turn[1]) @ np.array(shape["size"]) / 2.0)

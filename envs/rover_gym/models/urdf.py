@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections import Counter
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any
@@ -30,10 +31,10 @@ def read_urdf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
         OSError: The file cannot be read.
     """
     parser = require("yourdfpy", "models")
-    root, others = parse(path)
+    checked = parse(path)
     etree = require("lxml.etree", "models")
     # Parsed anew from the checked tree. What cannot be read strictly must not get there: yourdfpy would skip it.
-    text = etree.tostring(root)
+    text = etree.tostring(checked.root)
     try:
         etree.fromstring(text)
         robot = parser.URDF.load(
@@ -41,17 +42,17 @@ def read_urdf_tree(path: Path, *, ignore: Collection[str]) -> RobotTree:
         ).robot
     except Exception as error:  # what yourdfpy raises has no common class
         refuse_in(path, "robot", path.name, f"cannot be read ({type(error).__name__}: {error})")
-    tree = RobotTree(path, robot.name or path.stem, {}, left_out=others)
+    tree = RobotTree(path, robot.name or path.stem, {}, ignore, checked.left_out(), checked.assumed)
     _check_names(path, robot)
-    for element in root.findall("gazebo"):
+    for element in checked.root.findall("gazebo"):
         if any("joint" in str(one.tag) for one in element.iter()):
-            tree.leave_out("closed loops", "gazebo", element.get("reference"), "closes a loop by a joint", ignore)
+            tree.leave_out("closed loops", "gazebo", element.get("reference"), "closes a loop by a joint")
     carriers = {joint.child: joint for joint in robot.joints}
     links = {link.name: link for link in robot.links}
     driven = {joint.name for transmission in robot.transmission for joint in transmission.joints}
     for name in _parents_first(path, links, carriers):
         carrier = carriers.get(name)
-        joint = _joint(tree, carrier, ignore) if carrier is not None else FileJoint(name, "fixed")
+        joint = _joint(tree, carrier) if carrier is not None else FileJoint(name, "fixed")
         joint.is_driven = joint.name in driven and carrier is not None
         R, p = _pose(carrier.origin if carrier is not None else None)
         link = FileLink(name, None if carrier is None else carrier.parent, joint, p, R)
@@ -71,9 +72,9 @@ def _check_names(path: Path, robot: Any) -> None:
     names = [link.name for link in robot.links]
     joints = [joint.name for joint in robot.joints]
     for kind, given in (("link", names), ("joint", joints)):
-        twice = next((name for name in given if given.count(name) > 1), None) if len(set(given)) < len(given) else None
-        if twice is not None:
-            refuse_in(path, f"{kind}[{twice}].name", twice, "is used twice")
+        for name, count in Counter(given).items():
+            if count > 1:
+                refuse_in(path, f"{kind}[{name}].name", name, "is used twice")
     known, carried = set(names), set()
     for joint in robot.joints:
         for field in ("parent", "child"):
@@ -108,7 +109,7 @@ def _pose(origin: Array | None) -> tuple[Array, Array]:
     return (np.eye(3), np.zeros(3)) if origin is None else (np.array(origin[:3, :3]), np.array(origin[:3, 3]))
 
 
-def _joint(tree: RobotTree, source: Any, ignore: Collection[str]) -> FileJoint:
+def _joint(tree: RobotTree, source: Any) -> FileJoint:
     at = f"joint[{source.name}]"
     if source.type == "floating":
         return FileJoint(source.name, "free")
@@ -135,7 +136,7 @@ def _joint(tree: RobotTree, source: Any, ignore: Collection[str]) -> FileJoint:
         joint.damping = float(source.dynamics.damping or 0.0)
         friction = float(source.dynamics.friction or 0.0)
         if friction != 0.0:
-            tree.leave_out("friction", f"{at}.dynamics.friction", friction, "dry friction is not simulated", ignore)
+            tree.leave_out("friction", f"{at}.dynamics.friction", friction, "dry friction is not simulated")
     if source.mimic is not None:
         ratio, offset = source.mimic.multiplier, source.mimic.offset
         joint.follows = (source.mimic.joint, 1.0 if ratio is None else ratio, offset or 0.0)
@@ -155,7 +156,7 @@ def _add_body(path: Path, source: Any, link: FileLink) -> None:
 def _shape(path: Path, source: Any, *, collides: bool) -> FileShape:
     R, p = _pose(source.origin)
     geometry = source.geometry
-    made = FileShape("mesh", (), p, R, collides, not collides)
+    made = FileShape("mesh", (), p, R, collides, not collides, source.name or "")
     if geometry.box is not None:
         made.kind, made.size = "box", tuple(float(s) for s in geometry.box.size)
     elif geometry.cylinder is not None:

@@ -7,15 +7,19 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from rover_gym.extras import require
-from rover_gym.models.robot_tree import MAX_LINKS, refuse_in
+from rover_gym.models.robot_tree import MAX_LINKS, check_size, refuse_in
 
-#: Largest file, bytes, and largest number of elements.
-MAX_BYTES, MAX_ELEMENTS = 16 << 20, 200_000
+#: Largest number of elements.
+MAX_ELEMENTS = 200_000
 
+#: A substitution of ROS: its kind and its arguments.
+SUBSTITUTION = re.compile(r"\$\((\w+)\s+([^()]*)\)")
 #: A declaration of no version of XML, which some exporters write.
 UNVERSIONED = re.compile(rb'^<\?xml version="0\.0"[^>\n]*\?>')
 
@@ -62,11 +66,29 @@ REQUIRED = {
 }
 
 
-def parse(path: Path) -> tuple[Any, list[str]]:
-    """Reads and checks a file.
+@dataclass
+class CheckedUrdf:
+    """A URDF whose elements and attributes are what they must be.
 
-    Returns:
-        The root element without what no URDF holds, and a list of that.
+    Attributes:
+        path: The file.
+        root: Its root element, without what no URDF holds.
+        others: What no URDF holds, and how often.
+        assumed: What stands for something that the file does not state.
+    """
+
+    path: Path
+    root: Any
+    others: Counter[str] = field(default_factory=Counter)
+    assumed: list[str] = field(default_factory=list)
+
+    def left_out(self) -> list[str]:
+        """What no URDF holds, with the number of times."""
+        return [f"{what}, {count} times" if count > 1 else what for what, count in self.others.items()]
+
+
+def parse(path: Path) -> CheckedUrdf:
+    """Reads and checks a file.
 
     Raises:
         ModelError: The file is no URDF; the message names file, line, element and value.
@@ -74,9 +96,7 @@ def parse(path: Path) -> tuple[Any, list[str]]:
         OSError: The file cannot be read.
     """
     etree = require("lxml.etree", "models")
-    size = path.stat().st_size
-    if size > MAX_BYTES:
-        refuse_in(path, "file", size, f"must have at most {MAX_BYTES} bytes")
+    check_size(path)
     data = UNVERSIONED.sub(b"", path.read_bytes())
     try:
         root = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True))
@@ -94,57 +114,83 @@ def parse(path: Path) -> tuple[Any, list[str]]:
     n_links = len(root.findall("link"))
     if n_links > MAX_LINKS:
         refuse_in(path, "robot", n_links, f"must have at most {MAX_LINKS} links")
-    others: dict[str, int] = {}
-    _check(path, root, "robot", "robot", others)
-    return root, [f"{what}, {count} times" if count > 1 else what for what, count in others.items()]
+    checked = CheckedUrdf(path, root)
+    _check(checked, root, "robot", "robot")
+    return checked
 
 
-def _check(path: Path, element: Any, key: str, where: str, others: dict[str, int]) -> None:
-    spec = ATTRIBUTES[key]
-    known = {name.rstrip("!"): kind for name, kind in spec.items()}
+def _check(checked: CheckedUrdf, element: Any, key: str, where: str) -> None:
+    """Checks an element and what it holds. `key` is its entry in `ATTRIBUTES`, `where` its place in the file."""
+    path, line = checked.path, f"line {element.sourceline}"
+    spec = {name.rstrip("!"): kind for name, kind in ATTRIBUTES[key].items()}
     for name in element.attrib:
-        if name not in known:
-            others[f"attribute {name} of <{element.tag}>"] = others.get(f"attribute {name} of <{element.tag}>", 0) + 1
+        if name not in spec:
+            checked.others[f"attribute {name} of <{element.tag}>"] += 1
     for name, kind in spec.items():
-        value = element.get(name.rstrip("!"))
-        at = f"line {element.sourceline}, {where}.{name.rstrip('!')}"
+        at = f"{line}, {where}.{name}"
+        value = element.get(name)
         if value is None:
-            if name.endswith("!"):
+            if f"{name}!" in ATTRIBUTES[key]:
                 refuse_in(path, at, None, "is missing")
-        elif kind is str:
-            if not value.strip():
-                refuse_in(path, at, value, "must not be empty")
-        else:
+            continue
+        if "$" in value:
+            value = _without_substitutions(checked, at, value)
+            element.set(name, value)
+        if kind is not str:
             _check_numbers(path, at, value, kind)
-    seen: dict[str, int] = {}
+        elif not value.strip():
+            refuse_in(path, at, value, "must not be empty")
+    seen: Counter[str] = Counter()
     for child in list(element):
         if not isinstance(child.tag, str):  # a processing instruction
             element.remove(child)
             continue
-        seen[child.tag] = seen.get(child.tag, 0) + 1
+        seen[child.tag] += 1
         at = f"{where}.{child.tag}"
         if child.tag in ONCE and seen[child.tag] > 1:
             refuse_in(path, f"line {child.sourceline}, {at}", child.tag, "is there twice")
         below = f"{element.tag}/{child.tag}"
         if below in ATTRIBUTES:
             name = child.get("name")
-            _check(path, child, below, f"{child.tag}[{name}]" if name else at, others)
-        else:
-            if child.tag not in APPEARANCE and element.tag != "transmission":
-                others[f"<{child.tag}> of <{element.tag}>"] = others.get(f"<{child.tag}> of <{element.tag}>", 0) + 1
-            if child.tag != "gazebo":  # the reader looks into it for loops
-                element.remove(child)
+            _check(checked, child, below, f"{child.tag}[{name}]" if name else at)
+            continue
+        if child.tag not in APPEARANCE and element.tag != "transmission":
+            checked.others[f"<{child.tag}> of <{element.tag}>"] += 1
+        if child.tag != "gazebo":  # the reader looks into it for loops
+            element.remove(child)
     for name in REQUIRED.get(element.tag, ()) if key != "transmission/joint" else ():
         if name not in seen:
-            refuse_in(path, f"line {element.sourceline}, {where}.{name}", None, "is missing")
-    if element.tag == "geometry" and sum(seen.get(shape, 0) for shape in SHAPES) != 1:
-        refuse_in(path, f"line {element.sourceline}, {where}", sorted(seen), f"must hold one of {', '.join(SHAPES)}")
+            refuse_in(path, f"{line}, {where}.{name}", None, "is missing")
+    if element.tag == "geometry" and sum(seen[shape] for shape in SHAPES) != 1:
+        refuse_in(path, f"{line}, {where}", sorted(seen), f"must hold one of {', '.join(SHAPES)}")
+
+
+def _without_substitutions(checked: CheckedUrdf, where: str, text: str) -> str:
+    """A value whose substitutions of ROS are made: `$(optenv NAME default)` by its default, `$(find package)` by a URI.
+
+    The environment is not read, so that a file means the same everywhere.
+    """
+
+    def value(match: re.Match[str]) -> str:
+        kind, argument = match[1], match[2].strip()
+        if kind == "find":
+            return f"package://{argument}"
+        name, _, default = argument.partition(" ")
+        if kind == "optenv" and default.strip():
+            checked.assumed.append(f"{where}: {default.strip()!r}, the default of {name}")
+            return default.strip()
+        return match[0]
+
+    made = SUBSTITUTION.sub(value, text)
+    if "$(" in made or "${" in made:
+        refuse_in(checked.path, where, text, "holds what xacro or roslaunch replaces by a value: put the value there")
+    return made
 
 
 def _check_numbers(path: Path, where: str, text: str, count: int | tuple[int, ...]) -> None:
     counts = (count,) if isinstance(count, int) else count
     parts = text.split()
-    wanted = " or ".join("a number" if n == 1 else f"{n} numbers" for n in counts)
+    wanted = " or ".join("a number" if n == 1 else f"{n} numbers with spaces between them" for n in counts)
     try:
         values = [float(part) for part in parts]
     except ValueError:

@@ -6,16 +6,14 @@ from collections.abc import Collection
 from typing import Any
 from xml.etree import ElementTree as ET
 
-import numpy as np
-
 from rover_gym.mechanics import RoverModel
-from rover_gym.models.file_axes import Array, roll_pitch_yaw, turn_z_to
-from rover_gym.models.file_writing import WHEEL_WIDTH, WrittenSolid, text_of, write_xml, written_solids
-from rover_gym.models.robot_tree import check_kinds
+from rover_gym.models.file_axes import roll_pitch_yaw
+from rover_gym.models.file_writing import WrittenSolid, text_of, write_xml, written_solids
+from rover_gym.models.robot_tree import FileShape, check_kinds
 
 #: What URDF cannot express and `ignore` may name.
 IGNORABLE = ("springs", "armature")
-FAST = 1e3  # rad/s, the velocity limit where there is no motor: URDF wants one
+FAST = 1e3  # rad/s, the velocity limit of a joint whose speed no motor limits: URDF wants one
 WORLD = "world"
 
 
@@ -70,35 +68,26 @@ def _link(solid: WrittenSolid, wheel: dict[str, Any] | None) -> ET.Element:
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = solid.inertia
     entries = {"ixx": xx, "iyy": yy, "izz": zz, "ixy": xy, "ixz": xz, "iyz": yz}
     ET.SubElement(inertial, "inertia", {name: text_of(float(value)) for name, value in entries.items()})
-    for shape, centre, R, collides, visible in solid.shapes():
-        if visible or shape["kind"] == "disc":
-            _add_shape(link, "visual", shape, centre, R)
-        if collides:
-            _add_shape(link, "collision", shape, centre, R)
-    if wheel is not None:
-        x, y, z = wheel["axle"]
-        radius = wheel.get("contact_radius") or wheel["radius"]
-        rim = {"kind": "cylinder", "radius": radius, "height": wheel.get("width") or WHEEL_WIDTH * radius}
-        axle = np.array([x, -z, y]) / np.linalg.norm((x, y, z))
-        _add_shape(link, "collision", rim, np.zeros(3), turn_z_to(axle))
+    for shape in solid.shapes(wheel):
+        if shape.visible:
+            _add_shape(link, "visual", shape)
+        if shape.collides:
+            _add_shape(link, "collision", shape)
     return link
 
 
-def _add_shape(link: ET.Element, role: str, shape: dict[str, Any], centre: Array, R: Array) -> None:
-    element = ET.SubElement(link, role)
-    if shape["kind"] == "disc":  # about our z, which is the file's -y
-        R = R @ turn_z_to(np.array([0.0, -1.0, 0.0]))
-    ET.SubElement(element, "origin", xyz=text_of(centre), rpy=text_of(roll_pitch_yaw(R)))
+def _add_shape(link: ET.Element, role: str, shape: FileShape) -> None:
+    element = ET.SubElement(link, role, {"name": shape.name} if shape.name else {})
+    ET.SubElement(element, "origin", xyz=text_of(shape.position), rpy=text_of(roll_pitch_yaw(shape.rotation)))
     geometry = ET.SubElement(element, "geometry")
-    match shape["kind"]:
+    match shape.kind:
         case "box":
-            x, y, z = shape["size"]
-            ET.SubElement(geometry, "box", size=text_of((x, z, y)))
+            ET.SubElement(geometry, "box", size=text_of(shape.size))
         case "sphere":
-            ET.SubElement(geometry, "sphere", radius=text_of(shape["radius"]))
+            ET.SubElement(geometry, "sphere", radius=text_of(shape.size))
         case _:
-            length = shape.get("height") or WHEEL_WIDTH * shape["radius"]
-            ET.SubElement(geometry, "cylinder", radius=text_of(shape["radius"]), length=text_of(length))
+            radius, length = shape.size
+            ET.SubElement(geometry, "cylinder", radius=text_of(radius), length=text_of(length))
 
 
 def _joint(solid: WrittenSolid, wheel: dict[str, Any] | None, drive: float | None) -> ET.Element:
@@ -119,7 +108,7 @@ def _joint(solid: WrittenSolid, wheel: dict[str, Any] | None, drive: float | Non
     ET.SubElement(joint, "axis", xyz=text_of(solid.axis))
     motor = (wheel or {}).get("motor") or {}
     effort = wheel["torque_limit"] if wheel is not None else (drive or 0.0)
-    limit = {"effort": text_of(effort), "velocity": text_of(motor.get("no_load_speed", FAST))}
+    limit = {"effort": text_of(effort), "velocity": text_of(motor.get("no_load_speed") or FAST)}
     if limits is not None:
         limit |= {"lower": text_of(limits["lower"]), "upper": text_of(limits["upper"])}
     ET.SubElement(joint, "limit", limit)

@@ -330,6 +330,8 @@ impl RoverModel {
     ///     steering_stiffness: Stiffness of every steering controller, N m/rad.
     ///     steering_damping: Damping of every steering controller, N m s/rad.
     ///     steering_limit: Largest steering set-point, rad; by default the joint's stop.
+    ///     wheel_width: Width of every wheel, m, 0 for thin discs, which cost less to simulate; by
+    ///         default that of the cylinder that touches for it in the file, or 0.
     ///     ignore: Kinds of what changes the motion and is left out all the same: "friction",
     ///         "actuators", "closed loops", "tendons", "springs", "fluid".
     ///
@@ -344,9 +346,10 @@ impl RoverModel {
     #[staticmethod]
     #[pyo3(signature = (path, *, wheels = Given::MISSING, steering = Given::MISSING, free_base = Given::MISSING,
         forward = Given::MISSING, torque_limit = Given::MISSING, steering_stiffness = Given::MISSING,
-        steering_damping = Given::MISSING, steering_limit = Given::MISSING, ignore = Given::MISSING),
+        steering_damping = Given::MISSING, steering_limit = Given::MISSING,
+        wheel_width = Given::MISSING, ignore = Given::MISSING),
         text_signature = "(path, *, wheels=None, steering=None, free_base=True, forward=\"x\", torque_limit=None, \
-        steering_stiffness=None, steering_damping=None, steering_limit=None, ignore=())")]
+        steering_stiffness=None, steering_damping=None, steering_limit=None, wheel_width=None, ignore=())")]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python method
     fn from_urdf<'py>(
         path: &Bound<'py, PyAny>,
@@ -358,6 +361,7 @@ impl RoverModel {
         steering_stiffness: Given<'py>,
         steering_damping: Given<'py>,
         steering_limit: Given<'py>,
+        wheel_width: Given<'py>,
         ignore: Given<'py>,
     ) -> PyResult<Self> {
         let options = vec![
@@ -369,6 +373,7 @@ impl RoverModel {
             ("steering_stiffness", steering_stiffness),
             ("steering_damping", steering_damping),
             ("steering_limit", steering_limit),
+            ("wheel_width", wheel_width),
             ("ignore", ignore),
         ];
         model_files::read("read_urdf", path, options)
@@ -391,6 +396,8 @@ impl RoverModel {
     ///     steering_stiffness: Stiffness of every steering controller, N m/rad.
     ///     steering_damping: Damping of every steering controller, N m s/rad.
     ///     steering_limit: Largest steering set-point, rad; by default the joint's stop.
+    ///     wheel_width: Width of every wheel, m, 0 for thin discs, which cost less to simulate; by
+    ///         default that of the cylinder that touches for it in the file, or 0.
     ///     ignore: Kinds of what changes the motion and is left out all the same: "friction",
     ///         "actuators", "closed loops", "tendons", "springs", "fluid".
     ///
@@ -405,9 +412,10 @@ impl RoverModel {
     #[staticmethod]
     #[pyo3(signature = (path, *, wheels = Given::MISSING, steering = Given::MISSING, free_base = Given::MISSING,
         forward = Given::MISSING, torque_limit = Given::MISSING, steering_stiffness = Given::MISSING,
-        steering_damping = Given::MISSING, steering_limit = Given::MISSING, ignore = Given::MISSING),
+        steering_damping = Given::MISSING, steering_limit = Given::MISSING,
+        wheel_width = Given::MISSING, ignore = Given::MISSING),
         text_signature = "(path, *, wheels=None, steering=None, free_base=None, forward=\"x\", torque_limit=None, \
-        steering_stiffness=None, steering_damping=None, steering_limit=None, ignore=())")]
+        steering_stiffness=None, steering_damping=None, steering_limit=None, wheel_width=None, ignore=())")]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python method
     fn from_mjcf<'py>(
         path: &Bound<'py, PyAny>,
@@ -419,6 +427,7 @@ impl RoverModel {
         steering_stiffness: Given<'py>,
         steering_damping: Given<'py>,
         steering_limit: Given<'py>,
+        wheel_width: Given<'py>,
         ignore: Given<'py>,
     ) -> PyResult<Self> {
         let options = vec![
@@ -430,6 +439,7 @@ impl RoverModel {
             ("steering_stiffness", steering_stiffness),
             ("steering_damping", steering_damping),
             ("steering_limit", steering_limit),
+            ("wheel_width", wheel_width),
             ("ignore", ignore),
         ];
         model_files::read("read_mjcf", path, options)
@@ -446,7 +456,7 @@ impl RoverModel {
 
     /// Writes a URDF file, for other programs: x forward, y left, z up.
     ///
-    /// Wheels are written as cylinders, a tenth of their radius wide.
+    /// Wheels are written as cylinders; a thin disc is a tenth of its radius wide and named so.
     ///
     /// Args:
     ///     path: Path of the file.
@@ -464,9 +474,9 @@ impl RoverModel {
 
     /// Writes an MJCF file, for MuJoCo: x forward, y left, z up.
     ///
-    /// Wheels are written as cylinders, a tenth of their radius wide, their drives as motors, held
-    /// steering as position servos, and coupled joints as equality constraints, which MuJoCo
-    /// satisfies approximately.
+    /// Wheels are written as cylinders, of which a thin disc is a tenth of its radius wide and named
+    /// so, their drives as motors, held steering as position servos, and coupled joints as equality
+    /// constraints, which MuJoCo satisfies approximately.
     ///
     /// Args:
     ///     path: Path of the file.
