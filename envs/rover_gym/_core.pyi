@@ -358,9 +358,9 @@ class RoverModel:
     def to_mjcf(self, path: str | Any) -> None:
         """Writes an MJCF file, for MuJoCo: x forward, y left, z up.
 
-        Wheels are written as cylinders, of which a thin disc is a tenth of its radius wide and named
-        so, their drives as motors, held steering as position servos, and coupled joints as equality
-        constraints, which MuJoCo satisfies approximately.
+        Wheels are written as cylinders, of which a thin disc is a tenth of its radius wide and
+        named so, their drives as motors, held steering as position servos, and coupled joints as
+        equality constraints, which MuJoCo satisfies approximately.
 
         Args:
             path: Path of the file.
@@ -733,12 +733,13 @@ class SphereField:
         cls, centres: npt.ArrayLike, radii: npt.ArrayLike, ground: Plane | None = None, material: str = "rock"
     ) -> SphereField: ...
     @staticmethod
-    def from_file(path: str | PathLike[str], ground: Plane | None = None) -> SphereField:
+    def from_file(path: str | PathLike[str], ground: Plane | None = None, material: str = "rock") -> SphereField:
         """Reads spheres from a CSV file with the header `x,y,z,radius`, in m.
 
         Args:
             path: Path of the file.
             ground: The plane under the spheres; none by default.
+            material: Name of the spheres' material.
 
         Returns:
             The field.
@@ -766,6 +767,7 @@ class SphereField:
         burial: float | tuple[float, float] | None = None,
         ground: _Terrain | _Terrains | None = None,
         clear: npt.ArrayLike | None = None,
+        material: str = "rock",
     ) -> SphereField:
         """Rocks on a plane, with the size-frequency distribution of rocks on Mars.
 
@@ -782,6 +784,7 @@ class SphereField:
                 the field. Rocks on any other terrain are raised by its height, and the terrain is
                 not part of the field: combine them as `Union([terrain, rocks])`.
             clear: Circles x, z, radius that no rock reaches into, (n, 3), m; none by default.
+            material: Name of the rocks' material.
 
         Returns:
             The field.

@@ -105,6 +105,7 @@ def test_terrains_name_their_material() -> None:
         HeightField(heights, 1.0, material="sand"),
         TriangleMesh(corners, triangle, material="sand"),
         SphereField([[0, 0, 0]], [1.0], material="sand"),
+        SphereField.rocks(0.1, [0, 0, 5, 5], 1, material="sand"),
         HeightField.fractal(4.0, 0.5, 0.1, material="sand"),
     )
     for terrain in given:

@@ -67,6 +67,23 @@ pub fn vector(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<Vec
     Ok(view.iter().copied().collect())
 }
 
+/// One number for both, or two.
+pub fn one_or_two(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<[f64; 2]> {
+    if value.len().is_err() {
+        return Ok([number(value, kind, field)?; 2]);
+    }
+    let values = vector(value, kind, field)?;
+    let wrong = || refused(value, kind, field, "one number or two");
+    Ok(<[f64; 2]>::try_from(values).map_err(|_| wrong())?)
+}
+
+/// Two numbers.
+pub fn two(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<[f64; 2]> {
+    let values = vector(value, kind, field)?;
+    let wrong = || refused(value, kind, field, "two numbers");
+    Ok(<[f64; 2]>::try_from(values).map_err(|_| wrong())?)
+}
+
 /// Three numbers.
 pub fn triple(value: &Bound<'_, PyAny>, kind: Kind, field: &str) -> PyResult<[f64; 3]> {
     let values = vector(value, kind, field)?;

@@ -11,7 +11,7 @@ use rover_core::episode::{Beginning, EpisodeBatch, EpisodeDistribution as CoreDi
 use rover_core::simulation::RoverSimulation;
 
 use crate::arguments::{Given, count, number, refused};
-use crate::arrays::{fresh_table, vector};
+use crate::arrays::{fresh_table, two, vector};
 use crate::episode::{self, EpisodeRun};
 use crate::errors::{BorderError, Kind};
 use crate::generators::{generators, halves};
@@ -110,12 +110,7 @@ impl<'a, 'py> Named<'a, 'py> {
     }
 
     fn point(&self, name: &str) -> PyResult<Option<[f64; 2]>> {
-        let read = |value: Bound<'py, PyAny>| {
-            let point = vector(&value, Kind::Option, &self.path(name))?;
-            let point = <[f64; 2]>::try_from(point);
-            let what = "two numbers";
-            point.map_err(|_| refused(&value, Kind::Option, &self.path(name), what).into())
-        };
+        let read = |value: Bound<'py, PyAny>| two(&value, Kind::Option, &self.path(name));
         self.some(name)?.map(read).transpose()
     }
 

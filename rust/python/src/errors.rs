@@ -404,11 +404,11 @@ impl From<BatchError> for BorderError {
 impl From<DrawError> for BorderError {
     fn from(e: DrawError) -> Self {
         match e {
-            DrawError::NoRoom { overlap, .. } => Self {
+            DrawError::NoRoom { depth, .. } => Self {
                 kind: Kind::Terrain,
                 message: e.to_string(),
                 field: Some("terrain".to_owned()),
-                value: Value::Number(overlap),
+                value: Value::Number(depth),
             },
             DrawError::Unsuitable { why, attempts } => {
                 let message = format!("{why}, in the last of {attempts} scenes");

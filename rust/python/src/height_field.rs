@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::geometry::{HeightField as CoreField, Terrain};
 
-use crate::arguments::{Given, number, refused};
-use crate::arrays::vector;
+use crate::arguments::{Given, refused};
+use crate::arrays::{one_or_two, two};
 use crate::errors::{BorderError, Kind, Value};
 use crate::ground::heights;
 use crate::materials;
@@ -69,16 +69,6 @@ fn table(value: &Bound<'_, PyAny>) -> PyResult<(Vec<f32>, [usize; 2])> {
     Ok((view.iter().copied().collect(), [rows, columns]))
 }
 
-/// One number for both, or two.
-fn pair(value: &Bound<'_, PyAny>, field: &str) -> PyResult<[f64; 2]> {
-    if value.len().is_err() {
-        return Ok([number(value, Kind::Terrain, field)?; 2]);
-    }
-    let values = vector(value, Kind::Terrain, field)?;
-    let wrong = || refused(value, Kind::Terrain, field, "one number or two");
-    Ok(<[f64; 2]>::try_from(values).map_err(|_| wrong())?)
-}
-
 /// Calls a function of the package that gives heights, spacing and origin.
 fn from_package<'py>(
     py: Python<'py>,
@@ -108,9 +98,9 @@ impl HeightField {
     ) -> PyResult<Self> {
         let material = materials::name(material)?;
         let (heights, shape) = table(heights)?;
-        let spacing = pair(spacing, "spacing")?;
+        let spacing = one_or_two(spacing, Kind::Terrain, "spacing")?;
         let origin = if let Some(origin) = origin {
-            pair(origin, "origin")?
+            two(origin, Kind::Terrain, "origin")?
         } else {
             let middle = |n: usize, step: f64| -0.5 * step * (n.max(1) - 1) as f64;
             [middle(shape[1], spacing[0]), middle(shape[0], spacing[1])]
@@ -165,8 +155,18 @@ impl HeightField {
         material: Given<'py>,
     ) -> PyResult<Self> {
         let options = PyDict::new(py);
-        options.set_item("spacing", spacing.map(|s| pair(s, "spacing")).transpose()?)?;
-        options.set_item("origin", origin.map(|o| pair(o, "origin")).transpose()?)?;
+        options.set_item(
+            "spacing",
+            spacing
+                .map(|s| one_or_two(s, Kind::Terrain, "spacing"))
+                .transpose()?,
+        )?;
+        options.set_item(
+            "origin",
+            origin
+                .map(|o| two(o, Kind::Terrain, "origin"))
+                .transpose()?,
+        )?;
         options.set_item("height_range", height_range)?;
         options.set_item("scale", scale)?;
         options.set_item("datum", datum)?;

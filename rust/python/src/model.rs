@@ -16,7 +16,7 @@ use rover_core::multibody::{
 use rover_core::nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arguments::{self, Given, number};
-use crate::arrays::{fresh, fresh_blocks, fresh_matrix, fresh_rows, triple, vector};
+use crate::arrays::{fresh, fresh_blocks, fresh_matrix, fresh_rows, triple, two, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::files::{self, in_file, read_text, write_text};
 use crate::ground::Ground;
@@ -474,9 +474,9 @@ impl RoverModel {
 
     /// Writes an MJCF file, for MuJoCo: x forward, y left, z up.
     ///
-    /// Wheels are written as cylinders, of which a thin disc is a tenth of its radius wide and named
-    /// so, their drives as motors, held steering as position servos, and coupled joints as equality
-    /// constraints, which MuJoCo satisfies approximately.
+    /// Wheels are written as cylinders, of which a thin disc is a tenth of its radius wide and
+    /// named so, their drives as motors, held steering as position servos, and coupled joints as
+    /// equality constraints, which MuJoCo satisfies approximately.
     ///
     /// Args:
     ///     path: Path of the file.
@@ -951,10 +951,7 @@ impl RoverModel {
         heading: &Bound<'_, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let ground = Ground::parse(terrain)?;
-        let place = <[f64; 2]>::try_from(vector(position, Kind::State, "position")?);
-        let what = "two numbers";
-        let place =
-            place.map_err(|_| arguments::refused(position, Kind::State, "position", what))?;
+        let place = two(position, Kind::State, "position")?;
         let heading = number(heading, Kind::State, "heading")?;
         let q = if let Ground::Plane(plane) = &ground {
             resting_pose(&self.inner, &plane.inner, place, heading).map_err(BorderError::from)?

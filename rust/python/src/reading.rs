@@ -4,8 +4,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice};
 use rover_core::simulation::ReadingLayout;
 
-use crate::arguments::refused;
-use crate::arrays::{array, vector};
+use crate::arrays::{array, two};
 use crate::errors::{BorderError, Kind, Value};
 
 /// Names with their slices.
@@ -40,9 +39,7 @@ pub fn place(target: Option<&Bound<'_, PyAny>>) -> PyResult<[f64; 2]> {
     let Some(given) = target else {
         return Ok([0.0; 2]);
     };
-    let Ok(target) = <[f64; 2]>::try_from(vector(given, Kind::Option, "target")?) else {
-        return Err(refused(given, Kind::Option, "target", "two numbers").into());
-    };
+    let target = two(given, Kind::Option, "target")?;
     match target.iter().position(|x| !x.is_finite()) {
         None => Ok(target),
         Some(index) => {

@@ -9,7 +9,7 @@ use rover_core::geometry::{
 };
 
 use crate::arguments::{Given, number, refused, whole};
-use crate::arrays::{array, fresh_rows, vector};
+use crate::arrays::{array, fresh_rows, one_or_two, vector};
 use crate::errors::{BorderError, Kind, Value};
 use crate::files::{self, in_file, read_text};
 use crate::ground::{Ground, heights};
@@ -82,14 +82,16 @@ fn plane(given: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Plane>> {
     given.map(read).transpose()
 }
 
-/// One number for both ends of a range, or two.
-fn range(given: &Bound<'_, PyAny>, field: &str) -> PyResult<[f64; 2]> {
-    if given.len().is_err() {
-        return Ok([number(given, Kind::Terrain, field)?; 2]);
+impl SphereField {
+    /// The same of another material, if one is given.
+    fn of(self, material: Option<String>) -> Self {
+        let Some(material) = material else {
+            return self;
+        };
+        Self {
+            inner: Arc::new(Arc::unwrap_or_clone(self.inner).with_material(&material)),
+        }
     }
-    let values = vector(given, Kind::Terrain, field)?;
-    let wrong = || refused(given, Kind::Terrain, field, "one number or two");
-    Ok(<[f64; 2]>::try_from(values).map_err(|_| wrong())?)
 }
 
 #[pymethods]
@@ -108,12 +110,7 @@ impl SphereField {
         let centres = rows::<3>(centres, "centres")?;
         let radii = vector(radii, Kind::Terrain, "radii")?;
         let field = build(py, &centres, &radii, plane(ground)?)?;
-        Ok(match material {
-            None => field,
-            Some(material) => Self {
-                inner: Arc::new(Arc::unwrap_or_clone(field.inner).with_material(&material)),
-            },
-        })
+        Ok(field.of(material))
     }
 
     /// Reads spheres from a CSV file with the header `x,y,z,radius`, in m.
@@ -121,6 +118,7 @@ impl SphereField {
     /// Args:
     ///     path: Path of the file.
     ///     ground: The plane under the spheres; none by default.
+    ///     material: Name of the spheres' material.
     ///
     /// Returns:
     ///     The field.
@@ -129,12 +127,15 @@ impl SphereField {
     ///     TerrainError: The file does not describe spheres; the message names the path.
     ///     OSError: The file cannot be read.
     #[staticmethod]
-    #[pyo3(signature = (path, ground = None))]
+    #[pyo3(signature = (path, ground = None, material = Given::MISSING),
+        text_signature = "(path, ground=None, material='rock')")]
     fn from_file(
         py: Python<'_>,
         path: &Bound<'_, PyAny>,
         ground: Option<&Bound<'_, PyAny>>,
+        material: Given<'_>,
     ) -> PyResult<Self> {
+        let material = materials::name(material)?;
         let ground = plane(ground)?;
         let path = files::path(path, Kind::Terrain)?;
         let text = read_text(py, &path, Kind::Terrain, MAX_FILE)?;
@@ -180,7 +181,8 @@ impl SphereField {
         let table = rows::<4>(&table, "path")?;
         let centres: Vec<[f64; 3]> = table.iter().map(|r| [r[0], r[1], r[2]]).collect();
         let radii: Vec<f64> = table.iter().map(|r| r[3]).collect();
-        build(py, &centres, &radii, ground).map_err(|e| in_file(e, &path).into())
+        let field = build(py, &centres, &radii, ground).map_err(|e| in_file(e, &path))?;
+        Ok(field.of(material))
     }
 
     /// The wavy ground of the 2010 report's Fig. 6.6.
@@ -210,6 +212,7 @@ impl SphereField {
     ///         the field. Rocks on any other terrain are raised by its height, and the terrain is
     ///         not part of the field: combine them as `Union([terrain, rocks])`.
     ///     clear: Circles x, z, radius that no rock reaches into, (n, 3), m; none by default.
+    ///     material: Name of the rocks' material.
     ///
     /// Returns:
     ///     The field.
@@ -221,8 +224,9 @@ impl SphereField {
     #[staticmethod]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
     #[pyo3(signature = (abundance, area, seed, *, max_diameter = Given::MISSING, min_diameter = Given::MISSING, burial = None, ground = None,
-        clear = None),
-        text_signature = "(abundance, area, seed, *, max_diameter=0.5, min_diameter=0.05, burial=None, ground=None, clear=None)")]
+        clear = None, material = Given::MISSING),
+        text_signature = "(abundance, area, seed, *, max_diameter=0.5, min_diameter=0.05, burial=None, ground=None, clear=None, \
+        material='rock')")]
     fn rocks(
         py: Python<'_>,
         abundance: &Bound<'_, PyAny>,
@@ -233,8 +237,12 @@ impl SphereField {
         burial: Option<&Bound<'_, PyAny>>,
         ground: Option<&Bound<'_, PyAny>>,
         clear: Option<&Bound<'_, PyAny>>,
+        material: Given<'_>,
     ) -> PyResult<Self> {
-        let burial = burial.map_or(Ok([0.5; 2]), |given| range(given, "burial"))?;
+        let material = materials::name(material)?;
+        let burial = burial.map_or(Ok([0.5; 2]), |given| {
+            one_or_two(given, Kind::Terrain, "burial")
+        })?;
         let corners = vector(area, Kind::Terrain, "area")?;
         let [x_min, z_min, x_max, z_max] = corners[..] else {
             let what = "the four numbers x_min, z_min, x_max, z_max";
@@ -264,9 +272,10 @@ impl SphereField {
             None | Some(Ground::Plane(_)) => CoreField::rocks(&rocks),
             Some(other) => CoreField::rocks_on(&rocks, &*other.terrain()),
         });
-        Ok(Self {
+        let field = Self {
             inner: Arc::new(field.map_err(BorderError::from)?),
-        })
+        };
+        Ok(field.of(material))
     }
 
     /// Name of the spheres' material.

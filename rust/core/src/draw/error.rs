@@ -12,12 +12,12 @@ use crate::multibody::{ModelError, StateError};
 pub enum DrawError {
     /// The rover would stand in the ground or in a sphere.
     #[error(
-        "terrain: the rover stands {overlap} m deep in the ground or in a sphere at its start, in the last of \
+        "terrain: the rover stands {depth} m deep in the ground or in a sphere at its start, in the last of \
          {attempts} scenes"
     )]
     NoRoom {
-        /// Deepest gap in the last scene, negative, m.
-        overlap: f64,
+        /// How deep it stands in the last scene, m.
+        depth: f64,
         /// Scenes that were drawn.
         attempts: usize,
     },

@@ -89,13 +89,14 @@ impl SceneDistribution {
                     if overlap >= -START_OVERLAP {
                         return Ok(drawn);
                     }
-                    last = Some(DrawError::NoRoom { overlap, attempts });
+                    let depth = -overlap;
+                    last = Some(DrawError::NoRoom { depth, attempts });
                 }
                 Err(why) => last = Some(DrawError::Unsuitable { why, attempts }),
             }
         }
         Err(last.unwrap_or(DrawError::NoRoom {
-            overlap: f64::NEG_INFINITY,
+            depth: f64::INFINITY,
             attempts,
         }))
     }

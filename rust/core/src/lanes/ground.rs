@@ -543,7 +543,7 @@ fn over_surface(
         low - reach,
         &mut |id, piece| {
             visit_on_surface(&shape, (field, id, piece), &nowhere, reach, |_| {
-                touches = true
+                touches = true;
             });
         },
     );

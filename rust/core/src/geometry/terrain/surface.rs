@@ -164,11 +164,11 @@ impl Vertex {
     #[must_use]
     pub fn inward(&self) -> Vector3<f64> {
         let spokes = self.spokes[..self.n].iter();
-        let sum: Vector3<f64> = spokes.map(|spoke| spoke.normalize()).sum();
+        let sum: Vector3<f64> = spokes.map(Vector3::normalize).sum();
         sum.try_normalize(FLAT).unwrap_or_default()
     }
 
-    /// Sine of the angle by which the steepest of its edges rises over the plane with a unit normal.
+    /// Sine of the angle by which its steepest edge rises over the plane with a unit normal.
     #[must_use]
     pub fn steepest(&self, n: &Vector3<f64>) -> f64 {
         let spokes = self.spokes[..self.n].iter();
