@@ -29,7 +29,8 @@ fn rocks(numbers: &mut Random) -> Arc<dyn Terrain> {
 
 /// A rover on its ground: a plane, rocks, a flat map, hills, or hills with rocks.
 fn rover(i: usize, model: &Arc<Model>, numbers: &mut Random) -> RoverSimulation {
-    let terrain: Arc<dyn Terrain> = match i % 6 {
+    let terrain: Arc<dyn Terrain> = match i % 7 {
+        6 => crate::surfaces::hills(0.02, i as u64),
         1 => crate::surfaces::flat(0.25),
         3 => crate::surfaces::hills(0.15, i as u64),
         4 => crate::surfaces::hills_with_rocks(i as u64),

@@ -4,9 +4,12 @@ use std::sync::Arc;
 
 use rover_core::geometry::{HeightField, Rocks, SphereField, Terrain, Union};
 
+/// At least 8 m wide.
 fn map(spacing: f64, height: impl Fn(f64, f64) -> f64) -> Arc<HeightField> {
-    let n = 81;
-    let low = -40.0 * spacing;
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few hundred
+    let half = (4.0 / spacing).ceil().max(40.0) as usize;
+    let n = 2 * half + 1;
+    let low = -(half as f64) * spacing;
     #[allow(clippy::cast_possible_truncation)] // a map is single
     let heights = (0..n * n)
         .map(|k| {

@@ -102,11 +102,12 @@ impl Nearby {
             }
             return;
         }
+        let within = reach + ROUNDING + AHEAD_FOR_PIECES;
         (self.from, self.axle, self.n) = (centre, disc.axle, 0);
-        self.within = reach + ROUNDING + AHEAD_FOR_PIECES;
-        terrain.visit_near(&centre, disc.radius + self.within, &mut |id, piece| {
+        self.within = within;
+        terrain.visit_near(&centre, disc.radius + within, &mut |id, piece| {
             let clearance = clearance(disc, piece, base);
-            if clearance > self.within {
+            if clearance > within {
                 return;
             }
             match self.pieces.get_mut(self.n) {
