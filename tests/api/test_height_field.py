@@ -80,6 +80,29 @@ def test_the_rover_starts_on_all_wheels_and_drives_over_hills_and_rocks() -> Non
     assert simulation.q[1] > field.heights([simulation.q[[0, 2]]])[0]
 
 
+def test_a_drive_over_a_sine_converges_with_the_square_of_the_spacing() -> None:
+    """On cells of 1.25 cm a wheel has more pieces within reach than are kept from step to step."""
+    model = RoverModel()
+
+    def path(spacing: float) -> np.ndarray:
+        x = np.arange(-8.0, 8.0 + spacing, spacing)
+        ground = HeightField(np.tile(0.05 * np.sin(np.pi * x / 2.0), (x.size, 1)), spacing, (-8.0, -8.0))
+        simulation = Simulation(model, ground, time_step=1e-3)
+        simulation.set_state(model.resting_pose(ground, (-4.0, 0.0), 0.0))
+        simulation.set_wheel_torques([15.0] * 6)
+        places = []
+        for _ in range(30):
+            assert simulation.step(100).is_converged
+            places.append(simulation.q[:3])
+        return np.array(places)
+
+    finest = path(0.0125)
+    assert np.ptp(finest[:, 0]) > 2.0
+    errors = [np.sqrt(np.mean(np.sum((path(spacing) - finest) ** 2, axis=1))) for spacing in (0.2, 0.05)]
+    assert errors[1] < 2e-3
+    assert np.log2(errors[0] / errors[1]) / 2 > 1.7
+
+
 def test_off_the_map_and_over_holes_the_error_names_the_place() -> None:
     heights = np.zeros((41, 41))
     heights[:, 30:] = np.nan
