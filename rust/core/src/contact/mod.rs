@@ -5,11 +5,13 @@
 //! [`detection`] finds contacts with the ground, [`pair_detection`] contacts between bodies, and
 //! [`limit`] joints at their stops. The broad phase selects candidates, [`crate::geometry::query`]
 //! computes gaps and normals, and [`activation`] decides which contacts enter the step.
-//! [`wheel_gaps`] measures how far the wheels are from the ground and nothing else.
+//! [`wheel_gaps`] measures how far the wheels are from the ground and nothing else,
+//! `box_clearance` how far a box is from a surface at least.
 //! [`relocation`] re-evaluates them in another configuration. [`jacobian`] and [`delassus`]
 //! assemble the matrices.
 
 pub mod activation;
+pub(crate) mod box_clearance;
 pub mod delassus;
 pub mod detection;
 pub mod frame;

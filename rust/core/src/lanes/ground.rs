@@ -10,6 +10,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Vector3};
 
 use super::footing::{Footing, Wheels};
+use crate::contact::box_clearance::over_surfaces;
 use crate::contact::detection::visit_on_surface;
 use crate::geometry::query::sweep::DEEP;
 use crate::geometry::{Coverage, OrientedBox, PlacedShape, Sphere, SupportMap, Terrain};
@@ -510,25 +511,10 @@ fn over_surface(
     if field.coverage(&solid.centre, bound) != Coverage::Known {
         return (f64::NEG_INFINITY, true);
     }
-    // A plane between the box and the surface: level, or along the box, or along the slope.
-    let need = near.reach + near.motion + ROUNDING;
-    let over = |n: &Vector3<f64>, ahead: f64| {
-        let from = n.dot(&solid.support(&-n));
-        (from - field.furthest(n, &solid.centre, bound + ahead)).min(ahead)
-    };
     if field.coverage(&solid.centre, bound + AHEAD_OF_BOX) == Coverage::Known {
-        let clearance = over(&Vector3::y(), AHEAD_OF_BOX);
-        if clearance > need {
-            return (clearance, false);
-        }
-        let upright = solid.axis((0..3).fold(0, |best, k| {
-            let rises = |k: usize| solid.R[(1, k)].abs();
-            if rises(k) > rises(best) { k } else { best }
-        }));
-        let slope = slope_under(field, &solid.centre, bound);
-        let tilted = [Some(upright * upright.y.signum()), slope];
-        let best = (tilted.iter().flatten().map(|n| over(n, AHEAD_TILTED))).reduce(f64::max);
-        if let Some(clearance) = best.filter(|clearance| *clearance > need) {
+        let need = near.reach + near.motion + ROUNDING;
+        let ahead = [AHEAD_OF_BOX, AHEAD_TILTED];
+        if let Some(clearance) = over_surfaces(field, solid, ahead, need) {
             return (clearance, false);
         }
     }
@@ -548,14 +534,6 @@ fn over_surface(
         },
     );
     (f64::NEG_INFINITY, touches)
-}
-
-/// Unit normal of the mean slope of a surface within `radius` (m) of `centre`, seen from above.
-fn slope_under(field: &dyn Terrain, centre: &Vector3<f64>, radius: f64) -> Option<Vector3<f64>> {
-    let height = |x: f64, z: f64| field.height(centre.x + x, centre.z + z);
-    let along = height(radius, 0.0)? - height(-radius, 0.0)?;
-    let across = height(0.0, radius)? - height(0.0, -radius)?;
-    Some(Vector3::new(-along, 2.0 * radius, -across).normalize())
 }
 
 /// Distance of a sphere from a box, m; at least minus the radius.
