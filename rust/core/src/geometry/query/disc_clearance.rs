@@ -11,7 +11,7 @@ use super::disc_sphere;
 use crate::geometry::terrain::surface::{Edge, Face, Vertex};
 use crate::geometry::{Disc, Primitive, Sphere};
 
-/// What turning the axle by an angle moves, in wheel radii, while |n × s| is at least [`UPRIGHT`]:
+/// What turning the axle by an angle moves, in wheel radii, while |n × s| is at least `UPRIGHT`:
 /// the lowest rim point over n moves by the radius times the turn of the unit vector of
 /// n − s (n · s), which changes by at most 2 |δs| and whose direction thus by 4 |δs| / UPRIGHT.
 pub const TURNING: f64 = 8.0;
