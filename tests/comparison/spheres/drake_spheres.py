@@ -10,11 +10,9 @@ from functools import partial
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.geometry import (
-    AddContactMaterial,
     Box,
     CollisionFilterDeclaration,
     GeometrySet,
-    ProximityProperties,
     Sphere,
 )
 from pydrake.math import RigidTransform
@@ -22,7 +20,6 @@ from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import (
     AddMultibodyPlantSceneGraph,
     ContactModel,
-    CoulombFriction,
     DiscreteContactApproximation,
     ExternallyAppliedSpatialForce,
 )
@@ -31,6 +28,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import DiagramBuilder
 
 from comparison.peers.base import LeftOut
+from comparison.peers.drake import material as properties_of
 from comparison.spheres.scene import Array, FreeScene, G
 
 GROUND = 500.0  # m, edge of the box that is the plane
@@ -40,17 +38,6 @@ STIFFNESS_OF_SLAB, STIFFNESS = 1e8, 1e6
 DISSIPATION = 50.0  # s/m
 #: A continuous plant's springs are as stiff as a step resolves (angular frequency times step), but no softer than this.
 RESOLVED, SOFTEST = 0.3, 1e5
-
-
-def _material(friction: float, stiffness: float, dissipation: float) -> ProximityProperties:
-    properties = ProximityProperties()
-    AddContactMaterial(
-        dissipation=dissipation,
-        point_stiffness=stiffness,
-        friction=CoulombFriction(friction, friction),
-        properties=properties,
-    )
-    return properties
 
 
 def _inertia(mass: float, own: Array) -> SpatialInertia:
@@ -84,10 +71,10 @@ class DrakeSpheres:
             plant.set_discrete_contact_approximation(approximation)
         plant.mutable_gravity_field().set_gravity_vector(np.array([0.0, -G, 0.0]))
         # Of two frictions f and g it takes 2 f g/(f + g); stiffnesses act in series.
-        ground = _material(scene.friction, stiffness, dissipation)
+        ground = properties_of(scene.friction, stiffness, dissipation)
         below = RigidTransform(np.array([0.0, -5.0, 0.0]))
         plant.RegisterCollisionGeometry(plant.world_body(), below, Box(GROUND, 10.0, GROUND), "ground", ground)
-        material = _material(slab.friction if slab else scene.friction, stiffness, dissipation)
+        material = properties_of(slab.friction if slab else scene.friction, stiffness, dissipation)
         inertia = np.full(3, 0.4 * scene.mass * scene.radius**2)
         self.bodies = []
         for k in range(len(scene.centres)):
