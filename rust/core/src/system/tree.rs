@@ -53,10 +53,10 @@ pub struct DriveAction {
 /// Poses, matrices and momenta of a tree: scratch, allocated once.
 #[derive(Clone, Debug)]
 pub struct TreeScratch {
-    kinematics: Kinematics,
-    kinematics_end: Kinematics,
+    pub(super) kinematics: Kinematics,
+    pub(super) kinematics_end: Kinematics,
     mass_matrix: MassMatrix,
-    factor: FactoredMassMatrix,
+    pub(super) factor: FactoredMassMatrix,
     bias_scratch: BiasScratch,
     momenta: Vec<Momentum>,
     momenta_end: Vec<Momentum>,
@@ -75,7 +75,7 @@ pub struct TreeScratch {
     /// has a stop.
     joints_middle: Vec<f64>,
     joints_end: Vec<f64>,
-    system: ContactSystem,
+    pub(super) system: ContactSystem,
 }
 
 impl TreeScratch {

@@ -23,7 +23,7 @@
 
 pub mod bodies;
 pub mod contact;
-mod detection;
+pub(in crate::system) mod detection;
 pub mod error;
 pub mod grid;
 pub mod machine;
