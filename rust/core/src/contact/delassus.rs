@@ -94,7 +94,7 @@ impl ContactSystem {
         self.Z.resize(n * w, [0.0; 4]);
         self.u.resize(3 * n, 0.0);
         for (c, contact) in contacts.iter().enumerate() {
-            if !matches!(contact.key.opposite, Opposite::Ground(_)) {
+            if matches!(contact.key.opposite, Opposite::Part(_) | Opposite::Stop) {
                 let u = match (limit::row(model, contact), contact.other) {
                     (Some(row), _) => self.stop(model, factor, row, v),
                     (None, Some(other)) => {

@@ -28,7 +28,7 @@ use crate::solver::{ManyBodies, SolveReport, SolverOptions, SolverWorkspace, sol
 pub struct GrainTouch {
     /// Its key among all contacts of grains: the part's code after the grains, then the grain.
     pub key: GrainKey,
-    /// As a contact of the tree, with the grain's number in place of the ground's primitive.
+    /// As a contact of the tree.
     pub contact: Contact,
     /// Gap at the start of the step, m.
     pub gap_start: f64,
@@ -210,7 +210,7 @@ impl<'a, 'b> Coupling<Bed<'a>, TreeSystem<'b>> for AmongGrains<'_> {
                             b: *index,
                         },
                         contact: Contact {
-                            key: ContactKey::on_ground(part, point.feature, *index),
+                            key: ContactKey::on_grain(part, point.feature, *index),
                             part,
                             body: part.body(model),
                             other: None,

@@ -170,7 +170,7 @@ impl TreeSystem<'_> {
         let opposite = match (contact.key.opposite, contact.other) {
             (Opposite::Ground(primitive), _) => self.terrain.material(primitive),
             (Opposite::Part(_), Some(other)) => other.part.material(self.model),
-            (Opposite::Part(_), None) | (Opposite::Stop, _) => return None,
+            (Opposite::Part(_), None) | (Opposite::Grain(_) | Opposite::Stop, _) => return None,
         };
         options.materials.between(own, opposite)
     }
@@ -323,7 +323,7 @@ impl MechanicalSystem for TreeSystem<'_> {
     fn friction_coefficient(&self, options: &StepOptions, contact: &Contact) -> f64 {
         match contact.key.opposite {
             Opposite::Stop => 0.0,
-            Opposite::Ground(_) | Opposite::Part(_) => {
+            Opposite::Ground(_) | Opposite::Part(_) | Opposite::Grain(_) => {
                 let of_pair = self.between_materials(options, contact);
                 of_pair.map_or(options.friction_coefficient, |[mu, _]| mu)
             }
