@@ -5,6 +5,7 @@ mod accuracy;
 mod arguments;
 mod arrays;
 mod batch;
+mod bed_arguments;
 mod contacts;
 mod draw;
 mod elementary;
