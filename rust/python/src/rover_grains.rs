@@ -143,10 +143,9 @@ impl RoverGrainSimulation {
         Ok(watch.result(report)?.into())
     }
 
-    /// Gap of each wheel now to the nearest grain or the terrain, (n_wheels,), m, positive when
-    /// apart.
+    /// Gap of each wheel now to the nearest grain or the terrain, (n_wheels,), m.
     ///
-    /// A wheel with nothing within its diameter has the gap to the terrain.
+    /// Positive when apart. A wheel without a grain within its radius has the gap to the terrain.
     #[getter]
     fn wheel_gaps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let link = self.link()?;
