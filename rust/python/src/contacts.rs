@@ -54,12 +54,7 @@ pub struct Contacts {
 
 impl Contacts {
     pub fn new(model: &Model, active: &[ActiveContact<Contact>]) -> Self {
-        let name = |a: &ActiveContact<Contact>| match a.contact.part {
-            Part::Wheel(i) => model.description().wheels[i].solid.clone(),
-            Part::Box(i) => model.boxes()[i].name.clone(),
-            Part::Sphere(i) => model.spheres()[i].name.clone(),
-            Part::Limit(i, _) => model.bodies()[model.joints()[i].body].name.clone(),
-        };
+        let name = |a: &ActiveContact<Contact>| a.contact.part.name(model).to_owned();
         Self {
             active: Columns(active.to_vec()),
             bodies: active.iter().map(name).collect(),
