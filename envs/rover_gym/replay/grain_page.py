@@ -1,0 +1,207 @@
+"""Export of a run of balls in space as a browser page: tens of thousands of balls, the rover, a timeline and curves.
+
+The page draws by itself, with WebGL 2 and no library. A ball is a square that the graphics card turns into an exact
+sphere. The places of two neighbouring samples lie in its memory as 16-bit numbers, and it goes from one to the other;
+so a picture costs the script next to nothing, and a new sample one upload. In the file, a sample holds its differences
+to the one before, in pieces of a second that unpack while the page plays.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import zlib
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rover_gym.rendering.appearance import GROUND_COLOUR, ROCK_COLOUR, SKY_COLOUR, SKY_COLOUR_2, Colour
+from rover_gym.replay.grain_curves import grain_curves
+from rover_gym.replay.player import shortened
+from rover_gym.replay.rotation import continuous, quaternions
+from rover_gym.replay.scenery import coloured_meshes, first_view, ground_plane, ground_tiles, parts_by_solid, surfaces
+from rover_gym.replay.wall_polygons import wall_polygons, wall_poses
+
+if TYPE_CHECKING:
+    from rover_gym.grains.grain_run import GrainRun
+
+SAMPLES = 25  # of a piece: each begins with whole places
+LEVELS = 65535  # of a place, along each axis
+FIELD_OF_VIEW = 0.6  # rad, vertical, of a run without a rover
+FOLLOW_TIME = 1.0  # s, smoothing window of the path that the eye follows
+
+Array = npt.NDArray[np.float64]
+Mesh = tuple[Colour, Array, npt.NDArray[np.int32]]
+
+
+def write_grain_page(run: GrainRun, path: str | Path, *, follow: bool = True) -> Path:
+    """Writes a run of balls as a single browser page.
+
+    Args:
+        run: The run; every sample becomes a frame of the replay, and the page goes smoothly from one to the next.
+        path: The file to write, usually `.html`. Its folder is created.
+        follow: Whether the eye follows the rover; otherwise the ground stays fixed.
+
+    Raises:
+        RecordingError: The recording is damaged.
+        OSError: The file cannot be written.
+    """
+    places, low, extent = _quantised(run)
+    meshes, poses = _meshes(run)
+    pieces = [places[first : first + SAMPLES] for first in range(0, run.n_frames, SAMPLES)]
+    scene = {
+        "balls": len(run.radius),
+        "time": [round(float(time - run.time[0]), 6) for time in run.time],
+        "low": low.tolist(),
+        "extent": extent.tolist(),
+        "samples": SAMPLES,
+        "pieces": len(pieces),
+        "radius": float(run.radius.mean()),
+        "solids": poses.shape[1],
+        "rover": 0 if run.model is None else len(run.model.solid_names),
+        "reach": 0.0 if run.model is None else run.model.clear_radius,
+        "meshes": [{"solid": solid, "first": first, "count": count} for solid, first, count in _ranges(meshes)],
+        "view": _view(run),
+        "centres": np.round(_centres(run, follow=follow), 4).tolist(),
+        "sky": [SKY_COLOUR_2, SKY_COLOUR],
+    }
+    blobs = {
+        "radii": run.radius.astype("<f4").tobytes(),
+        "fixed": run.kinematic.astype(np.uint8).tobytes(),
+        "poses": np.ascontiguousarray(poses, dtype="<f4").tobytes(),
+        **_packed_meshes([mesh for _, mesh in meshes]),
+        **{f"piece-{i}": _differences(piece) for i, piece in enumerate(pieces)},
+    }
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", encoding="utf-8") as file:
+        file.writelines(_page(run.title, scene, blobs, grain_curves(run)))
+    return path
+
+
+def _page(title: str, scene: dict[str, Any], blobs: dict[str, bytes], curves: dict[str, Any]) -> Any:
+    """The page in pieces."""
+    files = resources.files("rover_gym.replay")
+
+    def text(name: str) -> str:
+        return files.joinpath(name).read_text(encoding="utf-8")
+
+    yield f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>'
+    yield f'<meta name="viewport" content="width=device-width"><style>{text("panel.css")}{text("grain_page.css")}'
+    yield f'</style></head><body>{text("grain_page.html")}<aside id="panel"></aside>'
+    for name, value in (("scene", scene), ("curves", curves)):
+        data = json.dumps(value, separators=(",", ":")).replace("<", "\\u003c")  # no closing tag may end it early
+        yield f'<script type="application/json" id="{name}">{data}</script>\n'
+    for name, data in blobs.items():
+        packed = base64.b64encode(zlib.compress(data, 6)).decode()
+        yield f'<script type="application/octet-stream" id="{name}">{packed}</script>\n'
+    for name in ("grain_frames.js", "grain_view.js", "grain_player.js", "panel.js"):
+        yield f"<script>{text(name)}</script>\n"
+    yield "</body></html>\n"
+
+
+def _quantised(run: GrainRun) -> tuple[npt.NDArray[np.uint16], Array, Array]:
+    """Places (n, n_balls, 3) as levels between bounds, the lower bounds and the extents, m.
+
+    The bounds hold all places, but no more than twice the size of the first sample to each side of it: a ball that
+    falls for ever stops there.
+    """
+    places = run.positions
+    low, high = places.min(axis=(0, 1)).astype(np.float64), places.max(axis=(0, 1)).astype(np.float64)
+    first = places[0].astype(np.float64)
+    size = 2.0 * float((first.max(axis=0) - first.min(axis=0)).max()) + 4.0 * float(run.radius.max())
+    low, high = np.maximum(low, first.min(axis=0) - size), np.minimum(high, first.max(axis=0) + size)
+    extent = np.maximum(high - low, 1e-6)
+    result = np.empty(places.shape, dtype=np.uint16)
+    for k, sample in enumerate(places):
+        result[k] = np.clip(np.round((sample - low) / extent * LEVELS), 0, LEVELS)
+    return result, low, extent
+
+
+def _differences(piece: npt.NDArray[np.uint16]) -> bytes:
+    """Differences of samples (n, n_balls, 3) modulo 2^16: x of all balls, then y, then z; low bytes before high ones.
+
+    The first sample is whole.
+    """
+    steps = np.diff(piece, axis=0, prepend=np.zeros_like(piece[:1])).transpose(0, 2, 1)
+    # A small step back has high byte 255: shifted by half a byte, small steps of both signs have high byte 0.
+    steps[1:] += np.uint16(128)
+    result = np.stack((steps & 255, steps >> 8), axis=2).astype(np.uint8)
+    return result.tobytes()
+
+
+def _meshes(run: GrainRun) -> tuple[list[tuple[int, Mesh]], Array]:
+    """Meshes, each with its moving frame (-1: none), and the frames' poses (n, n_frames, 7): m, and x, y, z, w."""
+    meshes: list[tuple[int, Mesh]] = []
+    poses = np.zeros((run.n_frames, 0, 7))
+    if run.rover is not None:
+        for i, parts in enumerate(parts_by_solid(run.rover).values()):
+            meshes += [(i, mesh) for mesh in coloured_meshes(parts)]
+        turns = continuous(quaternions(run.rover.rotations))[..., [1, 2, 3, 0]]
+        poses = np.concatenate((run.rover.positions, turns), axis=-1)
+        meshes += [(-1, mesh) for mesh in _ground(run)]
+    of_walls = wall_polygons(run, GROUND_COLOUR, ROCK_COLOUR)
+    meshes += [(poses.shape[1] + i, mesh) for i, mesh in enumerate(of_walls)]
+    return meshes, shortened(np.concatenate((poses, wall_poses(run)), axis=1), 16)
+
+
+def _ground(run: GrainRun) -> list[Mesh]:
+    """The fixed ground about the rover's path."""
+    if run.rover is None:
+        return []
+    meshes: list[Mesh] = []
+    tiles = ground_tiles(run.rover) if ground_plane(run.rover) is not None else None
+    if tiles is not None:
+        vertices, light, dark = tiles
+        meshes += [(GROUND_COLOUR, vertices, light), (tuple(0.9 * c for c in GROUND_COLOUR), vertices, dark)]  # type: ignore[list-item]
+    for vertices, faces in surfaces(run.rover):
+        meshes += [(colour, vertices, triangles) for colour, triangles in faces if len(triangles)]
+    return meshes
+
+
+def _ranges(meshes: list[tuple[int, Mesh]]) -> list[tuple[int, int, int]]:
+    """Of each mesh its frame, and its first index and number of indices."""
+    ends = np.cumsum([0, *(triangles.size for _, (_, _, triangles) in meshes)]).tolist()
+    return [(solid, first, end - first) for (solid, _), first, end in zip(meshes, ends[:-1], ends[1:], strict=True)]
+
+
+def _packed_meshes(meshes: list[Mesh]) -> dict[str, bytes]:
+    """Vertices, their colours, and triangles of all meshes."""
+    vertices, colours, triangles, n = [], [], [], 0
+    for colour, points, corners in meshes:
+        vertices.append(points.astype("<f4"))
+        colours.append(np.tile(np.round(255.0 * np.array([*colour, 1.0])).astype(np.uint8), (len(points), 1)))
+        triangles.append((corners + n).astype("<u4"))
+        n += len(points)
+    return {
+        "vertices": b"".join(piece.tobytes() for piece in vertices),
+        "colours": b"".join(piece.tobytes() for piece in colours),
+        "triangles": b"".join(piece.tobytes() for piece in triangles),
+    }
+
+
+def _view(run: GrainRun) -> dict[str, Any]:
+    """Eye, target and vertical field of view at the start."""
+    if run.rover is not None:
+        view = first_view(run.rover)
+        return {"eye": view.eye.tolist(), "target": view.target.tolist(), "angle": view.field_of_view}
+    first = run.positions[0].astype(np.float64)
+    low, high = np.quantile(first, 0.01, axis=0), np.quantile(first, 0.99, axis=0)
+    middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low)) + 2.0 * float(run.radius.max())
+    eye = middle + 1.1 * size / np.tan(FIELD_OF_VIEW) * np.array([-0.42, 0.45, 0.79])
+    return {"eye": eye.tolist(), "target": middle.tolist(), "angle": FIELD_OF_VIEW}
+
+
+def _centres(run: GrainRun, *, follow: bool) -> Array:
+    """(n, 3) what the eye follows, relative to its start: the trunk's smoothed path."""
+    if run.rover is None or not follow:
+        return np.zeros((run.n_frames, 3))
+    path = run.trajectory["q"][:, :3]
+    spans = np.abs(run.time[:, None] - run.time) <= FOLLOW_TIME / 2
+    smooth = spans @ path / spans.sum(axis=1, keepdims=True)
+    result: Array = smooth - smooth[0]
+    return result
