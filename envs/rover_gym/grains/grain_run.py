@@ -134,7 +134,8 @@ class GrainRun:
         """
         centres = self.wheel_centres
         radii = np.zeros(0) if self.model is None else np.asarray(self.model.wheel_radii)
-        surface = self.first_surface.at(centres[..., [0, 2]], width=4.0 * float(self.radius.mean()))
+        width = max(4.0 * float(self.radius.mean()), float(radii.max(initial=0.0)))
+        surface = self.first_surface.at(centres[..., [0, 2]], width=width)
         result: Array = surface - (centres[..., 1] - radii)
         return result
 

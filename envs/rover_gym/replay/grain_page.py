@@ -135,7 +135,7 @@ def _differences(piece: npt.NDArray[np.uint16]) -> bytes:
 
 
 def _meshes(run: GrainRun) -> tuple[list[tuple[int, Mesh]], Array]:
-    """Meshes, each with its moving frame (-1: none), and the frames' poses (n, n_frames, 7): m, and x, y, z, w."""
+    """Meshes, each with its moving frame (-1: none), and poses (n, n_moving, 7): m, and x, y, z, w."""
     meshes: list[tuple[int, Mesh]] = []
     poses = np.zeros((run.n_frames, 0, 7))
     if run.rover is not None:

@@ -169,18 +169,25 @@
     const begin = performance.now();
     const elapsed = before === null ? 0 : Math.min(0.25, (now - before) / 1000);
     before = now;
+    let drawn = false;
     if (playing && end > 0) {
       const moment = time;
       time = (time + elapsed * Number(speed.value)) % end;
-      if (draw()) show();
+      drawn = draw();
+      if (drawn) show();
       else time = moment; // its piece is not unpacked yet: the clock waits
-    } else if (stale) stale = !draw();
-    spent.push(performance.now() - begin);
-    if (spent.length > 120) spent.shift();
-    canvas.dataset.script = spent.slice().sort((a, b) => a - b)[Math.floor(spent.length / 2)].toFixed(3);
-    canvas.dataset.slowest = Math.max(...spent).toFixed(3);
-    canvas.dataset.drawn = Number(canvas.dataset.drawn || 0) + 1;
+    } else if (stale) {
+      drawn = draw();
+      stale = !drawn;
+    }
+    if (drawn) measured(performance.now() - begin);
     requestAnimationFrame(tick);
+  };
+  const measured = (took) => {
+    spent.push(took);
+    if (spent.length > 120) spent.shift();
+    canvas.dataset.script = spent.slice().sort((a, b) => a - b)[Math.floor(spent.length / 2)].toFixed(2);
+    canvas.dataset.drawn = Number(canvas.dataset.drawn || 0) + 1;
   };
   const begin = () => {
     const levels = frames.sample(0);

@@ -32,7 +32,8 @@ flat out vec3 colour;
 out vec3 ray;
 const vec3 sand = vec3(0.80, 0.62, 0.42);
 vec3 heat(float t) {
-  return clamp(vec3(1.6 * t - 0.15, 1.0 - abs(2.1 * t - 1.1), 1.05 - 1.7 * t), 0.05, 1.0);
+  vec3 slow = vec3(0.24, 0.30, 0.46), middle = vec3(0.93, 0.76, 0.36), fast = vec3(0.80, 0.13, 0.16);
+  return t < 0.5 ? mix(slow, middle, 2.0 * t) : mix(middle, fast, 2.0 * t - 1.0);
 }
 void main() {
   vec3 centre = (view * vec4(low + extent * mix(before, after, share), 1.0)).xyz;
@@ -110,6 +111,7 @@ void main() {
 }`;
 
 // A pixel is darker the more of the pixels about it lie before it: near ones for edges, farther ones for hollows.
+// Opposite pixels count together, so that a plane seen at a slant has no shade; what is far before it does not count.
 const SCREEN_FRAGMENT = `#version 300 es
 precision highp float;
 uniform sampler2D picture;
@@ -131,13 +133,15 @@ void main() {
   for (int ring = 0; ring < 2; ring++) {
     float wide = ring == 0 ? reach.x : clamp(4.0 * reach.y / here, 3.0 * reach.x, 40.0 * reach.x);
     float depth = max(ring == 0 ? radius : 3.0 * radius, 1.5 * wide * here * radius / reach.y);
-    for (int i = 0; i < 8; i++) {
+    for (int i = 0; i < 4; i++) {
       float a = 0.7854 * float(i) + 0.3927 * float(ring);
-      float before = (here - away(at + wide * vec2(cos(a), sin(a)) / size)) / depth;
-      hidden += before > 0.0 ? min(before, 1.0) / (1.0 + max(before - 2.0, 0.0)) : 0.0;
+      vec2 aside = wide * vec2(cos(a), sin(a)) / size;
+      vec2 before = (here - vec2(away(at + aside), away(at - aside))) / depth;
+      vec2 counts = clamp(before, -1.0, 1.0) / (1.0 + 4.0 * max(abs(before) - 2.0, 0.0));
+      hidden += max(0.0, counts.x + counts.y);
     }
   }
-  pixel = vec4(texture(picture, at).rgb * exp(-0.075 * hidden), 1.0);
+  pixel = vec4(texture(picture, at).rgb * exp(-0.11 * hidden), 1.0);
 }`;
 
 const multiply = (a, b) => {
