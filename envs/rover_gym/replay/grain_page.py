@@ -19,11 +19,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.rendering.appearance import GROUND_COLOUR, ROCK_COLOUR, SKY_COLOUR, SKY_COLOUR_2, Colour
+from rover_gym.rendering.appearance import (
+    FIXED_BALL_COLOUR,
+    GROUND_COLOUR,
+    GROUND_COLOUR_2,
+    ROCK_COLOUR,
+    SAND_COLOUR,
+    SKY_COLOUR,
+    SKY_COLOUR_2,
+    Colour,
+)
 from rover_gym.replay.grain_curves import grain_curves
+from rover_gym.replay.grain_eye import eye_path, start_view
 from rover_gym.replay.player import shortened
 from rover_gym.replay.rotation import continuous, quaternions
-from rover_gym.replay.scenery import coloured_meshes, first_view, ground_plane, ground_tiles, parts_by_solid, surfaces
+from rover_gym.replay.scenery import coloured_meshes, ground_plane, ground_tiles, parts_by_solid, surfaces
 from rover_gym.replay.wall_polygons import wall_polygons, wall_poses
 
 if TYPE_CHECKING:
@@ -31,8 +41,6 @@ if TYPE_CHECKING:
 
 SAMPLES = 25  # of a piece: each begins with whole places
 LEVELS = 65535  # of a place, along each axis
-FIELD_OF_VIEW = 0.6  # rad, vertical, of a run without a rover
-FOLLOW_TIME = 1.0  # s, smoothing window of the path that the eye follows
 
 Array = npt.NDArray[np.float64]
 Mesh = tuple[Colour, Array, npt.NDArray[np.int32]]
@@ -65,9 +73,10 @@ def write_grain_page(run: GrainRun, path: str | Path, *, follow: bool = True) ->
         "rover": 0 if run.model is None else len(run.model.solid_names),
         "reach": 0.0 if run.model is None else run.model.clear_radius,
         "meshes": [{"solid": solid, "first": first, "count": count} for solid, first, count in _ranges(meshes)],
-        "view": _view(run),
-        "centres": np.round(_centres(run, follow=follow), 4).tolist(),
+        "view": start_view(run)._asdict(),
+        "centres": np.round(eye_path(run, follow=follow), 4).tolist(),
         "sky": [SKY_COLOUR_2, SKY_COLOUR],
+        "sand": [SAND_COLOUR, FIXED_BALL_COLOUR],
     }
     blobs = {
         "radii": run.radius.astype("<f4").tobytes(),
@@ -157,7 +166,7 @@ def _ground(run: GrainRun) -> list[Mesh]:
     tiles = ground_tiles(run.rover) if ground_plane(run.rover) is not None else None
     if tiles is not None:
         vertices, light, dark = tiles
-        meshes += [(GROUND_COLOUR, vertices, light), (tuple(0.9 * c for c in GROUND_COLOUR), vertices, dark)]  # type: ignore[list-item]
+        meshes += [(GROUND_COLOUR, vertices, light), (GROUND_COLOUR_2, vertices, dark)]
     for vertices, faces in surfaces(run.rover):
         meshes += [(colour, vertices, triangles) for colour, triangles in faces if len(triangles)]
     return meshes
@@ -182,26 +191,3 @@ def _packed_meshes(meshes: list[Mesh]) -> dict[str, bytes]:
         "colours": b"".join(piece.tobytes() for piece in colours),
         "triangles": b"".join(piece.tobytes() for piece in triangles),
     }
-
-
-def _view(run: GrainRun) -> dict[str, Any]:
-    """Eye, target and vertical field of view at the start."""
-    if run.rover is not None:
-        view = first_view(run.rover)
-        return {"eye": view.eye.tolist(), "target": view.target.tolist(), "angle": view.field_of_view}
-    first = run.positions[0].astype(np.float64)
-    low, high = np.quantile(first, 0.01, axis=0), np.quantile(first, 0.99, axis=0)
-    middle, size = 0.5 * (low + high), float(np.linalg.norm(high - low)) + 2.0 * float(run.radius.max())
-    eye = middle + 1.1 * size / np.tan(FIELD_OF_VIEW) * np.array([-0.42, 0.45, 0.79])
-    return {"eye": eye.tolist(), "target": middle.tolist(), "angle": FIELD_OF_VIEW}
-
-
-def _centres(run: GrainRun, *, follow: bool) -> Array:
-    """(n, 3) what the eye follows, relative to its start: the trunk's smoothed path."""
-    if run.rover is None or not follow:
-        return np.zeros((run.n_frames, 3))
-    path = run.trajectory["q"][:, :3]
-    spans = np.abs(run.time[:, None] - run.time) <= FOLLOW_TIME / 2
-    smooth = spans @ path / spans.sum(axis=1, keepdims=True)
-    result: Array = smooth - smooth[0]
-    return result

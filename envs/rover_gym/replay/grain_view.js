@@ -14,7 +14,7 @@ vec3 lit(vec3 colour, vec3 place, vec3 normal) {
   vec3 s = 0.5 + 0.5 * (light * vec4(place, 1.0)).xyz;
   bool outside = any(lessThan(s, vec3(0.0))) || any(greaterThan(s, vec3(1.0)));
   float seen = outside ? 1.0 : texture(shadow, s - vec3(0.0, 0.0, 2e-3));
-  float sky = 0.42 + 0.2 * normal.y;
+  float sky = 0.37 + 0.17 * normal.y;
   return colour * (sky + 0.62 * max(dot(normal, sun), 0.0) * seen);
 }
 `;
@@ -30,7 +30,7 @@ uniform int paint;
 flat out vec4 sphere;
 flat out vec3 colour;
 out vec3 ray;
-const vec3 sand = vec3(0.80, 0.62, 0.42);
+uniform vec3 sand, still;
 vec3 heat(float t) {
   vec3 slow = vec3(0.24, 0.30, 0.46), middle = vec3(0.93, 0.76, 0.36), fast = vec3(0.80, 0.13, 0.16);
   return t < 0.5 ? mix(slow, middle, 2.0 * t) : mix(middle, fast, 2.0 * t - 1.0);
@@ -55,7 +55,7 @@ void main() {
     float speed = length(extent * (after - before)) * rate;
     colour = heat(clamp(log(max(speed, 1e-6) / 1e-3) / log(1e3), 0.0, 1.0));
   }
-  if (ball.w > 0.5) colour = vec3(0.52) * (0.85 + 0.3 * ball.y);
+  if (ball.w > 0.5) colour = still * (0.85 + 0.3 * ball.y);
   gl_Position = projection * vec4(ray, 1.0);
 }`;
 
@@ -336,6 +336,8 @@ class GrainView {
     this.use(this.balls, { view, projection, light });
     gl.uniform3fv(uniforms.low, scene.low);
     gl.uniform3fv(uniforms.extent, scene.extent);
+    gl.uniform3fv(uniforms.sand, scene.sand[0]);
+    gl.uniform3fv(uniforms.still, scene.sand[1]);
     gl.uniform1f(uniforms.share, share);
     gl.uniform1f(uniforms.rate, rate);
     gl.uniform1i(uniforms.paint, paint);
