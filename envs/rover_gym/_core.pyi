@@ -34,6 +34,9 @@ __all__ = [
     "EpisodeRules",
     "EpisodeRun",
     "FrictionContactSolution",
+    "GrainContacts",
+    "GrainSimulation",
+    "GrainSnapshot",
     "HeightField",
     "Line",
     "MirroredRoverSimulation",
@@ -68,6 +71,7 @@ __all__ = [
     "__version__",
     "accuracy_options",
     "atan2",
+    "ball_packing",
     "exp",
     "seed_generators",
     "sin_cos",
@@ -2884,6 +2888,230 @@ class SoilSimulation:
             StateError: The snapshot belongs to another soil or is damaged. Nothing has changed.
         """
 
+@final
+class GrainContacts:
+    """The contacts of the last step of grains in space, as new arrays with one row a contact.
+
+    Contacts between sleeping balls are left out.
+    """
+
+    @property
+    def bodies(self) -> npt.NDArray[np.int64]:
+        """Numbers of both bodies, (n, 2), balls from 0; -1 for a wall or the terrain."""
+    @property
+    def points(self) -> _Array:
+        """Points of the first body's surface, (n, 3), m."""
+    @property
+    def normals(self) -> _Array:
+        """Unit normals from the second body into the first, (n, 3)."""
+    @property
+    def frames(self) -> _Array:
+        """Contact frames, world frame, (n, 3, 3).
+
+        Rows are the unit vectors n (normal), t and b (tangents).
+        """
+    @property
+    def gaps(self) -> _Array:
+        """Gaps at the start of the step, (n,), m; negative where bodies overlap."""
+    @property
+    def impulses(self) -> _Array:
+        """Impulses on the first body along n, t, b of `frames`, (n, 3), N s."""
+    @property
+    def velocities(self) -> _Array:
+        """Velocities of the first body against the second after the step along n, t, b, (n, 3), m/s."""
+    @property
+    def world_impulses(self) -> _Array:
+        """Impulses on the first body along x, y, z, (n, 3), N s."""
+    def __len__(self) -> int: ...
+
+@final
+class GrainSnapshot:
+    """Everything that grains in space need to continue bit for bit. Picklable."""
+
+    @staticmethod
+    def from_bytes(data: bytes) -> GrainSnapshot:
+        """Reads a snapshot.
+
+        Args:
+            data: What `to_bytes` returned.
+
+        Returns:
+            The snapshot.
+
+        Raises:
+            StateError: The bytes are not those of a snapshot.
+        """
+    def to_bytes(self) -> bytes:
+        """The snapshot as bytes, as `from_bytes` reads them."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class GrainSimulation:
+    """Grains in space: free balls with friction, between walls or on a terrain.
+
+    World axes: x forward, y up, z to the right. One call at a time: a call during another one, from
+    another thread or a signal handler, raises BusyError.
+
+    Args:
+        radius: Radii of the balls, (n,), m.
+        mass: Masses of the balls, (n,), kg; they are homogeneous.
+        position: Centres, (n, 3), m.
+        kinematic: Balls whose velocity no force changes, (n,), such as grains glued to a rough
+            floor, or a piston with the velocity that `set_state` gives it; none by default. They
+            may overlap one another and walls.
+        walls: A point of each wall and the normal to its free side, (m, 6), m; none by default.
+        terrain: A `Plane`, `SphereField`, `HeightField`, `TriangleMesh` or `Union`, or a list of
+            them, below the balls; none by default. Where it knows no ground, balls fall.
+        friction: Coulomb's coefficient between balls.
+        wall_friction: Coulomb's coefficient of balls on walls and terrain.
+        restitution: Newton's coefficient of all contacts, in [0, 1].
+        gravity: Gravity, (3,), m/s²; (0, -9.81, 0) by default.
+        time_step: Time step, s.
+        tolerance: Largest relative residual of the contact problem. Its velocities are also right
+            to 25 times that, in units of the root of gravity times the smallest radius; without
+            gravity that of 9.81 m/s².
+        max_iterations: Largest number of sweeps of the contact solver in a step.
+        stabilisation: "projection" moves overlapping bodies apart, which may add energy by lifting
+            those above; "none" leaves them. By default "none" without restitution and "projection"
+            with it.
+        penetration_tolerance: Overlap that projection leaves alone, m; 0.5% of the smallest radius
+            by default.
+        sleep: Whether balls at rest far from anything that moves are left out of the step.
+        sleep_speed: Speed below which a ball is at rest, m/s; 5e-4 by default.
+        sleep_distance: Distance within which nothing may move for a ball to sleep, m; 0.2 by
+            default.
+
+    Raises:
+        ModelError: A radius or mass is not finite and positive.
+        StateError: Positions have a wrong shape or an entry that is not finite, or balls, walls or
+            terrain overlap.
+        TerrainError: A wall has no direction, or `terrain` is not a terrain.
+        OptionError: An option is out of its range.
+    """
+
+    def __new__(
+        cls,
+        radius: npt.ArrayLike,
+        mass: npt.ArrayLike,
+        position: npt.ArrayLike,
+        *,
+        kinematic: npt.ArrayLike | None = None,
+        walls: npt.ArrayLike | None = None,
+        terrain: _Terrain | _Terrains | None = None,
+        friction: float = 0.5,
+        wall_friction: float = 0.5,
+        restitution: float = 0.0,
+        gravity: npt.ArrayLike | None = None,
+        time_step: float = 0.002,
+        tolerance: float = 0.001,
+        max_iterations: int = 2000,
+        stabilisation: Literal["projection", "none"] | None = None,
+        penetration_tolerance: float | None = None,
+        sleep: bool = False,
+        sleep_speed: float | None = None,
+        sleep_distance: float | None = None,
+    ) -> GrainSimulation: ...
+    @property
+    def time(self) -> float:
+        """Time since the last call of `set_state`, s."""
+    @property
+    def time_step(self) -> float:
+        """Time step, s."""
+    @property
+    def radius(self) -> _Array:
+        """Radii of the balls, (n,), m."""
+    @property
+    def mass(self) -> _Array:
+        """Masses of the balls, (n,), kg."""
+    @property
+    def position(self) -> _Array:
+        """Centres of the balls, (n, 3), m."""
+    @property
+    def velocity(self) -> _Array:
+        """Velocities of the centres, (n, 3), m/s."""
+    @property
+    def spin(self) -> _Array:
+        """Angular velocities of the balls, world frame, (n, 3), rad/s."""
+    @property
+    def kinematic(self) -> npt.NDArray[np.bool_]:
+        """Which balls are kinematic, (n,)."""
+    @property
+    def asleep(self) -> npt.NDArray[np.bool_]:
+        """Which balls sleep, (n,); kinematic ones always do."""
+    @property
+    def terrain(self) -> _Terrain | None:
+        """The terrain below the balls, or None."""
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The options of contacts, gravity and solver, by the names of the arguments."""
+    def set_state(
+        self,
+        position: npt.ArrayLike,
+        velocity: npt.ArrayLike | None = None,
+        spin: npt.ArrayLike | None = None,
+    ) -> None:
+        """Sets positions and velocities; time starts at 0.
+
+        Args:
+            position: Centres, (n, 3), m.
+            velocity: Velocities of the centres, (n, 3), m/s; at rest by default.
+            spin: Angular velocities, (n, 3), rad/s; at rest by default.
+
+        Raises:
+            StateError: An array has a wrong shape or an entry that is not finite, or bodies
+                overlap. Nothing has changed.
+        """
+    def remove(self, which: npt.ArrayLike) -> None:
+        """Takes balls out; the others keep their order.
+
+        Args:
+            which: Which balls go, (n,) truth values.
+
+        Raises:
+            ModelError: The number of truth values differs, or no ball would be left. Nothing has
+                changed.
+        """
+    def step(self, n: int = 1) -> StepReport:
+        """Takes n steps, as `Simulation.step` does.
+
+        Args:
+            n: Number of steps.
+
+        Returns:
+            How the steps went.
+
+        Raises:
+            StepError: A step could not be taken; the state before it stays.
+            OptionError: `n` is not a count.
+        """
+    @property
+    def contacts(self) -> GrainContacts:
+        """The contacts of the last step."""
+    def energy(self) -> Energy:
+        """Kinetic and potential energy now."""
+    def momentum(self) -> _Array:
+        """Momentum of the balls, (6,): along x, y, z, kg m/s, and about the origin, kg m²/s.
+
+        Kinematic balls do not count.
+        """
+    def penetration(self) -> float:
+        """Deepest overlap now, m."""
+    def wake(self) -> None:
+        """Wakes all balls."""
+    def snapshot(self) -> GrainSnapshot:
+        """Everything that is needed to continue bit for bit."""
+    def restore(self, snapshot: GrainSnapshot) -> None:
+        """Goes back to a snapshot.
+
+        Args:
+            snapshot: A snapshot of the same grains.
+
+        Raises:
+            StateError: The snapshot belongs to other grains or is damaged. Nothing has changed.
+        """
+
 def seed_generators(seeds: Sequence[int]) -> _Rows:
     """Seeds generators as `numpy.random.PCG64` does.
 
@@ -2943,6 +3171,43 @@ def soil_packing(
     Raises:
         ModelError: A number is not finite or out of its range, the radii are the wrong way round,
             or a disk does not fit.
+    """
+
+def ball_packing(
+    count: int,
+    *,
+    radius_min: float,
+    radius_max: float,
+    mass: float,
+    width: float,
+    depth: float,
+    left: float = 0.0,
+    back: float = 0.0,
+    bottom: float = 0.0,
+    seed: int = 0,
+) -> tuple[_Array, _Array, _Array]:
+    """Balls in loose layers over a rectangle, without overlap: where a bed starts from.
+
+    The radii are drawn evenly from their range.
+
+    Args:
+        count: Number of balls, at most 1 000 000.
+        radius_min: Smallest radius, m.
+        radius_max: Largest radius, m.
+        mass: Mass of a ball of the mean radius, kg; the others' go with their volume.
+        left: Smallest x, m.
+        width: Width of the rectangle along x, m.
+        back: Smallest z, m.
+        depth: Width of the rectangle along z, m.
+        bottom: Height of the lower edge, m.
+        seed: Seed of the random numbers; equal seeds give equal balls.
+
+    Returns:
+        Radii, (n,), m, masses, (n,), kg, and centres, (n, 3), m.
+
+    Raises:
+        ModelError: A number is not finite or out of its range, the radii are the wrong way round,
+            or a ball does not fit.
     """
 
 @final

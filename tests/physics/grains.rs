@@ -152,6 +152,7 @@ where
                     contacts: self.scratch.contacts(),
                     impulses: self.scratch.impulses(),
                     count: self.steps,
+                    movers: &[],
                 };
                 self.sleep.update(options, taken, &mut self.warm_start);
             }

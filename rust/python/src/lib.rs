@@ -4,7 +4,9 @@
 mod accuracy;
 mod arguments;
 mod arrays;
+mod balls;
 mod batch;
+mod bed_arguments;
 mod contacts;
 mod draw;
 mod elementary;
@@ -15,6 +17,7 @@ mod errors;
 mod files;
 mod friction_contact;
 mod generators;
+mod grains;
 mod ground;
 mod height_field;
 mod infos;
@@ -79,5 +82,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(generators::standard_normals, module)?)?;
     planar::register(module)?;
     planar_soil::register(module)?;
+    grains::register(module)?;
     Ok(())
 }

@@ -13,11 +13,14 @@ use rover_core::planar::{
 };
 use rover_core::problem::Operator;
 use rover_core::simulation::PlanarSimulation;
-use rover_core::system::{Apart, Composite, CompositeParts, Coupling, PlanarScratch, PlanarSystem};
+use rover_core::system::{
+    Apart, Composite, CompositeParts, Coupling, PlanarContact, PlanarScratch, PlanarSystem,
+};
 
 use crate::scenes::{G, VARIANTS, level, options};
 
 type Pair<const N: usize, const P: usize> = (SVector<f64, N>, SVector<f64, P>);
+type Both<'s, 'a> = (&'s PlanarSystem<'a, 3, Ball>, &'s PlanarSystem<'a, 3, Ball>);
 
 /// A machine on a ground under constant torques.
 struct Driven<const NV: usize, M> {
@@ -69,16 +72,16 @@ impl<const NV: usize, M: PlanarMachine<NV>> Driven<NV, M> {
 }
 
 /// Moves two machines as one system; asks after each step that its solve converged.
-fn together<const N: usize, const P: usize, A, B, K>(
-    (first, second): (&mut Driven<N, A>, &mut Driven<P, B>),
-    coupling: &K,
+fn together<'a, const N: usize, const P: usize, A, B, K>(
+    (first, second): (&'a mut Driven<N, A>, &'a mut Driven<P, B>),
+    coupling: K,
     (q, v): (&mut Pair<N, P>, &mut [f64]),
     options: &StepOptions,
     n: usize,
 ) where
     A: PlanarMachine<N>,
     B: PlanarMachine<P>,
-    K: Coupling<SVector<f64, N>, SVector<f64, P>>,
+    K: Coupling<PlanarSystem<'a, N, A>, PlanarSystem<'a, P, B>>,
 {
     let mut parts = CompositeParts::default();
     let mut system = Composite {
@@ -130,7 +133,7 @@ fn two_balls_apart_move_as_each_alone() {
         );
         let (mut q, mut v) = ((q_a, q_b), [v_a, v_b].concat());
         let both = (&mut first, &mut second);
-        together(both, &Apart, (&mut q, &mut v), &options, 500);
+        together(both, Apart, (&mut q, &mut v), &options, 500);
         assert!((q.0 - expected.0.0).amax() < 1e-12);
         assert!((q.1 - expected.1.0).amax() < 1e-12);
         let alone = [expected.0.1, expected.1.1].concat();
@@ -161,7 +164,7 @@ fn machines_of_two_kinds_move_as_each_alone() {
     let ball = second.alone(&q_b, &rest[..3], &options, 300);
     let (mut q, mut v) = ((q_a, q_b), vec![0.0; 8]);
     let both = (&mut first, &mut second);
-    together(both, &Apart, (&mut q, &mut v), &options, 300);
+    together(both, Apart, (&mut q, &mut v), &options, 300);
     assert!(q.0.x > 0.3, "drives: {}", q.0.x);
     // Both systems share the record of persistent impulses: when one lands, the other is of order 1
     // for a step.
@@ -172,6 +175,12 @@ fn machines_of_two_kinds_move_as_each_alone() {
 /// Two balls that collide.
 struct Meeting {
     radii: [f64; 2],
+    /// Where they are, in the middle and at the end of the step.
+    middle: Pair<3, 3>,
+    end: Pair<3, 3>,
+    /// Rows of Hᵀ and of Zᵀ of their contact (2 × 3), of each ball.
+    H: [[f64; 6]; 2],
+    Z: [[f64; 6]; 2],
 }
 
 /// Their contact.
@@ -191,8 +200,34 @@ impl UnilateralContact for Touch {
     }
 }
 
+/// `out += Hᵀ v` of one ball.
+fn add_rows(rows: &[f64; 6], v: &[f64], out: &mut [f64]) {
+    for (out, row) in out.iter_mut().zip(rows.chunks_exact(3)) {
+        *out += row.iter().zip(v).map(|(a, b)| a * b).sum::<f64>();
+    }
+}
+
+/// `out += H p` of one ball.
+fn add_columns(rows: &[f64; 6], p: &[f64], out: &mut [f64]) {
+    for (p, row) in p.iter().zip(rows.chunks_exact(3)) {
+        for (out, entry) in out.iter_mut().zip(row) {
+            *out += entry * p;
+        }
+    }
+}
+
 impl Meeting {
-    fn touch(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> Touch {
+    fn new(radii: [f64; 2]) -> Self {
+        Self {
+            radii,
+            middle: Pair::default(),
+            end: Pair::default(),
+            H: [[0.0; 6]; 2],
+            Z: [[0.0; 6]; 2],
+        }
+    }
+
+    fn touch(&self, (a, b): &Pair<3, 3>) -> Touch {
         let between = a.xy() - b.xy();
         let distance = between.norm();
         Touch {
@@ -202,35 +237,96 @@ impl Meeting {
     }
 }
 
-impl Coupling<Vector3<f64>, Vector3<f64>> for Meeting {
+impl<'a> Coupling<PlanarSystem<'a, 3, Ball>, PlanarSystem<'a, 3, Ball>> for Meeting {
     type Contact = Touch;
 
+    fn place_middle(&mut self, q: (&Vector3<f64>, &Vector3<f64>)) {
+        self.middle = (*q.0, *q.1);
+    }
+
+    fn place_end(&mut self, q: (&Vector3<f64>, &Vector3<f64>)) {
+        self.end = (*q.0, *q.1);
+    }
+
     fn detect(
-        &self,
-        (a, b): (&Vector3<f64>, &Vector3<f64>),
+        &mut self,
+        _systems: Both<'_, 'a>,
         (v_a, v_b): (&[f64], &[f64]),
         activation: Activation,
         out: &mut Vec<Touch>,
     ) {
-        let touch = self.touch(a, b);
+        let touch = self.touch(&self.middle);
         let u = Vector2::new(v_a[0] - v_b[0], v_a[1] - v_b[1]);
         if activation.admits(touch.gap, || touch.n.dot(&u)) {
             out.push(touch);
         }
     }
 
-    fn relocate(&self, (a, b): (&Vector3<f64>, &Vector3<f64>), contact: &mut Touch) {
-        *contact = self.touch(a, b);
+    fn relocate(&mut self, _systems: Both<'_, 'a>, contacts: &mut [Touch]) {
+        for contact in contacts {
+            *contact = self.touch(&self.end);
+        }
     }
 
-    fn rows(
-        &self,
-        _q: (&Vector3<f64>, &Vector3<f64>),
-        Touch { n, .. }: &Touch,
-        (a, b): (&mut [f64], &mut [f64]),
+    fn assemble(
+        &mut self,
+        (first, second): (&mut PlanarSystem<'a, 3, Ball>, &PlanarSystem<'a, 3, Ball>),
+        _of_second: &[PlanarContact],
+        contacts: &[Touch],
+        v: (&[f64], &[f64]),
+        u: &mut [f64],
     ) {
-        a.copy_from_slice(&[n.x, n.y, 0.0, n.y, -n.x, self.radii[0]]);
-        b.copy_from_slice(&[-n.x, -n.y, 0.0, -n.y, n.x, self.radii[1]]);
+        let [Touch { n, .. }] = contacts else {
+            return;
+        };
+        let [a, b] = self.radii;
+        self.H = [
+            [n.x, n.y, 0.0, n.y, -n.x, a],
+            [-n.x, -n.y, 0.0, -n.y, n.x, b],
+        ];
+        self.Z = self.H;
+        for row in self.Z[0].chunks_exact_mut(3) {
+            first.half_solve(row);
+        }
+        for row in self.Z[1].chunks_exact_mut(3) {
+            second.half_solve(row);
+        }
+        u.fill(0.0);
+        add_rows(&self.H[0], v.0, u);
+        add_rows(&self.H[1], v.1, u);
+    }
+
+    fn local(&self, _systems: Both<'_, 'a>, y: (&[f64], &[f64]), out: &mut [f64]) {
+        out.fill(0.0);
+        add_rows(&self.Z[0], y.0, out);
+        add_rows(&self.Z[1], y.1, out);
+    }
+
+    fn add_local_of_velocity(
+        &self,
+        _systems: Both<'_, 'a>,
+        _contacts: &[Touch],
+        v: (&[f64], &[f64]),
+        out: &mut [f64],
+    ) {
+        add_rows(&self.H[0], v.0, out);
+        add_rows(&self.H[1], v.1, out);
+    }
+
+    fn add_impulses(&self, _systems: Both<'_, 'a>, p: &[f64], y: (&mut [f64], &mut [f64])) {
+        add_columns(&self.Z[0], p, y.0);
+        add_columns(&self.Z[1], p, y.1);
+    }
+
+    fn add_generalized_impulse(
+        &self,
+        _systems: Both<'_, 'a>,
+        _contacts: &[Touch],
+        p: &[f64],
+        out: (&mut [f64], &mut [f64]),
+    ) {
+        add_columns(&self.H[0], p, out.0);
+        add_columns(&self.H[1], p, out.1);
     }
 }
 
@@ -244,9 +340,9 @@ fn collision(offset: f64, friction: f64, restitution: f64) -> (Pair<3, 3>, Vec<f
         Vector3::new(0.7, 5.0 + offset, 0.0),
     );
     let mut v = vec![2.0, 0.0, 1.0, -1.0, 0.0, 0.0];
-    let coupling = Meeting { radii: [0.3; 2] };
+    let coupling = Meeting::new([0.3; 2]);
     let both = (&mut first, &mut second);
-    together(both, &coupling, (&mut q, &mut v), &options, 200);
+    together(both, coupling, (&mut q, &mut v), &options, 200);
     (q, v)
 }
 
@@ -278,12 +374,12 @@ fn the_operator_between_is_the_sum_of_both_mobilities() {
     let options = options(0.0, 0.5, 0.0, 1e-3);
     let mut first = Driven::new(disc(), level(), &[0.0]);
     let mut second = Driven::new(Ball::new(5.0, 0.2, 0.1).unwrap(), level(), &[0.0]);
-    let coupling = Meeting { radii: [0.3, 0.2] };
+    let coupling = Meeting::new([0.3, 0.2]);
     let mut parts = CompositeParts::default();
     let mut system = Composite {
         first: first.system(),
         second: second.system(),
-        coupling: &coupling,
+        coupling,
         parts: &mut parts,
     };
     // The first also rests on the ground.

@@ -66,6 +66,26 @@ impl ContactSystem {
         contacts: &[Contact],
         v: &[f64],
     ) {
+        self.assemble_rows(model, kinematics, factor, contacts, v);
+        let n = contacts.len();
+        self.W.resize(9 * n * n, 0.0);
+        if self.spans.is_empty() {
+            self.fill_operator(n, |system, c, d| system.block_on_ground(model, c, d));
+        } else {
+            self.fill_operator(n, |system, c, d| system.block(model, c, d));
+            self.close_stops(contacts);
+        }
+    }
+
+    /// [`Self::assemble`] without W, which stays what it was.
+    pub fn assemble_rows(
+        &mut self,
+        model: &Model,
+        kinematics: &Kinematics,
+        factor: &FactoredMassMatrix,
+        contacts: &[Contact],
+        v: &[f64],
+    ) {
         let (n, w) = (contacts.len(), self.stride);
         self.bodies.clear();
         self.bodies.extend(contacts.iter().map(|c| c.body));
@@ -73,9 +93,8 @@ impl ContactSystem {
         self.unions.clear();
         self.Z.resize(n * w, [0.0; 4]);
         self.u.resize(3 * n, 0.0);
-        self.W.resize(9 * n * n, 0.0);
         for (c, contact) in contacts.iter().enumerate() {
-            if !matches!(contact.key.opposite, Opposite::Ground(_)) {
+            if matches!(contact.key.opposite, Opposite::Part(_) | Opposite::Stop) {
                 let u = match (limit::row(model, contact), contact.other) {
                     (Some(row), _) => self.stop(model, factor, row, v),
                     (None, Some(other)) => {
@@ -96,11 +115,16 @@ impl ContactSystem {
             self.u[3 * c..][..3].copy_from_slice(&u[..3]);
             factor.half_solve_path(path, rows);
         }
-        if self.spans.is_empty() {
-            self.fill_operator(n, |system, c, d| system.block_on_ground(model, c, d));
-        } else {
-            self.fill_operator(n, |system, c, d| system.block(model, c, d));
-            self.close_stops(contacts);
+    }
+
+    /// Appends the three rows n, t, b of Zᵀ of a contact, with zeros off its path (3 nv).
+    pub fn push_dense_rows(&self, model: &Model, c: usize, out: &mut Vec<f64>) {
+        let (nv, begin) = (model.nv(), out.len());
+        out.resize(begin + 3 * nv, 0.0);
+        for (k, z) in self.entries(model, c) {
+            for (row, z) in z[..3].iter().enumerate() {
+                out[begin + row * nv + k] = *z;
+            }
         }
     }
 

@@ -19,6 +19,8 @@ pub enum Opposite {
     Ground(u32),
     /// A part of another body, by its [`Part::code`].
     Part(u16),
+    /// A grain, by its number.
+    Grain(u32),
     /// None: a joint's stop ([`super::limit`]) has no shape.
     Stop,
 }
@@ -72,6 +74,19 @@ impl ContactKey {
         }
     }
 
+    /// Key of a part's feature on a grain.
+    ///
+    /// # Panics
+    /// If a part has more than 2^16 features.
+    #[must_use]
+    pub fn on_grain(part: Part, feature: usize, grain: u32) -> Self {
+        Self {
+            part: part.code(),
+            feature: narrow(feature),
+            opposite: Opposite::Grain(grain),
+        }
+    }
+
     /// Key of a feature of two parts.
     ///
     /// # Panics
@@ -110,7 +125,7 @@ pub struct Contact {
     pub part: Part,
     /// Body that carries the part.
     pub body: usize,
-    /// The other body; `None` for the ground or a joint's stop.
+    /// The other body of a model; `None` for the ground, a grain or a joint's stop.
     pub other: Option<OtherSide>,
     /// Contact point relative to the origin of the body's tree, world axes, m: on the ground the
     /// body's own point, between bodies the midpoint.

@@ -86,6 +86,17 @@ impl Part {
         }
     }
 
+    /// Name of the solid that carries it.
+    #[must_use]
+    pub fn name(self, model: &Model) -> &str {
+        match self {
+            Self::Wheel(i) => &model.description().wheels[i].solid,
+            Self::Box(i) => &model.boxes()[i].name,
+            Self::Sphere(i) => &model.spheres()[i].name,
+            Self::Limit(i, _) => &model.bodies()[model.joints()[i].body].name,
+        }
+    }
+
     /// Name of its material; empty for a joint at its stop.
     #[must_use]
     pub fn material(self, model: &Model) -> &str {

@@ -11,7 +11,7 @@ use crate::geometry::{PlacedShape, Primitive, Sphere, Terrain};
 use crate::multibody::{Kinematics, Model};
 
 /// Updates point, frame and gap of a contact to the poses of `kinematics`. For a joint's stop use
-/// [`super::relocate_limit`].
+/// [`super::relocate_limit`]; one with a grain stays as it is.
 pub fn relocate(
     model: &Model,
     kinematics: &Kinematics,
@@ -24,7 +24,7 @@ pub fn relocate(
             relocate_pair(model, kinematics, other, contact);
             return;
         }
-        (Opposite::Part(_), None) | (Opposite::Stop, _) => return,
+        (Opposite::Part(_), None) | (Opposite::Grain(_) | Opposite::Stop, _) => return,
     };
     let base = kinematics.origin(contact.body);
     let feature = usize::from(contact.key.feature) & !ON_SURFACE;

@@ -144,6 +144,7 @@ impl Audit {
     ) -> Verdict {
         system.normalise(&mut ws.end);
         let Some(before) = self.before else {
+            system.work(options, start, &ws.v);
             return Verdict::Sound;
         };
         ws.audited.energy = None;

@@ -170,6 +170,7 @@ where
             contacts: taken.scratch.contacts(),
             impulses: taken.scratch.impulses(),
             count: taken.memory.count,
+            movers: &[],
         };
         taken.memory.sleep.update(options, step, taken.warm_start);
     }

@@ -7,6 +7,7 @@
 //!   [contacts](rover_contacts), its [ordinary] steps and its [`reading`];
 //! - [`planar`]: a planar machine on a ground; [`grains`]: a bed of grains,
 //!   perhaps with a machine on it;
+//! - [`rover_in_grains`]: a rover and a bed of balls, stepped together;
 //! - [`batch`]: many rovers side by side, each with its [turn](turns); [`profile`]: time spent in each part of a step.
 
 pub mod active_contact;
@@ -22,6 +23,7 @@ pub mod reading;
 pub mod rover;
 pub mod rover_command;
 pub mod rover_contacts;
+pub mod rover_in_grains;
 mod rover_quick;
 pub mod scene;
 pub mod snapshot;
@@ -41,6 +43,7 @@ pub use planar::{
 pub use reading::{Look, ReadingLayout, ReadingScratch};
 pub use rover::{LastCall, Placement, RoverScene, RoverSimulation};
 pub use rover_command::RoverCommand;
+pub use rover_in_grains::{RoverInGrains, TogetherError};
 pub use scene::{DenseOperator, QuickStep, Scene, SceneKey, SceneScratch, StepTaken};
 pub use snapshot::Snapshot;
 pub use state::State;

@@ -1,15 +1,16 @@
 //! Two systems as one: block-diagonal M, the contacts of each, and possibly contacts between them.
 //!
-//! Each system runs its own code. A [`Coupling`] finds the contacts between the two and provides
-//! their rows of Hᵀ, which span both systems. With the factors of M̂ = diag(M̂_a, M̂_b)
+//! Each system runs its own code. A [`Coupling`] finds the contacts between the two and maps
+//! impulses at them to both systems and back. With the factors of M̂ = diag(M̂_a, M̂_b)
 //!
 //! ```text
 //! Z = diag(F_a, F_b)⁻ᵀ H,        W = Zᵀ Z.
 //! ```
 //!
 //! Without contacts between the two the problem is solved system by system, by each system's own
-//! method. Otherwise W is assembled dense, which suits the few contacts of machines rather than the
-//! thousands of a bed. A composite of composites holds more than two systems.
+//! method. Otherwise the coupling solves it, or W is assembled dense, which suits the few contacts
+//! of machines rather than the thousands of a bed. A composite of composites holds more than two
+//! systems.
 //!
 //! Decisions about a whole step apply to both systems: whether to repeat it, what the energy audit
 //! removes, and whether the last step's impulses serve as a forecast. Apart from that, two systems
@@ -68,36 +69,105 @@ where
 pub type ContactOf<A, B, K> = Of<
     <A as MechanicalSystem>::Contact,
     <B as MechanicalSystem>::Contact,
-    <K as Coupling<
-        <A as MechanicalSystem>::Configuration,
-        <B as MechanicalSystem>::Configuration,
-    >>::Contact,
+    <K as Coupling<A, B>>::Contact,
 >;
 
-/// Finds the contacts between two systems of configurations A and B. Normals point into the first.
-pub trait Coupling<A, B> {
+/// Contacts between two systems.
+///
+/// Both systems are placed, and their own contacts found and assembled, before the coupling is asked
+/// for the same. Local vectors hold its own contacts alone.
+pub trait Coupling<A: MechanicalSystem, B: MechanicalSystem> {
     /// A contact between them.
     type Contact: UnilateralContact + Clone;
 
+    /// The middle configurations of a step. By default the placed systems know enough.
+    fn place_middle(&mut self, _q: (&A::Configuration, &B::Configuration)) {}
+
+    /// The configurations of the step's end.
+    fn place_end(&mut self, _q: (&A::Configuration, &B::Configuration)) {}
+
     /// Finds the contacts of a step at the middle configurations, and appends them to `out`.
     fn detect(
-        &self,
-        q: (&A, &B),
+        &mut self,
+        systems: (&A, &B),
         v: (&[f64], &[f64]),
         activation: Activation,
         out: &mut Vec<Self::Contact>,
     );
 
-    /// Measures a contact again at the configurations of the step's end.
-    fn relocate(&self, q: (&A, &B), contact: &mut Self::Contact);
-
-    /// Rows of Hᵀ of a contact, d for each system, row-major: (d × nv) and
-    /// (d × nv), which come as zeros.
-    fn rows(&self, q: (&A, &B), contact: &Self::Contact, rows: (&mut [f64], &mut [f64]));
+    /// Measures contacts again at the configurations of the step's end.
+    fn relocate(&mut self, systems: (&A, &B), contacts: &mut [Self::Contact]);
 
     /// μ of a contact.
-    fn friction_coefficient(&self, options: &StepOptions, _contact: &Self::Contact) -> f64 {
+    fn friction_coefficient(
+        &self,
+        _systems: (&A, &B),
+        options: &StepOptions,
+        _contact: &Self::Contact,
+    ) -> f64 {
         options.friction_coefficient
+    }
+
+    /// See [`MechanicalSystem::normal_shift`].
+    fn normal_shift(
+        &self,
+        _systems: (&A, &B),
+        options: &StepOptions,
+        _contact: &Self::Contact,
+        u_N_before: f64,
+    ) -> f64 {
+        rebound(options.restitution, u_N_before)
+    }
+
+    /// Builds H and Z of the contacts, and `u = Hᵀ v`, m/s. `of_second`: the contacts of the second
+    /// system alone.
+    fn assemble(
+        &mut self,
+        systems: (&mut A, &B),
+        of_second: &[B::Contact],
+        contacts: &[Self::Contact],
+        v: (&[f64], &[f64]),
+        u: &mut [f64],
+    );
+
+    /// `out = Zᵀ y`, m/s.
+    fn local(&self, systems: (&A, &B), y: (&[f64], &[f64]), out: &mut [f64]);
+
+    /// `out += Hᵀ v`, m/s.
+    fn add_local_of_velocity(
+        &self,
+        systems: (&A, &B),
+        contacts: &[Self::Contact],
+        v: (&[f64], &[f64]),
+        out: &mut [f64],
+    );
+
+    /// `y += Z p`, with p in N s.
+    fn add_impulses(&self, systems: (&A, &B), p: &[f64], y: (&mut [f64], &mut [f64]));
+
+    /// `out += H p`, N s and N m s.
+    fn add_generalized_impulse(
+        &self,
+        systems: (&A, &B),
+        contacts: &[Self::Contact],
+        p: &[f64],
+        out: (&mut [f64], &mut [f64]),
+    );
+
+    /// Solves all contacts: the first system's, the second's, those between. None if the dense
+    /// problem will do. Called only where there are contacts between.
+    #[allow(clippy::too_many_arguments)] // a problem and its answer
+    fn solve(
+        &self,
+        _systems: (&A, &B),
+        _q: &[f64],
+        _mu: &[f64],
+        _options: &SolverOptions,
+        _p: &mut [f64],
+        _u: &mut [f64],
+        _workspace: &mut SolverWorkspace,
+    ) -> Option<SolveReport> {
+        None
     }
 }
 
@@ -121,61 +191,74 @@ impl UnilateralContact for Never {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Apart;
 
-impl<A, B> Coupling<A, B> for Apart {
+impl<A: MechanicalSystem, B: MechanicalSystem> Coupling<A, B> for Apart {
     type Contact = Never;
 
     fn detect(
-        &self,
-        _q: (&A, &B),
+        &mut self,
+        _systems: (&A, &B),
         _v: (&[f64], &[f64]),
         _activation: Activation,
         _out: &mut Vec<Never>,
     ) {
     }
 
-    fn relocate(&self, _q: (&A, &B), contact: &mut Never) {
-        match *contact {}
+    fn relocate(&mut self, _systems: (&A, &B), _contacts: &mut [Never]) {}
+
+    fn assemble(
+        &mut self,
+        _systems: (&mut A, &B),
+        _of_second: &[B::Contact],
+        _contacts: &[Never],
+        _v: (&[f64], &[f64]),
+        _u: &mut [f64],
+    ) {
     }
 
-    fn rows(&self, _q: (&A, &B), contact: &Never, _rows: (&mut [f64], &mut [f64])) {
-        match *contact {}
+    fn local(&self, _systems: (&A, &B), _y: (&[f64], &[f64]), _out: &mut [f64]) {}
+
+    fn add_local_of_velocity(
+        &self,
+        _systems: (&A, &B),
+        _contacts: &[Never],
+        _v: (&[f64], &[f64]),
+        _out: &mut [f64],
+    ) {
+    }
+
+    fn add_impulses(&self, _systems: (&A, &B), _p: &[f64], _y: (&mut [f64], &mut [f64])) {}
+
+    fn add_generalized_impulse(
+        &self,
+        _systems: (&A, &B),
+        _contacts: &[Never],
+        _p: &[f64],
+        _out: (&mut [f64], &mut [f64]),
+    ) {
     }
 }
 
-/// Scratch of a composite: contacts sorted by system, and the rows of those between.
+/// Scratch of a composite: contacts sorted by system, and the dense W.
 #[derive(Clone, Debug)]
-pub struct CompositeParts<Q, A, B, K> {
-    middle: Option<Q>,
-    end: Option<Q>,
+pub struct CompositeParts<A, B, K> {
     first: Vec<A>,
     second: Vec<B>,
     between: Vec<K>,
-    /// Rows of Hᵀ of the contacts between (d × nv each).
-    H: Vec<f64>,
-    /// Their rows of Zᵀ.
-    Z: Vec<f64>,
-    /// Rows of one contact, of each system.
-    rows: [Vec<f64>; 2],
     W: OnceLock<Vec<f64>>,
 }
 
-impl<Q, A, B, K> Default for CompositeParts<Q, A, B, K> {
+impl<A, B, K> Default for CompositeParts<A, B, K> {
     fn default() -> Self {
         Self {
-            middle: None,
-            end: None,
             first: Vec::new(),
             second: Vec::new(),
             between: Vec::new(),
-            H: Vec::new(),
-            Z: Vec::new(),
-            rows: Default::default(),
             W: OnceLock::new(),
         }
     }
 }
 
-impl<Q, A: Clone, B: Clone, K: Clone> CompositeParts<Q, A, B, K> {
+impl<A: Clone, B: Clone, K: Clone> CompositeParts<A, B, K> {
     /// Sorts contacts by system.
     fn sort(&mut self, contacts: &[Of<A, B, K>]) {
         self.first.clear();
@@ -202,16 +285,9 @@ impl<Q, A: Clone, B: Clone, K: Clone> CompositeParts<Q, A, B, K> {
 
 /// Scratch of a composite of these systems.
 pub type PartsOf<A, B, K> = CompositeParts<
-    (
-        <A as MechanicalSystem>::Configuration,
-        <B as MechanicalSystem>::Configuration,
-    ),
     <A as MechanicalSystem>::Contact,
     <B as MechanicalSystem>::Contact,
-    <K as Coupling<
-        <A as MechanicalSystem>::Configuration,
-        <B as MechanicalSystem>::Configuration,
-    >>::Contact,
+    <K as Coupling<A, B>>::Contact,
 >;
 
 /// Two systems and their coupling.
@@ -219,39 +295,23 @@ pub struct Composite<'a, A, B, K>
 where
     A: MechanicalSystem,
     B: MechanicalSystem,
-    K: Coupling<A::Configuration, B::Configuration>,
+    K: Coupling<A, B>,
 {
     /// The first.
     pub first: A,
     /// The second.
     pub second: B,
     /// The coupling.
-    pub coupling: &'a K,
+    pub coupling: K,
     /// Scratch.
     pub parts: &'a mut PartsOf<A, B, K>,
-}
-
-/// The configurations at which a composite was placed.
-fn placed<Q>(q: Option<&Q>) -> &Q {
-    q.unwrap_or_else(|| panic!("invariant: a step places its systems before it finds contacts"))
-}
-
-fn keep<Q: Clone>(place: &mut Option<Q>, q: &Q) {
-    match place {
-        Some(own) => own.clone_from(q),
-        None => *place = Some(q.clone()),
-    }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 impl<A, B, K> Composite<'_, A, B, K>
 where
     A: MechanicalSystem,
     B: MechanicalSystem,
-    K: Coupling<A::Configuration, B::Configuration>,
+    K: Coupling<A, B>,
     A::Contact: Clone,
     B::Contact: Clone,
 {
@@ -262,6 +322,10 @@ where
         );
         A::DIMENSION.components()
     };
+
+    fn systems(&self) -> (&A, &B) {
+        (&self.first, &self.second)
+    }
 
     /// Numbers of local components of each system's contacts.
     fn counts(&self) -> [usize; 2] {
@@ -282,11 +346,6 @@ where
         let (first, rest) = local.split_at_mut(a);
         let (second, between) = rest.split_at_mut(b);
         [first, second, between]
-    }
-
-    /// Rows of Hᵀ or Zᵀ of the contacts between.
-    fn rows<'m>(&self, matrix: &'m [f64]) -> impl Iterator<Item = &'m [f64]> + use<'m, A, B, K> {
-        matrix.chunks_exact(self.nv().max(1))
     }
 
     /// The part of each system of a vector, and of one to be written.
@@ -323,7 +382,7 @@ where
     fn operator(&self) -> &[f64] {
         self.parts.W.get_or_init(|| {
             let [a, b] = self.counts();
-            let n = a + b + self.parts.Z.len() / self.nv().max(1);
+            let n = a + b + Self::D * self.parts.between.len();
             let (mut W, mut p) = (vec![0.0; n * n], vec![0.0; n]);
             let (mut y, mut column) = (vec![0.0; self.nv()], vec![0.0; n]);
             for j in 0..n {
@@ -361,7 +420,7 @@ impl<A, B, K> MechanicalSystem for Composite<'_, A, B, K>
 where
     A: MechanicalSystem,
     B: MechanicalSystem,
-    K: Coupling<A::Configuration, B::Configuration>,
+    K: Coupling<A, B>,
     A::Contact: Clone,
     B::Contact: Clone,
 {
@@ -404,13 +463,13 @@ where
     fn place_middle(&mut self, q: &Self::Configuration) {
         self.first.place_middle(&q.0);
         self.second.place_middle(&q.1);
-        keep(&mut self.parts.middle, q);
+        self.coupling.place_middle((&q.0, &q.1));
     }
 
     fn place_end(&mut self, q: &Self::Configuration) {
         self.first.place_end(&q.0);
         self.second.place_end(&q.1);
-        keep(&mut self.parts.end, q);
+        self.coupling.place_end((&q.0, &q.1));
     }
 
     fn detect(&mut self, v: &[f64], activation: Activation, out: &mut Vec<Self::Contact>) {
@@ -418,10 +477,12 @@ where
         let parts = &mut *self.parts;
         self.first.detect(v_a, activation, &mut parts.first);
         self.second.detect(v_b, activation, &mut parts.second);
+        // The order of the keys, in which the last step's impulses are looked up.
+        parts.second.sort_by_key(UnilateralContact::key);
         parts.between.clear();
-        let (q_a, q_b) = placed(parts.middle.as_ref());
+        let systems = (&self.first, &self.second);
         self.coupling
-            .detect((q_a, q_b), (v_a, v_b), activation, &mut parts.between);
+            .detect(systems, (v_a, v_b), activation, &mut parts.between);
         out.clear();
         out.extend(parts.listed());
     }
@@ -436,10 +497,8 @@ where
         parts.sort(contacts);
         self.first.relocate(&mut parts.first);
         self.second.relocate(&mut parts.second);
-        let (q_a, q_b) = placed(parts.end.as_ref());
-        for contact in &mut parts.between {
-            self.coupling.relocate((q_a, q_b), contact);
-        }
+        let systems = (&self.first, &self.second);
+        self.coupling.relocate(systems, &mut parts.between);
         for (place, contact) in contacts.iter_mut().zip(parts.listed()) {
             *place = contact;
         }
@@ -449,7 +508,11 @@ where
         match contact {
             Of::First(contact) => self.first.friction_coefficient(options, contact),
             Of::Second(contact) => self.second.friction_coefficient(options, contact),
-            Of::Between(contact) => self.coupling.friction_coefficient(options, contact),
+            Of::Between(contact) => {
+                let systems = self.systems();
+                self.coupling
+                    .friction_coefficient(systems, options, contact)
+            }
         }
     }
 
@@ -616,41 +679,21 @@ where
 
     fn assemble(&mut self, contacts: &[Self::Contact], v: &[f64], u: &mut [f64]) {
         self.parts.sort(contacts);
-        let (n_a, n_b) = (self.first.nv(), self.second.nv());
-        let (v_a, v_b) = v.split_at(n_a);
+        let (v_a, v_b) = v.split_at(self.first.nv());
         let [a, b] = self.counts();
         let (u_a, rest) = u.split_at_mut(a);
         let (u_b, between) = rest.split_at_mut(b);
         let parts = &mut *self.parts;
+        parts.W.take();
         self.first.assemble(&parts.first, v_a, u_a);
         self.second.assemble(&parts.second, v_b, u_b);
-        parts.W.take();
-        parts.H.clear();
-        parts.H.resize(between.len() * (n_a + n_b), 0.0);
-        let [rows_a, rows_b] = &mut parts.rows;
-        let (q_a, q_b) = placed(parts.end.as_ref());
-        let places = parts.H.chunks_exact_mut(Self::D * (n_a + n_b));
-        for (contact, place) in parts.between.iter().zip(places) {
-            rows_a.clear();
-            rows_a.resize(Self::D * n_a, 0.0);
-            rows_b.clear();
-            rows_b.resize(Self::D * n_b, 0.0);
-            self.coupling.rows((q_a, q_b), contact, (rows_a, rows_b));
-            let rows = rows_a.chunks_exact(n_a).zip(rows_b.chunks_exact(n_b));
-            for (place, (row_a, row_b)) in place.chunks_exact_mut(n_a + n_b).zip(rows) {
-                place[..n_a].copy_from_slice(row_a);
-                place[n_a..].copy_from_slice(row_b);
-            }
-        }
-        parts.Z.clone_from(&parts.H);
-        for row in parts.Z.chunks_exact_mut(n_a + n_b) {
-            let (row_a, row_b) = row.split_at_mut(n_a);
-            self.first.half_solve(row_a);
-            self.second.half_solve(row_b);
-        }
-        for (u, row) in between.iter_mut().zip(parts.H.chunks_exact(n_a + n_b)) {
-            *u = dot(row, v);
-        }
+        self.coupling.assemble(
+            (&mut self.first, &self.second),
+            &parts.second,
+            &parts.between,
+            (v_a, v_b),
+            between,
+        );
     }
 
     fn local(&self, y: &[f64], out: &mut [f64]) {
@@ -658,20 +701,18 @@ where
         let [out_a, out_b, between] = self.split_mut(out);
         self.first.local(y_a, out_a);
         self.second.local(y_b, out_b);
-        for (out, row) in between.iter_mut().zip(self.rows(&self.parts.Z)) {
-            *out = dot(row, y);
-        }
+        self.coupling.local(self.systems(), (y_a, y_b), between);
     }
 
     fn add_local_of_velocity(&self, _contacts: &[Self::Contact], v: &[f64], out: &mut [f64]) {
         let (v_a, v_b) = v.split_at(self.first.nv());
         let [out_a, out_b, between] = self.split_mut(out);
-        let (first, second) = (&self.parts.first, &self.parts.second);
-        self.first.add_local_of_velocity(first, v_a, out_a);
-        self.second.add_local_of_velocity(second, v_b, out_b);
-        for (out, row) in between.iter_mut().zip(self.rows(&self.parts.H)) {
-            *out += dot(row, v);
-        }
+        let parts = &*self.parts;
+        self.first.add_local_of_velocity(&parts.first, v_a, out_a);
+        self.second.add_local_of_velocity(&parts.second, v_b, out_b);
+        let systems = self.systems();
+        self.coupling
+            .add_local_of_velocity(systems, &parts.between, (v_a, v_b), between);
     }
 
     fn add_impulses(&self, p: &[f64], y: &mut [f64]) {
@@ -679,16 +720,19 @@ where
         let (y_a, y_b) = y.split_at_mut(self.first.nv());
         self.first.add_impulses(p_a, y_a);
         self.second.add_impulses(p_b, y_b);
-        add_rows(between, self.rows(&self.parts.Z), y);
+        let systems = self.systems();
+        self.coupling.add_impulses(systems, between, (y_a, y_b));
     }
 
     fn generalized_impulse(&self, _contacts: &[Self::Contact], p: &[f64], out: &mut [f64]) {
         let [p_a, p_b, between] = self.split(p);
         let (out_a, out_b) = out.split_at_mut(self.first.nv());
-        let (first, second) = (&self.parts.first, &self.parts.second);
-        self.first.generalized_impulse(first, p_a, out_a);
-        self.second.generalized_impulse(second, p_b, out_b);
-        add_rows(between, self.rows(&self.parts.H), out);
+        let parts = &*self.parts;
+        self.first.generalized_impulse(&parts.first, p_a, out_a);
+        self.second.generalized_impulse(&parts.second, p_b, out_b);
+        let systems = self.systems();
+        self.coupling
+            .add_generalized_impulse(systems, &parts.between, between, (out_a, out_b));
     }
 
     fn problem<'a>(&'a self, q: &'a [f64], mu: &'a [f64]) -> FrictionContactProblem<'a> {
@@ -699,7 +743,11 @@ where
         match contact {
             Of::First(contact) => self.first.normal_shift(options, contact, u_N_before),
             Of::Second(contact) => self.second.normal_shift(options, contact, u_N_before),
-            Of::Between(_) => rebound(options.restitution, u_N_before),
+            Of::Between(contact) => {
+                let systems = self.systems();
+                self.coupling
+                    .normal_shift(systems, options, contact, u_N_before)
+            }
         }
     }
 
@@ -716,8 +764,14 @@ where
         u: &mut [f64],
         workspace: &mut SolverWorkspace,
     ) -> SolveReport {
-        if !self.parts.between.is_empty() {
-            return solve(&self.problem(q, mu), options, p, u, workspace);
+        let is_apart = self.parts.between.is_empty();
+        if !is_apart {
+            let systems = self.systems();
+            let coupled = self
+                .coupling
+                .solve(systems, q, mu, options, p, u, workspace);
+            return coupled
+                .unwrap_or_else(|| solve(&self.problem(q, mu), options, p, u, workspace));
         }
         let (mu_a, mu_b) = mu.split_at(self.parts.first.len());
         let [q_a, q_b, _] = self.split(q);
@@ -732,14 +786,5 @@ where
     fn displacement(&self, y: &[f64]) -> f64 {
         let (y_a, y_b) = y.split_at(self.first.nv());
         (self.first.displacement(y_a)).max(self.second.displacement(y_b))
-    }
-}
-
-/// `out += Σ row p`.
-fn add_rows<'m>(p: &[f64], rows: impl Iterator<Item = &'m [f64]>, out: &mut [f64]) {
-    for (p, row) in p.iter().zip(rows) {
-        for (out, entry) in out.iter_mut().zip(row) {
-            *out += entry * p;
-        }
     }
 }

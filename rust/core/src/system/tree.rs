@@ -53,10 +53,10 @@ pub struct DriveAction {
 /// Poses, matrices and momenta of a tree: scratch, allocated once.
 #[derive(Clone, Debug)]
 pub struct TreeScratch {
-    kinematics: Kinematics,
-    kinematics_end: Kinematics,
+    pub(super) kinematics: Kinematics,
+    pub(super) kinematics_end: Kinematics,
     mass_matrix: MassMatrix,
-    factor: FactoredMassMatrix,
+    pub(super) factor: FactoredMassMatrix,
     bias_scratch: BiasScratch,
     momenta: Vec<Momentum>,
     momenta_end: Vec<Momentum>,
@@ -75,7 +75,7 @@ pub struct TreeScratch {
     /// has a stop.
     joints_middle: Vec<f64>,
     joints_end: Vec<f64>,
-    system: ContactSystem,
+    pub(super) system: ContactSystem,
 }
 
 impl TreeScratch {
@@ -170,7 +170,7 @@ impl TreeSystem<'_> {
         let opposite = match (contact.key.opposite, contact.other) {
             (Opposite::Ground(primitive), _) => self.terrain.material(primitive),
             (Opposite::Part(_), Some(other)) => other.part.material(self.model),
-            (Opposite::Part(_), None) | (Opposite::Stop, _) => return None,
+            (Opposite::Part(_), None) | (Opposite::Grain(_) | Opposite::Stop, _) => return None,
         };
         options.materials.between(own, opposite)
     }
@@ -323,7 +323,7 @@ impl MechanicalSystem for TreeSystem<'_> {
     fn friction_coefficient(&self, options: &StepOptions, contact: &Contact) -> f64 {
         match contact.key.opposite {
             Opposite::Stop => 0.0,
-            Opposite::Ground(_) | Opposite::Part(_) => {
+            Opposite::Ground(_) | Opposite::Part(_) | Opposite::Grain(_) => {
                 let of_pair = self.between_materials(options, contact);
                 of_pair.map_or(options.friction_coefficient, |[mu, _]| mu)
             }

@@ -209,6 +209,12 @@ impl<const D: usize> BodyPairs<D> {
             }
             out[r] += if r == 0 { normal } else { tangential };
         }
+        // A joint's stop has no tangent: any tangential mobility will do.
+        for k in 1..D {
+            if block[k][k] == 0.0 {
+                block[k][k] = block[0][0];
+            }
+        }
         block
     }
 

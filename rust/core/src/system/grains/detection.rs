@@ -39,17 +39,43 @@ struct Seeker<const D: usize> {
     velocity: SVector<f64, D>,
 }
 
-/// Range of detection: pairs that may close within the step or come within the skin.
-#[derive(Clone, Copy)]
-struct Rule {
-    reach: f64,
-    lead: f64,
-    skin: f64,
+/// How far detection looks in a step.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::system) struct Search {
+    /// s.
+    pub lead: f64,
+    /// Speed of the fastest body, rim included, m/s.
+    pub fastest: f64,
+    /// Gap below which a pair is a contact, m.
+    pub skin: f64,
+    /// Gap up to which pairs are looked at, m.
+    pub reach: f64,
 }
 
-impl Rule {
+impl Search {
+    /// For bodies of these radii (smallest and largest, m), the fastest of this speed.
+    pub fn new(activation: &Activation, [smallest, largest]: [f64; 2], fastest: f64) -> Self {
+        let lead = activation.lead.abs();
+        // Bodies that the fastest grain can reach within the step are contacts too, even if they
+        // are not yet approaching.
+        let skin = (SKIN * smallest)
+            .max(lead * fastest)
+            .min(FARTHEST_SKIN * smallest)
+            .max(activation.hover);
+        // Two bodies approach by at most twice that; the search ends at a diameter (a longer step
+        // is too long).
+        let reach = (skin + 2.0 * lead * fastest).min(2.0 * largest);
+        Self {
+            lead,
+            fastest,
+            skin,
+            reach,
+        }
+    }
+
+    /// Whether a pair is a contact of the step.
     #[inline]
-    fn admits(&self, gap: f64, u_N: f64) -> bool {
+    pub fn admits(&self, gap: f64, u_N: f64) -> bool {
         gap + self.lead * u_N.min(0.0) <= self.skin
     }
 }
@@ -138,7 +164,6 @@ where
         let mut grid = std::mem::take(&mut self.parts.grid);
         let scene = self.scene;
         let (radius, largest) = (scene.grains.radius(), scene.grains.largest());
-        let lead = activation.lead.abs();
         let sum = |x: &[f64]| x[1..].iter().fold(x[0].abs(), |sum, x| sum + x.abs());
         let mut fastest = v[..V * n]
             .chunks_exact(V)
@@ -162,17 +187,9 @@ where
                 });
             }
         }
-        // Bodies that the fastest grain can reach within the step are contacts too, even if they
-        // are not yet approaching.
-        let smallest = scene.grains.smallest();
-        let skin = (SKIN * smallest)
-            .max(lead * fastest)
-            .min(FARTHEST_SKIN * smallest);
-        let skin = skin.max(activation.hover);
-        // Two bodies approach by at most twice that; the search ends at a diameter (a longer step
-        // is too long).
-        let reach = (skin + 2.0 * lead * fastest).min(2.0 * largest);
-        let rule = Rule { reach, lead, skin };
+        let rule = Search::new(&activation, [scene.grains.smallest(), largest], fastest);
+        let reach = rule.reach;
+        self.parts.search = rule;
         grid.fill(&q, radius, 2.0 * largest + reach);
         #[allow(clippy::cast_possible_truncation)] // grains are numbered by u32
         for i in 0..n as u32 {
@@ -204,7 +221,7 @@ where
     }
 
     /// Adds the contacts of a round body with walls and ground.
-    fn meet_fixed(&mut self, seeker: &Seeker<D>, rule: &Rule, out: &mut Vec<GrainContact<D>>) {
+    fn meet_fixed(&mut self, seeker: &Seeker<D>, rule: &Search, out: &mut Vec<GrainContact<D>>) {
         let mut push = |b: u32, n: SVector<f64, D>, gap: f64| {
             if rule.admits(gap, n.dot(&seeker.velocity)) {
                 out.push(seeker.contact(b, n, gap));
@@ -266,7 +283,7 @@ fn meet_grains<'a, const D: usize>(
     seeker: &Seeker<D>,
     found: impl Iterator<Item = &'a Neighbour<D>>,
     v: &[f64],
-    rule: &Rule,
+    rule: &Search,
     out: &mut Vec<GrainContact<D>>,
 ) {
     for other in found {

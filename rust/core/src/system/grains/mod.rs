@@ -23,7 +23,7 @@
 
 pub mod bodies;
 pub mod contact;
-mod detection;
+pub(in crate::system) mod detection;
 pub mod error;
 pub mod grid;
 pub mod machine;
@@ -38,10 +38,11 @@ pub mod wall;
 pub use bodies::{COORDINATES, Grains, MAX_GRAINS};
 pub use contact::{GrainContact, GrainKey};
 pub use error::GrainError;
+pub use grid::Grid;
 pub use machine::{Machine, Wheel};
 pub use packing::Packing;
 pub use removal::Renumbering;
 pub use scene::{GrainFriction, GrainScene, OVERLAP};
-pub use sleep::{Sleep, SleepOptions, StepTaken};
+pub use sleep::{Mover, Sleep, SleepOptions, StepTaken};
 pub use system::{GrainParts, GrainSystem};
 pub use wall::Wall;

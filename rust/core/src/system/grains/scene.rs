@@ -38,7 +38,7 @@ impl Default for GrainFriction {
 impl GrainFriction {
     /// # Errors
     /// A coefficient that is not finite or negative.
-    fn check(&self) -> Result<(), QuantityError> {
+    pub fn check(&self) -> Result<(), QuantityError> {
         for (field, value) in [
             ("friction", self.grains),
             ("wall_friction", self.walls),

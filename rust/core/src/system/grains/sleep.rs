@@ -112,6 +112,19 @@ pub struct StepTaken<'a, const D: usize> {
     pub impulses: &'a [f64],
     /// How many steps have been taken.
     pub count: usize,
+    /// What moves among the grains, beside the scene's machine.
+    pub movers: &'a [Mover<D>],
+}
+
+/// Something that moves among grains.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mover<const D: usize> {
+    /// m.
+    pub centre: SVector<f64, D>,
+    /// Of a ball that holds it, m.
+    pub radius: f64,
+    /// Speed of its fastest point, m/s.
+    pub speed: f64,
 }
 
 impl Sleep {
@@ -187,6 +200,7 @@ impl Sleep {
             contacts,
             impulses,
             count,
+            movers,
         } = step;
         let (n, V) = (scene.grains.len(), body_velocities(D));
         let kinematic = scene.grains.kinematic();
@@ -229,7 +243,7 @@ impl Sleep {
             self.still[grain] = 0;
         }
         if looks {
-            let near = self.near_movers(options, scene, q, v);
+            let near = self.near_movers(options, scene, (q, v), movers);
             for i in (0..n).filter(|i| !kinematic[*i]) {
                 if near[i] {
                     if self.asleep[i] {
@@ -252,14 +266,21 @@ impl Sleep {
         &self,
         options: &SleepOptions,
         scene: &GrainScene<D>,
-        q: &[f64],
-        v: &[f64],
+        (q, v): (&[f64], &[f64]),
+        movers: &[Mover<D>],
     ) -> Vec<bool> {
         let n = scene.grains.len();
         let mut marks = Marks::<D>::new(n, options.distance);
         let centre = |i: usize| SVector::from_fn(|k, _| q[COORDINATES * i + k]);
         for i in (0..n).filter(|i| self.still[*i] == 0) {
             marks.mark(&centre(i), 1);
+        }
+        let mut mark = |centre: &SVector<f64, D>, radius: f64| {
+            let cells = 1 + marks.cell(radius + options.distance);
+            marks.mark(centre, cells.min(MOST_CELLS));
+        };
+        for mover in movers.iter().filter(|m| m.speed >= options.speed) {
+            mark(&mover.centre, mover.radius);
         }
         if let Some(machine) = scene.machine.as_deref() {
             let own = (&q[COORDINATES * n..], &v[body_velocities(D) * n..]);
@@ -272,8 +293,7 @@ impl Sleep {
                     velocity.norm()
                 };
                 if speed(&wheel.centre).max(speed(&below)) >= options.speed {
-                    let cells = 1 + marks.cell(wheel.radius + options.distance);
-                    marks.mark(&wheel.centre, cells.min(MOST_CELLS));
+                    mark(&wheel.centre, wheel.radius);
                 }
             }
         }

@@ -7,7 +7,7 @@ use nalgebra::SVector;
 
 use super::bodies::COORDINATES;
 use super::contact::{GrainContact, GrainKey, WALL};
-use super::detection::Neighbour;
+use super::detection::{Neighbour, Search};
 use super::grid::Grid;
 use super::machine::{Machine, MachineParts};
 use super::scene::GrainScene;
@@ -28,12 +28,14 @@ const NOWHERE: u32 = 0;
 /// Matrices of a step: scratch.
 #[derive(Debug, Default)]
 pub struct GrainParts<const D: usize> {
-    pub(super) middle: Vec<f64>,
-    pub(super) end: Vec<f64>,
-    pub(super) grid: Grid<D>,
+    pub(in crate::system) middle: Vec<f64>,
+    pub(in crate::system) end: Vec<f64>,
+    pub(in crate::system) grid: Grid<D>,
+    /// How far detection looked in the last step.
+    pub(in crate::system) search: Search,
     pub(super) found: Vec<Neighbour<D>>,
     pub(super) facing: Vec<Facing<D>>,
-    pub(super) pairs: BodyPairs<D>,
+    pub(in crate::system) pairs: BodyPairs<D>,
     pub(super) machine: MachineParts,
     /// W, assembled on request.
     operator: OnceLock<BlockSparseDelassus>,
@@ -106,6 +108,59 @@ impl<const D: usize> GrainSystem<'_, D> {
         self.scene.grains.len()
     }
 
+    /// A pair of nothing that moves, as the machine's side, with a grain, or with none.
+    pub(in crate::system) fn pair_with(
+        &self,
+        grain: Option<u32>,
+        frame: &[SVector<f64, D>; D],
+    ) -> RoundPair<D> {
+        let nothing = (NOWHERE, 0.0, 0.0);
+        let (at, c, s) = grain.map_or(nothing, |grain| side(self.scene, self.asleep, grain));
+        RoundPair {
+            bodies: [NOWHERE, at],
+            frame: frame.map(Into::into),
+            linear: [0.0, c],
+            angular: [0.0, s],
+        }
+    }
+
+    /// Subtracts the velocity of a grain's rim that faces along n, in a contact's frame.
+    pub(in crate::system) fn subtract_rim(
+        &self,
+        grain: u32,
+        v: &[f64],
+        frame: &[SVector<f64, D>; D],
+        u: &mut [f64],
+    ) {
+        let (i, V) = (grain as usize, body_velocities(D));
+        let radius = self.scene.grains.radius()[i];
+        let mut rim = SVector::zeros();
+        add_rim_velocity(&v[V * i..V * (i + 1)], -radius, &frame[0], -1.0, &mut rim);
+        for (u, direction) in u.iter_mut().zip(frame) {
+            *u += direction.dot(&rim);
+        }
+    }
+
+    /// `out += H p` of one impulse that pushes a grain from the side that n points to.
+    pub(in crate::system) fn push_grain(
+        &self,
+        grain: u32,
+        frame: &[SVector<f64, D>; D],
+        p: &[f64; D],
+        out: &mut [f64],
+    ) {
+        let (i, V) = (grain as usize, body_velocities(D));
+        let out = &mut out[V * i..V * (i + 1)];
+        let radius = self.scene.grains.radius()[i];
+        let turn = moment(frame, p);
+        for k in 0..D {
+            out[k] -= (0..D).map(|r| frame[r][k] * p[r]).sum::<f64>();
+        }
+        for k in D..V {
+            out[k] += radius * turn[k - D];
+        }
+    }
+
     /// μ of a contact.
     fn friction_of(&self, key: GrainKey) -> f64 {
         let friction = &self.scene.friction;
@@ -129,6 +184,19 @@ impl<const D: usize> GrainSystem<'_, D> {
                 *y /= J;
             }
         }
+    }
+}
+
+/// Place of a body's factor coordinates, and their c and s: nowhere and 0 for what does not move.
+fn side<const D: usize>(scene: &GrainScene<D>, asleep: &[bool], body: u32) -> (u32, f64, f64) {
+    let i = body as usize;
+    if i < scene.grains.len() && !asleep[i] {
+        let (c, s) = (scene.grains.linear[i], scene.grains.angular[i]);
+        #[allow(clippy::cast_possible_truncation)] // 3 or 6
+        let width = body_velocities(D) as u32;
+        (width * body, c, s)
+    } else {
+        (NOWHERE, 0.0, 0.0)
     }
 }
 
@@ -296,16 +364,7 @@ where
         own.clear_rows();
         operator.take();
         let asleep = self.asleep;
-        #[allow(clippy::cast_possible_truncation)] // 3 or 6
-        let side = |body: u32| {
-            let i = body as usize;
-            if i < n && !asleep[i] {
-                let (c, s) = (scene.grains.linear[i], scene.grains.angular[i]);
-                (V as u32 * body, c, s)
-            } else {
-                (NOWHERE, 0.0, 0.0)
-            }
-        };
+        let side = |body: u32| side(scene, asleep, body);
         for contact in contacts {
             let GrainKey { a, b } = contact.key;
             // A wheel is not a grain: its side of the pair is empty.
@@ -402,25 +461,13 @@ where
         FrictionContactProblem::from_assembled_sparse(self.parts.operator(), q, mu)
     }
 
-    /// Newton's law for a pair that collides within the step; any other pair may close by its gap.
-    ///
-    /// With `e u_N⁻ + s` and any s ≥ 0 a frictionless impact gains no energy, see
-    /// [`crate::law::newton_impact`]: here s is what the gap allows.
     fn normal_shift(
         &self,
         options: &StepOptions,
         contact: &GrainContact<D>,
         u_N_before: f64,
     ) -> f64 {
-        let h = options.time_step;
-        let gap = contact.gap_start.max(0.0);
-        let rebound = options.restitution * u_N_before;
-        let slow = 2.0 * options.gravity.norm() * h;
-        if rebound < 0.0 && u_N_before < -slow && gap + h * u_N_before <= 0.0 {
-            rebound
-        } else {
-            gap / h + rebound.max(0.0)
-        }
+        gap_law(options, contact.gap_start, u_N_before)
     }
 
     /// Its sweeps end at a loose tolerance, and a pile that bounces needs many.
@@ -451,6 +498,23 @@ where
             Some(machine) => machine.displacement(self.scene.machine_velocities(y)),
             None => 0.0,
         }
+    }
+}
+
+/// Newton's law for a pair that collides within the step; any other pair may close by its gap
+/// (`gap_start`, m).
+///
+/// With `e u_N⁻ + s` and any s ≥ 0 a frictionless impact gains no energy, see
+/// [`crate::law::newton_impact`]: here s is what the gap allows.
+pub(in crate::system) fn gap_law(options: &StepOptions, gap_start: f64, u_N_before: f64) -> f64 {
+    let h = options.time_step;
+    let gap = gap_start.max(0.0);
+    let rebound = options.restitution * u_N_before;
+    let slow = 2.0 * options.gravity.norm() * h;
+    if rebound < 0.0 && u_N_before < -slow && gap + h * u_N_before <= 0.0 {
+        rebound
+    } else {
+        gap / h + rebound.max(0.0)
     }
 }
 

@@ -1,8 +1,14 @@
 //! A ground of any shape under a round body.
+//!
+//! [`terrain`]: the rover's terrains.
+
+pub mod terrain;
 
 use std::fmt::Debug;
 
 use nalgebra::SVector;
+
+pub use terrain::TerrainSupport;
 
 /// A point of the ground that faces the centre of a round body.
 #[derive(Clone, Copy, Debug, PartialEq)]
