@@ -46,6 +46,7 @@ class MovingBalls:
         self.kinematic = grid[:, 1] == 0
         self.size = 2.0 * radius * np.array(shape)
         self.time, self.time_step = 0.0, 0.002
+        self.terrain, self.grains, self.rover = None, self, None
         self.settings: dict[str, Any] = {"gravity": [0.0, -9.81, 0.0], "time_step": self.time_step, "tolerance": 1e-4}
 
     @property
@@ -82,42 +83,44 @@ class MovingBalls:
         return 1e-6
 
 
-class RoverOnMovingBalls(MovingBalls):
-    """The rover drives on a plane as high as the bed, and its wheels hang a little lower than the balls' tops."""
+class Raised:
+    """A rover's simulation that names another ground than the one it drives on."""
+
+    def __init__(self, rover: Simulation, terrain: Plane) -> None:
+        self._rover, self.terrain = rover, terrain
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._rover, name)
+
+
+class RoverOnMovingBalls:
+    """The rover drives on a plane a little below the bed's top, and the balls move by their formula.
+
+    Args:
+        shape: Balls along x, y and z.
+        radius: Mean radius, m.
+        sinks: How far the plane lies below the tops, m.
+        moving: Share of the bed, from the top, that moves.
+    """
 
     def __init__(
-        self, shape: tuple[int, int, int] = (80, 2, 40), radius: float = 0.025, sinks: float = 0.02, **options: float
+        self,
+        shape: tuple[int, int, int] = (80, 2, 40),
+        radius: float = 0.025,
+        sinks: float = 0.02,
+        moving: float = 0.3,
     ) -> None:
-        super().__init__(shape, radius, **options)
-        top = float(self.size[1]) - sinks
-        self._rover = Simulation(RoverModel(), Plane([0.0, 1.0, 0.0], -top), time_step=self.time_step)
-        self.model, self.terrain = self._rover.model, Plane()
-        middle = (0.3 * self.size[0], 0.5 * self.size[2])
-        self._rover.set_state(self.model.resting_pose(self._rover.terrain, middle, 0.0))
-        self._rover.set_wheel_torques(np.full(6, 15.0))
-
-    @property
-    def q(self) -> Array:
-        return self._rover.q
-
-    @property
-    def v(self) -> Array:
-        return self._rover.v
-
-    @property
-    def wheel_torques(self) -> Array:
-        return self._rover.wheel_torques
-
-    @property
-    def steering(self) -> Array:
-        return self._rover.steering
-
-    def poses(self) -> dict[str, tuple[Array, Array]]:
-        return self._rover.poses()
-
-    def wheel_forces(self) -> Array:
-        return self._rover.wheel_forces[:, [1, 0, 2]]
+        self.grains = MovingBalls(shape, radius, moving)
+        size = self.grains.size
+        plane = Plane([0.0, 1.0, 0.0], sinks - float(size[1]))
+        rover = Simulation(RoverModel(), plane, time_step=self.grains.time_step)
+        rover.set_state(rover.model.resting_pose(plane, (0.3 * size[0], 0.5 * size[2]), 0.0))
+        rover.set_wheel_torques(np.full(6, 15.0))
+        self.rover = Raised(rover, Plane())
 
     def step(self, n: int = 1) -> Report:
-        self._rover.step(n)
-        return super().step(n)
+        self.rover.step(n)
+        return self.grains.step(n)
+
+    def penetration(self) -> float:
+        return 1e-6

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from rover_gym.grains.grain_run import GrainRun
 
 POINTS = 400  # of a section
+SMOOTHED_CELLS = 4.0  # edge of the square over which a section is smoothed: two balls
 FINEST = 600  # cells along a map, at most
 
 
@@ -91,18 +92,20 @@ def rut_sections(figure: Sheet, run: GrainRun) -> None:
 
 
 def _track(run: GrainRun, surface: SurfaceMap) -> Array:
-    """(POINTS, 2) x and z, equally spaced: the first wheel's way, or the middle of the bed along x."""
-    if run.model is None:
-        x = np.linspace(surface.x[0], surface.x[-1], POINTS)
-        return np.column_stack((x, np.full(POINTS, 0.5 * (surface.z[0] + surface.z[-1]))))
-    way = run.wheel_centres[:, 0][:, [0, 2]]
+    """(POINTS, 2) x and z, equally spaced: the first wheel's way over the bed, or the bed's middle along x."""
+    low, high = np.array([surface.x[0], surface.z[0]]), np.array([surface.x[-1], surface.z[-1]])
+    way = np.empty((0, 2)) if run.model is None else run.wheel_centres[:, 0][:, [0, 2]]
+    way = way[((low <= way) & (way <= high)).all(axis=1)]
+    if len(way) < 2:
+        x = np.linspace(low[0], high[0], POINTS)
+        return np.column_stack((x, np.full(POINTS, 0.5 * (low[1] + high[1]))))
     travelled = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))))
     places = np.linspace(0.0, max(float(travelled[-1]), 1e-9), POINTS)
     return np.column_stack([np.interp(places, travelled, way[:, i]) for i in range(2)])
 
 
 def _section(axes: Axes, before: SurfaceMap, after: SurfaceMap, places: Array, way: Array) -> None:
-    old, new = (1e3 * surface.at(places) for surface in (before, after))
+    old, new = (1e3 * surface.at(places, width=SMOOTHED_CELLS * surface.cell) for surface in (before, after))
     axes.plot(way, old, color=DARK, linewidth=0.9, label="before")
     axes.plot(way, new, color=QUANTITY_COLOURS[1], label="after")
     axes.fill_between(way, old, new, where=np.isfinite(old) & np.isfinite(new), color=QUANTITY_COLOURS[1], alpha=0.15)

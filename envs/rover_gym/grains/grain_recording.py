@@ -14,11 +14,11 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import OptionError, RoverModel, StepReport, Terrain
+from rover_gym.mechanics import GrainSimulation, RoverModel, Simulation, StepReport
 from rover_gym.record.channels import Channel
 from rover_gym.record.facts import row_count
 from rover_gym.record.recorder import Recorder
-from rover_gym.validation import number, refuse
+from rover_gym.validation import number
 
 Array = npt.NDArray[np.float64]
 
@@ -29,81 +29,31 @@ RESOLUTION = 1.0 / 250.0
 ROWS_PER_FLUSH = 16
 
 
-class _Energy(Protocol):
-    @property
-    def kinetic(self) -> float: ...
-    @property
-    def potential(self) -> float: ...
-
-
-class Grains(Protocol):
-    """What a simulation of balls offers to a recording."""
+class RoverAmongGrains(Protocol):
+    """A rover among grains, as `RoverGrainSimulation` offers it."""
 
     @property
-    def position(self) -> Array:
-        """(n, 3) centres, m."""
+    def rover(self) -> Simulation:
+        """The rover, whose contacts count those with grains."""
     @property
-    def radius(self) -> Array:
-        """(n,) m."""
-    @property
-    def mass(self) -> Array:
-        """(n,) kg."""
-    @property
-    def kinematic(self) -> npt.NDArray[np.bool_]:
-        """(n,) whether no force moves the ball."""
-    @property
-    def asleep(self) -> npt.NDArray[np.bool_]:
-        """(n,) whether the ball sleeps."""
-    @property
-    def walls(self) -> Array:
-        """(n_walls, 6) a point of each wall and the normal to its free side."""
-    @property
-    def time(self) -> float:
-        """Time, s."""
-    @property
-    def time_step(self) -> float:
-        """Time step, s."""
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Options of contacts, gravity and solver."""
+    def grains(self) -> GrainSimulation:
+        """The balls."""
 
     def step(self, n: int = 1) -> StepReport:
-        """Takes steps."""
-
-    def energy(self) -> _Energy:
-        """Energy, J."""
+        """Takes steps with both."""
 
     def penetration(self) -> float:
         """Deepest overlap, m."""
 
 
-class RoverOnGrains(Grains, Protocol):
-    """What a simulation of a rover among balls offers besides."""
+def _both(sim: GrainSimulation | RoverAmongGrains) -> tuple[GrainSimulation, Simulation | None]:
+    """The balls, and the rover among them."""
+    return (sim, None) if isinstance(sim, GrainSimulation) else (sim.grains, sim.rover)
 
-    @property
-    def model(self) -> RoverModel:
-        """The rover."""
-    @property
-    def terrain(self) -> Terrain:
-        """The fixed ground."""
-    @property
-    def q(self) -> Array:
-        """(nq,) coordinates."""
-    @property
-    def v(self) -> Array:
-        """(nv,) velocities."""
-    @property
-    def wheel_torques(self) -> Array:
-        """(n_wheels,) N m."""
-    @property
-    def steering(self) -> Array:
-        """(n_wheels,) set-points, rad."""
 
-    def poses(self) -> Mapping[str, tuple[Array, Array]]:
-        """Origin and rotation of each solid."""
-
-    def wheel_forces(self) -> Array:
-        """(n_wheels, 3) force on each wheel in the last step, world, N."""
+def _walls(grains: GrainSimulation) -> Array:
+    """(n_walls, 6) a point of each wall now and the normal to its free side."""
+    return np.asarray(getattr(grains, "walls", np.empty((0, 6))), dtype=np.float64).reshape(-1, 6)
 
 
 class StoredPlaces:
@@ -131,22 +81,20 @@ class GrainSampler:
     """Steps balls, alone or under a rover, from row to row and makes the rows for a `Recorder`.
 
     Args:
-        sim: The simulation.
+        sim: A `GrainSimulation` or a `RoverGrainSimulation`.
     """
 
-    def __init__(self, sim: Grains | RoverOnGrains) -> None:
+    def __init__(self, sim: GrainSimulation | RoverAmongGrains) -> None:
         self._sim = sim
-        self._model: RoverModel | None = getattr(sim, "model", None)
-        self._places = StoredPlaces(np.asarray(sim.radius))
-        self._residual, self._contacts, self._iterations = 0.0, 0, 0
-        self._forces: Array | None = None
-        self._steps = 0
+        self._grains, self._rover = _both(sim)
+        self._places = StoredPlaces(self._grains.radius)
+        n = len(self._grains.radius)
         self.channels: tuple[Channel, ...] = (
             Channel("time", "s", "time since the run's start"),
+            Channel("position", "m", "centre of each ball: x forward, y up, z right", (n, 3), packed=True),
             Channel(
-                "position", "m", "centre of each ball: x forward, y up, z right", (len(sim.radius), 3), packed=True
+                "walls", "m, 1", "a point of each wall and the normal to its free side", _walls(self._grains).shape
             ),
-            Channel("walls", "m, 1", "a point of each wall and the normal to its free side", np.shape(sim.walls)),
             Channel("n_asleep", "1", "number of balls that sleep"),
             Channel("kinetic_energy", "J", "kinetic energy of all"),
             Channel("potential_energy", "J", "potential energy, zero with all mass centres at height 0"),
@@ -155,9 +103,16 @@ class GrainSampler:
             Channel("solver_residual", "1", "largest residual of the contact solver since the last row"),
             Channel("solver_iterations", "1", "iterations of the contact solver since the last row"),
         )
-        if self._model is not None:
-            self.channels += _rover_channels(self._model)
-            self._wheel_solids = [wheel["solid"] for wheel in self._model.to_dict()["wheels"]]
+        self._wheel_solids: list[str] = []
+        if self._rover is not None:
+            self.channels += _rover_channels(self._rover.model)
+            self._wheel_solids = [wheel["solid"] for wheel in self._rover.model.to_dict()["wheels"]]
+        self._clear()
+
+    def _clear(self) -> None:
+        """Resets what is gathered from row to row."""
+        self._residual, self._contacts, self._iterations, self._steps = 0.0, 0, 0, 0
+        self._impulses = np.zeros((len(self._wheel_solids), 3))
 
     def step(self, n: int) -> bool:
         """Takes the steps that the next row covers; returns whether all of them converged to the tolerance.
@@ -167,50 +122,55 @@ class GrainSampler:
         """
         converged = True
         for _ in range(n):
-            report = self._sim.step(1)
+            report = self._sim.step()
+            self._steps += 1
             self._residual = max(self._residual, report.residual)
             self._contacts = max(self._contacts, report.n_contacts)
             self._iterations += report.iterations
             converged &= report.is_converged
-            if self._model is not None:
-                forces = np.asarray(self._sim.wheel_forces())  # type: ignore[union-attr]
-                self._forces = forces if self._forces is None else self._forces + forces
-                self._steps += 1
+            if self._rover is not None:
+                self._impulses += wheel_impulses(self._rover)
         return converged
 
     def row(self) -> dict[str, npt.ArrayLike]:
         """One row of `channels`: the current state, and means since the previous row."""
-        sim = self._sim
-        energy = sim.energy()
+        grains, rover = self._grains, self._rover
+        energies = [grains.energy()] + ([] if rover is None else [rover.energy()])
         row: dict[str, npt.ArrayLike] = {
-            "time": sim.time,
-            "position": self._places.of(np.asarray(sim.position)),
-            "walls": sim.walls,
-            "n_asleep": int(np.count_nonzero(sim.asleep)),
-            "kinetic_energy": energy.kinetic,
-            "potential_energy": energy.potential,
+            "time": grains.time,
+            "position": self._places.of(grains.position),
+            "walls": _walls(grains),
+            "n_asleep": int(np.count_nonzero(grains.asleep)),
+            "kinetic_energy": sum(energy.kinetic for energy in energies),
+            "potential_energy": sum(energy.potential for energy in energies),
             "n_contacts": self._contacts,
-            "penetration": sim.penetration(),
+            "penetration": self._sim.penetration(),
             "solver_residual": self._residual,
             "solver_iterations": self._iterations,
         }
-        if self._model is not None:
-            row |= self._rover_row(sim)  # type: ignore[arg-type]
-        self._residual, self._contacts, self._iterations = 0.0, 0, 0
-        self._forces, self._steps = None, 0
+        if rover is not None:
+            poses = rover.poses()
+            row |= {
+                "q": rover.q,
+                "v": rover.v,
+                "wheel_forces": self._impulses / (max(self._steps, 1) * grains.time_step),
+                "wheel_centres": np.array([poses[solid][0] for solid in self._wheel_solids]),
+                "wheel_torques": rover.wheel_torques,
+                "steering_set_points": rover.steering,
+            }
+        self._clear()
         return row
 
-    def _rover_row(self, sim: RoverOnGrains) -> dict[str, npt.ArrayLike]:
-        poses = sim.poses()
-        none = np.zeros((len(self._wheel_solids), 3))
-        return {
-            "q": sim.q,
-            "v": sim.v,
-            "wheel_forces": none if self._forces is None else self._forces / self._steps,
-            "wheel_centres": np.array([poses[solid][0] for solid in self._wheel_solids]),
-            "wheel_torques": sim.wheel_torques,
-            "steering_set_points": sim.steering,
-        }
+
+def wheel_impulses(rover: Simulation) -> Array:
+    """(n_wheels, 3) impulse of balls and ground on each wheel in the last step, world, N s."""
+    contacts = rover.contacts
+    impulses = np.zeros((len(rover.model.wheel_radii), 3))
+    touching = contacts.wheels >= 0
+    # The rows of a contact frame are n, t, b: a world impulse is the sum of its components times the rows.
+    world = np.einsum("ci,cij->cj", contacts.impulses[touching], contacts.frames[touching])
+    np.add.at(impulses, contacts.wheels[touching], world)
+    return impulses
 
 
 def _rover_channels(model: RoverModel) -> tuple[Channel, ...]:
@@ -246,7 +206,7 @@ def _rover_channels(model: RoverModel) -> tuple[Channel, ...]:
 
 
 def describe_grains(
-    sim: Grains | RoverOnGrains, title: str, scene: Mapping[str, Any] | None = None, *, seed: int | str = "none"
+    sim: GrainSimulation | RoverAmongGrains, title: str, scene: Mapping[str, Any] | None = None, *, seed: int | str = "none"
 ) -> dict[str, Any]:
     """The attributes of a recording, taken from the simulation at its start.
 
@@ -256,25 +216,25 @@ def describe_grains(
         scene: Further parameters of the scene.
         seed: Seed of the packing, or why there is none.
     """
-    model: RoverModel | None = getattr(sim, "model", None)
+    grains, rover = _both(sim)
     return {
         "title": title,
         "scene": {
             **(scene or {}),
             "kind": KIND,
-            "resolution": StoredPlaces(np.asarray(sim.radius)).resolution,
-            **({} if model is None else {"model": model.to_dict()}),
+            "resolution": StoredPlaces(grains.radius).resolution,
+            **({} if rover is None else {"model": rover.model.to_dict()}),
         },
-        "grain_radius": np.asarray(sim.radius, dtype=np.float64),
-        "grain_mass": np.asarray(sim.mass, dtype=np.float64),
-        "grain_kinematic": np.asarray(sim.kinematic, dtype=np.uint8),
+        "grain_radius": np.asarray(grains.radius, dtype=np.float64),
+        "grain_mass": np.asarray(grains.mass, dtype=np.float64),
+        "grain_kinematic": np.asarray(grains.kinematic, dtype=np.uint8),
         "seed": seed,
-        "solver": sim.settings,
+        "solver": grains.settings,
     }
 
 
 def record_grains(
-    sim: Grains | RoverOnGrains,
+    sim: GrainSimulation | RoverAmongGrains,
     duration: float,
     path: str | Path,
     fps: float = 25.0,
@@ -312,17 +272,16 @@ def record_grains(
         StepError: A step failed; the rows before it are on disk.
     """
     fps = number("fps", fps, above=0.0)
-    if not len(sim.radius):
-        refuse(OptionError, "sim", 0, "must hold at least one ball")
-    steps_per_row = max(1, round(1.0 / (fps * sim.time_step)))
-    rows = row_count(duration, sim.time_step, steps_per_row)
+    grains, rover = _both(sim)
+    steps_per_row = max(1, round(1.0 / (fps * grains.time_step)))
+    rows = row_count(duration, grains.time_step, steps_per_row)
     sampler = GrainSampler(sim)
     unconverged = 0
     with Recorder(
         path,
         sampler.channels,
         describe_grains(sim, title, scene, seed=seed),
-        terrain=getattr(sim, "terrain", None),
+        terrain=grains.terrain if rover is None else rover.terrain,
         rows_per_flush=ROWS_PER_FLUSH,
     ) as recorder:
         recorder.append(sampler.row())
@@ -330,7 +289,7 @@ def record_grains(
             before_row(sim)
             unconverged += not sampler.step(steps_per_row)
             recorder.append(sampler.row())
-            progress(sim.time)
+            progress(grains.time)
             if until(sim):
                 break
         recorder.note(unconverged_rows=unconverged)

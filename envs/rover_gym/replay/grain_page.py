@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from rover_gym.ground import spheres_of, surfaces_of, triangles_of
 from rover_gym.rendering.appearance import (
     FIXED_BALL_COLOUR,
     GROUND_COLOUR,
@@ -28,22 +29,35 @@ from rover_gym.rendering.appearance import (
     SKY_COLOUR,
     SKY_COLOUR_2,
     Colour,
+    sphere_mesh,
 )
 from rover_gym.replay.grain_curves import grain_curves
 from rover_gym.replay.grain_eye import eye_path, start_view
 from rover_gym.replay.player import shortened
 from rover_gym.replay.rotation import continuous, quaternions
-from rover_gym.replay.scenery import coloured_meshes, ground_plane, ground_tiles, parts_by_solid, surfaces
+from rover_gym.replay.scenery import (
+    MARGIN,
+    MOST_HEIGHTS,
+    coloured_meshes,
+    ground_plane,
+    ground_tiles,
+    parts_by_solid,
+    spheres,
+    surfaces,
+)
 from rover_gym.replay.wall_polygons import wall_polygons, wall_poses
 
 if TYPE_CHECKING:
     from rover_gym.grains.grain_run import GrainRun
+    from rover_gym.mechanics import Terrain
 
 SAMPLES = 25  # of a piece: each begins with whole places
 LEVELS = 65535  # of a place, along each axis
+MANY = 300  # spheres of the ground, above which each gets fewer triangles
 
 Array = npt.NDArray[np.float64]
-Mesh = tuple[Colour, Array, npt.NDArray[np.int32]]
+Faces = npt.NDArray[np.int32]
+Mesh = tuple[Colour, Array, Faces]
 
 
 def write_grain_page(run: GrainRun, path: str | Path, *, follow: bool = True) -> Path:
@@ -152,24 +166,42 @@ def _meshes(run: GrainRun) -> tuple[list[tuple[int, Mesh]], Array]:
             meshes += [(i, mesh) for mesh in coloured_meshes(parts)]
         turns = continuous(quaternions(run.rover.rotations))[..., [1, 2, 3, 0]]
         poses = np.concatenate((run.rover.positions, turns), axis=-1)
-        meshes += [(-1, mesh) for mesh in _ground(run)]
+    meshes += [(-1, mesh) for mesh in _ground(run)]
     of_walls = wall_polygons(run, GROUND_COLOUR, ROCK_COLOUR)
     meshes += [(poses.shape[1] + i, mesh) for i, mesh in enumerate(of_walls)]
     return meshes, shortened(np.concatenate((poses, wall_poses(run)), axis=1), 16)
 
 
 def _ground(run: GrainRun) -> list[Mesh]:
-    """The fixed ground about the rover's path."""
-    if run.rover is None:
-        return []
+    """The fixed ground about the rover's path, or under the balls."""
     meshes: list[Mesh] = []
-    tiles = ground_tiles(run.rover) if ground_plane(run.rover) is not None else None
+    tiles = None if run.rover is None or ground_plane(run.rover) is None else ground_tiles(run.rover)
     if tiles is not None:
         vertices, light, dark = tiles
         meshes += [(GROUND_COLOUR, vertices, light), (GROUND_COLOUR_2, vertices, dark)]
-    for vertices, faces in surfaces(run.rover):
+    if run.terrain is None:
+        return meshes
+    pieces = surfaces(run.rover) if run.rover is not None else _surfaces_under_balls(run, run.terrain)
+    for vertices, faces in pieces:
         meshes += [(colour, vertices, triangles) for colour, triangles in faces if len(triangles)]
+    centres, radii = spheres_of(run.terrain) if run.rover is None else spheres(run.rover)
+    ball, corners = sphere_mesh(10 if len(radii) < MANY else 5)
+    if len(radii):
+        vertices = (centres[:, None] + radii[:, None, None] * ball).reshape(-1, 3)
+        firsts = len(ball) * np.arange(len(radii), dtype=np.int32)
+        meshes.append((ROCK_COLOUR, vertices, (firsts[:, None, None] + corners).reshape(-1, 3)))
     return meshes
+
+
+def _surfaces_under_balls(run: GrainRun, terrain: Terrain) -> list[tuple[Array, list[tuple[Colour, Faces]]]]:
+    """Height fields and meshes under the balls, each in one colour."""
+    places = run.positions_of(run.rows[:1])[0][:, [0, 2]].astype(np.float64)
+    low, high = places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN
+    pieces = []
+    for surface in surfaces_of(terrain):
+        vertices, faces = triangles_of(surface, low, high, MOST_HEIGHTS)
+        pieces.append((vertices, [(GROUND_COLOUR, faces.astype(np.int32))]))
+    return pieces
 
 
 def _ranges(meshes: list[tuple[int, Mesh]]) -> list[tuple[int, int, int]]:

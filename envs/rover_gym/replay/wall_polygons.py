@@ -19,6 +19,15 @@ Array = npt.NDArray[np.float64]
 SAME = 1e-6  # m, distance within which a wall is the plane of the ground, which is drawn already
 
 
+def planes_of_run(run: GrainRun) -> Array:
+    """(n, n_planes, 6) the walls, and the plane of the ground where no rover has it drawn."""
+    plane = None if run.terrain is None or run.rover is not None else plane_of(run.terrain)
+    if plane is None:
+        return run.walls
+    ground = np.concatenate((-plane.offset * plane.normal, plane.normal))
+    return np.concatenate((run.walls, np.tile(ground, (run.n_frames, 1, 1))), axis=1)
+
+
 def wall_polygons(run: GrainRun, floor: Colour, upright: Colour) -> list[tuple[Colour, Array, npt.NDArray[np.int32]]]:
     """A mesh for each wall, in a frame that `wall_poses` moves; it shows from the wall's free side only.
 
@@ -32,7 +41,7 @@ def wall_polygons(run: GrainRun, floor: Colour, upright: Colour) -> list[tuple[C
     low, high = (first - margin).min(axis=0), (first + margin).max(axis=0)
     slack = 0.02 * float((high - low).max())
     meshes = []
-    for wall in run.walls[0]:
+    for wall in planes_of_run(run)[0]:
         point, normal = wall[:3], wall[3:] / np.linalg.norm(wall[3:])
         corners = np.empty((0, 3)) if _is_ground(run, point, normal) else _cut(point, normal, low - slack, high + slack)
         fan = [[0, k, k + 1] for k in range(1, len(corners) - 1)]
@@ -43,11 +52,11 @@ def wall_polygons(run: GrainRun, floor: Colour, upright: Colour) -> list[tuple[C
 
 def wall_poses(run: GrainRun) -> Array:
     """(n, n_walls, 7) places of the walls' points, m, and turns from their first normals as quaternions x, y, z, w."""
-    poses = np.zeros((run.n_frames, run.walls.shape[1], 7))
-    poses[..., 6] = 1.0
-    for i in range(run.walls.shape[1]):
-        poses[:, i, :3] = run.walls[:, i, :3]
-        normals = run.walls[:, i, 3:] / np.linalg.norm(run.walls[:, i, 3:], axis=1, keepdims=True)
+    walls = planes_of_run(run)
+    poses = np.zeros((run.n_frames, walls.shape[1], 7))
+    for i in range(walls.shape[1]):
+        poses[:, i, :3] = walls[:, i, :3]
+        normals = walls[:, i, 3:] / np.linalg.norm(walls[:, i, 3:], axis=1, keepdims=True)
         turns = np.array([_turn(normals[0], normal) for normal in normals])
         poses[:, i, 3:] = quaternions(turns)[:, [1, 2, 3, 0]]
     return poses
@@ -55,7 +64,7 @@ def wall_poses(run: GrainRun) -> Array:
 
 def _is_ground(run: GrainRun, point: Array, normal: Array) -> bool:
     """Whether the ground's plane lies in the wall."""
-    plane = None if run.terrain is None else plane_of(run.terrain)
+    plane = None if run.terrain is None or run.rover is None else plane_of(run.terrain)
     if plane is None:
         return False
     return bool(abs(plane.normal @ point + plane.offset) < SAME and plane.normal @ normal > 1.0 - SAME)
