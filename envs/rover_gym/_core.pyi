@@ -49,6 +49,8 @@ __all__ = [
     "Plane",
     "Polyline",
     "ProblemError",
+    "RoverGrainSimulation",
+    "RoverGrainSnapshot",
     "RoverGymError",
     "RoverModel",
     "Simulation",
@@ -3110,6 +3112,102 @@ class GrainSimulation:
 
         Raises:
             StateError: The snapshot belongs to other grains or is damaged. Nothing has changed.
+        """
+
+class RoverGrainSnapshot:
+    """Everything that a rover among grains needs to continue bit for bit. Picklable."""
+
+    @staticmethod
+    def from_bytes(data: bytes) -> RoverGrainSnapshot:
+        """Reads a snapshot.
+
+        Args:
+            data: What `to_bytes` returned.
+
+        Returns:
+            The snapshot.
+
+        Raises:
+            StateError: The bytes are not those of a snapshot.
+        """
+    def to_bytes(self) -> bytes:
+        """The snapshot as bytes, as `from_bytes` reads them."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class RoverGrainSimulation:
+    """A rover among grains in space, stepped together.
+
+    Wheels, boxes and balls of the rover meet the grains with exact contact and friction, and forces
+    go both ways within the step. The rover and the grains keep their own simulations, which have
+    their states, commands, contacts and forces; only the steps are taken here, with the solver
+    settings of the grains, θ = 1. Walls of the grains hold grains alone: what shall hold the rover
+    too is a terrain of both.
+
+    Args:
+        rover: The rover, with its model, terrain, friction and commands.
+        grains: The balls, with the same time step and gravity.
+        wheel_friction: Coulomb's coefficient between the rover and grains.
+
+    Raises:
+        OptionError: The time steps or gravities differ, or the coefficient is negative or not
+            finite.
+        StateError: A part of the rover is in a grain.
+    """
+
+    def __new__(
+        cls, rover: Simulation, grains: GrainSimulation, *, wheel_friction: float = 0.9
+    ) -> RoverGrainSimulation: ...
+    @property
+    def rover(self) -> Simulation:
+        """The rover's simulation. Its own `step` moves it without the grains."""
+    @property
+    def grains(self) -> GrainSimulation:
+        """The grains' simulation. Its own `step` moves them without the rover."""
+    @property
+    def wheel_friction(self) -> float:
+        """Coulomb's coefficient between the rover and grains."""
+    @property
+    def time(self) -> float:
+        """Time of the grains, s."""
+    @property
+    def time_step(self) -> float:
+        """Time step, s."""
+    def step(self, n: int = 1) -> StepReport:
+        """Takes n steps with both, as `Simulation.step` does.
+
+        Args:
+            n: Number of steps.
+
+        Returns:
+            How the steps went.
+
+        Raises:
+            StepError: A step could not be taken; the state before it stays.
+            OptionError: `n` is not a count.
+        """
+    @property
+    def wheel_gaps(self) -> npt.NDArray[np.float64]:
+        """Gap of each wheel now to the nearest grain or the terrain, (n_wheels,), m, positive when
+        apart.
+
+        A wheel with nothing within its diameter has the gap to the terrain.
+        """
+    def penetration(self) -> float:
+        """Deepest overlap now, m: of grains with anything, and of the rover with grains."""
+    def snapshot(self) -> RoverGrainSnapshot:
+        """Everything that is needed to continue bit for bit."""
+    def restore(self, snapshot: RoverGrainSnapshot) -> None:
+        """Goes back to a snapshot.
+
+        Args:
+            snapshot: A snapshot of the same rover among the same grains.
+
+        Raises:
+            StateError: The snapshot belongs to another rover or other grains, or is damaged.
+                Nothing has changed.
         """
 
 def seed_generators(seeds: Sequence[int]) -> _Rows:

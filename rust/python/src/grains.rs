@@ -76,7 +76,8 @@ pub struct GrainSimulation {
 }
 
 impl GrainSimulation {
-    fn open(&self) -> Result<MutexGuard<'_, Core>, BorderError> {
+    /// The simulation, for one call.
+    pub fn open(&self) -> Result<MutexGuard<'_, Core>, BorderError> {
         self.inner.open()
     }
 }

@@ -33,6 +33,7 @@ mod planar_soil;
 mod plane;
 mod reading;
 mod report;
+mod rover_grains;
 mod shared;
 mod simulation;
 mod snapshot;
@@ -83,5 +84,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     planar::register(module)?;
     planar_soil::register(module)?;
     grains::register(module)?;
+    rover_grains::register(module)?;
     Ok(())
 }

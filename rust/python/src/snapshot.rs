@@ -1,4 +1,4 @@
-//! `Snapshot`, `PlanarSnapshot`, `SoilSnapshot`, `GrainSnapshot`.
+//! `Snapshot`, `PlanarSnapshot`, `SoilSnapshot`, `GrainSnapshot`, `RoverGrainSnapshot`.
 
 use pyo3::PyTypeInfo;
 use pyo3::prelude::*;
@@ -127,4 +127,9 @@ snapshot_class! {
 snapshot_class! {
     /// Everything that grains in space need to continue bit for bit. Picklable.
     GrainSnapshot, SnapshotOf<GrainBed<3>>
+}
+
+snapshot_class! {
+    /// Everything that a rover among grains needs to continue bit for bit. Picklable.
+    RoverGrainSnapshot, (SnapshotOf<RoverScene>, SnapshotOf<GrainBed<3>>)
 }
