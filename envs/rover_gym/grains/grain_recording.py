@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.mechanics import GrainSimulation, RoverModel, Simulation, StepReport
+from rover_gym.mechanics import GrainSimulation, RoverGrainSimulation, RoverModel, Simulation
 from rover_gym.record.channels import Channel
 from rover_gym.record.facts import row_count
 from rover_gym.record.recorder import Recorder
@@ -29,24 +29,7 @@ RESOLUTION = 1.0 / 250.0
 ROWS_PER_FLUSH = 16
 
 
-class RoverAmongGrains(Protocol):
-    """A rover among grains, as `RoverGrainSimulation` offers it."""
-
-    @property
-    def rover(self) -> Simulation:
-        """The rover, whose contacts count those with grains."""
-    @property
-    def grains(self) -> GrainSimulation:
-        """The balls."""
-
-    def step(self, n: int = 1) -> StepReport:
-        """Takes steps with both."""
-
-    def penetration(self) -> float:
-        """Deepest overlap, m."""
-
-
-def _both(sim: GrainSimulation | RoverAmongGrains) -> tuple[GrainSimulation, Simulation | None]:
+def _both(sim: GrainSimulation | RoverGrainSimulation) -> tuple[GrainSimulation, Simulation | None]:
     """The balls, and the rover among them."""
     return (sim, None) if isinstance(sim, GrainSimulation) else (sim.grains, sim.rover)
 
@@ -84,7 +67,7 @@ class GrainSampler:
         sim: A `GrainSimulation` or a `RoverGrainSimulation`.
     """
 
-    def __init__(self, sim: GrainSimulation | RoverAmongGrains) -> None:
+    def __init__(self, sim: GrainSimulation | RoverGrainSimulation) -> None:
         self._sim = sim
         self._grains, self._rover = _both(sim)
         self._places = StoredPlaces(self._grains.radius)
@@ -206,7 +189,7 @@ def _rover_channels(model: RoverModel) -> tuple[Channel, ...]:
 
 
 def describe_grains(
-    sim: GrainSimulation | RoverAmongGrains, title: str, scene: Mapping[str, Any] | None = None, *, seed: int | str = "none"
+    sim: GrainSimulation | RoverGrainSimulation, title: str, scene: Mapping[str, Any] | None = None, *, seed: int | str = "none"
 ) -> dict[str, Any]:
     """The attributes of a recording, taken from the simulation at its start.
 
@@ -234,7 +217,7 @@ def describe_grains(
 
 
 def record_grains(
-    sim: GrainSimulation | RoverAmongGrains,
+    sim: GrainSimulation | RoverGrainSimulation,
     duration: float,
     path: str | Path,
     fps: float = 25.0,
