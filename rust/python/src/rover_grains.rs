@@ -4,7 +4,8 @@ use std::sync::MutexGuard;
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
-use rover_core::simulation::{RoverInGrains, TogetherError};
+use rover_core::integrator::{StepError, StepReport as CoreReport};
+use rover_core::simulation::{RoverInGrains, RoverSimulation, TogetherError};
 
 use crate::arguments::{Given, refused};
 use crate::bed_arguments::grain_error;
@@ -61,6 +62,23 @@ pub struct RoverGrainSimulation {
 }
 
 impl RoverGrainSimulation {
+    /// The rover.
+    pub fn of_rover(&self) -> &Simulation {
+        self.rover.get()
+    }
+
+    /// Takes n steps with both, as [`RoverInGrains::step`]; `rover` is the open simulation of
+    /// [`Self::of_rover`].
+    pub fn step_with(
+        &self,
+        rover: &mut RoverSimulation,
+        n: usize,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<Result<CoreReport, StepError>, BorderError> {
+        let (mut link, mut grains) = (self.link()?, self.grains.get().open()?);
+        Ok(link.step(rover, &mut grains, n, go_on))
+    }
+
     fn link(&self) -> Result<MutexGuard<'_, RoverInGrains>, BorderError> {
         self.link.open()
     }
@@ -134,12 +152,10 @@ impl RoverGrainSimulation {
     #[pyo3(signature = (n = Given::MISSING), text_signature = "($self, n=1)")]
     fn step(&self, py: Python<'_>, n: Given<'_>) -> PyResult<StepReport> {
         let steps = n.count(1, Kind::Option, "n")?;
-        let mut link = self.link()?;
-        let mut rover = self.rover.get().open()?;
-        let mut grains = self.grains.get().open()?;
-        let (link, rover, grains) = (&mut *link, &mut *rover, &mut *grains);
+        let mut rover = self.of_rover().open()?;
+        let moving = &mut *rover;
         let mut watch = Watch::new();
-        let report = py.detach(|| link.step(rover, grains, steps, &mut || watch.go_on()));
+        let report = py.detach(|| self.step_with(moving, steps, &mut || watch.go_on()))?;
         Ok(watch.result(report)?.into())
     }
 

@@ -25,7 +25,7 @@ mod scales;
 
 pub use friction_contact::{Dimension, FrictionContactProblem, ProblemError};
 pub use operator::{BlockSparseDelassus, BodyPairs, Operator, PairContact, RoundPair};
-pub(crate) use operator::{Storage, dot, rim_impulse, rim_velocity};
+pub(crate) use operator::{Storage, dot};
 pub(crate) use passivity::passive_share;
 pub(crate) use prepared::{Prepared, Proximal};
 pub(crate) use residual::{Magnitudes, Violations, evaluate_contact};

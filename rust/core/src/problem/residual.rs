@@ -97,6 +97,13 @@ impl Violations {
         self.largest = self.largest.max(square);
     }
 
+    /// Adds those of other contacts.
+    pub fn join(&mut self, other: &Self) {
+        self.squares += other.squares;
+        self.weighted += other.weighted;
+        self.largest = self.largest.max(other.largest);
+    }
+
     /// The residual; `inverse_speed` is `1/|q|` and `inverse_data` is `1/|(ρ_i q_i)|`.
     #[inline]
     pub fn residual(&self, inverse_speed: f64, inverse_data: f64) -> Residual {

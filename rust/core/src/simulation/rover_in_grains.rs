@@ -119,16 +119,9 @@ impl RoverInGrains {
     #[must_use]
     pub fn wheel_gaps(&self, rover: &RoverSimulation, bed: &GrainSimulation<3>) -> Vec<f64> {
         let contacts = rover.wheel_contacts();
-        let mut gaps: Vec<f64> = contacts.iter().map(|contact| contact.gap).collect();
-        let wheels = (0..gaps.len()).map(Part::Wheel);
-        let reach = rover.model().wheels().iter().map(|wheel| wheel.radius);
-        let reach = reach.fold(0.0, f64::max);
-        visit_near(rover, bed, wheels, reach, |part, _, gap| {
-            if let Part::Wheel(i) = part {
-                gaps[i] = gaps[i].min(gap);
-            }
-        });
-        gaps
+        let to_grains = gaps_to_grains(rover, bed);
+        let both = contacts.iter().zip(to_grains);
+        both.map(|(contact, gap)| contact.gap.min(gap)).collect()
     }
 
     /// Deepest overlap now, m: of grains with anything, and of the rover with grains.
@@ -161,6 +154,7 @@ impl RoverInGrains {
             ..bed.options.clone()
         };
         let result = self.steps(rover, bed, &options, n, go_on);
+        rover.parts.gaps_to_grains = gaps_to_grains(rover, bed);
         let report = result.clone().unwrap_or_default();
         rover.end_call(report);
         bed.end_call(report);
@@ -377,6 +371,21 @@ fn visit_near(
             visit(part, item.index as usize, gap);
         });
     }
+}
+
+/// Gap of each wheel now to the nearest grain, m; infinite without one within its radius.
+fn gaps_to_grains(rover: &RoverSimulation, bed: &GrainSimulation<3>) -> Vec<f64> {
+    let wheels = rover.model().wheels();
+    let mut gaps = vec![f64::INFINITY; wheels.len()];
+    let reach = wheels.iter().map(|wheel| wheel.radius);
+    let reach = reach.fold(0.0, f64::max);
+    let parts = (0..wheels.len()).map(Part::Wheel);
+    visit_near(rover, bed, parts, reach, |part, _, gap| {
+        if let Part::Wheel(i) = part {
+            gaps[i] = gaps[i].min(gap);
+        }
+    });
+    gaps
 }
 
 /// Checks that no part of the rover is in a grain.

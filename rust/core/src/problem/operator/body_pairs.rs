@@ -54,11 +54,15 @@ pub struct BodyPairs<const D: usize> {
     pub machine_at: usize,
     /// Number of factor coordinates.
     pub n_coordinates: usize,
+    /// Slab of each round body, by the place of its coordinates, in space: slabs lie side by side,
+    /// thick enough that most contacts are within one or between neighbours. Empty: one slab. Sweeps
+    /// visit slabs on several threads; the answer depends on the slabs alone.
+    pub slabs: Vec<u32>,
 }
 
 /// Velocity along tangent k (from 1) of a rim that rotates with `rim` = r ω.
 #[inline]
-pub(crate) fn rim_velocity<const D: usize>(frame: &[[f64; D]; D], k: usize, rim: &[f64]) -> f64 {
+fn rim_velocity<const D: usize>(frame: &[[f64; D]; D], k: usize, rim: &[f64]) -> f64 {
     if D == 2 {
         return rim[0];
     }
@@ -71,7 +75,7 @@ pub(crate) fn rim_velocity<const D: usize>(frame: &[[f64; D]; D], k: usize, rim:
 /// Component c of the moment of the tangential impulses, divided by r: the transpose of
 /// [`rim_velocity`].
 #[inline]
-pub(crate) fn rim_impulse<const D: usize>(frame: &[[f64; D]; D], p: &[f64; D], c: usize) -> f64 {
+fn rim_impulse<const D: usize>(frame: &[[f64; D]; D], p: &[f64; D], c: usize) -> f64 {
     if D == 2 {
         return p[1];
     }
@@ -176,6 +180,7 @@ impl<const D: usize> BodyPairs<D> {
         self.round.clear();
         self.machine.clear();
         self.rows.clear();
+        self.slabs.clear();
         (self.width, self.machine_at, self.n_coordinates) = (width, machine_at, n_coordinates);
     }
 

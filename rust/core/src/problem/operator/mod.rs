@@ -11,7 +11,6 @@ mod storage;
 
 pub use block_sparse::{BlockSparseDelassus, PairContact};
 pub use body_pairs::{BodyPairs, RoundPair};
-pub(crate) use body_pairs::{rim_impulse, rim_velocity};
 pub(crate) use dense::dot;
 pub(crate) use storage::Storage;
 

@@ -4,9 +4,13 @@
 //! [scratch](super::scratch). It returns `p`, `u = W p + q` and the reason for its end. No stage
 //! knows which one came before or comes next; the strategy decides that.
 
+mod accelerated;
 pub(super) mod admm;
-mod body_rows;
+mod ball_rows;
+mod ball_sweeps;
 pub(super) mod body_sweeps;
+mod disk_rows;
+mod disk_sweeps;
 pub(super) mod gauss_seidel;
 pub(super) mod guided;
 pub(super) mod newton;

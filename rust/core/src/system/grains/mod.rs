@@ -33,6 +33,7 @@ mod measures;
 pub mod packing;
 pub mod removal;
 pub mod scene;
+mod slabs;
 pub mod sleep;
 pub mod system;
 pub mod wall;

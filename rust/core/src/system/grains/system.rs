@@ -11,6 +11,7 @@ use super::detection::{Neighbour, Search};
 use super::grid::Grid;
 use super::machine::{Machine, MachineParts};
 use super::scene::GrainScene;
+use super::slabs::Slabs;
 use crate::contact::Activation;
 use crate::geometry::Facing;
 use crate::integrator::{MechanicalSystem, Start, StepOptions};
@@ -43,6 +44,7 @@ pub struct GrainParts<const D: usize> {
     attraction: Vec<f64>,
     pub(in crate::system) pairs: BodyPairs<D>,
     pub(super) machine: MachineParts,
+    slabs: Slabs,
     /// W, assembled on request.
     operator: OnceLock<BlockSparseDelassus>,
 }
@@ -398,10 +400,16 @@ where
             pairs,
             machine: own,
             operator,
+            slabs,
+            search,
             ..
         } = &mut *self.parts;
         let pose = scene.machine_coordinates(middle);
         pairs.clear(machine.map_or(0, Machine::nv), V * n, scene.nv());
+        if D == 3 {
+            let width = 2.0 * scene.grains.largest() + search.reach;
+            slabs.assign(middle, n, width, &mut pairs.slabs);
+        }
         own.clear_rows();
         operator.take();
         let asleep = self.asleep;

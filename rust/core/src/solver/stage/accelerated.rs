@@ -1,0 +1,104 @@
+//! Sweeps that are extrapolated, judged and kept from adding energy, whatever a sweep visits.
+//!
+//! The next sweep starts not from the impulses p_k but from `p_k + β (p_k − p_{k−1})`, with β from
+//! Nesterov's sequence. The sequence restarts when the change per sweep grows.
+
+use crate::problem::{Residual, passive_share};
+use crate::solver::options::SolverOptions;
+use crate::solver::report::{SolveReport, SolveStatus};
+
+/// Sweeps after which the residual is computed, whatever the change per sweep.
+const PATIENCE: usize = 50;
+
+/// Quality of an answer.
+pub(super) struct Measured {
+    pub residual: Residual,
+    /// pᵀu, J.
+    pub work: f64,
+    /// pᵀq, J.
+    pub free: f64,
+}
+
+impl Measured {
+    fn is_within(&self, options: &SolverOptions) -> bool {
+        self.residual.relative <= options.tolerance
+            && self.residual.velocity <= options.velocity_tolerance
+    }
+}
+
+/// Contacts that are swept.
+pub(super) trait Relaxation {
+    /// One sweep from the impulses extrapolated by `share`; the square of its change, N² s².
+    fn sweep(&mut self, share: f64) -> f64;
+
+    /// The residual as [`crate::problem::evaluate_into`] defines it, with the velocities summed
+    /// anew from the impulses.
+    fn measure(&mut self) -> Measured;
+
+    /// Multiplies all impulses.
+    fn scale(&mut self, share: f64);
+}
+
+/// Sweeps until the answer is within the tolerances. The impulses are those of the last
+/// measurement.
+pub(super) fn accelerate(
+    contacts: &mut impl Relaxation,
+    options: &SolverOptions,
+    report: &mut SolveReport,
+) {
+    let (mut t, mut share, mut last_change) = (1.0_f64, 0.0, f64::INFINITY);
+    // Violation, in tolerances, per N s of a sweep's change: tells when to compute the
+    // residual.
+    let (mut rate, mut last_look) = (f64::INFINITY, 0);
+    loop {
+        if report.iterations < options.max_sweeps {
+            let change = contacts.sweep(share);
+            report.iterations += 1;
+            if change > last_change {
+                t = 1.0;
+            }
+            last_change = change;
+            let is_due = rate * change.sqrt() <= 1.0
+                || report.iterations - last_look >= PATIENCE
+                || report.iterations == 1
+                || report.iterations == options.max_sweeps;
+            if !is_due {
+                share = next_share(&mut t);
+                continue;
+            }
+        }
+        let is_last = report.iterations >= options.max_sweeps;
+        let mut measured = contacts.measure();
+        if (is_last || measured.is_within(options))
+            && let Some(share) = passive_share(measured.work, measured.free)
+        {
+            contacts.scale(share);
+            measured = contacts.measure();
+            t = 1.0;
+        }
+        let Residual { relative, velocity } = measured.residual;
+        (report.residual, report.velocity_error) = (relative, velocity);
+        if !measured.residual.is_finite() {
+            report.status = SolveStatus::NonFinite;
+            return;
+        }
+        if measured.is_within(options) {
+            return;
+        }
+        if is_last {
+            report.status = SolveStatus::MaxIterations;
+            return;
+        }
+        let violation = (relative / options.tolerance).max(velocity / options.velocity_tolerance);
+        (rate, last_look) = (violation / last_change.sqrt(), report.iterations);
+        share = next_share(&mut t);
+    }
+}
+
+/// Extrapolation factor after a sweep; advances Nesterov's sequence.
+fn next_share(t: &mut f64) -> f64 {
+    let next = 0.5 * (1.0 + (1.0 + 4.0 * *t * *t).sqrt());
+    let share = (*t - 1.0) / next;
+    *t = next;
+    share
+}

@@ -1,0 +1,329 @@
+//! Contact rows of [`super::ball_sweeps`]: all data that a visit reads and writes, side by side.
+//!
+//! Velocities and impulses are vectors of the world, so that a visit needs no tangents. With
+//! `R = r_a ω_a + r_b ω_b` the two rims that touch along n move apart with
+//!
+//! ```text
+//! u = v_a − v_b + n × R
+//! ```
+//!
+//! An impulse p on the first changes `v` by `± p/m` and `r ω` by `(p × n) r²/J`. W is diagonal in
+//! the normal and the tangent plane, so that with all others fixed the law's answer is a clamp of
+//! the normal part and a shortening of the tangential one.
+
+use crate::law::signorini;
+use crate::problem::{BodyPairs, RoundPair};
+use crate::solver::local::one_contact::solve_one_contact;
+use crate::spatial::space::dot;
+
+/// A ball: its velocity with 1/m, and `r ω` with `r²/J`.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+pub(super) struct Ball {
+    pub linear: [f64; 4],
+    pub turning: [f64; 4],
+}
+
+/// A contact of two balls, or of one with a fixed body: two cache lines.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct BallRow {
+    /// Places of the balls, from the block's first.
+    pub bodies: [u32; 2],
+    pub mu: f64,
+    pub n: [f64; 3],
+    /// `1/W_NN`, `1/W_TT`, kg.
+    pub inverse: [f64; 2],
+    pub q: [f64; 3],
+    pub p: [f64; 3],
+    /// p of the previous sweep.
+    before: [f64; 3],
+}
+
+#[inline(always)]
+fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// Shortens a tangential vector to `limit`.
+#[inline(always)]
+fn shortened(t: [f64; 3], limit: f64) -> [f64; 3] {
+    let square = dot(&t, &t);
+    let share = if square > limit * limit {
+        limit / square.sqrt()
+    } else {
+        1.0
+    };
+    [share * t[0], share * t[1], share * t[2]]
+}
+
+/// A vector's part across n, and its normal part.
+#[inline(always)]
+fn split(n: &[f64; 3], x: &[f64; 3]) -> (f64, [f64; 3]) {
+    let along = dot(n, x);
+    let mut across = *x;
+    for k in 0..3 {
+        across[k] -= n[k] * along;
+    }
+    (along, across)
+}
+
+/// A vector of a contact's frame in the world's axes.
+#[inline]
+fn to_world(frame: &[[f64; 3]; 3], x: &[f64; 3]) -> [f64; 3] {
+    let mut out = [0.0; 3];
+    for k in 0..3 {
+        out[k] = frame[0][k] * x[0] + frame[1][k] * x[1] + frame[2][k] * x[2];
+    }
+    out
+}
+
+/// A vector of the world in a contact's frame.
+#[inline]
+pub(super) fn to_frame(frame: &[[f64; 3]; 3], x: &[f64; 3]) -> [f64; 3] {
+    [dot(&frame[0], x), dot(&frame[1], x), dot(&frame[2], x)]
+}
+
+fn invert(w: f64) -> f64 {
+    if w > 0.0 { 1.0 / w } else { 0.0 }
+}
+
+/// Violation of the law by one contact and its weight.
+#[derive(Clone, Copy)]
+pub(super) struct Judged {
+    /// Square, (m/s)².
+    pub square: f64,
+    /// Of the contact, kg.
+    pub mass: f64,
+    /// pᵀu, pᵀq, J.
+    pub work: f64,
+    pub free: f64,
+}
+
+/// 3 over the trace of W.
+pub(super) fn mass_of([i_n, i_t]: [f64; 2]) -> f64 {
+    let sum = 2.0 * i_n + i_t;
+    if sum > 0.0 {
+        3.0 * i_n * i_t / sum
+    } else {
+        1.0
+    }
+}
+
+impl BallRow {
+    pub(super) fn new(
+        pair: &RoundPair<3>,
+        bodies: [u32; 2],
+        q: &[f64; 3],
+        mu: f64,
+        p: &[f64; 3],
+    ) -> Self {
+        let p = to_world(&pair.frame, p);
+        Self {
+            bodies,
+            mu,
+            n: pair.frame[0],
+            inverse: pair.block().map(invert),
+            q: to_world(&pair.frame, q),
+            p,
+            before: p,
+        }
+    }
+
+    /// u.
+    #[inline(always)]
+    pub(super) fn velocity(&self, balls: &[Ball]) -> [f64; 3] {
+        let [a, b] = self.bodies;
+        let (a, b) = (&balls[a as usize], &balls[b as usize]);
+        let mut rim = [0.0; 3];
+        for k in 0..3 {
+            rim[k] = a.turning[k] + b.turning[k];
+        }
+        let mut u = cross(&self.n, &rim);
+        for k in 0..3 {
+            u[k] += a.linear[k] - b.linear[k] + self.q[k];
+        }
+        u
+    }
+
+    /// The effect of an impulse.
+    #[inline(always)]
+    pub(super) fn add(&self, p: &[f64; 3], balls: &mut [Ball]) {
+        let turn = cross(p, &self.n);
+        let [a, b] = self.bodies;
+        let ball = &mut balls[a as usize];
+        let (c, s) = (ball.linear[3], ball.turning[3]);
+        for k in 0..3 {
+            ball.linear[k] += c * p[k];
+            ball.turning[k] += s * turn[k];
+        }
+        let ball = &mut balls[b as usize];
+        let (c, s) = (ball.linear[3], ball.turning[3]);
+        for k in 0..3 {
+            ball.linear[k] -= c * p[k];
+            ball.turning[k] += s * turn[k];
+        }
+    }
+
+    /// Solves the contact law from the impulse extrapolated by `share`; returns the square of its
+    /// change.
+    #[inline(always)]
+    pub(super) fn visit(&mut self, share: f64, balls: &mut [Ball]) -> f64 {
+        let u = self.velocity(balls);
+        let mut start = self.p;
+        let mut wanted = self.p;
+        for k in 0..3 {
+            start[k] += share * (self.p[k] - self.before[k]);
+            wanted[k] = start[k] - self.inverse[1] * u[k];
+        }
+        let normal = (dot(&self.n, &start) - self.inverse[0] * dot(&self.n, &u)).max(0.0);
+        let (_, across) = split(&self.n, &wanted);
+        let across = shortened(across, self.mu * normal);
+        let mut change = [0.0; 3];
+        self.before = self.p;
+        for k in 0..3 {
+            self.p[k] = self.n[k] * normal + across[k];
+            change[k] = self.p[k] - start[k];
+        }
+        self.add(&change, balls);
+        dot(&change, &change)
+    }
+
+    /// As [`crate::law::coulomb::violation`] has it.
+    #[inline(always)]
+    pub(super) fn judge(&self, balls: &[Ball]) -> Judged {
+        let u = self.velocity(balls);
+        let mass = mass_of(self.inverse);
+        let or_mass = |i: f64| if i > 0.0 { i } else { mass };
+        let (i_n, i_t) = (or_mass(self.inverse[0]), or_mass(self.inverse[1]));
+        let (u_n, u_t) = split(&self.n, &u);
+        let (p_n, p_t) = split(&self.n, &self.p);
+        let mut wanted = p_t;
+        for k in 0..3 {
+            wanted[k] -= i_t * u_t[k];
+        }
+        let across = shortened(wanted, self.mu * p_n);
+        let mut square = signorini::violation(u_n, p_n, i_n).powi(2);
+        for k in 0..3 {
+            square += ((p_t[k] - across[k]) / i_t).powi(2);
+        }
+        Judged {
+            square,
+            mass,
+            work: dot(&self.p, &u),
+            free: dot(&self.p, &self.q),
+        }
+    }
+}
+
+/// A contact of the machine with a ball or with something fixed, in the contact's frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MachineRow {
+    ball: u32,
+    frame: [[f64; 3]; 3],
+    block: [[f64; 3]; 3],
+    pub q: [f64; 3],
+    pub mu: f64,
+    pub p: [f64; 3],
+    before: [f64; 3],
+}
+
+impl MachineRow {
+    /// `ball`: its place, or that of what is fixed.
+    pub(super) fn new(
+        pairs: &BodyPairs<3>,
+        i: usize,
+        ball: u32,
+        q: &[f64; 3],
+        mu: f64,
+        p: &[f64; 3],
+    ) -> Self {
+        Self {
+            ball,
+            frame: pairs.machine[i].frame,
+            block: pairs.machine_block(i),
+            q: *q,
+            mu,
+            p: *p,
+            before: *p,
+        }
+    }
+
+    /// `1/W_NN` and over the mean of the tangential diagonal, kg.
+    pub(super) fn inverse(&self) -> [f64; 2] {
+        let [[w_n, ..], [_, w_t, _], [.., w_b]] = self.block;
+        [w_n, 0.5 * (w_t + w_b)].map(invert)
+    }
+
+    /// u of the machine's contact i.
+    pub(super) fn velocity(
+        &self,
+        pairs: &BodyPairs<3>,
+        i: usize,
+        balls: &[Ball],
+        own: &[f64],
+    ) -> [f64; 3] {
+        let ball = &balls[self.ball as usize];
+        let [x, y, z, _] = ball.turning;
+        let mut world = cross(&self.frame[0], &[x, y, z]);
+        for k in 0..3 {
+            world[k] -= ball.linear[k];
+        }
+        let mut u = to_frame(&self.frame, &world);
+        for k in 0..3 {
+            u[k] += self.q[k];
+        }
+        pairs.add_local_of_machine(i, own, &mut u);
+        u
+    }
+
+    pub(super) fn add(
+        &self,
+        pairs: &BodyPairs<3>,
+        i: usize,
+        p: &[f64; 3],
+        balls: &mut [Ball],
+        own: &mut [f64],
+    ) {
+        let world = to_world(&self.frame, p);
+        let turn = cross(&world, &self.frame[0]);
+        let ball = &mut balls[self.ball as usize];
+        let (c, s) = (ball.linear[3], ball.turning[3]);
+        for k in 0..3 {
+            ball.linear[k] -= c * world[k];
+            ball.turning[k] += s * turn[k];
+        }
+        pairs.add_to_machine(i, p, own);
+    }
+
+    pub(super) fn visit(
+        &mut self,
+        pairs: &BodyPairs<3>,
+        i: usize,
+        share: f64,
+        balls: &mut [Ball],
+        own: &mut [f64],
+    ) -> f64 {
+        let mut start = self.p;
+        for k in 0..3 {
+            start[k] += share * (self.p[k] - self.before[k]);
+        }
+        self.before = self.p;
+        let mut free = self.velocity(pairs, i, balls, own);
+        for (free, row) in free.iter_mut().zip(&self.block) {
+            *free -= dot(row, &start);
+        }
+        // A NaN of the data shows in the change.
+        self.p = solve_one_contact(&self.block, &free, self.mu).impulse;
+        let mut change = self.p;
+        for k in 0..3 {
+            change[k] -= start[k];
+        }
+        self.add(pairs, i, &change, balls, own);
+        dot(&change, &change)
+    }
+}

@@ -1,0 +1,182 @@
+//! Contact rows of [`super::disk_sweeps`]: all data that a visit reads and writes, side by side.
+
+use super::body_sweeps::draw_in;
+use super::disk_sweeps::Velocity;
+use crate::problem::{BodyPairs, RoundPair};
+use crate::solver::local::one_contact::solve_one_contact;
+use crate::spatial::space::{body_velocities, dot};
+
+/// A contact among disks with all data that a sweep reads and writes: two cache lines.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    bodies: [u32; 2],
+    n: [f64; 2],
+    /// 1/m of each body, 1/kg.
+    linear: [f64; 2],
+    /// r²/J of each body, 1/kg.
+    angular: [f64; 2],
+    /// `1/W_NN`, `1/W_TT`, kg.
+    pub(super) inverse: [f64; 2],
+    pub(super) q: [f64; 2],
+    pub(super) mu: f64,
+    pub(super) p: [f64; 2],
+    /// p of the previous sweep.
+    before: [f64; 2],
+}
+
+/// A contact of the machine.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MachineRow {
+    /// The side of the round body, the second body.
+    pub(super) round: Row,
+    pub(super) block: [[f64; 2]; 2],
+}
+
+impl Row {
+    /// `still`: the place of fixed bodies.
+    pub(super) fn new(
+        pair: &RoundPair<2>,
+        block: [f64; 2],
+        still: u32,
+        q: &[f64; 2],
+        mu: f64,
+        p: &[f64; 2],
+    ) -> Self {
+        const V: u32 = body_velocities(2) as u32;
+        let place = |k: usize| {
+            let moves = pair.linear[k] > 0.0;
+            if moves { pair.bodies[k] / V } else { still }
+        };
+        let invert = |w: f64| if w > 0.0 { 1.0 / w } else { 0.0 };
+        Self {
+            bodies: [place(0), place(1)],
+            n: pair.frame[0],
+            linear: pair.linear.map(|c| c * c),
+            angular: pair.angular.map(|s| s * s),
+            inverse: block.map(invert),
+            q: *q,
+            mu,
+            p: *p,
+            before: *p,
+        }
+    }
+
+    /// t = n × e_z.
+    #[inline]
+    fn tangent(&self) -> [f64; 2] {
+        [self.n[1], -self.n[0]]
+    }
+
+    /// u.
+    #[inline]
+    pub(super) fn local(&self, velocity: &[Velocity]) -> [f64; 2] {
+        let [a, b] = self.bodies.map(|body| &velocity[body as usize]);
+        let between = [a[0] - b[0], a[1] - b[1]];
+        [
+            dot(&self.n, &between) + self.q[0],
+            dot(&self.tangent(), &between) + (a[2] + b[2]) + self.q[1],
+        ]
+    }
+
+    #[inline]
+    pub(super) fn add(&self, p: [f64; 2], velocity: &mut [Velocity]) {
+        let t = self.tangent();
+        let force = [
+            self.n[0] * p[0] + t[0] * p[1],
+            self.n[1] * p[0] + t[1] * p[1],
+        ];
+        let linear = [self.linear[0], -self.linear[1]];
+        for side in 0..2 {
+            let v = &mut velocity[self.bodies[side] as usize];
+            *v = [
+                v[0] + linear[side] * force[0],
+                v[1] + linear[side] * force[1],
+                v[2] + self.angular[side] * p[1],
+                0.0,
+            ];
+        }
+    }
+
+    /// p at the start of the sweep; stores the previous one.
+    #[inline]
+    pub(super) fn extrapolate(&mut self, share: f64) -> [f64; 2] {
+        let mut start = self.p;
+        for k in 0..2 {
+            start[k] += share * (self.p[k] - self.before[k]);
+        }
+        self.before = self.p;
+        start
+    }
+
+    /// Solves the contact law; returns the square of the impulse's change.
+    #[inline]
+    pub(super) fn visit(&mut self, share: f64, velocity: &mut [Velocity]) -> f64 {
+        let z = self.extrapolate(share);
+        let u = self.local(velocity);
+        let mut p = z;
+        p[0] = (z[0] - u[0] * self.inverse[0]).max(0.0);
+        p[1] = z[1] - u[1] * self.inverse[1];
+        let limit = self.mu * p[0];
+        draw_in(&mut p, limit);
+        self.p = p;
+        let mut change = p;
+        for k in 0..2 {
+            change[k] -= z[k];
+        }
+        self.add(change, velocity);
+        dot(&change, &change)
+    }
+}
+
+impl MachineRow {
+    /// u of the machine's contact i.
+    pub(super) fn local(
+        &self,
+        pairs: &BodyPairs<2>,
+        i: usize,
+        velocity: &[Velocity],
+        own: &[f64],
+    ) -> [f64; 2] {
+        let mut u = self.round.local(velocity);
+        pairs.add_local_of_machine(i, own, &mut u);
+        u
+    }
+
+    pub(super) fn add(
+        &self,
+        pairs: &BodyPairs<2>,
+        i: usize,
+        p: [f64; 2],
+        velocity: &mut [Velocity],
+        own: &mut [f64],
+    ) {
+        self.round.add(p, velocity);
+        pairs.add_to_machine(i, &p, own);
+    }
+
+    pub(super) fn visit(
+        &mut self,
+        pairs: &BodyPairs<2>,
+        i: usize,
+        share: f64,
+        velocity: &mut [Velocity],
+        own: &mut [f64],
+    ) -> f64 {
+        let z = self.round.extrapolate(share);
+        let mut free = self.local(pairs, i, velocity, own);
+        for (free, row) in free.iter_mut().zip(&self.block) {
+            for (w, z) in row.iter().zip(&z) {
+                *free -= w * z;
+            }
+        }
+        let p = solve_one_contact(&self.block, &free, self.round.mu).impulse;
+        // A NaN of the data shows in the change.
+        self.round.p = p;
+        let mut change = p;
+        for k in 0..2 {
+            change[k] -= z[k];
+        }
+        self.add(pairs, i, change, velocity, own);
+        dot(&change, &change)
+    }
+}
