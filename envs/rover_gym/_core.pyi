@@ -28,6 +28,7 @@ __all__ = [
     "CommandError",
     "Contacts",
     "DrawnEpisodes",
+    "Drum",
     "Energy",
     "EpisodeBatch",
     "EpisodeDistribution",
@@ -53,6 +54,7 @@ __all__ = [
     "RoverGrainSnapshot",
     "RoverGymError",
     "RoverModel",
+    "Silo",
     "Simulation",
     "SimulationBatch",
     "Sine",
@@ -72,6 +74,7 @@ __all__ = [
     "Union",
     "__version__",
     "accuracy_options",
+    "arrange_balls",
     "atan2",
     "ball_packing",
     "exp",
@@ -2891,6 +2894,39 @@ class SoilSimulation:
         """
 
 @final
+class Drum:
+    def __new__(
+        cls, radius: float, length: float, rate: float = 0.0, *, centre: npt.ArrayLike | None = None
+    ) -> Drum: ...
+    @property
+    def radius(self) -> float: ...
+    @property
+    def length(self) -> float: ...
+    @property
+    def rate(self) -> float: ...
+    @property
+    def centre(self) -> tuple[float, float, float]: ...
+
+@final
+class Silo:
+    def __new__(
+        cls,
+        radius: float,
+        *,
+        floor: float | None = None,
+        hole: float = 0.0,
+        axis: npt.ArrayLike | None = None,
+    ) -> Silo: ...
+    @property
+    def radius(self) -> float: ...
+    @property
+    def floor(self) -> float | None: ...
+    @property
+    def hole(self) -> float: ...
+    @property
+    def axis(self) -> tuple[float, float]: ...
+
+@final
 class GrainContacts:
     """The contacts of the last step of grains in space, as new arrays with one row a contact.
 
@@ -3001,9 +3037,13 @@ class GrainSimulation:
         *,
         kinematic: npt.ArrayLike | None = None,
         walls: npt.ArrayLike | None = None,
+        wall_velocity: npt.ArrayLike | None = None,
+        vessel: Drum | Silo | None = None,
         terrain: _Terrain | _Terrains | None = None,
         friction: float = 0.5,
         wall_friction: float = 0.5,
+        cohesion: float = 0.0,
+        cohesion_range: float | None = None,
         restitution: float = 0.0,
         gravity: npt.ArrayLike | None = None,
         time_step: float = 0.002,
@@ -3045,6 +3085,10 @@ class GrainSimulation:
     @property
     def terrain(self) -> _Terrain | None:
         """The terrain below the balls, or None."""
+    @property
+    def vessel(self) -> Drum | Silo | None: ...
+    @property
+    def walls(self) -> _Array: ...
     @property
     def settings(self) -> dict[str, Any]:
         """The options of contacts, gravity and solver, by the names of the arguments."""
@@ -3307,6 +3351,17 @@ def ball_packing(
         ModelError: A number is not finite or out of its range, the radii are the wrong way round,
             or a ball does not fit.
     """
+
+def arrange_balls(
+    radius: npt.ArrayLike,
+    *,
+    width: float,
+    depth: float,
+    left: float = 0.0,
+    back: float = 0.0,
+    bottom: float = 0.0,
+    seed: int = 0,
+) -> _Array: ...
 
 @final
 class SolverReport:

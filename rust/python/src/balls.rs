@@ -6,13 +6,16 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 use rover_core::geometry::{Support, TerrainSupport};
 use rover_core::integrator::StepOptions;
-use rover_core::system::grains::{COORDINATES, GrainScene, Grains, SleepOptions};
+use rover_core::nalgebra::Vector3;
+use rover_core::system::grains::{COORDINATES, Cohesion, GrainScene, Grains, SleepOptions, Wall};
 
 use crate::arguments::Given;
 use crate::arrays::fresh_rows;
-use crate::bed_arguments::{self, StepArguments, Usual, check_rows, rows};
+use crate::bed_arguments::{self, StepArguments, Usual, check_rows, grain_error, rows};
 use crate::errors::{BorderError, Kind, Value};
 use crate::ground::Ground;
+use crate::planar_ground::quantity;
+use crate::vessels::Vessel;
 
 /// Velocities of a ball: of its centre, then its spin.
 const VELOCITIES: usize = 6;
@@ -24,11 +27,13 @@ pub struct BallArguments<'a, 'py> {
     pub position: &'a Bound<'py, PyAny>,
     pub kinematic: Given<'py>,
     pub walls: Option<&'a Bound<'py, PyAny>>,
+    pub wall_velocity: Option<&'a Bound<'py, PyAny>>,
+    pub vessel: Option<&'a Bound<'py, PyAny>>,
     pub terrain: Option<&'a Bound<'py, PyAny>>,
     pub friction: Given<'py>,
     pub wall_friction: Given<'py>,
-    /// Missing where there are no wheels.
-    pub wheel_friction: Given<'py>,
+    pub cohesion: Given<'py>,
+    pub cohesion_range: Given<'py>,
     pub steps: StepArguments<'py>,
     pub sleep: Given<'py>,
     pub sleep_speed: Given<'py>,
@@ -43,6 +48,7 @@ pub struct Balls {
     /// Centres, (3 n,).
     pub q: Vec<f64>,
     pub terrain: Option<Ground>,
+    pub vessel: Option<Vessel>,
 }
 
 /// Velocities are right to 25 times the tolerance, in units of the speed that the smallest ball
@@ -63,13 +69,28 @@ impl BallArguments<'_, '_> {
         let q = rows(self.position, Kind::State, "position", COORDINATES)?;
         check_rows("balls", grains.len(), &q)?;
         let options = self.steps.options(&grains, usual(&grains))?;
-        let walls = bed_arguments::walls(self.walls)?;
+        let force = self.cohesion.number(0.0, Kind::Option, "cohesion")?;
+        let range = (self.cohesion_range).maybe(Kind::Option, "cohesion_range")?;
+        let cohesion = Cohesion::new(force, range, grains.smallest());
+        let cohesion = cohesion.map_err(|e| grain_error(&e))?;
+        let grains = if force > 0.0 {
+            grains.with_cohesion(cohesion)
+        } else {
+            grains
+        };
+        let walls = moving(bed_arguments::walls(self.walls)?, self.wall_velocity)?;
+        let vessel = self.vessel.map(Vessel::parse).transpose()?;
         let terrain = self.terrain.map(Ground::parse).transpose()?;
-        let ground = terrain
-            .as_ref()
-            .map(|terrain| Arc::new(TerrainSupport::new(terrain.terrain())) as Arc<dyn Support<3>>);
-        let friction =
-            bed_arguments::friction(self.friction, self.wall_friction, self.wheel_friction)?;
+        let ground: Option<Arc<dyn Support<3>>> = match (&terrain, &vessel) {
+            (Some(terrain), None) => Some(Arc::new(TerrainSupport::new(terrain.terrain()))),
+            (None, Some(vessel)) => Some(vessel.support()),
+            (None, None) => None,
+            (Some(_), Some(_)) => {
+                let message = "vessel: balls have a terrain or a vessel, not both".to_owned();
+                return Err(BorderError::option("vessel", message, Value::Nothing).into());
+            }
+        };
+        let friction = bed_arguments::friction(self.friction, self.wall_friction, Given::MISSING)?;
         Ok(Balls {
             scene: GrainScene {
                 grains,
@@ -82,8 +103,37 @@ impl BallArguments<'_, '_> {
             sleep: bed_arguments::sleep(self.sleep, self.sleep_speed, self.sleep_distance)?,
             q,
             terrain,
+            vessel,
         })
     }
+}
+
+/// The same walls with their velocities, (m, 3).
+fn moving(walls: Vec<Wall<3>>, velocity: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Wall<3>>> {
+    let Some(velocity) = velocity else {
+        return Ok(walls);
+    };
+    let flat = rows(velocity, Kind::Terrain, "wall_velocity", 3)?;
+    let count = flat.len() / 3;
+    if count != walls.len() {
+        let n = walls.len();
+        return Err(BorderError {
+            kind: Kind::Terrain,
+            message: format!("wall_velocity: needs one row for each of {n} walls, has {count}"),
+            field: Some("wall_velocity".to_owned()),
+            value: Value::Count(count),
+        }
+        .into());
+    }
+    let move_one = |(wall, v): (Wall<3>, &[f64])| {
+        let moved = wall.moving(Vector3::new(v[0], v[1], v[2]));
+        moved.map_err(|e| quantity(Kind::Terrain, &e).into())
+    };
+    walls
+        .into_iter()
+        .zip(flat.chunks_exact(3))
+        .map(move_one)
+        .collect()
 }
 
 /// Centres (3 n) and velocities (6 n) of `n` balls from arrays (n, 3); at rest where none is given.

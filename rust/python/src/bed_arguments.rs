@@ -21,7 +21,9 @@ pub fn grain_error(e: &GrainError) -> BorderError {
     let kind = match field.split('[').next().unwrap_or_default() {
         "position" | "velocity" | "spin" | "machine" | "machine_rate" => Kind::State,
         "torques" | "pull" => Kind::Command,
-        "friction" | "wall_friction" | "wheel_friction" => Kind::Option,
+        "friction" | "wall_friction" | "wheel_friction" | "cohesion" | "cohesion_range" => {
+            Kind::Option
+        }
         _ => Kind::Model,
     };
     let value = match e {
@@ -33,6 +35,7 @@ pub fn grain_error(e: &GrainError) -> BorderError {
         | GrainError::InWall { value, .. }
         | GrainError::WheelIn { value, .. }
         | GrainError::TooNarrow { value, .. }
+        | GrainError::Reach { value, .. }
         | GrainError::Range { value } => Value::Number(*value),
         GrainError::Empty => Value::Count(0),
         _ => Value::Nothing,

@@ -308,10 +308,19 @@ pub struct GrainContacts {
 }
 
 impl GrainContacts {
-    /// `n_moving`: number of balls and of what moves among them.
-    pub fn new(active: &[ActiveContact<GrainContact<3>>], n_moving: usize) -> Self {
+    /// `n_moving`: number of balls and of what moves among them. `attraction`: impulse of the
+    /// cohesion in a contact, N s, which the solver's has to bear.
+    pub fn new(
+        active: &[ActiveContact<GrainContact<3>>],
+        n_moving: usize,
+        attraction: impl Fn(&GrainContact<3>) -> f64,
+    ) -> Self {
+        let mut active = active.to_vec();
+        for one in &mut active {
+            one.impulse[0] -= attraction(&one.contact);
+        }
         Self {
-            active: Columns(active.to_vec()),
+            active: Columns(active),
             n_moving,
         }
     }
@@ -354,6 +363,8 @@ impl GrainContacts {
     }
 
     /// Impulses on the first body along n, t, b of `frames`, (n, 3), N s.
+    ///
+    /// Cohesion is part of the normal ones, which are negative where a contact bears tension.
     #[getter]
     fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         self.active.impulses(py)

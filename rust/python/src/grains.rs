@@ -5,11 +5,11 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::nalgebra::Vector3;
 use rover_core::simulation::GrainSimulation as CoreSimulation;
-use rover_core::system::grains::Packing;
+use rover_core::system::grains::{GrainContact, Packing, arranged};
 use std::sync::{Arc, MutexGuard};
 
 use crate::arguments::{Given, flags};
-use crate::arrays::{fresh, fresh_rows, triple};
+use crate::arrays::{fresh, fresh_rows, triple, vector};
 use crate::balls::{self, BallArguments};
 use crate::bed_arguments::{self, StepArguments, grain_error, setup_error};
 use crate::contacts::GrainContacts;
@@ -19,6 +19,7 @@ use crate::report::{Energy, StepReport};
 use crate::shared::Shared;
 use crate::snapshot::{GrainSnapshot, belonging};
 use crate::stepping::step;
+use crate::vessels::{Drum, Silo, Vessel};
 
 type Core = CoreSimulation<3>;
 
@@ -42,10 +43,19 @@ type Packed<'py> = (
 ///         floor, or a piston with the velocity that `set_state` gives it; none by default. They
 ///         may overlap one another and walls.
 ///     walls: A point of each wall and the normal to its free side, (m, 6), m; none by default.
+///     wall_velocity: Velocities of the walls, (m, 3), m/s; at rest by default. A wall is in its
+///         place at time 0.
+///     vessel: A `Drum` or a `Silo` around the balls; none by default.
 ///     terrain: A `Plane`, `SphereField`, `HeightField`, `TriangleMesh` or `Union`, or a list of
-///         them, below the balls; none by default. Where it knows no ground, balls fall.
+///         them, below the balls; none by default. Where it knows no ground, balls fall. Balls
+///         have a vessel or a terrain, not both.
 ///     friction: Coulomb's coefficient between balls.
-///     wall_friction: Coulomb's coefficient of balls on walls and terrain.
+///     wall_friction: Coulomb's coefficient of balls on walls, vessel and terrain.
+///     cohesion: Attraction of bodies that touch, N: the pull that breaks their contact. The law of
+///         a contact is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; friction is bounded
+///         by friction (p_N + h cohesion).
+///     cohesion_range: Gap up to which the attraction acts, m; 1% of the smallest radius by
+///         default, at most 20%.
 ///     restitution: Newton's coefficient of all contacts, in [0, 1].
 ///     gravity: Gravity, (3,), m/s²; (0, -9.81, 0) by default.
 ///     time_step: Time step, s.
@@ -67,12 +77,13 @@ type Packed<'py> = (
 ///     ModelError: A radius or mass is not finite and positive.
 ///     StateError: Positions have a wrong shape or an entry that is not finite, or balls, walls or
 ///         terrain overlap.
-///     TerrainError: A wall has no direction, or `terrain` is not a terrain.
-///     OptionError: An option is out of its range.
+///     TerrainError: A wall has no direction, or `terrain` or `vessel` is none.
+///     OptionError: An option is out of its range, or both `terrain` and `vessel` are given.
 #[pyclass(module = "rover_gym.mechanics", frozen)]
 pub struct GrainSimulation {
     inner: Shared<Core>,
     terrain: Option<Ground>,
+    vessel: Option<Vessel>,
 }
 
 impl GrainSimulation {
@@ -90,21 +101,25 @@ fn n_balls(inner: &Core) -> usize {
 impl GrainSimulation {
     #[new]
     #[allow(clippy::too_many_arguments)] // keyword arguments of a Python class
-    #[pyo3(signature = (radius, mass, position, *, kinematic = Given::MISSING, walls = None, terrain = None,
-        friction = Given::MISSING, wall_friction = Given::MISSING, restitution = Given::MISSING,
+    #[pyo3(signature = (radius, mass, position, *, kinematic = Given::MISSING, walls = None, wall_velocity = None, vessel = None, terrain = None,
+        friction = Given::MISSING, wall_friction = Given::MISSING, cohesion = Given::MISSING, cohesion_range = Given::MISSING, restitution = Given::MISSING,
         gravity = None, time_step = Given::MISSING, tolerance = Given::MISSING, max_iterations = Given::MISSING,
         stabilisation = Given::MISSING, penetration_tolerance = Given::MISSING,
         sleep = Given::MISSING, sleep_speed = Given::MISSING, sleep_distance = Given::MISSING),
-        text_signature = "(radius, mass, position, *, kinematic=None, walls=None, terrain=None, friction=0.5, wall_friction=0.5, restitution=0.0, gravity=None, time_step=0.002, tolerance=0.001, max_iterations=2000, stabilisation=None, penetration_tolerance=None, sleep=False, sleep_speed=None, sleep_distance=None)")]
+        text_signature = "(radius, mass, position, *, kinematic=None, walls=None, wall_velocity=None, vessel=None, terrain=None, friction=0.5, wall_friction=0.5, cohesion=0.0, cohesion_range=None, restitution=0.0, gravity=None, time_step=0.002, tolerance=0.001, max_iterations=2000, stabilisation=None, penetration_tolerance=None, sleep=False, sleep_speed=None, sleep_distance=None)")]
     fn new(
         radius: &Bound<'_, PyAny>,
         mass: &Bound<'_, PyAny>,
         position: &Bound<'_, PyAny>,
         kinematic: Given<'_>,
         walls: Option<&Bound<'_, PyAny>>,
+        wall_velocity: Option<&Bound<'_, PyAny>>,
+        vessel: Option<&Bound<'_, PyAny>>,
         terrain: Option<&Bound<'_, PyAny>>,
         friction: Given<'_>,
         wall_friction: Given<'_>,
+        cohesion: Given<'_>,
+        cohesion_range: Given<'_>,
         restitution: Given<'_>,
         gravity: Option<&Bound<'_, PyAny>>,
         time_step: Given<'_>,
@@ -123,10 +138,13 @@ impl GrainSimulation {
             position,
             kinematic,
             walls,
+            wall_velocity,
+            vessel,
             terrain,
             friction,
             wall_friction,
-            wheel_friction: Given::MISSING,
+            cohesion,
+            cohesion_range,
             steps: StepArguments {
                 restitution,
                 gravity: gravity.transpose()?.map(Vector3::from),
@@ -146,6 +164,7 @@ impl GrainSimulation {
         Ok(Self {
             inner: Shared::new(made.map_err(setup_error)?),
             terrain: balls.terrain,
+            vessel: balls.vessel,
         })
     }
 
@@ -213,12 +232,33 @@ impl GrainSimulation {
         self.terrain.as_ref().map(|t| t.to_object(py)).transpose()
     }
 
+    /// The vessel around the balls, or None.
+    #[getter]
+    fn vessel<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.vessel.as_ref().map(|v| v.to_object(py)).transpose()
+    }
+
+    /// A point of each wall now and the normal to its free side, (m, 6), m.
+    #[getter]
+    fn walls<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let inner = self.open()?;
+        let walls = inner.soil().walls.iter().map(|wall| {
+            let (n, offset) = (wall.n(), wall.at(inner.time()).offset());
+            let point = n * offset;
+            [point.x, point.y, point.z, n.x, n.y, n.z]
+        });
+        fresh_rows(py, &walls.collect::<Vec<_>>())
+    }
+
     /// The options of contacts, gravity and solver, by the names of the arguments.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let inner = self.open()?;
         let options = inner.options();
         let settings = bed_arguments::settings(py, options, &inner.soil().friction)?;
+        let cohesion = inner.soil().grains.cohesion();
+        settings.set_item("cohesion", cohesion.map_or(0.0, |c| c.force))?;
+        settings.set_item("cohesion_range", cohesion.map(|c| c.range))?;
         let gravity = options.gravity;
         settings.set_item("gravity", (gravity.x, gravity.y, gravity.z))?;
         Ok(settings)
@@ -281,7 +321,10 @@ impl GrainSimulation {
     #[getter]
     fn contacts(&self) -> PyResult<GrainContacts> {
         let inner = self.open()?;
-        Ok(GrainContacts::new(inner.contacts(), n_balls(&inner)))
+        let (scene, h) = (inner.soil(), inner.options().time_step);
+        let attraction = |contact: &GrainContact<3>| h * scene.attraction(contact);
+        let n = n_balls(&inner);
+        Ok(GrainContacts::new(inner.contacts(), n, attraction))
     }
 
     /// Kinetic and potential energy now.
@@ -409,11 +452,61 @@ pub fn ball_packing<'py>(
     ))
 }
 
+/// Places balls of given radii in loose layers over a rectangle, without overlap.
+///
+/// Each has a place as wide as the largest ball, and they fill the layers in the order given.
+///
+/// Args:
+///     radius: Radii, (n,), m.
+///     width: Width of the rectangle along x, m.
+///     depth: Width of the rectangle along z, m.
+///     left: Smallest x, m.
+///     back: Smallest z, m.
+///     bottom: Height of the lower edge, m.
+///     seed: Seed of the random numbers; equal seeds give equal places.
+///
+/// Returns:
+///     Centres, (n, 3), m.
+///
+/// Raises:
+///     ModelError: A number is not finite or out of its range, or a ball does not fit.
+#[pyfunction]
+#[pyo3(signature = (radius, *, width, depth, left = Given::MISSING, back = Given::MISSING, bottom = Given::MISSING, seed = Given::MISSING),
+    text_signature = "(radius, *, width, depth, left=0.0, back=0.0, bottom=0.0, seed=0)")]
+#[allow(clippy::too_many_arguments)] // keyword arguments of a Python function
+pub fn arrange_balls<'py>(
+    py: Python<'py>,
+    radius: &Bound<'py, PyAny>,
+    width: Given<'_>,
+    depth: Given<'_>,
+    left: Given<'_>,
+    back: Given<'_>,
+    bottom: Given<'_>,
+    seed: Given<'_>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let kind = Kind::Model;
+    let radius = vector(radius, kind, "radius")?;
+    let corner = [
+        left.number(0.0, kind, "left")?,
+        bottom.number(0.0, kind, "bottom")?,
+        back.number(0.0, kind, "back")?,
+    ];
+    let width = width.number(0.0, kind, "width")?;
+    let sides = [width, f64::INFINITY, depth.number(0.0, kind, "depth")?];
+    let seed = seed.whole(0, kind, "seed")?;
+    let q = py.detach(|| arranged::<3>(&radius, corner, sides, seed));
+    let q = q.map_err(|e| grain_error(&e))?;
+    balls::centres(py, &q, radius.len())
+}
+
 /// Adds the classes of grains in space to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<GrainSimulation>()?;
     module.add_class::<GrainContacts>()?;
     module.add_class::<GrainSnapshot>()?;
+    module.add_class::<Drum>()?;
+    module.add_class::<Silo>()?;
+    module.add_function(wrap_pyfunction!(arrange_balls, module)?)?;
     module.add_function(wrap_pyfunction!(ball_packing, module)?)?;
     Ok(())
 }

@@ -40,6 +40,7 @@ mod snapshot;
 mod sphere_field;
 mod stepping;
 mod triangle_mesh;
+mod vessels;
 
 use pyo3::prelude::*;
 
