@@ -77,7 +77,7 @@ def collapse(
     title = f"a column of {balls} balls collapses"
     run = _recorded(sim, "collapse", title, duration, fps, seed, output, film=film, scene={"tube": tube})
     aspect, spread = run_out(run, tube)
-    _say(run, {"height of the column": f"{aspect:.2f} radii", "spread": f"{spread:.2f} radii"})
+    _say(run, {"height of the column": f"{aspect:.2f} radii", "its edge went": f"{spread:.2f} radii"})
 
 
 @grains.command()
@@ -121,7 +121,7 @@ def silo(
 @plain_errors
 def drum(
     *,
-    balls: Balls = 1500,
+    balls: Balls = 700,
     radius: Radius = 0.005,
     wall: Annotated[float, typer.Option(help="Radius of the drum, m.")] = 0.1,
     length: Annotated[float, typer.Option(help="Length of the drum, m.")] = 0.06,

@@ -17,8 +17,8 @@ Array = npt.NDArray[np.float64]
 
 FLOOR = ((0.0, 0.0, 0.0, 0.0, 1.0, 0.0),)
 SPREAD = 0.1  # radii of balls are drawn within this share of their mean
-#: Share of the balls that the deposit of a column holds; the others rolled away from it.
-DEPOSIT = 0.98
+#: Share of a column's balls below its height, and share of the floor that balls cover at the edge of its deposit.
+HIGHEST, COVERED = 0.98, 0.5
 #: Share of a drum's radius about its axis in which the slope is measured, away from the wall.
 INNER = 0.6
 
@@ -84,33 +84,35 @@ def drum(
     """
     count, radius = _checked(count, radius)
     wall, length = number("wall", wall, above=0.0), number("length", length, above=0.0)
-    largest = (1.0 + SPREAD) * radius
-    # A box in the drum, as wide as 1.5 radii and as high as what remains.
-    width, depth = 1.5 * wall - 2.0 * largest, length
-    if width < 4.0 * largest or depth < 2.0 * largest:
-        refuse(OptionError, "radius", radius, "balls are too large for the drum")
-    bottom = -np.sqrt(wall**2 - 0.5625 * wall**2) + largest
-    packing = _packed(count, radius, width, depth, seed, bottom=bottom)
-    tops = packing[2][:, 1] + packing[0]
-    if float(tops.max()) > np.sqrt(wall**2 - 0.5625 * wall**2):
-        refuse(OptionError, "count", count, "balls do not fit into the drum")
-    filled = GrainSimulation(*packing, vessel=Drum(wall, length), **options)
+    places = _rows_in_drum(wall, length, (1.0 + SPREAD) * radius)
+    if count > len(places):
+        refuse(OptionError, "count", count, f"balls do not fit into the drum, which takes {len(places)} in rows")
+    radii = radius * np.random.default_rng(seed).uniform(1.0 - SPREAD, 1.0 + SPREAD, count)
+    mass = 4.0 / 3.0 * np.pi * DENSITY * radii**3
+    filled = GrainSimulation(radii, mass, places[:count], vessel=Drum(wall, length), **options)
     settle(filled)
     turning = Drum(wall, length, rate)
     return GrainSimulation(filled.radius, filled.mass, filled.position, vessel=turning, **options)
 
 
 def run_out(run: GrainRun, tube: float) -> tuple[float, float]:
-    """Aspect ratio of a column at the first sample, and how far it spread by the last, in its first radii.
+    """Aspect ratio of a column at the first sample, and how far its edge went by the last, in its first radii.
+
+    Single balls roll on: the edge is where balls cover less than half of the floor.
 
     Args:
         run: Of a `column`.
         tube: Its first radius, m.
     """
     first, last = (run.positions_of(run.rows[[k]])[0].astype(np.float64) for k in (0, -1))
-    height = float(np.quantile(first[:, 1] + run.radius, DEPOSIT))
-    reach = float(np.quantile(np.hypot(last[:, 0], last[:, 2]), DEPOSIT)) + float(run.radius.mean())
-    return height / tube, reach / tube - 1.0
+    height = float(np.quantile(first[:, 1] + run.radius, HIGHEST))
+    surface = surface_map(last, run.radius)
+    x, z = np.meshgrid(surface.x, surface.z)
+    rings = (np.hypot(x, z) / (2.0 * float(run.radius.mean()))).astype(int).ravel()
+    covered = np.bincount(rings, np.isfinite(surface.heights).ravel()) / np.maximum(np.bincount(rings), 1)
+    thin = np.flatnonzero(covered < COVERED)
+    edge = 2.0 * float(run.radius.mean()) * float(thin[0] if len(thin) else len(covered))
+    return height / tube, edge / tube - 1.0
 
 
 def outflow(run: GrainRun) -> Array:
@@ -144,6 +146,19 @@ def slopes(run: GrainRun) -> Array:
     return result
 
 
+def _rows_in_drum(wall: float, length: float, largest: float) -> Array:
+    """(n, 3) centres of balls of one radius in straight rows that fit into a drum about the origin, lowest first."""
+    pitch = 2.0 * largest * (1.0 + 1e-6)
+    half = wall - largest
+    if half <= 0.0 or length < pitch:
+        return np.empty((0, 3))
+    steps = pitch * np.arange(-np.floor(half / pitch), half / pitch)
+    along = pitch * np.arange(np.floor(length / pitch))
+    y, x, z = np.meshgrid(steps, steps, along - along.mean(), indexing="ij")
+    places = np.stack((x.ravel(), y.ravel(), z.ravel()), axis=1)
+    return places[np.hypot(places[:, 0], places[:, 1]) <= half]
+
+
 def _filled(
     count: int, tube: float, radius: float, vessel: Silo, seed: int, options: dict[str, Any], walls: Any = None
 ) -> GrainSimulation:
@@ -164,9 +179,7 @@ def _checked(count: int, radius: float) -> tuple[int, float]:
     return count, number("radius", radius, above=0.0)
 
 
-def _packed(
-    count: int, radius: float, width: float, depth: float, seed: int, bottom: float = 0.0
-) -> tuple[Array, Array, Array]:
+def _packed(count: int, radius: float, width: float, depth: float, seed: int) -> tuple[Array, Array, Array]:
     """A loose packing about the y axis."""
     return ball_packing(
         count,
@@ -177,6 +190,5 @@ def _packed(
         depth=depth,
         left=-0.5 * width,
         back=-0.5 * depth,
-        bottom=bottom,
         seed=seed,
     )
