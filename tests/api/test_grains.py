@@ -179,17 +179,16 @@ def test_a_sieve_curve_is_found_again_in_the_mass() -> None:
     assert np.log(radius).std() == pytest.approx(0.2, rel=0.03)
 
 
-def test_mirrored_tiles_stay_at_rest(bed: BallBed) -> None:
+def test_mirrored_tiles_nearly_stay_at_rest(bed: BallBed) -> None:
     large = tiled(bed, 3, 2)
     assert len(large.radius) == 6 * len(bed.radius)
     sim = large.simulation()
     assert sim.penetration() < 0.01 * bed.radius.min()
-    moved = []
-    for one_of in (bed.simulation(), sim):
-        before = one_of.position
-        one_of.step(25)
-        moved.append(np.quantile(np.linalg.norm(one_of.position - before, axis=1), 0.9))
-    assert moved[1] < 2.0 * moved[0] + 0.01 * bed.radius.min()
+    before = sim.position
+    sim.step(25)
+    moved = np.linalg.norm(sim.position - before, axis=1) / bed.radius.min()
+    assert np.median(moved) < 0.05
+    assert np.quantile(moved, 0.9) < 0.2
     assert large.surface == pytest.approx(bed.surface, rel=0.05)
 
 

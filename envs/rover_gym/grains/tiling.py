@@ -14,8 +14,9 @@ MOST_TILES = 10_000
 def tiled(bed: BallBed, along: int, across: int) -> BallBed:
     """Lays a bed beside its mirror images, as often as wanted along x and z.
 
-    Each tile is mirrored in the wall that it shares with the one before. So no two balls overlap, a ball that leaned
-    on a wall leans on its image, and what was at rest stays at rest.
+    Each tile is mirrored in the wall that it shares with the one before. So no two balls overlap, and a ball that
+    leaned on a wall leans on its image. Images bear no friction between each other: what the friction of a wall held
+    sags by some hundredths of a radius.
 
     Args:
         bed: The tile.
