@@ -11,6 +11,8 @@ from rover_gym.grains.bed_scenes import penetration_depths, rover_on_bed, striki
 from rover_gym.grains.grain_recording import GrainSampler, describe_grains, record_grains
 from rover_gym.grains.grain_run import GrainRun, read_grain_run
 from rover_gym.grains.grain_surface import SurfaceMap, surface_map
+from rover_gym.grains.sizes import even_radii, lognormal_radii, sieved_radii
+from rover_gym.grains.tiling import tiled
 from rover_gym.grains.vessel_scenes import column, drum, outflow, run_out, silo, slopes
 
 __all__ = [
@@ -22,6 +24,8 @@ __all__ = [
     "column",
     "describe_grains",
     "drum",
+    "even_radii",
+    "lognormal_radii",
     "outflow",
     "penetration_depths",
     "read_grain_run",
@@ -30,9 +34,11 @@ __all__ = [
     "run_out",
     "settle",
     "settled_balls",
+    "sieved_radii",
     "silo",
     "slopes",
     "striking_sphere",
     "surface_map",
+    "tiled",
     "with_wheel_width",
 ]

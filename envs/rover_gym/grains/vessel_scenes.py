@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rover_gym.grains.ball_bed import DENSITY, MOST_BALLS, settle
+from rover_gym.grains.ball_bed import DENSITY, check_memory, settle
 from rover_gym.grains.grain_run import GrainRun
 from rover_gym.grains.grain_surface import surface_map
+from rover_gym.grains.sizes import MOST_BALLS
 from rover_gym.mechanics import Drum, GrainSimulation, OptionError, Silo, ball_packing
 from rover_gym.validation import number, refuse, whole
 
@@ -176,6 +177,7 @@ def _filled(
 
 def _checked(count: int, radius: float) -> tuple[int, float]:
     count = whole("count", count, at_least=1, at_most=MOST_BALLS, error=OptionError)
+    check_memory("count", count)
     return count, number("radius", radius, above=0.0)
 
 
