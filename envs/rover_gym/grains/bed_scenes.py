@@ -14,12 +14,12 @@ from rover_gym.validation import number, refuse
 CLEARANCE = 1e-3  # m, between a rover's wheels and the balls, or a sphere and the balls, at the start
 
 
-def striking_sphere(bed: BallBed, radius: float, density: float, drop: float, **options: Any) -> GrainSimulation:
+def striking_sphere(bed: BallBed, sphere_radius: float, density: float, drop: float, **options: Any) -> GrainSimulation:
     """A sphere at the moment at which it strikes the middle of a bed; it is the last ball.
 
     Args:
         bed: The bed.
-        radius: Of the sphere, m.
+        sphere_radius: Of the sphere, m.
         density: Of the sphere, kg/m³.
         drop: Height from which it fell, m.
         **options: Those of `GrainSimulation`.
@@ -27,10 +27,10 @@ def striking_sphere(bed: BallBed, radius: float, density: float, drop: float, **
     Raises:
         OptionError: A number is out of its range, or the sphere is wider than half of the bed.
     """
-    radius, density = number("radius", radius, above=0.0), number("density", density, above=0.0)
+    radius, density = number("sphere_radius", sphere_radius, above=0.0), number("density", density, above=0.0)
     drop = number("drop", drop, at_least=0.0)
     if 4.0 * radius > min(bed.width, bed.depth):
-        refuse(OptionError, "radius", radius, "makes the sphere wider than half of the bed")
+        refuse(OptionError, "sphere_radius", radius, "makes the sphere wider than half of the bed")
     x, z = 0.5 * bed.width, 0.5 * bed.depth
     apart = np.hypot(bed.position[:, 0] - x, bed.position[:, 2] - z)
     reach = radius + bed.radius
@@ -99,14 +99,14 @@ def rover_on_bed(
     return RoverGrainSimulation(rover, grains, wheel_friction=wheel_friction)
 
 
-def with_wheel_width(model: RoverModel, width: float) -> RoverModel:
+def with_wheel_width(model: RoverModel, wheel_width: float) -> RoverModel:
     """The same rover on wheels of a width, m, between whose rims balls do not slip.
 
     Raises:
         OptionError: The width is not positive.
         ModelError: A wheel cannot have it.
     """
-    width = number("width", width, above=0.0)
+    width = number("wheel_width", wheel_width, above=0.0)
     described = model.to_dict()
     for wheel in described["wheels"]:
         wheel["width"] = width
