@@ -15,7 +15,8 @@ The package consists of the subpackages below. Each one may import those above i
     planning       the cheapest model that a scene permits
     record         trajectories in HDF5
     planar         the planar systems: a ball, a two-wheel rover
-    soil           granular soil
+    soil           granular soil of disks, in the plane
+    grains         granular ground of balls, in space
     reproduction   the experiments of the 2010 report
     replay         saved runs for the browser, VRML and glTF
     figures        figures of saved runs

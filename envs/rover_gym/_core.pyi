@@ -28,12 +28,16 @@ __all__ = [
     "CommandError",
     "Contacts",
     "DrawnEpisodes",
+    "Drum",
     "Energy",
     "EpisodeBatch",
     "EpisodeDistribution",
     "EpisodeRules",
     "EpisodeRun",
     "FrictionContactSolution",
+    "GrainContacts",
+    "GrainSimulation",
+    "GrainSnapshot",
     "HeightField",
     "Line",
     "MirroredRoverSimulation",
@@ -46,8 +50,11 @@ __all__ = [
     "Plane",
     "Polyline",
     "ProblemError",
+    "RoverGrainSimulation",
+    "RoverGrainSnapshot",
     "RoverGymError",
     "RoverModel",
+    "Silo",
     "Simulation",
     "SimulationBatch",
     "Sine",
@@ -67,7 +74,9 @@ __all__ = [
     "Union",
     "__version__",
     "accuracy_options",
+    "arrange_balls",
     "atan2",
+    "ball_packing",
     "exp",
     "seed_generators",
     "sin_cos",
@@ -2179,7 +2188,7 @@ class EpisodeRun:
         """
     def step(
         self,
-        simulation: Simulation,
+        simulation: Simulation | RoverGrainSimulation,
         action: npt.ArrayLike,
         normals: npt.ArrayLike | None = None,
         *,
@@ -2191,7 +2200,8 @@ class EpisodeRun:
         after a whole physics step, whose state stays; the episode then stays as before the call.
 
         Args:
-            simulation: The rover of this episode.
+            simulation: The rover of this episode, a `Simulation`, or a `RoverGrainSimulation` where
+                it drives among grains.
             action: Torques, then steering, within [-1, 1], (n_actions,).
             normals: A standard normal number for each entry of the observation, (size,), where the
                 rules have noise.
@@ -2884,6 +2894,415 @@ class SoilSimulation:
             StateError: The snapshot belongs to another soil or is damaged. Nothing has changed.
         """
 
+@final
+class Drum:
+    """A drum that turns about its axis, which lies along z, between two ends at rest.
+
+    Args:
+        radius: Inner radius, m.
+        length: Distance between the ends, m.
+        rate: Angular velocity about +z, rad/s.
+        centre: Its middle, (3,), m; the origin by default.
+
+    Raises:
+        TerrainError: A number is not finite, or the radius or length is not positive.
+    """
+
+    def __new__(
+        cls, radius: float, length: float, rate: float = 0.0, *, centre: npt.ArrayLike | None = None
+    ) -> Drum: ...
+    @property
+    def radius(self) -> float:
+        """Inner radius, m."""
+    @property
+    def length(self) -> float:
+        """Distance between the ends, m."""
+    @property
+    def rate(self) -> float:
+        """Angular velocity about +z, rad/s."""
+    @property
+    def centre(self) -> tuple[float, float, float]:
+        """Its middle, m."""
+
+@final
+class Silo:
+    """An upright tube, open above, perhaps on a flat floor with a round hole.
+
+    Without a floor it has no end. What falls through the hole is free.
+
+    Args:
+        radius: Inner radius, m.
+        floor: Height of the floor, m; no floor by default.
+        hole: Radius of the hole in the middle of the floor, m; 0 for none.
+        axis: Place (x, z) of the axis, (2,), m; the origin by default.
+
+    Raises:
+        TerrainError: A number is not finite, the radius is not positive, or the hole is as wide as
+            the tube.
+    """
+
+    def __new__(
+        cls,
+        radius: float,
+        *,
+        floor: float | None = None,
+        hole: float = 0.0,
+        axis: npt.ArrayLike | None = None,
+    ) -> Silo: ...
+    @property
+    def radius(self) -> float:
+        """Inner radius, m."""
+    @property
+    def floor(self) -> float | None:
+        """Height of the floor, m, or None."""
+    @property
+    def hole(self) -> float:
+        """Radius of the hole, m."""
+    @property
+    def axis(self) -> tuple[float, float]:
+        """Place (x, z) of the axis, m."""
+
+@final
+class GrainContacts:
+    """The contacts of the last step of grains in space, as new arrays with one row a contact.
+
+    Contacts between sleeping balls are left out.
+    """
+
+    @property
+    def bodies(self) -> npt.NDArray[np.int64]:
+        """Numbers of both bodies, (n, 2), balls from 0; -1 for a wall or the terrain."""
+    @property
+    def points(self) -> _Array:
+        """Points of the first body's surface, (n, 3), m."""
+    @property
+    def normals(self) -> _Array:
+        """Unit normals from the second body into the first, (n, 3)."""
+    @property
+    def frames(self) -> _Array:
+        """Contact frames, world frame, (n, 3, 3).
+
+        Rows are the unit vectors n (normal), t and b (tangents).
+        """
+    @property
+    def gaps(self) -> _Array:
+        """Gaps at the start of the step, (n,), m; negative where bodies overlap."""
+    @property
+    def impulses(self) -> _Array:
+        """Impulses on the first body along n, t, b of `frames`, (n, 3), N s.
+
+        Cohesion is part of the normal ones, which are negative where a contact bears tension.
+        """
+    @property
+    def velocities(self) -> _Array:
+        """Velocities of the first body against the second after the step along n, t, b, (n, 3), m/s."""
+    @property
+    def world_impulses(self) -> _Array:
+        """Impulses on the first body along x, y, z, (n, 3), N s."""
+    def __len__(self) -> int: ...
+
+@final
+class GrainSnapshot:
+    """Everything that grains in space need to continue bit for bit. Picklable."""
+
+    @staticmethod
+    def from_bytes(data: bytes) -> GrainSnapshot:
+        """Reads a snapshot.
+
+        Args:
+            data: What `to_bytes` returned.
+
+        Returns:
+            The snapshot.
+
+        Raises:
+            StateError: The bytes are not those of a snapshot.
+        """
+    def to_bytes(self) -> bytes:
+        """The snapshot as bytes, as `from_bytes` reads them."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class GrainSimulation:
+    """Grains in space: free balls with friction, between walls or on a terrain.
+
+    World axes: x forward, y up, z to the right. One call at a time: a call during another one, from
+    another thread or a signal handler, raises BusyError.
+
+    Args:
+        radius: Radii of the balls, (n,), m.
+        mass: Masses of the balls, (n,), kg; they are homogeneous.
+        position: Centres, (n, 3), m.
+        kinematic: Balls whose velocity no force changes, (n,), such as grains glued to a rough
+            floor, or a piston with the velocity that `set_state` gives it; none by default. They
+            may overlap one another and walls.
+        walls: A point of each wall and the normal to its free side, (m, 6), m; none by default.
+        wall_velocity: Velocities of the walls, (m, 3), m/s; at rest by default. A wall is in its
+            place at time 0.
+        vessel: A `Drum` or a `Silo` around the balls; none by default.
+        terrain: A `Plane`, `SphereField`, `HeightField`, `TriangleMesh` or `Union`, or a list of
+            them, below the balls; none by default. Where it knows no ground, balls fall. Balls
+            have a vessel or a terrain, not both.
+        friction: Coulomb's coefficient between balls.
+        wall_friction: Coulomb's coefficient of balls on walls, vessel and terrain.
+        cohesion: Attraction of bodies that touch, N: the pull that breaks their contact. The law of
+            a contact is 0 <= u_N + gap/h, p_N + h cohesion >= 0, one of them 0; friction is bounded
+            by friction (p_N + h cohesion).
+        cohesion_range: Gap up to which the attraction acts, m; 1% of the smallest radius by
+            default, at most 20%.
+        restitution: Newton's coefficient of all contacts, in [0, 1].
+        gravity: Gravity, (3,), m/s²; (0, -9.81, 0) by default.
+        time_step: Time step, s.
+        tolerance: Largest relative residual of the contact problem. Its velocities are also right
+            to 25 times that, in units of the root of gravity times the smallest radius; without
+            gravity that of 9.81 m/s².
+        max_iterations: Largest number of sweeps of the contact solver in a step.
+        stabilisation: "projection" moves overlapping bodies apart, which may add energy by lifting
+            those above; "none" leaves them. By default "none" without restitution and "projection"
+            with it.
+        penetration_tolerance: Overlap that projection leaves alone, m; 0.5% of the smallest radius
+            by default.
+        sleep: Whether balls at rest far from anything that moves are left out of the step.
+        sleep_speed: Speed below which a ball is at rest, m/s; 5e-4 by default.
+        sleep_distance: Distance within which nothing may move for a ball to sleep, m; 0.2 by
+            default.
+
+    Raises:
+        ModelError: A radius or mass is not finite and positive.
+        StateError: Positions have a wrong shape or an entry that is not finite, or balls, walls or
+            terrain overlap.
+        TerrainError: A wall has no direction, or `terrain` or `vessel` is none.
+        OptionError: An option is out of its range, or both `terrain` and `vessel` are given.
+    """
+
+    def __new__(
+        cls,
+        radius: npt.ArrayLike,
+        mass: npt.ArrayLike,
+        position: npt.ArrayLike,
+        *,
+        kinematic: npt.ArrayLike | None = None,
+        walls: npt.ArrayLike | None = None,
+        wall_velocity: npt.ArrayLike | None = None,
+        vessel: Drum | Silo | None = None,
+        terrain: _Terrain | _Terrains | None = None,
+        friction: float = 0.5,
+        wall_friction: float = 0.5,
+        cohesion: float = 0.0,
+        cohesion_range: float | None = None,
+        restitution: float = 0.0,
+        gravity: npt.ArrayLike | None = None,
+        time_step: float = 0.002,
+        tolerance: float = 0.001,
+        max_iterations: int = 2000,
+        stabilisation: Literal["projection", "none"] | None = None,
+        penetration_tolerance: float | None = None,
+        sleep: bool = False,
+        sleep_speed: float | None = None,
+        sleep_distance: float | None = None,
+    ) -> GrainSimulation: ...
+    @property
+    def time(self) -> float:
+        """Time since the last call of `set_state`, s."""
+    @property
+    def time_step(self) -> float:
+        """Time step, s."""
+    @property
+    def radius(self) -> _Array:
+        """Radii of the balls, (n,), m."""
+    @property
+    def mass(self) -> _Array:
+        """Masses of the balls, (n,), kg."""
+    @property
+    def position(self) -> _Array:
+        """Centres of the balls, (n, 3), m."""
+    @property
+    def velocity(self) -> _Array:
+        """Velocities of the centres, (n, 3), m/s."""
+    @property
+    def spin(self) -> _Array:
+        """Angular velocities of the balls, world frame, (n, 3), rad/s."""
+    @property
+    def kinematic(self) -> npt.NDArray[np.bool_]:
+        """Which balls are kinematic, (n,)."""
+    @property
+    def asleep(self) -> npt.NDArray[np.bool_]:
+        """Which balls sleep, (n,); kinematic ones always do."""
+    @property
+    def terrain(self) -> _Terrain | None:
+        """The terrain below the balls, or None."""
+    @property
+    def vessel(self) -> Drum | Silo | None:
+        """The vessel around the balls, or None."""
+    @property
+    def walls(self) -> _Array:
+        """A point of each wall now and the normal to its free side, (m, 6), m."""
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The options of contacts, gravity and solver, by the names of the arguments."""
+    def set_state(
+        self,
+        position: npt.ArrayLike,
+        velocity: npt.ArrayLike | None = None,
+        spin: npt.ArrayLike | None = None,
+    ) -> None:
+        """Sets positions and velocities; time starts at 0.
+
+        Args:
+            position: Centres, (n, 3), m.
+            velocity: Velocities of the centres, (n, 3), m/s; at rest by default.
+            spin: Angular velocities, (n, 3), rad/s; at rest by default.
+
+        Raises:
+            StateError: An array has a wrong shape or an entry that is not finite, or bodies
+                overlap. Nothing has changed.
+        """
+    def remove(self, which: npt.ArrayLike) -> None:
+        """Takes balls out; the others keep their order.
+
+        Args:
+            which: Which balls go, (n,) truth values.
+
+        Raises:
+            ModelError: The number of truth values differs, or no ball would be left. Nothing has
+                changed.
+        """
+    def step(self, n: int = 1) -> StepReport:
+        """Takes n steps, as `Simulation.step` does.
+
+        Args:
+            n: Number of steps.
+
+        Returns:
+            How the steps went.
+
+        Raises:
+            StepError: A step could not be taken; the state before it stays.
+            OptionError: `n` is not a count.
+        """
+    @property
+    def contacts(self) -> GrainContacts:
+        """The contacts of the last step."""
+    def energy(self) -> Energy:
+        """Kinetic and potential energy now."""
+    def momentum(self) -> _Array:
+        """Momentum of the balls, (6,): along x, y, z, kg m/s, and about the origin, kg m²/s.
+
+        Kinematic balls do not count.
+        """
+    def penetration(self) -> float:
+        """Deepest overlap now, m."""
+    def wake(self) -> None:
+        """Wakes all balls."""
+    def snapshot(self) -> GrainSnapshot:
+        """Everything that is needed to continue bit for bit."""
+    def restore(self, snapshot: GrainSnapshot) -> None:
+        """Goes back to a snapshot.
+
+        Args:
+            snapshot: A snapshot of the same grains.
+
+        Raises:
+            StateError: The snapshot belongs to other grains or is damaged. Nothing has changed.
+        """
+
+class RoverGrainSnapshot:
+    """Everything that a rover among grains needs to continue bit for bit. Picklable."""
+
+    @staticmethod
+    def from_bytes(data: bytes) -> RoverGrainSnapshot:
+        """Reads a snapshot.
+
+        Args:
+            data: What `to_bytes` returned.
+
+        Returns:
+            The snapshot.
+
+        Raises:
+            StateError: The bytes are not those of a snapshot.
+        """
+    def to_bytes(self) -> bytes:
+        """The snapshot as bytes, as `from_bytes` reads them."""
+    def __eq__(self, other: object, /) -> bool: ...
+    def __hash__(self) -> int: ...
+    def __reduce__(self) -> Any: ...
+
+@final
+class RoverGrainSimulation:
+    """A rover among grains in space, stepped together.
+
+    Wheels, boxes and balls of the rover meet the grains with exact contact and friction, and forces
+    go both ways within the step. The rover and the grains keep their own simulations, which have
+    their states, commands, contacts and forces; only the steps are taken here, with the solver
+    settings of the grains, θ = 1. Walls of the grains hold grains alone: what shall hold the rover
+    too is a terrain of both.
+
+    Args:
+        rover: The rover, with its model, terrain, friction and commands.
+        grains: The balls, with the same time step and gravity.
+        wheel_friction: Coulomb's coefficient between the rover and grains.
+
+    Raises:
+        OptionError: The time steps or gravities differ, or the coefficient is negative or not
+            finite.
+        StateError: A part of the rover is in a grain.
+    """
+
+    def __new__(
+        cls, rover: Simulation, grains: GrainSimulation, *, wheel_friction: float = 0.9
+    ) -> RoverGrainSimulation: ...
+    @property
+    def rover(self) -> Simulation:
+        """The rover's simulation. Its own `step` moves it without the grains."""
+    @property
+    def grains(self) -> GrainSimulation:
+        """The grains' simulation. Its own `step` moves them without the rover."""
+    @property
+    def wheel_friction(self) -> float:
+        """Coulomb's coefficient between the rover and grains."""
+    @property
+    def time(self) -> float:
+        """Time of the grains, s."""
+    @property
+    def time_step(self) -> float:
+        """Time step, s."""
+    def step(self, n: int = 1) -> StepReport:
+        """Takes n steps with both, as `Simulation.step` does.
+
+        Args:
+            n: Number of steps.
+
+        Returns:
+            How the steps went.
+
+        Raises:
+            StepError: A step could not be taken; the state before it stays.
+            OptionError: `n` is not a count.
+        """
+    @property
+    def wheel_gaps(self) -> npt.NDArray[np.float64]:
+        """Gap of each wheel now to the nearest grain or the terrain, (n_wheels,), m.
+
+        Positive when apart. A wheel without a grain within its radius has the gap to the terrain.
+        """
+    def penetration(self) -> float:
+        """Deepest overlap now, m: of grains with anything, and of the rover with grains."""
+    def snapshot(self) -> RoverGrainSnapshot:
+        """Everything that is needed to continue bit for bit."""
+    def restore(self, snapshot: RoverGrainSnapshot) -> None:
+        """Goes back to a snapshot.
+
+        Args:
+            snapshot: A snapshot of the same rover among the same grains.
+
+        Raises:
+            StateError: The snapshot belongs to another rover or other grains, or is damaged.
+                Nothing has changed.
+        """
+
 def seed_generators(seeds: Sequence[int]) -> _Rows:
     """Seeds generators as `numpy.random.PCG64` does.
 
@@ -2943,6 +3362,73 @@ def soil_packing(
     Raises:
         ModelError: A number is not finite or out of its range, the radii are the wrong way round,
             or a disk does not fit.
+    """
+
+def ball_packing(
+    count: int,
+    *,
+    radius_min: float,
+    radius_max: float,
+    mass: float,
+    width: float,
+    depth: float,
+    left: float = 0.0,
+    back: float = 0.0,
+    bottom: float = 0.0,
+    seed: int = 0,
+) -> tuple[_Array, _Array, _Array]:
+    """Balls in loose layers over a rectangle, without overlap: where a bed starts from.
+
+    The radii are drawn evenly from their range.
+
+    Args:
+        count: Number of balls, at most 1 000 000.
+        radius_min: Smallest radius, m.
+        radius_max: Largest radius, m.
+        mass: Mass of a ball of the mean radius, kg; the others' go with their volume.
+        left: Smallest x, m.
+        width: Width of the rectangle along x, m.
+        back: Smallest z, m.
+        depth: Width of the rectangle along z, m.
+        bottom: Height of the lower edge, m.
+        seed: Seed of the random numbers; equal seeds give equal balls.
+
+    Returns:
+        Radii, (n,), m, masses, (n,), kg, and centres, (n, 3), m.
+
+    Raises:
+        ModelError: A number is not finite or out of its range, the radii are the wrong way round,
+            or a ball does not fit.
+    """
+
+def arrange_balls(
+    radius: npt.ArrayLike,
+    *,
+    width: float,
+    depth: float,
+    left: float = 0.0,
+    back: float = 0.0,
+    bottom: float = 0.0,
+    seed: int = 0,
+) -> _Array:
+    """Places balls of given radii in loose layers over a rectangle, without overlap.
+
+    Each has a place as wide as the largest ball, and they fill the layers in the order given.
+
+    Args:
+        radius: Radii, (n,), m.
+        width: Width of the rectangle along x, m.
+        depth: Width of the rectangle along z, m.
+        left: Smallest x, m.
+        back: Smallest z, m.
+        bottom: Height of the lower edge, m.
+        seed: Seed of the random numbers; equal seeds give equal places.
+
+    Returns:
+        Centres, (n, 3), m.
+
+    Raises:
+        ModelError: A number is not finite or out of its range, or a ball does not fit.
     """
 
 @final

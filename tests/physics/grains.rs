@@ -152,6 +152,7 @@ where
                     contacts: self.scratch.contacts(),
                     impulses: self.scratch.impulses(),
                     count: self.steps,
+                    movers: &[],
                 };
                 self.sleep.update(options, taken, &mut self.warm_start);
             }
@@ -445,7 +446,7 @@ fn balls_fall_in_a_box_and_rest_in_it_and_their_energy_never_grows() {
         let off = (after - momentum - weight - heap.impulse_of_walls()).norm();
         assert!(off < 1e-12, "step {step}: {off} N s");
         momentum = after;
-        let depth = heap.scene.penetration(&heap.q) / smallest;
+        let depth = heap.scene.penetration(&heap.q, heap.time) / smallest;
         assert!(depth < 0.01, "step {step}: {depth}");
     }
     assert!(converged > 890, "{converged} of 900 steps");
@@ -656,7 +657,7 @@ fn a_machine_that_is_a_disk_or_a_ball_moves_as_one() {
 #[test]
 fn packings_in_space_do_not_overlap_and_stay_in_their_box() {
     let heap = bed(300);
-    assert!(heap.scene.penetration(&heap.q) <= 0.0);
+    assert!(heap.scene.penetration(&heap.q, heap.time) <= 0.0);
     let radius = heap.scene.grains.radius();
     for (i, r) in radius.iter().enumerate() {
         let x = heap.centre(i);

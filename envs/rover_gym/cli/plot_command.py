@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from rover_gym.cli.console import check_folder, plain_errors, say_path
+from rover_gym.grains.grain_run import grain_run_of, is_grains
 from rover_gym.record.rover_run import run_of
 from rover_gym.record.trajectory import read_trajectory
 from rover_gym.soil.soil_run import is_soil, soil_run_of
@@ -16,7 +17,8 @@ def plot(
     recording: Annotated[
         Path,
         typer.Argument(
-            metavar="RUN", help="A trajectory that `rover drive --output`, `rover report` or `rover planar soil` saved."
+            metavar="RUN",
+            help="What `rover drive --output`, `rover report`, `rover planar soil` or `rover grains` saved.",
         ),
     ],
     output: Annotated[
@@ -27,7 +29,8 @@ def plot(
 ) -> None:
     """Draw a saved run over time: gaps, loads, slip, attitude, torques, energy and solver, and its path from above.
 
-    Of a run on a soil: speed, slip and sinkage; forces on the wheels; energy, contacts and overlap.
+    Of a run on a soil: speed, slip and sinkage; forces on the wheels; energy, contacts and overlap. Of balls in space
+    also the ruts: the surface before and after, with sections along and across a track.
     """
     folder = recording.with_name(f"{recording.stem}-plots") if output is None else output
     trajectory = read_trajectory(recording)
@@ -37,6 +40,11 @@ def plot(
         from rover_gym.figures.soil_run_figures import draw_soil_run  # noqa: PLC0415 - as below
 
         paths = draw_soil_run(soil_run, folder, file_format=file_format, with_overview=overview)
+    elif is_grains(trajectory):
+        grain_run = grain_run_of(trajectory, recording)
+        from rover_gym.figures.grain_run_figures import draw_grain_run  # noqa: PLC0415 - as below
+
+        paths = draw_grain_run(grain_run, folder, file_format=file_format, with_overview=overview)
     else:
         run = run_of(trajectory, recording)
         from rover_gym.figures import draw_run  # noqa: PLC0415 - slow to load, and a bad file is told at once

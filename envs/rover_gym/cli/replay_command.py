@@ -5,12 +5,13 @@ from typing import Annotated
 
 import typer
 
-from rover_gym.cli.console import check_file, plain_errors, say_path
+from rover_gym.cli.console import check_file, plain_errors, progress_bar, say_path
 from rover_gym.extras import require
+from rover_gym.grains.grain_run import grain_run_of, is_grains
 from rover_gym.mechanics import OptionError
 from rover_gym.record.rover_run import run_of
 from rover_gym.record.trajectory import Trajectory, read_trajectory
-from rover_gym.replay import write_gltf, write_page, write_soil_page, write_vrml
+from rover_gym.replay import write_gltf, write_grain_page, write_page, write_soil_page, write_vrml
 from rover_gym.soil.soil_run import is_soil, soil_run_of
 from rover_gym.validation import refuse
 
@@ -20,30 +21,45 @@ def replay(
     *,
     run: Annotated[
         Path,
-        typer.Argument(help="A trajectory that `rover drive --output`, `rover report` or `rover planar soil` wrote."),
+        typer.Argument(
+            help="What `rover drive --output`, `rover report`, `rover planar soil` or `rover grains` saved."
+        ),
     ],
     html: Annotated[Path | None, typer.Option(dir_okay=False, help="Page for the browser; needs no network.")] = None,
     vrml: Annotated[Path | None, typer.Option(dir_okay=False, help="VRML97 file, usually .wrl.")] = None,
     gltf: Annotated[Path | None, typer.Option(dir_okay=False, help="Binary glTF 2.0 file, usually .glb.")] = None,
+    film: Annotated[
+        Path | None,
+        typer.Option(dir_okay=False, help="Video of a run of `rover grains`, .mp4; needs no browser."),
+    ] = None,
     fps: Annotated[float, typer.Option(help="Frames per second, at most as many as were recorded.")] = 25.0,
     follow: Annotated[
         bool, typer.Option("--follow/--no-follow", help="Let the camera of the page follow the rover.")
     ] = True,
 ) -> None:
     """Replay a saved run: as a page with a timeline and curves, and as animated 3D files for other programs."""
-    if html is None and vrml is None and gltf is None:
-        refuse(OptionError, "output", None, "say what to write: --html, --vrml or --gltf, each with a file's name")
-    for package, wanted in (("viser", html), ("pygltflib", gltf)):
-        if wanted is not None:
-            require(package, "replay")  # before the first file is written
+    wanted = {"html": html, "vrml": vrml, "gltf": gltf, "film": film}
+    if not any(wanted.values()):
+        refuse(OptionError, "output", None, "say what to write: --html, --vrml, --gltf or --film, with a file's name")
     trajectory = read_trajectory(run)
-    for name, path in (("html", html), ("vrml", vrml), ("gltf", gltf)):
+    for package, path in (("viser", None if is_grains(trajectory) else html), ("pygltflib", gltf)):
+        if path is not None:
+            require(package, "replay")  # before the first file is written
+    for name, path in wanted.items():
         if path is not None and path.exists() and path.samefile(run):
             refuse(OptionError, name, str(path), "would replace the run itself")
         check_file(name, path)
     if is_soil(trajectory):
-        _replay_soil(trajectory, run, html, {"vrml": vrml, "gltf": gltf}, fps, follow=follow)
+        _refuse_others({"vrml": vrml, "gltf": gltf, "film": film}, "a run on a soil is replayed as a page, with --html")
+        if html is not None:
+            say_path("page", write_soil_page(soil_run_of(trajectory, run).resample(fps), html, follow=follow))
         return
+    if is_grains(trajectory):
+        reason = "a run of balls is replayed as a page or a film, with --html or --film"
+        _refuse_others({"vrml": vrml, "gltf": gltf}, reason)
+        _replay_grains(trajectory, run, html, film, fps, follow=follow)
+        return
+    _refuse_others({"film": film}, "only runs of `rover grains` are filmed here: `rover drive --video` films a drive")
     frames = run_of(trajectory, run).resample(fps)
     if html is not None:
         say_path("page", write_page(frames, html, follow=follow))
@@ -53,11 +69,21 @@ def replay(
         say_path("glTF", write_gltf(frames, gltf))
 
 
-def _replay_soil(
-    trajectory: Trajectory, run: Path, html: Path | None, others: dict[str, Path | None], fps: float, *, follow: bool
-) -> None:
+def _refuse_others(others: dict[str, Path | None], reason: str) -> None:
     for name, path in others.items():
         if path is not None:
-            refuse(OptionError, name, str(path), "a run on a soil can be replayed as a page only, with --html")
+            refuse(OptionError, name, str(path), reason)
+
+
+def _replay_grains(
+    trajectory: Trajectory, run: Path, html: Path | None, film: Path | None, fps: float, *, follow: bool
+) -> None:
+    frames = grain_run_of(trajectory, run).resample(fps)
     if html is not None:
-        say_path("page", write_soil_page(soil_run_of(trajectory, run).resample(fps), html, follow=follow))
+        say_path("page", write_grain_page(frames, html, follow=follow))
+    if film is not None:
+        from rover_gym.figures.grain_frames import film_grains  # noqa: PLC0415 - VTK is slow to load
+
+        with progress_bar() as bar:
+            task = bar.add_task("film", total=frames.n_frames, state="")
+            say_path("film", film_grains(frames, film, fps, progress=lambda n: bar.update(task, completed=n)))

@@ -32,7 +32,7 @@ def slip_ratios(run: RoverRun) -> Array:
     It is nan where a wheel carried no load.
     """
     u = contact_velocities(run)
-    rim = _of_wheels(run, "v") * run.model.wheel_radii
+    rim = of_wheels(run, "v") * run.model.wheel_radii
     ground = np.hypot(rim + u[..., 1], u[..., 2])
     sliding = np.hypot(u[..., 1], u[..., 2])
     return np.asarray(sliding / np.maximum(np.maximum(np.abs(rim), ground), SLIP_SPEED))
@@ -43,7 +43,7 @@ def motor_work(run: RoverRun) -> Array:
 
     The drive torque of the last step before a row is taken as constant since the previous row.
     """
-    angles = _of_wheels(run, "q")
+    angles = of_wheels(run, "q")
     turned = np.diff(angles, axis=0, prepend=angles[:1])
     return np.cumsum(run.trajectory["motor_torques"] * turned, axis=0)
 
@@ -71,7 +71,7 @@ def smooth(time: Array, values: Array, window: float) -> Array:
     return smoothed.reshape(values.shape)
 
 
-def _of_wheels(run: RoverRun, name: str) -> Array:
+def of_wheels(run: RoverRun, name: str) -> Array:
     """(n, 6) angles ("q", rad) or rates ("v", rad/s) of the wheels, positive forward; zero where a wheel is welded."""
     columns = np.array(run.model.wheel_joint_indices)
     values: Array = run.trajectory[name][:, columns] * drive_signs(run.model)

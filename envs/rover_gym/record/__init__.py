@@ -4,7 +4,7 @@ from rover_gym.record.channels import Channel, RoverSampler
 from rover_gym.record.facts import describe, row_count
 from rover_gym.record.recorder import Recorder
 from rover_gym.record.rover_run import RoverRun, read_run
-from rover_gym.record.trajectory import Trajectory, read_trajectory
+from rover_gym.record.trajectory import Trajectory, read_frames, read_trajectory
 from rover_gym.record.trajectory_format import RecordingError
 
 __all__ = [
@@ -15,6 +15,7 @@ __all__ = [
     "RoverSampler",
     "Trajectory",
     "describe",
+    "read_frames",
     "read_run",
     "read_trajectory",
     "row_count",

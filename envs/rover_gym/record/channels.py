@@ -20,6 +20,8 @@ class Channel:
         description: Content of a row, with frame and sign.
         shape: Shape of a row, `()` for a scalar.
         columns: Names along the first axis of a row, or empty.
+        packed: Whether the data set is large: it is stored in single precision, compressed, in the group `frames`,
+            and read by `read_frames`.
     """
 
     name: str
@@ -27,6 +29,7 @@ class Channel:
     description: str
     shape: tuple[int, ...] = ()
     columns: tuple[str, ...] = ()
+    packed: bool = False
 
 
 class RoverSampler:

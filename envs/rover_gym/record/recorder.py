@@ -24,6 +24,7 @@ from rover_gym.record.steady_file import FileInUseError, SteadyFile
 from rover_gym.record.stored_terrain import write_terrain
 from rover_gym.record.trajectory import read_trajectory
 from rover_gym.record.trajectory_format import (
+    FRAMES,
     LIBRARY,
     TERRAIN,
     RecordingError,
@@ -36,6 +37,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     import h5py
+
+#: Columns of a chunk of a packed data set: with the rows of a flush, about a megabyte.
+PACKED_COLUMNS = 4096
 
 
 class Recorder:
@@ -77,6 +81,9 @@ class Recorder:
         facts = {**versions(), **storable(attributes or {}), "complete": False}
         self._pending: dict[str, list[npt.NDArray[np.float64]]] = {channel.name: [] for channel in channels}
         self._shapes = {channel.name: channel.shape for channel in channels}
+        self._places = {
+            channel.name: f"{FRAMES}/{channel.name}" if channel.packed else channel.name for channel in channels
+        }
         self._process = os.getpid()
         self._disk = _new_file(self.path)
         self._file: h5py.File = hdf5.File(self._disk, "w", libver=(LIBRARY, LIBRARY))
@@ -92,14 +99,17 @@ class Recorder:
         for key, value in facts.items():
             write_attribute(self._file, key, value)
         for channel in channels:
+            most = PACKED_COLUMNS if channel.packed else None
+            packing: dict[str, Any] = {"compression": "gzip", "compression_opts": 2, "shuffle": True}
             data = self._file.create_dataset(
-                channel.name,
+                self._places[channel.name],
                 shape=(0, *channel.shape),
                 # HDF5 has no empty chunks, so an empty channel (the wheels of a soil without a machine) is resizable.
                 maxshape=(None, *(n or None for n in channel.shape)),
-                chunks=(self._rows_per_flush, *(n or 1 for n in channel.shape)),
-                dtype="f8",
+                chunks=(self._rows_per_flush, *(min(n, most or n) or 1 for n in channel.shape)),
+                dtype="f4" if channel.packed else "f8",
                 fletcher32=True,  # a checksum, so that damaged data is not read as motion
+                **(packing if channel.packed else {}),
             )
             write_description(data, channel.unit, channel.description, channel.columns)
         if terrain is not None:
@@ -137,7 +147,7 @@ class Recorder:
         self._must_be_open()
         for name, rows in self._pending.items():
             if rows:
-                data = self._file[name]
+                data = self._file[self._places[name]]
                 data.resize(data.shape[0] + len(rows), axis=0)
                 data[-len(rows) :] = np.array(rows)
                 rows.clear()
@@ -237,6 +247,7 @@ def _checked_channels(channels: Sequence[Channel]) -> tuple[Channel, ...]:
     if not names:
         refuse(RecordingError, "channels", names, "must not be empty")
     for i, name in enumerate(names):
-        if not name or "/" in name or "\0" in name or name in (".", TERRAIN) or name in names[:i]:
-            refuse(RecordingError, "channels", name, f"must be names of their own, without / and not {TERRAIN!r}")
+        if not name or "/" in name or "\0" in name or name in (".", TERRAIN, FRAMES) or name in names[:i]:
+            reason = f"must be names of their own, without / and neither {TERRAIN!r} nor {FRAMES!r}"
+            refuse(RecordingError, "channels", name, reason)
     return result

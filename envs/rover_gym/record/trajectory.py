@@ -19,6 +19,7 @@ from rover_gym.record.stored_terrain import MATERIALS, Stored, is_stored, stored
 from rover_gym.record.trajectory_format import (
     FORMAT,
     FORMAT_VERSION,
+    FRAMES,
     OBJECTS,
     SIGNATURE,
     TERRAIN,
@@ -38,6 +39,10 @@ if TYPE_CHECKING:
 
 #: Largest ratio of decompressed data to file size: admits compressed files, refuses decompression bombs.
 LARGEST_EXPANSION = 100
+#: The same for packed data sets: what deflate can reach, since a bed at rest repeats its rows.
+LARGEST_PACKING = 1032
+#: Most bytes of frames that one call reads.
+MOST_BYTES = 1 << 32
 
 
 @dataclass(frozen=True)
@@ -80,9 +85,33 @@ def read_trajectory(path: str | Path) -> Trajectory:
     """
     h5py = import_h5py()
     path = file_path(path)
-    size = _check_bytes(path)
+    size = check_bytes(path)
     with sound(path), h5py.File(path, "r") as file:
         return _Reader(h5py, path, size).trajectory(file)
+
+
+def read_frames(path: str | Path, name: str, rows: npt.ArrayLike | None = None) -> npt.NDArray[np.float32]:
+    """Reads rows of a packed data set of a file that `Recorder` wrote, complete or not.
+
+    Args:
+        path: The file.
+        name: Name of the packed channel.
+        rows: Indices of the rows, increasing; all by default.
+
+    Returns:
+        (n_rows, ...) float32.
+
+    Raises:
+        RecordingError: The file holds no such data set or is damaged, a row is out of range, or the rows take more
+            than `MOST_BYTES`.
+        OSError: The file does not exist or may not be read.
+        MissingExtraError: h5py is not installed.
+    """
+    h5py = import_h5py()
+    path = file_path(path)
+    size = check_bytes(path)
+    with sound(path), h5py.File(path, "r") as file:
+        return _Reader(h5py, path, size).frames(file, name, rows)
 
 
 class _Reader:
@@ -122,6 +151,29 @@ class _Reader:
             attributes={key: self._decoded(key, self._attribute(file, key)) for key in file.attrs},
             terrain=terrain,
         )
+
+    def frames(self, file: h5py.File, name: str, rows: npt.ArrayLike | None) -> npt.NDArray[np.float32]:
+        if FRAMES not in file or name not in self._item(file, FRAMES):
+            refuse_field(self._path, f"{FRAMES}/{name}", "nothing", "is not in the file")
+        data, field = self._item(file[FRAMES], name), f"{FRAMES}/{name}"
+        if not isinstance(data, self._h5py.Dataset) or data.chunks is None:
+            refuse_field(self._path, field, type(data).__name__, "must be a data set in chunks")
+        self._room = LARGEST_PACKING * self._size
+        self._check(field, data, least_dimensions=1, single=True)
+        wanted = np.arange(len(data)) if rows is None else np.asarray(rows, dtype=np.int64).reshape(-1)
+        if len(wanted) and not (wanted[0] >= 0 and wanted[-1] < len(data) and (np.diff(wanted) > 0).all()):
+            refuse_field(self._path, f"{field}, rows", wanted[-1], f"must increase, from 0 to less than {len(data)}")
+        shape = (len(wanted), *data.shape[1:])
+        if 4 * math.prod(shape) > MOST_BYTES:
+            refuse_field(self._path, field, shape, f"take more than {MOST_BYTES >> 30} GiB: read fewer, of the shape")
+        result = np.empty(shape, dtype=np.float32)
+        step = data.chunks[0]  # a chunk is unpacked once
+        for first in range(0, len(data), step):
+            low, high = np.searchsorted(wanted, (first, first + step))
+            if low < high:
+                begin, end = wanted[low], wanted[high - 1] + 1
+                result[low:high] = data[begin:end][wanted[low:high] - begin]
+        return result
 
     def _item(self, group: h5py.Group, name: str) -> Any:
         """The item of a name; links and data outside the file are refused."""
@@ -225,7 +277,7 @@ class _Reader:
         return parts[0]
 
 
-def _check_bytes(path: Path) -> int:
+def check_bytes(path: Path) -> int:
     """Makes the checks that do not need HDF5, and returns the file's size."""
     if not stat.S_ISREG(path.stat().st_mode):  # `stat` raises for a missing file; opening a pipe would wait
         refuse(RecordingError, "path", str(path), "is no regular file")

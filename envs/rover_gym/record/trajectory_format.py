@@ -20,6 +20,7 @@ FORMAT_VERSION = 3
 #: HDF5 format version: the oldest with checksummed metadata; every HDF5 since 2008 reads it.
 LIBRARY = "v108"
 TERRAIN = "terrain"  # the group that holds the ground
+FRAMES = "frames"  # the group that holds the packed data sets
 OBJECTS = ("scene", "solver")  # attributes that are JSON objects
 SIGNATURE = b"\x89HDF\r\n\x1a\n"  # first bytes of an HDF5 file
 

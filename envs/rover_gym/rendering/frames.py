@@ -89,7 +89,7 @@ class FrameRenderer:
         }
         self.options = check_render_options("", options)
         self._wheel_mass = model.mass / len(model.wheel_radii)
-        self._window = _open_window(self.options.width, self.options.height)
+        self._window = open_window(self.options.width, self.options.height)
         self._scene = vtkRenderer()
         self._scene.SetUseFXAA(self.options.antialiasing)
         # Arrows begin inside wheels: a second layer draws them in front of everything.
@@ -140,6 +140,10 @@ class FrameRenderer:
             self._scene.AddActor(actor)
         self._view: tuple[tuple[float, ...], Array, float] | None = None
 
+    def add(self, actor: vtkActor) -> None:
+        """Adds what stays when the scene changes, such as the balls of a bed or its walls; their owner moves them."""
+        self._scene.AddActor(actor)
+
     def render(self, simulation: Simulation) -> npt.NDArray[np.uint8]:
         """The simulation's current state as an image (height, width, 3) uint8, top row first."""
         self._place_rover(simulation)
@@ -153,7 +157,7 @@ class FrameRenderer:
         if self.options.show_forces:
             self._place_arrows(simulation)
         self._place_camera(simulation, position)
-        with _Quiet():
+        with QuietLog():
             self._window.Render()
         width, height = self.options.width, self.options.height
         self._window.GetPixelData(0, 0, width - 1, height - 1, 0, self._pixels, 0)
@@ -251,7 +255,7 @@ def contact_forces(simulation: Simulation) -> tuple[Array, Array]:
     return contacts.points.reshape(-1, 3), forces.reshape(-1, 3)
 
 
-class _Quiet:
+class QuietLog:
     """Keeps VTK's log off standard error: users do not need the list of displays that it tried."""
 
     def __enter__(self) -> None:
@@ -262,9 +266,14 @@ class _Quiet:
         vtkLogger.SetStderrVerbosity(self._verbosity)
 
 
-def _open_window(width: int, height: int) -> vtkRenderWindow:
+def open_window(width: int, height: int) -> vtkRenderWindow:
+    """A window off screen.
+
+    Raises:
+        OSError: No OpenGL library works on this machine; the message names the packages that provide one.
+    """
     _load_triton()
-    with _Quiet():
+    with QuietLog():
         window = vtkRenderWindow()
         # VTK tries this kind last; without its library it would end the process at the first frame.
         if window.IsA("vtkOSOpenGLRenderWindow") and not _has_osmesa():

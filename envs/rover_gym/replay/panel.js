@@ -27,6 +27,7 @@
   const x = (time) => box.left + (time / end) * (box.width - box.left - box.right);
 
   const draw = (chart) => {
+    const series = chart.series ?? data.wheels;
     const known = chart.values.flat().filter((value) => value !== null);
     let low = known.reduce((a, b) => Math.min(a, b), 0);
     let high = known.reduce((a, b) => Math.max(a, b), 0);
@@ -56,7 +57,7 @@
         pen = value === null ? "M" : "L";
         return point;
       });
-      add(svg, "path", { class: "curve", stroke: data.wheels[wheel].colour, d: points.join("") });
+      add(svg, "path", { class: "curve", stroke: series[wheel].colour, d: points.join("") });
     });
     if (peak > high) {
       const place = { class: "peak", x: box.width - box.right - 2, y: box.top + 10, "text-anchor": "end" };
@@ -64,7 +65,7 @@
     }
     const cursor = add(svg, "line", { class: "cursor", y1: box.top, y2: box.height - box.bottom });
     const legend = add(panel, "div", { class: "legend" });
-    const readings = data.wheels.map(({ name, colour }) => {
+    const readings = series.map(({ name, colour }) => {
       const entry = add(legend, "span");
       add(entry, "i", { style: `background: ${colour}` });
       add(entry, "span", {}, `${name} `);

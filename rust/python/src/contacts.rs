@@ -1,4 +1,4 @@
-//! `Contacts`, `PlanarContacts`, `SoilContacts`: the contacts of the last step as arrays.
+//! `Contacts`, `PlanarContacts`, `SoilContacts`, `GrainContacts`: the contacts of the last step as arrays.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
@@ -6,6 +6,7 @@ use rover_core::contact::{Contact, Part};
 use rover_core::multibody::Model;
 use rover_core::simulation::{ActiveContact, Components, LocatedContact};
 use rover_core::system::PlanarContact;
+use rover_core::system::grains::GrainContact;
 use rover_core::system::soil::SoilContact;
 
 use crate::arrays::fresh_blocks;
@@ -42,6 +43,19 @@ impl<C: LocatedContact> Columns<C> {
 
     fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_iter(py, self.0.iter().map(|a| a.contact.gap()))
+    }
+}
+
+impl<const D: usize> Columns<GrainContact<D>> {
+    /// Numbers of both bodies; -1 from `n_moving` on.
+    fn bodies<'py>(&self, py: Python<'py>, n_moving: usize) -> PyResult<Bound<'py, PyAny>> {
+        let name = |body: u32| {
+            let is_fixed = body as usize >= n_moving;
+            if is_fixed { -1 } else { i64::from(body) }
+        };
+        let keys = self.0.iter().map(|a| a.contact.key);
+        let flat = PyArray1::from_iter(py, keys.flat_map(|k| [name(k.a), name(k.b)]));
+        flat.call_method1("reshape", (self.0.len(), 2))
     }
 }
 
@@ -232,13 +246,7 @@ impl SoilContacts {
     /// Numbers of both bodies, (n, 2), disks from 0, then the wheels; -1 for a wall or the ground.
     #[getter]
     fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let name = |body: u32| {
-            let is_fixed = body as usize >= self.n_moving;
-            if is_fixed { -1 } else { i64::from(body) }
-        };
-        let keys = self.active.0.iter().map(|a| a.contact.key);
-        let flat = PyArray1::from_iter(py, keys.flat_map(|k| [name(k.a), name(k.b)]));
-        flat.call_method1("reshape", (self.active.0.len(), 2))
+        self.active.bodies(py, self.n_moving)
     }
 
     /// Points of the first body's rim, (n, 2), m.
@@ -287,5 +295,101 @@ impl SoilContacts {
 
     fn __repr__(&self) -> String {
         format!("SoilContacts({})", self.active.0.len())
+    }
+}
+
+/// The contacts of the last step of grains in space, as new arrays with one row a contact.
+///
+/// Contacts between sleeping balls are left out.
+#[pyclass(module = "rover_gym.mechanics", frozen)]
+pub struct GrainContacts {
+    active: Columns<GrainContact<3>>,
+    n_moving: usize,
+}
+
+impl GrainContacts {
+    /// `n_moving`: number of balls and of what moves among them. `attraction`: impulse of the
+    /// cohesion in a contact, N s, which the solver's has to bear.
+    pub fn new(
+        active: &[ActiveContact<GrainContact<3>>],
+        n_moving: usize,
+        attraction: impl Fn(&GrainContact<3>) -> f64,
+    ) -> Self {
+        let mut active = active.to_vec();
+        for one in &mut active {
+            one.impulse[0] -= attraction(&one.contact);
+        }
+        Self {
+            active: Columns(active),
+            n_moving,
+        }
+    }
+}
+
+#[pymethods]
+impl GrainContacts {
+    /// Numbers of both bodies, (n, 2), balls from 0; -1 for a wall or the terrain.
+    #[getter]
+    fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.active.bodies(py, self.n_moving)
+    }
+
+    /// Points of the first body's surface, (n, 3), m.
+    #[getter]
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.active.points(py)
+    }
+
+    /// Unit normals from the second body into the first, (n, 3).
+    #[getter]
+    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.active.normals(py)
+    }
+
+    /// Contact frames, world frame, (n, 3, 3).
+    ///
+    /// Rows are the unit vectors n (normal), t and b (tangents).
+    #[getter]
+    fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let active = self.active.0.iter();
+        let frames = active.flat_map(|a| a.contact.frame().map(<[f64; 3]>::from));
+        fresh_blocks(py, frames.flatten().collect(), [self.active.0.len(), 3, 3])
+    }
+
+    /// Gaps at the start of the step, (n,), m; negative where bodies overlap.
+    #[getter]
+    fn gaps<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.active.0.iter().map(|a| a.contact.gap_start))
+    }
+
+    /// Impulses on the first body along n, t, b of `frames`, (n, 3), N s.
+    ///
+    /// Cohesion is part of the normal ones, which are negative where a contact bears tension.
+    #[getter]
+    fn impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.active.impulses(py)
+    }
+
+    /// Velocities of the first body against the second after the step along n, t, b, (n, 3), m/s.
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.active.velocities(py)
+    }
+
+    /// Impulses on the first body along x, y, z, (n, 3), N s.
+    #[getter]
+    fn world_impulses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.active.rows(py, |a| {
+            let [n, t, b] = a.contact.frame();
+            (n * a.impulse[0] + t * a.impulse[1] + b * a.impulse[2]).into()
+        })
+    }
+
+    fn __len__(&self) -> usize {
+        self.active.0.len()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("GrainContacts({})", self.active.0.len())
     }
 }

@@ -16,6 +16,7 @@ use crate::episode_rules::EpisodeRules;
 use crate::errors::{BorderError, Kind, Value};
 use crate::infos::info;
 use crate::reading::place;
+use crate::rover_grains::RoverGrainSimulation;
 use crate::shared::{Shared, Watch};
 use crate::simulation::Simulation;
 
@@ -280,7 +281,8 @@ impl EpisodeRun {
     /// after a whole physics step, whose state stays; the episode then stays as before the call.
     ///
     /// Args:
-    ///     simulation: The rover of this episode.
+    ///     simulation: The rover of this episode, a `Simulation`, or a `RoverGrainSimulation` where
+    ///         it drives among grains.
     ///     action: Torques, then steering, within [-1, 1], (n_actions,).
     ///     normals: A standard normal number for each entry of the observation, (size,), where the
     ///         rules have noise.
@@ -307,7 +309,11 @@ impl EpisodeRun {
         let inner = &mut *held;
         let rules = inner.episode.rules().clone();
         let (action, normals) = given(&rules, action, normals)?;
-        let mut rover = self::simulation(simulation, "simulation")?.get().open()?;
+        let among = simulation.cast::<RoverGrainSimulation>().ok();
+        let mut rover = match among {
+            Some(among) => among.get().of_rover().open()?,
+            None => self::simulation(simulation, "simulation")?.get().open()?,
+        };
         rules
             .check_model(rover.model())
             .map_err(BorderError::from)?;
@@ -317,7 +323,11 @@ impl EpisodeRun {
         let mut watch = Watch::new();
         let substeps = rules.settings().substeps;
         let moving = &mut *rover;
-        let done = py.detach(|| moving.step_while(substeps, &mut || watch.go_on()));
+        let among = among.map(pyo3::Bound::get);
+        let done = py.detach(|| match among {
+            Some(among) => among.step_with(moving, substeps, &mut || watch.go_on()),
+            None => Ok(moving.step_while(substeps, &mut || watch.go_on())),
+        })?;
         watch.raised()?;
         let error = done.err();
         let failed = error.is_some();

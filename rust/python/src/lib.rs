@@ -4,7 +4,9 @@
 mod accuracy;
 mod arguments;
 mod arrays;
+mod balls;
 mod batch;
+mod bed_arguments;
 mod contacts;
 mod draw;
 mod elementary;
@@ -15,6 +17,7 @@ mod errors;
 mod files;
 mod friction_contact;
 mod generators;
+mod grains;
 mod ground;
 mod height_field;
 mod infos;
@@ -30,12 +33,14 @@ mod planar_soil;
 mod plane;
 mod reading;
 mod report;
+mod rover_grains;
 mod shared;
 mod simulation;
 mod snapshot;
 mod sphere_field;
 mod stepping;
 mod triangle_mesh;
+mod vessels;
 
 use pyo3::prelude::*;
 
@@ -79,5 +84,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(generators::standard_normals, module)?)?;
     planar::register(module)?;
     planar_soil::register(module)?;
+    grains::register(module)?;
+    rover_grains::register(module)?;
     Ok(())
 }

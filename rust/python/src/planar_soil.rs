@@ -4,27 +4,32 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rover_core::geometry::Support;
-use rover_core::integrator::Stabilisation;
-use rover_core::nalgebra::Vector2;
 use rover_core::planar::{Ground, WheelRig};
-use rover_core::simulation::{SoilSetupError, SoilSimulation as Core, soil_options};
-use rover_core::system::soil::{
-    Disks, Machine, Packing, SleepOptions, SoilError, SoilFriction, SoilScene, Wall, on_soil,
-};
+use rover_core::simulation::SoilSimulation as Core;
+use rover_core::system::soil::{Machine, Packing, SoilScene, on_soil};
 use std::sync::{Arc, MutexGuard};
 
-use crate::arguments::{Given, flags, text};
+use crate::arguments::{Given, flags};
 use crate::arrays::{array, fresh, fresh_rows, vector};
+use crate::bed_arguments::{
+    self, StepArguments, Usual, check_rows, grain_error, grains, rows, setup_error,
+};
 use crate::contacts::SoilContacts;
 use crate::errors::{BorderError, Kind, Value};
-use crate::options::{STABILISATIONS, choice, name_of};
 use crate::planar::pair;
-use crate::planar_ground::{border, parse, quantity};
+use crate::planar_ground::{border, parse};
 use crate::planar_machines::two_wheel_rover;
 use crate::report::{Energy, StepReport};
 use crate::shared::Shared;
 use crate::snapshot::{SoilSnapshot, belonging};
 use crate::stepping::step;
+
+/// Of the steps of a soil: its velocities are right to ten times the tolerance, m/s.
+const USUAL: Usual = Usual {
+    time_step: 1e-3,
+    tolerance: 1e-4,
+    speed: 10.0,
+};
 
 /// Radii, masses and centres of a packing.
 type Packed<'py> = (
@@ -32,57 +37,6 @@ type Packed<'py> = (
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray2<f64>>,
 );
-
-fn soil_error(e: &SoilError) -> BorderError {
-    let field = e.field();
-    let kind = match field.split('[').next().unwrap_or_default() {
-        "position" | "velocity" | "machine" | "machine_rate" => Kind::State,
-        "torques" | "pull" => Kind::Command,
-        "friction" | "wall_friction" | "wheel_friction" => Kind::Option,
-        _ => Kind::Model,
-    };
-    let value = match e {
-        SoilError::Number(number) => return quantity(kind, number),
-        SoilError::Length { count, .. } | SoilError::TooMany { count, .. } => Value::Count(*count),
-        SoilError::Overlap { value, .. }
-        | SoilError::InWall { value, .. }
-        | SoilError::WheelIn { value, .. }
-        | SoilError::TooNarrow { value, .. }
-        | SoilError::Range { value } => Value::Number(*value),
-        SoilError::Empty => Value::Count(0),
-        _ => Value::Nothing,
-    };
-    BorderError {
-        kind,
-        message: e.to_string(),
-        field: Some(field),
-        value,
-    }
-}
-
-fn setup_error(e: SoilSetupError) -> BorderError {
-    match e {
-        SoilSetupError::Options(e) => e.into(),
-        SoilSetupError::Soil(e) => soil_error(&e),
-    }
-}
-
-/// An (n, m) array as rows, flattened.
-fn rows(value: &Bound<'_, PyAny>, kind: Kind, field: &str, width: usize) -> PyResult<Vec<f64>> {
-    let any = array(value, kind, field)?;
-    let view = any.as_array();
-    if view.ndim() != 2 || view.shape()[1] != width {
-        let message = format!("{field}: needs shape (n, {width}), has {:?}", view.shape());
-        return Err(BorderError {
-            kind,
-            message,
-            field: Some(field.to_owned()),
-            value: Value::Count(view.len()),
-        }
-        .into());
-    }
-    Ok(view.iter().copied().collect())
-}
 
 /// A granular soil of disks, and a machine that drives on it.
 ///
@@ -168,25 +122,6 @@ fn with_angles(value: &Bound<'_, PyAny>, field: &str) -> PyResult<Vec<f64>> {
     rows(value, Kind::State, field, 3)
 }
 
-/// What is struck away meets others that were not forecast, and goes into them.
-fn usual_stabilisation(restitution: f64) -> &'static str {
-    if restitution > 0.0 {
-        "projection"
-    } else {
-        "none"
-    }
-}
-
-/// Speeds go with the root of gravity, so the same soil under another
-/// gravity is solved alike; 1 without gravity.
-fn speed_scale(gravity: f64, usual: f64) -> f64 {
-    if gravity > 0.0 {
-        (gravity / usual).sqrt()
-    } else {
-        1.0
-    }
-}
-
 #[pymethods]
 impl SoilSimulation {
     #[new]
@@ -221,60 +156,24 @@ impl SoilSimulation {
         sleep_speed: Given<'_>,
         sleep_distance: Given<'_>,
     ) -> PyResult<Self> {
-        let option = Kind::Option;
-        let restitution = restitution.number(0.0, option, "restitution")?;
-        let tolerance = tolerance.number(1e-4, option, "tolerance")?;
-        let radius = vector(radius, Kind::Model, "radius")?;
-        let mass = vector(mass, Kind::Model, "mass")?;
-        let mut disks = Disks::new(radius, mass).map_err(|e| soil_error(&e))?;
-        if let Some(kinematic) = kinematic.some() {
-            let kinematic = flags(&kinematic, Kind::Model, "kinematic")?;
-            disks = disks
-                .with_kinematic(kinematic)
-                .map_err(|e| soil_error(&e))?;
-        }
+        let disks = grains::<2>(radius, mass, kinematic)?;
         let mut q = with_angles(position, "position")?;
-        if q.len() != 3 * disks.len() {
-            let message = format!(
-                "position: needs one row for each of the {} disks, has {}",
-                disks.len(),
-                q.len() / 3
-            );
-            return Err(BorderError {
-                kind: Kind::State,
-                message,
-                field: Some("position".to_owned()),
-                value: Value::Count(q.len() / 3),
-            }
-            .into());
-        }
-        let mut options = soil_options(&disks);
-        let usual_weight = options.gravity.norm();
-        if let Some(gravity) = gravity {
-            options.gravity = pair(gravity, Kind::Option, "gravity")?.push(0.0);
-        }
-        options.time_step = time_step.number(1e-3, option, "time_step")?;
-        options.restitution = restitution;
-        options.solver.tolerance = tolerance;
-        options.solver.max_sweeps = max_iterations.count(2000, option, "max_iterations")?;
-        let stabilisation = match stabilisation.some() {
-            Some(given) => text(&given, option, "stabilisation")?,
-            None => usual_stabilisation(restitution).to_owned(),
+        check_rows("disks", disks.len(), &q)?;
+        let gravity = gravity
+            .map(|g| pair(g, Kind::Option, "gravity"))
+            .transpose()?;
+        let steps = StepArguments {
+            restitution,
+            gravity: gravity.map(|g| g.push(0.0)),
+            time_step,
+            tolerance,
+            max_iterations,
+            stabilisation,
+            is_hollow: false,
+            penetration_tolerance,
         };
-        options.stabilisation =
-            choice::<Stabilisation>("stabilisation", &stabilisation, &STABILISATIONS)?;
-        options.solver.velocity_tolerance =
-            10.0 * tolerance * speed_scale(options.gravity.norm(), usual_weight);
-        if let Some(depth) = penetration_tolerance.maybe(option, "penetration_tolerance")? {
-            options.penetration_tolerance = depth;
-        }
-        let mut lines = Vec::new();
-        if let Some(walls) = walls {
-            for row in rows(walls, Kind::Terrain, "walls", 4)?.chunks_exact(4) {
-                let wall = Wall::new(Vector2::new(row[0], row[1]), Vector2::new(row[2], row[3]));
-                lines.push(wall.map_err(|e| quantity(Kind::Terrain, &e))?);
-            }
-        }
+        let options = steps.options(&disks, USUAL)?;
+        let lines = bed_arguments::walls(walls)?;
         let ground: Option<Arc<dyn Ground>> = ground.map(parse).transpose()?;
         let rover = rover.object::<Bound<'_, PyDict>>(Kind::Model, "rover", "a dict")?;
         let who: Option<Arc<Machine>> = match (&rover, rig) {
@@ -298,23 +197,10 @@ impl SoilSimulation {
             walls: lines,
             ground: ground.map(|ground| ground as Arc<dyn Support<2>>),
             machine: who,
-            friction: SoilFriction {
-                grains: friction.number(0.5, option, "friction")?,
-                walls: wall_friction.number(0.5, option, "wall_friction")?,
-                wheels: wheel_friction.number(0.9, option, "wheel_friction")?,
-            },
+            friction: bed_arguments::friction(friction, wall_friction, wheel_friction)?,
         };
-        let mut rest = SleepOptions::default();
-        if let Some(speed) = sleep_speed.maybe(option, "sleep_speed")? {
-            rest.speed = speed;
-        }
-        if let Some(distance) = sleep_distance.maybe(option, "sleep_distance")? {
-            rest.distance = distance;
-        }
-        rest.check().map_err(BorderError::from)?;
-        let sleep = sleep.flag(false, option, "sleep")?;
-        let inner =
-            Core::new(Arc::new(scene), options, sleep.then_some(rest), q).map_err(setup_error)?;
+        let sleep = bed_arguments::sleep(sleep, sleep_speed, sleep_distance)?;
+        let inner = Core::new(Arc::new(scene), options, sleep, q).map_err(setup_error)?;
         Ok(Self {
             inner: Shared::new(inner),
         })
@@ -421,17 +307,9 @@ impl SoilSimulation {
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let inner = self.open()?;
         let (o, friction) = (inner.options(), &inner.soil().friction);
-        let settings = PyDict::new(py);
-        settings.set_item("friction", friction.grains)?;
-        settings.set_item("wall_friction", friction.walls)?;
+        let settings = bed_arguments::settings(py, o, friction)?;
         settings.set_item("wheel_friction", friction.wheels)?;
-        settings.set_item("restitution", o.restitution)?;
         settings.set_item("gravity", (o.gravity.x, o.gravity.y))?;
-        settings.set_item("time_step", o.time_step)?;
-        settings.set_item("tolerance", o.solver.tolerance)?;
-        settings.set_item("max_iterations", o.solver.max_sweeps)?;
-        settings.set_item("stabilisation", name_of(o.stabilisation, &STABILISATIONS))?;
-        settings.set_item("penetration_tolerance", o.penetration_tolerance)?;
         Ok(settings)
     }
 
@@ -470,7 +348,7 @@ impl SoilSimulation {
             Some(rate) => v.extend(vector(rate, Kind::State, "machine_rate")?),
             None => v.resize(v.len() + inner.v().len() - 3 * n, 0.0),
         }
-        Ok(inner.set_state(&q, &v).map_err(|e| soil_error(&e))?)
+        Ok(inner.set_state(&q, &v).map_err(|e| grain_error(&e))?)
     }
 
     /// Takes disks out; the others keep their order.
@@ -484,7 +362,7 @@ impl SoilSimulation {
     fn remove(&self, which: &Bound<'_, PyAny>) -> PyResult<()> {
         let mut inner = self.open()?;
         let which = flags(which, Kind::Model, "which")?;
-        Ok(inner.remove(&which).map_err(|e| soil_error(&e))?)
+        Ok(inner.remove(&which).map_err(|e| grain_error(&e))?)
     }
 
     /// Sets the torques of the rover's wheels.
@@ -499,7 +377,7 @@ impl SoilSimulation {
         Ok(self
             .open()?
             .set_inputs(&torques)
-            .map_err(|e| soil_error(&e))?)
+            .map_err(|e| grain_error(&e))?)
     }
 
     /// Sets the force at the machine's centre, such as that of a drawbar.
@@ -514,7 +392,7 @@ impl SoilSimulation {
         Ok(self
             .open()?
             .set_pull(pull.into())
-            .map_err(|e| soil_error(&e))?)
+            .map_err(|e| grain_error(&e))?)
     }
 
     /// Takes n steps, as `Simulation.step` does.
@@ -655,7 +533,7 @@ pub fn soil_packing<'py>(
         seed: seed.whole(0, kind, "seed")?,
     };
     let built = py.detach(|| packing.build());
-    let (disks, q) = built.map_err(|e| soil_error(&e))?;
+    let (disks, q) = built.map_err(|e| grain_error(&e))?;
     let centres: Vec<[f64; 2]> = q.chunks_exact(3).map(|c| [c[0], c[1]]).collect();
     Ok((
         fresh(py, disks.radius()),

@@ -1,4 +1,4 @@
-//! `Snapshot`, `PlanarSnapshot`, `SoilSnapshot`.
+//! `Snapshot`, `PlanarSnapshot`, `SoilSnapshot`, `GrainSnapshot`, `RoverGrainSnapshot`.
 
 use pyo3::PyTypeInfo;
 use pyo3::prelude::*;
@@ -122,4 +122,14 @@ snapshot_class! {
 snapshot_class! {
     /// Everything that a soil needs to continue bit for bit. Picklable.
     SoilSnapshot, SnapshotOf<GrainBed<2>>
+}
+
+snapshot_class! {
+    /// Everything that grains in space need to continue bit for bit. Picklable.
+    GrainSnapshot, SnapshotOf<GrainBed<3>>
+}
+
+snapshot_class! {
+    /// Everything that a rover among grains needs to continue bit for bit. Picklable.
+    RoverGrainSnapshot, (SnapshotOf<RoverScene>, SnapshotOf<GrainBed<3>>)
 }

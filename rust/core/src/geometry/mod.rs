@@ -12,7 +12,7 @@ pub mod support;
 pub mod terrain;
 
 pub use shape::{Disc, OrientedBox, PlacedShape, Roller, Sphere, SupportMap};
-pub use support::{Facing, Support};
+pub use support::{Drum, Facing, Floor, Silo, Support, TerrainSupport};
 pub use terrain::{
     Clearing, Coverage, HeightField, Plane, Primitive, Rocks, SphereField, Terrain, TerrainError,
     TriangleMesh, Union,

@@ -73,8 +73,18 @@ pub struct BedCommand<const D: usize> {
 pub struct BedMemory {
     /// Steps taken.
     pub count: usize,
+    /// Time that walls have been moving, s.
+    pub elapsed: f64,
     /// Who sleeps.
     pub sleep: Sleep,
+}
+
+impl BedMemory {
+    /// Counts a step of h, s.
+    pub(super) fn count_step(&mut self, h: f64) {
+        self.count += 1;
+        self.elapsed += h;
+    }
 }
 
 /// A bed of grains, stepped through time.
@@ -125,6 +135,7 @@ where
     fn memory(&self) -> BedMemory {
         BedMemory {
             count: 0,
+            elapsed: 0.0,
             sleep: Sleep::new(self.soil.grains.kinematic()),
         }
     }
@@ -143,6 +154,7 @@ where
         memory: &'a BedMemory,
         parts: &'a mut GrainParts<D>,
     ) -> GrainSystem<'a, D> {
+        parts.wall_time = memory.elapsed;
         GrainSystem {
             scene: &self.soil,
             asleep: memory.sleep.asleep(),
@@ -158,7 +170,7 @@ where
 
     /// Lets grains sleep and wake.
     fn after_step(&self, taken: StepTaken<'_, Self>) {
-        taken.memory.count += 1;
+        taken.memory.count_step(taken.options.time_step);
         let Some(options) = &self.sleep else {
             return;
         };
@@ -207,6 +219,7 @@ where
         snapshot.state.configuration.len() == self.soil.nq()
             && torques.len() == expected[0]
             && snapshot.memory.count <= MAX_STEPS
+            && snapshot.memory.elapsed.is_finite()
             && snapshot.memory.sleep.is_of(grains.kinematic())
             && numbers.all(|x| x.is_finite())
             && keys.all(|key| is_body(key.a) && (key.b >= WALL || is_body(key.b)))
@@ -367,7 +380,7 @@ where
     /// other and with walls do not count.
     #[must_use]
     pub fn penetration(&self) -> f64 {
-        self.soil().penetration(self.q())
+        self.soil().penetration(self.q(), self.memory.elapsed)
     }
 
     /// Wakes all grains.

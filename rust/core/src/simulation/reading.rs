@@ -55,7 +55,7 @@ pub struct Look<'a> {
 /// | `pose` | nq | public q with the wheels' angles wrapped to one turn |
 /// | `body_velocity` | 6 | trunk, linear then angular, in the trunk's frame |
 /// | `joint_rates` | nv − 6 | |
-/// | `wheel_gaps` | n | distance to the ground, one a wheel |
+/// | `wheel_gaps` | n | distance to the ground or the nearest grain, one a wheel |
 /// | `wheel_contacts` | n | 1 where the gap is at most [`CONTACT_GAP`], else 0 |
 /// | `normal_forces` | n | mean of the last step, N |
 /// | `tangential_forces` | 2 n | rolling, lateral, wheel by wheel, N |
@@ -204,6 +204,9 @@ impl RoverSimulation {
         let (gaps, touch) = row.next(2 * n_wheels).split_at_mut(n_wheels);
         let terrain = &**self.terrain();
         (scratch.gaps).write(model, &state.configuration, terrain, gaps);
+        for (gap, to_grain) in gaps.iter_mut().zip(&self.parts.gaps_to_grains) {
+            *gap = gap.min(*to_grain);
+        }
         for (touch, gap) in touch.iter_mut().zip(gaps) {
             *touch = f64::from(u8::from(*gap <= CONTACT_GAP));
         }

@@ -83,6 +83,8 @@ pub struct RoverParts {
     pub(super) quick: Quick,
     /// Work of each joint's drive in the last call, J.
     pub(super) drive_work: Vec<f64>,
+    /// Gap of each wheel to the nearest grain after the last call, m; empty without grains.
+    pub(super) gaps_to_grains: Vec<f64>,
 }
 
 impl DenseOperator for RoverParts {
@@ -131,6 +133,7 @@ impl Scene for RoverScene {
             tree: TreeScratch::new(&self.model, self.contact_capacity()),
             quick: Quick::default(),
             drive_work: vec![0.0; self.model.n_joints()],
+            gaps_to_grains: Vec::new(),
         }
     }
 
@@ -166,6 +169,7 @@ impl Scene for RoverScene {
 
     fn begin_call(&self, parts: &mut RoverParts) {
         parts.drive_work.fill(0.0);
+        parts.gaps_to_grains.clear();
     }
 
     /// Records torques and work of the drives.

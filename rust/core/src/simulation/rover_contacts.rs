@@ -2,7 +2,13 @@
 
 use super::rover::RoverSimulation;
 use crate::contact::detection::{deepest_overlap, wheel_contacts};
-use crate::contact::{Contact, ContactFrame, Part};
+use nalgebra::Vector3;
+
+use super::active_contact::ActiveContact;
+use crate::contact::part::place_wheel;
+use crate::contact::{Contact, ContactFrame, Opposite, Part};
+
+type RoverContact = ActiveContact<Contact>;
 
 impl RoverSimulation {
     /// Current nearest point, frame and gap of every wheel.
@@ -19,7 +25,8 @@ impl RoverSimulation {
 
     /// Mean contact force of the last step on every wheel along its frame's n, t, b, N.
     ///
-    /// Several contacts of one wheel are summed in the frame of its first.
+    /// Several contacts of one wheel are summed in the frame of its first; where grains are among
+    /// them, in that of their mean normal, weighted by the normal impulses.
     #[must_use]
     pub fn wheel_forces(&self) -> Vec<[f64; 3]> {
         let mut forces = WheelForces::default();
@@ -64,6 +71,30 @@ impl WheelForces {
                     *force += impulse.dot(&d) / rover.options.time_step;
                 }
             }
+        }
+        let is_grain = |a: &RoverContact| matches!(a.contact.key.opposite, Opposite::Grain(_));
+        if rover.active.iter().any(is_grain) {
+            self.turn_to_mean_normals(rover);
+        }
+    }
+
+    /// Expresses the forces in frames of the wheels' mean normals.
+    fn turn_to_mean_normals(&mut self, rover: &RoverSimulation) {
+        let kinematics = rover.kinematics();
+        for (i, wheel) in rover.model().wheels().iter().enumerate() {
+            let of_wheel = rover.active.iter();
+            let of_wheel = of_wheel.filter(|a| a.contact.part == Part::Wheel(i));
+            let pushes = of_wheel.map(|a| a.contact.frame.n * a.impulse[0]);
+            let sum = pushes.fold(Vector3::zeros(), |sum, push| sum + push);
+            let (Some(n), Some(old)) = (sum.try_normalize(0.0), self.frames[i]) else {
+                continue;
+            };
+            let disc = place_wheel(wheel, &kinematics);
+            let new = ContactFrame::of_wheel(&n, &disc.axle, &disc.spoke);
+            let along = self.along[i];
+            let force = (0..3).map(|k| old.rows()[k] * along[k]);
+            let force = force.fold(Vector3::zeros(), |sum, part| sum + part);
+            self.along[i] = new.rows().map(|d| force.dot(&d));
         }
     }
 }

@@ -115,6 +115,26 @@ impl RoverInGrains {
         self.friction
     }
 
+    /// Gap of each wheel now to the nearest grain or the ground, m.
+    #[must_use]
+    pub fn wheel_gaps(&self, rover: &RoverSimulation, bed: &GrainSimulation<3>) -> Vec<f64> {
+        let contacts = rover.wheel_contacts();
+        let to_grains = gaps_to_grains(rover, bed);
+        let both = contacts.iter().zip(to_grains);
+        both.map(|(contact, gap)| contact.gap.min(gap)).collect()
+    }
+
+    /// Deepest overlap now, m: of grains with anything, and of the rover with grains.
+    #[must_use]
+    pub fn penetration(&self, rover: &RoverSimulation, bed: &GrainSimulation<3>) -> f64 {
+        let mut deepest = bed.penetration();
+        let parts = Part::all(rover.model());
+        visit_near(rover, bed, parts, 0.0, |_, _, gap| {
+            deepest = deepest.max(-gap)
+        });
+        deepest
+    }
+
     /// Takes n steps with both, or fewer once `go_on` returns false.
     ///
     /// # Errors
@@ -134,6 +154,7 @@ impl RoverInGrains {
             ..bed.options.clone()
         };
         let result = self.steps(rover, bed, &options, n, go_on);
+        rover.parts.gaps_to_grains = gaps_to_grains(rover, bed);
         let report = result.clone().unwrap_or_default();
         rover.end_call(report);
         bed.end_call(report);
@@ -242,7 +263,7 @@ impl RoverInGrains {
 
     /// Lets grains sleep and wake after a step.
     fn rest(&self, rover: &RoverSimulation, bed: &mut GrainSimulation<3>, options: &StepOptions) {
-        bed.memory.count += 1;
+        bed.memory.count_step(options.time_step);
         let Some(sleep) = &bed.scene.sleep else {
             return;
         };
@@ -323,28 +344,59 @@ impl RoverInGrains {
     }
 }
 
-/// Checks that no part of the rover is in a grain.
-fn check_apart(rover: &RoverSimulation, bed: &GrainSimulation<3>) -> Result<(), TogetherError> {
+/// Calls `visit` with the number of every ball near a part of the rover and the gap, m, between
+/// them now. Balls farther than `reach` (m) may be left out.
+fn visit_near(
+    rover: &RoverSimulation,
+    bed: &GrainSimulation<3>,
+    parts: impl Iterator<Item = Part>,
+    reach: f64,
+    mut visit: impl FnMut(Part, usize, f64),
+) {
     let (model, grains) = (rover.model(), &bed.soil().grains);
     let kinematics = Kinematics::of(model, rover.q());
     let mut grid = Grid::<3>::default();
     grid.fill(bed.q(), grains.radius(), 2.0 * grains.largest());
-    let mut deepest: Option<(Part, usize, f64)> = None;
-    for part in Part::all(model) {
+    for part in parts {
         let shape = part.place(model, &kinematics);
         let origin = kinematics.origin(part.body(model));
         let centre: [f64; 3] = (origin + shape.centre()).into();
-        grid.near(&centre, shape.bound() + grains.largest(), |item| {
+        let reach = shape.bound() + grains.largest() + reach;
+        grid.near(&centre, reach, |item| {
             let ball = PlacedShape::Sphere(Sphere {
                 centre: Vector3::from(item.centre) - origin,
                 radius: item.radius,
             });
             let gap = dispatch::nearest_points(&ball, &shape).gap;
-            if gap < deepest.map_or(-OVERLAP * grains.smallest(), |d| d.2) {
-                deepest = Some((part, item.index as usize, gap));
-            }
+            visit(part, item.index as usize, gap);
         });
     }
+}
+
+/// Gap of each wheel now to the nearest grain, m; infinite without one within its radius.
+fn gaps_to_grains(rover: &RoverSimulation, bed: &GrainSimulation<3>) -> Vec<f64> {
+    let wheels = rover.model().wheels();
+    let mut gaps = vec![f64::INFINITY; wheels.len()];
+    let reach = wheels.iter().map(|wheel| wheel.radius);
+    let reach = reach.fold(0.0, f64::max);
+    let parts = (0..wheels.len()).map(Part::Wheel);
+    visit_near(rover, bed, parts, reach, |part, _, gap| {
+        if let Part::Wheel(i) = part {
+            gaps[i] = gaps[i].min(gap);
+        }
+    });
+    gaps
+}
+
+/// Checks that no part of the rover is in a grain.
+fn check_apart(rover: &RoverSimulation, bed: &GrainSimulation<3>) -> Result<(), TogetherError> {
+    let (model, grains) = (rover.model(), &bed.soil().grains);
+    let mut deepest: Option<(Part, usize, f64)> = None;
+    visit_near(rover, bed, Part::all(model), 0.0, |part, grain, gap| {
+        if gap < deepest.map_or(-OVERLAP * grains.smallest(), |d| d.2) {
+            deepest = Some((part, grain, gap));
+        }
+    });
     match deepest {
         None => Ok(()),
         Some((part, grain, gap)) => Err(TogetherError::Overlap {

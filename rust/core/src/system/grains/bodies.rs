@@ -1,5 +1,6 @@
 //! The grains: radii and masses, and the factors of their diagonal mass matrix.
 
+use super::cohesion::Cohesion;
 use super::error::GrainError;
 use super::removal::Renumbering;
 use crate::quantity::{LENGTHS, MASSES, within};
@@ -46,6 +47,7 @@ pub struct Grains<const D: usize> {
     /// `√m`, `√J`.
     pub(super) roots: Vec<[f64; 2]>,
     kinematic: Vec<bool>,
+    cohesion: Option<Cohesion>,
     largest: f64,
     smallest: f64,
 }
@@ -83,6 +85,7 @@ impl<const D: usize> Grains<D> {
             largest: radius.iter().copied().fold(0.0, f64::max),
             smallest: radius.iter().copied().fold(f64::INFINITY, f64::min),
             kinematic: vec![false; radius.len()],
+            cohesion: None,
             radius,
             mass,
         })
@@ -104,13 +107,24 @@ impl<const D: usize> Grains<D> {
         Ok(Self { kinematic, ..self })
     }
 
+    /// The same grains, which attract each other and what they lie on.
+    #[must_use]
+    pub fn with_cohesion(self, cohesion: Cohesion) -> Self {
+        let cohesion = Some(cohesion);
+        Self { cohesion, ..self }
+    }
+
     /// Those that stay.
     ///
     /// # Errors
     /// None would be left.
     pub fn without(&self, renumbering: &Renumbering) -> Result<Self, GrainError> {
         let [radius, mass] = [&self.radius, &self.mass].map(|all| renumbering.keep(all, 1));
-        Self::new(radius, mass)?.with_kinematic(renumbering.keep(&self.kinematic, 1))
+        let kinematic = renumbering.keep(&self.kinematic, 1);
+        Ok(Self {
+            cohesion: self.cohesion,
+            ..Self::new(radius, mass)?.with_kinematic(kinematic)?
+        })
     }
 
     /// How many there are.
@@ -141,6 +155,12 @@ impl<const D: usize> Grains<D> {
     #[must_use]
     pub fn kinematic(&self) -> &[bool] {
         &self.kinematic
+    }
+
+    /// Their attraction, if they have one.
+    #[must_use]
+    pub fn cohesion(&self) -> Option<&Cohesion> {
+        self.cohesion.as_ref()
     }
 
     /// J of grain i, kg m².

@@ -6,7 +6,7 @@ use super::bodies::COORDINATES;
 use super::contact::{GROUND, GrainContact, GrainKey, WALL};
 use super::grid::Grid;
 use super::machine::point_velocity;
-use super::system::GrainSystem;
+use super::system::{GrainParts, GrainSystem};
 use crate::contact::Activation;
 use crate::problem::BodyPairs;
 use crate::solver::Swept;
@@ -187,8 +187,14 @@ where
                 });
             }
         }
-        let rule = Search::new(&activation, [scene.grains.smallest(), largest], fastest);
+        let fastest = fastest.max(scene.fastest_surface());
+        let mut rule = Search::new(&activation, [scene.grains.smallest(), largest], fastest);
+        if let Some(cohesion) = scene.grains.cohesion() {
+            rule.skin = rule.skin.max(cohesion.range);
+            rule.reach = rule.reach.max(cohesion.range);
+        }
         let reach = rule.reach;
+        self.parts.driven.clear();
         self.parts.search = rule;
         grid.fill(&q, radius, 2.0 * largest + reach);
         #[allow(clippy::cast_possible_truncation)] // grains are numbered by u32
@@ -222,23 +228,33 @@ where
 
     /// Adds the contacts of a round body with walls and ground.
     fn meet_fixed(&mut self, seeker: &Seeker<D>, rule: &Search, out: &mut Vec<GrainContact<D>>) {
-        let mut push = |b: u32, n: SVector<f64, D>, gap: f64| {
-            if rule.admits(gap, n.dot(&seeker.velocity)) {
-                out.push(seeker.contact(b, n, gap));
+        let GrainParts {
+            facing,
+            driven,
+            wall_time,
+            ..
+        } = &mut *self.parts;
+        let mut push = |b: u32, n: SVector<f64, D>, gap: f64, velocity: SVector<f64, D>| {
+            if rule.admits(gap, n.dot(&(seeker.velocity - velocity))) {
+                let contact = seeker.contact(b, n, gap);
+                if velocity.iter().any(|x| *x != 0.0) {
+                    driven.push((contact.key, velocity));
+                }
+                out.push(contact);
             }
         };
         for (k, wall) in (WALL..).zip(&self.scene.walls) {
-            let gap = wall.distance(&seeker.centre) - seeker.radius;
+            let gap = wall.at(*wall_time).distance(&seeker.centre) - seeker.radius;
             if gap <= rule.reach {
-                push(k, wall.n(), gap);
+                push(k, wall.n(), gap, wall.velocity());
             }
         }
         if let Some(ground) = &self.scene.ground {
-            let facing = &mut self.parts.facing;
             facing.clear();
             ground.facing(&seeker.centre, seeker.radius + rule.reach, facing);
             for (k, facing) in (GROUND..).zip(&*facing) {
-                push(k, facing.n, facing.distance - seeker.radius);
+                let gap = facing.distance - seeker.radius;
+                push(k, facing.n, gap, ground.velocity(facing));
             }
         }
     }
@@ -271,6 +287,8 @@ where
             let mut motion = moved(contact.key.a);
             if contact.is_with_grain() {
                 motion -= moved(contact.key.b);
+            } else if let Some(velocity) = self.parts.surface_velocity(contact.key) {
+                motion -= velocity * self.parts.search.lead;
             }
             contact.gap = contact.gap_start + contact.n.dot(&motion);
         }

@@ -84,6 +84,14 @@ pub enum GrainError {
         /// m.
         value: f64,
     },
+    /// A range of attraction that contacts do not have.
+    #[error("cohesion_range: must be positive and at most {limit} m, is {value}")]
+    Reach {
+        /// m.
+        value: f64,
+        /// A fifth of the smallest radius, m.
+        limit: f64,
+    },
     /// Where there is no machine, none can drive.
     #[error("machine: the scene has none")]
     NoMachine,
@@ -102,6 +110,7 @@ impl GrainError {
             Self::InWall { grain, .. } => format!("position[{grain}]"),
             Self::WheelIn { .. } | Self::NoMachine => "machine".to_owned(),
             Self::Range { .. } => "radius_max".to_owned(),
+            Self::Reach { .. } => "cohesion_range".to_owned(),
         }
     }
 }

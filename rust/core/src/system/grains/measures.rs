@@ -82,9 +82,9 @@ impl<const D: usize> GrainScene<D> {
     }
 
     /// Deepest overlap, m: 0 if nothing overlaps. Overlaps of kinematic grains with each other and
-    /// with walls do not count. q (nq).
+    /// with walls do not count. q (nq); walls as they are at `time`, s.
     #[must_use]
-    pub fn penetration(&self, q: &[f64]) -> f64 {
+    pub fn penetration(&self, q: &[f64], time: f64) -> f64 {
         let grains = &self.grains;
         let (n, radius, kinematic) = (grains.len(), grains.radius(), grains.kinematic());
         let mut grid = Grid::<D>::default();
@@ -103,7 +103,7 @@ impl<const D: usize> GrainScene<D> {
                 return;
             }
             for wall in &self.walls {
-                least = least.min(wall.distance(x) - r);
+                least = least.min(wall.at(time).distance(x) - r);
             }
             if let Some(ground) = &self.ground {
                 facing.clear();

@@ -6,6 +6,7 @@
 //!
 //! - [`bodies`], [`wall`], [`machine`], [`scene`]: the description; [`packing`]: initial positions
 //!   without overlap, from a seed;
+//! - [`cohesion`]: an attraction of contacts;
 //! - [`grid`]: the search for neighbours; [`contact`]: a contact and its key;
 //! - [`system`]: grains as a mechanical system for [`crate::integrator`]; `detection`: its
 //!   contacts; `measures`: energy, momentum, overlap;
@@ -22,6 +23,7 @@
 //! Anitescu and Potra 1997 (the gap in the velocity's law).
 
 pub mod bodies;
+pub mod cohesion;
 pub mod contact;
 pub(in crate::system) mod detection;
 pub mod error;
@@ -37,11 +39,12 @@ pub mod system;
 pub mod wall;
 
 pub use bodies::{COORDINATES, Grains, MAX_GRAINS};
+pub use cohesion::Cohesion;
 pub use contact::{GrainContact, GrainKey};
 pub use error::GrainError;
 pub use grid::Grid;
 pub use machine::{Machine, Wheel};
-pub use packing::Packing;
+pub use packing::{Packing, arranged};
 pub use removal::Renumbering;
 pub use scene::{GrainFriction, GrainScene, OVERLAP};
 pub use sleep::{Mover, Sleep, SleepOptions, StepTaken};

@@ -52,6 +52,90 @@ const ROOM: f64 = 0.003;
 const CORNER: [&str; 3] = ["left", "bottom", "back"];
 const SIDES: [&str; 3] = ["width", "height", "depth"];
 
+/// Sides and corner of an array of grains, and its places along each axis.
+struct Array<const D: usize> {
+    corner: [f64; D],
+    places: [usize; D],
+    /// Length of a place along each axis, m.
+    across: [f64; D],
+}
+
+impl<const D: usize> Array<D> {
+    /// For grains up to the radius `largest` (m).
+    fn new(corner: [f64; D], sides: [f64; D], largest: f64) -> Result<Self, GrainError> {
+        for k in (0..D).filter(|k| *k != 1) {
+            within(|| SIDES[k].to_owned(), sides[k], LENGTHS)?;
+        }
+        for k in 0..D {
+            within(|| CORNER[k].to_owned(), corner[k], PLACES)?;
+        }
+        let pitch = 2.0 * largest * (1.0 + ROOM);
+        // Places along each axis and their length; the array is spread over
+        // the whole sides, and upwards without end.
+        let (mut places, mut across) = ([usize::MAX; D], [pitch; D]);
+        for k in (0..D).filter(|k| *k != 1) {
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive
+            let along = (sides[k] / pitch).floor() as usize;
+            if along == 0 {
+                return Err(GrainError::TooNarrow {
+                    field: SIDES[k],
+                    noun: noun(D),
+                    value: sides[k],
+                    needed: pitch,
+                });
+            }
+            (places[k], across[k]) = (along, sides[k] / along as f64);
+        }
+        Ok(Self {
+            corner,
+            places,
+            across,
+        })
+    }
+
+    /// Coordinates of grain i of radius r, moved at random within its place.
+    fn put(&self, i: usize, r: f64, random: &mut Random) -> [f64; COORDINATES] {
+        let mut place = [0; COORDINATES];
+        let mut rest = i;
+        for k in (0..D).filter(|k| *k != 1).chain([1]) {
+            (place[k], rest) = (rest % self.places[k], rest / self.places[k]);
+        }
+        let mut x = [0.0; COORDINATES];
+        for k in 0..D {
+            let free = 0.5 * self.across[k] - r;
+            let middle = self.corner[k] + self.across[k] * (place[k] as f64 + 0.5);
+            x[k] = middle + free * (2.0 * random.uniform() - 1.0);
+        }
+        x
+    }
+}
+
+/// Coordinates ([`COORDINATES`] n) of grains of these radii (m) in an array that is filled as
+/// [`Packing`] says, in the order given.
+///
+/// # Errors
+/// No radius, or too many; a number that is not finite or out of its range; sides without room for
+/// the largest grain.
+pub fn arranged<const D: usize>(
+    radius: &[f64],
+    corner: [f64; D],
+    sides: [f64; D],
+    seed: u64,
+) -> Result<Vec<f64>, GrainError> {
+    check_count::<D>(radius.len())?;
+    for (i, r) in radius.iter().enumerate() {
+        within(|| format!("radius[{i}]"), *r, LENGTHS)?;
+    }
+    let largest = radius.iter().copied().fold(0.0, f64::max);
+    if radius.is_empty() {
+        return Err(GrainError::Empty);
+    }
+    let array = Array::new(corner, sides, largest)?;
+    let mut random = Random::new(seed);
+    let put = |(i, r): (usize, &f64)| array.put(i, *r, &mut random);
+    Ok(radius.iter().enumerate().flat_map(put).collect())
+}
+
 impl<const D: usize> Packing<D> {
     /// The grains, and the coordinates of each ([`COORDINATES`] n), m and rad.
     ///
@@ -63,36 +147,13 @@ impl<const D: usize> Packing<D> {
         within(|| "radius_min".to_owned(), self.radius_min, LENGTHS)?;
         within(|| "radius_max".to_owned(), self.radius_max, LENGTHS)?;
         within(|| "mass".to_owned(), self.mass, MASSES)?;
-        for k in (0..D).filter(|k| *k != 1) {
-            within(|| SIDES[k].to_owned(), self.sides[k], LENGTHS)?;
-        }
-        for k in 0..D {
-            within(|| CORNER[k].to_owned(), self.corner[k], PLACES)?;
-        }
         check_count::<D>(self.count)?;
         if self.radius_max < self.radius_min {
             return Err(GrainError::Range {
                 value: self.radius_max,
             });
         }
-        let pitch = 2.0 * self.radius_max * (1.0 + ROOM);
-        // Places along each axis and their length; the array is spread over
-        // the whole sides, and upwards without end.
-        let mut places = [usize::MAX; D];
-        let mut across = [pitch; D];
-        for k in (0..D).filter(|k| *k != 1) {
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive
-            let along = (self.sides[k] / pitch).floor() as usize;
-            if along == 0 {
-                return Err(GrainError::TooNarrow {
-                    field: SIDES[k],
-                    noun: noun(D),
-                    value: self.sides[k],
-                    needed: pitch,
-                });
-            }
-            (places[k], across[k]) = (along, self.sides[k] / along as f64);
-        }
+        let array = Array::new(self.corner, self.sides, self.radius_max)?;
         if self.count == 0 {
             return Err(GrainError::Empty);
         }
@@ -101,18 +162,7 @@ impl<const D: usize> Packing<D> {
         let (mut radius, mut mass, mut q) = (Vec::new(), Vec::new(), Vec::new());
         for i in 0..self.count {
             let r = self.radius_min + (self.radius_max - self.radius_min) * random.uniform();
-            let mut place = [0; COORDINATES];
-            let mut rest = i;
-            for k in (0..D).filter(|k| *k != 1).chain([1]) {
-                (place[k], rest) = (rest % places[k], rest / places[k]);
-            }
-            let mut x = [0.0; COORDINATES];
-            for k in 0..D {
-                let free = 0.5 * across[k] - r;
-                let middle = self.corner[k] + across[k] * (place[k] as f64 + 0.5);
-                x[k] = middle + free * (2.0 * random.uniform() - 1.0);
-            }
-            q.extend(x);
+            q.extend(array.put(i, r, &mut random));
             radius.push(r);
             mass.push(self.mass * (r / mean).powi(if D == 2 { 2 } else { 3 }));
         }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use nalgebra::SVector;
 
 use super::bodies::{COORDINATES, Grains, noun};
+use super::contact::GrainContact;
 use super::error::GrainError;
 use super::grid::Grid;
 use super::machine::Machine;
@@ -97,6 +98,24 @@ impl<const D: usize> GrainScene<D> {
     #[must_use]
     pub fn machine_velocities<'v>(&self, v: &'v [f64]) -> &'v [f64] {
         &v[body_velocities(D) * self.grains.len()..]
+    }
+
+    /// No wall and no point of the ground is faster, m/s.
+    #[must_use]
+    pub fn fastest_surface(&self) -> f64 {
+        let walls = self
+            .walls
+            .iter()
+            .map(|wall| length(wall.velocity().as_slice()));
+        let ground = self.ground.as_ref().map_or(0.0, |ground| ground.fastest());
+        walls.fold(ground, f64::max)
+    }
+
+    /// Attraction of a contact, N: the pull that breaks it.
+    #[must_use]
+    pub fn attraction(&self, contact: &GrainContact<D>) -> f64 {
+        let cohesion = self.grains.cohesion();
+        cohesion.map_or(0.0, |cohesion| cohesion.at(contact.gap_start))
     }
 
     /// A number that is equal for two scenes only if their grains and their machine are; it ties a

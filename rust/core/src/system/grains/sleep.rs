@@ -5,7 +5,8 @@
 //! limit within a distance. It wakes when something faster comes within the distance, or when the
 //! impulse of an awake neighbour differs from that at falling asleep by more than a fraction of the
 //! grain's weight. Impulses of sleeping contacts are stored, so a grain wakes with its previous
-//! load. A kinematic grain counts as asleep and never wakes.
+//! load. A kinematic grain counts as asleep and never wakes. Where a wall or the ground moves, no
+//! other grain sleeps.
 
 use serde::{Deserialize, Serialize};
 
@@ -270,6 +271,9 @@ impl Sleep {
         movers: &[Mover<D>],
     ) -> Vec<bool> {
         let n = scene.grains.len();
+        if scene.fastest_surface() > 0.0 {
+            return vec![true; n];
+        }
         let mut marks = Marks::<D>::new(n, options.distance);
         let centre = |i: usize| SVector::from_fn(|k, _| q[COORDINATES * i + k]);
         for i in (0..n).filter(|i| self.still[*i] == 0) {

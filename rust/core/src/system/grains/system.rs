@@ -36,6 +36,12 @@ pub struct GrainParts<const D: usize> {
     pub(in crate::system) search: Search,
     pub(super) found: Vec<Neighbour<D>>,
     pub(super) facing: Vec<Facing<D>>,
+    /// Contacts with surfaces that move, in the order of the keys, and their velocities, m/s.
+    pub(super) driven: Vec<(GrainKey, SVector<f64, D>)>,
+    /// How long walls have been moving, s.
+    pub(crate) wall_time: f64,
+    /// Force of the cohesion on every grain's coordinates, N and N m.
+    attraction: Vec<f64>,
     pub(in crate::system) pairs: BodyPairs<D>,
     pub(super) machine: MachineParts,
     slabs: Slabs,
@@ -55,6 +61,16 @@ impl<const D: usize> GrainParts<D> {
     #[must_use]
     pub fn pairs(&self) -> &BodyPairs<D> {
         &self.pairs
+    }
+
+    /// Velocity of the surface at a contact, m/s, if it moves.
+    #[inline]
+    pub(super) fn surface_velocity(&self, key: GrainKey) -> Option<SVector<f64, D>> {
+        if self.driven.is_empty() {
+            return None;
+        }
+        let place = self.driven.binary_search_by_key(&key, |(key, _)| *key);
+        place.ok().map(|k| self.driven[k].1)
     }
 
     /// The operator W of the last step's contacts, block by block, 1/kg.
@@ -172,6 +188,28 @@ impl<const D: usize> GrainSystem<'_, D> {
             friction.walls
         } else {
             friction.grains
+        }
+    }
+
+    /// Sums the attraction of the contacts over the grains that are awake.
+    fn attract(&mut self, contacts: &[GrainContact<D>]) {
+        let Some(cohesion) = self.scene.grains.cohesion() else {
+            return;
+        };
+        let (n, V) = (self.n(), body_velocities(D));
+        let sum = &mut self.parts.attraction;
+        sum.clear();
+        sum.resize(V * n, 0.0);
+        for contact in contacts {
+            let force = contact.n * cohesion.at(contact.gap_start);
+            for (body, sign) in [(contact.key.a, -1.0), (contact.key.b, 1.0)] {
+                let i = body as usize;
+                if i < n && !self.asleep[i] {
+                    for k in 0..D {
+                        sum[V * i + k] += sign * force[k];
+                    }
+                }
+            }
         }
     }
 
@@ -320,6 +358,9 @@ where
             }
             y[D..].fill(0.0);
         }
+        for (y, force) in y.iter_mut().zip(&self.parts.attraction) {
+            *y += h * force;
+        }
         if let Some(machine) = &self.scene.machine {
             let pose = self.scene.machine_coordinates(&self.parts.middle);
             let rate = self.scene.machine_velocities(v_mean);
@@ -393,6 +434,7 @@ where
                 pairs.machine.push(pair);
             }
         }
+        self.attract(contacts);
         u.fill(0.0);
         self.add_local_of_velocity(contacts, v, u);
     }
@@ -414,6 +456,8 @@ where
             }
             if contact.is_with_grain() {
                 add_rim_velocity(&v[V * b..V * (b + 1)], -radius[b], &contact.n, -1.0, &mut u);
+            } else if let Some(velocity) = self.parts.surface_velocity(contact.key) {
+                u -= velocity;
             }
             for (out, direction) in out.iter_mut().zip(contact.frame()) {
                 *out += direction.dot(&u);

@@ -1,4 +1,4 @@
-//! A straight wall: grains stay on one side of it.
+//! A straight wall: grains stay on one side of it. It may move at a constant velocity.
 
 use nalgebra::SVector;
 
@@ -6,10 +6,14 @@ use crate::quantity::{PLACES, QuantityError, within};
 use crate::spatial::space::axis;
 
 /// The half-plane or half-space `n · x ≥ offset` is free.
+///
+/// Time starts where a simulation's state is set. A wall that moves along its normal changes its
+/// place with it; one that moves along itself drags what it touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wall<const D: usize> {
     n: SVector<f64, D>,
     offset: f64,
+    velocity: SVector<f64, D>,
 }
 
 impl<const D: usize> Wall<D> {
@@ -34,7 +38,19 @@ impl<const D: usize> Wall<D> {
         Ok(Self {
             n,
             offset: n.dot(&point),
+            velocity: SVector::zeros(),
         })
+    }
+
+    /// The same wall at time 0, moving at `velocity` (m/s).
+    ///
+    /// # Errors
+    /// An entry that is not finite or beyond any speed.
+    pub fn moving(self, velocity: SVector<f64, D>) -> Result<Self, QuantityError> {
+        for (k, value) in velocity.iter().enumerate() {
+            within(|| format!("wall_velocity[{k}]"), *value, PLACES)?;
+        }
+        Ok(Self { velocity, ..self })
     }
 
     /// Floor at height y, m.
@@ -43,6 +59,7 @@ impl<const D: usize> Wall<D> {
         Self {
             n: axis(1),
             offset: y,
+            velocity: SVector::zeros(),
         }
     }
 
@@ -52,6 +69,7 @@ impl<const D: usize> Wall<D> {
         Self {
             n: axis(0),
             offset: x,
+            velocity: SVector::zeros(),
         }
     }
 
@@ -61,6 +79,23 @@ impl<const D: usize> Wall<D> {
         Self {
             n: -axis(0),
             offset: -x,
+            velocity: SVector::zeros(),
+        }
+    }
+
+    /// Its velocity, m/s.
+    #[must_use]
+    pub fn velocity(&self) -> SVector<f64, D> {
+        self.velocity
+    }
+
+    /// The wall at a time, s.
+    #[inline]
+    #[must_use]
+    pub fn at(&self, time: f64) -> Self {
+        Self {
+            offset: self.offset + self.n.dot(&self.velocity) * time,
+            ..*self
         }
     }
 

@@ -1,8 +1,18 @@
 //! A ground of any shape under a round body.
+//!
+//! [`terrain`]: the rover's terrains; [`drum`], [`silo`]: vessels.
+
+pub mod drum;
+pub mod silo;
+pub mod terrain;
 
 use std::fmt::Debug;
 
 use nalgebra::SVector;
+
+pub use drum::Drum;
+pub use silo::{Floor, Silo};
+pub use terrain::TerrainSupport;
 
 /// A point of the ground that faces the centre of a round body.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,4 +33,14 @@ pub trait Support<const D: usize>: Debug + Send + Sync {
     /// Each is a local minimum of the distance. From inside the ground only the nearest of all
     /// counts, at any depth.
     fn facing(&self, centre: &SVector<f64, D>, reach: f64, out: &mut Vec<Facing<D>>);
+
+    /// Velocity of its surface at one of these points, m/s. Its shape does not change.
+    fn velocity(&self, _at: &Facing<D>) -> SVector<f64, D> {
+        SVector::zeros()
+    }
+
+    /// No point of its surface is faster, m/s.
+    fn fastest(&self) -> f64 {
+        0.0
+    }
 }

@@ -1,0 +1,186 @@
+"""Figures of a recorded run of balls in space: wheels, ruts, energy and contacts."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rover_gym.env.wheels import SLIP_SPEED
+from rover_gym.figures.derived_signals import Array, of_wheels, smooth
+from rover_gym.figures.ruts import rut_maps, rut_sections
+from rover_gym.figures.saving import check_format, save_figures
+from rover_gym.figures.signals import SMOOTHED, WINDOW, plot_raw_and_smooth
+from rover_gym.figures.style import DARK, QUANTITY_COLOURS, panel_legend, plain
+from rover_gym.figures.wheel_style import WheelStyle
+from rover_gym.mechanics import RoverModel
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rover_gym.figures.style import Sheet
+    from rover_gym.grains.grain_run import GrainRun
+
+__all__ = ["GRAIN_DRAWINGS", "draw_grain_run", "slip_of_wheels"]
+
+
+def draw_grain_run(
+    run: GrainRun, folder: str | Path, *, file_format: str = "png", with_overview: bool = False
+) -> list[Path]:
+    """Draws the figures of a run of balls.
+
+    Args:
+        run: From `read_grain_run`.
+        folder: Output folder; created if it does not exist. Without a rover its wheels are not drawn.
+        file_format: "png", "svg" or "pdf".
+        with_overview: Whether to add one page with all figures.
+
+    Returns:
+        Paths of the files.
+
+    Raises:
+        OptionError: The file format is unknown.
+        MissingExtraError: matplotlib is not installed.
+    """
+    check_format(file_format)
+    chosen = {name: draw for name, draw in GRAIN_DRAWINGS.items() if run.model is not None or name not in OF_WHEELS}
+    drawings = {name: partial(_fill, draw=draw, run=run) for name, draw in chosen.items()}
+    paths = save_figures(drawings, folder, height=6.5, file_format=file_format)
+    if with_overview:
+        page = {"overview": partial(_overview, draws=list(chosen.values()), run=run)}
+        paths += save_figures(page, folder, height=6.5 * len(chosen), file_format=file_format)
+    return paths
+
+
+def wheel_forces(figure: Sheet, run: GrainRun) -> None:
+    """Load, thrust and side force of each wheel."""
+    panels = figure.subplots(3, 1, sharex=True)
+    style = WheelStyle.of(_model(run))
+    heading = run.trajectory["q"][:, 4]
+    ahead = np.stack((np.cos(heading), np.zeros_like(heading), -np.sin(heading)), axis=1)
+    right = np.stack((np.sin(heading), np.zeros_like(heading), np.cos(heading)), axis=1)
+    forces = run.wheel_forces
+    along = np.einsum("nwi,ni->nw", forces, ahead), np.einsum("nwi,ni->nw", forces, right)
+    for axes, values, name in zip(
+        panels,
+        (forces[..., 1], *along),
+        ("load", "thrust,\npositive forward", "side force,\nto the right"),
+        strict=True,
+    ):
+        plot_raw_and_smooth(axes, style, run.time, values, style.names)
+        axes.axhline(0.0, color=DARK, linewidth=0.6)
+        axes.set(ylabel=f"{name} (N)")
+    panels[-1].set(xlabel="time (s)")
+    style.legend(figure, note=SMOOTHED)
+    _title(figure, "Force of balls and ground on the wheels, mean since the row before", run)
+
+
+def sinkage_and_slip(figure: Sheet, run: GrainRun) -> None:
+    """Sinkage below the first surface, slip of each wheel, and the rover's speed."""
+    depth, slip, speed = figure.subplots(3, 1, sharex=True)
+    style = WheelStyle.of(_model(run))
+    style.plot(depth, run.time, 1e3 * run.sinkage)
+    depth.axhline(0.0, color=DARK, linewidth=0.6)
+    depth.set(ylabel="sinkage (mm)")
+    style.plot(slip, run.time, 100.0 * slip_of_wheels(run))
+    slip.set(ylabel="slip (%)", ylim=(-20.0, 110.0))
+    rate = np.hypot(*run.trajectory["v"][:, [0, 2]].T)
+    speed.plot(run.time, rate, color=DARK, linewidth=0.5, alpha=0.35)
+    speed.plot(run.time, smooth(run.time, rate, WINDOW), color=DARK)
+    speed.set(ylabel="speed of the trunk (m/s)", xlabel="time (s)")
+    style.legend(figure, note=f"slip and speed: smoothed over {WINDOW:g} s")
+    _title(figure, "Sinkage and slip of the wheels, speed", run)
+
+
+def slip_of_wheels(run: GrainRun) -> Array:
+    """(n, n_wheels) share of the rim's way that a wheel's centre falls short of, smoothed; nan where the rim stands.
+
+    Raises:
+        RecordingError: The run has no rover.
+    """
+    centres = run.wheel_centres
+    if run.rover is None or run.n_frames < 3:
+        return np.full(centres.shape[:2], np.nan)
+    heading = run.trajectory["q"][:, 4]
+    ahead = np.stack((np.cos(heading), np.zeros_like(heading), -np.sin(heading)), axis=1)
+    travel = np.einsum("nwi,ni->nw", np.gradient(centres, run.time, axis=0), ahead)
+    rims = of_wheels(run.rover, "v") * run.rover.model.wheel_radii
+    travel, rims = smooth(run.time, travel, WINDOW), smooth(run.time, rims, WINDOW)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        result: Array = np.where(np.abs(rims) > SLIP_SPEED, 1.0 - travel / rims, np.nan)
+    return result
+
+
+def balls_and_contacts(figure: Sheet, run: GrainRun) -> None:
+    """Energy, number of contacts, deepest overlap and the solver's residual."""
+    energy, contacts, overlap, residual = figure.subplots(4, 1, sharex=True)
+    data = run.trajectory
+    potential = data["potential_energy"] - data["potential_energy"][0]
+    energy.plot(run.time, data["kinetic_energy"], color=QUANTITY_COLOURS[0], label="kinetic")
+    energy.plot(run.time, potential, color=QUANTITY_COLOURS[1], label="potential, from the start")
+    energy.set(ylabel="energy (J)")
+    number = np.array(data["n_contacts"])
+    number[0] = np.nan  # no step had been taken
+    contacts.plot(run.time, number, color=QUANTITY_COLOURS[2], label="contacts, most of a row's steps")
+    contacts.plot(run.time, data["n_asleep"], color=QUANTITY_COLOURS[4], label="balls asleep")
+    contacts.set(ylabel="number (1)")
+    contacts.set_ylim(bottom=0.0)
+    share = 100.0 * data["penetration"] / float(run.radius.min())
+    overlap.plot(run.time, share, color=QUANTITY_COLOURS[3], label="deepest overlap, share of the smallest radius")
+    overlap.set(ylabel="overlap (%)")
+    overlap.set_ylim(bottom=0.0)
+    worst = np.where(data["solver_residual"] > 0.0, data["solver_residual"], np.nan)
+    residual.plot(run.time, worst, color=QUANTITY_COLOURS[0], label="largest residual of a row's steps")
+    residual.set(ylabel="residual (1)", xlabel="time (s)", yscale="log")
+    tolerance = data.attributes.get("solver", {}).get("tolerance")
+    if isinstance(tolerance, float) and tolerance > 0.0:
+        residual.axhline(tolerance, color=DARK, linewidth=0.8, linestyle="--", label="tolerance")
+    for axes in (energy, contacts, overlap, residual):
+        panel_legend(axes)
+    _title(figure, "Balls and contacts", run)
+
+
+def ruts(figure: Sheet, run: GrainRun) -> None:
+    """The surface at the first and the last sample, and what changed."""
+    rut_maps(figure, run)
+    _title(figure, "Surface of the balls", run)
+
+
+def sections(figure: Sheet, run: GrainRun) -> None:
+    """Sections along and across a track, or through the middle of the bed."""
+    rut_sections(figure, run)
+    _title(figure, "Sections through the surface of the balls", run)
+
+
+#: By file name.
+GRAIN_DRAWINGS: dict[str, Callable[[Sheet, GrainRun], None]] = {
+    "wheel-forces": wheel_forces,
+    "sinkage-and-slip": sinkage_and_slip,
+    "ruts": ruts,
+    "sections": sections,
+    "balls-and-contacts": balls_and_contacts,
+}
+#: Figures that need wheels.
+OF_WHEELS = frozenset({"wheel-forces", "sinkage-and-slip"})
+
+
+def _model(run: GrainRun) -> RoverModel:
+    return RoverModel() if run.model is None else run.model
+
+
+def _fill(figure: Sheet, draw: Callable[[Sheet, GrainRun], None], run: GrainRun) -> None:
+    draw(figure, run)
+
+
+def _title(figure: Sheet, what: str, run: GrainRun) -> None:
+    broken_off = "" if run.trajectory.attributes.get("complete", True) else " (the recording was broken off)"
+    figure.suptitle(f"{what}\n{plain(run.title)}{broken_off}")
+
+
+def _overview(figure: Sheet, draws: list[Callable[[Sheet, GrainRun], None]], run: GrainRun) -> None:
+    """All figures stacked on one page."""
+    parts = figure.subfigures(len(draws), 1, squeeze=False).flat
+    for part, draw in zip(parts, draws, strict=True):
+        draw(part, run)

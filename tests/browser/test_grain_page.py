@@ -1,0 +1,202 @@
+"""The page of balls in a real browser: it loads offline, shows balls and rover, and a picture costs little script."""
+
+import base64
+import json
+import re
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from balls import MovingBalls, RoverOnMovingBalls
+from browser.test_replay_page import await_that, coarse, go_to, messages, opened, picture, readings, slider
+from selenium import webdriver
+from selenium.webdriver.common.by import By
+
+from rover_gym.grains import GrainRun, read_grain_run, record_grains
+from rover_gym.rendering.appearance import SAND_COLOUR
+from rover_gym.replay import write_grain_page
+
+# Time of the script for a new sample, on any thread: rebuilt from its differences, and given to the graphics card.
+SAMPLE_TIMES = """
+const done = arguments[arguments.length - 1];
+(async () => {
+  const scene = JSON.parse(document.getElementById("scene").textContent);
+  const frames = new GrainFrames(scene);
+  frames.pieces.set(0, await unpacked("piece-0"));
+  const gl = document.createElement("canvas").getContext("webgl2");
+  gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+  gl.bufferData(gl.ARRAY_BUFFER, 8 * scene.balls, gl.DYNAMIC_DRAW);
+  const times = [];
+  for (let turn = 0; turn < 5; turn++) {
+    frames.at = -1;
+    for (let k = 0; k < 10; k++) {
+      const begin = performance.now();
+      gl.bufferSubData(gl.ARRAY_BUFFER, 0, frames.sample(k));
+      times.push(performance.now() - begin);
+    }
+  }
+  done(times.sort((a, b) => a - b)[25]);
+})();
+"""
+
+
+class BallsShown(NamedTuple):
+    """A page that is open, and the run that it should show."""
+
+    browser: webdriver.Chrome
+    run: GrainRun
+    page: Path
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BallsShown]:
+    folder = tmp_path_factory.mktemp("grains")
+    record_grains(RoverOnMovingBalls(), 1.2, folder / "run.h5", 10.0, title="a rover & <balls>")
+    run = read_grain_run(folder / "run.h5")
+    page = write_grain_page(run, folder / "replay.html")
+    with opened(page, folder / "profile") as browser:
+        yield BallsShown(browser, run, page)
+
+
+def test_the_page_loads_without_errors_and_without_the_network(shown: BallsShown) -> None:
+    asked = [params["request"]["url"] for params in messages(shown.browser, "Network.requestWillBeSent")]
+    assert shown.page.as_uri() in asked
+    inside = ("data:", "blob:", "chrome:", shown.page.as_uri())
+    assert [url[:100] for url in asked if not url.startswith(inside)] == []
+    assert [entry for entry in shown.browser.get_log("browser") if entry["level"] == "SEVERE"] == []
+    assert shown.browser.title == "a rover & <balls>"
+
+
+def test_balls_rover_and_sky_are_where_they_belong(shown: BallsShown) -> None:
+    go_to(shown.browser, 0.2)
+    image = picture(shown.browser)
+    height, width, _ = image.shape
+    red, green, blue = np.moveaxis(image, -1, 0)
+    # Sand is yellower than the ground: its green lies farther from its blue.
+    sand = (red > green + 15.0) & (green - blue > 0.75 * (red - green)) & (blue < 160.0)
+    assert SAND_COLOUR[1] - SAND_COLOUR[2] > 0.75 * (SAND_COLOUR[0] - SAND_COLOUR[1])
+    assert sand[height // 2 :].mean() > 0.1
+    assert (blue > red)[: height // 12].mean() > 0.8  # the sky
+    light = (image.min(axis=-1) > 120.0) & (np.ptp(image, axis=-1) < 40.0)
+    light[: height // 6] = False
+    rows, columns = np.nonzero(light)  # the trunk
+    assert len(rows) > 0.005 * light.size
+    assert abs(columns.mean() / width - 0.5) < 0.2
+    assert 0.25 < rows.mean() / height < 0.7
+
+
+def test_the_timeline_moves_balls_and_rover_and_comes_back(shown: BallsShown) -> None:
+    paint(shown.browser, 2)  # balls that move have another colour than balls at rest
+    go_to(shown.browser, 0.25)
+    first = coarse(picture(shown.browser))
+    go_to(shown.browser, 1.15)
+    later = coarse(picture(shown.browser))
+    go_to(shown.browser, 0.25)
+    back = coarse(picture(shown.browser))
+    paint(shown.browser, 0)
+    changed = (np.abs(later - first).max(axis=-1) > 15.0).mean()
+    assert changed > 0.03
+    assert (np.abs(back - first).max(axis=-1) > 15.0).mean() < 0.05 * changed
+
+
+def paint(browser: webdriver.Chrome, number: int) -> None:
+    """Chooses the colours of the balls: 0 sand, 1 layers, 2 speed."""
+    browser.execute_script(
+        "const choice = document.getElementById('paint'); choice.value = arguments[0];"
+        "choice.dispatchEvent(new Event('change'));",
+        str(number),
+    )
+
+
+def test_layers_show_the_height_at_the_start(shown: BallsShown) -> None:
+    go_to(shown.browser, 0.2)
+    plain = coarse(picture(shown.browser))
+    paint(shown.browser, 1)
+    go_to(shown.browser, 0.2)
+    layered = coarse(picture(shown.browser))
+    paint(shown.browser, 0)
+    assert (np.abs(layered - plain).max(axis=-1) > 15.0).mean() > 0.03
+
+
+def test_the_curves_follow_the_timeline(shown: BallsShown) -> None:
+    browser, run = shown.browser, shown.run
+    assert run.model is not None
+    assert [node.text for node in browser.find_elements(By.CSS_SELECTOR, "#panel h2")] == [
+        "wheel load (N)",
+        "sinkage (mm)",
+        "energy (J)",
+        "contacts (1)",
+        "deepest overlap (% of a radius)",
+    ]
+    go_to(browser, float(run.time[7]) + 0.01)
+    loads = run.wheel_forces[7, :, 1]
+    expected = [word for name, load in zip(run.model.wheel_names, loads, strict=True) for word in (name, f"{load:.1f}")]
+    await_that(lambda: readings(browser)[0] == expected, "the loads at that time")
+    chart = browser.find_element(By.CSS_SELECTOR, "#panel svg")
+    browser.execute_script(
+        "const box = arguments[0].getBoundingClientRect();"
+        "const at = {bubbles: true, clientX: box.x + box.width / 2, clientY: box.y + box.height / 2};"
+        "arguments[0].dispatchEvent(new MouseEvent('click', at));",
+        chart,
+    )
+    middle = (165 - 42) / (330 - 42 - 6) * float(run.time[-1])
+    await_that(lambda: slider(browser) == pytest.approx(middle, abs=0.02), "the time that was clicked on")
+
+
+def test_it_plays_and_the_wheel_of_the_mouse_zooms(shown: BallsShown) -> None:
+    browser = shown.browser
+    go_to(browser, 0.1)
+    browser.find_element(By.CSS_SELECTOR, "#root button").click()
+    await_that(lambda: (slider(browser) or 0.0) > 0.3, "a later time")
+    go_to(browser, 0.1)
+    far = coarse(picture(browser))
+    browser.execute_script(
+        "const turn = new WheelEvent('wheel', {deltaY: -400, cancelable: true});"
+        "document.querySelector('#root canvas').dispatchEvent(turn);"
+    )
+    go_to(browser, 0.1)
+    near = coarse(picture(browser))
+    assert (np.abs(near - far).max(axis=-1) > 15.0).mean() > 0.1
+
+
+def test_twenty_thousand_balls_cost_the_script_little(tmp_path: Path) -> None:
+    """60 pictures a second leave 17 ms for each; of 50 000 balls a new sample may take 3, and time goes with balls."""
+    record_grains(MovingBalls((50, 10, 40), 0.01, 0.5), 0.4, tmp_path / "run.h5")
+    page = write_grain_page(read_grain_run(tmp_path / "run.h5"), tmp_path / "replay.html")
+    with opened(page, tmp_path / "profile") as browser:
+        took = browser.execute_async_script(SAMPLE_TIMES)
+        severe = [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
+    assert severe == []
+    assert 0.0 < took < 1.2
+
+
+def parts(page: Path) -> dict[str, Any]:
+    """What the page holds."""
+    text = page.read_text(encoding="utf-8")
+    found = re.findall(r'<script type="application/(\w+)[^"]*" id="([\w-]+)">(.*?)</script>', text, flags=re.DOTALL)
+    return {
+        name: json.loads(data) if kind == "json" else zlib.decompress(base64.b64decode(data))
+        for kind, name, data in found
+    }
+
+
+def test_the_page_holds_the_places_of_every_sample(tmp_path: Path) -> None:
+    """Rebuilt here as the page's script does."""
+    record_grains(MovingBalls((12, 4, 8), moving=0.6), 2.4, tmp_path / "run.h5")
+    run = read_grain_run(tmp_path / "run.h5")
+    page = write_grain_page(run, tmp_path / "replay.html")
+    held = parts(page)
+    scene, n = held["scene"], len(run.radius)
+    assert scene["pieces"] == 3
+    places = []
+    for i in range(scene["pieces"]):
+        steps = np.frombuffer(held[f"piece-{i}"], np.uint8).reshape(-1, 3, 2, n).astype(np.int64)
+        steps = steps[:, :, 0] + 256 * steps[:, :, 1]
+        steps[1:] -= 128
+        places.append(np.cumsum(steps, axis=0) % 65536)
+    levels = np.concatenate(places).transpose(0, 2, 1)
+    rebuilt = np.array(scene["low"]) + levels / 65535.0 * np.array(scene["extent"])
+    assert np.abs(rebuilt - run.positions).max() <= 0.51 * max(scene["extent"]) / 65535.0 + 1e-6

@@ -1,0 +1,271 @@
+//! A rover among balls: momentum, weights, and fixed balls beside the same spheres as a terrain.
+#![allow(clippy::unwrap_used)]
+
+use std::sync::Arc;
+
+use rover_core::geometry::{Plane, SphereField, Terrain};
+use rover_core::integrator::{Stabilisation, StepOptions, StepReport};
+use rover_core::multibody::{Model, coordinates};
+use rover_core::nalgebra::Vector3;
+use rover_core::simulation::{
+    GrainSimulation, RoverInGrains, RoverSimulation, TogetherError, soil_options,
+};
+use rover_core::solver::SolverOptions;
+use rover_core::system::grains::{
+    COORDINATES, GrainFriction, GrainScene, Grains, Packing, SleepOptions, Wall,
+};
+
+/// θ = γ = 1, solved to `tolerance`.
+fn options(gravity: f64, time_step: f64, tolerance: f64) -> StepOptions {
+    StepOptions {
+        theta: 1.0,
+        forecast: 1.0,
+        time_step,
+        gravity: Vector3::new(0.0, -gravity, 0.0),
+        stabilisation: Stabilisation::None,
+        friction_coefficient: 0.6,
+        solver: SolverOptions {
+            tolerance,
+            velocity_tolerance: tolerance,
+            max_sweeps: 20_000,
+            ..SolverOptions::default()
+        },
+        ..StepOptions::default()
+    }
+}
+
+/// The report's rover at a place (m) on a terrain.
+fn rover(terrain: Arc<dyn Terrain>, place: [f64; 3], options: &StepOptions) -> RoverSimulation {
+    let model = Arc::new(Model::rover());
+    let mut rover = RoverSimulation::new(model, terrain, options.clone()).unwrap();
+    let mut q = [0.0; 21];
+    q[..3].copy_from_slice(&place);
+    let configuration = coordinates::from_public(rover.model(), &q).unwrap();
+    rover.set_state(configuration, vec![0.0; 21]);
+    rover
+}
+
+fn nowhere() -> Arc<dyn Terrain> {
+    Arc::new(Plane::new([0.0, 1.0, 0.0], 100.0).unwrap())
+}
+
+/// A rover and balls.
+struct Scene {
+    rover: RoverSimulation,
+    bed: GrainSimulation<3>,
+    link: RoverInGrains,
+}
+
+impl Scene {
+    fn new(rover: RoverSimulation, bed: GrainSimulation<3>) -> Self {
+        let link = RoverInGrains::new(&rover, &bed, 0.7).unwrap();
+        Self { rover, bed, link }
+    }
+
+    fn step(&mut self, n: usize) -> StepReport {
+        let Self { rover, bed, link } = self;
+        link.step(rover, bed, n, &mut || true).unwrap()
+    }
+
+    fn kinetic(&self) -> f64 {
+        self.rover.energy().kinetic + self.bed.energy().kinetic
+    }
+
+    /// Linear momentum, and angular momentum about the origin.
+    fn momentum(&self) -> [Vector3<f64>; 2] {
+        let (linear, moment) = self.bed.soil().momentum(self.bed.q(), self.bed.v());
+        let own = self.rover.momentum();
+        [linear + own.linear, moment + own.angular]
+    }
+}
+
+/// Balls without walls.
+fn balls(
+    centres: &[[f64; 3]],
+    radius: f64,
+    mass: f64,
+    kinematic: bool,
+    options: &StepOptions,
+) -> GrainSimulation<3> {
+    let n = centres.len();
+    let grains = Grains::new(vec![radius; n], vec![mass; n]).unwrap();
+    let scene = GrainScene {
+        grains: grains.with_kinematic(vec![kinematic; n]).unwrap(),
+        walls: Vec::new(),
+        ground: None,
+        machine: None,
+        friction: GrainFriction::default(),
+    };
+    let q = centres.concat();
+    GrainSimulation::new(Arc::new(scene), options.clone(), None, q).unwrap()
+}
+
+#[test]
+fn a_hail_of_balls_keeps_the_momenta_and_gains_no_energy() {
+    let options = options(0.0, 1e-3, 1e-10);
+    let rover = rover(nowhere(), [0.0, 0.0, 0.0], &options);
+    let mut centres = Vec::new();
+    for i in 0..4 {
+        for j in 0..4 {
+            for k in 0..3 {
+                let (i, j, k) = (f64::from(i), f64::from(j), f64::from(k));
+                centres.push([1.6 + 0.25 * k + 0.01 * j, 0.22 * i - 0.4, 0.31 * j - 0.5]);
+            }
+        }
+    }
+    let n = centres.len();
+    let mut bed = balls(&centres, 0.1, 6.0, false, &options);
+    let mut v = vec![0.0; 6 * n];
+    for (i, v) in v.chunks_exact_mut(6).enumerate() {
+        v.copy_from_slice(&[-3.0, 0.1, 0.0, 0.0, 0.0, (i % 3) as f64 - 1.0]);
+    }
+    let q = bed.q().clone();
+    bed.set_state(&q, &v).unwrap();
+    let mut scene = Scene::new(rover, bed);
+    let [linear, angular] = scene.momentum();
+    let (mut energy, mut touched) = (scene.kinetic(), 0);
+    let first = energy;
+    for _ in 0..400 {
+        let report = scene.step(1);
+        assert!(report.is_converged(), "{report:?}");
+        let now = scene.kinetic();
+        // The steering's springs give back what they took.
+        assert!(now <= energy * (1.0 + 1e-4), "{now} {energy}");
+        energy = now;
+        touched += scene.rover.contacts().len();
+    }
+    assert!(touched > 20, "{touched}");
+    assert!(energy < 0.9 * first);
+    let [later, turned] = scene.momentum();
+    // The rover's joints turn explicitly: its momenta are right to the order of the step.
+    assert!(
+        (later - linear).norm() < 1e-5 * linear.norm(),
+        "{later} {linear}"
+    );
+    assert!(
+        (turned - angular).norm() < 2e-2 * linear.norm(),
+        "{turned} {angular}"
+    );
+    assert!(scene.bed.penetration() < 1e-3);
+}
+
+/// A settled bed in a box of 2.6 m by 1.8 m.
+fn bed(options: &StepOptions, sleep: Option<SleepOptions>) -> GrainSimulation<3> {
+    let packing = Packing::<3> {
+        count: 700,
+        radius_min: 0.04,
+        radius_max: 0.05,
+        mass: 1.0,
+        corner: [-1.3, 0.0, -0.9],
+        sides: [2.6, f64::INFINITY, 1.8],
+        seed: 3,
+    };
+    let (grains, q) = packing.build().unwrap();
+    let wall = |p: [f64; 3], n: [f64; 3]| Wall::new(Vector3::from(p), Vector3::from(n)).unwrap();
+    let walls = vec![
+        wall([0.0; 3], [0.0, 1.0, 0.0]),
+        wall([-1.3, 0.0, 0.0], [1.0, 0.0, 0.0]),
+        wall([1.3, 0.0, 0.0], [-1.0, 0.0, 0.0]),
+        wall([0.0, 0.0, -0.9], [0.0, 0.0, 1.0]),
+        wall([0.0, 0.0, 0.9], [0.0, 0.0, -1.0]),
+    ];
+    let scene = GrainScene {
+        grains,
+        walls,
+        ground: None,
+        machine: None,
+        friction: GrainFriction::default(),
+    };
+    let mut bed = GrainSimulation::new(Arc::new(scene), options.clone(), sleep, q).unwrap();
+    bed.step(200).unwrap();
+    bed
+}
+
+#[test]
+fn a_rover_on_a_bed_is_borne_by_it() {
+    let options = options(9.81, 2e-3, 1e-3);
+    let mut bed = bed(&options, Some(SleepOptions::default()));
+    let top = bed.q().chunks_exact(COORDINATES).map(|q| q[1] + 0.05);
+    let top = top.fold(0.0, f64::max);
+    let rover = rover(nowhere(), [0.0, top + 0.36, 0.0], &options);
+    bed.wake();
+    let mut scene = Scene::new(rover, bed);
+    scene.step(500);
+    let weight = 9.81 * scene.rover.model().mass();
+    let (mut force, mut steps) = (0.0, 0);
+    for _ in 0..50 {
+        scene.step(1);
+        let up = scene.rover.contacts().iter().map(|c| {
+            let [n, t, b] = c.contact.frame.rows();
+            (n * c.impulse[0] + t * c.impulse[1] + b * c.impulse[2]).y
+        });
+        force += up.sum::<f64>() / options.time_step;
+        steps += 1;
+    }
+    let mean = force / f64::from(steps);
+    assert!((mean / weight - 1.0).abs() < 0.04, "{mean} {weight}");
+    assert!(
+        scene.bed.penetration() < 0.01 * 0.04,
+        "{}",
+        scene.bed.penetration()
+    );
+    let down = scene.rover.q().position.y;
+    assert!(down > 0.1 && down < top + 0.36, "{down}");
+}
+
+#[test]
+fn fixed_balls_carry_a_rover_like_the_spheres_of_a_terrain() {
+    let options = options(9.81, 1e-3, 1e-7);
+    let centres: Vec<[f64; 3]> = (0..240)
+        .map(|i| {
+            let (i, j) = (f64::from(i / 10), f64::from(i % 10));
+            [0.15 * i - 1.0, 0.01 * ((i + j) % 3.0), 0.15 * j - 0.67]
+        })
+        .collect();
+    let radii = vec![0.13; centres.len()];
+    let field: Arc<dyn Terrain> = Arc::new(SphereField::new(&centres, &radii, None).unwrap());
+    let place = [0.0, 0.55, 0.0];
+    let mut alone = rover(field, place, &options);
+    let mut scene = Scene::new(
+        rover(nowhere(), place, &options),
+        balls(&centres, 0.13, 1.0, true, &options),
+    );
+    let torques = [40.0; 6];
+    alone.set_wheel_torques(&torques).unwrap();
+    scene.rover.set_wheel_torques(&torques).unwrap();
+    alone.step(600).unwrap();
+    assert!(scene.step(600).is_converged());
+    let (one, other) = (alone.q().position, scene.rover.q().position);
+    assert!(one.x > 0.1, "drives: {one}");
+    assert!((one - other).norm() < 0.01, "{one} {other}");
+}
+
+#[test]
+fn what_does_not_belong_together_is_refused() {
+    let options = options(9.81, 1e-3, 1e-6);
+    let bed = |options| balls(&[[0.0, -0.3, 0.0]], 0.05, 1.0, false, options);
+    let mut own = rover(nowhere(), [0.0, 1.0, 0.0], &options);
+    let slow = soil_options(&bed(&options).soil().grains);
+    let other = StepOptions {
+        time_step: 2e-3,
+        ..slow
+    };
+    let refused = RoverInGrains::new(&own, &bed(&other), 0.5).unwrap_err();
+    assert!(matches!(
+        refused,
+        TogetherError::Differs {
+            field: "time_step",
+            ..
+        }
+    ));
+    assert!(RoverInGrains::new(&own, &bed(&options), -0.5).is_err());
+    own.set_state(
+        rover(nowhere(), [0.0, -0.3, 0.0], &options).q().clone(),
+        vec![0.0; 21],
+    );
+    let refused = RoverInGrains::new(&own, &bed(&options), 0.5).unwrap_err();
+    assert!(
+        matches!(refused, TogetherError::Overlap { grain: 0, .. }),
+        "{refused}"
+    );
+}

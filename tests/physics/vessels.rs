@@ -1,0 +1,227 @@
+//! Balls on walls that move, in vessels, and with cohesion: closed forms.
+
+use std::sync::Arc;
+
+use rover_core::geometry::{Drum, Floor, Silo, Support};
+use rover_core::integrator::StepOptions;
+use rover_core::nalgebra::Vector3;
+use rover_core::simulation::{GrainSimulation, soil_options};
+use rover_core::system::grains::{
+    Cohesion, GrainError, GrainFriction, GrainScene, Grains, Wall, arranged,
+};
+
+const G: f64 = 9.81;
+const RADIUS: f64 = 0.1;
+const MASS: f64 = 2.0;
+const MU: f64 = 0.3;
+
+fn scene(
+    n: usize,
+    walls: Vec<Wall<3>>,
+    ground: Option<Arc<dyn Support<3>>>,
+    cohesion: f64,
+) -> GrainScene<3> {
+    let attraction = Cohesion::new(cohesion, None, RADIUS).expect("a force");
+    let grains = Grains::new(vec![RADIUS; n], vec![MASS; n]).expect("grains");
+    GrainScene {
+        grains: grains.with_cohesion(attraction),
+        walls,
+        ground,
+        machine: None,
+        friction: GrainFriction {
+            grains: MU,
+            walls: MU,
+            wheels: MU,
+        },
+    }
+}
+
+fn exact(scene: &GrainScene<3>) -> StepOptions {
+    let mut options = soil_options(&scene.grains);
+    options.solver.tolerance = 1e-9;
+    options.solver.velocity_tolerance = 1e-9;
+    options
+}
+
+fn simulation(scene: GrainScene<3>, q: &[f64]) -> GrainSimulation<3> {
+    let options = exact(&scene);
+    GrainSimulation::new(Arc::new(scene), options, None, q.to_vec()).expect("a bed")
+}
+
+fn moving_floor(velocity: Vector3<f64>) -> Wall<3> {
+    Wall::floor(0.0).moving(velocity).expect("a velocity")
+}
+
+#[test]
+fn a_belt_leaves_a_ball_two_sevenths_of_its_speed() {
+    let belt = moving_floor(Vector3::new(1.4, 0.0, -0.7));
+    let mut ball = simulation(scene(1, vec![belt], None, 0.0), &[0.0, RADIUS, 0.0]);
+    ball.step(100).expect("steps");
+    let early = ball.v()[0].hypot(ball.v()[2]);
+    assert!((early - MU * G * 0.1).abs() < 1e-6, "dragged by friction");
+    ball.step(400).expect("steps");
+    let v = ball.v();
+    assert!(
+        (v[0] - 0.4).abs() < 1e-6 && (v[2] + 0.2).abs() < 1e-6,
+        "{v:?}"
+    );
+}
+
+#[test]
+fn a_floor_lifts_a_ball_and_a_snapshot_knows_where_it_is() {
+    let floor = moving_floor(Vector3::new(0.0, 0.5, 0.0));
+    let make = || simulation(scene(1, vec![floor], None, 0.0), &[0.0, RADIUS, 0.0]);
+    let mut ball = make();
+    ball.step(300).expect("steps");
+    assert!((ball.q()[1] - RADIUS - 0.15).abs() < 1e-9, "{:?}", ball.q());
+    assert!(ball.penetration() < 1e-9);
+    let snapshot = ball.snapshot();
+    ball.step(100).expect("steps");
+    let mut other = make();
+    other
+        .restore(&snapshot)
+        .expect("a snapshot of the same bed");
+    other.step(100).expect("steps");
+    let bits = |x: &[f64]| x.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(ball.q()), bits(other.q()));
+    ball.set_state(&[0.0, RADIUS, 0.0], &[0.0; 6])
+        .expect("a state");
+    assert!(
+        ball.penetration() <= 0.0,
+        "the floor is back where it began"
+    );
+}
+
+#[test]
+fn a_ball_rolls_on_the_spot_in_a_drum() {
+    let drum = Drum::new(Vector3::zeros(), 1.0, 1.0, 2.0).expect("a drum");
+    let bottom = [0.0, RADIUS - 1.0, 0.0];
+    let mut ball = simulation(scene(1, Vec::new(), Some(Arc::new(drum)), 0.0), &bottom);
+    let spin = 2.0 * 1.0 / RADIUS;
+    ball.set_state(&bottom, &[0.0, 0.0, 0.0, 0.0, 0.0, spin])
+        .expect("a state");
+    ball.step(500).expect("steps");
+    assert!(ball.q()[0].abs() < 1e-6 && (ball.q()[1] - bottom[1]).abs() < 1e-6);
+    assert!((ball.v()[5] - spin).abs() < 1e-6);
+    ball.set_state(&bottom, &[0.0; 6]).expect("a state");
+    ball.step(50).expect("steps");
+    assert!(ball.q()[0] > 1e-3, "the barrel drags it to where it goes");
+}
+
+#[test]
+fn a_ball_falls_through_a_hole_that_it_fits_and_lies_beside_it() {
+    let floor = Floor {
+        height: 0.0,
+        hole: 0.15,
+    };
+    let silo = Silo::new([0.0, 0.0], 0.6, Some(floor)).expect("a silo");
+    let q = [0.04, RADIUS, 0.0, 0.45, RADIUS, 0.0];
+    let mut balls = simulation(scene(2, Vec::new(), Some(Arc::new(silo)), 0.0), &q);
+    balls.step(600).expect("steps");
+    assert!(balls.q()[1] < -0.5, "it fell: {:?}", balls.q());
+    assert!(balls.q()[0].hypot(balls.q()[2]) < 0.15, "through the hole");
+    assert!((balls.q()[4] - RADIUS).abs() < 1e-6, "the other lies");
+    assert!(balls.penetration() < 1e-4);
+}
+
+fn hangs(force: f64) -> bool {
+    let ceiling = Wall::new(Vector3::zeros(), -Vector3::y()).expect("a wall");
+    let mut ball = simulation(scene(1, vec![ceiling], None, force), &[0.0, -RADIUS, 0.0]);
+    ball.step(200).expect("steps");
+    ball.q()[1] > -1.1 * RADIUS
+}
+
+#[test]
+fn cohesion_holds_a_ball_up_to_its_breaking_force() {
+    let weight = MASS * G;
+    assert!(hangs(1.01 * weight));
+    assert!(!hangs(0.99 * weight));
+    assert!(!hangs(0.0));
+}
+
+#[test]
+fn cohesion_adds_to_the_load_of_friction() {
+    let force = 1.5 * MASS * G;
+    let own = scene(1, vec![Wall::floor(0.0)], None, force);
+    let mut ball = simulation(own, &[0.0, RADIUS, 0.0]);
+    ball.set_state(&[0.0, RADIUS, 0.0], &[3.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        .expect("a state");
+    ball.step(50).expect("steps");
+    let expected = 3.0 - MU * 2.5 * G * 0.05;
+    assert!((ball.v()[0] - expected).abs() < 1e-6, "{:?}", ball.v());
+    let contact = &ball.contacts()[0];
+    let whole = contact.impulse[0] - 1e-3 * ball.soil().attraction(&contact.contact);
+    assert!(
+        (whole - 1e-3 * MASS * G).abs() < 1e-8,
+        "it bears its weight"
+    );
+}
+
+#[test]
+fn two_balls_that_cohere_move_as_one_and_keep_their_momentum() {
+    let own = scene(2, Vec::new(), None, 50.0);
+    let mut options = exact(&own);
+    options.gravity = Vector3::zeros();
+    let q = [0.0, 0.0, 0.0, 2.0 * RADIUS, 0.0, 0.0];
+    let mut pair = GrainSimulation::new(Arc::new(own), options, None, q.to_vec()).expect("a bed");
+    let mut v = [0.0; 12];
+    (v[1], v[7]) = (-0.5, 0.5);
+    pair.set_state(&q, &v).expect("a state");
+    let before = pair.soil().momentum(pair.q(), pair.v());
+    pair.step(1000).expect("steps");
+    let apart = (0..3).map(|k| (pair.q()[k] - pair.q()[3 + k]).powi(2));
+    assert!(
+        (apart.sum::<f64>().sqrt() - 2.0 * RADIUS).abs() < 0.01 * RADIUS,
+        "F exceeds the centrifugal force of 5 N"
+    );
+    let after = pair.soil().momentum(pair.q(), pair.v());
+    assert!((before.0 - after.0).norm() < 1e-12);
+    assert!((before.1 - after.1).norm() < 1e-3 * before.1.norm());
+}
+
+#[test]
+fn what_no_attraction_can_be_is_refused_by_name() {
+    for (force, range, field) in [
+        (-1.0, None, "cohesion"),
+        (f64::NAN, None, "cohesion"),
+        (1.0, Some(0.0), "cohesion_range"),
+        (1.0, Some(0.21 * RADIUS), "cohesion_range"),
+        (1.0, Some(f64::NAN), "cohesion_range"),
+    ] {
+        let refused = Cohesion::new(force, range, RADIUS).expect_err("no attraction");
+        assert_eq!(refused.field(), field);
+    }
+}
+
+#[test]
+fn balls_of_given_radii_are_arranged_without_overlap() {
+    let radius: Vec<f64> = (0..60).map(|i| 0.01 + 1e-4 * f64::from(i)).collect();
+    let sides = [0.2, f64::INFINITY, 0.1];
+    let q = arranged::<3>(&radius, [-0.1, 0.3, 0.0], sides, 7).expect("room");
+    let grains = Grains::<3>::new(radius.clone(), vec![1.0; 60]).expect("grains");
+    let around = [
+        Wall::left(-0.1),
+        Wall::right(0.1),
+        Wall::floor(0.3),
+        Wall::new(Vector3::zeros(), Vector3::z()).expect("a wall"),
+        Wall::new(Vector3::z() * 0.1, -Vector3::z()).expect("a wall"),
+    ];
+    let scene = GrainScene {
+        grains,
+        walls: around.to_vec(),
+        ground: None,
+        machine: None,
+        friction: GrainFriction::default(),
+    };
+    assert!(scene.penetration(&q, 0.0) <= 0.0);
+    assert_eq!(
+        q,
+        arranged::<3>(&radius, [-0.1, 0.3, 0.0], sides, 7).unwrap()
+    );
+    let narrow = [0.2, f64::INFINITY, 0.03];
+    let refused = arranged::<3>(&radius, [0.0; 3], narrow, 0).expect_err("too narrow");
+    assert!(matches!(
+        refused,
+        GrainError::TooNarrow { field: "depth", .. }
+    ));
+}
