@@ -190,7 +190,7 @@ fn a_rover_on_a_bed_is_borne_by_it() {
     let rover = rover(nowhere(), [0.0, top + 0.36, 0.0], &options);
     bed.wake();
     let mut scene = Scene::new(rover, bed);
-    scene.step(350);
+    scene.step(500);
     let weight = 9.81 * scene.rover.model().mass();
     let (mut force, mut steps) = (0.0, 0);
     for _ in 0..50 {
@@ -203,7 +203,7 @@ fn a_rover_on_a_bed_is_borne_by_it() {
         steps += 1;
     }
     let mean = force / f64::from(steps);
-    assert!((mean / weight - 1.0).abs() < 0.02, "{mean} {weight}");
+    assert!((mean / weight - 1.0).abs() < 0.04, "{mean} {weight}");
     assert!(
         scene.bed.penetration() < 0.01 * 0.04,
         "{}",

@@ -145,7 +145,7 @@ def settled_balls(
         radii = np.asarray(radius, dtype=float)
         if radii.shape != (count,) or not (np.isfinite(radii) & (radii > 0.0)).all():
             refuse(OptionError, "radius", radius, f"must be {count} positive lengths")
-    mean, largest = float(radii.mean()), float(radii.max())
+    largest = float(radii.max())
     for name, length in (("width", width), ("depth", depth)):
         if length < 2.01 * largest:
             refuse(OptionError, name, length, f"leaves no room for the largest ball's diameter, {2.0 * largest:g} m")
@@ -153,15 +153,27 @@ def settled_balls(
     packing = (radii, 4.0 / 3.0 * np.pi * density * radii**3, position)
     walls = box_walls(width, depth)
     sim = GrainSimulation(*packing, walls=walls, **options)
+    settle(sim)
+    return BallBed(sim.radius, sim.mass, sim.position, walls, width, depth)
+
+
+def settle(sim: GrainSimulation) -> None:
+    """Steps balls until they are at rest, or for a time in which they could have fallen 12 times from their top.
+
+    Raises:
+        OptionError: There is no gravity.
+        StepError: A step failed.
+    """
     g = float(np.linalg.norm(sim.settings["gravity"]))
     if g == 0.0:
         refuse(OptionError, "gravity", sim.settings["gravity"], "must pull balls down, or they do not settle")
-    height = float((sim.position[:, 1] + sim.radius).max())
-    still = SETTLED * float(np.sqrt(2.0 * g * mean))
-    most = MOST_FALLS * float(np.sqrt(2.0 * height / g))
-    while sim.time < most:
+    places = sim.position[:, 1]
+    height = float((places + sim.radius).max() - (places - sim.radius).min())
+    still = SETTLED * float(np.sqrt(2.0 * g * sim.radius.mean()))
+    fall = float(np.sqrt(2.0 * height / g))
+    start = sim.time
+    while sim.time - start < MOST_FALLS * fall:
         sim.step(10)
         speed = float(np.sqrt(2.0 * sim.energy().kinetic / sim.mass.sum()))
-        if sim.time > np.sqrt(2.0 * height / g) and speed < still:
+        if sim.time - start > fall and speed < still:
             break
-    return BallBed(sim.radius, sim.mass, sim.position, walls, width, depth)
