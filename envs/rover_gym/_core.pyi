@@ -2188,7 +2188,7 @@ class EpisodeRun:
         """
     def step(
         self,
-        simulation: Simulation,
+        simulation: Simulation | RoverGrainSimulation,
         action: npt.ArrayLike,
         normals: npt.ArrayLike | None = None,
         *,
