@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
 #: The built-in rover's wheels: thin discs would cut into the grains.
 WHEEL_RADIUS, WHEEL_WIDTH = 0.25, 0.2
-#: Coulomb's coefficient between grains, and of grains on the ground.
-GRAIN_FRICTION = 0.5
 #: Speed below which a grain may sleep, m/s: a twentieth of what a free one gains in a control period.
 SLEEP_SPEED = 0.02
 #: Arguments of `RoverEnv` with another default.
@@ -99,11 +97,12 @@ class RoverGrainsEnv(RoverEnv):
     | pit             | `Pit()`        |       | the pit, a `rover_gym.grains.Pit`                              |
     | grain_radius    | (0.03, 0.04) | m     | range of the grains' radii                                     |
     | grain_density   | 2600           | kg/m³ | density of the grains                                          |
+    | grain_friction  | 0.5            |       | Coulomb's coefficient between grains, and of grains on ground  |
     | grain_tolerance | 0.001          |       | relative residual to which a step's contact problem is solved  |
     | n_beds          | 2              |       | how many beds episodes are drawn from                          |
     | sleep           | True           |       | whether grains at rest far from the rover are left out         |
 
-    `friction` is that of the rover on ground and grains; between grains it is 0.5.
+    `friction` is that of the rover on ground and grains.
 
     ## Version history
 
@@ -116,6 +115,7 @@ class RoverGrainsEnv(RoverEnv):
         pit: Pit | None = None,
         grain_radius: float | tuple[float, float] = (0.03, 0.04),
         grain_density: float = 2600.0,
+        grain_friction: float = 0.5,
         grain_tolerance: float = 1e-3,
         n_beds: int = 2,
         sleep: bool = True,
@@ -136,6 +136,7 @@ class RoverGrainsEnv(RoverEnv):
         self.pit = pit
         self.grain_radius = span("grain_radius", grain_radius, above=0.0)
         self.grain_density = number("grain_density", grain_density, above=0.0)
+        self.grain_friction = number("grain_friction", grain_friction, at_least=0.0)
         self.grain_tolerance = number("grain_tolerance", grain_tolerance, above=0.0, at_most=1.0)
         self.n_beds = whole("n_beds", n_beds, at_least=1, at_most=MOST_BEDS, error=OptionError)
         self.sleep = flag("sleep", sleep)
@@ -193,10 +194,10 @@ class RoverGrainsEnv(RoverEnv):
 
     def _grains(self, rover: Simulation, bed: BedDraw) -> GrainSimulation:
         """The grains of a bed, in the steps of a rover."""
-        fill = _settled(self.pit, self.grain_radius, self.grain_density, bed.number)
+        fill = _settled(self.pit, self.grain_radius, self.grain_density, self.grain_friction, bed.number)
         return fill.mirrored(along_x=bed.along_x, along_z=bed.along_z).simulation(
-            friction=GRAIN_FRICTION,
-            wall_friction=GRAIN_FRICTION,
+            friction=self.grain_friction,
+            wall_friction=self.grain_friction,
             gravity=rover.gravity,
             time_step=rover.time_step,
             tolerance=self.grain_tolerance,
@@ -264,6 +265,7 @@ class RoverGrainsEnv(RoverEnv):
 
 
 @functools.lru_cache(maxsize=8)
-def _settled(pit: Pit, radius: tuple[float, float], density: float, number: int) -> PitFill:
+def _settled(pit: Pit, radius: tuple[float, float], density: float, friction: float, number: int) -> PitFill:
     """Bed number k of all environments of a process with this pit and these grains."""
-    return pit.fill(*radius, density=density, seed=number, time_step=4e-3)
+    frictions = {"friction": friction, "wall_friction": friction}
+    return pit.fill(*radius, density=density, seed=number, time_step=4e-3, **frictions)

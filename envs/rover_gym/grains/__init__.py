@@ -11,6 +11,7 @@ from rover_gym.grains.bed_scenes import penetration_depths, rover_on_bed, striki
 from rover_gym.grains.grain_recording import GrainSampler, describe_grains, record_grains
 from rover_gym.grains.grain_run import GrainRun, read_grain_run
 from rover_gym.grains.grain_surface import SurfaceMap, surface_map
+from rover_gym.grains.pit import Pit, PitFill
 from rover_gym.grains.sizes import even_radii, lognormal_radii, sieved_radii
 from rover_gym.grains.tiling import tiled
 from rover_gym.grains.vessel_scenes import column, drum, outflow, run_out, silo, slopes
@@ -19,6 +20,8 @@ __all__ = [
     "BallBed",
     "GrainRun",
     "GrainSampler",
+    "Pit",
+    "PitFill",
     "SurfaceMap",
     "box_walls",
     "column",
