@@ -120,6 +120,6 @@ def saturation(runs: list[dict[str, float]]) -> float:
 
 def measure(ledger: Ledger) -> dict[str, object]:
     """Holes of several widths, and fillings of several heights."""
-    runs = [discharge(1800, hole, seed, ledger) for hole in HOLES for seed in (0, 1)]
-    loads = [borne(count, seed, ledger) for count in (150, 400, 800) for seed in (0, 1)]
+    runs = [discharge(1200, hole, seed, ledger, duration=0.4) for hole in HOLES for seed in (0, 1)]
+    loads = [borne(count, 0, ledger) for count in (150, 300, 600)]
     return {"runs": runs, "fit": beverloo(runs), "loads": loads, "saturation": saturation(loads)}
