@@ -17,7 +17,7 @@ from validation.watch import GRAVITY, Ledger
 FRICTION = 0.5
 FRACTION = 0.57  # of a filling, where a unit of mass is needed
 TUBE = 6.0 * DIAMETER  # radius of the silo
-HOLES = (4.0, 5.0, 6.0, 7.0)  # their diameters, in diameters of a ball
+HOLES = (5.0, 6.0, 7.0)  # their diameters, in diameters of a ball; one of 4 clogs
 
 
 def filled(count: int, tube: float, seed: int, ledger: Ledger) -> Any:
