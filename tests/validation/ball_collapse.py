@@ -1,6 +1,6 @@
 """Run-out of collapsing columns of balls.
 
-Source: Lube, Huppert, Sparks, Hallworth 2004, *Axisymmetric collapses of granular columns*, J. Fluid Mech. 508,
+Source: Lube et al. 2004, *Axisymmetric collapses of granular columns*, J. Fluid Mech. 508,
 175-199: (R - R0)/R0 = 1.24 a below a = 1.7 and 1.6 a^(1/2) above, a = H0/R0.
 """
 

@@ -1,6 +1,6 @@
 """Discharge of a silo through a hole, and the load on the bottom of one.
 
-Sources: Beverloo, Leniger, van de Velde 1961, *The flow of granular solids through orifices*, Chem. Eng. Sci. 15,
+Sources: Beverloo et al. 1961, *The flow of granular solids through orifices*, Chem. Eng. Sci. 15,
 260-269: W = C rho_b sqrt(g) (D - k d)^(5/2), C about 0.58, k about 1.4, rho_b the bulk density; Janssen 1895.
 """
 
