@@ -3060,8 +3060,8 @@ class GrainSimulation:
             gravity that of 9.81 m/s².
         max_iterations: Largest number of sweeps of the contact solver in a step.
         stabilisation: "projection" moves overlapping bodies apart, which may add energy by lifting
-            those above; "none" leaves them. By default "none" without restitution and "projection"
-            with it.
+            those above; "none" leaves them. By default "none", but "projection" with restitution
+            or in a vessel: a step along the inside of a curve leads into it.
         penetration_tolerance: Overlap that projection leaves alone, m; 0.5% of the smallest radius
             by default.
         sleep: Whether balls at rest far from anything that moves are left out of the step.
@@ -3386,10 +3386,10 @@ def ball_packing(
         radius_min: Smallest radius, m.
         radius_max: Largest radius, m.
         mass: Mass of a ball of the mean radius, kg; the others' go with their volume.
-        left: Smallest x, m.
         width: Width of the rectangle along x, m.
-        back: Smallest z, m.
         depth: Width of the rectangle along z, m.
+        left: Smallest x, m.
+        back: Smallest z, m.
         bottom: Height of the lower edge, m.
         seed: Seed of the random numbers; equal seeds give equal balls.
 

@@ -64,7 +64,7 @@ def collapse(data: dict[str, Any], path: Path) -> None:
         label = "Lube et al. 2004: 1.24 a, 1.6 a$^{1/2}$" if span[0] < 1.0 else None
         left.plot(span, [lube(a) for a in span], color=PAPER, label=label)
     runs = data["runs"]
-    left.plot([r["aspect"] for r in runs], [r["run_out"] for r in runs], "o", color=OURS, label="1000 balls")
+    left.plot([r["aspect"] for r in runs], [r["run_out"] for r in runs], "o", color=OURS, label="700 balls")
     left.set_xlabel("aspect ratio a = H$_0$/R$_0$")
     left.set_ylabel("run-out (R - R$_0$)/R$_0$")
     limit = data["limit"]

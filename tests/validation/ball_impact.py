@@ -1,6 +1,6 @@
 """Depth that a sphere falls into a bed of balls.
 
-Source: Uehara, Ambroso, Ojha, Durian 2003, *Low-speed impact craters in loose granular media*, Phys. Rev. Lett. 90,
+Source: Uehara et al. 2003, *Low-speed impact craters in loose granular media*, Phys. Rev. Lett. 90,
 194301: depth = 0.14/mu (rho_p/rho_g)^(1/2) D^(2/3) H^(1/3), mu the tangent of the angle of repose, H the whole drop
 from the release to the deepest point, rho_g the density of a grain's material times the packing fraction.
 """
@@ -15,7 +15,7 @@ from validation.balls import DENSITY, DIAMETER, Balls, box, free, loose, settle
 from validation.watch import GRAVITY, Ledger
 
 FRICTION = 0.5
-#: Tangent of the angle of repose of balls with this friction: 22 to 25 degrees (Zhou et al. 2002).
+#: Tangent of the angle of repose of balls with this friction: taken, not measured.
 REPOSE = float(np.tan(np.radians(23.5)))
 #: Packing fraction of a poured bed.
 FRACTION = 0.58

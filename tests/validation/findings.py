@@ -249,7 +249,7 @@ def ball_collapse(data: dict[str, Any]) -> Iterator[Finding]:
     yield Finding(what, "1 ± 20%", LUBE, limit["value"], 0.8, 1.2)
     tall = [run for run in data["runs"] if run["aspect"] > 1.7]
     ratio = float(np.mean([run["run_out"] / np.sqrt(run["aspect"]) for run in tall]))
-    yield Finding("balls: run-out / a^0.5, a ≥ 1.7, 1000 balls", "1.6 ± 25%", LUBE, ratio, 1.2, 2.0)
+    yield Finding("balls: run-out / a^0.5, a ≥ 1.7, 700 balls", "1.6 ± 25%", LUBE, ratio, 1.2, 2.0)
 
 
 def ball_silo(data: dict[str, Any]) -> Iterator[Finding]:

@@ -1,4 +1,5 @@
-//! `Contacts`, `PlanarContacts`, `SoilContacts`, `GrainContacts`: the contacts of the last step as arrays.
+//! `Contacts`, `PlanarContacts`, `SoilContacts`, `GrainContacts`: the contacts of the last step as
+//! arrays.
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;

@@ -394,10 +394,10 @@ impl GrainSimulation {
 ///     radius_min: Smallest radius, m.
 ///     radius_max: Largest radius, m.
 ///     mass: Mass of a ball of the mean radius, kg; the others' go with their volume.
-///     left: Smallest x, m.
 ///     width: Width of the rectangle along x, m.
-///     back: Smallest z, m.
 ///     depth: Width of the rectangle along z, m.
+///     left: Smallest x, m.
+///     back: Smallest z, m.
 ///     bottom: Height of the lower edge, m.
 ///     seed: Seed of the random numbers; equal seeds give equal balls.
 ///

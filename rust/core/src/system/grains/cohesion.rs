@@ -8,9 +8,6 @@
 //!
 //! The attraction is a load on both bodies, and the solver's impulse is p_N + h F, so no solver
 //! knows of it.
-//!
-//! Source: Radjai, Preechawuttipong, Peyroux 2001, *Cohesive granular texture*, in "Continuous and
-//! discontinuous modelling of cohesive-frictional materials".
 
 use super::error::GrainError;
 use crate::quantity::{QuantityError, finite};
