@@ -26,7 +26,7 @@ use crate::spatial::space::{body_velocities, dot};
 const PLACES: usize = 4;
 
 /// Rows below which a part of a sweep is not worth another thread.
-const FEW: usize = 1000;
+const FEW: usize = 400;
 
 /// Most sweeps that a contact rests.
 const LONGEST_REST: u8 = 7;
