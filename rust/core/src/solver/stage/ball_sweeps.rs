@@ -13,6 +13,8 @@
 //!
 //! Threads are those of the pool that the caller runs in; outside a pool there is one.
 
+#![allow(clippy::inline_always)] // a visit is one piece of code
+
 use super::accelerated::{Measured, Relaxation};
 use super::ball_rows::{Ball, BallRow, MachineRow, mass_of, to_frame};
 use super::body_sweeps::draw_in;
