@@ -424,12 +424,15 @@ fn bed(count: usize) -> Heap<3> {
 }
 
 /// Balls that fall in a box, long enough for several slabs and several threads.
-fn falling(steps: usize) -> Heap<3> {
+fn falling() -> Heap<3> {
     let mut heap = bed(1000);
     heap.options.time_step = 2e-3;
     heap.options.solver.tolerance = 1e-3;
     heap.options.solver.velocity_tolerance = 1e-2;
-    heap.step(steps);
+    while heap.parts.pairs().round.len() < 1200 && heap.steps < 300 {
+        heap.step(1);
+    }
+    heap.step(5);
     heap
 }
 
@@ -439,19 +442,19 @@ fn any_number_of_threads_gives_balls_the_same_bits() {
         let numbers = heap.q.iter().chain(&heap.v);
         numbers.map(|x| x.to_bits()).collect()
     };
-    let alone = falling(60);
+    let alone = falling();
     assert!(alone.parts.pairs().slabs.iter().any(|slab| *slab >= 2));
-    assert!(alone.parts.pairs().round.len() > 2000);
+    assert!(alone.parts.pairs().round.len() > 1000);
     for threads in [1, 2, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-        let together = pool.build().expect("threads").install(|| falling(60));
+        let together = pool.build().expect("threads").install(|| falling());
         assert!(bits(&together) == bits(&alone), "{threads} threads");
     }
 }
 
 #[test]
 fn contacts_that_rest_between_sweeps_obey_the_law_within_the_tolerance() {
-    let mut heap = falling(60);
+    let mut heap = falling();
     for _ in 0..20 {
         let before = heap.energy();
         let report = heap.step(1);
@@ -464,8 +467,7 @@ fn contacts_that_rest_between_sweeps_obey_the_law_within_the_tolerance() {
         // The operator block by block and the pairs are two ways to the same velocities.
         let q = vec![0.0; p.len()];
         let mu = vec![0.5; p.len() / 3];
-        let problem =
-            FrictionContactProblem::from_assembled_sparse(heap.parts.operator(), &q, &mu);
+        let problem = FrictionContactProblem::from_assembled_sparse(heap.parts.operator(), &q, &mu);
         let mut u = vec![0.0; p.len()];
         problem.operator().multiply_add(p, &q, &mut u);
         let largest = u.iter().fold(0.0_f64, |most, u| most.max(u.abs()));

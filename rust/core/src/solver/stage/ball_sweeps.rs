@@ -13,6 +13,8 @@
 //!
 //! Threads are those of the pool that the caller runs in; outside a pool there is one.
 
+#![allow(clippy::inline_always)] // a visit is one piece of code
+
 use super::accelerated::{Measured, Relaxation};
 use super::ball_rows::{Ball, BallRow, MachineRow, mass_of, to_frame};
 use super::body_sweeps::draw_in;
@@ -26,7 +28,7 @@ use crate::spatial::space::{body_velocities, dot};
 const PLACES: usize = 4;
 
 /// Rows below which a part of a sweep is not worth another thread.
-const FEW: usize = 1000;
+const FEW: usize = 400;
 
 /// Most sweeps that a contact rests.
 const LONGEST_REST: u8 = 7;

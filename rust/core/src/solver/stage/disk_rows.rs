@@ -42,6 +42,7 @@ impl Row {
         mu: f64,
         p: &[f64; 2],
     ) -> Self {
+        #[allow(clippy::cast_possible_truncation)] // 3
         const V: u32 = body_velocities(2) as u32;
         let place = |k: usize| {
             let moves = pair.linear[k] > 0.0;
